@@ -295,10 +295,9 @@ def run(
     from femgear.storage.files import resumable
     from femgear.storage.results import completed_since_now, run_folder
     from femgear.trains.reading import open_results, read_case
-    from femgear.trains.registry import check_case, train_of, trains
+    from femgear.trains.registry import check_case, stage_names, train_of
 
-    if only is not None and not any(known.train.stage(only) for known in trains()):
-        known = dict.fromkeys(one.name for known in trains() for one in known.train.stages)
+    if only is not None and only not in (known := stage_names()):
         raise CaseError(
             "no train has this stage", code="E-ARGUMENTS", key="--only", value=only, limit=", ".join(known),
             remedy="femgear run --help",

@@ -54,6 +54,7 @@ CATALOGUE = {
     "W-OPEN": (NOTE, "A planet carries nothing at some positions."),
     "W-PARTED": (NOTE, "Teeth never touch."),
     "W-PLANETS": (NOTE, "Planets are not equally spaced, or their number is unusual."),
+    "W-PLUGIN": (NOTE, "A package has a train of a name that is taken."),
     "W-POINTS": (DOUBT, "Points on the ring do not resolve its waves."),
     "W-POSITIONS": (DOUBT, "Peaks between positions may be higher."),
     "W-PRESSURE": (FAULT, "The contact pressure exceeds what any steel carries."),

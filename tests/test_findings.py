@@ -363,9 +363,30 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-WIDTHS": lambda: of_case(PLANETARY, {"sun.face_width": "35 mm"}),
     "W-WEDGING": lambda: of_case(PLANETARY, {"set.pin_errors": [{"planet": 1, "tangential": "20 um"}]}),
 }
+
+
+def plugin(folder: Path) -> list[Finding]:
+    """A package whose train has the name of one of femgear's."""
+    from unittest import mock
+
+    from femgear.trains import registry
+
+    taken = registry.Installed("pair", "model", "swinging:FILE", "swinging:TRAIN", "swings")
+    registry._tell_taken.cache_clear()
+    with (
+        mock.patch.object(registry, "_installed", lambda: (taken,)),
+        warnings.catch_warnings(record=True) as w,
+    ):
+        warnings.simplefilter("always")
+        registry.trains()
+    registry._tell_taken.cache_clear()
+    return [one.message.args[0] for one in w]
+
+
 OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
     "W-CLIPPING": exported("wav", acceleration_scale=1e-6),
     "W-JOURNAL": damaged_journal,
+    "W-PLUGIN": plugin,
     "W-REXS": rexs,
     "W-ROWS": exported("xlsx", rows=3),
     "W-SWEEP": long_sweep,

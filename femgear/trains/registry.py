@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from pkgutil import resolve_name
@@ -10,6 +11,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 from femgear.case.text import CaseFile, described
 from femgear.errors import CaseError, FemgearError
+from femgear.findings import Finding, tell
 
 if TYPE_CHECKING:
     from femgear.trains.protocol import Stage, Train
@@ -76,21 +78,31 @@ class Installed(Known):
 def trains() -> tuple[Known, ...]:
     """List the trains of femgear and those of other installed packages, none of which is loaded for it.
 
-    Raises
-    ------
-    FemgearError
-        E-DUPLICATE: two have the same name.
+    Of two of one name the first is kept, femgear's own before all others; the other one is told (W-PLUGIN).
     """
-    known = *TRAINS, *_installed()
-    for one in known:
-        same = next(other for other in known if other.name == one.name)
-        if isinstance(one, Installed) and same is not one:
-            raise FemgearError(
-                f"the package {one.package} has a train {one.name}, "
-                f"and so has {getattr(same, 'package', 'femgear')}",
-                code="E-DUPLICATE", remedy=f"remove {one.package}, or rename its train",
-            )  # fmt: skip
-    return known
+    known = {one.name: one for one in TRAINS}
+    for one in _installed():
+        first = known.setdefault(one.name, one)
+        if first is not one:
+            _tell_taken(one, getattr(first, "package", "femgear"))
+    return tuple(known.values())
+
+
+@cache
+def _tell_taken(one: Installed, first: str) -> None:
+    """Tell once that a package has a train of a name that is taken."""
+    text = f"the package {one.package} has a train {one.name}, and so has {first}, whose is taken"
+    remedy = f"remove {one.package}, or rename its train"
+    tell(Finding("W-PLUGIN", "", text, remedy=remedy), stacklevel=3)
+
+
+def stage_names() -> list[str]:
+    """List the names of the stages of all trains, but of those that cannot be loaded."""
+    names = dict[str, None]()
+    for one in trains():
+        with suppress(FemgearError):
+            names |= dict.fromkeys(stage.name for stage in one.train.stages)
+    return list(names)
 
 
 @cache

@@ -1,12 +1,12 @@
 """Trains of other packages: entry points of the group femgear.trains."""
 
+import re
 import subprocess
 import sys
 
 import pytest
 
 from femgear import cli, read_case
-from femgear.errors import FemgearError
 from femgear.trains import registry
 
 TEXT = """model = "oscillator"
@@ -34,6 +34,7 @@ def install(tmp_path, monkeypatch):
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n", "utf-8")
         (info / "entry_points.txt").write_text(f"[femgear.trains]\n{name} = swinging\n", "utf-8")
         registry._installed.cache_clear()
+        registry._tell_taken.cache_clear()
         return tmp_path / "case.toml"
 
     yield installed
@@ -75,14 +76,23 @@ def test_what_cannot_be_loaded_names_its_package(install, capsys, text, reason):
     assert reason in said and "update swings or remove it" in said
 
 
-def test_names_are_given_once(install, capsys):
-    path = install(MODULE, "pair")
-    assert cli.main(["check", str(path)]) == 3
-    assert "the package swings has a train pair, and so has femgear" in capsys.readouterr().err
+def test_of_two_of_a_name_the_first_is_taken_and_the_other_told(install, capsys):
+    install(MODULE, "pair")
+    assert cli.main(["check", "cases/spur_pair.toml"]) == 0
+    said = capsys.readouterr().err
+    assert "[W-PLUGIN] the package swings has a train pair, and so has femgear" in said
+    assert said.count("W-PLUGIN") == 1
     install(MODULE, "oscillator", "pendulums")
-    install(MODULE, "oscillator", "springs")
-    with pytest.raises(FemgearError, match=r"train oscillator, and so has (springs|pendulums)"):
-        registry.trains()
+    path = install(MODULE, "oscillator", "springs")
+    assert cli.main(["check", str(path)]) == 0
+    assert re.search(r"train oscillator, and so has (springs|pendulums)", capsys.readouterr().err)
+
+
+def test_a_package_that_ends_the_program_stops_no_other_train(install, tmp_path, capsys):
+    install("import sys; sys.exit(7)")
+    assert cli.main(["check", "cases/spur_pair.toml"]) == 0
+    assert cli.main(["run", "cases/spur_pair.toml", "-o", str(tmp_path / "out"), "--only", "nowhere"]) == 2
+    assert "E-ARGUMENTS" in capsys.readouterr().err
 
 
 def test_the_help_looks_for_none():
