@@ -158,7 +158,7 @@ def solve_slices(
             newton.across = newton.across + coupling / newton.unit
             bodies = [(one, change + coupling) for one, change in bodies]
         # a sector settles as its whole set does
-        solved = newton.solve(found.setup.images * np.abs(load).max())
+        solved = newton.solve(found.setup.images)
         after = newton.tangents(bodies)
         after = [b - a for a, b in zip(before, after, strict=True)] if before else after
         # positions come first
@@ -246,15 +246,16 @@ class _SliceNewton:
         gap = gap - (self.motions[:, :shared] @ self.laws.approach.T)[:, None]
         return gap - np.einsum("nwk,pk->pnw", self.tilts, self.motions[:, shared:]), slope
 
-    def solve(self, load: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def solve(self, images: int = 1) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Iterate until all positions are solved: forces, motions, steps and residuals.
 
-        ``load`` is the largest one on the whole set [N]; what changes by little against it is settled.
+        What changes by little against the load of the whole set, of so many ``images``, is settled.
 
         Slices that pull open and slices that overlap close, all at once; after `_BOLD` steps the last one
         alone (K. G. Murty, Linear Algebra Appl. 7, 1974), which ends for every linear problem.
         """
         P, steps = len(self.rows), np.zeros(len(self.rows), int)
+        load = images * np.abs(self.load).max()
         # separations that are large against the load leave their rounding in it
         limit = max(_SETTLED * load, _ROUNDED * self.widest / self.unit)
         todo = np.ones(P, bool)
