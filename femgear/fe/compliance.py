@@ -18,13 +18,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.sparse import block_array, csc_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import SuperLU, splu
 
 from femgear.errors import GridError
-from femgear.fe.grid import Grid, shape_functions
+from femgear.fe.grid import Grid, boundary_edges, shape_functions
+
+_EDGE_POINTS = np.polynomial.legendre.leggauss(6)
+"""Places and weights of the integration along the edge of an element."""
 
 
 @dataclass(frozen=True)
@@ -520,3 +524,80 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
         for sector, (interior, own), cut in zip(sectors, solved, on_cut, strict=True)
     )
     return np.fft.irfft(field, n=count, axis=1).T.reshape(count, -1, 2)
+
+
+def rim_compliance(grid: Grid, stiffness, *, count: int, orders) -> np.ndarray:
+    """Compute the static compliance of the rim for waves of radial and tangential traction around it.
+
+    Each moves neighbouring sectors with one phase: a small problem of its own.
+
+    Parameters
+    ----------
+    grid : Grid
+        Sector about the x axis with boundaries ``cut_left``, ``cut_right`` and ``rim``.
+    stiffness : (2n, 2n) sparse matrix
+        [N/m]; a foundation, if any, is part of it.
+    count : int
+        Number of sectors.
+    orders : (m,) int array
+        Circumferential orders nu.
+
+    Returns
+    -------
+    (m, 2, 2) complex array
+        ``C`` of the mean ``u_i = sum_nu C_ij exp(i nu (phi - phi_0))`` at the angle phi under a unit force
+        at phi_0, i and j radial, then tangential [m/N].
+    """
+    cuts = [_by_radius(grid, boundary_nodes(grid, f"cut_{side}")) for side in ("right", "left")]
+    inside = np.setdiff1d(boundary_nodes(grid, "rim"), np.concatenate(cuts))
+    kept = np.concatenate([node_dofs(cuts[0]), node_dofs(cuts[1]), node_dofs(inside)])
+    turn, size = np.pi / count, 2 * len(cuts[0])
+    right = np.kron(np.eye(len(cuts[0])), [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    polar = block_array(
+        [[right, None, None], [None, right.T, None], [None, None, eye_array(2 * len(inside))]]
+    )
+    polar = polar.toarray()
+    schur, found = polar.T @ _condensed(stiffness, kept) @ polar, np.empty((len(orders), 2, 2), complex)
+    rest = np.r_[:size, 2 * size : len(kept)]
+    for i, order in enumerate(orders):
+        lag = np.exp(2j * turn * order)
+        # the left cut moves as the right one of the next sector
+        load, both = polar.T @ _wave(grid, order)[kept], schur[:, rest].astype(complex)
+        both[:, :size] += lag * schur[:, size : 2 * size]
+        load[:size] += lag.conjugate() * load[size : 2 * size]
+        both[:size] += lag.conjugate() * both[size : 2 * size]
+        found[i] = load[rest].conj().T @ np.linalg.solve(both[rest], load[rest])
+    return found * count / (4.0 * np.pi**2)
+
+
+def _by_radius(grid: Grid, nodes: np.ndarray) -> np.ndarray:
+    return nodes[np.argsort(np.hypot(*grid.points[nodes].T))]
+
+
+def _condensed(stiffness, kept: np.ndarray) -> np.ndarray:
+    """Schur complement of a sparse stiffness on some degrees of freedom."""
+    matrix: Any = csc_array(stiffness)
+    inner = np.setdiff1d(np.arange(matrix.shape[0]), kept)
+    across = matrix[inner][:, kept].toarray()
+    return matrix[kept][:, kept].toarray() - across.T @ symmetric_factor(matrix[inner][:, inner]).solve(
+        across
+    )
+
+
+def _wave(grid: Grid, order: int) -> np.ndarray:
+    """Nodal forces (2n, 2) of radial and tangential waves of one newton a radian on the rim of a sector."""
+    edges, (place, weight) = boundary_edges(grid, "rim"), _EDGE_POINTS
+    shape = np.stack([0.5 * place * (place - 1.0), 0.5 * place * (place + 1.0), 1.0 - place**2])
+    slope = np.stack([place - 0.5, place + 0.5, -2.0 * place])
+    points = grid.points[edges]
+    x, y = np.moveaxis(np.einsum("aq,eac->eqc", shape, points), -1, 0)
+    dx, dy = np.moveaxis(np.einsum("aq,eac->eqc", slope, points), -1, 0)
+    angle, turned = np.arctan2(y, x), np.abs(x * dy - y * dx) / (x**2 + y**2)
+    wave = np.exp(1j * order * angle) * turned * weight
+    out = np.stack([np.cos(angle), np.sin(angle)]), np.stack([-np.sin(angle), np.cos(angle)])
+    found = np.zeros((2 * grid.n_nodes, 2), complex)
+    for column, direction in enumerate(out):
+        for axis in range(2):
+            forces = np.einsum("aq,eq->ea", shape, wave * direction[axis])
+            np.add.at(found[:, column], 2 * edges + axis, forces)
+    return found

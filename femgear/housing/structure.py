@@ -323,16 +323,103 @@ def ring_waves(order) -> np.ndarray:
     return waves
 
 
+@dataclass(frozen=True)
+class _Places:
+    """Angles, widths and directions from outwards (p,) of places of the outer surface [rad]."""
+
+    angle: np.ndarray
+    width: np.ndarray
+    direction: np.ndarray
+
+
+def _patches(supports: Sequence[Support], top: int) -> tuple[_Places, np.ndarray, np.ndarray]:
+    """Cut supports into patches that waves of an order resolve; their stiffness [N/m] and mass [kg] (p,)."""
+    rows = list[tuple[float, ...]]()
+    for one in supports:
+        count = max(int(np.ceil(2 * top * one.width)), 1)
+        width = one.width / count
+        for i in range(count):
+            angle = one.angle + (i - 0.5 * (count - 1)) * width
+            for turned, stiffness in ((0.0, one.radial_stiffness), (0.5 * np.pi, one.tangential_stiffness)):
+                rows.append((angle, width, turned, stiffness / count, one.mass / count))
+    angle, width, direction, stiffness, mass = np.array(rows).reshape(-1, 5).T
+    return _Places(angle, width, direction), stiffness, mass
+
+
+def _beyond_modes(rim: np.ndarray, radial, tangential, omega: np.ndarray) -> np.ndarray:
+    """Compliance (m, 2, 2) of the outer surface that modes of frequencies omega [rad/s] leave out [m/N].
+
+    Radial and tangential displacement (n_coordinates, 2 top + 1) of the coordinates. Free motions have none.
+    """
+    top, fields = radial.shape[1] // 2, np.stack([radial, tangential])[:, omega > 0.0]
+    known = np.einsum("icn,jcn,c->nij", fields, fields.conj(), 1.0 / omega[omega > 0.0] ** 2)[top:]
+    rest = np.array(rim)
+    rest[: top + 1] -= known[: len(rest)]
+    values, ways = np.linalg.eigh(rest)
+    # differences of rounding are no negative compliance
+    return (ways * np.maximum(values, 0.0)[:, None]) @ ways.conj().swapaxes(1, 2)
+
+
+def _compliance(rest: np.ndarray | None, loads: _Places, seen: _Places) -> np.ndarray:
+    """Compliance (n_loads, n_seen) of the outer surface beyond its modes between places [m/N]."""
+    found = np.zeros((len(loads.angle), len(seen.angle)))
+    if rest is None:
+        return found
+    order = np.arange(len(rest))
+    weight = np.where(order == 0, 1.0, 2.0)
+    acting, watched = (
+        np.exp(1j * np.outer(one.angle, order)) * np.sinc(np.outer(one.width, order) / (2 * np.pi))
+        for one in (loads, seen)
+    )
+    for i, to in enumerate((np.cos(seen.direction), np.sin(seen.direction))):
+        for j, of in enumerate((np.cos(loads.direction), np.sin(loads.direction))):
+            waves = (acting.conj() * (weight * rest[:, i, j])) @ watched.T
+            found += of[:, None] * np.real(waves) * to
+    return found * (loads.width > 0.0)[:, None]
+
+
+def _held(
+    omega: np.ndarray, supports: Sequence[Support], at: np.ndarray, between: np.ndarray, springs, fields
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Stiffness and mass of the coordinates of a ring on supports, and what its patches do to them.
+
+    By the displacement ``at`` (n_coordinates, p) of the patches, the compliance (p, p) between them beyond
+    the modes, their stiffness and mass (p,), and radial and tangential fields of the coordinates.
+    """
+    (stiffness, mass), n = springs, np.arange(fields[0].shape[1]) - fields[0].shape[1] // 2
+    root = np.sqrt(stiffness)
+    # springs in series with what the surface yields beneath them beyond the modes
+    series = root[:, None] * np.linalg.solve(
+        np.eye(len(root)) + root[:, None] * between * root, np.diag(root)
+    )
+    carried = at @ series
+    rode = at - carried @ between
+    K, M = np.diag(omega**2) + (carried - at * stiffness) @ at.T, np.eye(len(omega))
+    M = M + (rode * mass) @ rode.T - (at * mass) @ at.T
+    for one in supports:
+        apart = n[:, None] - n
+        mean = np.exp(1j * apart * one.angle) * np.sinc(apart * one.width / (2 * np.pi))
+        for spring, felt in zip((one.radial_stiffness, one.tangential_stiffness), fields):
+            both = np.real(felt @ mean @ felt.conj().T)
+            K, M = K + spring * both, M + one.mass * both
+    return K, M, carried
+
+
 def supported_ring(
     ring: CyclicModes, supports: Sequence[Support], *, max_diameter: int, max_frequency: float,
     damping_ratio: float, sensor_angles: Any = (0.0,), sensor_directions: Any = 0.0, sensor_widths: Any = 0.0,
+    rim: np.ndarray | None = None,
 ) -> FixedStructure:  # fmt: skip
     """Make a structure of a ring on supports: a Ritz approximation in the cyclic modes of the ring.
 
     Mass-normalised coordinates of the ring have the stiffness ``diag(omega^2) + sum k V G V^H`` and the mass
     ``1 + sum m V G V^H`` with V of `circumferential` at the outer surface, and for a support of the width b
     at the angle phi_s ``G[n, n'] = exp(i (n - n') phi_s) sin((n - n') b/2)/((n - n') b/2)``, the mean over
-    it. Supports couple nodal diameters (X. Wu and R. G. Parker, J. Sound Vib. 295, 2006, 194-213).
+    it. Springs stand in series with the surface: less ``B (k - (1/k + D)^-1) B^T``, B the displacement of the
+    coordinates at patches into which supports are cut along the circumference. D is what the surface yields
+    under these beyond the modes: residual attachment, one static shape a patch (R. R. Craig and A. J. Kurdila,
+    Fundamentals of Structural Dynamics, 2006, chapter 17), whose inertia is left out. Supports couple nodal
+    diameters (X. Wu and R. G. Parker, J. Sound Vib. 295, 2006, 194-213).
 
     CaseError: as `FixedStructure`: supports that do not hold the ring (E-MECHANISM).
 
@@ -354,19 +441,27 @@ def supported_ring(
     sensor_directions, sensor_widths : float or (n_sensors,) array
         Directions from outwards, counter-clockwise, and angles over which sensors take the mean [rad]. The
         mean over a support times its stiffness is its force on the ground.
+    rim : (m, 2, 2) complex array, optional
+        Static compliance of the outer surface for waves of the orders 0 .. m - 1, all of it, see
+        `femgear.fe.compliance.rim_compliance` [m/N]. Supports of no width yield nothing of their own: that of
+        a point has no limit.
     """
     top = max(int(ring.nodal_diameter.max()), max_diameter)
     path, radial, tangential = (
         circumferential(ring, one, top) for one in (ring.load[:, 0], ring.output[:, 0], ring.output[:, 1])
     )
-    omega = 2 * np.pi * ring.frequency[_coordinates(ring)[0]]
-    K, M, n = np.diag(omega**2), np.eye(len(omega)), np.arange(-top, top + 1)
-    for one in supports:
-        apart = n[:, None] - n
-        mean = np.exp(1j * apart * one.angle) * np.sinc(apart * one.width / (2 * np.pi))
-        for stiffness, felt in ((one.radial_stiffness, radial), (one.tangential_stiffness, tangential)):
-            both = np.real(felt @ mean @ felt.conj().T)
-            K, M = K + stiffness * both, M + one.mass * both
+    omega, n = 2 * np.pi * ring.frequency[_coordinates(ring)[0]], np.arange(-top, top + 1)
+
+    def moved(places: _Places) -> np.ndarray:
+        """Displacement (n_coordinates, p) of the coordinates at places of the outer surface."""
+        waves = np.exp(1j * np.outer(n, places.angle)) * np.sinc(np.outer(n, places.width) / (2 * np.pi))
+        across, along = np.cos(places.direction), np.sin(places.direction)
+        return np.real(across * (radial @ waves) + along * (tangential @ waves))
+
+    rest = None if rim is None else _beyond_modes(rim, radial, tangential, omega)
+    patches, *springs = _patches(supports, top)
+    between = _compliance(rest, patches, patches)
+    K, M, carried = _held(omega, supports, moved(patches), between, springs, (radial, tangential))
     square, shape = eigh(K, M)
     square = np.where(square < _FREE * square[-1], 0.0, square)
     if not square[0] > 0:
@@ -374,11 +469,10 @@ def supported_ring(
         remedy = "hold x, y and rotation by supports, or give the ring a foundation"
         raise CaseError(message, code="E-MECHANISM", key="housing.support", remedy=remedy)
     middle = slice(top - max_diameter, top + max_diameter + 1)
-    waves = np.exp(1j * np.outer(n, sensor_angles)) * np.sinc(np.outer(n, sensor_widths) / (2 * np.pi))
-    felt = (turned * (field @ waves) for turned, field in (
-        (np.cos(sensor_directions), radial), (np.sin(sensor_directions), tangential)
-    ))  # fmt: skip
-    heard = np.real(sum(felt))
+    sensors = _Places(*np.broadcast_arrays(*(np.atleast_1d(one).astype(float) for one in (
+        sensor_angles, sensor_widths, sensor_directions
+    ))))  # fmt: skip
+    heard = moved(sensors) - carried @ _compliance(rest, patches, sensors)
     waves, sensors = shape.T @ path[:, middle], shape.T @ heard
     mode, sine = _coordinates(ring)
     order, n_waves = np.where(sine, -1, 1) * ring.nodal_diameter[mode], waves.shape[1]

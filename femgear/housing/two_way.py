@@ -262,11 +262,11 @@ class _Problem:
         shapes, load = (blocks.on_gears.shape, blocks.on_structure.shape), blocks.load()
         forces = [np.zeros(shape, complex) for shape in shapes]
         moved = [np.zeros_like(load), np.zeros_like(load[: len(self.place)])]
-        start, first, products, change, passes = None, None, 0, 1.0, list[_Pass]()
+        start, products, radius, change, passes = None, 0, 0.0, 1.0, list[_Pass]()
         for _ in range(_PASSES):
             accuracy = max(0.5 * tolerance, min(1e-3 * change, 1e-4))
             found = self._solved(blocks, load + moved[0], moved[1], start, accuracy)
-            first, start, products = first or found, found.extra, products + found.products
+            start, products, radius = found.extra, products + found.products, max(radius, found.radius)
             answer = damping.forces(blocks.speed, *blocks.modal(found.extra, found.way, found.force, *forces))
             made = blocks.moved(*answer)
             apart = self.gears.mean[:, None, None] * _over_ring(made[0] - moved[0], made[1] - moved[1])
@@ -277,8 +277,7 @@ class _Problem:
             share = _shares([one.change for one in passes])
             forces = _blend(share, [one.forces for one in passes])
             moved = _blend(share, [one.moved for one in passes])
-        assert first is not None
-        return _Answer(found.force, forces[1], max(found.residual, change), first.radius, products)
+        return _Answer(found.force, forces[1], max(found.residual, change), radius, products)
 
     def tail(self, force: np.ndarray) -> float:
         """Share (root of energies) of the fluctuating ring forces that is at the outer side bands."""

@@ -102,7 +102,7 @@ def _without(name):
         (lambda a: a | {"ring_shape": a["ring_shape"][:, :39]}, "E-SHAPE"),
         (lambda a: a | {"natural_frequency": -a["natural_frequency"]}, "E-MECHANISM"),
         (lambda a: a | {"natural_frequency": a["natural_frequency"][:-1]}, "E-SHAPE"),
-        (lambda a: a | {"sensor_shape": a["sensor_shape"] * np.nan}, "E-SHAPE"),
+        (lambda a: a | {"sensor_shape": a["sensor_shape"] * np.nan}, "E-FINITE"),
         (lambda a: a | {"damping_ratio": 1.2}, "E-DAMPING"),
     ],
 )

@@ -99,6 +99,30 @@ def splitting() -> tuple[Row, ...]:
     return tuple(rows)
 
 
+# CalculiX: plane ring of the reference set on its foundation, springs and masses spread over the feet
+_FEET = {
+    (4e8, 0.05): (2861.2, 3526.4, 3678.4, 4137.0, 4188.4, 4707.6, 6225.9),
+    (4e9, 0.0): (4751.1, 4848.4, 5556.7, 5805.2, 6758.2, 7757.8, 9931.1),
+}
+
+
+def yielding() -> tuple[Row, ...]:
+    """The ring of the reference set on four feet of 20 mm, which press into its rim."""
+    case, rows = with_values(reference_case(), {"housing.published": []}), list[Row]()
+    ring = elastic.solve_modes(case, solve_static(case)).ring
+    for (stiffness, mass), frequencies in _FEET.items():
+        width = 0.02 / case.ring.outer_radius
+        held = [Support(np.radians(a), stiffness, stiffness, mass, width) for a in (35, 145, 215, 325)]
+        found = supported_ring(
+            ring.modes, held, max_diameter=26, max_frequency=np.inf, damping_ratio=0.0,
+            rim=ring.rim_compliance,
+        ).natural_frequency / (2 * np.pi)  # fmt: skip
+        for i, reference in enumerate(frequencies):
+            words = f"four feet of {stiffness:.0e} N/m, {1e3 * mass:g} g: natural frequency {i + 1}, Hz"
+            rows.append(within("feet", "CalculiX", words, reference, found[i], 0.002))
+    return tuple(rows)
+
+
 def gears(angles) -> MechanicalSystem:
     """Sun (x, y, rotation as a length) in springs and planets that roll on fixed pins."""
     N = len(angles)

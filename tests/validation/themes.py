@@ -429,6 +429,7 @@ THEMES = (
         "share no equation with the solution.",
         (
             fixed_housing.splitting,
+            fixed_housing.yielding,
             fixed_housing.order_rules,
             fixed_housing.array_factors,
             fixed_housing.turning_errors,

@@ -6,7 +6,7 @@ beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -98,18 +98,15 @@ class HousingModel:
     def __init__(self, case: Case, modes: ModesResult, sense: float):
         self.case, self.modes, self.sense = case, modes, int(np.sign(sense))
         self.highest, n_max = MODES_ABOVE * modes.reach, fixed_diameters(case)
-        self.missing, known = (
-            "",
-            {"max_frequency": self.highest, "damping_ratio": case.dynamics.damping_ratio},
-        )
-        self.ring = supported_ring(modes.ring.modes, (), max_diameter=modes.max_diameter, **known)
+        self.missing, ratio, top = "", case.dynamics.damping_ratio, modes.max_diameter
+        known: Any = {"max_frequency": self.highest, "damping_ratio": ratio, "max_diameter": top}
+        self.ring = supported_ring(modes.ring.modes, (), **known)
         if case.housing.structure:
             low = {name: getattr(modes.ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
             told = _casing(case, low["compliance"], self.highest)
             self.structure, self.sensors, self.forces, self.missing = told
             self.springs = mesh_springs(planetary_set(case), replace(modes.ring, **low), modes.state)
         else:
-            known["max_diameter"] = modes.max_diameter
             self.structure, self.sensors, self.forces = _ring_on_supports(case, modes, known)
             self.springs = modes.excitation, modes.model.system.flexibility
 
@@ -221,7 +218,7 @@ def _casing(
 
 
 def _ring_on_supports(
-    case: Case, modes: ModesResult, known: Mapping[str, Any]
+    case: Case, modes: ModesResult, known: Any
 ) -> tuple[FixedStructure, tuple[str, ...], tuple[str, ...]]:
     """Structure of a ring on supports with sensors all around, those of the case, and forces on the ground.
 
@@ -236,7 +233,7 @@ def _ring_on_supports(
     angle, turned, width, factor = np.array(places).T
     structure = supported_ring(
         modes.ring.modes, supports, **known, sensor_angles=angle, sensor_directions=turned,
-        sensor_widths=width,
+        sensor_widths=width, rim=modes.ring.rim_compliance,
     )  # fmt: skip
     ways = [f"support {i} {way}" for i in range(1, len(supports) + 1) for way in ("radial", "tangential")]
     return structure.combined(np.diag(factor)), tuple(one.name for one in case.housing.sensor), tuple(ways)

@@ -12,13 +12,14 @@ tooth; what the passing teeth add is part of the mesh stiffness, not of the ring
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.contact.bodies import active_flank_load, active_flank_weights, flank_stations
 from femgear.errors import ContactError
-from femgear.fe.compliance import cyclic_harmonics, static_cut_shapes
+from femgear.fe.compliance import cyclic_harmonics, rim_compliance, static_cut_shapes
 from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis, smooth_cut_shapes
 from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import mesh_normals, torques
@@ -357,12 +358,23 @@ class RingModel:
         Static compliance of each nodal diameter at the load, on the foundation [m/N].
     held_compliance : (n_max + 1,) array
         The same with the outer surface held [m/N].
+    sector : (Grid, sparse matrix), optional
+        Grid of one sector, and its stiffness on the foundation [N/m].
     """
 
     modes: CyclicModes
     load_angle: float
     compliance: np.ndarray
     held_compliance: np.ndarray
+    sector: tuple[Grid, Any] | None = None
+
+    @cached_property
+    def rim_compliance(self) -> np.ndarray | None:
+        """Static compliance (m, 2, 2) of the outer surface, see `rim_compliance`."""
+        if self.sector is None:
+            return None
+        orders = np.arange(2 * self.modes.count + 1)
+        return rim_compliance(*self.sector, count=self.modes.count, orders=orders)
 
 
 def ring_model(
@@ -421,6 +433,7 @@ def ring_model(
         load_angle=-side * float(half_thickness_angle(ring, pitch_radius)),
         compliance=compliance[0],
         held_compliance=compliance[1],
+        sector=(grid, sector.stiffness + foundation),
     )
 
 
