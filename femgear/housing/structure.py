@@ -384,7 +384,10 @@ def _held(
     """Stiffness and mass of the coordinates of a ring on supports, and what its patches do to them.
 
     By the displacement ``at`` (n_coordinates, p) of the patches, the compliance (p, p) between them beyond
-    the modes, their stiffness and mass (p,), and radial and tangential fields of the coordinates.
+    the modes, their stiffness and mass (p,), and radial and tangential fields of the coordinates. The springs
+    are less by ``B (k - (1/k + D)^-1) B^T``, B and D these displacements and that compliance: residual
+    attachment, one static shape a patch, whose inertia is left out (R. R. Craig and A. J. Kurdila,
+    Fundamentals of Structural Dynamics, 2006, chapter 17).
     """
     (stiffness, mass), n = springs, np.arange(fields[0].shape[1]) - fields[0].shape[1] // 2
     root = np.sqrt(stiffness)
@@ -405,6 +408,17 @@ def _held(
     return K, M, carried
 
 
+def _modes_of(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Squares of the natural frequencies [rad^2/s^2] and mode shapes; refuses free motions (E-MECHANISM)."""
+    square, shape = eigh(K, M)
+    square = np.where(square < _FREE * square[-1], 0.0, square)
+    if not square[0] > 0:
+        message = f"the supports leave {int((square == 0).sum())} motions of the ring free"
+        remedy = "hold x, y and rotation by supports, or give the ring a foundation"
+        raise CaseError(message, code="E-MECHANISM", key="housing.support", remedy=remedy)
+    return square, shape
+
+
 def supported_ring(
     ring: CyclicModes, supports: Sequence[Support], *, max_diameter: int, max_frequency: float,
     damping_ratio: float, sensor_angles: Any = (0.0,), sensor_directions: Any = 0.0, sensor_widths: Any = 0.0,
@@ -415,11 +429,8 @@ def supported_ring(
     Mass-normalised coordinates of the ring have the stiffness ``diag(omega^2) + sum k V G V^H`` and the mass
     ``1 + sum m V G V^H`` with V of `circumferential` at the outer surface, and for a support of the width b
     at the angle phi_s ``G[n, n'] = exp(i (n - n') phi_s) sin((n - n') b/2)/((n - n') b/2)``, the mean over
-    it. Springs stand in series with the surface: less ``B (k - (1/k + D)^-1) B^T``, B the displacement of the
-    coordinates at patches into which supports are cut along the circumference. D is what the surface yields
-    under these beyond the modes: residual attachment, one static shape a patch (R. R. Craig and A. J. Kurdila,
-    Fundamentals of Structural Dynamics, 2006, chapter 17), whose inertia is left out. Supports couple nodal
-    diameters (X. Wu and R. G. Parker, J. Sound Vib. 295, 2006, 194-213).
+    it. What the surface yields under supports beyond the modes stands in series, see `_held`. Supports couple
+    nodal diameters (X. Wu and R. G. Parker, J. Sound Vib. 295, 2006, 194-213).
 
     CaseError: as `FixedStructure`: supports that do not hold the ring (E-MECHANISM).
 
@@ -462,12 +473,7 @@ def supported_ring(
     patches, *springs = _patches(supports, top)
     between = _compliance(rest, patches, patches)
     K, M, carried = _held(omega, supports, moved(patches), between, springs, (radial, tangential))
-    square, shape = eigh(K, M)
-    square = np.where(square < _FREE * square[-1], 0.0, square)
-    if not square[0] > 0:
-        message = f"the supports leave {int((square == 0).sum())} motions of the ring free"
-        remedy = "hold x, y and rotation by supports, or give the ring a foundation"
-        raise CaseError(message, code="E-MECHANISM", key="housing.support", remedy=remedy)
+    square, shape = _modes_of(K, M)
     middle = slice(top - max_diameter, top + max_diameter + 1)
     sensors = _Places(*np.broadcast_arrays(*(np.atleast_1d(one).astype(float) for one in (
         sensor_angles, sensor_widths, sensor_directions
