@@ -47,6 +47,7 @@ from femgear.contact.batch import (
 from femgear.contact.flank_pairs import pair_separations
 from femgear.contact.supports import MovingMembers, moving_members
 from femgear.errors import CaseError, FemgearError, StorageError
+from femgear.findings import Finding, tell
 from femgear.gears.deviations import (
     Runout,
     SetDeviations,
@@ -65,7 +66,7 @@ from femgear.study.relief import DesignBasis, design_basis, sun_torque
 from femgear.study.runner import Runner, check_complete
 from femgear.trains.protocol import Progress, one_blas_thread, silent
 from femgear.trains.reading import to_toml, with_values
-from femgear.trains.static.results import HELD, SERIES
+from femgear.trains.static.results import HELD, LARGEST_PEAK_DOUBT, SERIES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -541,6 +542,19 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
     return float(np.ptp(motions[..., N])), float(share)
 
 
+def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
+    """Compute the transmission error [m] and the largest share of a sample with the positions between.
+
+    As ``femgear run`` does of the case that `sample_case` makes of it: exactly, and at the peaks between the
+    positions of the model. ``errors`` (K,) are those of the sample [m].
+    """
+    basis, driver = model.basis, model.basis.gears.n_planets
+    torque = model.load[driver] * basis.gears.sun.base_radius
+    sample = replace(basis, deviations=model.deviations(errors), positions=len(model.position))
+    cycle = sample.walk(torque if model.solved.gears is basis.gears else -torque)
+    return float(cycle.peak_to_peak("sun_arc")), float(cycle.extremes("load_share")[1].max())
+
+
 @one_blas_thread()
 def samples_into(
     case: Case, folder: Path, basis: tuple[SampleModel, str], *, count: int = 1000, seed: int = 1,
@@ -566,11 +580,34 @@ def samples_into(
     with resumable(folder), open_journal(folder / _JOURNAL, case, more, _is_block) as journal:
         values = _computed(model, more, count, journal, progress, runner or Runner())
         data, ideal = _checked_again(case, model, text, values, more)
+        _tell_of_peaks(data)
         write_dataset(data, folder / FILES[0])
         save_figure(figure(data), folder / FILES[1])
         write_text(to_toml(sample_case(case, model, seed, data.attrs["worst"])), folder / FILES[2])
     (folder / _JOURNAL).unlink(missing_ok=True)
     return [_described(data, ideal, _limits(case, model))], list(FILES)
+
+
+def _ratios(larger: np.ndarray, smaller: np.ndarray) -> tuple[float, float]:
+    """Smallest and largest ratio of numbers (n,) to others; one where the others are zero."""
+    ratio = np.divide(larger, smaller, out=np.ones(len(larger)), where=smaller > 0.0)
+    return float(ratio.min()), float(ratio.max())
+
+
+def _tell_of_peaks(data: xr.Dataset) -> None:
+    """Tell (W-POSITIONS) where the positions of the samples miss much of what lies between them."""
+    missed = {
+        name: 1.0 - 1.0 / _ratios(data[f"{name}_between"].values, data[f"{name}_exact"].values)[1]
+        for name in _SHOWN
+        if f"{name}_between" in data
+    }
+    name = max(missed, key=missed.__getitem__)
+    if missed[name] > LARGEST_PEAK_DOUBT:
+        text = (
+            f"{data.attrs['positions']} positions of a mesh period miss up to {missed[name]:.0%} of the "
+            f"{name.replace('_', ' ')} of the samples that were solved again"
+        )
+        tell(Finding("W-POSITIONS", "--positions", text, remedy="take more positions"))
 
 
 def _limits(case: Case, model: SampleModel) -> Iterator[str]:
@@ -613,10 +650,15 @@ def _checked_again(case: Case, model: SampleModel, text: str, values, more) -> t
     chosen = np.unique(np.append(chosen, values["largest_share"].argmax()))
     errors = np.concatenate([model.draw(seed, int(i), 1) for i in chosen])
     again = exact_numbers(model, errors)
-    turn = dict(zip(_SHOWN, np.transpose([over_a_turn(model, one) for one in errors])))
+    turn, between = (
+        dict(zip(_SHOWN, np.transpose([numbers(model, one) for one in errors])))
+        for numbers in (over_a_turn, between_positions)
+    )
     ideal = exact_numbers(model, np.zeros((1, model.size)))
     attrs = {"seed": seed, "tolerances": text, "case": to_toml(case), "worst": int(order[-1])}
-    return _dataset(model, values, chosen, again, turn, attrs | {"method": more["method"]}), ideal
+    attrs["method"] = more["method"]
+    more = {"turn": turn, "between": between}
+    return _dataset(model, values, chosen, again, more, attrs), ideal
 
 
 def _block(model: SampleModel, seed: int, exact: bool, ends: tuple[int, int]) -> dict[str, np.ndarray]:
@@ -650,8 +692,8 @@ def checked(value: int, key: str, least: int, most: int = _MOST) -> None:
         raise CaseError(message, code="E-RANGE", key=key, value=value, limit=f"{least} to {most}")
 
 
-def _dataset(model: SampleModel, values, chosen, again, turn, attrs) -> xr.Dataset:
-    """Numbers of all samples, of those solved `again`, and of those over a `turn` of the carrier."""
+def _dataset(model: SampleModel, values, chosen, again, more, attrs) -> xr.Dataset:
+    """Numbers of all samples; of those solved `again`, also over a ``turn``, and ``between`` positions."""
     entries: dict[str, tuple] = {
         n: (dims, values[n], unit, words) for n, (dims, unit, words) in _NUMBERS.items()
     }
@@ -662,8 +704,9 @@ def _dataset(model: SampleModel, values, chosen, again, turn, attrs) -> xr.Datas
         entries[f"{name}_quantile"] = ("quantile", quantiles, unit, f"{words}, quantiles")
         entries[f"{name}_exact"] = ("check", exact, unit, f"{words}, whole contact problem")
         entries[f"{name}_error"] = ("", error, "1", f"{words}: largest error of the checked samples")
-        if name in turn:
-            entries[f"{name}_turn"] = ("check", turn[name], unit, f"{words}, over a turn of the carrier")
+        for where, told in (("turn", "over a turn of the carrier"), ("between", "with the peaks between")):
+            if name in more[where]:
+                entries[f"{name}_{where}"] = ("check", more[where][name], unit, f"{words}, {told}")
     samples, planets = values["opens"].shape
     coords = {
         "sample": ("sample", np.arange(samples), "1", "sample of the seed"),
@@ -703,24 +746,26 @@ def figure(data: xr.Dataset):
 def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[str]) -> Block:
     """Quantiles of all numbers, and how far to trust them; what they assume."""
     scales = {"m": (1e6, " [um]"), "N/m": (1e-6, " [N/um]"), "1": (1.0, "")}
-    rows, errors, turns = [], [], []
+    rows, errors, turns, between = [], [], [], []
     for name in _SHOWN:
         one, (scale, shown) = data[name], scales[data[name].units]
         values = [ideal[name][0], *data[f"{name}_quantile"].values, one.values.max()]
         rows.append((f"{one.long_name}{shown}", *(f"{scale * value:.5g}" for value in values)))
         errors.append(f"{float(data[f'{name}_error']):.1e} ({name.replace('_', ' ')})")
-        if f"{name}_turn" in data:
-            ratio = data[f"{name}_turn"].values / data[f"{name}_exact"].values
-            turns.append(f"{ratio.min():.2f} to {ratio.max():.2f} times the {name.replace('_', ' ')}")
+        for where, told in (("turn", turns), ("between", between)):
+            if (compared := data.get(f"{name}_{where}")) is not None:
+                low, high = _ratios(compared.values, data[f"{name}_exact"].values)
+                told.append(f"{low:.3g} to {high:.3g} times the {name.replace('_', ' ')}")
     worst, at, check = int(data.attrs["worst"]), int(data.largest_share.values.argmax()), data.check.values
-    exact = 1e6 * float(data.transmission_error_exact.values[check == worst][0])
+    of_worst = 1e6 * float(data.transmission_error_between.values[check == worst][0])
     notes = (
         f"method {data.attrs['method']}; {len(check)} samples solved again exactly differ by at most "
         f"{', '.join(errors)} of the largest",
         f"{data.attrs['positions']} positions of one mesh period; over the {data.attrs['turn']} of a turn of "
         f"the carrier these samples have {' and '.join(turns)}",
+        f"with the peaks between the positions, as femgear run has them, {' and '.join(between)}",
         f"a planet loses its load in {float(data.opens.any('planet').mean()):.2%} of the samples",
-        f"worst.toml (femgear run --only static): sample {worst}, exact STE {exact:.6g} um; "
+        f"worst.toml (femgear run --only static): sample {worst}, STE {of_worst:.6g} um; "
         f"largest share: sample {at}",
         *limits,
     )

@@ -6,6 +6,7 @@ beside it.
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.findings import Finding
-from femgear.gears.deviations import no_deviations, rotational_symmetry
+from femgear.gears.deviations import common_period, no_deviations, rotational_symmetry
 from femgear.housing.carrier_orders import MeshPaths, mean_excitation
 from femgear.housing.casing_files import may_lack_compliance, missing_compliance
 from femgear.housing.orders import order_level
@@ -30,7 +31,6 @@ from femgear.trains.elastic.checks import (
     fixed_diameters,
     housing_supports,
     imported_casing,
-    record_periods,
 )
 from femgear.trains.elastic.excitation_limit import (
     MODES_ABOVE,
@@ -340,8 +340,9 @@ def housing_memory(case: Case, modes: ModesResult, limit: FrequencyLimit) -> np.
 def turning_errors_time(case: Case) -> Iterator[Finding]:
     """Warn of minutes that errors which turn take in a housing that stands still (W-SIZE)."""
     gears, speeds = planetary_set(case), np.array(case.operation.speeds)
-    periods = record_periods(case, gears)
-    if not case.housing.stands_still or periods == 1:
+    periods = common_period(set_deviations(case), gears, limit=sys.maxsize)[0]
+    # a longer record is refused by the stages that need it
+    if not case.housing.stands_still or not 1 < periods <= case.static.longest_record:
         return
     first = member_speeds(case, gears, speeds[0]).mesh_frequency
     frequency = first * speeds / speeds[0]
