@@ -303,7 +303,10 @@ def test_the_verdict_says_where_the_run_up_ends(case, files):
     )
     fast = 12 * 1116.0 / 1e3
     points = list(verdict(results_of(case, files | {"runup": runup, "housing": housing})))[1]
-    assert f"excitation up to 1.08 to {fast:.4g} kHz" in points.notes[-1]
+    assert (
+        f"excitation up to 1.08 to {fast:.4g} kHz" in points.notes[-2]
+        and "of the ring alone" in points.notes[-1]
+    )
     assert "equivalent radiated power" not in " ".join(points.notes)
     housing.attrs["method"] = "casing"
     points = list(verdict(results_of(case, files | {"housing": housing})))[1]
