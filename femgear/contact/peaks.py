@@ -89,14 +89,36 @@ def open_places(
     doubt : float
         Largest share of a peak to peak that intervals which are not halved any more may add.
     """
-    P, length = len(position), np.diff(np.append(position, position[0] + periods))
+    other = codes != np.roll(codes, -1, axis=1)
+    beyond, length = _beyond(position, values, other, least, periods)
+    wanted = (beyond > 0.5 * TOLERANCE) | (other & (length > (1.0 + 1e-9) * ENCLOSED))
+    halved = wanted.any(axis=0) & (length > SHORTEST)
+    left = np.where(halved, 0.0, beyond)
+    places = (position + 0.5 * length)[halved]
+    if position[-1] <= 1e-9:
+        # a record that ends at zero has no position beyond it
+        places = np.where(places > 0.0, places - periods, places)
+    return np.sort(places), float(left.max(initial=0.0)) if len(position) > 2 else 1.0
+
+
+def peak_doubt(position: np.ndarray, values: np.ndarray, least: np.ndarray, periods: int) -> float:
+    """Find the largest share of a peak to peak that curves may rise beyond their positions.
+
+    Parameters are those of `open_places`, of curves whose tooth pairs are not looked at.
+    """
+    beyond, _ = _beyond(position, values, np.zeros(values.shape, bool), least, periods)
+    return float(beyond.max(initial=0.0))
+
+
+def _beyond(position, values, other, least, periods: int) -> tuple[np.ndarray, np.ndarray]:
+    """Shares (K, P) of peaks to peaks by which curves may rise in intervals, and their lengths (P,)."""
+    length = np.diff(np.append(position, position[0] + periods))
     after = np.roll(values, -1, axis=1)
     slope = (after - values) / length
     low, high = values.min(axis=1)[:, None], values.max(axis=1)[:, None]
     size = np.maximum(high - low, least[:, None])
     # what is zero throughout, as of planets that carry nothing, has no peaks
     size = np.where(size > 0.0, size, 1.0)
-    other = codes != np.roll(codes, -1, axis=1)
     steepest = np.abs(slope)
     steepest = np.maximum(steepest, np.maximum(np.roll(steepest, 1, axis=1), np.roll(steepest, -1, axis=1)))
     beyond = np.zeros(values.shape)
@@ -111,11 +133,4 @@ def open_places(
         by_slope = 0.5 * (begin + end) + 0.5 * steepest * length
         most = np.where(other, np.maximum(most, by_slope), most)
         beyond = np.maximum(beyond, (most - extreme) / size)
-    wanted = (beyond > 0.5 * TOLERANCE) | (other & (length > (1.0 + 1e-9) * ENCLOSED))
-    halved = wanted.any(axis=0) & (length > SHORTEST)
-    left = np.where(halved, 0.0, beyond)
-    places = (position + 0.5 * length)[halved]
-    if position[-1] <= 1e-9:
-        # a record that ends at zero has no position beyond it
-        places = np.where(places > 0.0, places - periods, places)
-    return np.sort(places), float(left.max(initial=0.0)) if P > 2 else 1.0
+    return beyond, length
