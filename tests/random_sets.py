@@ -1,4 +1,8 @@
-"""Random valid planetary sets: in phase, out of phase and unequally spaced, two to seven planets."""
+"""Random valid planetary sets: in phase, out of phase and unequally spaced, two to seven planets.
+
+Some have tip reliefs, materials and widths of single gears, leads, misalignments or helical teeth in slices
+over the width, and supports of the ring; all have 8 to 64 positions and torques of either sign.
+"""
 
 import math
 from dataclasses import dataclass
@@ -9,7 +13,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.sections import Case
 from femgear.errors import GeometryError
 from femgear.trains.elastic.checks import MOST_WINDING
-from femgear.trains.reading import parse_case
+from femgear.trains.reading import parse_case, with_values
 
 KINDS = ("in phase", "out of phase", "unequal")
 PLANETS = (2, 3, 4, 5, 6, 7)
@@ -27,6 +31,27 @@ class RandomSet:
     kind: str
     refused: tuple[str, ...]
 
+    @property
+    def alike(self) -> bool:
+        """Whether planets differ in their places alone: no axis is askew."""
+        return not (self.case.planet.misalignment or self.case.sun.misalignment)
+
+    @property
+    def features(self) -> str:
+        """What the set has beside plain spur gears on an even foundation, in words."""
+        case = self.case
+        gears = case.sun, case.planet, case.ring
+        has = {
+            "relief": any(one.kind == "tip relief" for gear in gears for one in gear.modifications),
+            "materials": any(gear.material for gear in gears),
+            "widths": any(gear.face_width for gear in gears),
+            "slices": case.static.slices > 1,
+            "askew": not self.alike,
+            "helix": bool(case.set.helix_angle),
+            "supports": bool(case.housing.support),
+        }
+        return ", ".join(name for name, here in has.items() if here) or "plain"
+
 
 def random_set(seed: int) -> RandomSet:
     """The valid set of a seed: kind and number of planets follow from it, all else is drawn.
@@ -37,14 +62,24 @@ def random_set(seed: int) -> RandomSet:
     kind, planets = KINDS[seed % len(KINDS)], PLANETS[seed // len(KINDS) % len(PLANETS)]
     refused = []
     for _ in range(MOST_DRAWS):
-        case = parse_case(_text(rng, kind, planets, f"random set {seed}: {kind}"), name=f"seed {seed}")
+        plain = parse_case(_text(rng, kind, planets, f"random set {seed}: {kind}"), name=f"seed {seed}")
         try:
+            case = with_values(plain, _features(rng, plain))
             planetary_set(case)
         except GeometryError as error:
             refused.append(error.code)
         else:
             return RandomSet(case, kind, tuple(refused))
     raise AssertionError(f"seed {seed}: no valid set in {MOST_DRAWS} draws, refused {refused}")
+
+
+def few_harmonics(case: Case) -> dict[str, object]:
+    """Entries that leave the highest speed and 20 mesh harmonics: a housing that stands still takes long."""
+    speed = case.operation.speeds[-1]
+    sun, ring = case.sun.teeth, case.ring.teeth
+    a_turn = sun * ring / (sun + ring) if case.operation.input == "sun" else ring
+    end = 20.0 * a_turn * speed / (2.0 * math.pi)
+    return {"operation.speeds": [f"{speed!r} rad/s"], "dynamics.up_to": f"{end!r} Hz"}
 
 
 def symmetry(angles, teeth_sum: int) -> int:
@@ -174,6 +209,113 @@ def _text(rng, kind: str, planets: int, title: str) -> str:
         f'sensor_angle = "{rng.uniform(-180.0, 180.0)!r} deg"',
     ]
     return "\n".join(lines) + "\n"
+
+
+def _features(rng, case: Case) -> dict[str, object]:
+    """Entries that make a plain case of spur gears on an even foundation another one."""
+    changed: dict[str, object] = {"static.positions": int(rng.integers(8, 65))}
+    over_width = rng.random() < 0.3
+    helical = over_width and rng.random() < 0.5
+    modifications = {gear: [] for gear in case.gear_names}
+    if rng.random() < 0.4:
+        for gear in ("sun", "planet"):
+            modifications[gear].append(_tip_relief(rng, case, gear))
+    if rng.random() < 0.25:
+        changed["planet.material"] = {
+            "youngs_modulus": f"{case.material.youngs_modulus * rng.uniform(0.6, 1.4)!r} Pa",
+            "density": f"{case.material.density * rng.uniform(0.6, 1.4)!r} kg/m^3",
+        }
+    if rng.random() < 0.25:
+        # slices need meshes of one common width
+        least = {"planet": 0.9, "sun": 1.0 if over_width else 0.9, "ring": 1.0 if over_width else 0.9}
+        most = {"planet": 1.0 if over_width else 1.2, "sun": 1.2, "ring": 1.2}
+        for gear in case.gear_names:
+            width = 1e3 * case.set.face_width * rng.uniform(least[gear], most[gear])
+            changed[f"{gear}.face_width"] = f"{width!r} mm"
+    if over_width:
+        changed |= _helix(rng, case) if helical else _askew(rng, case)
+        for gear in case.gear_names:
+            modifications[gear] += _leads(rng, case)
+    changed |= {f"{gear}.modifications": tables for gear, tables in modifications.items() if tables}
+    if rng.random() < 0.25:
+        changed["housing.support"] = [_support(rng, case) for _ in range(rng.integers(1, 5))]
+        changed |= few_harmonics(case)
+    return changed
+
+
+def _micrometres(rng, case: Case, low: float, high: float) -> str:
+    """Length of so many micrometres at a module of 2 mm, in proportion for others."""
+    return f"{rng.uniform(low, high) * case.module / 2e-3!r} um"
+
+
+def _tip_relief(rng, case: Case, gear: str) -> dict[str, object]:
+    """Relief that begins between the reference circle and the tip of a rack without shift."""
+    share = rng.uniform(0.3, 0.8)
+    diameter = case.module * (getattr(case, gear).teeth + 2.0 * case.rack.addendum * share)
+    diameter += 2.0 * case.module * (getattr(case, gear).profile_shift or 0.0)
+    return {
+        "kind": "tip relief",
+        "amount": _micrometres(rng, case, 1.0, 10.0),
+        "start_diameter": f"{1e3 * diameter!r} mm",
+        "shape": str(rng.choice(["linear", "parabolic"])),
+    }
+
+
+def _leads(rng, case: Case) -> list[dict[str, object]]:
+    """One modification over the width of a gear, or none."""
+    kind = str(rng.choice(["lead slope", "lead crowning", "end relief", "flank twist", "none", "none"]))
+    if kind == "none":
+        return []
+    signed = kind in ("lead slope", "flank twist")
+    table = {"kind": kind, "amount": _micrometres(rng, case, -6.0 if signed else 1.0, 6.0)}
+    if kind == "end relief":
+        table["length"] = f"{1e3 * case.set.face_width * rng.uniform(0.1, 0.3)!r} mm"
+    return [table]
+
+
+def _helix(rng, case: Case) -> dict[str, object]:
+    """Helical teeth, with circles that grow as the transverse module does."""
+    angle = math.radians(rng.uniform(5.0, 20.0))
+    overlap = 1.2 * case.set.face_width * math.sin(angle) / (math.pi * case.module)
+    changed: dict[str, object] = {
+        "set.helix_angle": f"{math.degrees(angle) * (1.0 if rng.random() < 0.5 else -1.0)!r} deg",
+        "ring.outer_radius": f"{case.ring.outer_radius / math.cos(angle)!r} m",
+        "static.slices": max(int(rng.integers(5, 10)), math.ceil(6.0 * overlap) + 1),
+    }
+    if case.set.centre_distance is not None:
+        changed["set.centre_distance"] = f"{1e3 * case.set.centre_distance / math.cos(angle)!r} mm"
+    return changed
+
+
+def _askew(rng, case: Case) -> dict[str, object]:
+    """Slices of spur teeth; axes that are askew by some micrometres over the width, or that may tilt."""
+    changed: dict[str, object] = {"static.slices": int(rng.integers(5, 14))}
+
+    def slope() -> str:
+        return f"{rng.uniform(-3e-3, 3e-3) * case.module / case.set.face_width!r} rad"
+
+    if rng.random() < 0.4:
+        changed["sun.misalignment"] = {"x": slope(), "y": slope()}
+    if rng.random() < 0.4:
+        askew = int(rng.integers(1, case.set.planets + 1))
+        changed["planet.misalignment"] = [{"planet": askew, "radial": slope(), "tangential": slope()}]
+    if rng.random() < 0.3:
+        stiffness = 15e9 * case.set.face_width**3 / 12 * case.material.youngs_modulus / 206e9
+        changed["planet.tilt_stiffness"] = f"{stiffness * _log(rng, 1.0, 30.0)!r} N m/rad"
+    return changed
+
+
+def _support(rng, case: Case) -> dict[str, object]:
+    """Foot or bolt of the ring, as stiff as some meshes."""
+    mesh = 15e9 * case.set.face_width * case.material.youngs_modulus / 206e9
+    area = case.ring.outer_radius * case.set.face_width
+    return {
+        "angle": f"{rng.uniform(-180.0, 180.0)!r} deg",
+        "radial_stiffness": f"{mesh * _log(rng, 0.03, 3.0)!r} N/m",
+        "tangential_stiffness": f"{mesh * _log(rng, 0.03, 3.0)!r} N/m",
+        "width": f"{1e3 * case.module * rng.uniform(0.0, 8.0)!r} mm",
+        "mass": f"{case.material.density * area * case.module * rng.uniform(0.0, 1.0)!r} kg",
+    }
 
 
 def _log(rng, low: float, high: float) -> float:

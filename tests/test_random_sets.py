@@ -6,13 +6,14 @@
 import math
 import warnings
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import pytest
-from random_sets import KINDS, PLANETS, RandomSet, equal_planets, random_set, symmetry
+import set_images as images
+from random_sets import KINDS, PLANETS, RandomSet, equal_planets, few_harmonics, random_set, symmetry
 from validation.reference.sensor_in_time import symmetry_leakage
 
-from femgear.case.gear_set import set_deviations
 from femgear.gears.kinematics import torques
 from femgear.housing.orders import OrderSpectrum, order_level
 from femgear.housing.sensor import fixed_sensor_lines
@@ -20,27 +21,63 @@ from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
-from femgear.trains.reading import with_value
+from femgear.trains.reading import with_value, with_values
 from femgear.trains.static.results import StaticResult
 from femgear.trains.static.stages import solve_static
 
 # every kind and every number of planets; `make soak` goes on beyond the others
-QUICK = (1, 2, 3, 5, 7, 8, 9, 13, 15)
-SLOW = range(320)
+QUICK = (1, 4, 7, 8, 10, 13, 15, 18)
+SLOW = range(500)
+# gates: of static records of equal sets, of their levels (fixed points of 1e-6), of a support of none, and
+# of twice the positions
+ROUNDING, DYNAMIC, SUPPORT, POSITIONS = 1e-6, 1e-5, 1e-3, 0.03
 # harmonics of a record that are compared between planets
 LINES = 24
 
 
 @dataclass(frozen=True)
 class Solved:
-    """One random set through the whole pipeline."""
+    """One random set, each stage solved when it is asked for, without a warning of the libraries."""
 
     drawn: RandomSet
-    static: StaticResult
-    modes: ModesResult
-    dynamics: DynamicsResult
-    housing: HousingResult
     cache: object
+
+    @cached_property
+    def static(self) -> StaticResult:
+        return quietly(solve_static, self.case, cache=self.cache)
+
+    @cached_property
+    def modes(self) -> ModesResult:
+        return quietly(solve_modes, self.case, self.static)
+
+    @cached_property
+    def dynamics(self) -> DynamicsResult:
+        return quietly(solve_dynamics, self.case, self.static, self.modes)
+
+    @cached_property
+    def housing(self) -> HousingResult:
+        return quietly(solve_housing, self.case, self.dynamics)
+
+    @property
+    def symmetry(self) -> int:
+        """Largest g for which a rotation by 2 pi/g takes every planet to the place of one like it."""
+        return symmetry(self.angles, self.teeth_sum) if self.drawn.alike else 1
+
+    @property
+    def equal_planets(self) -> list[list[int]]:
+        """Groups of planets (numbers from 0) that are equal but for the time."""
+        if self.drawn.alike:
+            return equal_planets(self.angles, self.teeth_sum)
+        return [[planet] for planet in range(len(self.angles))]
+
+    def solved_as(self, case) -> "Solved":
+        """Another case."""
+        return Solved(replace(self.drawn, case=case), self.cache)
+
+    def warned(self, code: str, stage: str) -> bool:
+        """Whether the results of a stage warn so."""
+        result = getattr(self, stage)
+        return any(one.code == code for one in result.warnings(result.dataset()))
 
     @property
     def case(self):
@@ -60,16 +97,16 @@ def cache(tmp_path_factory):
     return tmp_path_factory.mktemp("grids")
 
 
-def solve_set(seed: int, cache) -> Solved:
-    """The set of a seed, solved without a warning of the libraries."""
-    drawn = random_set(seed)
+def quietly(solve, *args, **known):
+    """Results of a stage; a warning of the libraries is an error."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        static = solve_static(drawn.case, cache=cache)
-        modes = solve_modes(drawn.case, static)
-        dynamics = solve_dynamics(drawn.case, static, modes)
-        housing = solve_housing(drawn.case, dynamics)
-    return Solved(drawn, static, modes, dynamics, housing, cache)
+        return solve(*args, **known)
+
+
+def solve_set(seed: int, cache) -> Solved:
+    """The set of a seed."""
+    return Solved(random_set(seed), cache)
 
 
 @pytest.fixture(scope="module")
@@ -117,7 +154,7 @@ def unequal_lines(amplitudes: np.ndarray, solved: Solved) -> float:
     phase = np.tile(solved.static.planetary_set.mesh_phases[:N], 2)
     turned = amplitudes * np.exp(-2j * math.pi * np.outer(phase, np.arange(amplitudes.shape[-1])))
     worst = 0.0
-    for group in equal_planets(solved.angles, solved.teeth_sum):
+    for group in solved.equal_planets:
         for meshes in (np.array(group), N + np.array(group)):
             found, size = turned[..., meshes, :], np.abs(amplitudes[..., meshes, :]).max()
             worst = max(worst, np.abs(found - found[..., :1, :]).max() / size)
@@ -127,7 +164,7 @@ def unequal_lines(amplitudes: np.ndarray, solved: Solved) -> float:
 def unequal_peaks(values: np.ndarray, solved: Solved) -> float:
     """Largest difference of values (2N,) between planets that should be equal, relative to the largest."""
     N, worst = len(solved.angles), 0.0
-    for group in equal_planets(solved.angles, solved.teeth_sum):
+    for group in solved.equal_planets:
         for meshes in (np.array(group), N + np.array(group)):
             worst = max(worst, np.ptp(values[meshes]) / max(np.abs(values[meshes]).max(), 1e-300))
     return worst
@@ -197,7 +234,7 @@ def test_static_solution_is_in_equilibrium(solved):
     for name, rest in balance.items():
         assert np.abs(rest).max() < 1e-9, name
     assert cycle.residual.max() < 1e-9
-    assert cycle.force.min() > 0
+    assert cycle.force.min() > 0 or solved.warned("W-OPEN", "static")
 
 
 @every_set
@@ -207,7 +244,8 @@ def test_equal_planets_are_equal(solved):
     for state in (cycle, getattr(solved.modes, "state", cycle)):
         for name in ("stiffness", "deflection", "force"):
             record = getattr(state, name)
-            assert unequal_lines(lines(state.position, record, LINES), solved) < 1e-8, name
+            count = min(LINES, (len(state.position) - 1) // 2)
+            assert unequal_lines(lines(state.position, record, count), solved) < 1e-8, name
             assert unequal_peaks(record.max(axis=1), solved) < 1e-8, name
             assert unequal_peaks(record.min(axis=1), solved) < 1e-8, name
     assert unequal_peaks(cycle.tooth_load.max(axis=(1, 2)), solved) < 1e-8
@@ -219,7 +257,7 @@ def test_equal_planets_are_equal(solved):
 @every_set
 def test_housing_has_only_the_orders_of_the_symmetry(solved):
     """A set that a rotation by 2 pi/g takes to itself gives a fixed sensor multiples of g alone."""
-    g, housing, dynamics = symmetry(solved.angles, solved.teeth_sum), solved.housing, solved.dynamics
+    g, housing, dynamics = solved.symmetry, solved.housing, solved.dynamics
     carrier = np.array([one.carrier for one in dynamics.speeds])
     place = dynamics.ring_teeth, carrier, housing.exact.sensor_angle
     field = mesh_and_ring_outputs(replace(solved.modes, symmetry=1), dynamics.response)[1]
@@ -228,8 +266,12 @@ def test_housing_has_only_the_orders_of_the_symmetry(solved):
     assert (spectrum.amplitude.max(axis=-1) > 0).all()
     assert symmetry_leakage(spectrum, g).max() < 1e-8
     # others are left out where every planet is like every other
-    assert housing.symmetry == (g if set_deviations(solved.case).ideal else 1)
-    assert order_level(housing.exact) == pytest.approx(order_level(lines), rel=1e-9)
+    assert housing.symmetry == g
+    if solved.case.housing.support:
+        heard = OrderSpectrum(housing.exact.order, housing.exact.acceleration)
+        assert symmetry_leakage(heard, g).max() < 1e-8
+    else:
+        assert order_level(housing.exact) == pytest.approx(order_level(lines), rel=1e-9)
 
 
 @every_set
@@ -237,6 +279,8 @@ def test_dynamic_transmission_error_at_rest_is_the_static_one(solved):
     """At the lowest speed of the case, in the harmonics that the excitation keeps."""
     state, dynamics = solved.modes.state, solved.dynamics
     rest = int(np.argmin(dynamics.input_speed))
+    if solved.case.housing.support:
+        return  # these are not asked for it
     count = round(dynamics.excitation_limit[rest] / dynamics.response.mesh_frequency[rest])
     dynamic = dynamics.dte[rest, :, : count + 1]
     expected = harmonics_of(state.resampled("deflection", 8192), count)
@@ -260,3 +304,171 @@ def test_dynamics_start_from_the_static_solution_with_elastic_members(solved):
         assert np.sqrt(np.mean(apart**2, axis=1)).max() < 1e-3 * moving + rounding, name
         # bends and steps of the contact cells between positions of the one that the other does not have
         assert np.abs(apart).max() < 2e-3 * moving + rounding, name
+
+
+def off(found, expected) -> float:
+    """Largest difference, over the largest value."""
+    found, expected = np.asarray(found), np.asarray(expected)
+    return float(np.abs(found - expected).max() / np.abs(expected).max())
+
+
+def same_record(found, expected, meshes=slice(None), positions=slice(None), **factors) -> None:
+    """Records over the mesh period are equal but for the order of meshes and positions and for factors."""
+    for name in ("deflection", "stiffness", "force"):
+        values = getattr(expected, name)[meshes][:, positions] * factors.get(name, 1.0)
+        rest = off(getattr(found, name), values)
+        assert rest < ROUNDING, (name, rest)
+
+
+def same_peaks(found, expected, meshes=slice(None), **factors) -> None:
+    """Extremes of transmission errors and stiffnesses, positions between among them, are equal."""
+    for name in ("deflection", "stiffness"):
+        for one, other in zip(found.extremes(name), expected.extremes(name), strict=True):
+            rest = off(one, other[meshes] * factors.get(name, 1.0))
+            assert rest < ROUNDING, (name, rest)
+
+
+def same_level(found, expected, gate) -> None:
+    """Levels of the housing are equal."""
+    assert off(heard_level(found), heard_level(expected)) < gate, (heard_level(found), heard_level(expected))
+
+
+def heard_level(solved) -> np.ndarray:
+    """Level of the housing at the speeds of the case [m/s^2]."""
+    return order_level(solved.housing.exact)
+
+
+def similar_in_length(solved):
+    """1.7 times as large of the same material: deflections grow alike, stresses and stiffness/width stay."""
+    factor, cycle = 1.7, solved.static.cycle
+    found = solved.solved_as(images.larger(solved.case, factor)).static.cycle
+    same_record(found, cycle, deflection=factor, stiffness=factor, force=factor**2)
+    same_peaks(found, cycle, deflection=factor, stiffness=factor)
+
+
+def similar_in_modulus_and_torque(solved):
+    """Moduli, torque, springs and masses 1.7 times: all moves as before, static and in time."""
+    factor, cycle = 1.7, solved.static.cycle
+    found = solved.solved_as(images.stiffer(solved.case, factor))
+    same_record(found.static.cycle, cycle, stiffness=factor, force=factor)
+    same_peaks(found.static.cycle, cycle, stiffness=factor)
+    same_level(found, solved, DYNAMIC)
+
+
+def equal_in_the_mirror(solved):
+    """The other torque on the mirrored set: the same record, backwards in its positions."""
+    cycle, found = solved.static.cycle, solved.solved_as(images.mirrored(solved.case)).static.cycle
+    assert np.array_equal(found.position, cycle.position)
+    order = np.array(images.mirrored_planets(len(solved.angles)))
+    meshes = np.concatenate([order, len(order) + order])
+    backwards = -np.arange(len(cycle.position))
+    same_record(found, cycle, meshes, backwards)
+    same_peaks(found, cycle, meshes)
+
+
+def equal_with_other_numbers(solved):
+    """Planets counted from the second: its mesh period is the first one's, and all peaks are the same."""
+    cycle, N = solved.static.cycle, len(solved.angles)
+    found = solved.solved_as(images.renumbered(solved.case, 1)).static.cycle
+    order = np.roll(np.arange(N), -1)
+    meshes, P = np.concatenate([order, N + order]), len(cycle.position)
+    later = solved.static.planetary_set.mesh_phases[1] * P * (-1.0 if cycle.position[-1] < 0.0 else 1.0)
+    if abs(later - round(later)) < 1e-6:
+        same_record(found, cycle, meshes, (np.arange(P) - round(later)) % P)
+        same_peaks(found, cycle, meshes)
+
+
+def equal_where_it_is_turned(solved):
+    """The set turned by five places of a planet, with sensor, supports and axes: nothing else changes."""
+    found = solved.solved_as(images.turned(solved.case, 5 * 2 * math.pi / solved.teeth_sum))
+    same_record(found.static.cycle, solved.static.cycle)
+    same_peaks(found.static.cycle, solved.static.cycle)
+    same_level(found, solved, DYNAMIC)
+
+
+def equal_on_a_support_of_none(solved):
+    """A support of 1e-7 of the foundation, at the highest speed: level and lines as without.
+
+    Lines up to the end of the excitation: beyond it either solution has modes of its own that are left out.
+    """
+    alone = with_values(solved.case, {"housing.support": None} | few_harmonics(solved.case))
+    without = solved.solved_as(alone)
+    found = solved.solved_as(images.with_support_of_none(alone, 1e-7))
+    same_level(found, without, SUPPORT)
+    lines, expected = found.housing.exact, without.housing.exact
+    end = without.dynamics.excitation_limit[0] / expected.base_speed[0] * 2.0 * math.pi
+    inside = expected.order <= end * (1.0 + 1e-9)
+    common, here, there = np.intersect1d(lines.order, expected.order[inside], return_indices=True)
+    rest = np.abs(lines.acceleration[0, here] - expected.acceleration[0, there]).max()
+    rest /= np.abs(expected.acceleration).max()
+    assert len(common) and rest < SUPPORT, rest
+
+
+def converged_in_positions(solved):
+    """Twice the positions: peaks and means within what the pages promise, or W-POSITIONS before."""
+    if solved.warned("W-POSITIONS", "static"):
+        return
+    case = with_values(solved.case, {"static.positions": 2 * solved.case.static.positions})
+    cycle, finer = solved.static.cycle, solved.solved_as(case).static.cycle
+    # what counts as constant, as in `femgear.contact.cycle`
+    for name, still in (("deflection", 1e-3), ("stiffness", 1e-3), ("load_share", 0.1)):
+        values, size = finer.peak_to_peak(name), still * np.abs(np.asarray(getattr(finer, name))).max()
+        change = np.abs(cycle.peak_to_peak(name) - values) / np.maximum(values, size)
+        assert change.max() < POSITIONS, (name, change)
+    assert off(cycle.stiffness.mean(axis=1), finer.stiffness.mean(axis=1)) < POSITIONS
+    assert off(cycle.load_share.mean(axis=1), finer.load_share.mean(axis=1)) < POSITIONS
+
+
+def converged_in_excitation(solved):
+    """Twice the end of the excitation: the level changes by less than 1 dB, or W-EXCITATION says so."""
+    limit = float(solved.dynamics.excitation_limit[-1])
+    speeds = [f"{solved.case.operation.speeds[-1]!r} rad/s"]
+    ended, further = (
+        solved.solved_as(
+            with_values(solved.case, {"dynamics.up_to": f"{end!r} Hz", "operation.speeds": speeds})
+        )
+        for end in (min(limit, 100e3), min(2.0 * limit, 200e3))
+    )
+    change = 20.0 * np.log10(heard_level(further) / heard_level(ended))[0]
+    assert abs(change) < 1.0 or ended.warned("W-EXCITATION", "dynamics"), change
+
+
+INVARIANTS = (
+    similar_in_length,
+    similar_in_modulus_and_torque,
+    equal_in_the_mirror,
+    equal_with_other_numbers,
+    equal_where_it_is_turned,
+    equal_on_a_support_of_none,
+    converged_in_positions,
+    converged_in_excitation,
+)
+
+
+QUICK_INVARIANTS = {
+    1: (equal_on_a_support_of_none, equal_where_it_is_turned, converged_in_excitation),
+    7: (similar_in_length, equal_in_the_mirror, equal_with_other_numbers, converged_in_positions),
+    18: (similar_in_modulus_and_torque,),
+    23: (equal_in_the_mirror,),
+}
+"""Some for each of few sets; all of them are in the slow tests."""
+
+
+@pytest.mark.parametrize(
+    ("solved", "invariant"),
+    [
+        pytest.param(
+            seed,
+            invariant,
+            id=f"seed{seed:03d}-{invariant.__name__}",
+            marks=[] if invariant in QUICK_INVARIANTS.get(seed, ()) else pytest.mark.slow,
+        )
+        for seed in SLOW
+        for invariant in INVARIANTS
+    ],
+    indirect=["solved"],
+    scope="module",
+)
+def test_invariant(solved, invariant):
+    """What another set, or a finer computation, must give."""
+    invariant(solved)
