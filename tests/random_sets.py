@@ -73,15 +73,6 @@ def random_set(seed: int) -> RandomSet:
     raise AssertionError(f"seed {seed}: no valid set in {MOST_DRAWS} draws, refused {refused}")
 
 
-def few_harmonics(case: Case) -> dict[str, object]:
-    """Entries that leave the highest speed and 20 mesh harmonics: a housing that stands still takes long."""
-    speed = case.operation.speeds[-1]
-    sun, ring = case.sun.teeth, case.ring.teeth
-    a_turn = sun * ring / (sun + ring) if case.operation.input == "sun" else ring
-    end = 20.0 * a_turn * speed / (2.0 * math.pi)
-    return {"operation.speeds": [f"{speed!r} rad/s"], "dynamics.up_to": f"{end!r} Hz"}
-
-
 def symmetry(angles, teeth_sum: int) -> int:
     """Largest g for which a rotation by 2 pi/g takes every planet to the place of a planet."""
     places = _places(angles, teeth_sum)
@@ -239,8 +230,17 @@ def _features(rng, case: Case) -> dict[str, object]:
     changed |= {f"{gear}.modifications": tables for gear, tables in modifications.items() if tables}
     if rng.random() < 0.25:
         changed["housing.support"] = [_support(rng, case) for _ in range(rng.integers(1, 5))]
-        changed |= few_harmonics(case)
+        changed |= _few_harmonics(case)
     return changed
+
+
+def _few_harmonics(case: Case) -> dict[str, object]:
+    """Entries that leave the highest speed and 20 mesh harmonics: a housing that stands still takes long."""
+    speed = case.operation.speeds[-1]
+    sun, ring = case.sun.teeth, case.ring.teeth
+    a_turn = sun * ring / (sun + ring) if case.operation.input == "sun" else ring
+    end = 20.0 * a_turn * speed / (2.0 * math.pi)
+    return {"operation.speeds": [f"{speed!r} rad/s"], "dynamics.up_to": f"{end!r} Hz"}
 
 
 def _micrometres(rng, case: Case, low: float, high: float) -> str:

@@ -76,18 +76,6 @@ def turned(case: Case, angle: float) -> Case:
     return with_values(case, changed)
 
 
-def with_support_of_none(case: Case, share: float) -> Case:
-    """One support at the ring, of so small a share of the stiffness of its whole foundation."""
-    ring = case.ring
-    area = 2.0 * math.pi * ring.outer_radius * (ring.face_width or case.set.face_width or 0.0)
-    support = {
-        "angle": "40 deg",
-        "radial_stiffness": f"{share * ring.foundation_radial * area!r} N/m",
-        "tangential_stiffness": f"{share * ring.foundation_tangential * area!r} N/m",
-    }
-    return with_values(case, {"housing.support": [support]})
-
-
 def _angles(case: Case) -> tuple[float, ...]:
     """Angles of the planets [rad]."""
     return tuple(case.set.planet_angles or equal_planet_angles(case.set.planets))
