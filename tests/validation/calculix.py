@@ -1,0 +1,398 @@
+"""CalculiX as a reference: plane bodies written as its input, ``ccx`` run on it, its tables read.
+
+CalculiX (G. Dhondt and K. Wittig, calculix.de; Debian: calculix-ccx) is a finite-element program that shares
+nothing with femgear. Lengths are in mm, forces in N, masses in t, so that stresses are in MPa.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from scipy.spatial import KDTree
+
+from femgear.fe.elasticity import Material
+from femgear.fe.grid import Grid
+from femgear.fe.meshing import mesh_outlines
+from femgear.gears.gear import Gear, flank_points
+from femgear.gears.tooth import HalfSector, half_sector
+
+PROGRAM = shutil.which("ccx")
+TIME_LIMIT = 900.0
+"""Seconds after which CalculiX is stopped."""
+MILLIMETRE = 1e3
+
+
+def installed() -> bool:
+    """Tell whether CalculiX can be run."""
+    return PROGRAM is not None
+
+
+@dataclass(frozen=True)
+class Output:
+    """Tables (``.dat``) and fields at nodes (``.frd``) of CalculiX, both as text."""
+
+    tables: str
+    fields: str
+
+
+def run(text: str) -> Output:
+    """Run an input.
+
+    Raises
+    ------
+    RuntimeError
+        CalculiX is not installed, ended with an error, did not converge or wrote no table.
+    """
+    if PROGRAM is None:
+        raise RuntimeError("CalculiX (ccx) is not installed")
+    with TemporaryDirectory() as folder:
+        place = Path(folder)
+        (place / "job.inp").write_text(text)
+        environment = os.environ | {"OMP_NUM_THREADS": "1"}
+        done = subprocess.run(
+            [PROGRAM, "-i", "job"], cwd=place, env=environment, capture_output=True, text=True,
+            timeout=TIME_LIMIT,
+        )  # fmt: skip
+        table, fields = place / "job.dat", place / "job.frd"
+        if done.returncode or not table.is_file() or "Job finished" not in done.stdout:
+            raise RuntimeError(f"CalculiX: {done.stdout[-2000:]}{done.stderr[-500:]}")
+        return Output(table.read_text(), fields.read_text() if fields.is_file() else "")
+
+
+def tables(text: str, title: str) -> list[np.ndarray]:
+    """Read all tables whose title begins so, one a step, rows of numbers each."""
+    found, rows = [], None
+    for line in text.splitlines():
+        if re.match(r" *[a-zA-Z]", line):
+            rows = None
+            if line.strip().startswith(title):
+                rows = []
+                found.append(rows)
+        elif rows is not None and line.strip():
+            rows.append([float(cell) for cell in line.split()])
+    return [np.array(rows) for rows in found]
+
+
+def fields(text: str, name: str) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Read all fields of a name, such as ``"STRESS"``, one a step: numbers of nodes and components."""
+    found, nodes, values = [], None, None
+    for line in text.splitlines():
+        if line.startswith(" -4"):
+            nodes = values = None
+            if line.split()[1] == name:
+                nodes, values = [], []
+                found.append((nodes, values))
+        elif line.startswith(" -1") and nodes is not None:
+            nodes.append(int(line[3:13]))
+            values.append([float(line[i : i + 12]) for i in range(13, len(line.rstrip()), 12)])
+        elif line.startswith(" -3"):
+            nodes = None
+    return [(np.array(numbers), np.array(rows)) for numbers, rows in found]
+
+
+@dataclass(frozen=True)
+class PlaneBody:
+    """Six-node triangles of a whole plane body.
+
+    Parameters
+    ----------
+    points : (n, 2) array
+        [m]
+    triangles : (e, 6) int array
+        Corners, then the middles of the sides 12, 23, 31.
+    edges : mapping of str to (k, 3) int array
+        Boundary edges by name: ends and middle.
+    tooth : (e,) bool array
+        Elements of teeth, the others are of the body.
+    """
+
+    points: np.ndarray
+    triangles: np.ndarray
+    edges: Mapping[str, np.ndarray]
+    tooth: np.ndarray
+
+    def turned(self, angle: float, centre: Sequence[float] = (0.0, 0.0)) -> PlaneBody:
+        """Turn the body about the origin [rad], then move it there [m]."""
+        return replace(self, points=_turned(self.points, angle) + np.asarray(centre))
+
+
+def _turned(points: np.ndarray, angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    return points @ np.array([[c, s], [-s, c]])
+
+
+NEAR_SIZE, FAR_SIZE = 3.0, 6.0
+"""Elements of the teeth beside loaded ones and of all others, in those that femgear takes."""
+
+
+def whole_gear(gear: Gear, side: str, fine: Sequence[int], *, flank_elements: int) -> PlaneBody:
+    """Mesh all teeth of a gear, one side of those of the given numbers finely.
+
+    Parameters
+    ----------
+    gear : Gear
+    side : {"left", "right"}
+        Of the fine teeth that is meshed as finely as femgear does, with so many elements along the flank.
+    fine : sequence of int
+        Numbers of teeth; edges of these have it in their name: "flank 0", "fillet -1". "rim" is that of all.
+    flank_elements : int
+    """
+    far, near = (half_sector(gear, flank_elements=12, refine=1.0 / size) for size in (FAR_SIZE, NEAR_SIZE))
+    cuts = {name: far.curve(name) for name in ("cut", "rim")}
+    near = _with_curves(near, cuts)
+    loaded = half_sector(gear, flank_elements=flank_elements)
+    loaded = _with_curves(loaded, cuts | {"symmetry": near.curve("symmetry")})
+    grids = mesh_outlines([far, near, loaded])
+    parts = []
+    for tooth in range(gear.teeth):
+        away = [(tooth - number + gear.teeth // 2) % gear.teeth - gear.teeth // 2 for number in fine]
+        number = next((number for number, distance in zip(fine, away) if distance == 0), None)
+        for half in ("left", "right"):
+            chosen = number is not None and half == side
+            level = 2 if chosen else int(min(map(abs, away)) <= 1)
+            grid = grids[level] if half == "left" else _mirrored(grids[level])
+            names = {f"flank {number}": "flank", f"fillet {number}": "fillet"} if chosen else {}
+            edges = {name: grid.boundaries[curve] for name, curve in names.items()}
+            is_tooth = np.isin(np.arange(len(grid.triangles)), grid.regions["tooth"])
+            points = _turned(grid.points, tooth * gear.pitch_angle)
+            parts.append(PlaneBody(points, grid.triangles, edges | {"rim": grid.boundaries["rim"]}, is_tooth))
+    return _joined(parts)
+
+
+def _with_curves(half: HalfSector, curves: Mapping[str, np.ndarray]) -> HalfSector:
+    """Half sector with some of its curves replaced by others between the same points."""
+    chain = [(name, np.array(curves.get(name, points))) for name, points in half.curves]
+    for (_, before), (_, points) in zip([chain[-1], *chain], chain):
+        points[0] = before[-1]
+    base = [(name, np.array(points)) for name, points in half.interfaces]
+    line = curves.get("symmetry", half.curve("symmetry"))
+    for _, points in base:
+        points[0] = line[np.abs(line[:, 0] - points[0, 0]).argmin()]
+    return replace(half, curves=tuple(chain), interfaces=tuple(base))
+
+
+def _mirrored(grid: Grid) -> Grid:
+    return Grid(
+        grid.points * [1.0, -1.0],
+        grid.triangles[:, [0, 2, 1, 5, 4, 3]],
+        {name: edges[:, [1, 0, 2]] for name, edges in grid.boundaries.items()},
+        grid.regions,
+    )
+
+
+def _joined(parts: Sequence[PlaneBody]) -> PlaneBody:
+    """Bodies as one, nodes at the same place merged."""
+    first = np.cumsum([0, *(len(part.points) for part in parts)])
+    points = np.vstack([part.points for part in parts])
+    pairs = KDTree(points).query_pairs(1e-7 * np.ptp(points), output_type="ndarray")
+    target = np.arange(len(points))
+    for a, b in np.sort(pairs, axis=1)[np.argsort(pairs.min(axis=1))]:
+        target[b] = min(target[a], target[b])
+    kept, number = np.unique(target, return_inverse=True)
+    edges: dict[str, list] = {}
+    for start, part in zip(first, parts):
+        for name, chain in part.edges.items():
+            edges.setdefault(name, []).append(chain + start)
+    triangles = np.vstack([part.triangles + start for start, part in zip(first, parts)])
+    return PlaneBody(
+        points[kept],
+        number[triangles],
+        {name: number[np.vstack(chains)] for name, chains in edges.items()},
+        np.concatenate([part.tooth for part in parts]),
+    )
+
+
+def moduli(material: Material, state: str) -> tuple[float, float]:
+    """Modulus [MPa] and ratio with which elements in plane strain have a plane state.
+
+    Plane stress of E and nu is plane strain of E (1 + 2 nu)/(1 + nu)^2 and nu/(1 + nu): S. P. Timoshenko
+    and J. N. Goodier, Theory of Elasticity, 3rd ed., section 20.
+    """
+    E, nu = 1e-6 * material.youngs_modulus, material.poisson_ratio
+    if state == "plane strain":
+        return E, nu
+    return E * (1.0 + 2.0 * nu) / (1.0 + nu) ** 2, nu / (1.0 + nu)
+
+
+def body_input(
+    body: PlaneBody, name: str, material: Material, state: Mapping[str, str], *, node: int = 0, element: int = 0
+) -> list[str]:
+    """Write nodes, elements of 1 mm thickness and materials of a plane body, numbered after those given.
+
+    ``state`` has "plane strain" or "plane stress" for "tooth" and "body".
+    """
+    lines = [f"*NODE, NSET=N{name}"]
+    lines += [f"{node + i + 1},{x:.14g},{y:.14g},0" for i, (x, y) in enumerate(MILLIMETRE * body.points)]
+    for part, chosen in (("tooth", body.tooth), ("body", ~body.tooth)):
+        group = f"{part.upper()}{name}"
+        lines.append(f"*ELEMENT, TYPE=CPE6, ELSET={group}")
+        lines += [
+            f"{element + i + 1}," + ",".join(str(node + n + 1) for n in body.triangles[i])
+            for i in np.flatnonzero(chosen)
+        ]
+        E, nu = moduli(material, state[part])
+        lines += [
+            f"*MATERIAL, NAME=M{group}\n*ELASTIC\n{E:.12g},{nu:.12g}\n*DENSITY\n{1e-12 * material.density:.9g}",
+            f"*SOLID SECTION, ELSET={group}, MATERIAL=M{group}\n1.",
+        ]
+    return lines
+
+
+def surface_input(body: PlaneBody, name: str, edges: np.ndarray, *, element: int = 0) -> list[str]:
+    """Write a surface of element sides."""
+    sides = {}
+    for i, nodes in enumerate(body.triangles):
+        for side, (a, b) in enumerate(((0, 1), (1, 2), (2, 0)), 1):
+            sides[frozenset((int(nodes[a]), int(nodes[b])))] = f"{element + i + 1},S{side}"
+    return [f"*SURFACE, NAME={name}, TYPE=ELEMENT", *(sides[frozenset(edge[:2])] for edge in edges.tolist())]
+
+
+def near_teeth(
+    gears: Sequence[Gear], angles: Sequence[float], centre: float, *, within: float
+) -> list[tuple[int, int]]:
+    """Find the teeth of two gears, turned so [rad], the second about (centre, 0), whose flanks are near.
+
+    ``within`` is a distance [m]; the flanks are left ones, of an internal gear right ones.
+    """
+    found, curves = [], []
+    for gear in gears:
+        flank = flank_points(gear, np.linspace(gear.form_roll, gear.tip_roll, 1000))
+        curves.append(flank * [1.0, -1.0] if gear.internal else flank)
+    for tooth in (-2, -1, 0, 1, 2):
+        mates = tooth, tooth if gears[1].internal else -tooth
+        first, second = (
+            _turned(flank, angle + number * gear.pitch_angle) + (place, 0.0)
+            for flank, angle, number, gear, place in zip(curves, angles, mates, gears, (0.0, centre))
+        )
+        if KDTree(second).query(first)[0].min() < within:
+            found.append(mates)
+    return found
+
+
+@dataclass(frozen=True)
+class PairContact:
+    """Contact of two gears under given rotations of the first, every array over these.
+
+    Parameters
+    ----------
+    approach : (s,) array
+        Along the line of action [m].
+    torque : (s,) array
+        On the first gear [N m].
+    pressure : (2, s) array
+        Largest contact pressure [Pa] from the stress normal to either gear's flank at its nodes, which is
+        the mean of the elements beside them.
+    root : (2, s) array
+        Largest principal stress in the fillets of the loaded side of each gear [Pa].
+    """
+
+    approach: np.ndarray
+    torque: np.ndarray
+    pressure: np.ndarray
+    root: np.ndarray
+
+    def at(self, torque: float, values: np.ndarray) -> float:
+        """Interpolate one of the arrays (s,) at a torque [N m], which may lie a little outside."""
+        return float(np.polyval(np.polyfit(self.torque - torque, values, len(self.torque) - 1), 0.0))
+
+
+def pair_contact(
+    bodies: Sequence[PlaneBody], teeth: Sequence[tuple[int, int]], approach: Sequence[float], *, base_radius: float, width: float,
+    material: Material, states: Sequence[Mapping[str, str]], penalty: float,
+) -> PairContact:  # fmt: skip
+    """Solve the contact of two whole plane gears: rim of the first turned, that of the second held.
+
+    Parameters
+    ----------
+    bodies : two PlaneBody
+        In place, touching; the first about the origin.
+    teeth : sequence of (int, int)
+        Teeth of the first and the second gear whose edges "flank ..." may touch: CalculiX takes a flank
+        for penetrated that lies behind another, however far.
+    approach : sequence of float
+        Rotations of the first gear as paths along the line of action [m], in rising order.
+    base_radius, width : float
+        Base radius of the first gear and face width [m].
+    material : Material
+    states : two mappings
+        See `body_input`.
+    penalty : float
+        Contact pressure over overclosure [Pa/m].
+    """
+    lines, node, element, roots, flanks = [], 0, 0, [], []
+    for number, (body, state) in enumerate(zip(bodies, states), 1):
+        lines += body_input(body, str(number), material, state, node=node, element=element)
+        for i, mates in enumerate(teeth):
+            flank = body.edges[f"flank {mates[number - 1]}"]
+            lines += surface_input(body, f"S{number}T{i}", flank, element=element)
+        fillets = np.vstack([edges for name, edges in body.edges.items() if name.startswith("fillet")])
+        roots.append(node + 1 + np.unique(fillets))
+        chains = [np.unique(edges) for name, edges in body.edges.items() if name.startswith("flank")]
+        flanks.append([(node + 1 + chain, body.points[chain]) for chain in chains])
+        shown = np.concatenate([roots[-1], *(own for own, _ in flanks[-1])])
+        lines += ["*NSET, NSET=SHOWN", *map(str, shown)]
+        rim = node + 1 + np.unique(body.edges["rim"])
+        lines += [f"*NSET, NSET=RIM{number}", *map(str, rim)]
+        node, element = node + len(body.points), element + len(body.triangles)
+    lines += [
+        "*SURFACE INTERACTION, NAME=SI\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
+        f"{penalty * 1e-9:.6g}",
+        *(
+            f"*CONTACT PAIR, INTERACTION=SI, TYPE=SURFACE TO SURFACE\nS1T{i},S2T{i}"
+            for i in range(len(teeth))
+        ),
+        "*BOUNDARY\nRIM2,1,2",
+    ]
+    rim = np.unique(bodies[0].edges["rim"])
+    x, y = MILLIMETRE * bodies[0].points[rim].T
+    for path in approach:
+        angle = path / base_radius
+        lines.append("*STEP, INC=200\n*STATIC\n1.,1.\n*BOUNDARY")
+        lines += [f"{n + 1},1,1,{-angle * b:.14g}\n{n + 1},2,2,{angle * a:.14g}" for n, a, b in zip(rim, x, y)]
+        lines += ["*NODE PRINT, NSET=RIM1\nRF", "*EL FILE, OUTPUT=2D, NSET=SHOWN\nS", "*END STEP"]  # fmt: skip
+    output = run("\n".join(lines) + "\n")
+    torque = []
+    for rows in tables(output.tables, "forces"):
+        order = np.searchsorted(rim + 1, rows[:, 0].astype(int))
+        torque.append(np.sum(x[order] * rows[:, 2] - y[order] * rows[:, 1]) * width)
+    roots_found, pressure = [], []
+    for numbers, values in fields(output.fields, "STRESS"):
+        stress = np.full((node + 1, 2), np.nan)
+        stress[numbers] = 1e6 * _principal(values)
+        roots_found.append([stress[own, 1].max() for own in roots])
+        pressure.append([max(_peak(points, -stress[own, 0]) for own, points in chains) for chains in flanks])
+    return PairContact(
+        np.array(approach), np.array(torque), np.array(pressure).T, np.array(roots_found).T
+    )
+
+
+def _peak(points: np.ndarray, pressure: np.ndarray) -> float:
+    """Largest pressure (n,) at the nodes of a flank: that of a parabola through those above 0.8 of the largest.
+
+    Values at nodes scatter by some per cent, as the sides of elements do not end where the contact does.
+    Hertz's half ellipse is such a parabola within 0.3 % there.
+    """
+    largest = int(pressure.argmax())
+    middle = points[largest]
+    tangent = points[np.argsort(((points - middle) ** 2).sum(axis=1))[1]] - middle
+    along = (points - middle) @ tangent / np.hypot(*tangent)
+    near = pressure > 0.8 * pressure[largest]
+    if np.count_nonzero(near) < 4:
+        return float(pressure[largest])
+    a, b, c = np.polyfit(along[near], pressure[near], 2)
+    return float(c - 0.25 * b**2 / a) if a < 0 else float(pressure[largest])
+
+
+def _principal(stress: np.ndarray) -> np.ndarray:
+    """Principal stresses in the plane, the lower one first, of rows xx, yy, zz, xy, ..."""
+    xx, yy, xy = stress[:, 0], stress[:, 1], stress[:, 3]
+    middle, radius = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+    return np.column_stack([middle - radius, middle + radius])

@@ -1,0 +1,152 @@
+"""Rows of the validation against CalculiX, where it is installed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import wraps
+
+import numpy as np
+
+from femgear.case.sections import Case
+from femgear.contact.bodies import RING_STATE
+from femgear.fe.elasticity import Material
+from femgear.gears.kinematics import orientations
+from femgear.gears.planetary import GearSet
+from validation import calculix
+from validation.rows import Row, information, within
+
+SOURCE = "CalculiX"
+POSITIONS = 8
+STEP = 0.02
+"""Change of the approach to either side, for the tangent."""
+PENALTY = 1e17
+"""Contact pressure over overclosure [Pa/m]: 1 GPa at 10 nm."""
+FLANK_ELEMENTS = 96
+NEAR = 40e-6
+"""Distance [m] within which flanks may touch: twice the approach of the pairs."""
+PLANE_STRAIN = {"tooth": "plane strain", "body": "plane strain"}
+QUANTITIES = (
+    "transmission error [um]", "tangent stiffness [N/um]", "contact pressure [MPa]",
+    "largest stress in the root of gear 1 [MPa]", "largest stress in the root of gear 2 [MPa]",
+)  # fmt: skip
+GATES = 0.002, 0.002, 0.02, 0.02, 0.02
+
+PAIR = """
+format = 1
+model = "pair"
+title = "Pair for CalculiX"
+material = { youngs_modulus = "206 GPa", poisson_ratio = 0.3, density = "7850 kg/m^3" }
+operation = { torque = "200 N m" }
+"""
+# the entries of cases/spur_pair.toml
+EXTERNAL = """
+set = { module = "3 mm", pressure_angle = "20 deg", face_width = "20 mm", centre_distance = "91.5 mm" }
+gear_1 = { teeth = 24, profile_shift = 0.3, bore_radius = "15 mm", tip_diameter = "79.8 mm" }
+gear_2 = { teeth = 36, tip_diameter = "115.3786 mm", bore_radius = "25 mm" }
+"""
+INTERNAL = """
+set = { module = "3 mm", pressure_angle = "20 deg", face_width = "20 mm", centre_distance = "54 mm" }
+gear_1 = { teeth = 24, profile_shift = 0.0, bore_radius = "15 mm" }
+gear_2 = { teeth = 60, outer_radius = "100 mm", cutter_teeth = 30, tip_diameter = "175 mm" }
+"""
+
+
+def where_installed(rows: Callable[[], tuple[Row, ...]]) -> Callable[[], tuple[Row, ...]]:
+    """Compute rows only where CalculiX is installed, else say that it is not."""
+
+    @wraps(rows)
+    def either() -> tuple[Row, ...]:
+        if calculix.installed():
+            return rows()
+        name = rows.__name__.replace("_", " ")
+        note = "needs the program ccx (Debian: calculix-ccx)"
+        return (information("CalculiX", SOURCE, f"{name}: not computed", None, float("nan"), note=note),)
+
+    return either
+
+
+def pair_case(teeth: str, positions: int = POSITIONS) -> Case:
+    """Case of one of the pairs."""
+    from femgear.trains.reading import parse_case
+
+    return parse_case(f"{PAIR}{teeth}static = {{ positions = {positions} }}\n", name="pair")
+
+
+@where_installed
+def external_pair() -> tuple[Row, ...]:
+    """Pair 24/36 of cases/spur_pair.toml: whole gears of CalculiX in contact, plane strain."""
+    return pair_rows(EXTERNAL, "24/36")
+
+
+@where_installed
+def internal_pair() -> tuple[Row, ...]:
+    """Pair 24/60 with an internal gear, whose body is in plane stress as in femgear."""
+    return pair_rows(INTERNAL, "24/-60")
+
+
+def pair_rows(teeth: str, name: str) -> tuple[Row, ...]:
+    """Compare a pair at equidistant positions: approach, tangent stiffness, pressure and roots."""
+    from femgear.case.gear_set import gear_material
+    from femgear.trains.static.stages import solve_static, solve_stress
+
+    case = pair_case(teeth)
+    static = solve_static(case)
+    cycle, stress = static.cycle, solve_stress(case, static)
+    ours = np.column_stack([
+        1e6 * cycle.deflection[0], 1e-6 * cycle.stiffness[0], 1e-6 * cycle.max_pressure[0],
+        *(1e-6 * root.stress[:, :, 0].max(axis=(0, 2)) for root in stress.roots),
+    ])  # fmt: skip
+    rows = []
+    for position, values in zip(cycle.position, ours):
+        expected = contact_of_gears(
+            static.planetary_set, gear_material(case, "gear_1"), torque=static.sun_torque,
+            position=float(position), approach=1e-6 * values[0],
+        )  # fmt: skip
+        for quantity, gate, theirs, value in zip(QUANTITIES, GATES, expected, values):
+            text = f"{name}, position {position:g}: {quantity}"
+            rows.append(within("CalculiX", SOURCE, text, theirs, value, gate))
+    return tuple(rows)
+
+
+def contact_of_gears(
+    gears: GearSet, material: Material, *, torque: float, position: float, approach: float,
+    penalty: float = PENALTY, flank_elements: int = FLANK_ELEMENTS,
+) -> np.ndarray:  # fmt: skip
+    """Compute the quantities of `QUANTITIES` of a pair by CalculiX.
+
+    Parameters
+    ----------
+    gears : GearSet
+        Of one pair.
+    material : Material
+    torque : float
+        [N m]
+    position : float
+        [mesh periods]
+    approach : float
+        Where the contact is solved, a little to either side [m]; values are interpolated to the torque.
+    penalty, flank_elements : float, int
+        See `calculix.pair_contact` and `calculix.whole_gear`.
+    """
+    first, second = gears.kinds[0].gears
+    angles = [of_gear[0] for of_gear in orientations(gears, position).gears]
+    centre = gears.centre_distance * (-1.0 if second.internal else 1.0)
+    teeth = calculix.near_teeth((first, second), angles, centre, within=NEAR)
+    bodies = [
+        calculix.whole_gear(
+            gear, "right" if gear.internal else "left", [mates[number] for mates in teeth],
+            flank_elements=flank_elements,
+        ).turned(angles[number], (place, 0.0))
+        for number, (gear, place) in enumerate(((first, 0.0), (second, centre)))
+    ]  # fmt: skip
+    contact = calculix.pair_contact(
+        bodies, teeth, approach * np.array([1.0 - STEP, 1.0 + STEP]), base_radius=first.base_radius,
+        width=first.face_width, material=material, penalty=penalty,
+        states=(PLANE_STRAIN, RING_STATE if second.internal else PLANE_STRAIN),
+    )  # fmt: skip
+    stiffness = np.diff(contact.torque)[0] / first.base_radius / np.diff(contact.approach)[0]
+    return np.array([
+        1e6 * contact.at(torque, contact.approach), 1e-6 * stiffness,
+        1e-6 * contact.at(torque, contact.pressure.mean(axis=0)),
+        *(1e-6 * contact.at(torque, root) for root in contact.root),
+    ])  # fmt: skip
