@@ -223,7 +223,13 @@ def moduli(material: Material, state: str) -> tuple[float, float]:
 
 
 def body_input(
-    body: PlaneBody, name: str, material: Material, state: Mapping[str, str], *, node: int = 0, element: int = 0
+    body: PlaneBody,
+    name: str,
+    material: Material,
+    state: Mapping[str, str],
+    *,
+    node: int = 0,
+    element: int = 0,
 ) -> list[str]:
     """Write nodes, elements of 1 mm thickness and materials of a plane body, numbered after those given.
 
@@ -240,7 +246,8 @@ def body_input(
         ]
         E, nu = moduli(material, state[part])
         lines += [
-            f"*MATERIAL, NAME=M{group}\n*ELASTIC\n{E:.12g},{nu:.12g}\n*DENSITY\n{1e-12 * material.density:.9g}",
+            f"*MATERIAL, NAME=M{group}\n*ELASTIC\n{E:.12g},{nu:.12g}",
+            f"*DENSITY\n{1e-12 * material.density:.9g}",
             f"*SOLID SECTION, ELSET={group}, MATERIAL=M{group}\n1.",
         ]
     return lines
@@ -269,12 +276,74 @@ def near_teeth(
     for tooth in (-2, -1, 0, 1, 2):
         mates = tooth, tooth if gears[1].internal else -tooth
         first, second = (
-            _turned(flank, angle + number * gear.pitch_angle) + (place, 0.0)
+            _turned(flank, angle + number * gear.pitch_angle) + np.array([place, 0.0])
             for flank, angle, number, gear, place in zip(curves, angles, mates, gears, (0.0, centre))
         )
         if KDTree(second).query(first)[0].min() < within:
             found.append(mates)
     return found
+
+
+def over_arc(body: PlaneBody, name: str, angle: float = 0.0, width: float = 2.0 * np.pi) -> dict[int, float]:
+    """Spread one over an arc of a round boundary about an angle [rad]: shares of its nodes.
+
+    Shares are integrals of the shape functions of the edges over the arc, by Gauss points.
+    """
+    points, weights = np.polynomial.legendre.leggauss(40)
+    shapes = np.array([0.5 * points * (points - 1), 0.5 * points * (points + 1), 1 - points**2])
+    shares: dict[int, float] = {}
+    for edge in body.edges[name]:
+        x, y = body.points[edge].T
+        middle = np.arctan2(y[2], x[2])
+        ends = np.angle(np.exp(1j * (np.arctan2(y[:2], x[:2]) - middle)))
+        place = 0.5 * (ends[1] - ends[0]) * points
+        away = np.abs(np.angle(np.exp(1j * (middle + place - angle))))
+        inside = (away < 0.5 * width) | (width >= 2.0 * np.pi)
+        if inside.any():
+            for node, share in zip(edge, shapes @ (weights * inside) * abs(place[-1] / points[-1])):
+                shares[int(node)] = shares.get(int(node), 0.0) + float(share)
+    total = sum(shares.values())
+    return {node: share / total for node, share in shares.items()}
+
+
+def natural_frequencies(
+    body: PlaneBody, material: Material, state: Mapping[str, str], *, springs: Mapping[int, float],
+    masses: Mapping[int, float], count: int,
+) -> np.ndarray:  # fmt: skip
+    """Compute the lowest natural frequencies [Hz] of a plane body on springs to the ground.
+
+    Parameters
+    ----------
+    body : PlaneBody
+    material : Material
+    state : mapping
+        See `body_input`.
+    springs : mapping of int to float
+        Stiffness of nodes in x and y over the width of the body [N/m^2].
+    masses : mapping of int to float
+        Masses that move along with nodes, over the width [kg/m].
+    count : int
+    """
+    lines, element = body_input(body, "1", material, state), len(body.triangles)
+    for kind, given, factor in (("SPRING", springs, 1e-6), ("MASS", masses, 1e-6)):
+        groups: dict[str, list[int]] = {}
+        for node, value in given.items():
+            groups.setdefault(f"{factor * value:.9e}", []).append(node + 1)
+        for group, (value, nodes) in enumerate(groups.items()):
+            for way in (1, 2) if kind == "SPRING" else (0,):
+                name = f"{kind}{way}G{group}"
+                lines.append(f"*ELEMENT, TYPE={'SPRING1' if way else 'MASS'}, ELSET={name}")
+                lines += [f"{element + i + 1},{node}" for i, node in enumerate(nodes)]
+                lines += [f"*SPRING, ELSET={name}\n{way}" if way else f"*MASS, ELSET={name}", value]
+                element += len(nodes)
+    lines.append(f"*STEP\n*FREQUENCY\n{count}\n*END STEP")
+    return frequencies(run("\n".join(lines) + "\n").tables)
+
+
+def frequencies(text: str) -> np.ndarray:
+    """Read the natural frequencies [Hz]."""
+    found = re.findall(r"^ +\d+((?: +[-+.E0-9]+){4}) *$", text, flags=re.MULTILINE)
+    return np.array([float(row.split()[2]) for row in found])
 
 
 @dataclass(frozen=True)
@@ -305,8 +374,8 @@ class PairContact:
 
 
 def pair_contact(
-    bodies: Sequence[PlaneBody], teeth: Sequence[tuple[int, int]], approach: Sequence[float], *, base_radius: float, width: float,
-    material: Material, states: Sequence[Mapping[str, str]], penalty: float,
+    bodies: Sequence[PlaneBody], teeth: Sequence[tuple[int, int]], approach: Sequence[float], *,
+    base_radius: float, width: float, material: Material, states: Sequence[Mapping[str, str]], penalty: float,
 ) -> PairContact:  # fmt: skip
     """Solve the contact of two whole plane gears: rim of the first turned, that of the second held.
 
@@ -356,8 +425,10 @@ def pair_contact(
     for path in approach:
         angle = path / base_radius
         lines.append("*STEP, INC=200\n*STATIC\n1.,1.\n*BOUNDARY")
-        lines += [f"{n + 1},1,1,{-angle * b:.14g}\n{n + 1},2,2,{angle * a:.14g}" for n, a, b in zip(rim, x, y)]
-        lines += ["*NODE PRINT, NSET=RIM1\nRF", "*EL FILE, OUTPUT=2D, NSET=SHOWN\nS", "*END STEP"]  # fmt: skip
+        lines += [
+            f"{n + 1},1,1,{-angle * b:.14g}\n{n + 1},2,2,{angle * a:.14g}" for n, a, b in zip(rim, x, y)
+        ]
+        lines += ["*NODE PRINT, NSET=RIM1\nRF", "*EL FILE, OUTPUT=2D, NSET=SHOWN\nS", "*END STEP"]
     output = run("\n".join(lines) + "\n")
     torque = []
     for rows in tables(output.tables, "forces"):
@@ -369,13 +440,11 @@ def pair_contact(
         stress[numbers] = 1e6 * _principal(values)
         roots_found.append([stress[own, 1].max() for own in roots])
         pressure.append([max(_peak(points, -stress[own, 0]) for own, points in chains) for chains in flanks])
-    return PairContact(
-        np.array(approach), np.array(torque), np.array(pressure).T, np.array(roots_found).T
-    )
+    return PairContact(np.array(approach), np.array(torque), np.array(pressure).T, np.array(roots_found).T)
 
 
 def _peak(points: np.ndarray, pressure: np.ndarray) -> float:
-    """Largest pressure (n,) at the nodes of a flank: that of a parabola through those above 0.8 of the largest.
+    """Largest pressure at the nodes (n,) of a flank, by a parabola through those above 0.8 of the largest.
 
     Values at nodes scatter by some per cent, as the sides of elements do not end where the contact does.
     Hertz's half ellipse is such a parabola within 0.3 % there.
@@ -387,8 +456,9 @@ def _peak(points: np.ndarray, pressure: np.ndarray) -> float:
     near = pressure > 0.8 * pressure[largest]
     if np.count_nonzero(near) < 4:
         return float(pressure[largest])
-    a, b, c = np.polyfit(along[near], pressure[near], 2)
-    return float(c - 0.25 * b**2 / a) if a < 0 else float(pressure[largest])
+    parabola = np.polyfit(along[near], pressure[near], 2)
+    place = np.linspace(along[near].min(), along[near].max(), 501)
+    return float(np.polyval(parabola, place).max())
 
 
 def _principal(stress: np.ndarray) -> np.ndarray:

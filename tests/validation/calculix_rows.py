@@ -12,8 +12,11 @@ from femgear.contact.bodies import RING_STATE
 from femgear.fe.elasticity import Material
 from femgear.gears.kinematics import orientations
 from femgear.gears.planetary import GearSet
-from validation import calculix
+from validation import calculix, fixed_housing
+from validation.cases import reference_case, reference_material, reference_static
+from validation.fixed_housing import FEET_ANGLES, FOOT_WIDTH
 from validation.rows import Row, information, within
+from validation.whole_ring import whole_grid
 
 SOURCE = "CalculiX"
 POSITIONS = 8
@@ -29,6 +32,7 @@ QUANTITIES = (
     "transmission error [um]", "tangent stiffness [N/um]", "contact pressure [MPa]",
     "largest stress in the root of gear 1 [MPa]", "largest stress in the root of gear 2 [MPa]",
 )  # fmt: skip
+MODES = 8
 GATES = 0.002, 0.002, 0.02, 0.02, 0.02
 
 PAIR = """
@@ -150,3 +154,33 @@ def contact_of_gears(
         1e-6 * contact.at(torque, contact.pressure.mean(axis=0)),
         *(1e-6 * contact.at(torque, root) for root in contact.root),
     ])  # fmt: skip
+
+
+@where_installed
+def ring_on_feet() -> tuple[Row, ...]:
+    """Ring of the reference set on its foundation and four feet, all its teeth in one plane grid."""
+    case, rows = reference_case(), list[Row]()
+    gear = reference_static().planetary_set.ring
+    grid = whole_grid(gear)
+    teeth = np.concatenate([own for name, own in grid.regions.items() if name.startswith("tooth")])
+    body = calculix.PlaneBody(
+        grid.points, grid.triangles, grid.boundaries, np.isin(np.arange(len(grid.triangles)), teeth)
+    )
+    around = 2.0 * np.pi * gear.rim_radius * case.ring.foundation_radial
+    for stiffness, mass in ((4e8, 0.05), (4e9, 0.0)):
+        springs = {node: around * share for node, share in calculix.over_arc(body, "rim").items()}
+        masses: dict[int, float] = {}
+        for angle in np.radians(FEET_ANGLES):
+            foot = calculix.over_arc(body, "rim", angle, FOOT_WIDTH / gear.rim_radius)
+            for node, share in foot.items():
+                springs[node] += share * stiffness / gear.face_width
+                masses[node] = share * mass / gear.face_width
+        expected = calculix.natural_frequencies(
+            body, reference_material(), RING_STATE, springs=springs, masses=masses if mass else {},
+            count=MODES,
+        )  # fmt: skip
+        found = fixed_housing.ring_on_feet(stiffness, mass)
+        for i, reference in enumerate(expected[:MODES]):
+            words = f"four feet of {stiffness:.0e} N/m, {1e3 * mass:g} g: natural frequency {i + 1} [Hz]"
+            rows.append(within("feet", SOURCE, words, reference, found[i], 0.002))
+    return tuple(rows)

@@ -7,6 +7,7 @@ under its slow parts when it takes more than a few seconds.
 from __future__ import annotations
 
 from validation import (
+    calculix_rows,
     contact,
     drivetrain,
     dynamics,
@@ -130,6 +131,16 @@ THEMES = (
         "gears solid over their face width, half as fine as in plane contact, contacts on the path alone.",
         (),
         (pairs.iso_stiffness, pairs.whole_bodies, helical_pair.finite_width),
+    ),
+    Theme(
+        "CalculiX",
+        "CalculiX",
+        "Another finite-element program, where it is installed (`ccx`; Debian: calculix-ccx). Pairs: whole "
+        "gears in contact at 200 N m, 20 mm wide, at eight positions; the body of an internal gear is in "
+        "plane stress, as in femgear, all else in plane strain. Contact is a penalty of 1 GPa at 10 nm. The "
+        "ring is that of the reference set on its foundation and on feet of 20 mm, all teeth in one grid.",
+        (),
+        (calculix_rows.external_pair, calculix_rows.internal_pair, calculix_rows.ring_on_feet),
     ),
     Theme(
         "static",
