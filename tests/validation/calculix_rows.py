@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import wraps
 
 import numpy as np
@@ -19,7 +19,8 @@ from validation.rows import Row, information, within
 from validation.whole_ring import whole_grid
 
 SOURCE = "CalculiX"
-POSITIONS = 8
+EXTERNAL_POSITIONS = tuple(np.arange(8) / 8)
+INTERNAL_POSITIONS = (20 / 64,)
 STEP = 0.02
 """Change of the approach to either side, for the tangent."""
 PENALTY = 1e17
@@ -28,12 +29,35 @@ FLANK_ELEMENTS = 96
 NEAR = 40e-6
 """Distance [m] within which flanks may touch: twice the approach of the pairs."""
 PLANE_STRAIN = {"tooth": "plane strain", "body": "plane strain"}
-QUANTITIES = (
+APPROACH, STIFFNESS, PRESSURE, ROOT_1, ROOT_2 = QUANTITIES = (
     "transmission error [um]", "tangent stiffness [N/um]", "contact pressure [MPa]",
     "largest stress in the root of gear 1 [MPa]", "largest stress in the root of gear 2 [MPa]",
 )  # fmt: skip
 MODES = 8
 GATES = 0.002, 0.002, 0.02, 0.02, 0.02
+CORNER = (
+    "a tip corner carries, as femgear's edge_contact says: neither program resolves it, and which is nearer "
+    "is not known"
+)
+TANGENT = (
+    "CalculiX's tangent is that between two solutions 4 % apart, whose contacts end inside elements of 0.06 "
+    "mm: it scatters by 0.3 % to either side over the positions, where transmission errors stay within 0.1 %"
+)
+NODES = (
+    "CalculiX's pressure is that of stresses at nodes of elements half as long as the contact's half width: "
+    "at position 0 it is 1.4 % above femgear's with 96 elements along the flank, 0.5 % with 120"
+)
+STATES = (
+    "the plane state changes on the tooth base, which ends in the fillet, where CalculiX's stress at nodes "
+    "has the jump; with all in plane strain CalculiX has 123.1 MPa"
+)
+DIFFERS = {
+    **{("24/36", position, STIFFNESS): TANGENT for position in (0.125, 0.375, 0.75)},
+    **{("24/36", position, PRESSURE): NODES for position in (0.375, 0.5, 0.625, 0.75)},
+    ("24/-60", 20 / 64, STIFFNESS): TANGENT,
+    ("24/-60", 20 / 64, PRESSURE): NODES,
+    ("24/-60", 20 / 64, ROOT_2): STATES,
+}
 
 PAIR = """
 format = 1
@@ -69,7 +93,7 @@ def where_installed(rows: Callable[[], tuple[Row, ...]]) -> Callable[[], tuple[R
     return either
 
 
-def pair_case(teeth: str, positions: int = POSITIONS) -> Case:
+def pair_case(teeth: str, positions: int) -> Case:
     """Case of one of the pairs."""
     from femgear.trains.reading import parse_case
 
@@ -79,37 +103,48 @@ def pair_case(teeth: str, positions: int = POSITIONS) -> Case:
 @where_installed
 def external_pair() -> tuple[Row, ...]:
     """Pair 24/36 of cases/spur_pair.toml: whole gears of CalculiX in contact, plane strain."""
-    return pair_rows(EXTERNAL, "24/36")
+    return pair_rows(EXTERNAL, "24/36", EXTERNAL_POSITIONS)
 
 
 @where_installed
 def internal_pair() -> tuple[Row, ...]:
     """Pair 24/60 with an internal gear, whose body is in plane stress as in femgear."""
-    return pair_rows(INTERNAL, "24/-60")
+    return pair_rows(INTERNAL, "24/-60", INTERNAL_POSITIONS)
 
 
-def pair_rows(teeth: str, name: str) -> tuple[Row, ...]:
-    """Compare a pair at equidistant positions: approach, tangent stiffness, pressure and roots."""
+def pair_rows(teeth: str, name: str, positions: Sequence[float]) -> tuple[Row, ...]:
+    """Compare a pair at some of 64 positions: approach, tangent stiffness, pressure and roots."""
     from femgear.case.gear_set import gear_material
     from femgear.trains.static.stages import solve_static, solve_stress
 
-    case = pair_case(teeth)
+    case = pair_case(teeth, 64)
     static = solve_static(case)
     cycle, stress = static.cycle, solve_stress(case, static)
-    ours = np.column_stack([
-        1e6 * cycle.deflection[0], 1e-6 * cycle.stiffness[0], 1e-6 * cycle.max_pressure[0],
-        *(1e-6 * root.stress[:, :, 0].max(axis=(0, 2)) for root in stress.roots),
-    ])  # fmt: skip
-    rows = []
-    for position, values in zip(cycle.position, ours):
+    edge, rows = static.dataset()["edge_contact"].values[0], list[Row]()
+    for position in positions:
+        i = round(64 * position)
+        ours = (
+            1e6 * cycle.deflection[0, i], 1e-6 * cycle.stiffness[0, i], 1e-6 * cycle.max_pressure[0, i],
+            *(1e-6 * root.stress[:, i, 0].max() for root in stress.roots),
+        )  # fmt: skip
         expected = contact_of_gears(
             static.planetary_set, gear_material(case, "gear_1"), torque=static.sun_torque,
-            position=float(position), approach=1e-6 * values[0],
+            position=position, approach=cycle.deflection[0, i],
         )  # fmt: skip
-        for quantity, gate, theirs, value in zip(QUANTITIES, GATES, expected, values):
-            text = f"{name}, position {position:g}: {quantity}"
-            rows.append(within("CalculiX", SOURCE, text, theirs, value, gate))
+        rows += compared(name, position, expected, ours, edge=bool(edge[i]))
     return tuple(rows)
+
+
+def compared(
+    name: str, position: float, expected: Sequence[float], ours: Sequence[float], *, edge: bool
+) -> list[Row]:
+    """Compare the quantities of `QUANTITIES`; ``edge`` says that a tip corner carries."""
+    rows = []
+    for quantity, gate, theirs, value in zip(QUANTITIES, GATES, expected, ours, strict=True):
+        reason = CORNER if edge else DIFFERS.get((name, position, quantity), "")
+        text = f"{name}, position {position:g}: {quantity}"
+        rows.append(within("CalculiX", SOURCE, text, theirs, float(value), gate, explanation=reason))
+    return rows
 
 
 def contact_of_gears(
