@@ -138,7 +138,7 @@ THEMES = (
         "Another finite-element program, where it is installed (`ccx`; Debian: calculix-ccx). Pairs: whole "
         "gears in contact at 200 N m, 20 mm wide, positions in mesh periods; the body of an internal gear is "
         "in plane stress, as in femgear, all else in plane strain. Contact is a penalty of 1 GPa at 10 nm. "
-        "The ring is that of the reference set on its foundation and on feet of 20 mm, all teeth in one grid.",
+        "The ring is that of the reference set on its foundation and on feet of 20 mm, all teeth in a grid.",
         (),
         (calculix_rows.external_pair, calculix_rows.internal_pair, calculix_rows.ring_on_feet),
     ),
