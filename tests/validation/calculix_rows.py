@@ -45,7 +45,8 @@ TANGENT = (
 )
 NODES = (
     "CalculiX's pressure is that of stresses at nodes of elements half as long as the contact's half width: "
-    "at position 0 it is 1.4 % above femgear's with 96 elements along the flank, 0.5 % with 120"
+    "at position 0.5 it is 4.5 % above femgear's with 96 elements along the flank, 0.4 % with 192, where "
+    "transmission error and stiffness stay within 0.03 %"
 )
 STATES = (
     "the plane state changes on the tooth base, which ends in the fillet, where CalculiX's stress at nodes "
