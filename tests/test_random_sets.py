@@ -442,8 +442,8 @@ QUICK_INVARIANTS = {
 """Some for each of few sets; all of them are in the slow tests."""
 
 
-# seed 23: stiffness 2.7e-4 of the largest apart, at equal places 2e-12 (9e-4 of the deflection with the planets
-# counted from the second)
+# seed 23: stiffness 2.7e-4 of the largest apart, at equal places 2e-12; with the planets counted from the
+# second 9e-4 of the deflection
 _LAST_INTERVAL = pytest.mark.xfail(
     strict=False,
     reason="the interval over the end of the period always counts as one in which tooth pairs change; it is "
