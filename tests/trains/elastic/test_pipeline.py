@@ -137,6 +137,8 @@ def test_planets_out_of_phase_are_equal_and_leave_only_multiples_of_three(case):
     for entry in (
         (data["set"], "centre_distance"),
         (data["sun"], "profile_shift"),
+        (data["sun"], "tip_diameter"),
+        (data["planet"], "tip_diameter"),
         (data["housing"], "published"),
     ):
         entry[0].pop(entry[1])

@@ -256,7 +256,9 @@ def test_safeties_of_static_runs_have_no_dynamic_factors(case, files):
 def test_the_verdict_says_what_shares_belong_to(case, files):
     """Static results with fixed centres beside factors on supports, and shares of an instant beside means."""
     share = np.array([0.0, 0.5, 0.5])[:, None] + 0.0 * files["static"]["load_share"]
-    one_off = files | {"static": files["static"].assign(load_share=share.transpose("planet", "position"))}
+    share = share.transpose("planet", "position")
+    unequal = files["static"].assign(load_share=share, largest_load_share=share.max("position"))
+    one_off = files | {"static": unequal}
     rows, notes = told_of(case, one_off)
     assert {"largest root stress, all centres held", "transmission error, peak to peak, all centres held"} < {
         *rows

@@ -174,7 +174,7 @@ def test_documentation_names_every_variable(results):
     assert table.keys() == set(data.data_vars) | ONLY_LONG | ONLY_SLICES and ONLY_SHORT <= set(data.data_vars)
     for name, variable in data.data_vars.items():
         assert table[name] == (", ".join(variable.dims), variable.attrs["units"]), name
-    assert set(data.attrs) - {"title", "femgear_format", "femgear_version"} <= set(
+    assert set(data.attrs) - {"title", "findings", "femgear_format", "femgear_version"} <= set(
         re.findall(r"`(\w+)`", section)
     )
     assert set(data.coords) <= set(re.findall(r"`(\w+)`", section))
