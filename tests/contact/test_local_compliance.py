@@ -73,11 +73,15 @@ def test_surface_displacement_is_the_mean_of_flamants_logarithm(nu):
 
 
 def test_windows_yield_on_both_flanks_as_their_material_and_width_say():
-    """Equal cells inside the flanks: twice Flamant's mean logarithm over the face width, by distance."""
+    """Equal cells inside the flanks: Flamant's mean logarithm of both, over the mesh width, by distance."""
     cells, width = 4, 3e-4
-    bodies = SimpleNamespace(material=Material(E, NU, 7850.0), face_width=12.5e-3)
-    found = _window_compliance(width, cells, bodies)[0]
-    h, factor = width / cells / 2, -2 * (1 - NU) / (np.pi * MU * 12.5e-3)
+    mates = [
+        SimpleNamespace(corner=SimpleNamespace(shear_modulus=shear, poisson_ratio=nu))
+        for shear, nu in ((MU, NU), (0.5 * MU, 0.27))
+    ]
+    bodies = SimpleNamespace(mates=(None, mates), widths=(25e-3, 12.5e-3))
+    found = _window_compliance(width, cells, bodies, 1)[0]
+    h, factor = width / cells / 2, -((1 - NU) / MU + (1 - 0.27) / (0.5 * MU)) / (np.pi * 12.5e-3)
 
     def mean_log(x):
         # of ln |x - s| over |s| < h, by the antiderivative t ln t - t

@@ -20,6 +20,7 @@ CASES = Path(__file__).parents[3] / "cases"
 PAIR = {
     "teeth = 24": "teeth = 23", "teeth = 36 ": "teeth = 71 ", '"91.5 mm"': '"142 mm"',
     '# backlash = "0.1 mm"': 'backlash = "0.12 mm"', "positions = 64": "positions = 32",
+    'tip_diameter = "79.8 mm"': "", 'tip_diameter = "115.3786 mm"': "",
 }  # fmt: skip
 ENTRY = "parallel[0].stiffness"
 

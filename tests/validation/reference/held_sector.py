@@ -20,4 +20,5 @@ def held_sector_compliance(
     sector = condense_sector(grid, stiffness, count=gear.teeth, rim=held, loads=loads, observations=seen)
     even, odd = sector.supported().compliance
     held_compliance = np.block([[even + odd, even - odd], [even - odd, even + odd]])[None]
-    return _without_half_plane(gear, material, stations, depths, held_compliance, len(grid.points))
+    widths = (gear.face_width,) * 2
+    return _without_half_plane(gear, material, stations, depths, held_compliance, len(grid.points), widths)
