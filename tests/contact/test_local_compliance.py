@@ -18,7 +18,6 @@ from validation.reference.hertz import (
 
 from femgear.contact.assembly import _window_compliance
 from femgear.contact.local_compliance import depth_displacement, surface_displacement
-from femgear.fe.elasticity import Material
 
 E, NU = 206e9, 0.3
 MU = E / (2 * (1 + NU))
