@@ -134,7 +134,14 @@ def test_clean_keeps_the_grids_of_the_repository(tmp_path, checkout):
 def test_ci_runs_the_tests_and_stops_at_the_first_failure():
     lines = (ROOT / ".ci" / "run").read_text().splitlines()
     assert "set -euo pipefail" in lines
-    assert lines[-3] == "make test" and lines[-1].startswith("if command -v chromium")
+    assert {"make lint", "make test"} <= set(lines) and any(
+        line.startswith("if command -v chromium") for line in lines
+    )
+    # once more in a folder with the name of the package, a blank and a letter beyond ASCII
+    assert lines[-2:] == [
+        'git clone --quiet . "$elsewhere/fem gear/femgear ü"',
+        'make -C "$elsewhere/fem gear/femgear ü" test',
+    ]
     assert os.access(ROOT / ".ci" / "run", os.X_OK)
 
 
