@@ -442,15 +442,6 @@ QUICK_INVARIANTS = {
 """Some for each of few sets; all of them are in the slow tests."""
 
 
-# seed 23: stiffness 2.7e-4 of the largest apart, at equal places 2e-12; with the planets counted from the
-# second 9e-4 of the deflection
-_LAST_INTERVAL = pytest.mark.xfail(
-    strict=False,
-    reason="the interval over the end of the period always counts as one in which tooth pairs change; it is "
-    "halved, while its mirror image at the beginning need not be",
-)
-
-
 @pytest.mark.parametrize(
     ("solved", "invariant"),
     [
@@ -458,10 +449,7 @@ _LAST_INTERVAL = pytest.mark.xfail(
             seed,
             invariant,
             id=f"seed{seed:03d}-{invariant.__name__}",
-            marks=[
-                *([] if invariant in QUICK_INVARIANTS.get(seed, ()) else [pytest.mark.slow]),
-                *([_LAST_INTERVAL] if invariant is equal_peaks_in_the_mirror else []),
-            ],
+            marks=[] if invariant in QUICK_INVARIANTS.get(seed, ()) else [pytest.mark.slow],
         )
         for seed in SLOW
         for invariant in INVARIANTS

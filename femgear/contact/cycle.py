@@ -628,8 +628,12 @@ class _Walk:
         """What has peaks over the positions, and the tooth pairs that carry as `tooth_pair_codes`."""
         names = ("position", "deflection", "stiffness", "sun_arc", "load_share")
         pitch = self.planetary_set.base_pitch
-        codes = tooth_pair_codes(record.path, record.tooth_load, record.position, pitch)
-        return {name: np.asarray(getattr(record, name)) for name in names} | {"codes": codes}
+        codes, later = (
+            tooth_pair_codes(record.path, record.tooth_load, record.position + after, pitch)
+            for after in (0.0, float(self.empty.periods))
+        )
+        curves = {name: np.asarray(getattr(record, name)) for name in names}
+        return curves | {"codes": codes, "later_codes": later}
 
     def _open_places(self, known: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
         """Find open peaks, see `open_places`; the first of planets that are alike stands for all."""
@@ -637,15 +641,18 @@ class _Walk:
         deflection, stiffness = known["deflection"], known["stiffness"]
         first = np.flatnonzero(np.arange(len(deflection)) % N < N // self.alike)
         arc, share = known["sun_arc"][None], known["load_share"][: N // self.alike]
-        codes = known["codes"][first]
+        codes, later = (
+            np.concatenate([numbers.sum(axis=0)[None], numbers[first]])
+            for numbers in (known["codes"], known["later_codes"][:, order[:1]])
+        )
         # which pairs carry changes slopes of deflections; stiffnesses jump there, and are equal on both sides
         same = np.zeros((len(first) + len(share), len(order)), np.int64)
         curves = np.concatenate([arc, deflection[first], stiffness[first], share])
         still = [1e-3] * (1 + len(first)) + [0.1] * len(same)
         least = np.array(still) * np.abs(curves).max(axis=1)
-        codes = np.concatenate([known["codes"].sum(axis=0)[None], codes, same])
+        codes, later = np.concatenate([codes, same]), np.append(later[:, 0], same[:, 0])
         position, curves, codes = known["position"][order], curves[:, order], codes[:, order]
-        return open_places(position, curves, codes, least, self.empty.periods)
+        return open_places(position, curves, codes, least, self.empty.periods, later)
 
     def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
         """What `MeshCycle` keeps of some positions, by the names of its fields; of the planets solved."""

@@ -68,6 +68,7 @@ def open_places(
     codes: np.ndarray,
     least: np.ndarray,
     periods: int,
+    later: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """Find the middles of intervals (n,) that may hold higher peaks, and what is left beyond them.
 
@@ -81,6 +82,8 @@ def open_places(
         Numbers of the tooth pairs that carry, which say where these change.
     least : (K,) array
         Peak to peak below which a curve counts as constant.
+    later : (K,) array, optional
+        Numbers of the first position after all ``periods``: those of other teeth. Default: as at first.
 
     Returns
     -------
@@ -89,7 +92,7 @@ def open_places(
     doubt : float
         Largest share of a peak to peak that intervals which are not halved any more may add.
     """
-    other = codes != np.roll(codes, -1, axis=1)
+    other = codes != np.column_stack([codes[:, 1:], codes[:, 0] if later is None else later])
     beyond, length = _beyond(position, values, other, least, periods)
     wanted = (beyond > 0.5 * TOLERANCE) | (other & (length > (1.0 + 1e-9) * ENCLOSED))
     halved = wanted.any(axis=0) & (length > SHORTEST)
