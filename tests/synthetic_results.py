@@ -123,6 +123,8 @@ def stress() -> xr.Dataset:
         "root_worst_slope": _variable(mg, slope[at] * same, "rad", "its place"),
         "root_worst_position": _variable(mg, path[top] % 1 * same, "1", "its position"),
         "root_worst_path": _variable(mg, path[top] * same, "1", "its path"),
+        "root_worst_load": _variable(mg, load[top] * same, "N", "its load"),
+        "root_notch_radius": _variable(mg, 0.45 * MODULE * same, "m", "smallest radius of curvature"),
         "root_range_maximum": _variable(mg, height, "Pa", "largest stress over a turn"),
         "root_range_minimum": _variable(mg, low, "Pa", "smallest stress over a turn"),
         "root_range_arc": _variable(mg, arc[at] * same, "m", "place of the range"),
@@ -131,7 +133,15 @@ def stress() -> xr.Dataset:
     return xr.Dataset(
         data | _planet_turn(height, low) | _tooth_contacts(force),
         coords={"mesh": MESHES, "gear": ["first", "second"], "root": ["loaded", "back"]},
-        attrs={"sun_torque": 100.0, "mesh_periods": 1, "repeats": 1, "iso": "", "load_counting": "peaks"},
+        attrs={
+            "sun_torque": 100.0,
+            "mesh_periods": 1,
+            "repeats": 1,
+            "iso": "",
+            "load_counting": "peaks",
+            "module": MODULE,
+            "nominal_load": force,
+        },
     )
 
 
@@ -166,7 +176,13 @@ def _tooth_contacts(force) -> dict:
         "pressure_offset": _variable(("mesh", "cell"), np.tile(offset, (2 * N, 1)), "m", "place of a cell"),
         "pressure_centre": _variable(mpp, np.zeros((2 * N, 2, 64)), "m", "middle of the window"),
         "pressure_path": _variable(mpp, np.tile(path, (2 * N, 1, 1)), "m", "path"),
+        "contact_worst_path": _variable("mesh", np.zeros(2 * N), "m", "its place: the pitch point"),
+        "contact_worst_load": _variable("mesh", np.full(2 * N, force), "N", "its load"),
+        "contact_worst_curvature": _variable("mesh", np.ones(2 * N), "1", "over that of the pitch point"),
+        "contact_start": _variable(("mesh", "gear"), np.full((2 * N, 2), 1e-3), "m", "begin above the base"),
+        "relief_kink": _variable("mesh", np.zeros(2 * N, dtype=int), "1", "whether a relief has a kink"),
         "iso_contact_stress": _variable("mesh", np.full(2 * N, 0.9 * largest.max()), "Pa", "nominal"),
+        "iso_contact_ratio_factor": _variable("mesh", np.full(2 * N, 0.9), "1", "Z_eps"),
         "load_bin_low": _variable("load_bin", edges[:-1], "N", "lower limit"),
         "load_bin_high": _variable("load_bin", edges[1:], "N", "upper limit"),
         "load_time_share": _variable(ml, last, "1", "share of the time"),

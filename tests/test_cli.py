@@ -689,4 +689,4 @@ def test_files_are_written_under_names_that_run_takes(tmp_path, capsys, monkeypa
 def test_terminals_without_columns_have_a_help(columns, monkeypatch, capsys):
     monkeypatch.setenv("COLUMNS", columns)
     assert cli.main(["new", "--help"]) == 0
-    assert "--teeth INT" in capsys.readouterr().out
+    assert "--teeth STR" in capsys.readouterr().out

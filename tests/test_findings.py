@@ -22,6 +22,7 @@ from femgear.report.tables import Marks, lower_bound, tabulate, unmarked
 from femgear.run import solve
 from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import train_of, trains
+from femgear.trains.static.results import describe_stress
 
 PACKAGE = Path(__file__).parents[1] / "femgear"
 CASES = Path(__file__).parents[1] / "cases"
@@ -495,6 +496,16 @@ def test_a_folder_of_the_former_format_says_that_its_warnings_are_not_known(tmp_
     edit_manifest(folder, femgear_format=4)
     (finding,) = open_results(folder).findings
     assert "stored no warnings" in finding.text and not finding.code
+
+
+def test_stresses_of_the_former_format_are_tabulated_without_reasons():
+    data = synthetic.stress()
+    data["iso_root_stress"] = 0.5 * data["iso_root_stress"]
+    assert any("FE/ISO =" in note for note in describe_stress(data).notes)
+    del data.attrs["nominal_load"], data.attrs["module"]
+    later = ("root_worst_load", "root_notch_radius", "contact_worst_load", "contact_worst_curvature")
+    block = describe_stress(data.drop_vars([*later, "contact_start", "relief_kink"]))
+    assert len(block.rows) == 6 and not any("FE/ISO =" in note for note in block.notes)
 
 
 def test_a_code_that_the_catalogue_has_no_more_is_read_as_text():

@@ -148,7 +148,7 @@ def test_every_part_of_a_message_is_one_line_without_control_characters():
         HOSTILE, code="E-CASE", key=HOSTILE, value=[HOSTILE], limit=HOSTILE, remedy=HOSTILE, file=HOSTILE
     )
     assert len(str(error).splitlines()) == 4 and str(error).count(ESCAPED) == 6
-    assert str(Finding("W-X", HOSTILE, HOSTILE, remedy=HOSTILE)).count(ESCAPED) == 3
+    assert str(Finding("W-TIP", HOSTILE, HOSTILE, remedy=HOSTILE)).count(ESCAPED) == 3
 
 
 def test_tables_show_control_characters_as_escapes(capsys):

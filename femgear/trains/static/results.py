@@ -962,7 +962,8 @@ def describe_stress(data: xr.Dataset) -> Block:
 
 def _reasons(data: xr.Dataset) -> Iterator[str]:
     """Say why stresses differ from nominal ones by more than `DIFFERS`, factor by factor."""
-    names, nominal_load = [str(name) for name in data["mesh"].values], float(data.attrs["nominal_load"])
+    names = [str(name) for name in data["mesh"].values]
+    nominal_load = float(data.attrs.get("nominal_load", 0.0))  # files of format 4 have none
     if nominal_load == 0.0:
         return
     excess = _over_hertz(data)
