@@ -280,7 +280,8 @@ def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, di
             break
         files |= {name: manifest.files[name] for name in names}
     discard(folder, {name: digest for name, digest in manifest.files.items() if name not in files})
-    run = _Run(folder, files)
+    # in the order of the run, whatever of it is there already
+    run = _Run(folder, files, findings={name: () for name in ("", *(stage.name for stage in stages))})
     for name in results:
         run.timings[name], run.convergence[name] = manifest.timings[name], manifest.convergence.get(name)
         run.findings[name] = tuple(one for one in manifest.findings if one.stage == name)

@@ -12,6 +12,7 @@ import xarray as xr
 from edited_manifests import edit_manifest
 
 from femgear.errors import StorageError
+from femgear.findings import as_data
 from femgear.run import run_case
 from femgear.storage import files
 from femgear.storage.files import append_dataset, checksum, read_dataset, read_result, write_result
@@ -81,6 +82,8 @@ def test_an_interrupted_run_goes_on_from_its_stages_to_the_same_bits(name, tmp_p
     with pytest.warns(UserWarning, match=f"{', '.join(left.timings)}: as the run that was interrupted"):
         assert run(case, tmp_path / "out") == stages[-1:]
     assert contents(tmp_path / "out") == contents(tmp_path / "whole")
+    again, whole = (read_manifest(tmp_path / name) for name in ("out", "whole"))
+    assert as_data(again.findings) == as_data(whole.findings) and again.convergence == whole.convergence
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(
         path.name for path in (tmp_path / "whole").iterdir()
     )

@@ -114,9 +114,10 @@ class Piece:
 
 def soak(state: State, folder: Path, minutes: float, processes: int, kinds: Sequence[str]) -> int:
     """Run pieces in so many processes until the time is over; the next call repeats interrupted ones."""
-    end, running, failed = time.monotonic() + 60.0 * minutes, [], 0
     now, here = commit(), machine()
     spent = {kind: state.seconds(kind, now) for kind in kinds}
+    # from here on: what Git and a long state take on a loaded machine would leave no time for a piece
+    end, running, failed = time.monotonic() + 60.0 * minutes, [], 0
     before = signal.signal(signal.SIGTERM, signal.default_int_handler)  # no piece is left behind
     try:
         while running or time.monotonic() < end:
