@@ -211,6 +211,8 @@ def _name_root_radius(error: GeometryError, case: Case) -> None:
     if most is None:
         error.limit, error.remedy = None, "reduce the dedendum: no root_radius fits"
     else:
+        # none fits with the one cutter that the gear has then; a smaller rounding may have another
+        error.message = error.message.removesuffix(", nor does any other")
         error.limit = f"<= {most:.4f} modules for the gears of this rack"
         error.remedy = "reduce root_radius"
 

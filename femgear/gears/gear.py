@@ -11,7 +11,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from numbers import Integral
 
 import numpy as np
@@ -296,6 +296,12 @@ def _rack_tip(gear: Gear, rounding: float | None) -> RackTip:
     )
 
 
+@lru_cache(maxsize=1024)
+def _working_angle(involute: float) -> float:
+    """Find the pressure angle [rad] of an involute [rad], kept: searches ask for the same ones again."""
+    return arcinv(involute)
+
+
 def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float | None = None) -> CutterTip:
     """Cutter at the centre distance that leaves it no play in the finished gap; lengths in m.
 
@@ -309,7 +315,7 @@ def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float | None = None)
     # a thinner tooth is a wider gap: the cutter is fed in as if the flank were shifted further out
     flank_shift = gear.profile_shift + 0.5 * gear.thickness_allowance / (module * tangent)
     shift = flank_shift - cutter.profile_shift
-    working = arcinv(inv(alpha) + 2.0 * tangent * shift / (gear.teeth - cutter.teeth))
+    working = _working_angle(inv(alpha) + 2.0 * tangent * shift / (gear.teeth - cutter.teeth))
     base = 0.5 * module * cutter.teeth * math.cos(alpha)
     pitch, cutter_pitch = gear.base_radius / math.cos(working), base / math.cos(working)
     centre_radius = gear.root_radius - (pitch - cutter_pitch) - rounding
