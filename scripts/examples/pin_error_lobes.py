@@ -24,7 +24,7 @@ figure, axes = plt.subplots(1, 2, subplot_kw={"projection": "polar"}, figsize=(8
 # %%
 # Measured were five lobes around order 216 at 800 rpm and six around order 432 at 2200 rpm.
 
-for (name, errors), style in zip(pins.items(), ("--", "-")):
+for (name, errors), style in zip(pins.items(), ("-", "--")):
     housing = solve(with_values(case, {"set.pin_errors": errors}), "housing")["housing"].dataset()
     for ax, (speed, harmonic) in zip(axes, ((800, 2), (2200, 4))):
         lines = stored_lines(housing.sel(speed=speed, method="nearest"))
