@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from femgear.housing.carrier_orders import CarrierOrders, LeadingMeshes, receptance, ring_load
+from femgear.housing.carrier_orders import CarrierOrders, LeadingMeshes, receptance
 from femgear.housing.set_damping import complex_times
 from femgear.housing.structure import FixedStructure
 from femgear.solvers.periodic.spectral import compliance
@@ -85,37 +85,6 @@ class HarmonicBlocks:
         found = np.zeros(self.compliance.shape[1:], complex)
         found[:, 0, self.orders.side_bands] = self.gears.load
         return found
-
-    def moved(self, on_gears: np.ndarray, on_structure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Deflections d_0 and u_0 by modal forces on gears (B, R, n_modes) and structure (B, S, m)."""
-        still = np.moveaxis(complex_times(on_gears * self.on_gears, self.gears.rows.T), -1, 0)
-        wave, path = self.structure.ring_shape, on_structure * self.on_structure
-        path = path @ wave
-        path = np.concatenate([path, np.zeros((len(path), 1, path.shape[2]))], axis=1)
-        turned, diameters = np.exp(1j * np.outer(self.orders.diameters, self.place)), np.arange(len(wave.T))
-        way = np.empty((len(self.place), *still.shape[1:]), complex)
-        for residue in range(self.orders.paths.symmetry):
-            own, to = self.orders.blocks(residue), self.orders.meeting(residue)[0]
-            way[:, own] = np.moveaxis(path[own][:, to, diameters] @ turned, -1, 0)
-        return still, way
-
-    def modal(self, extra, way, force, on_gears, on_structure) -> tuple[np.ndarray, np.ndarray]:
-        """Motions of the modes of gears (B, R, n_modes) and structure (B, S, m), without the constant load.
-
-        By forces e beyond k0, u, forces f of the meshes, and by modal forces.
-        """
-        G, orders, gears = len(self.place), self.orders, self.gears
-        excess, load = np.array(extra), np.array(on_gears)
-        excess[G:] -= gears.mean[G:, None, None] * way
-        structure = np.array(on_structure)
-        for residue in range(orders.paths.symmetry):
-            own, back = orders.blocks(residue), orders.meeting(residue)[1]
-            for c, rows in enumerate(gears.folded):
-                at = np.ix_(own, np.flatnonzero((residue + orders.bands) % len(gears.folded) == c))
-                load[at] -= np.moveaxis(excess[:, *at], 0, -1) @ rows
-            waves = ring_load(orders.paths.symmetry, force[G:, own], self.place, orders.diameters, back)
-            structure[own] += waves @ self.structure.ring_shape.conj().T
-        return self.on_gears * load, self.on_structure * structure
 
     @cached_property
     def on_gears(self) -> np.ndarray:

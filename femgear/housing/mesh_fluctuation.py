@@ -15,7 +15,7 @@ from femgear.housing.carrier_orders import CarrierOrders
 _FEW, _STEPS, _CYCLES, _RITZ = 3000, 250, 3, 60
 """Unknowns up to which a cycle of GMRES takes as many steps as it needs; steps of the first cycle of more of
 them at most, of each one after it twice as many; cycles; steps that tell the spectral radius."""
-_TINY = np.finfo(float).tiny
+_TWICE, _TINY = 0.7, np.finfo(float).tiny
 
 
 def _fft() -> Any:
@@ -115,11 +115,13 @@ def _krylov(answer, rest: np.ndarray, limit: float, most: int) -> tuple[np.ndarr
     basis[0] = rest / right[0]
     for k in range(most):
         image, known = answer(basis[k]), basis[: k + 1]
-        for _ in range(2):
+        before, length = np.inf, np.linalg.norm(image)
+        while length < _TWICE * before:  # what is left is orthogonal only if it is not small
             share = known @ image
             image = image - share @ known
             hessenberg[: k + 1, k] += share
-        hessenberg[k + 1, k] = np.linalg.norm(image)
+            before, length = length, np.linalg.norm(image)
+        hessenberg[k + 1, k] = length
         basis[k + 1] = image / max(hessenberg[k + 1, k], _TINY)
         # rotations make the equations (1 - answer) triangular
         column = -hessenberg[: k + 2, k]

@@ -15,27 +15,64 @@ turns of the ring acts on each order of the structure alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.housing.carrier_orders import CarrierOrders
+from femgear.housing.carrier_orders import CarrierOrders, LeadingMeshes, ring_load
 from femgear.housing.structure import FixedStructure, ring_waves
 from femgear.system.system import Modes
 
+if TYPE_CHECKING:
+    from femgear.housing.harmonic_blocks import HarmonicBlocks
+
+_TOGETHER = 16
+"""Blocks that are answered together: what lies between forces and motion stays in the cache."""
+_NOTHING = 1e-11
+"""Part of the largest number that is nothing in single precision."""
 _MOST_RATIO = 0.999
 """Damping ratio of a mode at most; what a set has beyond it is left to `SetDamping`."""
 
 
 @dataclass(frozen=True)
-class _Residue:
-    """Side bands of one residue in blocks of one, the waves that meet them, and the damping between both."""
+class _Class:
+    """Side bands of a block in which the same waves meet the gears, and the damping between both."""
 
-    blocks: np.ndarray
     bands: np.ndarray
     waves: np.ndarray
     place: np.ndarray  # (bands, waves) of L - s n among the orders of the structure
     matrix: np.ndarray  # of modes of the gears and these waves
+    rows: np.ndarray  # (J, n_modes) deflections of the leading meshes by the modes of the gears
+
+
+@dataclass(frozen=True)
+class _Residue:
+    """Blocks of one residue: classes of their side bands, and places of K + s n among these."""
+
+    blocks: np.ndarray
+    classes: tuple[_Class, ...]
+    path_back: np.ndarray  # (S, W) for the circumferential orders of the path
+    wave_back: np.ndarray  # (S, n_waves)
+    path_to: np.ndarray  # (R, W) of L - s n among the orders of the structure
+
+
+@dataclass(frozen=True)
+class DampingForces:
+    """Modal forces of the damping on gears (B, R, n_modes) and structure (B, S, m), and what they move.
+
+    Deflections of the meshes ``still`` (J, B, R) and of the ring ``way`` (G, B, R) by them [m].
+    """
+
+    on_gears: np.ndarray
+    on_structure: np.ndarray
+    still: np.ndarray
+    way: np.ndarray
+
+    @property
+    def parts(self) -> tuple[np.ndarray, ...]:
+        """The four arrays, in their order."""
+        return self.on_gears, self.on_structure, self.still, self.way
 
 
 @dataclass(frozen=True)
@@ -44,55 +81,102 @@ class SetDamping:
 
     orders: CarrierOrders
     residues: tuple[_Residue, ...]
-    first: np.ndarray  # cosines among the coordinates of waves, each before its sine
     wave: np.ndarray  # (n_waves,) place of each wave among the circumferential orders
-    shape: np.ndarray  # (m, n_waves + m) modes in these coordinates, and what acts on each order alone
+    shape: np.ndarray  # (m, n_waves) modes of the structure in these waves
+    own: np.ndarray  # (m, m) what acts on each order alone
+    path: np.ndarray  # (m, W) modes of the structure on the path of the meshes
+    rows: np.ndarray  # (J, n_modes) deflections of the leading meshes by the modes of the gears
 
-    def forces(self, speed: float, gears: np.ndarray, structure: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the modal forces of modal motions of gears (B, R, n_modes) and structure (B, S, m).
+    def none(self, leaders: int) -> DampingForces:
+        """No forces yet, of a set with so many leading planets."""
+        orders, (J, modes) = self.orders, self.rows.shape
+        size = len(orders.base), len(orders.bands)
+        shapes = (*size, modes), (size[0], len(orders.structure_bands(0)), len(self.own)), (J, *size)
+        return DampingForces(*(np.zeros(shape, complex) for shape in (*shapes, (leaders, *size))))
 
-        At a speed of the carrier [rad/s]; of the same shapes [N kg^-1/2].
+    def single(self) -> SetDamping:
+        """The same in single precision."""
+        residues = tuple(
+            replace(one, classes=tuple(
+                replace(part, matrix=_single(part.matrix), rows=_single(part.rows)) for part in one.classes
+            ))
+            for one in self.residues
+        )  # fmt: skip
+        given = {name: _single(getattr(self, name)) for name in ("shape", "own", "path", "rows")}
+        return replace(self, residues=residues, **given)
+
+    def answer(self, blocks: HarmonicBlocks, extra, way, force, before: DampingForces) -> DampingForces:
+        """Compute the forces of the damping by the motion at a speed, part by part of the blocks.
+
+        By forces e (J, B, R) beyond k0, u (G, B, R), forces f (J, B, R) of the meshes, and the forces of the
+        damping in that motion.
         """
-        count, orders, modes = len(self.wave), self.orders, gears.shape[2]
-        turning, s = -1j * speed * orders.order[..., None], -1j * speed * orders.sense
-        both = complex_times(structure, self.shape)
-        moved = _padded(self._mixed(both[..., :count], -1j))
-        on_gears, on_waves = np.empty_like(gears), np.zeros((*gears.shape[:2], count), complex)
-        for one in self.residues:
-            at = np.ix_(one.blocks, one.bands)
-            waves = moved[one.blocks][:, one.place, one.waves]
-            waves *= turning[at] - s * orders.diameters[self.wave[one.waves]]
-            motion = np.concatenate([turning[at] * gears[at], waves], axis=2)
-            force = motion @ one.matrix.T
-            on_gears[at] = force[..., :modes]
-            on_waves[one.blocks[:, None, None], one.bands[:, None], one.waves] = force[..., modes:]
-        gathered, on_waves = np.empty((*structure.shape[:2], count), complex), _padded(on_waves)
-        for residue in range(orders.paths.symmetry):
-            own, back = orders.blocks(residue), orders.meeting(residue)[1][:, self.wave]
-            gathered[own] = on_waves[own][:, back, np.arange(count)]
-        alone = -1j * speed * orders.structure_order[..., None] * both[..., count:]
-        return on_gears, complex_times(self._mixed(gathered, 1.0), self.shape[:, :count].T) + alone
-
-    def _mixed(self, values: np.ndarray, turn: complex) -> np.ndarray:
-        """Coordinates (..., n_waves) as waves, with -i, or waves as coordinates, with 1, as `ring_waves`."""
-        one, other = values[..., self.first], values[..., self.first + 1]
-        found, half = values.copy(), np.sqrt(0.5)
-        if turn == 1.0:
-            found[..., self.first], found[..., self.first + 1] = (
-                half * (one + other),
-                1j * half * (one - other),
-            )
-        else:
-            found[..., self.first], found[..., self.first + 1] = (
-                half * (one - 1j * other),
-                half * (one + 1j * other),
-            )
+        G = len(blocks.place)
+        excess, ring = np.array(extra), force[G:]
+        excess[G:] -= blocks.gears.mean[G:, None, None] * way
+        turned = np.exp(1j * np.outer(self.orders.diameters, blocks.place))
+        if self.path.dtype == np.complex64:
+            excess, ring, turned = _single(excess), _single(ring), _single(turned)
+            before = DampingForces(*(_single(part) for part in before.parts))
+        found = DampingForces(*(np.empty_like(part) for part in before.parts))
+        for residue in self.residues:
+            for some in np.array_split(residue.blocks, -(-len(residue.blocks) // _TOGETHER)):
+                loads = excess[:, some], ring[:, some], before.on_gears[some], before.on_structure[some]
+                self._answer_part(blocks, residue, some, loads, turned, found)
         return found
+
+    def _answer_part(
+        self, blocks: HarmonicBlocks, residue: _Residue, some, loads, turned, found: DampingForces
+    ) -> None:  # fmt: skip
+        """Write the answer of some blocks of a residue to loads on meshes, ring and modes into ``found``."""
+        orders, kind, (excess, ring, load, on_modes) = self.orders, self.path.dtype, loads
+        gears, structure = blocks.on_gears[some].astype(kind), blocks.on_structure[some].astype(kind)
+        for one in residue.classes:
+            load[:, one.bands] -= np.moveaxis(excess[:, :, one.bands], 0, -1) @ one.rows
+        waves = ring_load(orders.paths.symmetry, ring, blocks.place, orders.diameters, residue.path_back)
+        moved = (waves.astype(kind) @ self.path.conj().T + on_modes) * structure
+        on_gears, on_waves = self._on_waves(residue, blocks.speed, some, load * gears, moved @ self.shape)
+        order = (1j * blocks.speed * orders.structure_order[some, :, None]).astype(kind)
+        on_structure = on_waves @ self.shape.conj().T - order * (moved @ self.own)
+        found.on_gears[some], found.on_structure[some] = on_gears, on_structure
+        found.still[:, some] = np.moveaxis((on_gears * gears) @ self.rows.T, -1, 0)
+        waves = _padded((on_structure * structure) @ self.path)
+        waves = waves[:, residue.path_to, np.arange(self.path.shape[1])]
+        found.way[:, some] = np.moveaxis(waves @ turned, -1, 0)
+
+    def _on_waves(self, residue: _Residue, speed: float, some, gears: np.ndarray, waves: np.ndarray):
+        """Forces on the modes of the gears (b, R, n_modes) and on waves (b, S, n_waves) by their motions."""
+        modes, kind = gears.shape[2], gears.dtype
+        number = self.orders.sense * self.orders.diameters[self.wave]
+        order = -1j * speed * self.orders.order[some][..., None]
+        on_gears, moved = np.empty_like(gears), _padded(waves)
+        on_waves = np.zeros((len(gears), gears.shape[1] + 1, waves.shape[2]), kind)
+        for one in residue.classes:
+            turning = order[:, one.bands]
+            of_waves = (turning + 1j * speed * number[one.waves]).astype(kind)
+            motion = np.concatenate([
+                turning.astype(kind) * gears[:, one.bands], of_waves * moved[:, one.place, one.waves],
+            ], axis=2)  # fmt: skip
+            made = motion @ one.matrix.T
+            on_gears[:, one.bands] = made[..., :modes]
+            on_waves[:, one.bands[:, None], one.waves] = made[..., modes:]
+        return on_gears, on_waves[:, residue.wave_back, np.arange(waves.shape[2])]
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    """Values in single precision, without what is far below its rounding.
+
+    Lines that vanish but for rounding end in numbers that processors are slow with.
+    """
+    found = np.asarray(values).astype(np.complex64)
+    size = np.abs(found)
+    found[size < _NOTHING * size.max(initial=0.0)] = 0.0
+    return found
 
 
 def _padded(values: np.ndarray) -> np.ndarray:
     """Values (B, n, k) with zeros at the place n, which stands for none."""
-    return np.concatenate([values, np.zeros((len(values), 1, values.shape[2]))], axis=1)
+    return np.concatenate([values, np.zeros((len(values), 1, values.shape[2]), values.dtype)], axis=1)
 
 
 def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:
@@ -129,7 +213,9 @@ def _checked_matrix(matrix, gears: Modes, structure: FixedStructure) -> np.ndarr
     return matrix
 
 
-def set_damping(matrix, gears: Modes, structure: FixedStructure, orders: CarrierOrders) -> SetDamping:
+def set_damping(
+    matrix, leading: LeadingMeshes, structure: FixedStructure, orders: CarrierOrders
+) -> SetDamping:  # fmt: skip
     """Take the damping of a set apart for the orders of the two-way response.
 
     CaseError: a matrix that does not fit, or a structure without waves (E-SHAPE).
@@ -140,10 +226,13 @@ def set_damping(matrix, gears: Modes, structure: FixedStructure, orders: Carrier
         Damping of the gears' coordinates, then those of the ring, cosine and sine of its modes in turn, in
         the frame of the carrier [N s/m, ...]. Waves beyond the circumferential orders of the structure must
         be damped alone.
-    gears, structure
-        As for `femgear.housing.two_way.solve_two_way`; the structure knows its waves.
+    leading : LeadingMeshes
+        Of the modes of gears and carrier.
+    structure
+        As for `femgear.housing.two_way.solve_two_way`; it knows its waves.
     orders : CarrierOrders
     """
+    gears = leading.modes
     matrix, n = _checked_matrix(matrix, gears, structure), structure.wave_order
     dofs, modes = gears.shape.shape
     to_waves = np.zeros((len(matrix), modes + len(n)), complex)
@@ -157,16 +246,27 @@ def set_damping(matrix, gears: Modes, structure: FixedStructure, orders: Carrier
     modal = 2.0 * structure.damping_ratio * structure.natural_frequency
     near = np.flatnonzero(np.abs(n) <= top)
     own = np.real((shape.conj() * mean) @ shape.T) - np.diag(modal)
-    coordinates = np.real(shape[:, near] @ ring_waves(n[near]).conj())
     kept = np.append(np.arange(modes), modes + near)
-    whole, n = whole[np.ix_(kept, kept)], n[near]
-    residues = list[_Residue]()
-    for residue in range(N):
-        blocks, to = orders.blocks(residue), orders.meeting(residue)[0][:, n + top]
-        for c in range(N if len(blocks) else 0):
-            bands = np.flatnonzero((residue + orders.bands) % N == c)
-            met = np.flatnonzero((c - orders.sense * n) % N == 0)
-            kept = np.append(np.arange(modes), modes + met)
-            residues.append(_Residue(blocks, bands, met, to[np.ix_(bands, met)], whole[np.ix_(kept, kept)]))
-    first = np.flatnonzero(n < 0) - 1
-    return SetDamping(orders, tuple(residues), first, n + top, np.hstack([coordinates, own]))
+    whole, number = whole[np.ix_(kept, kept)], n[near]
+    residues = tuple(_residue(orders, residue, leading, whole, number) for residue in range(N))
+    return SetDamping(
+        orders, tuple(one for one in residues if len(one.blocks)), number + top, shape[:, near], own,
+        structure.ring_shape, leading.rows,
+    )  # fmt: skip
+
+
+def _residue(orders: CarrierOrders, residue: int, leading: LeadingMeshes, whole, number) -> _Residue:
+    """Sort the side bands in blocks of a residue by the waves of orders ``number`` (n_waves,) that meet them.
+
+    ``whole`` is the damping of the modes of the gears and these waves.
+    """
+    N, modes, wave = orders.paths.symmetry, leading.rows.shape[1], number + orders.max_diameter
+    to, back = orders.meeting(residue)
+    classes = list[_Class]()
+    for c in range(N):
+        bands = np.flatnonzero((residue + orders.bands) % N == c)
+        met = np.flatnonzero((c - orders.sense * number) % N == 0)
+        kept = np.append(np.arange(modes), modes + met)
+        place = to[np.ix_(bands, wave[met])]
+        classes.append(_Class(bands, met, place, whole[np.ix_(kept, kept)], leading.folded[c]))
+    return _Residue(orders.blocks(residue), tuple(classes), back, back[:, wave], to)

@@ -46,7 +46,7 @@ from femgear.housing.carrier_orders import (
 from femgear.housing.harmonic_blocks import HarmonicBlocks, blocks_of_speed
 from femgear.housing.mesh_fluctuation import MeshFluctuation, gmres
 from femgear.housing.sensor import ReadOnlyArrays, carrier_turns
-from femgear.housing.set_damping import SetDamping, set_damping
+from femgear.housing.set_damping import DampingForces, SetDamping, set_damping
 from femgear.housing.structure import FixedStructure
 from femgear.system.fourier import Product, pad
 from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
@@ -55,6 +55,8 @@ _EQUAL, _RESIDUAL = 1e-9, 1e-6
 """Part of the largest harmonic by which meshes that repeat others may differ; residual that is refused."""
 _PASSES, _MIXED = 60, 5
 """Passes of the damping at most, and those that are extrapolated together."""
+_INNER, _SINGLE = 3e-2, 1e-6
+"""Accuracy of a solution over the change by its pass; of the forces of the damping in single precision."""
 _MOST, _TINY = 4e9, np.finfo(float).tiny
 """Size of what one speed takes at most [bytes]; what no norm is below."""
 
@@ -232,7 +234,7 @@ class _Problem:
         source[..., orders.side_bands] = 0.5 * forcing
         source[:, 0, orders.side_bands] = np.real(forcing[:, 0])
         self.source = self.fluctuation.of_leaders(source)
-        self.damping = None if damping is None else set_damping(damping, gears, structure, orders)
+        self.damping = None if damping is None else set_damping(damping, self.gears, structure, orders)
 
     def solve(self, speed: float, tolerance: float) -> _Answer:
         """Solve at a speed of the carrier [rad/s], positive."""
@@ -259,25 +261,23 @@ class _Problem:
 
     def _damped(self, blocks: HarmonicBlocks, damping: SetDamping, tolerance: float) -> _Answer:
         """Solve with the damping of the set, whose forces follow the motion, pass by pass."""
-        shapes, load = (blocks.on_gears.shape, blocks.on_structure.shape), blocks.load()
-        forces = [np.zeros(shape, complex) for shape in shapes]
-        moved = [np.zeros_like(load), np.zeros_like(load[: len(self.place)])]
+        load, forces = blocks.load(), damping.none(len(self.place))
         start, products, radius, change, passes = None, 0, 0.0, 1.0, list[_Pass]()
         for _ in range(_PASSES):
-            accuracy = max(0.5 * tolerance, min(1e-3 * change, 1e-4))
-            found = self._solved(blocks, load + moved[0], moved[1], start, accuracy)
+            accuracy = max(0.5 * tolerance, min(_INNER * change, 1e-4))
+            found = self._solved(blocks, load + forces.still, forces.way, start, accuracy)
             start, products, radius = found.extra, products + found.products, max(radius, found.radius)
-            answer = damping.forces(blocks.speed, *blocks.modal(found.extra, found.way, found.force, *forces))
-            made = blocks.moved(*answer)
-            apart = self.gears.mean[:, None, None] * _over_ring(made[0] - moved[0], made[1] - moved[1])
+            made = damping.answer(blocks, found.extra, found.way, found.force, forces)
+            apart = _over_ring(made.still - forces.still, made.way - forces.way).astype(complex)
+            apart *= self.gears.mean[:, None, None]
             change = float(np.linalg.norm(apart) / max(np.linalg.norm(found.force), _TINY))
             if max(change, found.residual) <= tolerance:
                 break
-            passes = [*passes[1 - _MIXED :], _Pass(answer, made, apart)]
-            share = _shares([one.change for one in passes])
-            forces = _blend(share, [one.forces for one in passes])
-            moved = _blend(share, [one.moved for one in passes])
-        return _Answer(found.force, forces[1], max(found.residual, change), radius, products)
+            if not passes and tolerance > _SINGLE * change:
+                damping = damping.single()
+            passes = [*passes[1 - _MIXED :], _Pass(made, apart)]
+            forces = _blend(_shares([one.change for one in passes]), [one.forces for one in passes])
+        return _Answer(found.force, made.on_structure, max(found.residual, change), radius, products)
 
     def tail(self, force: np.ndarray) -> float:
         """Share (root of energies) of the fluctuating ring forces that is at the outer side bands."""
@@ -363,20 +363,21 @@ def _over_ring(deflection: np.ndarray, way: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Pass:
-    """Forces of the damping on gears and structure, d_0 and u_0 by these, and what is new in mesh forces."""
+    """Forces of the damping of the set, and what is new in mesh forces by them."""
 
-    forces: tuple[np.ndarray, np.ndarray]
-    moved: tuple[np.ndarray, np.ndarray]
+    forces: DampingForces
     change: np.ndarray
 
 
-def _blend(share: np.ndarray, pairs: list[tuple[np.ndarray, np.ndarray]]) -> list[np.ndarray]:
-    """Blend pairs of arrays of the passes by the shares (n,) of these."""
-    found = [share[0] * part for part in pairs[0]]
-    for times, pair in zip(share[1:], pairs[1:]):
-        for total, part in zip(found, pair):
-            total += times * part
-    return found
+def _blend(share: np.ndarray, passes: list[DampingForces]) -> DampingForces:
+    """Blend the forces of the passes by the shares (n,) of these."""
+    blended = list[np.ndarray]()
+    for parts in zip(*(one.parts for one in passes)):
+        total = parts[0] * parts[0].dtype.type(share[0])
+        for times, part in zip(share[1:], parts[1:]):
+            total += part * part.dtype.type(times)
+        blended.append(total)
+    return DampingForces(*blended)
 
 
 def _shares(changes: list[np.ndarray]) -> np.ndarray:
