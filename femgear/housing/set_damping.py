@@ -15,17 +15,14 @@ turns of the ring acts on each order of the structure alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.errors import CaseError
 from femgear.housing.carrier_orders import CarrierOrders, LeadingMeshes, ring_load
+from femgear.housing.harmonic_blocks import HarmonicBlocks
 from femgear.housing.structure import FixedStructure, ring_waves
 from femgear.system.system import Modes
-
-if TYPE_CHECKING:
-    from femgear.housing.harmonic_blocks import HarmonicBlocks
 
 _TOGETHER = 16
 """Blocks that are answered together: what lies between forces and motion stays in the cache."""
@@ -177,13 +174,6 @@ def _single(values: np.ndarray) -> np.ndarray:
 def _padded(values: np.ndarray) -> np.ndarray:
     """Values (B, n, k) with zeros at the place n, which stands for none."""
     return np.concatenate([values, np.zeros((len(values), 1, values.shape[2]), values.dtype)], axis=1)
-
-
-def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:
-    """Multiply a complex matrix (..., n, k) by a real one (k, m), half the work of a complex one."""
-    found = np.empty((*values.shape[:-1], real.shape[1]), complex)
-    found.real, found.imag = np.real(values) @ real, np.imag(values) @ real
-    return found
 
 
 def with_set_damping(matrix, gears: Modes, structure: FixedStructure) -> tuple[Modes, FixedStructure]:
