@@ -8,6 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from femgear.case import text as case_text
+from femgear.case.gear_set import planetary_set
 from femgear.case.sections import Case
 from femgear.gears.planetary import equal_planet_angles
 from femgear.trains.reading import parse_case, with_values
@@ -25,9 +26,14 @@ def larger(case: Case, factor: float) -> Case:
 
     Forces then grow with the square of the factor, torques, masses and torsional stiffnesses with its third
     power, moments of inertia with its fifth, stiffnesses with the first, foundations per area with its
-    inverse, as frequencies.
+    inverse, as frequencies. Tips that femgear shortens are at multiples of 0.1 um, whatever the size of the
+    set: the larger one is given those of the smaller.
     """
-    return _scaled(case, lambda unit: factor ** POWERS[unit][0])
+    set_of_case = planetary_set(case)
+    gears = zip(case.gear_names, set_of_case.gears, strict=True)
+    tips = {name: 2.0 * factor * gear.tip_radius for name, gear in gears if gear.tip_shortening > 0.0}
+    changed = {f"{name}.tip_diameter": f"{diameter!r} m" for name, diameter in tips.items()}
+    return with_values(_scaled(case, lambda unit: factor ** POWERS[unit][0]), changed)
 
 
 def stiffer(case: Case, factor: float) -> Case:

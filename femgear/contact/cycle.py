@@ -414,6 +414,8 @@ def walk_mesh_cycle(
         record = found if found.force.any() else record
     if options.ahead is not None and not np.ndim(positions):
         record = replace(record, **over_slices(record, options.ahead, periods=periods))
+        pins = pin_forces(solved, record.force, record.back_force)
+        record = replace(record, bearing_force=pins)
     return _seen_from_front(record, planetary_set, order) if mirrored else record
 
 

@@ -25,6 +25,8 @@ _FORCES, _LEAST, _MOST = 32, 1e-4, 4.0
 """Of the curves of tooth pairs: their number, and the shares of the torque at which they begin and end."""
 _EVEN = ("deflection", "sun_arc", "force", "stiffness", "member_motion", "held_stiffness")
 """What all slices of helical teeth have in common, and forces and stiffnesses that are sums over them."""
+_OF_PAIRS = ("tooth_load", "slice_load")
+"""Loads of tooth pairs, whose sum is the force of their mesh."""
 
 
 @dataclass(frozen=True)
@@ -214,7 +216,8 @@ def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.
     Slices at single places come into contact one after the other, with a frequency of their own, which is
     none of the teeth: the mean over the mesh periods from one to the next takes it out. The record, with
     names of `MeshCycle`, is at equidistant positions of whole mesh periods; ``ahead`` (slices,) is that of
-    its slices [mesh periods].
+    its slices [mesh periods]. Tooth pairs share the mean force of their mesh as they shared that of the place,
+    so that they stay in equilibrium with it.
     """
     step, found = np.ptp(ahead) / (len(ahead) - 1), {}
     for name in _EVEN:
@@ -223,6 +226,11 @@ def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.
             count = values.shape[-1]
             mean = np.sinc(np.fft.rfftfreq(count, periods / count) * step)
             found[name] = np.fft.irfft(mean * np.fft.rfft(values), n=count)
+    carried = np.asarray(record.force)
+    share = np.divide(found["force"], carried, out=np.ones(carried.shape), where=carried > 0.0)
+    for name in (name for name in _OF_PAIRS if getattr(record, name, None) is not None):
+        values = getattr(record, name)
+        found[name] = values * share.reshape(len(share), *np.ones(values.ndim - 2, int), -1)
     return found
 
 

@@ -80,26 +80,31 @@ class LoadedPeriod:
         whole = self.periods
         at, values, tau = np.arange(count) / count * whole, getattr(self, name), self.position
         found = np.array([np.interp(at, tau, row, period=whole) for row in values])
-        for piece, place in self._smooth_pieces():
+        for piece, place, ends in self._smooth_pieces():
             curve = Akima1DInterpolator(place, values[:, piece], axis=1, method="makima")
             for turn in (-whole, 0, whole):
-                first, last = np.searchsorted(at + turn, place[[0, -1]], side="left")
-                inside = slice(first, last + (last < count and at[last % count] + turn == place[-1]))
+                first, last = np.searchsorted(at + turn, ends, side="left")
+                inside = slice(first, last + (last < count and at[last % count] + turn == ends[1]))
                 found[:, inside] = curve(at[inside] + turn)
         return found
 
     def _smooth_pieces(self):
-        """Positions without a jump between them: their numbers, and their places counted on past the end."""
+        """Positions without a jump between them: their numbers, and their places counted on past the end.
+
+        With the first and the last place (2,) between which a curve through them holds.
+        """
         tau, P, whole = self.position, len(self.position), self.periods
         jumps = np.flatnonzero(np.diff(np.append(tau, tau[0] + whole)) <= SHORTEST)
         if not len(jumps):
+            # the slopes of a cubic are those of two neighbours on either side; further out they are made up
             around = np.arange(-3, P + 3)
-            yield around % P, tau[around % P] + around // P * whole
+            yield around % P, tau[around % P] + around // P * whole, (tau[0], tau[0] + whole)
             return
         for last, jump in zip(np.append(jumps[1:], jumps[0] + P), jumps, strict=True):
             piece = np.arange(jump + 1, last + 1)
             if len(piece) > 2:
-                yield piece % P, tau[piece % P] + piece // P * whole
+                place = tau[piece % P] + piece // P * whole
+                yield piece % P, place, place[[0, -1]]
 
 
 def loaded_period(

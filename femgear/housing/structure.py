@@ -325,11 +325,20 @@ def ring_waves(order) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Places:
-    """Angles, widths and directions from outwards (p,) of places of the outer surface [rad]."""
+    """Angles, widths and directions from outwards (p,) of places of the outer surface [rad].
+
+    And the largest orders (p,) of the waves that they feel.
+    """
 
     angle: np.ndarray
     width: np.ndarray
     direction: np.ndarray
+    waves: np.ndarray
+
+    def factors(self, order: np.ndarray) -> np.ndarray:
+        """Means (p, n) over the places of the waves ``exp(i n phi)`` of orders (n,); zero of those not felt."""
+        mean = np.exp(1j * np.outer(self.angle, order)) * np.sinc(np.outer(self.width, order) / (2 * np.pi))
+        return np.where(np.abs(order) <= self.waves[:, None], mean, 0.0)
 
 
 def _patches(supports: Sequence[Support], top: int) -> tuple[_Places, np.ndarray, np.ndarray]:
@@ -343,7 +352,7 @@ def _patches(supports: Sequence[Support], top: int) -> tuple[_Places, np.ndarray
             for turned, stiffness in ((0.0, one.radial_stiffness), (0.5 * np.pi, one.tangential_stiffness)):
                 rows.append((angle, width, turned, stiffness / count, one.mass / count))
     angle, width, direction, stiffness, mass = np.array(rows).reshape(-1, 5).T
-    return _Places(angle, width, direction), stiffness, mass
+    return _Places(angle, width, direction, np.full(len(angle), np.inf)), stiffness, mass
 
 
 def _beyond_modes(rim: np.ndarray, radial, tangential, omega: np.ndarray) -> np.ndarray:
@@ -367,10 +376,7 @@ def _compliance(rest: np.ndarray | None, loads: _Places, seen: _Places) -> np.nd
         return found
     order = np.arange(len(rest))
     weight = np.where(order == 0, 1.0, 2.0)
-    acting, watched = (
-        np.exp(1j * np.outer(one.angle, order)) * np.sinc(np.outer(one.width, order) / (2 * np.pi))
-        for one in (loads, seen)
-    )
+    acting, watched = loads.factors(order), seen.factors(order)
     for i, to in enumerate((np.cos(seen.direction), np.sin(seen.direction))):
         for j, of in enumerate((np.cos(loads.direction), np.sin(loads.direction))):
             waves = (acting.conj() * (weight * rest[:, i, j])) @ watched.T
@@ -422,7 +428,7 @@ def _modes_of(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def supported_ring(
     ring: CyclicModes, supports: Sequence[Support], *, max_diameter: int, max_frequency: float,
     damping_ratio: float, sensor_angles: Any = (0.0,), sensor_directions: Any = 0.0, sensor_widths: Any = 0.0,
-    rim: np.ndarray | None = None,
+    sensor_waves: Any = np.inf, rim: np.ndarray | None = None,
 ) -> FixedStructure:  # fmt: skip
     """Make a structure of a ring on supports: a Ritz approximation in the cyclic modes of the ring.
 
@@ -452,6 +458,9 @@ def supported_ring(
     sensor_directions, sensor_widths : float or (n_sensors,) array
         Directions from outwards, counter-clockwise, and angles over which sensors take the mean [rad]. The
         mean over a support times its stiffness is its force on the ground.
+    sensor_waves : float or (n_sensors,) array
+        Nodal diameters up to which sensors feel waves: what sensors around the ring tell of places between
+        them knows nothing of shorter ones.
     rim : (m, 2, 2) complex array, optional
         Static compliance of the outer surface for waves of the orders 0 .. m - 1, all of it, see
         `femgear.fe.compliance.rim_compliance` [m/N]. Supports of no width yield nothing of their own: that of
@@ -465,7 +474,7 @@ def supported_ring(
 
     def moved(places: _Places) -> np.ndarray:
         """Displacement (n_coordinates, p) of the coordinates at places of the outer surface."""
-        waves = np.exp(1j * np.outer(n, places.angle)) * np.sinc(np.outer(n, places.width) / (2 * np.pi))
+        waves = places.factors(n).T
         across, along = np.cos(places.direction), np.sin(places.direction)
         return np.real(across * (radial @ waves) + along * (tangential @ waves))
 
@@ -476,7 +485,7 @@ def supported_ring(
     square, shape = _modes_of(K, M)
     middle = slice(top - max_diameter, top + max_diameter + 1)
     sensors = _Places(*np.broadcast_arrays(*(np.atleast_1d(one).astype(float) for one in (
-        sensor_angles, sensor_widths, sensor_directions
+        sensor_angles, sensor_widths, sensor_directions, sensor_waves
     ))))  # fmt: skip
     heard = moved(sensors) - carried @ _compliance(rest, patches, sensors)
     waves, sensors = shape.T @ path[:, middle], shape.T @ heard

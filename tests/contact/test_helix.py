@@ -8,6 +8,7 @@ from contact.test_cycle import STEEL, TORQUE, reference_set
 
 from femgear.contact.bodies import helical_stiffness, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.supports import pin_forces
 from femgear.contact.width_waves import _beside, width_waves
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope
@@ -107,6 +108,10 @@ def test_loads_balance_the_torque_and_go_over_the_width(gears, whole_overlap):
     found = whole_overlap
     force = found.slice_load.sum(axis=1).mean(axis=1)[:3].sum(axis=0)
     assert force == pytest.approx(TORQUE / gears.sun.base_radius, rel=1e-9)
+    # tooth pairs are in equilibrium with the means of the mesh forces at every position, and so are the pins
+    assert found.tooth_load.sum(axis=1) == pytest.approx(found.force, rel=1e-9)
+    assert found.slice_load.mean(axis=2) == pytest.approx(found.tooth_load, rel=1e-9)
+    assert found.bearing_force == pytest.approx(pin_forces(gears, found.force, found.back_force), rel=1e-9)
     assert found.face_load_factor == pytest.approx(1.0, abs=0.02)
     assert found.helical and found.residual.max() < 1e-12
 

@@ -231,9 +231,11 @@ def _ring_on_supports(
         for turned, stiffness in ((0.0, one.radial_stiffness), (0.5 * np.pi, one.tangential_stiffness)):
             places.append((one.angle, turned, one.width, stiffness))
     angle, turned, width, factor = np.array(places).T
+    # those around are asked for places between them
+    waves = np.where(np.arange(len(angle)) < points, modes.max_diameter, np.inf)
     structure = supported_ring(
         modes.ring.modes, supports, **known, sensor_angles=angle, sensor_directions=turned,
-        sensor_widths=width, rim=modes.ring.rim_compliance,
+        sensor_widths=width, sensor_waves=waves, rim=modes.ring.rim_compliance,
     )  # fmt: skip
     ways = [f"support {i} {way}" for i in range(1, len(supports) + 1) for way in ("radial", "tangential")]
     return structure.combined(np.diag(factor)), tuple(one.name for one in case.housing.sensor), tuple(ways)
