@@ -1,13 +1,13 @@
 """What must hold for any valid set: random ones, from their teeth to the signal of the housing.
 
-``pytest tests/test_random_sets.py -m "" -k seed117`` repeats one set, the case of ``random_set(117)``. What is
-true of one solution is tested for each, one of the `INVARIANTS` for each in turn.
+``pytest tests/test_random_sets.py -m "" -k seed117`` repeats one set, the case of ``random_set(117)``. What
+is true of one solution is tested for each, one of the `INVARIANTS` for each in turn.
 """
 
 import math
 import warnings
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 
 import numpy as np
 import pytest
@@ -15,6 +15,7 @@ import set_images as images
 from random_sets import KINDS, PLANETS, RandomSet, equal_planets, random_set, symmetry
 from validation.reference.sensor_in_time import symmetry_leakage
 
+from femgear.case.dependencies import Steps, static_entries
 from femgear.gears.kinematics import torques
 from femgear.housing.orders import OrderSpectrum, order_level
 from femgear.housing.sensor import fixed_sensor_lines
@@ -41,14 +42,17 @@ class Solved:
 
     drawn: RandomSet
     cache: object
+    steps: Steps = field(default_factory=Steps)
 
     @cached_property
     def static(self) -> StaticResult:
-        return quietly(solve_static, self.case, cache=self.cache)
+        known, solve = static_entries(self.case), partial(solve_static, cache=self.cache, steps=self.steps)
+        kept = self.steps.kept("static solution", known)
+        return kept or self.steps.keep("static solution", known, quietly(solve, self.case))
 
     @cached_property
     def modes(self) -> ModesResult:
-        return quietly(solve_modes, self.case, self.static)
+        return quietly(solve_modes, self.case, self.static, steps=self.steps)
 
     @cached_property
     def dynamics(self) -> DynamicsResult:
@@ -71,8 +75,8 @@ class Solved:
         return [[planet] for planet in range(len(self.angles))]
 
     def solved_as(self, case) -> "Solved":
-        """Another case."""
-        return Solved(replace(self.drawn, case=case), self.cache)
+        """Another case, of which what depends on the same entries is not solved again."""
+        return Solved(replace(self.drawn, case=case), self.cache, self.steps)
 
     def warned(self, code: str, stage: str) -> bool:
         """Whether the results of a stage warn so."""
@@ -297,7 +301,7 @@ def test_dynamics_start_from_the_static_solution_with_elastic_members(solved):
     case, state = solved.case, solved.modes.state
     cycle = solved.static.cycle
     if case.static.members == "fixed":
-        cycle = solve_static(with_value(case, "static.members", "elastic"), cache=solved.cache).cycle
+        cycle = solved.solved_as(with_value(case, "static.members", "elastic")).static.cycle
     for name in ("deflection", "force"):
         found, expected = state.resampled(name, len(cycle.position)), getattr(cycle, name)
         apart, moving, rounding = found - expected, np.ptp(expected, axis=1).max(), 1e-7 * expected.max()
@@ -356,7 +360,7 @@ def similar_in_modulus_and_torque(solved):
 
 
 def equal_in_the_mirror(solved):
-    """The other torque on the mirrored set: the same record, backwards in its positions, the same extremes."""
+    """The other torque on the mirrored set: the same record, backwards in its positions, and extremes."""
     cycle, found = solved.static.cycle, solved.solved_as(images.mirrored(solved.case)).static.cycle
     assert np.array_equal(found.position, cycle.position)
     same_record(found, cycle, in_the_mirror(solved), -np.arange(len(cycle.position)))

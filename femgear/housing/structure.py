@@ -336,7 +336,7 @@ class _Places:
     waves: np.ndarray
 
     def factors(self, order: np.ndarray) -> np.ndarray:
-        """Means (p, n) over the places of the waves ``exp(i n phi)`` of orders (n,); zero of those not felt."""
+        """Means (p, n) over the places of waves ``exp(i n phi)`` of orders (n,); zero of those not felt."""
         mean = np.exp(1j * np.outer(self.angle, order)) * np.sinc(np.outer(self.width, order) / (2 * np.pi))
         return np.where(np.abs(order) <= self.waves[:, None], mean, 0.0)
 
@@ -425,7 +425,7 @@ def _modes_of(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return square, shape
 
 
-def supported_ring(
+def supported_ring(  # noqa: PLR0913
     ring: CyclicModes, supports: Sequence[Support], *, max_diameter: int, max_frequency: float,
     damping_ratio: float, sensor_angles: Any = (0.0,), sensor_directions: Any = 0.0, sensor_widths: Any = 0.0,
     sensor_waves: Any = np.inf, rim: np.ndarray | None = None,
