@@ -216,8 +216,8 @@ def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.
     Slices at single places come into contact one after the other, with a frequency of their own, which is
     none of the teeth: the mean over the mesh periods from one to the next takes it out. The record, with
     names of `MeshCycle`, is at equidistant positions of whole mesh periods; ``ahead`` (slices,) is that of
-    its slices [mesh periods]. Tooth pairs share the mean force of their mesh as they did that of the place, so
-    that they stay in equilibrium with it.
+    its slices [mesh periods]. Tooth pairs share the mean force of their mesh as they did that of the place:
+    they stay in equilibrium with it.
     """
     step, found = np.ptp(ahead) / (len(ahead) - 1), {}
     for name in _EVEN:
