@@ -340,6 +340,12 @@ class _Places:
         mean = np.exp(1j * np.outer(self.angle, order)) * np.sinc(np.outer(self.width, order) / (2 * np.pi))
         return np.where(np.abs(order) <= self.waves[:, None], mean, 0.0)
 
+    def moved(self, radial: np.ndarray, tangential: np.ndarray) -> np.ndarray:
+        """Displacement (n_coordinates, p) of coordinates with fields (n_coordinates, 2 top + 1) of waves."""
+        order = np.arange(radial.shape[1]) - radial.shape[1] // 2
+        waves, across, along = self.factors(order).T, np.cos(self.direction), np.sin(self.direction)
+        return np.real(across * (radial @ waves) + along * (tangential @ waves))
+
 
 def _patches(supports: Sequence[Support], top: int) -> tuple[_Places, np.ndarray, np.ndarray]:
     """Cut supports into patches that waves of an order resolve; their stiffness [N/m] and mass [kg] (p,)."""
@@ -470,24 +476,19 @@ def supported_ring(  # noqa: PLR0913
     path, radial, tangential = (
         circumferential(ring, one, top) for one in (ring.load[:, 0], ring.output[:, 0], ring.output[:, 1])
     )
-    omega, n = 2 * np.pi * ring.frequency[_coordinates(ring)[0]], np.arange(-top, top + 1)
-
-    def moved(places: _Places) -> np.ndarray:
-        """Displacement (n_coordinates, p) of the coordinates at places of the outer surface."""
-        waves = places.factors(n).T
-        across, along = np.cos(places.direction), np.sin(places.direction)
-        return np.real(across * (radial @ waves) + along * (tangential @ waves))
-
+    omega = 2 * np.pi * ring.frequency[_coordinates(ring)[0]]
     rest = None if rim is None else _beyond_modes(rim, radial, tangential, omega)
     patches, *springs = _patches(supports, top)
     between = _compliance(rest, patches, patches)
-    K, M, carried = _held(omega, supports, moved(patches), between, springs, (radial, tangential))
+    K, M, carried = _held(
+        omega, supports, patches.moved(radial, tangential), between, springs, (radial, tangential)
+    )
     square, shape = _modes_of(K, M)
     middle = slice(top - max_diameter, top + max_diameter + 1)
     sensors = _Places(*np.broadcast_arrays(*(np.atleast_1d(one).astype(float) for one in (
         sensor_angles, sensor_widths, sensor_directions, sensor_waves
     ))))  # fmt: skip
-    heard = moved(sensors) - carried @ _compliance(rest, patches, sensors)
+    heard = sensors.moved(radial, tangential) - carried @ _compliance(rest, patches, sensors)
     waves, sensors = shape.T @ path[:, middle], shape.T @ heard
     mode, sine = _coordinates(ring)
     order, n_waves = np.where(sine, -1, 1) * ring.nodal_diameter[mode], waves.shape[1]
