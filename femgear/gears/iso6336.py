@@ -1,11 +1,13 @@
 """Nominal tooth stresses and mesh stiffness after ISO 6336, for orientation beside what is computed.
 
-sigma_H0 (part 2) and sigma_F0 (part 3, method B) of spur gears with tooth contact factors only: no
-application, dynamic or face load factors. The formulas are those of ISO 6336-2:2006 and ISO 6336-3:2006, with
-the factor f_eps of ISO 6336-3:2019 for contact ratios of two and above. In the formulas here
-teeth and diameters of internal gears are negative and profile shifts have the sign of the standard, which for
-internal gears is minus that of `gear.Gear`. `mesh_stiffness_method_b` (part 1) is the mesh stiffness of
-sets that are given by their teeth alone.
+sigma_H0 (part 2) and sigma_F0 (part 3, method B) of spur and helical gears with tooth contact factors only:
+no application, dynamic or face load factors. The formulas are those of ISO 6336-2:2006 (with the helix factor
+of its corrigendum of 2008) and ISO 6336-3:2006, with the factor f_eps of ISO 6336-3:2019 for spur teeth of
+contact ratios of two and above. Teeth and diameters of internal gears are negative here and profile shifts
+have the sign of the standard, which for internal gears is minus that of `gear.Gear`. Helical gears are given
+by their transverse section, whose rack tells the helix angle (`profile.BasicRack`); their roots are those of
+the virtual spur gear of the normal section. `mesh_stiffness_method_b` (part 1) is the mesh stiffness of sets
+that are given by their teeth alone.
 """
 
 from __future__ import annotations
@@ -18,7 +20,7 @@ import numpy as np
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, cutter_of
 from femgear.gears.pair import GearPair
-from femgear.gears.profile import base_helix_angle, inv
+from femgear.gears.profile import base_helix_angle, inv, overlap_ratio, roll
 
 # coefficients C1 .. C9 of the minimum flexibility q', ISO 6336-1:2019, eq. 82 (gears of one module depth)
 _C = (0.04723, 0.15551, 0.25791, -0.00635, -0.11654, -0.00193, -0.24188, 0.00529, 0.00182)
@@ -36,19 +38,21 @@ class NominalRootStress:
     ----------
     stress : float
         sigma_F0 [Pa].
-    form, correction : float
-        Y_F, with f_eps, and Y_S.
+    form, correction, helix : float
+        Y_F, with f_eps, Y_S and Y_beta.
     arm, chord, fillet_radius : float
         Bending moment arm h_Fe, thickness of the tooth s_Fn and rho_F at the critical section [m].
     load_angle : float
         alpha_Fen [rad]: angle of the load against the normal of the centreline.
     load_radius : float
-        Radius of the outer point of single pair contact, at which the load acts [m].
+        Radius of the outer point of single pair contact, at which the load acts [m]; of helical teeth that of
+        the virtual gear, d_en/2.
     """
 
     stress: float
     form: float
     correction: float
+    helix: float
     arm: float
     chord: float
     fillet_radius: float
@@ -56,12 +60,47 @@ class NominalRootStress:
     load_radius: float
 
 
-def zone_factor(pressure_angle: float, working_angle: float) -> float:
-    """Compute the zone factor Z_H of spur gears (ISO 6336-2, section 6).
+@dataclass(frozen=True)
+class _VirtualTooth:
+    """Tooth of the virtual spur gear of the normal section (ISO 6336-3, section 6.2), of spur gears itself.
 
-    ``sqrt(2 cos(alpha_w) / (cos^2(alpha) sin(alpha_w)))``, pressure angle and working pressure angle in rad.
+    ``teeth`` z_n are negative for an internal gear. Shift, ``dedendum`` of the rack and ``rounding`` are in
+    normal modules; lengths in m, angles in rad.
     """
-    return math.sqrt(2.0 / math.tan(working_angle)) / math.cos(pressure_angle)
+
+    teeth: float
+    module: float
+    pressure_angle: float
+    shift: float
+    dedendum: float
+    rounding: float
+    base_radius: float
+    tip_roll: float
+
+    @property
+    def base_pitch(self) -> float:
+        """``pi m_n cos(alpha_n)`` [m]."""
+        return math.pi * self.module * math.cos(self.pressure_angle)
+
+
+def helix_of(gear: Gear) -> tuple[float, float]:
+    """Find the helix angles of a gear on the reference and the base cylinder [rad], 0 of a spur gear."""
+    angle = math.acos(1.0 / gear.rack.stretch)
+    return angle, base_helix_angle(_normal_pressure_angle(gear), angle)
+
+
+def overlap_of(gear: Gear, width: float) -> float:
+    """Compute the overlap ratio eps_beta of a gear over a face width [m]."""
+    return overlap_ratio(width, gear.module / gear.rack.stretch, helix_of(gear)[0])
+
+
+def zone_factor(pressure_angle: float, working_angle: float, base_helix: float = 0.0) -> float:
+    """Compute the zone factor Z_H (ISO 6336-2, section 6).
+
+    ``sqrt(2 cos(beta_b) cos(alpha_wt) / (cos^2(alpha_t) sin(alpha_wt)))``: pressure angle and working
+    pressure angle of the transverse section, and helix angle on the base cylinder, in rad.
+    """
+    return math.sqrt(2.0 * math.cos(base_helix) / math.tan(working_angle)) / math.cos(pressure_angle)
 
 
 def elasticity_factor(
@@ -91,10 +130,28 @@ def material_factor(modulus_1: float, modulus_2: float) -> float:
     return 2.0 * modulus_1 / (modulus_1 + modulus_2) * modulus_2 / STEEL
 
 
-def contact_ratio_factor(contact_ratio: float) -> float:
-    """Compute the contact ratio factor Z_eps = ``sqrt((4 - eps_alpha)/3)`` (ISO 6336-2, section 8)."""
+def contact_ratio_factor(contact_ratio: float, overlap: float = 0.0) -> float:
+    """Compute the contact ratio factor Z_eps of the transverse contact ratio and the overlap ratio.
+
+    ``sqrt((4 - eps_alpha)/3 (1 - eps_beta) + eps_beta/eps_alpha)``, eps_beta at most 1 (ISO 6336-2,
+    section 8).
+    """
     _check_contact_ratio(contact_ratio)
-    return math.sqrt((4.0 - contact_ratio) / 3.0)
+    overlap = min(overlap, 1.0)
+    return math.sqrt((4.0 - contact_ratio) / 3.0 * (1.0 - overlap) + overlap / contact_ratio)
+
+
+def contact_helix_factor(helix_angle: float) -> float:
+    """Compute the helix factor of the contact Z_beta = ``1/sqrt(cos(beta))`` (ISO 6336-2:2006/Cor 1:2008)."""
+    return 1.0 / math.sqrt(math.cos(helix_angle))
+
+
+def root_helix_factor(helix_angle: float, overlap: float) -> float:
+    """Compute the helix factor of the root Y_beta = ``1 - eps_beta beta/120 deg`` (ISO 6336-3:2006).
+
+    The overlap ratio counts up to 1, the helix angle [rad] up to 30 deg (section 8).
+    """
+    return 1.0 - min(overlap, 1.0) * min(math.degrees(abs(helix_angle)), 30.0) / 120.0
 
 
 def nominal_contact_stress(
@@ -110,7 +167,7 @@ def nominal_contact_stress(
 ) -> float:
     """Compute the nominal contact stress sigma_H0 [Pa] of a gear pair (ISO 6336-2, section 5).
 
-    ``Z_H Z_E Z_eps sqrt(F_t/(d_1 b) (u + 1)/u)``
+    ``Z_H Z_E Z_eps Z_beta sqrt(F_t/(d_1 b) (u + 1)/u)``
 
     Parameters
     ----------
@@ -119,7 +176,7 @@ def nominal_contact_stress(
     gear_2 : Gear
         For an internal gear u is negative.
     working_angle : float
-        Working pressure angle of the pair [rad].
+        Transverse working pressure angle of the pair [rad].
     contact_ratio : float
         Transverse contact ratio, 1 to 2.5.
     tangential_force : float
@@ -134,57 +191,63 @@ def nominal_contact_stress(
     GeometryError
         Contact ratio outside the range of the method (E-ISO6336).
     """
-    zone = zone_factor(gear_1.pressure_angle, working_angle)
+    width, (helix, base_helix) = min(gear_1.face_width, gear_2.face_width), helix_of(gear_1)
+    zone = zone_factor(gear_1.pressure_angle, working_angle, base_helix)
     elasticity = elasticity_factor(youngs_modulus, poisson_ratio, mate)
-    ratio = contact_ratio_factor(contact_ratio)
+    ratio = contact_ratio_factor(contact_ratio, overlap_of(gear_1, width))
     u = (-gear_2.teeth if gear_2.internal else gear_2.teeth) / gear_1.teeth
-    width = min(gear_1.face_width, gear_2.face_width)
     line = tangential_force / (2.0 * gear_1.reference_radius * width) * (u + 1.0) / u
-    return zone * elasticity * ratio * math.sqrt(line)
+    return zone * elasticity * ratio * contact_helix_factor(helix) * math.sqrt(line)
 
 
 def nominal_root_stress(
     gear: Gear, *, contact_ratio: float, tangential_force: float, common_width: float | None = None
 ) -> NominalRootStress:
-    """Compute the nominal root stress sigma_F0 [Pa] of a gear, ``F_t/(b m) Y_F Y_S``.
+    """Compute the nominal root stress sigma_F0 [Pa] of a gear, ``F_t/(b m_n) Y_F Y_S Y_beta``.
 
-    The load acts at the outer point of single pair contact, from a contact ratio of two on with the part
-    `load_distribution_factor` of it; rim, deep-tooth and helix factors are 1. The
-    critical section is where the tangent of the fillet stands at 30 deg (internal gears 60 deg) to the
-    centreline of the tooth; the fillet of an internal gear enters through the equivalent rack radius rho_fPv
-    of its pinion cutter (ISO 6336-3, section 6.2).
+    The load acts at the outer point of single pair contact of the virtual spur gear, whose contact ratio is
+    ``eps_alpha/cos^2(beta_b)``; of spur teeth, from a contact ratio of two on, the part
+    `load_distribution_factor` of it (for helical ones the edition of 2019 has that factor together with
+    another Y_beta: theirs is 1, on the safe side). Rim and deep-tooth factors are 1. The critical section is where the tangent of the fillet stands at
+    30 deg (internal gears 60 deg) to the centreline of the tooth; the fillet of an internal gear enters
+    through the equivalent rack radius rho_fPv of its pinion cutter (ISO 6336-3, section 6.2).
 
     Parameters
     ----------
     contact_ratio, tangential_force : float
         As for `nominal_contact_stress`, with its mate [1, N].
     common_width : float, optional
-        Face width that both have in common, where its mate is narrower [m]; see `root_face_width`.
+        Face width that both have in common, where its mate is narrower [m]; see `root_face_width`. The
+        overlap ratio is that of this width.
 
     Raises
     ------
     GeometryError
-        Contact ratio outside the range of the method, or a tooth that has no such section (E-ISO6336).
+        Contact ratio of the virtual gear outside the range of the method, or a tooth that has no such section
+        (E-ISO6336).
     """
+    helix, base_helix = helix_of(gear)
+    contact_ratio = contact_ratio / math.cos(base_helix) ** 2
     _check_contact_ratio(contact_ratio)
-    chord, fillet, direction, offset = _critical_section(gear)
-    arm, angle, radius = _load(gear, contact_ratio, direction, offset)
+    tooth, common = _virtual_tooth(gear), common_width or gear.face_width
+    chord, fillet, direction, offset = _critical_section(gear, tooth)
+    arm, angle, radius = _load(tooth, contact_ratio, direction, offset)
     if not (chord > 0.0 and arm > 0.0 and fillet > 0.0):
         raise GeometryError(
             "the tooth has no critical section: "
             f"chord {chord:.4g}, arm {arm:.4g}, fillet radius {fillet:.4g} modules", code="E-ISO6336",
             limit="all > 0", remedy="the root of this tooth is outside the range of method B",
         )  # fmt: skip
-    form = 6.0 * arm * math.cos(angle) / (chord**2 * math.cos(gear.pressure_angle))
-    form *= load_distribution_factor(contact_ratio)
+    form = 6.0 * arm * math.cos(angle) / (chord**2 * math.cos(tooth.pressure_angle))
+    form *= load_distribution_factor(contact_ratio) if helix == 0.0 else 1.0
     correction = stress_correction(chord / arm, 0.5 * chord / fillet)
-    m = gear.module
-    width = root_face_width(gear.face_width, common_width or gear.face_width, m)
-    nominal = tangential_force / (width * m)
+    inclined, m = root_helix_factor(helix, overlap_of(gear, common)), tooth.module
+    nominal = tangential_force / (root_face_width(gear.face_width, common, m) * m)
     return NominalRootStress(
-        stress=nominal * form * correction,
+        stress=nominal * form * correction * inclined,
         form=form,
         correction=correction,
+        helix=inclined,
         arm=arm * m,
         chord=chord * m,
         fillet_radius=fillet * m,
@@ -194,7 +257,7 @@ def nominal_root_stress(
 
 
 def load_distribution_factor(contact_ratio: float) -> float:
-    """Compute f_eps of spur teeth (ISO 6336-3:2019): 0.7 where two pairs or more always carry, else 1.
+    """Compute f_eps (ISO 6336-3:2019, of spur teeth): 0.7 where two pairs or more always carry, else 1.
 
     At a contact ratio of two and above no pair carries alone at the point that the standard goes on to call
     the outer point of single pair contact, a contact ratio less one base pitches below the tip.
@@ -241,7 +304,7 @@ def single_pair_factor(
     """Compute the larger of Z_B, Z_D and 1, from the pitch point to a single pair in contact (ISO 6336-2, 6).
 
     The root of the relative curvature at the inner point of single contact of either gear over that at the
-    pitch point; 1 where two pairs always touch.
+    pitch point; 1 where two pairs always touch. Helical teeth have the part 1 - eps_beta of what exceeds 1.
 
     Parameters
     ----------
@@ -259,7 +322,8 @@ def single_pair_factor(
         relative_curvature(gear_1, gear_2, working_angle=working_angle, path=place)
         for place in (high - pitch, low + pitch, 0.0)
     )
-    return math.sqrt(max(inner, outer, middle) / middle)
+    overlap = min(overlap_of(gear_1, min(gear_1.face_width, gear_2.face_width)), 1.0)
+    return 1.0 + (1.0 - overlap) * (math.sqrt(max(inner, outer, middle) / middle) - 1.0)
 
 
 def relative_curvature(gear_1: Gear, gear_2: Gear, *, working_angle: float, path):
@@ -285,26 +349,41 @@ def bending_face_factor(contact_factor, face_width: float, tooth_height: float):
     return contact_factor ** (1 / (1 + ratio + ratio**2))
 
 
-def _standard_signs(gear: Gear) -> tuple[float, float, float]:
-    """Teeth, profile shift and dedendum of the rack [modules] as the standard counts them."""
-    sign = -1.0 if gear.internal else 1.0
-    depth = sign * (gear.reference_radius - gear.root_radius) / gear.module
-    shift = sign * gear.profile_shift
-    return sign * gear.teeth, shift, depth + shift
+def _normal_pressure_angle(gear: Gear) -> float:
+    """Pressure angle of the normal section [rad]."""
+    return math.atan(math.tan(gear.pressure_angle) / gear.rack.stretch)
 
 
-def _critical_section(gear: Gear) -> tuple[float, float, float, float]:
+def _virtual_tooth(gear: Gear) -> _VirtualTooth:
+    """Tooth of the normal section, ``z_n = z/(cos^2(beta_b) cos(beta))``, ``d_an = d_n + d_a - d``."""
+    sign, stretch, alpha = -1.0 if gear.internal else 1.0, gear.rack.stretch, _normal_pressure_angle(gear)
+    module, teeth = gear.module / stretch, gear.teeth * stretch / math.cos(helix_of(gear)[1]) ** 2
+    reference, shift = 0.5 * module * teeth, sign * gear.profile_shift * stretch
+    base = reference * math.cos(alpha)
+    return _VirtualTooth(
+        teeth=sign * teeth,
+        module=module,
+        pressure_angle=alpha,
+        shift=shift,
+        dedendum=sign * (gear.reference_radius - gear.root_radius) / module + shift,
+        rounding=gear.rack.root_radius * stretch,
+        base_radius=base,
+        tip_roll=roll(reference + (gear.tip_radius - gear.reference_radius), base),
+    )
+
+
+def _critical_section(gear: Gear, tooth: _VirtualTooth) -> tuple[float, float, float, float]:
     """Chord s_Fn and radius rho_F [modules] (ISO 6336-3, section 6.2).
 
     With them what the moment arm follows from: ``pi/3 - theta`` (internal ``pi/6 - theta``) and
     ``G / cos(theta) - rho_fPv``.
     """
-    z, shift, dedendum = _standard_signs(gear)
-    alpha, rounding, limit = gear.pressure_angle, gear.rack.root_radius, math.pi / 3.0
+    z, shift, dedendum = tooth.teeth, tooth.shift, tooth.dedendum
+    alpha, rounding, limit = tooth.pressure_angle, tooth.rounding, math.pi / 3.0
     if gear.internal:
-        cutter, limit = cutter_of(gear), math.pi / 6.0
-        tip = rounding if cutter.tip_radius is None else cutter.tip_radius
-        grown = (cutter.profile_shift + dedendum - tip) ** 1.95 / (3.156 * 1.036**cutter.teeth)
+        cutter, limit, stretch = cutter_of(gear), math.pi / 6.0, gear.rack.stretch
+        tip = rounding if cutter.tip_radius is None else cutter.tip_radius * stretch
+        grown = (cutter.profile_shift * stretch + dedendum - tip) ** 1.95 / (3.156 * 1.036**cutter.teeth)
         rounding = tip + grown
     E = 0.25 * math.pi - dedendum * math.tan(alpha) - (1.0 - math.sin(alpha)) * rounding / math.cos(alpha)
     G = rounding - dedendum + shift
@@ -333,18 +412,17 @@ def _solve_theta(z: float, G: float, H: float, start: float) -> float:
     )
 
 
-def _load(gear: Gear, contact_ratio: float, direction: float, offset: float):
+def _load(tooth: _VirtualTooth, contact_ratio: float, direction: float, offset: float):
     """Arm h_Fe [modules], load angle alpha_Fen and radius [m] of the outer single contact."""
-    z, shift, _ = _standard_signs(gear)
-    sign = math.copysign(1.0, z)
-    roll = gear.tip_roll - sign * gear.base_pitch * (contact_ratio - 1.0)
-    radius = math.hypot(roll, gear.base_radius)
-    alpha = math.acos(gear.base_radius / radius)
-    half = (0.5 * math.pi + 2.0 * shift * math.tan(gear.pressure_angle)) / z
-    gamma = half + inv(gear.pressure_angle) - inv(alpha)
+    z, sign = tooth.teeth, math.copysign(1.0, tooth.teeth)
+    along = tooth.tip_roll - sign * tooth.base_pitch * (contact_ratio - 1.0)
+    radius = math.hypot(along, tooth.base_radius)
+    alpha = math.acos(tooth.base_radius / radius)
+    half = (0.5 * math.pi + 2.0 * tooth.shift * math.tan(tooth.pressure_angle)) / z
+    gamma = half + inv(tooth.pressure_angle) - inv(alpha)
     angle = alpha - gamma
-    reach = (math.cos(gamma) - math.sin(gamma) * math.tan(angle)) * sign * 2.0 * radius / gear.module
-    arm = 0.5 * (reach - z * math.cos(direction) - (math.sqrt(3.0) if gear.internal else 1.0) * offset)
+    reach = (math.cos(gamma) - math.sin(gamma) * math.tan(angle)) * sign * 2.0 * radius / tooth.module
+    arm = 0.5 * (reach - z * math.cos(direction) - (math.sqrt(3.0) if z < 0.0 else 1.0) * offset)
     return arm, angle, radius
 
 

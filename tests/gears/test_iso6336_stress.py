@@ -1,9 +1,11 @@
 """Nominal stresses of ISO 6336 against a published calculation.
 
 Source: KISSsoft 03/2017 report of the NREL 5 MW gearbox, planetary stage 2 (ISO 6336:2006, method B):
-github.com/gfsReboucas/Drivetrain, @NREL_5MW/stage_02.rtf.
+github.com/gfsReboucas/Drivetrain, @NREL_5MW/stage_02.rtf. Helical teeth: worked example 1 of ISO/TR 6336-30,
+and the FZG test gear H501 by the formulas of the standard, evaluated apart from femgear.
 """
 
+import dataclasses
 import math
 
 import numpy as np
@@ -13,15 +15,21 @@ from validation.planetary import nrel_set
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import (
+    contact_helix_factor,
     contact_ratio_factor,
     elasticity_factor,
+    helix_of,
     nominal_contact_stress,
     nominal_root_stress,
+    overlap_of,
     relative_curvature,
+    root_helix_factor,
+    single_pair_factor,
     stress_correction,
     zone_factor,
 )
-from femgear.gears.profile import BasicRack
+from femgear.gears.pair import close_pair
+from femgear.gears.profile import BasicRack, transverse_rack, transverse_tool
 
 FORCE = 285900.438
 STEEL = {"youngs_modulus": 206e9, "poisson_ratio": 0.3}
@@ -152,6 +160,100 @@ def test_two_pairs_share_the_load_from_a_contact_ratio_of_two_on():
     assert above.form / below.form == pytest.approx(0.7, abs=1e-3)
     high = nominal_root_stress(gear, contact_ratio=2.113, tangential_force=200 / 0.06).stress
     assert high == pytest.approx(105.5e6, rel=0.02)
+
+
+def helical_pair(teeth, shifts, tips, *, module, angle, width, centre, rack=(1.0, 1.25, 0.38)):
+    """Two external helical gears [mm, deg]; the shift of the wheel is found from the centre distance."""
+    helix = math.radians(angle)
+    section = transverse_tool(1e-3 * module, math.radians(20.0), helix)
+    gears = [
+        Gear(
+            z, *section, x * math.cos(helix), 1e-3 * width, 5e-3 * module,
+            rack=transverse_rack(BasicRack(*rack), helix), tip_diameter=1e-3 * tip, name=name,
+        )
+        for z, x, tip, name in zip(teeth, shifts, tips, ("pinion", "wheel"), strict=True)
+    ]  # fmt: skip
+    return close_pair(*gears, centre_distance=1e-3 * centre, find=("wheel",))
+
+
+def iso_tr_example():
+    """Worked example 1 of ISO/TR 6336-30."""
+    return helical_pair(
+        (17, 103), (0.145, 0.0), (159.66, 872.35), module=8.0, angle=15.8, width=100.0, centre=500.0,
+        rack=(1.0, 1.4, 0.39),
+    )  # fmt: skip
+
+
+def fzg_h501(rounding):
+    return helical_pair(
+        (20, 30), (0.1809, 0.0891), (80.672, 116.264), module=3.5, angle=15.0, width=23.0, centre=91.5,
+        rack=(1.0, 1.25, rounding),
+    )  # fmt: skip
+
+
+def test_contact_stress_of_helical_teeth_is_that_of_the_technical_report():
+    """Z_H 2.39533, Z_eps 0.803, Z_beta 1.01944, sigma_H0 1206.58 N/mm^2 under 9000 N m."""
+    pair = iso_tr_example()
+    small, large = pair.gears
+    helix, base = helix_of(small)
+    assert math.degrees(helix) == pytest.approx(15.8, abs=1e-12)
+    zone = zone_factor(small.pressure_angle, pair.working_pressure_angle, base)
+    assert zone == pytest.approx(2.39533, abs=6e-6)
+    overlap = overlap_of(small, pair.face_width)
+    assert contact_ratio_factor(pair.contact_ratio, overlap) == pytest.approx(0.803, abs=5e-4)
+    assert contact_helix_factor(helix) == pytest.approx(1.01944, abs=5e-6)
+    stress = nominal_contact_stress(
+        small, large, working_angle=pair.working_pressure_angle, contact_ratio=pair.contact_ratio,
+        tangential_force=9000.0 / small.reference_radius, **STEEL,
+    )  # fmt: skip
+    assert stress == pytest.approx(1206.58e6, rel=5e-6)
+
+
+@pytest.mark.parametrize(
+    ("rounding", "form", "correction"),
+    [(0.38, (1.4356, 1.4543), (1.9756, 1.9607)), (0.30, (1.4791, 1.4905), (2.0468, 2.0358))],
+)
+def test_root_stress_of_helical_teeth_is_that_of_the_virtual_spur_gear(rounding, form, correction):
+    """Y_F, Y_S of ISO 6336-3:2006 by hand in the normal section, Y_beta 0.9323."""
+    pair = fzg_h501(rounding)
+    force = 100.0 / pair.gears[0].reference_radius
+    for gear, y_form, y_correction in zip(pair.gears, form, correction, strict=True):
+        ours = nominal_root_stress(gear, contact_ratio=pair.contact_ratio, tangential_force=force)
+        assert ours.form == pytest.approx(y_form, abs=6e-5)
+        assert ours.correction == pytest.approx(y_correction, abs=6e-5)
+        assert ours.helix == pytest.approx(1.0 - 0.54138 * 15.0 / 120.0, abs=1e-5)
+        whole = force / (0.023 * 3.5e-3) * ours.form * ours.correction * ours.helix
+        assert ours.stress == pytest.approx(whole, rel=1e-12)
+
+
+def test_factors_of_the_helix():
+    # a whole overlap ratio: Z_eps = 1/sqrt(eps_alpha), and no single pair in contact
+    assert contact_ratio_factor(1.6, 1.0) == contact_ratio_factor(1.6, 2.3) == pytest.approx(1.6**-0.5)
+    assert contact_ratio_factor(1.6, 0.5) ** 2 == pytest.approx(0.5 * (0.8 + 1.0 / 1.6))
+    assert root_helix_factor(math.radians(40.0), 1.7) == root_helix_factor(math.radians(-30.0), 1.0) == 0.75
+    assert root_helix_factor(0.0, 0.0) == contact_helix_factor(0.0) == 1.0
+    pair = fzg_h501(0.38)
+    angle = {"working_angle": pair.working_pressure_angle, "path": pair.path}
+    narrow, wide = (
+        single_pair_factor(*(dataclasses.replace(gear, face_width=b) for gear in pair.gears), **angle)
+        for b in (1e-6, 0.05)
+    )
+    ours, overlap = single_pair_factor(*pair.gears, **angle), overlap_of(pair.gears[0], 0.023)
+    assert wide == 1.0 < narrow
+    assert ours - 1.0 == pytest.approx((1.0 - overlap) * (narrow - 1.0), rel=1e-3)
+
+
+def test_internal_teeth_of_a_small_helix_are_spur_teeth(nrel):
+    """All factors go over into those of spur teeth, for the ring and its cutter too."""
+    helix = 1e-4
+    ring = dataclasses.replace(
+        nrel.ring, rack=dataclasses.replace(nrel.ring.rack, stretch=1.0 / math.cos(helix))
+    )
+    spur, helical = (
+        nominal_root_stress(gear, contact_ratio=1.6, tangential_force=FORCE).stress
+        for gear in (nrel.ring, ring)
+    )
+    assert helical == pytest.approx(spur, rel=1e-5) and helical != spur
 
 
 @pytest.mark.parametrize("tooth_pair", [(20, 40, False), (20, 60, True)])

@@ -13,9 +13,12 @@ from femgear.fe.grid import copy_nodes, mirror, rotated_copies
 from femgear.fe.meshing import mesh_outline
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import (
+    contact_helix_factor,
     contact_ratio_factor,
+    helix_of,
     nominal_contact_stress,
     nominal_root_stress,
+    overlap_of,
     zone_factor,
 )
 from femgear.gears.pair import close_pair
@@ -26,6 +29,7 @@ from validation.contact import HERTZ
 from validation.planetary import ALPHA, KISSSOFT, nrel_set
 from validation.reference.plane_elasticity import stress
 from validation.rows import Row, printed, within
+from validation.standard import helical_pair
 
 STEEL = Material(206e9, 0.3, 7850.0)
 REPORT_FORCE = 285900.438
@@ -83,6 +87,29 @@ def nominal_roots() -> tuple[Row, ...]:
         quantity = f"nominal root stress sigma_F0{words} [MPa]"
         rows.append(printed("D6", KISSSOFT, quantity, nominal, 1e-6 * ours.stress))
     return tuple(rows)
+
+
+def nominal_helical_flanks() -> tuple[Row, ...]:
+    """Contact stress of helical teeth in the example to the standard."""
+    source = "ISO/TR 6336-30:2017, worked example 1 (17/103, m_n 8, 15.8 deg)"
+    pair = helical_pair(
+        (17, 103), (0.145, 0.0), module=8, degrees=15.8, distance=500, rack=BasicRack(1.0, 1.4, 0.39),
+        tips=(159.66, 872.35),
+    )  # fmt: skip
+    pinion, working = pair.gear_1, pair.working_pressure_angle
+    helix, base = helix_of(pinion)
+    ours = nominal_contact_stress(
+        *pair.gears, working_angle=working, contact_ratio=pair.contact_ratio,
+        tangential_force=9000.0 / pinion.reference_radius, youngs_modulus=206e9, poisson_ratio=0.3,
+    )  # fmt: skip
+    ratio = contact_ratio_factor(pair.contact_ratio, overlap_of(pinion, pair.face_width))
+    zone, inclined = zone_factor(pinion.pressure_angle, working, base), contact_helix_factor(helix)
+    return (
+        printed("D6", source, "zone factor Z_H", "2.39533", zone),
+        printed("D6", source, "contact ratio factor Z_eps", "0.803", ratio),
+        printed("D6", source, "helix factor Z_beta", "1.01944", inclined),
+        printed("D6", source, "nominal contact stress sigma_H0 [MPa]", "1206.58", 1e-6 * ours),
+    )
 
 
 def root_against_whole_gear() -> tuple[Row, ...]:

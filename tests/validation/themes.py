@@ -196,7 +196,7 @@ THEMES = (
         "stress",
         "Stresses of teeth",
         "",
-        (stress.nominal_flanks, stress.nominal_roots, stress.hertz_of_teeth),
+        (stress.nominal_flanks, stress.nominal_roots, stress.nominal_helical_flanks, stress.hertz_of_teeth),
         (stress.root_against_whole_gear, stress.sharp_root_over_grids, stress.roots_of_high_contact_ratio),
     ),
     Theme(

@@ -519,9 +519,6 @@ def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> I
     where = _where(results.static, ", static")
     yield f"largest root stress{where}", f"{root[worst] * 1e-6:.1f} MPa, {_PARTS[worst]}"
     yield f"largest contact pressure{where}", _kinds("{:.1f} MPa", contact * 1e-6)
-    if results.case.helix_angle is not None:
-        notes.append("no safeties of helical teeth: nominal stresses of ISO 6336 are those of spur teeth")
-        return
     yield from _safeties(results.case, nominal, nominals, factors, " ".join(known), notes)
 
 

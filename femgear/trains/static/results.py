@@ -28,7 +28,7 @@ from femgear.findings import Finding, findings_in
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import Gear, tooth_thickness
-from femgear.gears.iso6336 import bending_face_factor, relative_curvature
+from femgear.gears.iso6336 import bending_face_factor, contact_helix_factor, helix_of, relative_curvature
 from femgear.gears.kinematics import speeds, torques
 from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_set, phasing_table
 from femgear.gears.profile import base_helix_angle, overlap_ratio
@@ -376,12 +376,6 @@ class NominalStresses:
     contact_ratio_factor: np.ndarray
     message: str
 
-    @classmethod
-    def of_none(cls, gears: GearSet, message: str) -> NominalStresses:
-        """Give none of a set of gears, and why."""
-        missing = np.full(len(gears.kinds), np.nan)
-        return cls(missing, np.full((len(gears.kinds), 2), np.nan), missing, message)
-
 
 @dataclass(frozen=True)
 class StressResult(StageResult):
@@ -465,6 +459,7 @@ class StressResult(StageResult):
             "repeats": int(self.closes),
             "module": self.planetary_set.gears[0].module,
             "nominal_load": self._nominal_load,
+            "iso_contact_helix_factor": contact_helix_factor(helix_of(self.planetary_set.gears[0])[0]),
             "load_counting": _COUNTING,
             "iso": self.nominal.message,
         }
@@ -731,10 +726,15 @@ def _kinked_reliefs(data: xr.Dataset) -> Iterator[Finding]:
 def _over_hertz(data: xr.Dataset) -> np.ndarray:
     """Largest pressure of every mesh over that of Hertz for load and curvature; 0 without sigma_H0."""
     load, curvature = data["contact_worst_load"].values, data["contact_worst_curvature"].values
-    hertz = data["iso_contact_stress"].values / data["iso_contact_ratio_factor"].values
+    hertz = data["iso_contact_stress"].values / _nominal_over_hertz(data)
     hertz = hertz * np.sqrt(load / data.attrs["nominal_load"] * curvature)
     largest = data["contact_pressure"].values.max(axis=1)
     return np.divide(largest, hertz, out=np.zeros(len(hertz)), where=hertz > 0.0)
+
+
+def _nominal_over_hertz(data: xr.Dataset) -> np.ndarray:
+    """Z_eps Z_beta of every mesh: sigma_H0 over the pressure of Hertz at the pitch point."""
+    return data["iso_contact_ratio_factor"].values * data.attrs.get("iso_contact_helix_factor", 1.0)
 
 
 def _more_slices(data: xr.Dataset, module: float) -> str:
@@ -967,6 +967,7 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
     if nominal_load == 0.0:
         return
     excess = _over_hertz(data)
+    factors = "Z_eps Z_beta" if data.attrs.get("iso_contact_helix_factor", 1.0) > 1.0 else "Z_eps"
     for kind in dict.fromkeys(map(family, names)):
         meshes = [i for i, name in enumerate(names) if family(name) == kind]
         mesh = meshes[int(data["contact_pressure"].values[meshes].max(axis=1).argmax())]
@@ -982,7 +983,7 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
                 f"curvature where the pressure is largest, {curvature:.2f} times that of the pitch point"
                 f"{near if curvature > DIFFERS else ''}; x {math.sqrt(load / nominal_load):.2f} by the load "
                 f"of the tooth pair, {load / nominal_load:.2f} of the nominal one; x "
-                f"{1.0 / float(one['iso_contact_ratio_factor']):.2f}: sigma_H0 has Z_eps; x "
+                f"{1.0 / _nominal_over_hertz(data)[mesh]:.2f}: sigma_H0 has {factors}; x "
                 f"{excess[mesh]:.2f} by all else (kinks and ends of flanks, deformation of the teeth)"
             )
         for number, title in enumerate(SIDES.get(kind, tuple(kind.split("-")))):

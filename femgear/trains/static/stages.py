@@ -55,6 +55,7 @@ from femgear.gears.iso6336 import (
     contact_ratio_factor,
     nominal_contact_stress,
     nominal_root_stress,
+    overlap_of,
     root_face_width,
 )
 from femgear.gears.planetary import PlanetarySet
@@ -321,9 +322,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
         first_period=first,
         ranges=ranges,
         spectrum=load_spectrum(teeth, gears.mates, closes=closes),
-        nominal=nominal_stresses(gears, static.sun_torque, materials_of(case))
-        if case.helix_angle is None
-        else NominalStresses.of_none(gears, "helical teeth: nominal stresses are those of spur teeth"),
+        nominal=nominal_stresses(gears, static.sun_torque, materials_of(case)),
         sun_torque=static.sun_torque,
         closes=closes,
         relief_kinks=relief_kinks(case),
@@ -365,7 +364,7 @@ def nominal_stresses(
                 small, large, working_angle=pair.working_pressure_angle, youngs_modulus=modulus,
                 poisson_ratio=ratio, mate=mate, **load,
             )  # fmt: skip
-            ratio_factor[i] = contact_ratio_factor(pair.contact_ratio)
+            ratio_factor[i] = contact_ratio_factor(pair.contact_ratio, overlap_of(small, pair.face_width))
         except GeometryError as error:
             messages.append(f"{one.name}-{two.name}: {error.message}")
         for j, gear in enumerate((one, two)):

@@ -60,7 +60,20 @@ def test_elastic_set_with_a_helix(few_waves, tmp_path):
         there = path[meshes][carries]
         assert (there > ends[0] - 0.2).all() and (there < ends[1] + 0.2).all()
     file = stress.dataset()
-    assert np.isnan(file["iso_root_stress"].values).all() and "spur" in file.attrs["iso"]
+    # Z_eps^2 of a whole overlap ratio is 1/eps_alpha; without Z_eps and Z_beta sigma_H0 is that of Hertz
+    ratios = np.repeat([pair.contact_ratio for pair in gears.kinds], 3)
+    assert file["iso_contact_ratio_factor"].values == pytest.approx(ratios**-0.5, rel=1e-3)
+    assert file.attrs["iso_contact_helix_factor"] == pytest.approx(np.cos(np.radians(15.5)) ** -0.5)
+    hertz = (
+        file["iso_contact_stress"] / file["iso_contact_ratio_factor"] / file.attrs["iso_contact_helix_factor"]
+    )
+    hertz *= np.sqrt(
+        file["contact_worst_load"] / file.attrs["nominal_load"] * file["contact_worst_curvature"]
+    )
+    assert file["contact_pressure"].max("position").values == pytest.approx(hertz.values, rel=0.01)
+    roots = (file["root_worst"] / file["iso_root_stress"]).values
+    assert roots[:3] == pytest.approx(0.85, abs=0.05) and roots[3:, 0] == pytest.approx(0.85, abs=0.05)
+    assert roots[3:, 1] == pytest.approx(0.67, abs=0.05) and not file.attrs["iso"]
     assert file["root_face_factor"].values == pytest.approx(1.0, abs=0.06)
     straight = replace(found, base_helix_angle=0.0)
     ratio = file["root_worst"].values / solve_stress(case, straight).dataset()["root_worst"].values
