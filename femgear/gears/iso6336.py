@@ -207,10 +207,11 @@ def nominal_root_stress(
 
     The load acts at the outer point of single pair contact of the virtual spur gear, whose contact ratio is
     ``eps_alpha/cos^2(beta_b)``; of spur teeth, from a contact ratio of two on, the part
-    `load_distribution_factor` of it (for helical ones the edition of 2019 has that factor together with
-    another Y_beta: theirs is 1, on the safe side). Rim and deep-tooth factors are 1. The critical section is where the tangent of the fillet stands at
-    30 deg (internal gears 60 deg) to the centreline of the tooth; the fillet of an internal gear enters
-    through the equivalent rack radius rho_fPv of its pinion cutter (ISO 6336-3, section 6.2).
+    `load_distribution_factor` of it. The edition of 2019 has that factor for helical teeth too, with another
+    Y_beta; with the Y_beta of 2006 it is left out, on the safe side. Rim and deep-tooth factors are 1. The
+    critical section is where the tangent of the fillet stands at 30 deg (internal gears 60 deg) to the
+    centreline of the tooth; the fillet of an internal gear enters through the equivalent rack radius rho_fPv
+    of its pinion cutter (ISO 6336-3, section 6.2).
 
     Parameters
     ----------
