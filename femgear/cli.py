@@ -12,6 +12,7 @@ import signal
 import sys
 import textwrap
 import threading
+import time
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -86,14 +87,54 @@ Whole = Annotated[int, Parameter(converter=_convert_whole)]
 """A number with its unit, which may be negative."""
 
 
+_SILENCE = 10.0
+"""Longest time without a line where standard error is a file or a pipe [s]."""
+
+
 class Progress:
-    """Bars on the terminal, or one line a stage where standard error is a file; called by the stages."""
+    """Bars on the terminal, or lines where standard error is a file or a pipe; called by the stages."""
 
     def __enter__(self):
-        from rich import progress
         from rich.console import Console
 
         self._console = Console(stderr=True, markup=False, highlight=False)
+        self._done, self._now, self._start = dict[str, tuple[float, float]](), "", time.monotonic()
+        self._ended, self._bars, self._tasks = threading.Event(), None, {}
+        if self._console.is_terminal:
+            self._draw_bars()
+        else:
+            threading.Thread(target=self._tell_time, daemon=True).start()
+        return self
+
+    def __exit__(self, *_):
+        self._ended.set()
+        if self._bars is not None:
+            self._bars.stop()
+
+    def __call__(self, stage: str, done: float = 0.0, total: float = 1.0) -> None:
+        """Say that ``done`` of ``total`` steps of a stage are done."""
+        if stage not in self._done and self._bars is None:
+            self._console.print(stage)
+        self._done[stage], self._now = (done, total), stage
+        if self._bars is not None:
+            if stage not in self._tasks:
+                self._tasks[stage] = self._bars.add_task(stage, total=total)
+            self._bars.update(self._tasks[stage], completed=done, total=total)
+
+    @contextlib.contextmanager
+    def aside(self) -> Iterator[None]:
+        """Leave the terminal to others in this context; the bars of what comes stand below."""
+        if self._bars is not None:
+            self._bars.stop()
+        yield
+        if self._bars is not None:
+            self._draw_bars()
+
+    def _draw_bars(self) -> None:
+        """Begin with new bars."""
+        from rich import progress
+
+        self._tasks = {}
         self._bars = progress.Progress(
             progress.TextColumn("{task.description}", markup=False),
             progress.BarColumn(),
@@ -102,22 +143,15 @@ class Progress:
             progress.TimeElapsedColumn(),
             progress.TimeRemainingColumn(),
             console=self._console,
-            disable=not self._console.is_terminal,
         )
-        self._tasks = {}
         self._bars.start()
-        return self
 
-    def __exit__(self, *_):
-        self._bars.stop()
-
-    def __call__(self, stage: str, done: float = 0.0, total: float = 1.0) -> None:
-        """Say that ``done`` of ``total`` steps of a stage are done."""
-        if stage not in self._tasks:
-            self._tasks[stage] = self._bars.add_task(stage, total=total)
-            if not self._console.is_terminal:
-                self._console.print(stage)
-        self._bars.update(self._tasks[stage], completed=done, total=total)
+    def _tell_time(self) -> None:
+        """Print how far the stage has come as often as a reader would begin to wonder."""
+        while not self._ended.wait(_SILENCE):
+            done, total = self._done.get(self._now, (0.0, 1.0))
+            share = f", {done:.5g} of {total:.5g}" if total > 1.0 else ""
+            self._console.print(f"{self._now}{share}, {time.monotonic() - self._start:.0f} s")
 
 
 def _load_xarray() -> None:
@@ -294,7 +328,7 @@ def run(
     from femgear.run import run_case
     from femgear.storage.files import resumable
     from femgear.storage.results import completed_since_now, run_folder
-    from femgear.trains.reading import open_results, read_case
+    from femgear.trains.reading import read_case
     from femgear.trains.registry import check_case, stage_names, train_of
 
     if only is not None and only not in (known := stage_names()):
@@ -312,12 +346,17 @@ def run(
     with resumable(output, completed_since_now(output)):
         _load_xarray()
         with place as folder, Progress() as progress:
-            written = run_case(data, folder, only=only, pictures=pictures, progress=progress)
-        results = open_results(output, known=written)
-        _print(train.describe_results(results))
-        _warn(train.result_warnings(results))
+
+            def tell_numbers(results) -> None:
+                """Print what was found, before anything is drawn."""
+                with progress.aside():
+                    _print(train.describe_results(results))
+                    _warn(train.result_warnings(results))
+                    sys.stdout.flush()
+
+            run_case(data, folder, only=only, pictures=pictures, progress=progress, computed=tell_numbers)
         _say(f"results: {output}")
-        if "report.html" in results.manifest.files:
+        if pictures:
             _say(f"report:  {output / 'report.html'}")
     return 0
 

@@ -6,7 +6,7 @@ import hashlib
 import os
 import time
 from collections import defaultdict
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
@@ -161,13 +161,15 @@ def run_case(
     only: str | None = None,
     pictures: bool = True,
     progress: Progress = silent,
+    computed: Callable[[Results], None] | None = None,
 ) -> Mapping[str, xr.Dataset]:
     """Compute a case and write its results; goes on from the stages of an interrupted run of the same case.
 
     Into a folder from `femgear.storage.results.run_folder`, whose manifest says after every stage what is
     there; up to the stage ``only``, whatever the case says of it; ``pictures`` are figures, fields and
-    report; ``progress`` is called with (stage, done, total). Returns the contents of those files that were
-    written at once, by stage.
+    report; ``progress`` is called with (stage, done, total), ``computed`` with the results once all stages
+    are done, before anything is drawn. Returns the contents of the files, by stage, those that were written
+    part by part only where they were drawn or told.
     """
     asked, stages = _asked(case, only)
     run, results = _resumed(folder, asked, stages)
@@ -180,23 +182,34 @@ def run_case(
     for stage in stages:
         if stage.name not in run.timings:
             _compute(run, asked, stage, stages, results, progress)
-    if pictures:
-        start = time.perf_counter()
+    if pictures or computed is not None:
         files = (stage.name for stage in stages if stage.name not in run.data)
         run.data |= {name: read_dataset(folder / f"{name}.nc") for name in files}
-        drawn = Drawn(
-            case, run.data, {name: one for name, one in results.items() if one is not None}, grid_cache()
-        )
-        names = write_pictures(folder, train_of(case), drawn, progress=progress)
-        run.timings["pictures"] = time.perf_counter() - start
-        manifest = run.record(*names)
-        shown = replace(manifest, complete=True, files=_without_kept(manifest.files))
-        written = Results(folder, shown, read_case).with_known(run.data)
-        write_text(page(train_of(case), written), folder / "report.html")
-        run.record("report.html")
+    if computed is not None:
+        computed(_results_so_far(run))
+    if pictures:
+        _draw(run, case, {name: one for name, one in results.items() if one is not None}, progress)
     run.files = _without_kept(run.files)
     run.record(complete=True)
     return run.data
+
+
+def _results_so_far(run: _Run, *names: str) -> Results:
+    """Results of the stages that are computed, with some more files, as those of a complete run."""
+    manifest = run.record(*names)
+    shown = replace(manifest, complete=True, files=_without_kept(manifest.files))
+    return Results(run.folder, shown, read_case).with_known(run.data)
+
+
+def _draw(run: _Run, case: Case, results: dict[str, Any], progress: Progress) -> None:
+    """Write the page with its charts, then the pictures, and the page with these."""
+    start, train = time.perf_counter(), train_of(case)
+    write_text(page(train, _results_so_far(run)), run.folder / "report.html")
+    drawn = Drawn(case, run.data, results, grid_cache())
+    names = write_pictures(run.folder, train, drawn, progress=progress)
+    run.timings["pictures"] = time.perf_counter() - start
+    write_text(page(train, _results_so_far(run, *names)), run.folder / "report.html")
+    run.record("report.html")
 
 
 def _without_kept(files: Mapping[str, str]) -> dict[str, str]:

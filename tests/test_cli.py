@@ -289,7 +289,7 @@ def test_schema_is_json(capsys):
 # --- run -------------------------------------------------------------------------------------------
 
 
-def fake_run(case, out, *, only=None, pictures=True, progress=None):
+def fake_run(case, out, *, only=None, pictures=True, progress=None, computed=None):
     """Write synthetic results as the pipeline would."""
     data = synthetic()
     names = ["case.toml"]
@@ -305,6 +305,7 @@ def fake_run(case, out, *, only=None, pictures=True, progress=None):
         if stage == only:
             break
     finish(out, names, timings={"static": 0.25}, convergence={})
+    computed(open_results(out))
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import io
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -298,3 +299,13 @@ def test_progress_is_one_line_a_stage_in_a_file(capsys):
             progress("pictures", done, 2)
         progress("sound", 0, 1)
     assert capsys.readouterr().err.split() == ["pictures", "sound"]
+
+
+def test_progress_is_never_silent_for_long_in_a_file(monkeypatch, capsys):
+    monkeypatch.setattr(cli, "_SILENCE", 0.05)
+    with cli.Progress() as progress:
+        progress("pictures", 3, 11)
+        time.sleep(0.5)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "pictures" and len(lines) > 2
+    assert all(line.startswith("pictures, 3 of 11, ") and line.endswith(" s") for line in lines[1:])

@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 from edited_manifests import edit_manifest
 
+from femgear import run as run_module
 from femgear.errors import StorageError
 from femgear.findings import as_data
 from femgear.run import run_case
@@ -62,6 +63,23 @@ def run(case, folder, *, stop="", only=None, force=False):
     with run_folder(folder, case=case.source, force=force) as place:
         run_case(case, place, only=only, pictures=False, progress=progress)
     return begun
+
+
+def test_numbers_are_told_before_anything_is_drawn(tmp_path, monkeypatch):
+    case, seen = quick("four_stage_reducer"), list[list[str]]()
+
+    def drawn(folder, *_, **__):
+        seen.append(sorted(path.name for path in folder.glob("report.html")))
+        return []
+
+    def computed(results):
+        seen.append([*results])
+        assert not {*tmp_path.glob("*.png"), *tmp_path.glob("report.html")}
+
+    monkeypatch.setattr(run_module, "write_pictures", drawn)
+    with run_folder(tmp_path, case=case.source) as place:
+        run_case(case, place, computed=computed)
+    assert seen == [["modes", "response"], ["report.html"]]
 
 
 def contents(folder):
