@@ -198,36 +198,45 @@ def housing(reference: Reference):
     return solve_housing(reference.case, reference.dynamics)
 
 
-def on_feet(case, harmonics: int, diameters: int, count: int):
-    """The case on the four feet of docs/bolts.md at 300 to 3100 rpm, half of the harmonics excited."""
+def on_feet(case, speeds, *, harmonics: int | None = None, diameters: int = 14, runup: int = 0):
+    """The case on the four feet of docs/bolts.md, with a run-up of so many speeds from 300 to 3100 rpm.
+
+    The excitation ends at so many mesh harmonics, by default where that of a run does.
+    """
     from femgear.trains.reading import with_values
 
     stiffness = dict.fromkeys(("radial_stiffness", "tangential_stiffness"), "4e8 N/m")
     feet = [{"angle": f"{a} deg", "width": "20 mm", "mass": "50 g", **stiffness} for a in (35, 145, 215, 325)]
     entries = {
         "housing.support": feet, "housing.nodal_diameters": diameters, "housing.published": [],
-        "dynamics.mesh_harmonics": harmonics // 2, "dynamics.response_harmonics": harmonics,
-        "operation.speeds": {"from": "300 rpm", "to": "3100 rpm", "count": count},
-    }  # fmt: skip
+        "operation.speeds": speeds, "runup.from": "300 rpm", "runup.to": "3100 rpm", "runup.count": runup,
+    } | ({} if harmonics is None else {"dynamics.mesh_harmonics": harmonics})  # fmt: skip
     return with_values(case, entries)
 
 
-def two_way(reference: Reference, modes=None, *, count: int = 1000, harmonics: int = 6, diameters: int = 14):
+def turning_speeds(count: int) -> dict:
+    """Speeds of the input from 300 to 3100 rpm."""
+    return {"from": "300 rpm", "to": "3100 rpm", "count": count}
+
+
+def two_way(reference: Reference, modes=None, *, speeds=("250 rpm",), harmonics=None, diameters: int = 14):
     """Mesh forces of the set on four feet both ways, and of the ring without them."""
     from femgear.trains.elastic.excitation_limit import limited
     from femgear.trains.elastic.fixed_housing import fixed_housing
     from femgear.trains.rigid import member_speeds
 
-    case, first = (
-        on_feet(reference.case, harmonics, diameters, count),
-        member_speeds(reference.case, reference.gears),
-    )
-    speeds = np.array(case.operation.speeds)
-    carrier, kept = first.carrier * speeds, case.dynamics.mesh_harmonics
-    for part in np.array_split(carrier, -(-count // 250)):  # about as many as a run has in memory at a time
-        limit = limited(case, first.mesh_frequency * part / first.carrier, 0.0, given=kept)
-        found = fixed_housing(case, modes or reference.modes, part, limit)
-    return found
+    modes = modes or reference.modes
+    case = on_feet(reference.case, speeds, harmonics=harmonics, diameters=diameters)
+    first, speeds = member_speeds(case, reference.gears), np.array(case.operation.speeds)
+    limit = limited(case, first.mesh_frequency * speeds, modes.reach, given=case.dynamics.mesh_harmonics)
+    return fixed_housing(case, modes, first.carrier * speeds, limit)
+
+
+def runup_on_feet(reference: Reference, count: int = 400):
+    """The run-up of the set on four feet, with speeds beside its resonances."""
+    from femgear.trains.elastic.stages import solve_runup
+
+    return solve_runup(on_feet(reference.case, ["3100 rpm"], runup=count), reference.modes)
 
 
 def whole(reference: Reference):
@@ -388,12 +397,11 @@ STAGES = {
         "sweep of 1000 speeds with Floquet verdicts", sweep_verdicts, ("modes",), _lines, 3
     ),
     "two_way": Stage(
-        "both ways, four feet, 1000 speeds, six harmonics, n to 14",
+        "both ways, four feet, 250 rpm, excited as in a run, n to 14",
         two_way,
         ("modes",),
         lambda _, r: r.two_way.force[:, 1:].size * 2,
-        1,
-        60.0,
+        3,
     ),
     "housing": Stage("housing, 2 speeds", housing, ("dynamics",), lambda _, h: h.lines.displacement.size, 9),
     "whole": Stage("whole computation, grids cached", whole, ("grids",), _none, 3, 3.0),
