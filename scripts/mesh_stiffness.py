@@ -7,7 +7,6 @@ import sys
 from pathlib import Path
 from typing import Annotated, Literal
 
-import numpy as np
 from cyclopts import Parameter
 from script_tools import REFERENCE_CASE, Progress, print_table, ready_folder, run_script, say_files, write_csv
 
@@ -90,10 +89,13 @@ def _print_summary(torques, results):
     rows = []
     for torque, static in zip(torques, results):
         for name, j in distinct_lines(static["mesh"].values, static["mesh_stiffness"]):
-            k, ste = static["mesh_stiffness"].values[j] / 1e6, static["ste"].values[j] * 1e6
             k_peak, ste_peak = (static[f"{one}_peak_to_peak"].values[j] for one in ("mesh_stiffness", "ste"))
-            values = (k.mean(), k_peak / 1e6, ste.mean(), ste_peak * 1e6)
-            per_width = k.mean() / (1e3 * static.attrs["face_width"])
+            k, ste = (
+                factor * float(static[f"{one}_mean"][j])
+                for one, factor in (("mesh_stiffness", 1e-6), ("ste", 1e6))
+            )
+            values = (k, k_peak / 1e6, ste, ste_peak * 1e6)
+            per_width = k / (1e3 * static.attrs["face_width"])
             rows.append((name, f"{torque:g}", *(f"{v:.4f}" for v in values), f"{per_width:.3f}"))
     header = ("mesh", "torque [N m]", "k mean [N/um]", "k p-p", "STE mean [um]", "STE p-p", "k/b [N/(mm um)]")
     print_table("Tangent mesh stiffness and static transmission error", header, rows)
@@ -132,7 +134,9 @@ def _figure(torques, results):
             peak = 1e6 * float(stored["ste_peak_to_peak"])
             title += f", {torques[0]:g} N m: {peak:.3g} µm peak to peak"
             peak = 1e-6 * float(stored["mesh_stiffness_peak_to_peak"])
-            mean = f"mean {np.mean(k[:-1]):.4g} N/µm, {peak:.4g} N/µm peak to peak"
+            mean = (
+                f"mean {1e-6 * float(stored['mesh_stiffness_mean']):.4g} N/µm, {peak:.4g} N/µm peak to peak"
+            )
         label(axes[column], y="transmission error [µm]", title=title)
         label(axes[len(kinds) + column], "position in the mesh period [1]", "tangent stiffness [N/µm]", mean)
     axes[0].set_xlim(0, 1)

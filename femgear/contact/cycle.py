@@ -34,7 +34,15 @@ from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
 from femgear.contact.flank_pairs import mesh_count
 from femgear.contact.omitted_pairs import needed_nearest
-from femgear.contact.peaks import FEWEST, MOST_PLACES, MOST_ROUNDS, Between, open_places, tooth_pair_codes
+from femgear.contact.peaks import (
+    FEWEST,
+    MOST_PLACES,
+    MOST_ROUNDS,
+    Between,
+    mean_weights,
+    open_places,
+    tooth_pair_codes,
+)
 from femgear.contact.slices import largest_mean
 from femgear.contact.supports import (
     RIGID,
@@ -149,6 +157,9 @@ class MeshCycle:
     max_pressure : (M, P) array
         Largest pressure of the contacts that do not reach the end of a flank [Pa]: under a sharp edge the
         pressure has no limit, it grows with every halving of the cells.
+    pressed_path, pressed_load : (M, P) arrays
+        Path coordinate of the tooth pair that has it [m], and its load [N]; in slices those of the slice that
+        has it, the load times their number.
     edge_contact : (M, P) bool array
         Whether a contact of the mesh reaches a tip corner or the start of the involute.
     open_planets : (N, P) bool array
@@ -212,6 +223,8 @@ class MeshCycle:
     back_tooth: np.ndarray
     bearing_force: np.ndarray
     max_pressure: np.ndarray
+    pressed_path: np.ndarray
+    pressed_load: np.ndarray
     edge_contact: np.ndarray
     open_planets: np.ndarray
     residual: np.ndarray
@@ -240,7 +253,8 @@ class MeshCycle:
     def extremes(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest values over the record and the positions between.
 
-        Of ``deflection`` or ``stiffness`` of every mesh (M,), ``load_share`` of planets (N,), or ``sun_arc``.
+        Of ``deflection``, ``stiffness`` or ``max_pressure`` of every mesh (M,), ``load_share`` of planets
+        (N,), or ``sun_arc``.
         """
         values = np.asarray(getattr(self, name))
         if self.between is not None:
@@ -260,6 +274,23 @@ class MeshCycle:
         """Compute the difference of the `extremes`: of a static transmission error by default."""
         low, high = self.extremes(name)
         return np.asarray(high - low)
+
+    def mean(self, name: str = "stiffness") -> np.ndarray:
+        """Compute the mean over the record of what is linear between its positions and those between.
+
+        Of every mesh (M,). Stiffnesses jump where tooth pairs come and go, which a few equidistant positions
+        place some per cent of a mesh period off.
+        """
+        values, between = np.asarray(getattr(self, name)), self.between
+        if between is None:
+            return values.mean(axis=-1)
+        weights = mean_weights(np.append(self.position, between.position), self.periods)
+        of_meshes = np.concatenate([values, getattr(between, name)], axis=-1) @ weights
+        # of planets that go through the same states those count whose jumps are enclosed
+        classes = len(between.looked) // self.alike
+        looked = between.looked.reshape(self.alike, classes)
+        of_class = np.where(looked, of_meshes.reshape(-1, self.alike, classes), 0.0).sum(axis=1)
+        return np.repeat(of_class[:, None] / looked.sum(axis=0), self.alike, axis=1).ravel()
 
     @property
     def face_load_factor(self) -> np.ndarray | None:
@@ -312,9 +343,10 @@ class MeshCycle:
 
 _PRESSURES = ("pressure", "pressure_offset", "pressure_centre")
 _OVER_MESHES = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
+_PRESSED = ("pressed_path", "pressed_load")
 _SLICED = ("slice_load", "slice_pressure", "mesh_misalignment", "lead_offset")
 _AXES = {
-    "mt": (*_OVER_MESHES, "held_stiffness", "mesh_misalignment", "lead_offset"),
+    "mt": (*_OVER_MESHES, *_PRESSED, "held_stiffness", "mesh_misalignment", "lead_offset"),
     "mst": ("tooth_load", "path", "back_tooth_load", "back_path", "pressure_centre"),
     "gms": ("tooth", "back_tooth"),
     "t": ("sun_arc", "residual", "iterations"),
@@ -325,7 +357,9 @@ _AXES = {
     "mswt": ("slice_load", "slice_pressure"),
 }
 """Axes of the arrays of a cycle: gear, mesh, planet n, tooth pair (slot), cell, slice w, position t."""
-_ODD = ("path", "back_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
+_BETWEEN = ("position", "deflection", "stiffness", "sun_arc", "load_share", "max_pressure", *_PRESSED)
+"""What is kept at the positions between."""
+_ODD = ("path", "back_path", "pressed_path", "tooth", "back_tooth", "pressure_offset", "pressure_centre")
 """What counts the other way round in the mirror image."""
 
 
@@ -594,6 +628,7 @@ class _Walk:
         if record is None or (wider, further) != (share, nearest) or not record.force.any():
             return record, wider, further
         equidistant, doubt = len(record.position), 0.0
+        records: list[MeshCycle] = []
         known, places = self._curves(record), self._first_places(record.position)
         for _ in range(MOST_ROUNDS + 1):
             if not len(places):
@@ -605,12 +640,18 @@ class _Walk:
             between, wider, further = self._at(places).attempt(share, nearest)
             if between is None or (wider, further) != (share, nearest):
                 return None, wider, further
+            records.append(between)
             more = self._curves(between)
             known = {name: np.concatenate([known[name], more[name]], axis=-1) for name in known}
             places = np.zeros(0)
         order = equidistant + np.argsort(known["position"][equidistant:])
-        names = ("position", "deflection", "stiffness", "sun_arc", "load_share")
-        between = Between(**{name: known[name][..., order] for name in names}, doubt=doubt)
+        looked = np.arange(self.planetary_set.n_planets) < self.planetary_set.n_planets // self.alike
+        between = Between(
+            **{name: known[name][..., order] for name in _BETWEEN},
+            looked=looked,
+            records=tuple(records),
+            doubt=doubt,
+        )
         return replace(record, between=between, alike=self.alike), share, nearest
 
     def _first_places(self, position: np.ndarray) -> np.ndarray:
@@ -628,13 +669,12 @@ class _Walk:
 
     def _curves(self, record: MeshCycle) -> dict[str, np.ndarray]:
         """What has peaks over the positions, and the tooth pairs that carry as `tooth_pair_codes`."""
-        names = ("position", "deflection", "stiffness", "sun_arc", "load_share")
         pitch = self.planetary_set.base_pitch
         codes, later = (
             tooth_pair_codes(record.path, record.tooth_load, record.position + after, pitch)
             for after in (0.0, float(self.empty.periods))
         )
-        curves = {name: np.asarray(getattr(record, name)) for name in names}
+        curves = {name: np.asarray(getattr(record, name)) for name in _BETWEEN}
         return curves | {"codes": codes, "later_codes": later}
 
     def _open_places(self, known: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
@@ -685,6 +725,7 @@ class _Walk:
             "member_motion": motion,
             "edge_contact": found.by_pairs(at_edge)[:meshes].any(axis=1),
             "max_pressure": found.by_pairs(inner).max(axis=1)[:meshes],
+            "pressed": found.by_pairs(inner).argmax(axis=1)[:meshes],
             "residual": state.residual,
             "iterations": state.iterations,
         }
@@ -714,6 +755,7 @@ class _Walk:
                     turned[place, kind * N : (kind + 1) * N] = setup.places[1][:N] * teeth
             tooth = tooth[:, every] + turned[..., None]
         values |= {"path": path[drive], "tooth": tooth[:, drive]}
+        values |= self._most_pressed(values)
         looked = self.options.both_flanks
         values["back_path"] = path[back] if looked else np.zeros_like(path)
         if self.options.ahead is not None:
@@ -746,6 +788,22 @@ class _Walk:
             tilt_names=() if tilting is None else tilting.names,
             message=message,
         )
+
+    def _most_pressed(self, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Path and load (meshes, P) of the tooth pair with the largest pressure, in slices of the slice."""
+        path, load, pressed = values["path"], values["tooth_load"], values.pop("pressed", None)
+        if "slice_pressure" in values:
+            load, slices = values["slice_load"], self.options.slices
+            ahead = np.zeros(slices) if self.options.ahead is None else self.options.ahead
+            path = path[:, :, None] + ahead[:, None] * self.planetary_set.base_pitch
+            places = len(load), -1, load.shape[-1]
+            path, load = np.broadcast_to(path, load.shape).reshape(places), load.reshape(places)
+            pressed = values["slice_pressure"].reshape(places).argmax(axis=1)
+        assert pressed is not None
+        return {
+            name: np.take_along_axis(of_pairs, pressed[:, None], axis=1)[:, 0]
+            for name, of_pairs in zip(_PRESSED, (path, load), strict=True)
+        }
 
 
 def _between_meshes(setup: MeshWindows, tangents: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -792,6 +850,11 @@ def _seen_from_front(cycle: MeshCycle, planetary_set: GearSet, order) -> MeshCyc
             stiffness=one.stiffness[mesh, ::-1],
             sun_arc=one.sun_arc[::-1],
             load_share=one.load_share[planet, ::-1],
+            max_pressure=one.max_pressure[mesh, ::-1],
+            pressed_path=-one.pressed_path[mesh, ::-1],
+            pressed_load=one.pressed_load[mesh, ::-1],
+            looked=one.looked[planet],
+            records=tuple(_seen_from_front(record, planetary_set, order) for record in one.records),
         )
     found["member_motion"] = _in_mirror(cycle.member_names, cycle.member_motion, planet, angle)
     if cycle.member_tilt is not None:

@@ -10,8 +10,12 @@ with other pairs at their ends until they are as short as `ENCLOSED`: slopes nee
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
+
+if TYPE_CHECKING:
+    from femgear.contact.cycle import MeshCycle
 
 TOLERANCE = 0.01
 """Share of a peak to peak that what is not resolved may still add to it."""
@@ -38,6 +42,12 @@ class Between:
     sun_arc : (E,) array
         [m]
     load_share : (N, E) array
+    max_pressure, pressed_path, pressed_load : (M, E) arrays
+        [Pa], [m], [N]
+    looked : (N,) bool array
+        Planets whose extremes these positions enclose: one of those that go through the same states.
+    records : tuple of MeshCycle
+        The same positions in the order in which they were solved, with the loads of the tooth pairs.
     doubt : float
         Share of a peak to peak that what is not resolved may still add.
     """
@@ -47,7 +57,21 @@ class Between:
     stiffness: np.ndarray
     sun_arc: np.ndarray
     load_share: np.ndarray
+    max_pressure: np.ndarray
+    pressed_path: np.ndarray
+    pressed_load: np.ndarray
+    looked: np.ndarray
+    records: tuple[MeshCycle, ...]
     doubt: float
+
+
+def mean_weights(position: np.ndarray, periods: int) -> np.ndarray:
+    """Find the weights (P,) of the mean over the mesh periods of what is linear between positions (P,)."""
+    order = np.argsort(position, kind="stable")
+    length = np.diff(np.append(position[order], position[order[0]] + periods))
+    weights = np.empty(len(position))
+    weights[order] = 0.5 * (length + np.roll(length, 1)) / periods
+    return weights
 
 
 def tooth_pair_codes(

@@ -370,18 +370,23 @@ def root_stress_cycle(
 
 
 def root_ranges(
-    planetary_set: GearSet, roots: RootStresses, slices: Sequence[LoadedTeeth], *, closes: bool = True
+    planetary_set: GearSet,
+    roots: RootStresses,
+    slices: Sequence[LoadedTeeth],
+    *,
+    closes: bool = True,
+    between: Sequence[Sequence[LoadedTeeth]] = (),
 ) -> tuple[RootRange, ...]:
     """Find the stress range in the root of every loaded flank, from the field of whole bodies.
 
     Of gear 1 and gear 2 of mesh 0, then of mesh 1, and so on, under the loads of all slices of the width, see
     `RootStresses.loads`. Where the record ``closes``, that is, repeats after its end, every tooth meets every
     state that tooth numbers and periods without a common divisor allow; otherwise each tooth has what the
-    record shows of it.
+    record shows of it. Largest and smallest stresses are those at the positions ``between`` too.
     """
     found = {}
     for number, root, acting in roots.of_bodies(planetary_set):
-        for one in _body_ranges(planetary_set, number, root, acting, slices, closes):
+        for one in _body_ranges(planetary_set, number, root, acting, (slices, *between), closes):
             found[one.mesh, one.gear] = one
     return tuple(found[mesh, gear] for mesh in range(mesh_count(planetary_set)) for gear in (0, 1))
 
@@ -450,8 +455,9 @@ def _root_cycle(planetary_set, kind, root: _RootStress, cycle: MeshCycle, target
     )
 
 
-def _body_ranges(planetary_set, number, root: _RootStress, acting, slices: Sequence[LoadedTeeth], closes):
-    """Ranges of the roots of the acting flanks of one body."""
+def _body_ranges(planetary_set, number, root: _RootStress, acting, records, closes):
+    """Ranges of the roots of the acting flanks of one body under the loads of all slices of some records."""
+    slices, *between = records
     z, m, S = len(root.influence), len(root.arc), len(slices)
     teeth = replace(slices[0], path=np.mean([one.path for one in slices], axis=0))
     # with every period the sun's teeth go on to the next higher place, those of planets and ring back
@@ -469,6 +475,13 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, slices: Seque
         for target in acting:
             found = _largest_tension(field, teeth, target, m, samples)
             worst[target] = max(worst.get(target, found), found)
+    for more in between:
+        for turn in np.unique(more[0].turn):
+            samples = np.flatnonzero(more[0].turn == turn)
+            others = body_stress(planetary_set, root, acting, more, samples, np.arange(z))
+            of_tooth = (np.arange(z) - step * turn) % alike
+            np.maximum.at(high, of_tooth, others.max(axis=-1))
+            np.minimum.at(low, of_tooth, others.min(axis=-1))
     for target in acting:
         rows = slice(target[2] * m, (target[2] + 1) * m)
         top, bottom = (one[:, rows].reshape(alike, -1) for one in (high, low))

@@ -122,7 +122,6 @@ class DeformedBody:
 
 def loaded_teeth(cycle: MeshCycle, *, reverse: bool) -> LoadedTeeth:
     """Take the tooth loads from a cycle; `reverse` says that the torque on the sun is negative."""
-    each = len(cycle.position) // cycle.periods
     sense, order = (-1, slice(None, None, -1)) if reverse else (1, slice(None))
     return LoadedTeeth(
         load=cycle.tooth_load[:, order],
@@ -131,7 +130,7 @@ def loaded_teeth(cycle: MeshCycle, *, reverse: bool) -> LoadedTeeth:
         back_load=cycle.back_tooth_load,
         back_path=sense * cycle.back_path,
         back_tooth=sense * cycle.back_tooth,
-        turn=sense * (np.arange(len(cycle.position)) // each),
+        turn=sense * np.floor(cycle.position + 1e-9).astype(int),
         periods=cycle.periods,
         reverse=reverse,
     )

@@ -19,7 +19,6 @@ from femgear.case.dependencies import Steps, static_entries
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import ACCELERATION, FREQUENCY, SPEED, TORQUE, Dimension, to_si
 from femgear.case.sections import LARGEST_TORQUE, Case
-from femgear.contact.root_stress import LOADED
 from femgear.errors import CaseError
 from femgear.gears.gear import tooth_thickness
 from femgear.trains.elastic import stages as elastic_stages
@@ -325,7 +324,7 @@ def contact_pressure() -> Quantity:
 
 
 def _largest_pressure(variant: Variant) -> float:
-    return float(variant.static().cycle.max_pressure.max())
+    return float(variant.static().cycle.extremes("max_pressure")[1].max())
 
 
 def root_stress(gear: _GearName) -> Quantity:
@@ -336,10 +335,8 @@ def root_stress(gear: _GearName) -> Quantity:
 
 
 def _largest_stress(wanted: tuple[tuple[int, int], ...], variant: Variant) -> float:
-    n, roots = variant.gears.n_planets, variant.stress().roots
-    # gear 1 and gear 2 of mesh 0, then of mesh 1, and so on
-    chosen = [roots[2 * mesh + i] for k, i in wanted for mesh in range(k * n, (k + 1) * n)]
-    return max(float(root.stress[:, :, LOADED].max()) for root in chosen)
+    n, largest = variant.gears.n_planets, variant.stress().worst_roots()["root_worst"]
+    return max(float(largest[k * n : (k + 1) * n, gear].max()) for k, gear in wanted)
 
 
 def _chosen(value, table: dict, key: str):

@@ -12,7 +12,7 @@ from femgear.contact.peaks import TOLERANCE, open_places, tooth_pair_codes
 from femgear.study.objectives import Variant, transmission_error
 from femgear.study.relief import design_basis, harris_map, sun_torque, with_tip_relief
 from femgear.trains.reading import with_values
-from femgear.trains.static.stages import solve_static
+from femgear.trains.static.stages import solve_static, solve_stress
 
 PEAKS = CycleOptions(peaks=True)
 
@@ -73,7 +73,7 @@ def reference():
     return gears, make_bodies(make_sectors(gears, STEEL, flank_elements=8), STEEL)
 
 
-def against_many(walk, count):
+def against_many(walk, count, deviations=None):
     """Largest relative difference of peaks to peaks from those of 512 positions, and of shares."""
     many, few = walk(512, None), walk(count, PEAKS)
     apart = []
@@ -81,6 +81,11 @@ def against_many(walk, count):
         values = getattr(many, name)
         apart.append(few.peak_to_peak(name) / np.ptp(values, axis=-1) - 1.0)
     share = few.extremes("load_share")[1] / many.load_share.max(axis=1) - 1.0
+    for name in ("stiffness", "deflection"):
+        # those of equidistant positions are up to 4 % off at 8, 0.4 % at 64
+        assert few.mean(name) == pytest.approx(many.mean(name), rel=5e-3)
+    pressure = few.extremes("max_pressure")[1], many.max_pressure.max(axis=1)
+    assert deviations is not None or pressure[0] == pytest.approx(pressure[1], rel=0.02)
     return np.abs(np.hstack(apart)).max(), np.abs(share).max(), few
 
 
@@ -125,7 +130,8 @@ def test_tip_relief_that_makes_the_error_small(reference, power):
         return walk_mesh_cycle(gears, bodies, deviations=relief, **options)
 
     for count in (8, 32):
-        apart, _, _ = against_many(walk, count)
+        # under the kink of a linear relief the pressure has no limit
+        apart, _, _ = against_many(walk, count, relief)
         assert apart < 0.03
 
 
@@ -154,4 +160,25 @@ def test_maps_have_the_numbers_of_a_run(tmp_path):
     assert found.overall[0, 0] == pytest.approx(data["ste_overall_peak_to_peak"].values[0], rel=1e-9)
     variant = Variant(case, Steps(), tmp_path)
     assert transmission_error("sun-planet").compute(variant) == pytest.approx(stored[0], rel=1e-9)
+    assert 0.05 < data.attrs["peaks_cut_off"] < 0.6
     assert (stored > np.ptp(data["ste"].values, axis=1).reshape(2, -1).max(axis=1)).all()
+
+
+@pytest.mark.parametrize("seed", [4, 13])
+def test_root_stresses_and_pressures_of_few_positions(seed, tmp_path):
+    """At 9 positions root stresses were up to 6 % low; all planets that are alike have the largest."""
+    case = random_set(seed).case
+    plain = {f"{gear}.modifications": [] for gear in ("sun", "planet", "ring")}
+    few, many = (
+        solve_stress(one, solve_static(one, cache=tmp_path)).dataset()
+        for one in (with_values(case, plain | {"static.positions": count}) for count in (8, 256))
+    )
+    for name, least in (("root_worst", 0.985), ("root_range_maximum", 0.98), ("largest_pressure", 0.98)):
+        assert (few[name] > least * many[name]).all() and (few[name] < many[name] / 0.985).all()
+    assert (few.root_range_maximum <= few.root_worst.max() * (1.0 + 1e-9)).all()
+    assert np.ptp(few.root_worst.values.reshape(2, -1, 2), axis=1).max() == 0.0
+    assert few.largest_pressure.values.max() >= few.contact_pressure.values.max()
+    nominal = few.iso_contact_stress / few.iso_contact_ratio_factor
+    hertz = nominal * np.sqrt(few.contact_worst_load / few.nominal_load * few.contact_worst_curvature)
+    # the place and load of the pair that are said make the pressure that is said
+    assert few.largest_pressure.values == pytest.approx(hertz.values, rel=0.1)

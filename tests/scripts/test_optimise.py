@@ -11,6 +11,7 @@ from script_runs import run_script, wait_for_lines
 from soak import programs
 
 from femgear.trains.reading import read_case
+from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
@@ -80,6 +81,34 @@ def test_a_search_that_is_killed_goes_on_with_the_same_command(gears, tmp_path):
         # what each design took is no result
         first, second = (re.sub(r', "seconds".*', "", text) for text in texts)
         assert first == second
+
+
+@pytest.mark.slow
+def test_the_optimum_that_is_printed_is_that_of_a_run(tmp_path):
+    """Errors, pressure and root stress of optimum.csv are those of a run of optimum.toml."""
+    text = CASE.read_text(encoding="utf-8").replace("positions = 64", "positions = 12\nflank_elements = 6")
+    case = tmp_path / "case.toml"
+    tables = '\n[[sun.modifications]]\nkind = "tip relief"\namount = "1 um"\nstart_diameter = "42.4 mm"\n'
+    case.write_text(text + tables + 'shape = "parabolic"\n', encoding="utf-8")
+    of = "ste overall", "ste planet-ring", "contact pressure", "root stress sun", "root stress planet"
+    done = run(
+        case, "--vary", "sun.modifications[0].amount=0 um..8 um +- 1 um", "--objective", "ste sun-planet",
+        *(word for name in of for word in ("--of", name)), "--samples", "2", "--max-designs", "4",
+        "--positions", "8", "--flank-elements", "4", "--no-check", "-o", tmp_path / "out", folder=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    with open(tmp_path / "out" / "optimum.csv", newline="", encoding="utf-8") as stream:
+        printed = [float(row["optimum"]) for row in csv.DictReader(stream)]
+    best = read_case(tmp_path / "out" / "optimum.toml")
+    static = solve_static(best)
+    errors, stress = static.dataset(), solve_stress(best, static).dataset()
+    kinds = errors["ste_peak_to_peak"].values.reshape(2, -1).max(axis=1)
+    root = stress["root_worst"].values.reshape(2, -1, 2).max(axis=1)
+    expected = [
+        kinds[0], errors["ste_overall_peak_to_peak"].values.max(), kinds[1],
+        stress["largest_pressure"].values.max(), root[0, 0], max(root[0, 1], root[1, 0]),
+    ]  # fmt: skip
+    assert printed == pytest.approx(expected, rel=1e-5)
 
 
 @pytest.mark.parametrize(

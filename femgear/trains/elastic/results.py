@@ -62,7 +62,7 @@ from femgear.trains.elastic.checks import NOTICEABLE, checked_speeds, dynamics_w
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 from femgear.trains.elastic.runup import KINDS, loudest, meeting_columns
 from femgear.trains.protocol import StageResult
-from femgear.trains.static.results import HELD, LARGE, UNEQUAL, peak_to_peak, shares
+from femgear.trains.static.results import HELD, LARGE, UNEQUAL, largest_pressure, peak_to_peak, shares
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -514,7 +514,7 @@ def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> I
         return np.array([half.max(axis=0) for half in np.split(stress[name].values, 2)])
 
     root, nominal = largest("root_worst").ravel(), largest("iso_root_stress").ravel()
-    contact, worst = largest("contact_pressure").reshape(2, -1).max(axis=1), int(root.argmax())
+    contact, worst = largest_pressure(stress).reshape(2, -1).max(axis=1), int(root.argmax())
     nominals, factors = largest("iso_contact_stress"), np.prod([np.ones(2), *known.values()], axis=0)
     where = _where(results.static, ", static")
     yield f"largest root stress{where}", f"{root[worst] * 1e-6:.1f} MPa, {_PARTS[worst]}"

@@ -21,6 +21,7 @@ from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness
 from femgear.trains.protocol import StageResult
 from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
+from femgear.trains.static.results import mean_over_period, peak_to_peak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -217,18 +218,16 @@ def _model(case: HelicalCase, s: PlanetarySet) -> tuple[str, ...]:
 
 def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None) -> Block:
     """Tabulate static.nc, which holds spur gears, and beside them the helical meshes of modes.nc."""
-    sources = [("spur", static["ste"], static["mesh_stiffness"])]
+    curves = "ste", "mesh_stiffness"
+    sources = [("spur", [(mean_over_period(static, name), peak_to_peak(static, name)) for name in curves])]
     if modes is not None and "helical_ste" in modes:
-        sources.insert(0, ("helical", modes["helical_ste"], modes["helical_stiffness"]))
+        sliced = (modes[name].values for name in ("helical_ste", "helical_stiffness"))
+        sources.insert(0, ("helical", [(one.mean(axis=1), np.ptp(one, axis=1)) for one in sliced]))
     header, columns = ["mesh"], [[str(name) for name in static["mesh"].values]]
-    for name, *pair in sources:
-        for values, short, factor, unit in zip(pair, ("STE", "k"), (1e6, 1e-6), ("um", "N/um")):
-            values = factor * values.values
+    for name, pair in sources:
+        for sizes, short, factor, unit in zip(pair, ("STE", "k"), (1e6, 1e-6), ("um", "N/um")):
             header += [f"{name} {short} mean [{unit}]", "p-p"]
-            columns += [
-                [f"{v:.4g}" for v in values.mean(axis=1)],
-                [f"{v:.4g}" for v in np.ptp(values, axis=1)],
-            ]
+            columns += [[f"{factor * v:.4g}" for v in size] for size in sizes]
     header.append("spur force [N]")
     columns.append([f"{v:.3f}" for v in static["mesh_force"].values.mean(axis=1)])
     share = static["load_share"].values

@@ -78,6 +78,7 @@ from femgear.trains.static.results import (
     describe_meshes,
     describe_static,
     load_warnings,
+    mean_over_period,
 )
 from femgear.trains.static.stages import LARGEST_APPROACH, STATIC, STRESS
 
@@ -152,7 +153,7 @@ def _describe_static(results: Results) -> Block:
     case, data = results.case, results.static
     block = describe_static(data)
     single, mean = (1e-9 * value for value in iso_stiffness(case))
-    found = 1e-9 * float(data.mesh_stiffness.mean()) / data.attrs["face_width"]
+    found = 1e-9 * float(mean_over_period(data, "mesh_stiffness").mean()) / data.attrs["face_width"]
     words = f"mean k over face width {found:.3f} N/(mm um); ISO 6336-1, method B: "
     standard = f"c' = {single:.3f}, c_gamma_alpha = {mean:.3f} N/(mm um)"
     return replace(block, notes=(*block.notes, words + (standard if mean > 0 else "out of range")))

@@ -101,7 +101,7 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
         support = needed(one.support_stiffness, f"{name}.support_stiffness")
         bodies[name] = PlanarBody(one.mass, one.inertia, support, torsional)
     given = planar.mesh_stiffness
-    mean = needed(static, "static").cycle.stiffness.mean(axis=1) if given is None else None
+    mean = needed(static, "static").cycle.mean() if given is None else None
     return planar_from_set(
         gears,
         **bodies,

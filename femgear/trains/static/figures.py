@@ -48,7 +48,7 @@ from femgear.report.style import (
 )
 from femgear.storage.files import write_text
 from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.results import SIDES, UNEQUAL, StaticResult, peak_to_peak, shares
+from femgear.trains.static.results import SIDES, UNEQUAL, StaticResult, largest_pressure, peak_to_peak, shares
 from femgear.trains.static.stages import over_width, static_supports
 
 if TYPE_CHECKING:
@@ -300,7 +300,8 @@ def root_stress_history(stress: xr.Dataset) -> Figure:
         _nominal(ax, row, "iso_root_stress", "σ_F0 of ISO 6336-3")
         if number >= len(gears) - 2:
             label(ax, "path from the pitch point [base pitches]")
-        return f"{title}: {tension.max() * 1e-6:.3g} and {compression.min() * 1e-6:.3g} MPa".replace("-", "−")
+        largest = float(row.get("root_worst", tension.max()))
+        return f"{title}: {largest * 1e-6:.3g} and {compression.min() * 1e-6:.3g} MPa".replace("-", "−")
 
     return _panels(draw, "stress [MPa]", len(gears), columns=2, sharex=True)
 
@@ -343,7 +344,7 @@ def root_stress_over_width(stress: xr.Dataset) -> Figure:
         ax.pcolormesh(row["root_path"].values[shown], place, np.maximum(values, 0.0), **scale)
         if number >= len(gears) - 2:
             label(ax, "path from the pitch point [base pitches]")
-        return f"{title}\nup to {values.max():.3g} MPa, K_Fβ = {float(row['root_face_factor']):.3f}"
+        return f"{title}\nup to {1e-6 * float(row['root_worst']):.3g} MPa, K_Fβ = {float(row['root_face_factor']):.3f}"
 
     figure = _panels(draw, "place over the face width [mm]", len(gears), columns=2)
     image = figure.axes[0].collections[0]
@@ -365,7 +366,7 @@ def contact_pressure(stress: xr.Dataset) -> Figure:
         upper.plot(path, pressure.max(axis=0), color=VERMILION, label="largest pressure")
         _nominal(upper, row, "iso_contact_stress", "σ_H0 of ISO 6336-2")
         upper.set_ylim(0.0, 1.6 * top)
-        largest = float(row["contact_pressure"].max()) * 1e-6
+        largest = float(largest_pressure(row)) * 1e-6
         label(upper, title=f"{row['mesh'].item()}\n{largest:.4g} MPa away from flank ends")
         image = lower.pcolormesh(
             np.broadcast_to(path, place.shape), place, np.ma.masked_less_equal(pressure, 0.0),

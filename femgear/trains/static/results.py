@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from operator import itemgetter
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -56,26 +57,48 @@ HELD = "all centres held"
 SERIES = "of planet-ring with the ring on its foundation in series: no stiffness of the teeth alone"
 """What a mesh stiffness is, where members move."""
 _PIN_FORCE = "force of the pin on the planet in the frame of the carrier"
+_EQUIDISTANT = "{} at equidistant positions, which cut peaks off; its peak to peak: {}_peak_to_peak"
 STATIC_VARIABLES = {
-    "ste": ("mesh position", "m", "static transmission error of the mesh"),
-    "ste_overall": ("planet position", "m", "static transmission error from sun to ring"),
+    "ste": ("mesh position", "m", _EQUIDISTANT.format("static transmission error of the mesh", "ste")),
+    "ste_overall": (
+        "planet position",
+        "m",
+        _EQUIDISTANT.format("static transmission error from sun to ring", "ste_overall"),
+    ),
     "mesh_force": ("mesh position", "N", "mesh force along the line of action"),
     "back_force": ("mesh position", "N", "force on the back flanks of the mesh"),
     "member_motion": ("member position", "m", "displacement of the axis of a member that moves"),
     "bearing_force": ("planet axis position", "N", _PIN_FORCE),
-    "mesh_stiffness": ("mesh position", "N/m", "tangent mesh stiffness"),
+    "mesh_stiffness": (
+        "mesh position",
+        "N/m",
+        _EQUIDISTANT.format("tangent mesh stiffness", "mesh_stiffness"),
+    ),
     "mesh_stiffness_secant": ("mesh position", "N/m", "secant mesh stiffness"),
     "tooth_load": ("mesh tooth position", "N", "load of a tooth pair"),
     "back_tooth_load": ("mesh tooth position", "N", "load of a tooth pair on its back flanks"),
-    "load_share": ("planet position", "1", "share of the planet in the torque"),
-    "max_pressure": ("mesh position", "Pa", "largest contact pressure away from flank ends"),
+    "load_share": (
+        "planet position",
+        "1",
+        "share of the planet in the torque at equidistant positions; its largest: largest_load_share",
+    ),
+    "max_pressure": (
+        "mesh position",
+        "Pa",
+        "largest contact pressure away from flank ends at equidistant positions; of all: largest_pressure",
+    ),
     "edge_contact": ("mesh position", "1", "whether a contact reaches the end of a flank"),
     "residual": ("position", "1", "residual of contact conditions and equilibrium"),
     "iterations": ("position", "1", "steps of the active set"),
 }
 """Variables of static.nc: dimensions, unit, and what they are."""
 _PEAK = "peak to peak of the {} over the record and the positions between"
+_MEAN = "mean of the {} over the record and the positions between"
+_LARGEST = "largest contact pressure away from flank ends over the record and the positions between"
 PEAK_VARIABLES = {
+    "ste_mean": ("mesh", "m", _MEAN.format("static transmission error of the mesh")),
+    "mesh_stiffness_mean": ("mesh", "N/m", _MEAN.format("tangent mesh stiffness")),
+    "largest_pressure": ("mesh", "Pa", _LARGEST),
     "ste_peak_to_peak": ("mesh", "m", _PEAK.format("static transmission error of the mesh")),
     "ste_overall_peak_to_peak": ("planet", "m", _PEAK.format("transmission error from sun to ring")),
     "mesh_stiffness_peak_to_peak": ("mesh", "N/m", _PEAK.format("tangent mesh stiffness")),
@@ -85,7 +108,7 @@ PEAK_VARIABLES = {
     "ste_overall_between": ("planet between", "m", "that from sun to ring at the positions between"),
     "mesh_stiffness_between": ("mesh between", "N/m", "tangent mesh stiffness at the positions between"),
 }
-"""Extremes, and further positions at which they lie."""
+"""Extremes and means, and further positions at which extremes lie."""
 SLICE_VARIABLES = {
     "slice_load": ("mesh tooth slice position", "N", "load of a tooth pair in a slice, times their number"),
     "face_load_factor": (
@@ -174,6 +197,8 @@ STRESS_VARIABLES = {
     "loaded_contact_ratio": ("mesh", "1", "mesh periods a tooth pair is loaded"),
     "root_worst_load": ("mesh gear", "N", "load of its tooth pair then"),
     "root_notch_radius": ("mesh gear", "m", "smallest radius of curvature of the root"),
+    "largest_pressure": ("mesh", "Pa", _LARGEST),
+    "contact_worst_position": ("mesh", "1", "its position in mesh periods, of planets that are alike of one"),
     "contact_worst_path": (
         "mesh",
         "m",
@@ -299,6 +324,7 @@ class StaticResult(StageResult):
                 "mesh_periods": cycle.periods,
                 **({} if cycle.between is None else {"peak_doubt": cycle.between.doubt}),
                 "period": self.period_message,
+                "peaks_cut_off": self._cut_off(),
                 "pressure_cells": cycle.unknowns,
                 "unknowns": np.array([body.unknowns for body in bodies]),
                 "message": cycle.message,
@@ -306,10 +332,13 @@ class StaticResult(StageResult):
         )
 
     def _peaks(self) -> dict[str, np.ndarray]:
-        """Extremes of the record, and what was solved between its positions."""
+        """Extremes and means of the record, and what was solved between its positions."""
         cycle, planets = self.cycle, np.ones(self.planetary_set.n_planets)
         share = cycle.extremes("load_share")
         found = {
+            "ste_mean": cycle.mean("deflection"),
+            "mesh_stiffness_mean": cycle.mean("stiffness"),
+            "largest_pressure": cycle.extremes("max_pressure")[1],
             "ste_peak_to_peak": cycle.peak_to_peak(),
             "ste_overall_peak_to_peak": cycle.peak_to_peak("sun_arc") * planets,
             "mesh_stiffness_peak_to_peak": cycle.peak_to_peak("stiffness"),
@@ -321,6 +350,12 @@ class StaticResult(StageResult):
             found["ste_overall_between"] = planets[:, None] * between.sun_arc
             found["mesh_stiffness_between"] = between.stiffness
         return found
+
+    def _cut_off(self) -> float:
+        """Find the largest share that equidistant positions cut off a transmission error's peak to peak."""
+        whole = self.cycle.peak_to_peak()
+        missed = whole - np.ptp(self.cycle.deflection, axis=-1)
+        return float(np.divide(missed, whole, out=np.zeros(len(whole)), where=whole > 0.0).max())
 
     def _planet_couple(self) -> np.ndarray:
         """Couple (N, P) [N m] of the axial forces of sun and ring on every planet, at the working circles."""
@@ -395,6 +430,8 @@ class StressResult(StageResult):
         Mesh period of the record with which each of `roots` begins.
     ranges : tuple of RootRange
         In the same order.
+    between : tuple of tuple of RootCycle
+        The same gears and meshes as those of `roots`, for every record of positions between.
     sun_torque : float
         [N m]
     closes : bool
@@ -415,6 +452,7 @@ class StressResult(StageResult):
     sun_torque: float
     closes: bool
     relief_kinks: tuple[bool, ...] = ()
+    between: tuple[tuple[RootCycle, ...], ...] = ()
 
     @property
     def message(self) -> str:
@@ -429,7 +467,7 @@ class StressResult(StageResult):
     def dataset(self) -> xr.Dataset:
         """Collect the contents of stress.nc."""
         cycle, edges = self.cycle, self.spectrum.edges
-        values: dict[str, Any] = root_values(self.roots) | self._worst() | self._ranges() | self._loads()
+        values: dict[str, Any] = root_values(self.roots) | self.worst_roots() | self._ranges() | self._loads()
         values |= self._contacts()
         values["contact_pressure"] = cycle.max_pressure
         if cycle.pressure is not None:
@@ -465,20 +503,36 @@ class StressResult(StageResult):
         }
         return dataset(declared(STRESS_VARIABLES, values), coords, attributes)
 
-    def _worst(self) -> dict[str, np.ndarray]:
-        """Largest stress in the root of the loaded flank of every gear in every mesh, and where it is."""
+    def worst_roots(self) -> dict[str, np.ndarray]:
+        """Find the largest stress in the root of the loaded flank of every gear in every mesh, and its place.
+
+        Over the record and the positions between, by the names of `STRESS_VARIABLES`.
+        """
         rows, position = [], self.cycle.position
         each = len(position) // self.cycle.periods
         for root, first in zip(self.roots, self.first_period, strict=True):
-            slot, at, point = root.worst
-            instant = position[(first * each + at) % len(position)]
-            place = root.arc[point], root.slope[point]
-            rows.append((root.tension[slot, at], *place, instant, root.path[slot, at], root.load[slot, at]))
+            at = root.worst[1]
+            rows.append(_worst_of(root, position[(first * each + at) % len(position)]))
+        if self.cycle.between is not None:
+            for record, roots in zip(self.cycle.between.records, self.between, strict=True):
+                others = [_worst_of(root, record.position[root.worst[1]]) for root in roots]
+                rows = [max(pair, key=itemgetter(0)) for pair in zip(rows, others, strict=True)]
         parts = ("arc", "slope", "position", "path", "load")
-        names = ("root_worst", *(f"root_worst_{name}" for name in parts))
-        found = dict(zip(names, (_by_gear(column) for column in zip(*rows)), strict=True))
+        names = ("root_worst", *(f"root_worst_{name}" for name in parts), "root_profile")
+        found = dict(zip(names, map(_by_gear, zip(*self._largest_of_alike(rows))), strict=True))
         notches = [[root_notches(gear)[1] for gear in pair.gears] for pair in self.planetary_set.kinds]
         return found | {"root_notch_radius": np.repeat(notches, self.planetary_set.n_planets, axis=0)}
+
+    def _largest_of_alike(self, rows: list[tuple]) -> list[tuple]:
+        """Give all planets that go through the same states the row, gear by gear, whose first is largest.
+
+        The positions between are those of one of them.
+        """
+        N, alike = self.planetary_set.n_planets, self.cycle.alike
+        return [
+            max((rows[2 * n + root.gear] for n in _alike(root.mesh, N, alike)), key=itemgetter(0))
+            for root in self.roots
+        ]
 
     @property
     def _nominal_load(self) -> float:
@@ -492,12 +546,12 @@ class StressResult(StageResult):
         rows, starts = [], []
         for mesh, pair in enumerate(pair for pair in s.kinds for _ in range(s.n_planets)):
             angle, (low, high) = pair.working_pressure_angle, pair.path
-            place, load = self._most_pressed(mesh)
+            position, place, load = self._most_pressed(mesh)
             at, pitch = (
                 relative_curvature(*pair.gears, working_angle=angle, path=path)
                 for path in (float(np.clip(place, low, high)), 0.0)
             )
-            rows.append((place, load, at / pitch))
+            rows.append((position, place, load, at / pitch))
             one, two = (gear.base_radius * math.tan(angle) for gear in pair.gears)
             rolls = one + low, (two + low if pair.gear_2.internal else two - high)
             starts.append(
@@ -506,44 +560,42 @@ class StressResult(StageResult):
                     for gear, roll in zip(pair.gears, rolls, strict=True)
                 ]
             )
-        names = "contact_worst_path", "contact_worst_load", "contact_worst_curvature"
+        parts = "position", "path", "load", "curvature"
+        names = [f"contact_worst_{part}" for part in parts]
         kinks = self.relief_kinks or (False,) * len(s.kinds)
         return dict(zip(names, np.array(rows).T, strict=True)) | {
+            "largest_pressure": self.cycle.extremes("max_pressure")[1],
             "contact_start": np.array(starts),
             "relief_kink": np.repeat(np.array(kinks, dtype=int), s.n_planets),
         }
 
-    def _most_pressed(self, mesh: int) -> tuple[float, float]:
-        """Path [m] and load [N] of the tooth pair of a mesh with the largest pressure off the flank ends."""
-        cycle, pair = self.cycle, self.planetary_set.kinds[mesh // self.planetary_set.n_planets]
+    def _most_pressed(self, mesh: int) -> tuple[float, float, float]:
+        """Position, path [m] and load [N] of the tooth pair of a mesh with its `largest_pressure`."""
+        cycle, between = self.cycle, self.cycle.between
+        records = [cycle] if between is None else [cycle, between]
+        # of planets that go through the same states the pair of that which the positions between enclose
+        meshes = _alike(mesh, self.planetary_set.n_planets, cycle.alike)
+        one, mesh = max(
+            ((record, n) for n in meshes for record in records),
+            key=lambda place: float(place[0].max_pressure[place[1]].max(initial=0.0)),
+        )
+        at = int(one.max_pressure[mesh].argmax())
         # the cycle counts paths in the direction of motion, towards the root of gear 1 where that is turned
         sense = -1.0 if self.sun_torque < 0.0 else 1.0
-        if cycle.slice_pressure is not None and cycle.slice_load is not None:
-            found = np.unravel_index(cycle.slice_pressure[mesh].argmax(), cycle.slice_pressure[mesh].shape)
-            tooth, piece, position = (int(one) for one in found)
-            ahead = 0.0 if self.influences.ahead is None else self.influences.ahead[piece]
-            path = cycle.path[mesh, tooth, position] + ahead * self.planetary_set.base_pitch
-            return sense * float(path), float(cycle.slice_load[mesh, tooth, piece, position])
-        position = int(cycle.max_pressure[mesh].argmax())
-        path, load = sense * cycle.path[mesh, :, position], cycle.tooth_load[mesh, :, position]
-        curvature = relative_curvature(
-            *pair.gears, working_angle=pair.working_pressure_angle, path=np.clip(path, *pair.path)
+        return (
+            float(one.position[at]),
+            sense * float(one.pressed_path[mesh, at]),
+            float(one.pressed_load[mesh, at]),
         )
-        if cycle.pressure is None:
-            tooth = int(np.argmax(load * curvature))  # that of Hertz is largest for the same one
-        else:
-            pressure = cycle.pressure[mesh, :, :, position].max(axis=1)
-            tooth = int(np.abs(pressure - cycle.max_pressure[mesh, position]).argmin())
-        return float(path[tooth]), float(load[tooth])
 
     def _ranges(self) -> dict[str, np.ndarray]:
         """Stress ranges over a turn, of single teeth where they differ, and the history of planets' roots."""
         ranges = self.ranges
-        values = {
-            "root_range_maximum": _by_gear([one.maximum for one in ranges]),
-            "root_range_minimum": _by_gear([one.minimum for one in ranges]),
-            "root_range_arc": _by_gear([r.arc[one.point] for r, one in zip(self.roots, ranges, strict=True)]),
-        }
+        rows = [
+            (one.maximum, one.minimum, r.arc[one.point]) for r, one in zip(self.roots, ranges, strict=True)
+        ]
+        names = "root_range_maximum", "root_range_minimum", "root_range_arc"
+        values = dict(zip(names, map(_by_gear, zip(*self._largest_of_alike(rows))), strict=True))
         planets = [one.history for one in ranges if one.kind == "planet"]
         if planets and planets[0] is not None:
             values["planet_root_stress"] = np.array(planets)
@@ -583,6 +635,19 @@ class StressResult(StageResult):
         }
 
 
+def _alike(mesh: int, planets: int, alike: int) -> list[int]:
+    """List the meshes of a kind whose planets go through the same states as that of a mesh, itself first."""
+    first = mesh // planets * planets
+    return [first + (mesh + n * planets // alike) % planets for n in range(alike)]
+
+
+def _worst_of(root: RootCycle, position: float) -> tuple:
+    """Largest stress of a root [Pa], its arc, slope, position, path and load, and the stresses along it."""
+    slot, at, point = root.worst
+    place = root.arc[point], root.slope[point], position, root.path[slot, at], root.load[slot, at]
+    return root.tension[slot, at], *place, root.stress[slot, at]
+
+
 def root_values(roots: tuple[RootCycle, ...]) -> dict[str, np.ndarray]:
     """Follow the worst tooth of every gear through every mesh: stresses of both roots and loads.
 
@@ -620,9 +685,9 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if "lead_offset" in data:
         # an offset of leads is no deflection
         approach = approach - data["lead_offset"].values
-    if pressure.max(initial=0.0) > LARGEST_PRESSURE:
+    if (largest := float(largest_pressure(data).max())) > LARGEST_PRESSURE:
         text = (
-            f"the contact pressure reaches {pressure.max() * 1e-6:.0f} MPa: no steel carries that, and the "
+            f"the contact pressure reaches {largest * 1e-6:.0f} MPa: no steel carries that, and the "
             "model stays elastic"
         )
         yield Finding("W-PRESSURE", "", text)
@@ -728,7 +793,7 @@ def _over_hertz(data: xr.Dataset) -> np.ndarray:
     load, curvature = data["contact_worst_load"].values, data["contact_worst_curvature"].values
     hertz = data["iso_contact_stress"].values / _nominal_over_hertz(data)
     hertz = hertz * np.sqrt(load / data.attrs["nominal_load"] * curvature)
-    largest = data["contact_pressure"].values.max(axis=1)
+    largest = largest_pressure(data)
     return np.divide(largest, hertz, out=np.zeros(len(hertz)), where=hertz > 0.0)
 
 
@@ -844,6 +909,19 @@ def peak_to_peak(data: xr.Dataset, name: str) -> np.ndarray:
     return np.ptp(data[name].values, axis=-1) if stored is None else stored.values
 
 
+def mean_over_period(data: xr.Dataset, name: str) -> np.ndarray:
+    """Find the mean of a variable of static.nc, positions between included where there are any."""
+    stored = data.get(f"{name}_mean")
+    return data[name].values.mean(axis=-1) if stored is None else stored.values
+
+
+def largest_pressure(data: xr.Dataset) -> np.ndarray:
+    """Find the largest contact pressures of the meshes in static.nc or stress.nc [Pa]."""
+    if (stored := data.get("largest_pressure")) is not None:
+        return stored.values
+    return data["max_pressure" if "max_pressure" in data else "contact_pressure"].values.max(axis=-1)
+
+
 def describe_static(data: xr.Dataset) -> Block:
     """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
     lowest, highest = (data.get(f"{end}_load_share", data.load_share) for end in ("smallest", "largest"))
@@ -859,14 +937,16 @@ def describe_static(data: xr.Dataset) -> Block:
 
     columns = {
         "mesh": lambda one: str(one.mesh.item()),
-        "STE mean [um]": lambda one: marks(error(one, one.ste.values.mean()), *LARGE),
+        "STE mean [um]": lambda one: marks(error(one, float(mean_over_period(one, "ste"))), *LARGE),
         "STE p-p [um]": lambda one: marks(error(one, float(peak_to_peak(one, "ste"))), *LARGE, "W-POSITIONS"),
-        "k mean [N/um]": lambda one: marks(f"{one.mesh_stiffness.values.mean() / 1e6:.3f}", *LARGE),
+        "k mean [N/um]": lambda one: marks(
+            f"{float(mean_over_period(one, 'mesh_stiffness')) / 1e6:.3f}", *LARGE
+        ),
         "k p-p [N/um]": lambda one: marks(
             f"{float(peak_to_peak(one, 'mesh_stiffness')) / 1e6:.3f}", *LARGE, "W-POSITIONS"
         ),
         "force [N]": lambda one: f"{one.mesh_force.values.mean():.3f}",
-        "p max [MPa]": lambda one: _pressure(one.max_pressure.values, marks),
+        "p max [MPa]": lambda one: _pressure(float(largest_pressure(one)), marks),
     }
     if "face_load_factor" in data:
         columns["K_Hbeta"] = lambda one: (
@@ -905,12 +985,12 @@ def describe_static(data: xr.Dataset) -> Block:
     return tabulate("Static", meshes, columns, notes, marks)
 
 
-def _pressure(pressure: np.ndarray, marks: Marks) -> str:
+def _pressure(pressure: float, marks: Marks) -> str:
     """Write the largest contact pressure of a mesh [MPa], a dash without any, marked where it is doubtful."""
-    if not pressure.any():
+    if pressure <= 0.0:
         return "-"
-    codes = ["W-PRESSURE"] if pressure.max() > LARGEST_PRESSURE else []
-    return marks(f"{pressure.max() / 1e6:.1f}", *codes, "W-EDGE")
+    codes = ["W-PRESSURE"] if pressure > LARGEST_PRESSURE else []
+    return marks(f"{pressure / 1e6:.1f}", *codes, "W-EDGE")
 
 
 def shares(data: xr.Dataset) -> tuple[float, float, str]:
@@ -970,9 +1050,9 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
     factors = "Z_eps Z_beta" if data.attrs.get("iso_contact_helix_factor", 1.0) > 1.0 else "Z_eps"
     for kind in dict.fromkeys(map(family, names)):
         meshes = [i for i, name in enumerate(names) if family(name) == kind]
-        mesh = meshes[int(data["contact_pressure"].values[meshes].max(axis=1).argmax())]
+        mesh = meshes[int(largest_pressure(data)[meshes].argmax())]
         one = data.isel(mesh=mesh)
-        ratio = float(one["contact_pressure"].max() / one["iso_contact_stress"])
+        ratio = float(largest_pressure(one) / one["iso_contact_stress"])
         if ratio > DIFFERS or 0.0 < ratio < 1.0 / DIFFERS:
             curvature, load = float(one["contact_worst_curvature"]), float(one["contact_worst_load"])
             ends = sorted(zip(one["contact_start"].values, kind.split("-")))
@@ -1005,10 +1085,14 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
 
 def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:
     """Write the largest contact pressure of a kind of mesh."""
-    pressure = data["contact_pressure"].values
-    mesh, position = np.unravel_index(pressure.argmax(), pressure.shape)
-    found, nominal = float(pressure[mesh, position]), float(data["iso_contact_stress"][mesh])
-    place = f"{float(data['position'][position]):.3f}" if found else "-"
+    pressure = largest_pressure(data)
+    mesh = int(pressure.argmax())
+    found, nominal = float(pressure[mesh]), float(data["iso_contact_stress"][mesh])
+    if "contact_worst_position" in data:
+        position = float(data["contact_worst_position"][mesh])
+    else:
+        position = float(data["position"][int(data["contact_pressure"].values[mesh].argmax())])
+    place = f"{position:.3f}" if found else "-"
     return (f"contact {kind}", *_compared(found, nominal), place, *["-"] * 4)
 
 

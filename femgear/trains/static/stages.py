@@ -312,7 +312,9 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
     repeats, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
     closes = repeats == cycle.periods
     teeth = loaded_teeth(cycle, reverse=reverse)
-    ranges = root_ranges(gears, influences, influences.loads(gears, cycle, reverse=reverse), closes=closes)
+    between = () if cycle.between is None else cycle.between.records
+    loads, *loads_between = (influences.loads(gears, record, reverse=reverse) for record in (cycle, *between))
+    ranges = root_ranges(gears, influences, loads, closes=closes, between=loads_between)
     roots, first = _root_cycles(gears, influences, cycle, ranges, reverse)
     return StressResult(
         planetary_set=gears,
@@ -320,6 +322,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
         influences=influences,
         roots=roots,
         first_period=first,
+        between=tuple(root_stress_cycle(gears, influences, record, reverse=reverse) for record in between),
         ranges=ranges,
         spectrum=load_spectrum(teeth, gears.mates, closes=closes),
         nominal=nominal_stresses(gears, static.sun_torque, materials_of(case)),

@@ -103,7 +103,9 @@ def test_root_stresses_follow_the_load_over_the_width(misaligned):
     contact = static.cycle.face_load_factor
     # bending spreads the load: less than K_H-beta, more than one
     assert (factor[:3] < contact[:3, None]).all() and factor[:3].min() > 1.4
-    assert data["root_over_width"].max(("step", "slice")).values == pytest.approx(data["root_worst"].values)
+    # the record follows one tooth at equidistant positions, the largest may lie between
+    shown = data["root_over_width"].max(("step", "slice")) / data["root_worst"]
+    assert 0.9 < shown.min() and shown.max() < 1.0 + 1e-9
     assert (np.diff(data["root_over_width"].max("step").values[:3], axis=-1) > 0).all()
     height = 1.0 / (1.0 + (h := 3.375e-3 / 25e-3) + h**2)
     assert data["iso_face_factor"].values[:3] == pytest.approx(contact[:3] ** height, rel=1e-2)
@@ -111,7 +113,7 @@ def test_root_stresses_follow_the_load_over_the_width(misaligned):
     assert all(len(row) == len(block.header) for row in block.rows)
     assert block.rows[2][block.header.index("K_Fbeta")] == f"{factor[0, 0]:.3f}"
     image = root_stress_over_width(data).axes[0].collections[0].get_array()
-    assert image.max() == pytest.approx(float(data["root_worst"][0, 0]) * 1e-6)
+    assert image.max() == pytest.approx(float(data["root_over_width"][0, 0].max()) * 1e-6)
 
 
 def test_modes_follow_the_softer_meshes(case, misaligned):

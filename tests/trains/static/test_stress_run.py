@@ -77,7 +77,9 @@ def test_variables_belong_together(results, library):
     static, result = library
     stress = results.stress
     assert (stress["contact_pressure"].values == results.static["max_pressure"].values).all()
-    assert stress["root_worst"].values == pytest.approx(stress["root_tension"].max("step").values)
+    # the record follows one tooth at equidistant positions, the largest may lie between
+    shown = stress["root_tension"].max("step") / stress["root_worst"]
+    assert 0.9 < shown.min() and shown.max() < 1.0 + 1e-9
     along = stress["root_profile"].sel(root="loaded").max("point")
     assert stress["root_worst"].values == pytest.approx(along.values)
     for root in result.roots:
@@ -135,7 +137,7 @@ def test_table_of_the_summary(results):
     assert [row[0].split()[0] for row in block.rows] == ["contact"] * 2 + ["root"] * 4
     for row, name in zip(block.rows[:2], ("sun-planet", "planet-ring"), strict=True):
         meshes = [m for m in results.stress["mesh"].values if ("ring" in m) == (name == "planet-ring")]
-        largest = float(results.stress["contact_pressure"].sel(mesh=meshes).max()) * 1e-6
+        largest = float(results.stress["largest_pressure"].sel(mesh=meshes).max()) * 1e-6
         assert float(row[1]) == pytest.approx(largest, abs=0.051)
     sun = block.rows[2]
     assert float(sun[1]) == pytest.approx(float(results.stress["root_worst"][:3, 0].max()) * 1e-6, abs=0.051)
