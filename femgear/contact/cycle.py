@@ -643,6 +643,8 @@ class _Walk:
             records.append(between)
             more = self._curves(between)
             known = {name: np.concatenate([known[name], more[name]], axis=-1) for name in known}
+            if len(records) == 1:
+                known = self._without_end(known)
             places = np.zeros(0)
         order = equidistant + np.argsort(known["position"][equidistant:])
         looked = np.arange(self.planetary_set.n_planets) < self.planetary_set.n_planets // self.alike
@@ -655,11 +657,21 @@ class _Walk:
         return replace(record, between=between, alike=self.alike), share, nearest
 
     def _first_places(self, position: np.ndarray) -> np.ndarray:
-        """Positions that divide the intervals of a record of few positions."""
+        """Positions that divide the intervals of a record of few positions, and the end of the record."""
         periods = self.empty.periods
         parts = -(-FEWEST * periods // len(position))
         between = np.arange(1, parts) / parts * (periods / len(position))
-        return (position[:, None] - between if position[-1] <= 0.0 else position[:, None] + between).ravel()
+        sign = -1.0 if position[-1] <= 0.0 else 1.0
+        return np.append((position[:, None] + sign * between).ravel(), sign * periods)
+
+    def _without_end(self, known: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+        """Leave out the end of a record that closes: it is its beginning again."""
+        position, deflection = known["position"], known["deflection"]
+        end = np.abs(position) > self.empty.periods - 1e-9
+        start = np.abs(position) < 1e-9
+        if not np.allclose(deflection[:, end], deflection[:, start], rtol=1e-6, atol=0.0):
+            return known
+        return {name: values[..., ~end] for name, values in known.items()}
 
     def _at(self, places: np.ndarray) -> _Walk:
         """The same set at other positions (n,), of which nobody is told."""

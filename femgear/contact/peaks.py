@@ -99,7 +99,7 @@ def open_places(
     Parameters
     ----------
     position : (P,) array
-        Ascending, over so many mesh ``periods``.
+        Ascending, over so many mesh ``periods``; of records that do not close from one end to the other.
     values : (K, P) array
         Curves over the positions.
     codes : (K, P) array
@@ -141,7 +141,8 @@ def _beyond(position, values, other, least, periods: int) -> tuple[np.ndarray, n
     """Shares (K, P) of peaks to peaks by which curves may rise in intervals, and their lengths (P,)."""
     length = np.diff(np.append(position, position[0] + periods))
     after = np.roll(values, -1, axis=1)
-    slope = (after - values) / length
+    # a record that does not close ends at its end: nothing goes on from there to its beginning
+    slope = np.divide(after - values, length, out=np.zeros(values.shape), where=length > 0.0)
     low, high = values.min(axis=1)[:, None], values.max(axis=1)[:, None]
     size = np.maximum(high - low, least[:, None])
     # what is zero throughout, as of planets that carry nothing, has no peaks

@@ -5,7 +5,9 @@ Sample ``i`` of a seed adds errors to the deviations of the case, drawn by NumPy
 matrix, made of unit errors, gives the separations of all samples. A profile slope tilts them within the
 windows of the case, which it does not move.
 
-The positions span one mesh period with the teeth that mesh in the first one. Teeth drawn independently make
+The positions span one mesh period with the teeth that mesh in the first one, from one end to the other: where
+teeth have errors of their own the record does not close. They are equidistant ones and those at which the set
+without drawn errors has its extremes (`sample_positions`). Teeth drawn independently make
 any mesh period as likely as any other, but the record of one period sees neither the slow part of pitch and
 runout nor the worst tooth: `over_a_turn` says how much larger both are in some samples.
 """
@@ -45,6 +47,7 @@ from femgear.contact.batch import (
     solve_laws,
 )
 from femgear.contact.flank_pairs import pair_separations
+from femgear.contact.peaks import mean_weights
 from femgear.contact.supports import MovingMembers, moving_members
 from femgear.errors import CaseError, FemgearError, StorageError
 from femgear.findings import Finding, tell
@@ -76,6 +79,8 @@ POSITIONS = 16
 """Of a mesh period."""
 _FORCES, _LEAST = 48, 1e-3
 """Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
+_STRAIGHT = 0.005
+"""Share of a peak to peak that straight lines between positions may miss, of the set without drawn errors."""
 _TOGETHER, _EXACT_TOGETHER, _CHECKED = 32, 64, 8
 """Samples as springs and positions of the whole problem solved at once; samples solved again exactly."""
 _BLOCKS = {"spring": 256, "exact": 64}
@@ -377,6 +382,31 @@ def sample_model(
     return replace(model, windows=windows)
 
 
+def sample_positions(basis: DesignBasis, sun_torque: float, positions: int) -> np.ndarray:
+    """Choose positions (P,) of samples of a basis under a torque [N m] in a mesh period, its end included.
+
+    Equidistant ones, at least so many; of those between, at which the basis has extremes, as many as leave
+    `_STRAIGHT` of its curves beside straight lines; and the end, where teeth with other errors follow.
+    """
+    equidistant = basis.gears.equal_positions(positions)
+    cycle = replace(basis, positions=equidistant).walk(sun_torque)
+    position, curves = cycle.position, np.vstack([cycle.sun_arc, cycle.load_share])
+    if cycle.between is not None:
+        position = np.append(position, cycle.between.position)
+        between = np.vstack([cycle.between.sun_arc, cycle.between.load_share])
+        curves = np.concatenate([curves, between], axis=1)
+    order = np.argsort(position)
+    kept, position, curves = order < equidistant, position[order], curves[:, order]
+    # shares that are equal but for rounding have no shape
+    size = np.maximum(np.ptp(curves, axis=1), 1e-3 * np.abs(curves).max(axis=1))[:, None]
+    while True:
+        straight = np.array([np.interp(position, position[kept], row[kept], period=1.0) for row in curves])
+        apart = np.where(kept, 0.0, np.abs(straight - curves) / size).max(axis=0)
+        if apart.max() <= _STRAIGHT:
+            return np.append(position[kept & (position < 1.0)], 1.0)
+        kept[apart.argmax()] = True
+
+
 def sample_block(
     model: SampleModel, seed: int, first: int, count: int, *, exact: bool = False
 ) -> dict[str, np.ndarray]:
@@ -441,7 +471,7 @@ def _solved(
         inside = setup.listed.gap + shifts < np.moveaxis(approach, 1, 2)[..., None]
         missed = (inside & ~setup.listed.near).reshape(n, -1)
     share = force.reshape(n, P, 2, N, -1).sum(axis=-1)[:, :, 0, back] / model.load[N]
-    stiffness = stiffness.reshape(n, P, 2, N).mean(axis=(1, 3))
+    stiffness = np.einsum("p,npk->nk", mean_weights(model.position, 1), stiffness.reshape(n, P, 2, N).mean(3))
     numbers = np.ptp(motions[..., N], axis=1), share.max(axis=(1, 2)), *stiffness.T
     planets = share.max(axis=1), (share <= 0.0).any(axis=1)
     all_numbers = dict(zip(_NUMBERS, (*numbers, *planets), strict=True))
@@ -545,12 +575,11 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
 def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
     """Compute the transmission error [m] and the largest share of a sample with the positions between.
 
-    As ``femgear run`` does of the case that `sample_case` makes of it: exactly, and at the peaks between the
-    positions of the model. ``errors`` (K,) are those of the sample [m].
+    As ``femgear run`` does of the case that `sample_case` makes of it: exactly, at the peaks of the sample. ``errors`` (K,) are those of the sample [m].
     """
     basis, driver = model.basis, model.basis.gears.n_planets
     torque = model.load[driver] * basis.gears.sun.base_radius
-    sample = replace(basis, deviations=model.deviations(errors), positions=len(model.position))
+    sample = replace(basis, deviations=model.deviations(errors), positions=POSITIONS)
     cycle = sample.walk(torque if model.solved.gears is basis.gears else -torque)
     return float(cycle.peak_to_peak("sun_arc")), float(cycle.extremes("load_share")[1].max())
 
@@ -682,7 +711,9 @@ def prepared(
             file=case.location("static.back_flanks"),
         )  # fmt: skip
     basis = design_basis(case, cache=cache)
-    return sample_model(basis, found, sun_torque=sun_torque(case, basis.gears), positions=positions), text
+    torque = sun_torque(case, basis.gears)
+    places = sample_positions(basis, torque, positions)
+    return sample_model(basis, found, sun_torque=torque, positions=places), text
 
 
 def checked(value: int, key: str, least: int, most: int = _MOST) -> None:
@@ -763,7 +794,7 @@ def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[
         f"{', '.join(errors)} of the largest",
         f"{data.attrs['positions']} positions of one mesh period; over the {data.attrs['turn']} of a turn of "
         f"the carrier these samples have {' and '.join(turns)}",
-        f"with the peaks between the positions, as femgear run has them, {' and '.join(between)}",
+        f"with the peaks of the samples themselves, as femgear run has them, {' and '.join(between)}",
         f"a planet loses its load in {float(data.opens.any('planet').mean()):.2%} of the samples",
         f"worst.toml (femgear run --only static): sample {worst}, STE {of_worst:.6g} um; "
         f"largest share: sample {at}",

@@ -344,7 +344,8 @@ def root_stress_over_width(stress: xr.Dataset) -> Figure:
         ax.pcolormesh(row["root_path"].values[shown], place, np.maximum(values, 0.0), **scale)
         if number >= len(gears) - 2:
             label(ax, "path from the pitch point [base pitches]")
-        return f"{title}\nup to {1e-6 * float(row['root_worst']):.3g} MPa, K_Fβ = {float(row['root_face_factor']):.3f}"
+        most = 1e-6 * float(row["root_worst"])
+        return f"{title}\nup to {most:.3g} MPa, K_Fβ = {float(row['root_face_factor']):.3f}"
 
     figure = _panels(draw, "place over the face width [mm]", len(gears), columns=2)
     image = figure.axes[0].collections[0]
