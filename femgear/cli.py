@@ -788,7 +788,7 @@ def samples(
     output
         Folder of samples.nc, samples.png and worst.toml.
     positions
-        Of one mesh period.
+        Equidistant ones of one mesh period; those of the peaks of the set and its end come beside them.
     method
         Tooth pairs as springs, whose error is stated, or the whole contact problem.
     force

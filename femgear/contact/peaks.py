@@ -160,5 +160,7 @@ def _beyond(position, values, other, least, periods: int) -> tuple[np.ndarray, n
         most = np.where(meet, begin + rising * at, np.maximum(begin, end))
         by_slope = 0.5 * (begin + end) + 0.5 * steepest * length
         most = np.where(other, np.maximum(most, by_slope), most)
-        beyond = np.maximum(beyond, (most - extreme) / size)
+        # stiffnesses and shares that are zero go on no lower
+        bounded = (sign < 0.0) & (low == 0.0)
+        beyond = np.maximum(beyond, np.where(bounded, 0.0, (most - extreme) / size))
     return beyond, length

@@ -234,8 +234,8 @@ class SampleModel:
 
     The set, and as it is ``solved``: its mirror image where the torque is negative, of which planet ``i`` is
     planet ``order[i]``. ``errors`` holds key, distribution, and number of bodies and of values on each,
-    ``load`` (m,) is on the motions [N], ``position`` (P,) in the solved set [mesh periods], ``windows`` are
-    share [N] and nearest [m] of the first windows.
+    ``load`` (m,) is on the motions [N], ``position`` (P,) in the solved set [mesh periods], of which so many
+    are ``equidistant``, ``windows`` are share [N] and nearest [m] of the first windows.
     """
 
     basis: DesignBasis
@@ -245,6 +245,7 @@ class SampleModel:
     members: MovingMembers
     load: np.ndarray
     position: np.ndarray
+    equidistant: int
     windows: tuple[float, float] = (0.0, 0.0)
     _levels: dict[tuple[float, float], _Level] = field(default_factory=dict)
 
@@ -368,7 +369,7 @@ def sample_model(
     load[N] = abs(sun_torque) / gears.sun.base_radius
     position = cycle_positions(gears.equal_positions(positions) if isinstance(positions, int) else positions)
     position = -position[::-1] if sun_torque < 0 else position
-    model = SampleModel(basis, solved, order, tuple(errors), members, load, position)
+    model = SampleModel(basis, solved, order, tuple(errors), members, load, position, len(position))
 
     def attempt(share: float, nearest: float):
         """Windows that hold the contact of the case, and no pair that some samples miss."""
@@ -503,7 +504,7 @@ def _repeated(level: _Level, times: int) -> Candidates:
 
 
 def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
-    """Make a sample a case, which `femgear.run` solves at the positions of the model, in one mesh period."""
+    """Make a sample a case, which `femgear.run` solves over one mesh period."""
     s, d = model.basis.gears, model.deviations(model.draw(seed, index, 1)[0])
     base, written = model.basis.deviations or no_deviations(s), case_text.parse(case.source, case.name)
 
@@ -543,7 +544,7 @@ def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
         ]
         if slopes:
             values[f"{gear}.modifications"] = [*written[gear].get("modifications", []), *slopes]
-    values |= {"static.positions": len(model.position), "static.longest_record": 1}
+    values |= {"static.positions": model.equidistant, "static.longest_record": 1}
     values["title"] = f"{case.title[:150]}: sample {index} of seed {seed}"
     return with_values(case, values)
 
@@ -575,11 +576,12 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
 def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
     """Compute the transmission error [m] and the largest share of a sample with the positions between.
 
-    As ``femgear run`` does of the case that `sample_case` makes of it: exactly, at the peaks of the sample. ``errors`` (K,) are those of the sample [m].
+    As ``femgear run`` does of the case that `sample_case` makes of it: exactly, at the peaks of the sample.
+    ``errors`` (K,) are those of the sample [m].
     """
     basis, driver = model.basis, model.basis.gears.n_planets
     torque = model.load[driver] * basis.gears.sun.base_radius
-    sample = replace(basis, deviations=model.deviations(errors), positions=POSITIONS)
+    sample = replace(basis, deviations=model.deviations(errors), positions=model.equidistant)
     cycle = sample.walk(torque if model.solved.gears is basis.gears else -torque)
     return float(cycle.peak_to_peak("sun_arc")), float(cycle.extremes("load_share")[1].max())
 
@@ -684,6 +686,8 @@ def _checked_again(case: Case, model: SampleModel, text: str, values, more) -> t
         for numbers in (over_a_turn, between_positions)
     )
     ideal = exact_numbers(model, np.zeros((1, model.size)))
+    # those of a run of the case
+    ideal |= dict(zip(_SHOWN, np.transpose([between_positions(model, np.zeros(model.size))])))
     attrs = {"seed": seed, "tolerances": text, "case": to_toml(case), "worst": int(order[-1])}
     attrs["method"] = more["method"]
     more = {"turn": turn, "between": between}
@@ -713,7 +717,8 @@ def prepared(
     basis = design_basis(case, cache=cache)
     torque = sun_torque(case, basis.gears)
     places = sample_positions(basis, torque, positions)
-    return sample_model(basis, found, sun_torque=torque, positions=places), text
+    model = sample_model(basis, found, sun_torque=torque, positions=places)
+    return replace(model, equidistant=basis.gears.equal_positions(positions)), text
 
 
 def checked(value: int, key: str, least: int, most: int = _MOST) -> None:
@@ -745,6 +750,7 @@ def _dataset(model: SampleModel, values, chosen, again, more, attrs) -> xr.Datas
         "quantile": ("quantile", QUANTILES, "1", "share of the samples below"),
         "check": ("check", chosen, "1", "sample of the seed that was solved again"),
     }
+    attrs |= {"equidistant": model.equidistant}
     attrs |= {"positions": len(model.position), "mesh_periods": 1, "turn": model.basis.gears.ring.teeth}
     return dataset(entries, coords, attrs)
 
@@ -792,8 +798,9 @@ def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[
     notes = (
         f"method {data.attrs['method']}; {len(check)} samples solved again exactly differ by at most "
         f"{', '.join(errors)} of the largest",
-        f"{data.attrs['positions']} positions of one mesh period; over the {data.attrs['turn']} of a turn of "
-        f"the carrier these samples have {' and '.join(turns)}",
+        f"{data.attrs['positions']} positions of one mesh period: {data.attrs['equidistant']} equidistant, "
+        "others where the set without drawn errors has its peaks, and the end; over the "
+        f"{data.attrs['turn']} of a turn of the carrier these samples have {' and '.join(turns)}",
         f"with the peaks of the samples themselves, as femgear run has them, {' and '.join(between)}",
         f"a planet loses its load in {float(data.opens.any('planet').mean()):.2%} of the samples",
         f"worst.toml (femgear run --only static): sample {worst}, STE {of_worst:.6g} um; "

@@ -8,7 +8,7 @@ from random_sets import random_set
 from femgear.case.dependencies import Steps
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.peaks import TOLERANCE, open_places, tooth_pair_codes
+from femgear.contact.peaks import TOLERANCE, open_places, peak_doubt, tooth_pair_codes
 from femgear.study.objectives import Variant, transmission_error
 from femgear.study.relief import design_basis, harris_map, sun_torque, with_tip_relief
 from femgear.trains.reading import with_values
@@ -182,3 +182,18 @@ def test_root_stresses_and_pressures_of_few_positions(seed, tmp_path):
     hertz = nominal * np.sqrt(few.contact_worst_load / few.nominal_load * few.contact_worst_curvature)
     # the place and load of the pair that are said make the pressure that is said
     assert few.largest_pressure.values == pytest.approx(hertz.values, rel=0.1)
+
+
+def test_what_is_zero_goes_on_no_lower():
+    """Of a mesh that opens the stiffness falls to zero, and not below."""
+    tau = np.arange(8) / 8
+    stiffness = np.array([3.0, 2.9, 1.5, 0.0, 0.0, 1.5, 2.9, 3.0])
+    assert peak_doubt(tau, stiffness[None], np.array([1e-3]), 1) < 0.05
+    assert peak_doubt(tau, stiffness[None] + 1.0, np.array([1e-3]), 1) > 0.2
+
+
+def test_a_record_that_does_not_close_has_its_end():
+    """A ramp that starts anew: what lies beyond the last position is no way back to the first."""
+    tau, ramp = np.arange(9) / 8, np.arange(9.0)
+    places, doubt = open_places(tau, ramp[None], np.zeros((1, 9), int), np.zeros(1), 1)
+    assert not len(places) and doubt == 0.0

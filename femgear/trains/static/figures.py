@@ -67,12 +67,12 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
     """Draw the static transmission error of every mesh, and of sun to ring over every planet (static.nc)."""
     figure, (left, right) = new_figure(columns=2, height=3.6, sharex=True)
     drawn = distinct_lines(static["mesh"].values, static["ste"], partly=True, within=ALIKE)
-    position, each = periodic(*_with_between(static, "ste"))
+    position, each = _with_between(static, "ste")
     if len(drawn) == len(_kinds(static)) == 1:
         return _one_error(position, each[0], drawn[0][0])
     for i, (text, row) in enumerate(drawn):
         left.plot(position, each[row], label=text, **line_style(i))
-    overall = periodic(*_with_between(static, "ste_overall"))[1]
+    overall = _with_between(static, "ste_overall")[1]
     planets = _of_planets(static, overall)
     for i, (text, row) in enumerate(planets, len(drawn)):
         right.plot(position, overall[row], label=f"sun to ring over {text}", **line_style(i))
@@ -91,13 +91,16 @@ def static_transmission_error(static: xr.Dataset) -> Figure:
 
 
 def _with_between(static: xr.Dataset, name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of static.nc and those between in their order, and a transmission error there [um]."""
+    """Positions of static.nc and those between from end to end, and a transmission error there [um]."""
     position, values = static["position"].values, static[name].values
     if f"{name}_between" in static:
         position = np.concatenate([position, static["between"].values])
         values = np.concatenate([values, static[f"{name}_between"].values], axis=-1)
     order = np.argsort(position, kind="stable")
-    return position[order], values[:, order] * 1e6
+    position, values = position[order], values[:, order] * 1e6
+    # a record that does not close has its end
+    ends = position[-1] - position[0] >= static.attrs.get("mesh_periods", 1) - 1e-9
+    return (position, values) if ends else periodic(position, values)
 
 
 def _one_error(position: np.ndarray, error: np.ndarray, title: str) -> Figure:

@@ -595,7 +595,8 @@ class StressResult(StageResult):
             (one.maximum, one.minimum, r.arc[one.point]) for r, one in zip(self.roots, ranges, strict=True)
         ]
         names = "root_range_maximum", "root_range_minimum", "root_range_arc"
-        values = dict(zip(names, map(_by_gear, zip(*self._largest_of_alike(rows))), strict=True))
+        columns = zip(*self._largest_of_alike(rows))
+        values: dict[str, np.ndarray] = dict(zip(names, map(_by_gear, columns), strict=True))
         planets = [one.history for one in ranges if one.kind == "planet"]
         if planets and planets[0] is not None:
             values["planet_root_stress"] = np.array(planets)
