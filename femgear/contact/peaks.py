@@ -137,9 +137,11 @@ def peak_doubt(position: np.ndarray, values: np.ndarray, least: np.ndarray, peri
     return float(beyond.max(initial=0.0))
 
 
-def _beyond(position, values, other, least, periods: int) -> tuple[np.ndarray, np.ndarray]:
+def _beyond(
+    position: np.ndarray, values: np.ndarray, other: np.ndarray, least: np.ndarray, periods: int
+) -> tuple[np.ndarray, np.ndarray]:
     """Shares (K, P) of peaks to peaks by which curves may rise in intervals, and their lengths (P,)."""
-    length = np.diff(np.append(position, position[0] + periods))
+    length: np.ndarray = np.diff(np.append(position, position[0] + periods))
     after = np.roll(values, -1, axis=1)
     # a record that does not close ends at its end: nothing goes on from there to its beginning
     slope = np.divide(after - values, length, out=np.zeros(values.shape), where=length > 0.0)

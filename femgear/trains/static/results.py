@@ -512,10 +512,10 @@ class StressResult(StageResult):
         each = len(position) // self.cycle.periods
         for root, first in zip(self.roots, self.first_period, strict=True):
             at = root.worst[1]
-            rows.append(_worst_of(root, position[(first * each + at) % len(position)]))
+            rows.append(_worst_of(root, float(position[(first * each + at) % len(position)])))
         if self.cycle.between is not None:
             for record, roots in zip(self.cycle.between.records, self.between, strict=True):
-                others = [_worst_of(root, record.position[root.worst[1]]) for root in roots]
+                others = [_worst_of(root, float(record.position[root.worst[1]])) for root in roots]
                 rows = [max(pair, key=itemgetter(0)) for pair in zip(rows, others, strict=True)]
         parts = ("arc", "slope", "position", "path", "load")
         names = ("root_worst", *(f"root_worst_{name}" for name in parts), "root_profile")
