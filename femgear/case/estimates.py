@@ -78,16 +78,25 @@ def usual_torque(teeth: int, mate: int, module: float, width: float, meshes: int
 
 
 def usual_rim(
-    teeth: int, module: float, dedendum: float, shift: float = 0.0, *, internal: bool, helix: float = 0.0
+    teeth: int,
+    module: float,
+    dedendum: float,
+    shift: float = 0.0,
+    *,
+    internal: bool,
+    helix: float = 0.0,
+    addendum: float = 1.0,
 ) -> tuple[float, float]:
     """Choose the bore or outer radius of a gear, and compute its root radius [m].
 
-    The rim is three normal modules, of internal gears four: from 2.7 on it does not weaken the teeth (ISO
-    6336-3, 1.2 tooth heights). ``module`` in m, ``helix`` in rad, ``dedendum`` and ``shift`` in modules.
+    The rim is three normal modules, of internal gears four, and 1.25 tooth heights of longer teeth: from 1.2
+    on it does not weaken them (ISO 6336-3). ``module`` in m, ``helix`` in rad, ``dedendum``, ``addendum`` and
+    ``shift`` in modules.
     """
+    rim = module * max(4.0 if internal else 3.0, 1.25 * (addendum + dedendum))
     sense = 1.0 if internal else -1.0
     root = module * (0.5 * teeth / math.cos(helix) + shift + sense * dedendum)
-    return root + 4.0 * module if internal else max(root - 3.0 * module, 0.15 * root), root
+    return root + rim if internal else max(root - rim, 0.15 * root), root
 
 
 def estimates(case: Any) -> dict[str, Estimate]:

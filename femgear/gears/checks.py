@@ -39,6 +39,8 @@ from femgear.gears.tips import (
 
 DOUBTFUL_OVERLAP = 1e-4
 """Overlap of a tip corner with a root fillet [modules] from which numbers are in doubt."""
+FEW_TEETH = 17
+"""Teeth below which the basic rack undercuts an external gear without profile shift (at 20 deg)."""
 _OF_TIPS = ("E-FILLET", "E-INTERFERENCE", "E-CLEARANCE")
 # backlash of one kind of mesh beyond that of the other, in modules, from which profile shifts do not suit
 _UNEVEN = 0.05
@@ -239,6 +241,22 @@ def _clearances(s: GearSet):
             )  # fmt: skip
 
 
+def _longer_contact(pair: GearPair) -> str:
+    """Say what lengthens the path of contact of a pair whose contact ratio is below one."""
+    given = [f"{gear.name}.tip_diameter" for gear in pair.gears if gear.tip_diameter is not None]
+    few = [
+        f"{gear.name} ({gear.teeth})"
+        for gear in pair.gears
+        if gear.undercut or (gear.teeth < FEW_TEETH and not gear.internal)
+    ]
+    found = [f"leave {' and '.join(given)} out: tips are then as long as can be"] if given else []
+    if few:
+        found.append(
+            f"take more teeth, or a larger profile shift where undercut cuts the flank: {', '.join(few)}"
+        )
+    return "; ".join([*found, "lengthen the tips or reduce the working pressure angle"])
+
+
 def _contact_ratios(s: GearSet):
     """Refuse contact ratios below one, and warn of those below 1.2."""
     for pair in s.kinds:
@@ -247,8 +265,7 @@ def _contact_ratios(s: GearSet):
             yield GeometryError(
                 f"{mesh}: contact ratio {value:.4f}, so contact is lost between teeth",
                 code="E-CONTACT-RATIO", key="set.centre_distance", value=f"contact ratio {value:.4f}",
-                limit="contact ratio >= 1",
-                remedy="lengthen the tips, reduce the working pressure angle or avoid undercut",
+                limit="contact ratio >= 1", remedy=_longer_contact(pair),
             )  # fmt: skip
         elif value < 1.2:
             yield GeometryWarning(

@@ -572,6 +572,25 @@ def _worst(d: SetDeviations, s: GearSet, *, back: bool) -> np.ndarray:
     return np.concatenate(pitch[: len(profile)]) + np.repeat(profile, N) + lead
 
 
+def _causes(d: SetDeviations) -> list[str]:
+    """Name the kinds of deviations of a set that there are."""
+    forms = d.sun, d.planet_sun_side, d.planet_ring_side, d.ring
+    runouts = d.sun_runout, d.ring_runout, d.carrier_runout, *d.planet_runout
+    pitches = d.sun_pitch, d.ring_pitch, d.planet_pitch, d.planet_ring_side_pitch
+    slopes = d.planet_misalignment, d.sun_misalignment, d.carrier_misalignment
+    found = {
+        "pin errors": d.pin_errors.any(),
+        "pitch errors": any(pitch.any() for pitch in pitches),
+        "runout": any(one.amplitude for one in runouts),
+        "ovality": bool(d.ovality.amplitude),
+        "misaligned axes": any(slope.any() for slope in slopes),
+        "tooth thickness": bool(d.sun_thickness or d.ring_thickness or d.planet_thickness.any()),
+        "profile modifications": any(form.profile for form in forms),
+        "lead modifications such as crowning": any(form.lead for form in forms),
+    }
+    return [name for name, there in found.items() if there]
+
+
 def _wedging(d: SetDeviations, s: GearSet):
     """Warn where the deviations may use up the play (W-WEDGING)."""
     if d.ideal and not (d.planet_thickness.any() or d.sun_thickness or d.ring_thickness):
@@ -581,7 +600,7 @@ def _wedging(d: SetDeviations, s: GearSet):
     if least < -1e-12:
         nominal = min(kind.backlash for kind in s.kinds)
         where = "in one mesh" if single <= whole else "between different planets"
-        which = "pin errors and other deviations" if len(s.kinds) > 1 else "the deviations"
+        which = " and ".join(_causes(d)) or "deviations"
         yield GeometryWarning(
             "W-WEDGING",
             "set.backlash",

@@ -221,6 +221,15 @@ def _teeth(kind: str, teeth: tuple[int, ...]) -> tuple[int, ...]:
     usual, teeth = KINDS[kind], teeth or KINDS[kind]
     if len(usual) == 3 == len(teeth):
         teeth = (*teeth[:2], abs(teeth[2]))
+    if len(usual) == 2 == len(teeth) and min(teeth) < 0:
+        external = [abs(z) for z in teeth]
+        raise CaseError(
+            f"a {kind} case is drafted with external gears", code="E-COUNT", key="--teeth", value=teeth,
+            limit="positive numbers",
+            remedy=f"write --teeth {external[0]} {external[1]}, then make gear 2 internal in the case: "
+            "gear_2.outer_radius in place of its bore_radius"
+            if kind == "pair" else "leave the sign out",
+        )  # fmt: skip
     if len(teeth) != len(usual) or min(teeth) < 5 or max(teeth) > 5000:
         raise CaseError(
             f"a {kind} case needs {len(usual)} numbers of teeth", code="E-COUNT", key="--teeth",
@@ -302,6 +311,9 @@ def check_rack(rack: Mapping[str, float]) -> None:
         )  # fmt: skip
 
 
+_MODULES = {3.0: "three", 4.0: "four"}
+
+
 def _sections(
     gears: list[dict[str, Any]], of_all: dict[str, Any], size: float, beta: float, notes: dict[str, str]
 ) -> dict[str, dict[str, Any]]:
@@ -310,11 +322,15 @@ def _sections(
     for gear in gears:
         section = dict(gear)
         name, internal = section.pop("name"), gear["name"] == "ring"
-        dedendum = of_all.get("rack", {}).get("dedendum", 1.25)
+        rack = of_all.get("rack", {})
+        dedendum, addendum = rack.get("dedendum", 1.25), rack.get("addendum", 1.0)
         shift = section.pop("rim_shift", section.get("profile_shift", 0.0))
-        radius, _ = usual_rim(gear["teeth"], size, dedendum, shift, internal=internal, helix=beta)
+        radius, _ = usual_rim(
+            gear["teeth"], size, dedendum, shift, internal=internal, helix=beta, addendum=addendum
+        )
         key = "outer_radius" if internal else "bore_radius"
-        notes[f"{name}.{key}"] = f"estimated: a rim of {'four' if internal else 'three'} modules"
+        rim = max(4.0 if internal else 3.0, 1.25 * (addendum + dedendum))
+        notes[f"{name}.{key}"] = f"estimated: a rim of {_MODULES.get(rim, f'{rim:.4g}')} modules"
         found[name] = {**section, key: LENGTH.show(radius), "tip_diameter": FREE}
     return found
 
