@@ -18,7 +18,7 @@ import xarray as xr
 
 from femgear import cli
 from femgear.findings import CATALOGUE, SEVERITIES, Finding, FindingWarning, as_data, from_data, once, remark
-from femgear.report.tables import Marks, lower_bound, tabulate, unmarked
+from femgear.report.tables import Marks, in_decibels, lower_bound, tabulate, unmarked
 from femgear.run import solve
 from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import train_of, trains
@@ -431,10 +431,25 @@ def test_every_finding_of_a_table_has_a_mark_of_its_own():
 
 
 @pytest.mark.parametrize(
-    ("value", "text"), [(0.0053, "> 0.005"), (5.2, "> 5"), (0.001, "> 0.001"), (0.0, "> 0")]
+    ("value", "text"),
+    [
+        (0.0053, "> 0.005"),
+        (5.2, "> 5"),
+        (0.001, "> 0.001"),
+        (0.0, "> 0"),
+        (24.6, "> 20"),
+        (31234.0, "> 30000"),
+    ],
 )
 def test_a_bound_is_never_above_what_it_bounds(value, text):
     assert lower_bound(value) == text and float(unmarked(text)) <= value
+
+
+def test_a_level_that_hardly_changes_has_no_sign():
+    assert [in_decibels(one) for one in (-0.04, 0.0, 0.2, -3.0)] == ["below 0.05 dB"] * 2 + [
+        "+0.2 dB",
+        "-3.0 dB",
+    ]
 
 
 def test_the_level_of_an_excitation_that_ends_early_is_a_bound(tmp_path):

@@ -130,7 +130,14 @@ class Marks:
 def lower_bound(value: float) -> str:
     """Write a positive number of which only a lower bound is known, with one digit: "> 0.005" of 0.0053."""
     unit = 10.0 ** np.floor(np.log10(value)) if value > 0.0 else 1.0
-    return f"> {np.floor(value / unit * (1.0 + 1e-12)) * unit:.1g}"
+    digit = np.floor(value / unit * (1.0 + 1e-12)) * unit
+    # %g has exponents from ten on where one digit is asked for
+    return f"> {digit:.1g}" if digit < 10.0 else f"> {digit:.0f}"
+
+
+def in_decibels(change: float) -> str:
+    """Write how far a level is from another [dB], to a tenth."""
+    return "below 0.05 dB" if abs(change) < 0.05 else f"{change:+.1f} dB"
 
 
 def unmarked(text: str) -> str:

@@ -292,6 +292,7 @@ def test_play_left_and_wedging():  # bad input 50
     assert "in one mesh" in str(check_deviations(deep, PLAY)[0])
     thin = replace(deep, sun_thickness=50 * UM)
     assert check_deviations(thin, PLAY) == ()
+    assert "pin errors may exceed" in str(check_deviations(deep, PLAY)[0])
 
 
 def test_a_pair_has_no_pins_that_use_up_its_play():

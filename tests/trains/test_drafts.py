@@ -231,6 +231,7 @@ def test_all_drafts_with_teeth_left_over(teeth):
         ("planetary", {"teeth": (17, 22, 62)}),
         ("planetary", {"form": ToothForm(helix="20 deg")}),
         ("planetary", {"form": ToothForm(addendum=1.1)}),
+        ("planetary", {"teeth": (24, 36, 96), "planets": 4, "form": ToothForm(addendum=1.3)}),
         ("helical", {"teeth": (37, 27, 89), "module": "0.2 mm"}),
         ("planar", {"teeth": (21, 33, 87)}),
         ("pair", {"teeth": (12, 24), "form": ToothForm(centre_distance="37 mm")}),
@@ -242,6 +243,20 @@ def test_all_drafts_with_teeth_left_over(teeth):
 )
 def test_drafts_of_other_kinds_never_warn_of_themselves(kind, numbers):
     assert not said(new_case(kind, **numbers)) - {""}
+
+
+@pytest.mark.parametrize(
+    ("kind", "teeth", "words"),
+    [
+        ("pair", (20, -60), "gear_2.outer_radius in place of its bore_radius"),
+        ("drivetrain", (20, -60), "leave the sign out"),
+        ("pair", (5, 7), "take more teeth"),
+    ],
+)
+def test_teeth_that_are_refused_say_what_to_do(kind, teeth, words):
+    with pytest.raises(FemgearError) as refused:
+        check_case(read_case(new_case(kind, teeth=teeth)))
+    assert words in (refused.value.remedy or "")
 
 
 def test_shifts_are_shared_by_equal_sliding():

@@ -47,7 +47,7 @@ from femgear.housing.sound import (
     whole_turns,
 )
 from femgear.report.response import harmonics_of
-from femgear.report.tables import MANY, Block, Marks, chosen, lower_bound, tabulate
+from femgear.report.tables import MANY, Block, Marks, chosen, in_decibels, lower_bound, tabulate
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.storage.results import (
     FOURIER,
@@ -603,7 +603,7 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
     ring, limit, notes = case.ring, dynamics, list[str]()
     if housing and "one_way_difference" in results.housing:
         apart = results.housing["one_way_difference"].values
-        columns["level [m/s²]"] = lambda i: f"{level(i)} ({apart[i]:+.1f} dB)"
+        columns["level [m/s²]"] = lambda i: f"{level(i)} ({in_decibels(apart[i])})"
         notes.append(f"level: in brackets how far from {_ONE_WAY} (one way)")
     if housing:
         limit = results.housing
@@ -677,7 +677,7 @@ def _near_resonances(runup: xr.Dataset) -> Block:
 
 def _one_way(one: xr.Dataset) -> str:
     """Write the level of one speed by the forces of one way, and how far that of both ways is from it."""
-    return f"{float(one.one_way_level):.4g} ({float(one.one_way_difference):+.1f} dB)"
+    return f"{float(one.one_way_level):.4g} ({in_decibels(float(one.one_way_difference))})"
 
 
 def describe_housing(
