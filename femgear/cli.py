@@ -44,7 +44,7 @@ try:
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
     import femgear
-    from femgear.errors import CaseError, FemgearError, printable
+    from femgear.errors import CaseError, FemgearError, StorageError, printable
     from femgear.exchange.formats import Sampling
     from femgear.findings import FindingWarning
     from femgear.storage.files import noted_interrupts, storage_error
@@ -516,7 +516,14 @@ def _need_new(paths: Sequence[Path], *, force: bool) -> None:
 
     for path in paths:
         for name in (path.name, _results_folder(path).name):
-            checked_name(name)
+            try:
+                checked_name(name)
+            except StorageError as error:
+                # a name that was typed is no matter of the disk
+                raise CaseError(
+                    error.message, code="E-CHOICE", key="--output", value=name, limit=error.limit,
+                    remedy=error.remedy,
+                ) from None  # fmt: skip
         if path.exists() and not force:
             raise CaseError(
                 "the file is there already", code="E-OUTPUT", file=str(path), limit="a new file",

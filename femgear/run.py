@@ -10,13 +10,14 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.case.dependencies import fingerprint
-from femgear.errors import CaseError, StorageError
+from femgear.errors import CaseError, StorageError, nvh_library
 from femgear.exchange.formats import (
     SCALES,
     Sampling,
@@ -121,6 +122,12 @@ def _options(stage: Stage, progress: Progress) -> dict[str, Any]:
 
 
 _RECORDED = "wav", "uff", "quality"
+_LIBRARIES = {
+    "xlsx": ("spreadsheets", "openpyxl"),
+    "uff": ("universal files", "pyuff"),
+    "quality": ("loudness and tones", "mosqito"),
+}
+"""Libraries of formats that need one of the extra ``nvh``."""
 """Formats of what a test bench would record."""
 _LOSS = -0.1
 """Change of the level that is told when a rate leaves lines out [dB]."""
@@ -354,6 +361,7 @@ def export_results(
             limit=known or "runs with an elastic ring, and --wav of pairs",
             remedy="export tables, or run such a case without --only",
         )  # fmt: skip
+    _need_libraries(formats)
     if "csv" in formats:
         found += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
         if recorded is not None and recorded.cuts and {"runup", "housing"} <= {*results.stages}:
@@ -381,6 +389,15 @@ def export_results(
         signals = _told(recorded.signals(results, how), progress, steps)
         found += _export_sound(signals, folder, formats, how)
     return found
+
+
+def _need_libraries(formats: Collection[str]) -> None:
+    """Refuse formats whose library is not installed (E-LIBRARY), before any file is written."""
+    for one, (words, library) in _LIBRARIES.items():
+        if one in formats:
+            with nvh_library(words):
+                if find_spec(library) is None:
+                    raise ImportError(f"No module named {library!r}")
 
 
 def _told(signals: Iterable[Signal], progress: Progress, steps: int) -> Iterator[Signal]:

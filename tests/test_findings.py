@@ -18,7 +18,7 @@ import xarray as xr
 
 from femgear import cli
 from femgear.findings import CATALOGUE, SEVERITIES, Finding, FindingWarning, as_data, from_data, once, remark
-from femgear.report.tables import Marks, in_decibels, lower_bound, tabulate, unmarked
+from femgear.report.tables import Marks, in_decibels, lower_bound, significant, tabulate, unmarked
 from femgear.run import solve
 from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import train_of, trains
@@ -443,6 +443,16 @@ def test_every_finding_of_a_table_has_a_mark_of_its_own():
 )
 def test_a_bound_is_never_above_what_it_bounds(value, text):
     assert lower_bound(value) == text and float(unmarked(text)) <= value
+
+
+def test_small_numbers_keep_four_digits():
+    assert [significant(one, 3) for one in (0.0, 12.3456, 0.0456, 4.2e-5)] == [
+        "0.000",
+        "12.346",
+        "0.046",
+        "4.2e-05",
+    ]
+    assert significant(0.00312, 3) == "0.00312"
 
 
 def test_a_level_that_hardly_changes_has_no_sign():

@@ -127,6 +127,11 @@ class Marks:
         )
 
 
+def significant(value: float, places: int) -> str:
+    """Write a number with so many decimal places, and with four digits where these would not show it."""
+    return f"{value:.4g}" if 0.0 < abs(value) < 10.0 ** (1 - places) else f"{value:.{places}f}"
+
+
 def lower_bound(value: float) -> str:
     """Write a positive number of which only a lower bound is known, with one digit: "> 0.005" of 0.0053."""
     unit = 10.0 ** np.floor(np.log10(value)) if value > 0.0 else 1.0

@@ -35,7 +35,7 @@ from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_se
 from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.gears.tooth import ROOT_RADIUS_LIMIT, root_notches
 from femgear.report.style import family
-from femgear.report.tables import Block, Marks, chosen, tabulate
+from femgear.report.tables import Block, Marks, chosen, significant, tabulate
 from femgear.storage.results import coordinates, dataset, declared
 from femgear.trains.protocol import StageResult
 
@@ -931,7 +931,7 @@ def describe_static(data: xr.Dataset) -> Block:
     def error(one: xr.Dataset, value: float) -> str:
         """Write a transmission error, marked where the mesh of a loaded set carries nothing at times."""
         carries = (one.mesh_force + one.back_force).values > 0.0
-        text = f"{value * 1e6:.4f}"
+        text = significant(value * 1e6, 4) if abs(one.ste.values.mean()) < 1e-8 else f"{value * 1e6:.4f}"
         if not data.mesh_force.values.any() or carries.all():
             return text
         return f"{text}*" if carries.any() else "-"
@@ -946,7 +946,7 @@ def describe_static(data: xr.Dataset) -> Block:
         "k p-p [N/um]": lambda one: marks(
             f"{float(peak_to_peak(one, 'mesh_stiffness')) / 1e6:.3f}", *LARGE, "W-POSITIONS"
         ),
-        "force [N]": lambda one: f"{one.mesh_force.values.mean():.3f}",
+        "force [N]": lambda one: significant(one.mesh_force.values.mean(), 3),
         "p max [MPa]": lambda one: _pressure(float(largest_pressure(one)), marks),
     }
     if "face_load_factor" in data:
@@ -991,7 +991,7 @@ def _pressure(pressure: float, marks: Marks) -> str:
     if pressure <= 0.0:
         return "-"
     codes = ["W-PRESSURE"] if pressure > LARGEST_PRESSURE else []
-    return marks(f"{pressure / 1e6:.1f}", *codes, "W-EDGE")
+    return marks(significant(pressure / 1e6, 1), *codes, "W-EDGE")
 
 
 def shares(data: xr.Dataset) -> tuple[float, float, str]:
