@@ -38,7 +38,6 @@ from femgear.contact.peaks import (
     FEWEST,
     MOST_PLACES,
     MOST_ROUNDS,
-    Between,
     mean_weights,
     open_places,
     tooth_pair_codes,
@@ -116,6 +115,42 @@ class CycleOptions:
         """The options of the mirror image, whose planets have this order (N,) in the original."""
         gaps = None if self.planet_gaps is None else np.asarray(self.planet_gaps, float)[order]
         return replace(self, planet_gaps=gaps, ahead=None if self.ahead is None else -self.ahead)
+
+
+@dataclass(frozen=True)
+class Between:
+    """States at E positions between those of a mesh cycle, ascending.
+
+    Parameters
+    ----------
+    position : (E,) array
+        In mesh periods.
+    deflection, stiffness : (M, E) arrays
+        As in `MeshCycle` [m], [N/m].
+    sun_arc : (E,) array
+        [m]
+    load_share : (N, E) array
+    max_pressure, pressed_path, pressed_load : (M, E) arrays
+        [Pa], [m], [N]
+    looked : (N,) bool array
+        Planets whose extremes these positions enclose: one of those that go through the same states.
+    records : tuple of MeshCycle
+        The same positions in the order in which they were solved, with the loads of the tooth pairs.
+    doubt : float
+        Share of a peak to peak that what is not resolved may still add.
+    """
+
+    position: np.ndarray
+    deflection: np.ndarray
+    stiffness: np.ndarray
+    sun_arc: np.ndarray
+    load_share: np.ndarray
+    max_pressure: np.ndarray
+    pressed_path: np.ndarray
+    pressed_load: np.ndarray
+    looked: np.ndarray
+    records: tuple[MeshCycle, ...]
+    doubt: float
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,7 @@ with other pairs at their ends until they are as short as `ENCLOSED`: slopes nee
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
-
 import numpy as np
-
-if TYPE_CHECKING:
-    from femgear.contact.cycle import MeshCycle
 
 TOLERANCE = 0.01
 """Share of a peak to peak that what is not resolved may still add to it."""
@@ -27,42 +21,6 @@ MOST_ROUNDS, MOST_PLACES = 12, 512
 """Rounds of halving, and positions that they may add."""
 FEWEST = 16
 """Positions of a mesh period with which halving begins, at least."""
-
-
-@dataclass(frozen=True)
-class Between:
-    """States at E positions between those of a mesh cycle, ascending.
-
-    Parameters
-    ----------
-    position : (E,) array
-        In mesh periods.
-    deflection, stiffness : (M, E) arrays
-        As in `femgear.contact.cycle.MeshCycle` [m], [N/m].
-    sun_arc : (E,) array
-        [m]
-    load_share : (N, E) array
-    max_pressure, pressed_path, pressed_load : (M, E) arrays
-        [Pa], [m], [N]
-    looked : (N,) bool array
-        Planets whose extremes these positions enclose: one of those that go through the same states.
-    records : tuple of MeshCycle
-        The same positions in the order in which they were solved, with the loads of the tooth pairs.
-    doubt : float
-        Share of a peak to peak that what is not resolved may still add.
-    """
-
-    position: np.ndarray
-    deflection: np.ndarray
-    stiffness: np.ndarray
-    sun_arc: np.ndarray
-    load_share: np.ndarray
-    max_pressure: np.ndarray
-    pressed_path: np.ndarray
-    pressed_load: np.ndarray
-    looked: np.ndarray
-    records: tuple[MeshCycle, ...]
-    doubt: float
 
 
 def mean_weights(position: np.ndarray, periods: int) -> np.ndarray:
