@@ -28,6 +28,8 @@ PROGRAM = shutil.which("ccx")
 TIME_LIMIT = 900.0
 """Seconds after which CalculiX is stopped."""
 MILLIMETRE = 1e3
+LAST = 1000
+"""Increments from one table to the next: only that of the end of a step, where it was cut into several."""
 
 
 def installed() -> bool:
@@ -129,42 +131,103 @@ def _turned(points: np.ndarray, angle: float) -> np.ndarray:
     return points @ np.array([[c, s], [-s, c]])
 
 
-NEAR_SIZE, FAR_SIZE = 3.0, 6.0
-"""Elements of the teeth beside loaded ones and of all others, in those that femgear takes."""
+SIZES = 1.0, 3.0, 6.0
+"""Elements of loaded flanks, of the teeth beside them and of all others, in those that femgear takes."""
+CONTACT_REACH = 0.25e-3
+"""Length [m] to either side of a contact over which elements have the finest size and may touch.
+
+Flanks that are turned into each other overlap over three times the width of the contact: with more
+elements that may touch CalculiX takes more iterations until those that pull are out.
+"""
+GROWTH = 0.3
+"""Growth of the elements with the distance from there."""
 
 
-def whole_gear(gear: Gear, side: str, fine: Sequence[int], *, flank_elements: int) -> PlaneBody:
-    """Mesh all teeth of a gear, one side of those of the given numbers finely.
+def whole_gear(
+    gear: Gear, side: str, contacts: Mapping[int, float], *, size: float,
+    sizes: tuple[float, float, float] = SIZES, span: int | None = None,
+) -> PlaneBody:  # fmt: skip
+    """Mesh all teeth of a gear, one side of loaded ones as finely as femgear does and finer at the contact.
 
     Parameters
     ----------
     gear : Gear
     side : {"left", "right"}
-        Of the fine teeth that is meshed as finely as femgear does, with so many elements along the flank.
-    fine : sequence of int
-        Numbers of teeth; edges of these have it in their name: "flank 0", "fillet -1". "rim" is that of all.
-    flank_elements : int
+        Of the loaded teeth that is meshed finely.
+    contacts : mapping of int to float
+        Roll lengths [m] of the contacts by number of the loaded teeth; edges of these have the number in
+        their name: "flank 0", "fillet -1", and of the flank those that may touch, "contact 0". "rim" is that
+        of all.
+    size : float
+        Length of the elements at the contact [m].
+    sizes : (float, float, float)
+        See `SIZES`.
+    span : int, optional
+        Teeth to either side of loaded ones; others are left out.
     """
-    far, near = (half_sector(gear, flank_elements=12, refine=1.0 / size) for size in (FAR_SIZE, NEAR_SIZE))
+    far, near = (half_sector(gear, flank_elements=12, refine=1.0 / ratio) for ratio in sizes[:0:-1])
     cuts = {name: far.curve(name) for name in ("cut", "rim")}
     near = _with_curves(near, cuts)
-    loaded = half_sector(gear, flank_elements=flank_elements)
-    loaded = _with_curves(loaded, cuts | {"symmetry": near.curve("symmetry")})
-    grids = mesh_outlines([far, near, loaded])
+    half = _with_curves(half_sector(gear, refine=1.0 / sizes[0]), cuts | {"symmetry": near.curve("symmetry")})
+    loaded = [_with_curves(half, _fine_at(half, gear, roll, size)) for roll in contacts.values()]
+    grids, numbers = mesh_outlines([far, near, *loaded]), list(contacts)
     parts = []
     for tooth in range(gear.teeth):
-        away = [(tooth - number + gear.teeth // 2) % gear.teeth - gear.teeth // 2 for number in fine]
-        number = next((number for number, distance in zip(fine, away) if distance == 0), None)
+        away = [(tooth - number + gear.teeth // 2) % gear.teeth - gear.teeth // 2 for number in numbers]
+        if span is not None and min(map(abs, away)) > span:
+            continue
+        index = away.index(0) if 0 in away else None
         for half in ("left", "right"):
-            chosen = number is not None and half == side
-            level = 2 if chosen else int(min(map(abs, away)) <= 1)
+            chosen = index is not None and half == side
+            level = 2 + index if chosen else int(min(map(abs, away)) <= 1)
             grid = grids[level] if half == "left" else _mirrored(grids[level])
-            names = {f"flank {number}": "flank", f"fillet {number}": "fillet"} if chosen else {}
-            edges = {name: grid.boundaries[curve] for name, curve in names.items()}
+            edges = {}
+            if chosen:
+                place = flank_points(gear, [contacts[numbers[index]]])[0]
+                place *= [1.0, 1.0 if half == "left" else -1.0]
+                edges = _loaded_edges(grid, numbers[index], place)
             is_tooth = np.isin(np.arange(len(grid.triangles)), grid.regions["tooth"])
             points = _turned(grid.points, tooth * gear.pitch_angle)
             parts.append(PlaneBody(points, grid.triangles, edges | {"rim": grid.boundaries["rim"]}, is_tooth))
     return _joined(parts)
+
+
+def _loaded_edges(grid: Grid, number: int, place: np.ndarray) -> dict[str, np.ndarray]:
+    """Flank and fillet of a loaded tooth, and the part of the flank about a place that may touch."""
+    flank = grid.boundaries["flank"]
+    near = np.hypot(*(grid.points[flank[:, 2]] - place).T) < CONTACT_REACH
+    return {
+        f"flank {number}": flank,
+        f"fillet {number}": grid.boundaries["fillet"],
+        f"contact {number}": flank[near],
+    }
+
+
+def _fine_at(half: HalfSector, gear: Gear, roll: float, size: float) -> dict[str, np.ndarray]:
+    """Flank and tip of a half sector with finer elements about a roll length [m] of the flank."""
+    tip_roll, rolls = gear.tip_roll, half.flank_roll[:: -1 if gear.internal else 1]
+    arc = 0.5 * np.abs(tip_roll**2 - np.array([roll, rolls[-1]]) ** 2) / gear.base_radius
+    corner = flank_points(gear, [tip_roll])[0]
+    angle = np.arctan2(*corner[::-1])
+    lengths = arc[1], gear.tip_radius * angle
+    coarse = arc[1] / (len(rolls) // 2)
+    flank, tip = (
+        _graded(length, place, size, coarse) for length, place in zip(lengths, (arc[0], -arc[0]), strict=True)
+    )
+    inwards = np.sqrt(tip_roll**2 + np.sign(rolls[-1] - tip_roll) * 2 * gear.base_radius * flank)
+    angles = angle - tip / gear.tip_radius
+    towards = gear.tip_radius * np.column_stack([np.cos(angles), np.sin(angles)])[::-1]
+    flip = -1 if gear.internal else 1
+    return {"flank": flank_points(gear, inwards)[::flip], "tip": towards[::flip]}
+
+
+def _graded(length: float, place: float, size: float, coarse: float) -> np.ndarray:
+    """Ends and middles of edges along a length, of a size about a place and growing to a coarse one [m]."""
+    s = np.linspace(0.0, length, 20001)
+    edge = np.clip(size + GROWTH * (np.abs(s - place) - CONTACT_REACH), size, coarse)
+    number = np.append(0.0, np.cumsum(0.5 * (1 / edge[1:] + 1 / edge[:-1]) * np.diff(s)))
+    count = 2 * max(1, round(number[-1]))
+    return np.interp(np.linspace(0.0, number[-1], count + 1), number, s)
 
 
 def _with_curves(half: HalfSector, curves: Mapping[str, np.ndarray]) -> HalfSector:
@@ -262,26 +325,60 @@ def surface_input(body: PlaneBody, name: str, edges: np.ndarray, *, element: int
     return [f"*SURFACE, NAME={name}, TYPE=ELEMENT", *(sides[frozenset(edge[:2])] for edge in edges.tolist())]
 
 
+END = 50e-6
+"""Roll length [m] from an end of a flank within which a contact is at that end."""
+
+
+@dataclass(frozen=True)
+class Mates:
+    """Two teeth that may touch.
+
+    Parameters
+    ----------
+    teeth : (int, int)
+        Their numbers on the first and the second gear.
+    rolls : (float, float)
+        Roll lengths where they are nearest [m].
+    ends : (bool, bool)
+        Whether either flank ends there.
+    """
+
+    teeth: tuple[int, int]
+    rolls: tuple[float, float]
+    ends: tuple[bool, bool] = (False, False)
+
+
 def near_teeth(
     gears: Sequence[Gear], angles: Sequence[float], centre: float, *, within: float
-) -> list[tuple[int, int]]:
+) -> list[Mates]:
     """Find the teeth of two gears, turned so [rad], the second about (centre, 0), whose flanks are near.
 
     ``within`` is a distance [m]; the flanks are left ones, of an internal gear right ones.
     """
-    found, curves = [], []
+    mates, curves, rolls = [], [], []
     for gear in gears:
-        flank = flank_points(gear, np.linspace(gear.form_roll, gear.tip_roll, 1000))
+        rolls.append(np.linspace(gear.form_roll, gear.tip_roll, 4001))
+        flank = flank_points(gear, rolls[-1])
         curves.append(flank * [1.0, -1.0] if gear.internal else flank)
     for tooth in (-2, -1, 0, 1, 2):
-        mates = tooth, tooth if gears[1].internal else -tooth
+        numbers = tooth, tooth if gears[1].internal else -tooth
         first, second = (
             _turned(flank, angle + number * gear.pitch_angle) + np.array([place, 0.0])
-            for flank, angle, number, gear, place in zip(curves, angles, mates, gears, (0.0, centre))
+            for flank, angle, number, gear, place in zip(curves, angles, numbers, gears, (0.0, centre))
         )
-        if KDTree(second).query(first)[0].min() < within:
-            found.append(mates)
-    return found
+        nearest = KDTree(second).query(first)[1]
+        tangent = np.gradient(second, axis=0)[nearest]
+        tangent /= np.hypot(*tangent.T)[:, None]
+        apart, step = first - second[nearest], np.hypot(*np.diff(second, axis=0).T).max()
+        along = np.abs((apart * tangent).sum(axis=1))
+        gap = np.abs(apart[:, 0] * tangent[:, 1] - apart[:, 1] * tangent[:, 0])
+        gap = np.hypot(gap, np.maximum(along - step, 0.0))
+        i = int(gap.argmin())
+        if gap[i] < within:
+            at = float(rolls[0][i]), float(rolls[1][nearest[i]])
+            ends = (np.abs(roll - of_gear[[0, -1]]).min() < END for roll, of_gear in zip(at, rolls))
+            mates.append(Mates(numbers, at, tuple(ends)))
+    return mates
 
 
 def over_arc(body: PlaneBody, name: str, angle: float = 0.0, width: float = 2.0 * np.pi) -> dict[int, float]:
@@ -356,9 +453,9 @@ class PairContact:
         Along the line of action [m].
     torque : (s,) array
         On the first gear [N m].
-    pressure : (2, s) array
-        Largest contact pressure [Pa] from the stress normal to either gear's flank at its nodes, which is
-        the mean of the elements beside them.
+    pressure : (2, t, s) array
+        Largest contact pressure [Pa] of each pair of teeth, from the stress normal to either gear's flank at
+        its nodes, which is the mean of the elements beside them.
     root : (2, s) array
         Largest principal stress in the fillets of the loaded side of each gear [Pa].
     """
@@ -374,7 +471,7 @@ class PairContact:
 
 
 def pair_contact(
-    bodies: Sequence[PlaneBody], teeth: Sequence[tuple[int, int]], approach: Sequence[float], *,
+    bodies: Sequence[PlaneBody], mates: Sequence[Mates], approach: Sequence[float], *,
     base_radius: float, width: float, material: Material, states: Sequence[Mapping[str, str]], penalty: float,
 ) -> PairContact:  # fmt: skip
     """Solve the contact of two whole plane gears: rim of the first turned, that of the second held.
@@ -383,11 +480,14 @@ def pair_contact(
     ----------
     bodies : two PlaneBody
         In place, touching; the first about the origin.
-    teeth : sequence of (int, int)
-        Teeth of the first and the second gear whose edges "flank ..." may touch: CalculiX takes a flank
-        for penetrated that lies behind another, however far.
+    mates : sequence of Mates
+        Teeth of the first and the second gear whose edges "contact ..." may touch: CalculiX takes a flank
+        for penetrated that lies behind another, however far. Forces are normal to the flank that is master:
+        where a flank ends, the other one.
     approach : sequence of float
-        Rotations of the first gear as paths along the line of action [m], in rising order.
+        Rotations of the first gear as paths along the line of action [m]. CalculiX looks for the parts of
+        the flanks that face each other where the step before left the bodies: the mean rotation is solved
+        first, for the torque of the first step stands 1e-4 beside those of the others.
     base_radius, width : float
         Base radius of the first gear and face width [m].
     material : Material
@@ -399,12 +499,12 @@ def pair_contact(
     lines, node, element, roots, flanks = [], 0, 0, [], []
     for number, (body, state) in enumerate(zip(bodies, states), 1):
         lines += body_input(body, str(number), material, state, node=node, element=element)
-        for i, mates in enumerate(teeth):
-            flank = body.edges[f"flank {mates[number - 1]}"]
-            lines += surface_input(body, f"S{number}T{i}", flank, element=element)
+        for i, pair in enumerate(mates):
+            touching = body.edges[f"contact {pair.teeth[number - 1]}"]
+            lines += surface_input(body, f"S{number}T{i}", touching, element=element)
         fillets = np.vstack([edges for name, edges in body.edges.items() if name.startswith("fillet")])
         roots.append(node + 1 + np.unique(fillets))
-        chains = [np.unique(edges) for name, edges in body.edges.items() if name.startswith("flank")]
+        chains = [np.unique(body.edges[f"flank {pair.teeth[number - 1]}"]) for pair in mates]
         flanks.append([(node + 1 + chain, body.points[chain]) for chain in chains])
         shown = np.concatenate([roots[-1], *(own for own, _ in flanks[-1])])
         lines += ["*NSET, NSET=SHOWN", *map(str, shown)]
@@ -415,20 +515,25 @@ def pair_contact(
         "*SURFACE INTERACTION, NAME=SI\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
         f"{penalty * 1e-9:.6g}",
         *(
-            f"*CONTACT PAIR, INTERACTION=SI, TYPE=SURFACE TO SURFACE\nS1T{i},S2T{i}"
-            for i in range(len(teeth))
+            "*CONTACT PAIR, INTERACTION=SI, TYPE=SURFACE TO SURFACE\n"
+            + (f"S2T{i},S1T{i}" if pair.ends[1] else f"S1T{i},S2T{i}")
+            for i, pair in enumerate(mates)
         ),
         "*BOUNDARY\nRIM2,1,2",
     ]
     rim = np.unique(bodies[0].edges["rim"])
     x, y = MILLIMETRE * bodies[0].points[rim].T
-    for path in approach:
+    for path in (np.mean(approach), *approach):
         angle = path / base_radius
         lines.append("*STEP, INC=200\n*STATIC\n1.,1.\n*BOUNDARY")
         lines += [
             f"{n + 1},1,1,{-angle * b:.14g}\n{n + 1},2,2,{angle * a:.14g}" for n, a, b in zip(rim, x, y)
         ]
-        lines += ["*NODE PRINT, NSET=RIM1\nRF", "*EL FILE, OUTPUT=2D, NSET=SHOWN\nS", "*END STEP"]
+        lines += [
+            f"*NODE PRINT, NSET=RIM1, FREQUENCY={LAST}\nRF",
+            f"*EL FILE, OUTPUT=2D, NSET=SHOWN, FREQUENCY={LAST}\nS",
+            "*END STEP",
+        ]
     output = run("\n".join(lines) + "\n")
     torque = []
     for rows in tables(output.tables, "forces"):
@@ -439,8 +544,13 @@ def pair_contact(
         stress = np.full((node + 1, 2), np.nan)
         stress[numbers] = 1e6 * _principal(values)
         roots_found.append([stress[own, 1].max() for own in roots])
-        pressure.append([max(_peak(points, -stress[own, 0]) for own, points in chains) for chains in flanks])
-    return PairContact(np.array(approach), np.array(torque), np.array(pressure).T, np.array(roots_found).T)
+        pressure.append([[_peak(points, -stress[own, 0]) for own, points in chains] for chains in flanks])
+    return PairContact(
+        np.array(approach),
+        np.array(torque[1:]),
+        np.moveaxis(pressure[1:], 0, -1),
+        np.array(roots_found[1:]).T,
+    )
 
 
 def _peak(points: np.ndarray, pressure: np.ndarray) -> float:
@@ -454,8 +564,8 @@ def _peak(points: np.ndarray, pressure: np.ndarray) -> float:
     tangent = points[np.argsort(((points - middle) ** 2).sum(axis=1))[1]] - middle
     along = (points - middle) @ tangent / np.hypot(*tangent)
     near = pressure > 0.8 * pressure[largest]
-    if np.count_nonzero(near) < 4:
-        return float(pressure[largest])
+    if np.count_nonzero(near) < 4 or pressure[largest] <= 0.0:
+        return max(float(pressure[largest]), 0.0)
     parabola = np.polyfit(along[near], pressure[near], 2)
     place = np.linspace(along[near].min(), along[near].max(), 501)
     return float(np.polyval(parabola, place).max())

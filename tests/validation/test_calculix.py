@@ -5,6 +5,7 @@ import pytest
 
 from femgear.fe.elasticity import Material
 from validation.calculix import (
+    Mates,
     PlaneBody,
     fields,
     frequencies,
@@ -15,6 +16,8 @@ from validation.calculix import (
     pair_contact,
     tables,
 )
+from validation.calculix_casing import bore_load, hats
+from validation.calculix_solid import LAYERS, solid_contact
 
 WITHOUT_CONTRACTION = Material(206e9, 0.0, 7850.0)
 PLANE_STRAIN = {"tooth": "plane strain", "body": "plane strain"}
@@ -41,7 +44,8 @@ def block(x, y, count=4) -> PlaneBody:
 
 
 def named(body, rim, flank):
-    edges = {"rim": body.edges[rim], "flank 0": body.edges[flank], "fillet 0": body.edges["beside"]}
+    edges = {"rim": body.edges[rim], "fillet 0": body.edges["beside"]}
+    edges |= dict.fromkeys(("flank 0", "contact 0"), body.edges[flank])
     return PlaneBody(body.points, body.triangles, edges, body.tooth)
 
 
@@ -55,13 +59,13 @@ def test_two_bars_pressed_together_by_a_rotation():
         named(block(x, (0.0, length)), "above", "below"),
     )
     found = pair_contact(
-        bodies, [(0, 0)], [radius * theta, 2 * radius * theta], base_radius=radius, width=width,
-        material=WITHOUT_CONTRACTION, states=(PLANE_STRAIN, PLANE_STRAIN), penalty=1e17,
+        bodies, [Mates((0, 0), (0.0, 0.0))], [radius * theta, 2 * radius * theta], base_radius=radius,
+        width=width, material=WITHOUT_CONTRACTION, states=(PLANE_STRAIN, PLANE_STRAIN), penalty=1e17,
     )  # fmt: skip
     rate = 206e9 * theta / (2 * length)
     torque = rate * width * (height * radius**2 + height**3 / 12)
     assert found.torque == pytest.approx([torque, 2 * torque], rel=1e-3)
-    assert found.pressure == pytest.approx(np.full((2, 2), rate * x[1]) * [1, 2], rel=0.01)
+    assert found.pressure == pytest.approx(np.full((2, 1, 2), rate * x[1]) * [1, 2], rel=0.01)
     assert np.abs(found.root).max() < 0.01 * rate * x[1]
     assert found.at(1.5 * torque, found.approach) == pytest.approx(1.5 * radius * theta, rel=1e-3)
 
@@ -119,3 +123,39 @@ def test_tables_and_fields_are_read():
     assert nodes.tolist() == [12] and values.tolist() == [[-100.0, 2.0]]
     row = "      1   0.1579137E+08   0.3973836E+04   0.6324555E+03   0.0000000E+00\n"
     assert frequencies(f"\n     E I G E N V A L U E   O U T P U T\n\n{row}") == pytest.approx([632.4555])
+
+
+@needs_program
+def test_two_blocks_pressed_over_their_width():
+    """The same bars as solids of layers: every layer has the same part of the torque."""
+    radius, height, length, width, theta = 0.05, 0.01, 0.01, 0.02, 1e-4
+    x = radius - height / 2, radius + height / 2
+    bodies = (
+        named(block(x, (-length, 0.0), 2), "below", "above"),
+        named(block(x, (0.0, length), 2), "above", "below"),
+    )
+    found = solid_contact(
+        bodies, [radius * theta, 2 * radius * theta], base_radius=radius, width=width,
+        material=WITHOUT_CONTRACTION, slope=0.0, penalty=1e17,
+    )  # fmt: skip
+    torque = 206e9 * theta / (2 * length) * width * (height * radius**2 + height**3 / 12)
+    assert found.torque == pytest.approx([torque, 2 * torque], rel=1e-3)
+    assert found.layer_torque == pytest.approx(found.torque[:, None] / LAYERS * np.ones(LAYERS), rel=1e-6)
+
+
+def test_force_on_a_bore():
+    """A force on some waves of a ring still has its resultant, which is of the wave one."""
+    radius, width, count, place = 0.081, 0.025, 64, 0.3
+    angle, z = np.meshgrid(np.linspace(0, 2 * np.pi, 2 * count + 1), [-width / 2, 0, width / 2])
+    points = np.column_stack([radius * np.cos(angle.ravel()), radius * np.sin(angle.ravel()), z.ravel()])
+    number = np.arange(angle.size).reshape(angle.shape)
+    triangles = []
+    for j in range(0, 2 * count, 2):
+        s = number[:, j : j + 3]
+        triangles.append([s[0, 0], s[0, 2], s[2, 2], s[0, 1], s[1, 2], s[1, 1]])
+        triangles.append([s[0, 0], s[2, 2], s[2, 0], s[1, 1], s[2, 1], s[1, 0]])
+    load = bore_load(points, np.array(triangles), place, 56, radius)
+    slope = np.radians(20.0)
+    resultant = [np.sin(slope + place), -np.cos(slope + place), 0.0]
+    assert load.sum(axis=0) == pytest.approx(resultant, abs=5e-3)
+    assert hats(np.linspace(0, 7, 50), 56).sum(axis=0) == pytest.approx(np.ones(50))

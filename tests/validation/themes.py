@@ -7,7 +7,9 @@ under its slow parts when it takes more than a few seconds.
 from __future__ import annotations
 
 from validation import (
+    calculix_casing,
     calculix_rows,
+    calculix_solid,
     contact,
     drivetrain,
     dynamics,
@@ -137,10 +139,20 @@ THEMES = (
         "CalculiX",
         "Another finite-element program, where it is installed (`ccx`; Debian: calculix-ccx). Pairs: whole "
         "gears in contact at 200 N m, 20 mm wide, positions in mesh periods; the body of an internal gear is "
-        "in plane stress, as in femgear, all else in plane strain. Contact is a penalty of 1 GPa at 10 nm. "
-        "The ring is that of the reference set on its foundation and on feet of 20 mm, all teeth in a grid.",
+        "in plane stress, as in femgear, all else in plane strain. Contact is a penalty of 1 GPa at 10 nm, "
+        "elements there are 15 um long; rows *settings* have ten times the one and half the other. Rows "
+        "*width*: straight teeth as solids between mirror planes, one flank with a slope. "
+        "The ring is that of the reference set on its foundation and on feet of 20 mm, all teeth in a grid. "
+        "The casing is meshed anew from its geometry.",
         (),
-        (calculix_rows.external_pair, calculix_rows.internal_pair, calculix_rows.ring_on_feet),
+        (
+            calculix_rows.external_pair,
+            calculix_rows.internal_pair,
+            calculix_rows.settings,
+            calculix_solid.face_load,
+            calculix_rows.ring_on_feet,
+            calculix_casing.casing_example,
+        ),
     ),
     Theme(
         "static",
