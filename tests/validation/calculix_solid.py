@@ -26,8 +26,8 @@ SIZES = 2.0, 4.0, 6.0
 SPAN = 2
 """Teeth to either side of the loaded one: bores close under the teeth leave the others at rest.
 
-In the plane the pair approaches by 0.7 % more with these alone than with all teeth, and by as much less with four
-to either side as whole gears do.
+In the plane the pair approaches by 0.7 % more with these alone than with all teeth, by 0.02 % with four to
+either side.
 """
 GATE = 0.005
 """Of K_Hbeta; loads of single layers have twice that."""
