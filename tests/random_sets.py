@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import set_deviations
 from femgear.case.sections import Case
 from femgear.errors import GeometryError
 from femgear.trains.elastic.checks import MOST_WINDING
@@ -27,11 +27,12 @@ MOST_SLICES, HARMONICS = 8, 12.0
 
 @dataclass(frozen=True)
 class RandomSet:
-    """A case that femgear accepts, and the codes of the sets that it refused before."""
+    """A case that femgear accepts, the codes of the sets that it refused before, and `turn_of` its seed."""
 
     case: Case
     kind: str
     refused: tuple[str, ...]
+    turn: int = 0
 
     @property
     def alike(self) -> bool:
@@ -67,12 +68,18 @@ def random_set(seed: int) -> RandomSet:
         plain = parse_case(_text(rng, kind, planets, f"random set {seed}: {kind}"), name=f"seed {seed}")
         try:
             case = with_values(plain, _features(rng, plain))
-            planetary_set(case)
+            # reliefs of tips that are shortened may begin beyond them
+            set_deviations(case)
         except GeometryError as error:
             refused.append(error.code)
         else:
-            return RandomSet(case, kind, tuple(refused))
+            return RandomSet(case, kind, tuple(refused), turn_of(seed))
     raise AssertionError(f"seed {seed}: no valid set in {MOST_DRAWS} draws, refused {refused}")
+
+
+def turn_of(seed: int) -> int:
+    """How often all kinds with all numbers of planets have been drawn before a seed."""
+    return seed // (len(KINDS) * len(PLANETS))
 
 
 def symmetry(angles, teeth_sum: int) -> int:
@@ -231,7 +238,8 @@ def _features(rng, case: Case) -> dict[str, object]:
             modifications[gear] += _leads(rng, case)
     changed |= {f"{gear}.modifications": tables for gear, tables in modifications.items() if tables}
     if rng.random() < 0.25:
-        changed["housing.support"] = [_support(rng, case) for _ in range(rng.integers(1, 5))]
+        supports = [_support(rng, case) for _ in range(rng.integers(1, 5))]
+        changed["housing.support"] = _apart(supports, case.ring.outer_radius)
         changed |= _few_harmonics(case)
     return changed
 
@@ -319,6 +327,20 @@ def _support(rng, case: Case) -> dict[str, object]:
         "width": f"{1e3 * case.module * rng.uniform(0.0, 8.0)!r} mm",
         "mass": f"{case.material.density * area * case.module * rng.uniform(0.0, 1.0)!r} kg",
     }
+
+
+def _apart(supports: list[dict[str, object]], radius: float) -> list[dict[str, object]]:
+    """Supports without those that overlap one before them on a circle of a radius [m]."""
+    kept: list[dict[str, object]] = []
+    places: list[tuple[float, float]] = []
+    for support in supports:
+        angle, width = (float(str(support[key]).partition(" ")[0]) for key in ("angle", "width"))
+        angle, width = math.radians(angle), 1e-3 * width / radius
+        away = [abs(math.remainder(angle - other, 2.0 * math.pi)) - 0.5 * (width + b) for other, b in places]
+        if min(away, default=1.0) > 1e-3:
+            kept.append(support)
+            places.append((angle, width))
+    return kept
 
 
 def _log(rng, low: float, high: float) -> float:

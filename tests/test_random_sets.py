@@ -12,7 +12,7 @@ from functools import cached_property, partial
 import numpy as np
 import pytest
 import set_images as images
-from random_sets import KINDS, PLANETS, RandomSet, equal_planets, random_set, symmetry
+from random_sets import KINDS, PLANETS, RandomSet, equal_planets, random_set, symmetry, turn_of
 from validation.reference.sensor_in_time import symmetry_leakage
 
 from femgear.case.dependencies import Steps, static_entries
@@ -61,6 +61,11 @@ class Solved:
     @cached_property
     def housing(self) -> HousingResult:
         return quietly(solve_housing, self.case, self.dynamics)
+
+    @property
+    def still(self) -> bool:
+        """Whether the static solution alone is tested: slices take long, those of every third set move."""
+        return self.case.static.slices > 1 and self.drawn.turn % 3 > 0
 
     @property
     def symmetry(self) -> int:
@@ -116,6 +121,14 @@ def solve_set(seed: int, cache) -> Solved:
 @pytest.fixture(scope="module")
 def solved(request, cache):
     return solve_set(request.param, cache)
+
+
+@pytest.fixture(scope="module")
+def moving(solved):
+    """The set, if its dynamics are tested."""
+    if solved.still:
+        pytest.skip("dynamics of every third set in slices")
+    return solved
 
 
 every_set = pytest.mark.parametrize(
@@ -211,7 +224,8 @@ def test_lines_of_a_later_record_are_turned(uniform):
 
 @every_set
 def test_every_number_is_finite(solved):
-    for result in (solved.static, solved.modes, solved.dynamics, solved.housing):
+    moving = [] if solved.still else [solved.modes, solved.dynamics, solved.housing]
+    for result in (solved.static, *moving):
         data = result.dataset()
         for name in data.variables:
             if data[name].dtype.kind in "fc":
@@ -245,33 +259,44 @@ def test_static_solution_is_in_equilibrium(solved):
 def test_equal_planets_are_equal(solved):
     """Every planet that a rotation of the set takes to another has its record, a mesh phase later."""
     cycle = solved.static.cycle
-    for state in (cycle, getattr(solved.modes, "state", cycle)):
-        for name in ("stiffness", "deflection", "force"):
-            record = getattr(state, name)
-            count = min(LINES, (len(state.position) - 1) // 2)
-            assert unequal_lines(lines(state.position, record, count), solved) < 1e-8, name
-            assert unequal_peaks(record.max(axis=1), solved) < 1e-8, name
-            assert unequal_peaks(record.min(axis=1), solved) < 1e-8, name
+    check_equal_states(solved, cycle)
     assert unequal_peaks(cycle.tooth_load.max(axis=(1, 2)), solved) < 1e-8
-    for name, amplitudes in (("DTE", solved.dynamics.dte), ("mesh force", solved.dynamics.response.force)):
-        for amplitude in amplitudes:
-            assert unequal_lines(amplitude, solved) < 1e-8, name
 
 
 @every_set
-def test_housing_has_only_the_orders_of_the_symmetry(solved):
+def test_equal_planets_move_equally(moving):
+    """The same in the loaded state of the modes, and in the dynamics."""
+    check_equal_states(moving, moving.modes.state)
+    dynamics = moving.dynamics
+    for name, amplitudes in (("DTE", dynamics.dte), ("mesh force", dynamics.response.force)):
+        for amplitude in amplitudes:
+            assert unequal_lines(amplitude, moving) < 1e-8, name
+
+
+def check_equal_states(solved, state) -> None:
+    """Records of equal planets, their lines and extremes."""
+    for name in ("stiffness", "deflection", "force"):
+        record = getattr(state, name)
+        count = min(LINES, (len(state.position) - 1) // 2)
+        assert unequal_lines(lines(state.position, record, count), solved) < 1e-8, name
+        assert unequal_peaks(record.max(axis=1), solved) < 1e-8, name
+        assert unequal_peaks(record.min(axis=1), solved) < 1e-8, name
+
+
+@every_set
+def test_housing_has_only_the_orders_of_the_symmetry(moving):
     """A set that a rotation by 2 pi/g takes to itself gives a fixed sensor multiples of g alone."""
-    g, housing, dynamics = solved.symmetry, solved.housing, solved.dynamics
+    g, housing, dynamics = moving.symmetry, moving.housing, moving.dynamics
     carrier = np.array([one.carrier for one in dynamics.speeds])
     place = dynamics.ring_teeth, carrier, housing.exact.sensor_angle
-    field = mesh_and_ring_outputs(replace(solved.modes, symmetry=1), dynamics.response)[1]
+    field = mesh_and_ring_outputs(replace(moving.modes, symmetry=1), dynamics.response)[1]
     lines = fixed_sensor_lines(field, *place)
     spectrum = OrderSpectrum(lines.order, lines.acceleration)
     assert (spectrum.amplitude.max(axis=-1) > 0).all()
     assert symmetry_leakage(spectrum, g).max() < 1e-8
     # others are left out where every planet is like every other
     assert housing.symmetry == g
-    if solved.case.housing.support:
+    if moving.case.housing.support:
         heard = OrderSpectrum(housing.exact.order, housing.exact.acceleration)
         assert symmetry_leakage(heard, g).max() < 1e-8
     else:
@@ -279,11 +304,11 @@ def test_housing_has_only_the_orders_of_the_symmetry(solved):
 
 
 @every_set
-def test_dynamic_transmission_error_at_rest_is_the_static_one(solved):
+def test_dynamic_transmission_error_at_rest_is_the_static_one(moving):
     """At the lowest speed of the case, in the harmonics that the excitation keeps."""
-    state, dynamics = solved.modes.state, solved.dynamics
+    state, dynamics = moving.modes.state, moving.dynamics
     rest = int(np.argmin(dynamics.input_speed))
-    if solved.case.housing.support:
+    if moving.case.housing.support:
         return  # these are not asked for it
     count = round(dynamics.excitation_limit[rest] / dynamics.response.mesh_frequency[rest])
     dynamic = dynamics.dte[rest, :, : count + 1]
@@ -296,12 +321,12 @@ def test_dynamic_transmission_error_at_rest_is_the_static_one(solved):
 
 
 @every_set
-def test_dynamics_start_from_the_static_solution_with_elastic_members(solved):
+def test_dynamics_start_from_the_static_solution_with_elastic_members(moving):
     """Which a case of its own gives where the static results are those of held gears."""
-    case, state = solved.case, solved.modes.state
-    cycle = solved.static.cycle
+    case, state = moving.case, moving.modes.state
+    cycle = moving.static.cycle
     if case.static.members == "fixed":
-        cycle = solved.solved_as(with_value(case, "static.members", "elastic")).static.cycle
+        cycle = moving.solved_as(with_value(case, "static.members", "elastic")).static.cycle
     for name in ("deflection", "force"):
         found, expected = state.resampled(name, len(cycle.position)), getattr(cycle, name)
         apart, moving, rounding = found - expected, np.ptp(expected, axis=1).max(), 1e-7 * expected.max()
@@ -356,7 +381,8 @@ def similar_in_modulus_and_torque(solved):
     found = solved.solved_as(images.stiffer(solved.case, factor))
     same_record(found.static.cycle, cycle, stiffness=factor, force=factor)
     same_peaks(found.static.cycle, cycle, stiffness=factor)
-    same_level(found, solved, DYNAMIC)
+    if not solved.still:
+        same_level(found, solved, DYNAMIC)
 
 
 def equal_in_the_mirror(solved):
@@ -389,7 +415,8 @@ def equal_where_it_is_turned(solved):
     found = solved.solved_as(images.turned(solved.case, 5 * 2 * math.pi / solved.teeth_sum))
     same_record(found.static.cycle, solved.static.cycle)
     same_peaks(found.static.cycle, solved.static.cycle)
-    same_level(found, solved, DYNAMIC)
+    if not solved.still:
+        same_level(found, solved, DYNAMIC)
 
 
 def converged_in_positions(solved):
@@ -409,6 +436,8 @@ def converged_in_positions(solved):
 
 def converged_in_excitation(solved):
     """Twice the end of the excitation: the level changes by less than 1 dB, or W-EXCITATION says so."""
+    if solved.still:
+        pytest.skip("dynamics of every third set in slices")
     limit = float(solved.dynamics.excitation_limit[-1])
     speeds = [f"{solved.case.operation.speeds[-1]!r} rad/s"]
     ended, further = (
@@ -444,8 +473,7 @@ def invariants_of(seed: int) -> list:
 
     Sets of one kind and number of planets follow one another after as many seeds as there are such classes.
     """
-    turn = seed // (len(KINDS) * len(PLANETS))
-    drawn = INVARIANTS[(seed + turn) % len(INVARIANTS)]
+    drawn = INVARIANTS[(seed + turn_of(seed)) % len(INVARIANTS)]
     return [one for one in INVARIANTS if one is drawn or one in QUICK_INVARIANTS.get(seed, ())]
 
 
