@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.gear import Gear, flank_points, half_thickness_angle
+from femgear.gears.gear import Gear, cutter_of, flank_points, half_thickness_angle
 
 # point spacing in modules, before `refine`: about 1200 triangles in the half sector of the reference sun
 FILLET_SIZE = 0.05
@@ -26,6 +27,8 @@ SHARP_SIZE = 0.15  # of their radius of curvature: within 1.5 % of the stress on
 SHARPEST_SIZE = 0.002  # however sharp they are
 ROOT_RADIUS_LIMIT = SHARPEST_SIZE / SHARP_SIZE
 """Radius of curvature of a root [modules] below which elements do not follow it."""
+_MODULE, _DIGITS = 1e-3, 11
+"""Module [m] of the gears whose outlines are made, and digits of what their tools depend on, in modules."""
 GROWTH = 0.11  # increase of the spacing per unit length along a curve
 
 
@@ -76,12 +79,42 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     GeometryError
         A body so deep that more than 400 nodes, times `refine`, would lie on a cut (E-GRID).
     """
-    count = max(2, round(flank_elements * refine))
+    scale, size = gear.module / _MODULE, (flank_elements, refine)
+    try:
+        curves, interfaces, regions = _outline(_of_one_module(gear), *size)
+    except GeometryError:
+        _outline(gear, *size)  # refuses its own lengths
+        raise
+    curves, interfaces = (
+        tuple((name, _read_only(scale * points)) for name, points in some) for some in (curves, interfaces)
+    )
+    rolls = _flank_rolls(gear, *size)[:: -1 if gear.internal else 1]
+    inside = tuple((name, (scale * x, scale * y)) for name, (x, y) in regions)
+    return HalfSector(curves, interfaces, inside, _read_only(rolls))
+
+
+def _of_one_module(gear: Gear) -> Gear:
+    """Make the similar gear of the module `_MODULE`, with a tool of few digits.
+
+    The spacing of points follows the curvature of a finely sampled fillet, which makes more of rounding;
+    triangles that are equally good are then others in a gear of another size. Fillets of gears that differ by
+    rounding alone are here the same.
+    """
+    given: dict[str, Any] = {"profile_shift": round(gear.profile_shift, _DIGITS)}
+    for name in ("root_diameter", "thickness_allowance", "rim_radius", "tip_diameter", "tip_shortening"):
+        if (value := getattr(gear, name)) is not None:
+            modules = value / gear.module
+            of_tool = name in ("root_diameter", "thickness_allowance")
+            given[name] = _MODULE * (round(modules, _DIGITS) if of_tool else modules)
+    cutter = cutter_of(gear) if gear.internal else gear.cutter
+    # its tip has been checked
+    return replace(gear, module=_MODULE, cutter=cutter, tip_open=True, **given)
+
+
+def _outline(gear: Gear, flank_elements: int, refine: float) -> tuple[tuple, tuple, tuple]:
+    """Make curves, interfaces and regions of the half sector of this very gear, see `HalfSector`."""
     sizes = _Sizes(unit=gear.module / refine, growth=GROWTH / refine)
-    # steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and mid
-    # points drift to the quarter point there: the last micrometres of the involute belong to the fillet
-    end = max(gear.form_roll, gear.tip_roll / (count + 1))
-    rolls = np.linspace(gear.tip_roll, end, 2 * count + 1)
+    rolls = _flank_rolls(gear, flank_elements, refine)
     flank = flank_points(gear, rolls)
     fillet, split = _fillet(gear, flank, rolls[-1], sizes)
     root = _root(gear, fillet, sizes)
@@ -95,14 +128,22 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
     parts += ([] if root is None else [("root", root)]) + [("cut", cut), ("rim", rim)]
     if gear.internal:  # built as if the tooth pointed outwards; that of an internal gear runs the other way
         parts = [(name, points[::-1]) for name, points in reversed(parts)]
-        rolls = rolls[::-1]
     joined = []
     for i, (name, points) in enumerate(parts):
         # consecutive curves have the very same end points
         points = np.vstack([parts[i - 1][1][-1:], points[1:]])
-        joined.append((name, _read_only(points)))
+        joined.append((name, points))
     inside = _inside(gear, fillet[split])
-    return HalfSector(tuple(joined), (("tooth_base", _read_only(base)),), inside, _read_only(rolls))
+    return tuple(joined), (("tooth_base", base),), inside
+
+
+def _flank_rolls(gear: Gear, flank_elements: int, refine: float) -> np.ndarray:
+    """Roll lengths (2 n + 1,) of the flank's points from the tip to the fillet [m]."""
+    count = max(2, round(flank_elements * refine))
+    # steps uniform in roll angle shrink to nothing at the base circle (edge length roll^2 / (2 rb)) and mid
+    # points drift to the quarter point there: the last micrometres of the involute belong to the fillet
+    end = max(gear.form_roll, gear.tip_roll / (count + 1))
+    return np.linspace(gear.tip_roll, end, 2 * count + 1)
 
 
 @dataclass(frozen=True)

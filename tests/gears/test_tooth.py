@@ -1,6 +1,7 @@
 """The half sector: a simple closed polygon of exact points with the promised labels."""
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -236,3 +237,18 @@ def test_corners_of_roots_are_found():
         assert not len(notches), name
         if name in ("sun", "planet", "ring"):
             assert radius == pytest.approx(0.25 * gear.module, rel=0.2)
+
+
+@pytest.mark.parametrize("name", list(GEARS))
+def test_a_similar_gear_has_the_similar_outline(name):
+    """All lengths 1.7 times as large, with a rounding of their own: points and roll lengths to rounding."""
+    gear, factor = GEARS[name], 1.7
+    lengths = ("module", "face_width", "rim_radius", "tip_diameter", "root_diameter", "tip_shortening")
+    larger = {key: factor * value for key in lengths if (value := getattr(gear, key)) is not None}
+    shift = gear.profile_shift * (1.0 + 1e-15)
+    one, two = half_sector(gear), half_sector(replace(gear, **larger, profile_shift=shift))
+    for (kind, points), (_, others) in zip(
+        one.curves + one.interfaces, two.curves + two.interfaces, strict=True
+    ):
+        assert others == pytest.approx(factor * points, rel=1e-13, abs=1e-13 * gear.module), kind
+    assert two.flank_roll == pytest.approx(factor * one.flank_roll, rel=1e-13)
