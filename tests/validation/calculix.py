@@ -511,25 +511,16 @@ def pair_contact(
         rim = node + 1 + np.unique(body.edges["rim"])
         lines += [f"*NSET, NSET=RIM{number}", *map(str, rim)]
         node, element = node + len(body.points), element + len(body.triangles)
-    lines += [
-        "*SURFACE INTERACTION, NAME=SI\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
-        f"{penalty * 1e-9:.6g}",
-        *(
-            "*CONTACT PAIR, INTERACTION=SI, TYPE=SURFACE TO SURFACE\n"
-            + (f"S2T{i},S1T{i}" if pair.ends[1] else f"S1T{i},S2T{i}")
-            for i, pair in enumerate(mates)
-        ),
-        "*BOUNDARY\nRIM2,1,2",
-    ]
+    lines += contact_input(
+        [f"S2T{i},S1T{i}" if pair.ends[1] else f"S1T{i},S2T{i}" for i, pair in enumerate(mates)],
+        penalty,
+    )
+    lines.append("*BOUNDARY\nRIM2,1,2")
     rim = np.unique(bodies[0].edges["rim"])
     x, y = MILLIMETRE * bodies[0].points[rim].T
     for path in (np.mean(approach), *approach):
-        angle = path / base_radius
-        lines.append("*STEP, INC=200\n*STATIC\n1.,1.\n*BOUNDARY")
         lines += [
-            f"{n + 1},1,1,{-angle * b:.14g}\n{n + 1},2,2,{angle * a:.14g}" for n, a, b in zip(rim, x, y)
-        ]
-        lines += [
+            *turned_input(rim + 1, bodies[0].points[rim], path / base_radius),
             f"*NODE PRINT, NSET=RIM1, FREQUENCY={LAST}\nRF",
             f"*EL FILE, OUTPUT=2D, NSET=SHOWN, FREQUENCY={LAST}\nS",
             "*END STEP",
@@ -551,6 +542,20 @@ def pair_contact(
         np.moveaxis(pressure[1:], 0, -1),
         np.array(roots_found[1:]).T,
     )
+
+
+def contact_input(pairs: Sequence[str], penalty: float) -> list[str]:
+    """Write pairs of surfaces, slave and master, that touch with a pressure over overclosure [Pa/m]."""
+    behaviour = "*SURFACE INTERACTION, NAME=SI\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR"
+    kind = "*CONTACT PAIR, INTERACTION=SI, TYPE=SURFACE TO SURFACE"
+    return [behaviour, f"{penalty * 1e-9:.6g}", *(f"{kind}\n{pair}" for pair in pairs)]
+
+
+def turned_input(numbers: np.ndarray, points: np.ndarray, angle: float) -> list[str]:
+    """Begin a static step in which nodes at points (n, 2) [m] are turned about the origin [rad]."""
+    x, y = MILLIMETRE * points.T
+    rows = (f"{n},1,1,{-angle * b:.14g}\n{n},2,2,{angle * a:.14g}" for n, a, b in zip(numbers, x, y))
+    return ["*STEP, INC=200\n*STATIC\n1.,1.\n*BOUNDARY", *rows]
 
 
 def _peak(points: np.ndarray, pressure: np.ndarray) -> float:

@@ -43,9 +43,11 @@ CORNER = (
 """Reason of differences where a corner carries.
 
 At position 0.25 of 24/36 elements of 5 um at the contact change CalculiX's approach by 0.02 %, four times as
-many elements along the flanks femgear's by 0.01 %: both have converged, 0.45 % apart. At 0.875 the force on
-the corner of gear 1, 18 % of the load, has a lever arm 2.7 % below the base radius: alone some 1 % of the
-approach and 1.7 % of the stiffness, of the signs and nearly the sizes that are found.
+many elements along the flanks femgear's by 0.01 %: both have converged, 0.45 % apart. At 0.875 the lever arm
+of the force on the corner of gear 1 is 2.7 % below the base radius. With that arm alone femgear has 18.27 um
+and 391.3 N/um, CalculiX 18.17 and 392.3, femgear as it is 18.03 and 399.1. What is left, 0.5 % at both
+positions, makes the tooth pair 1.4 % too soft at a tilt of 0.8 degrees and 4.9 % at 2.5: in proportion to the
+tilt, as a force that pushes along the tooth too would be felt.
 """
 STATES = (
     "the plane state changes on the tooth base, which ends in the fillet: CalculiX's stress jumps there. "

@@ -145,30 +145,16 @@ def solid_contact(
     first, numbers = extruded(bodies[0], "1", material, width, twist=slope / base_radius)
     after = {"node": int(numbers.max()), "element": LAYERS * len(bodies[0].triangles)}
     lines = first + extruded(bodies[1], "2", material, width, **after)[0]
-    lines += [
-        "*SURFACE INTERACTION, NAME=SI\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR",
-        f"{penalty * 1e-9:.6g}",
-        *(
-            f"*CONTACT PAIR, INTERACTION=SI, TYPE=SURFACE TO SURFACE\nS1L{layer},S2L{layer}"
-            for layer in range(LAYERS)
-        ),
-        "*BOUNDARY\nRIM2,1,3\nRIM1,3,3\nENDS1,3,3\nENDS2,3,3",
-    ]
+    lines += calculix.contact_input([f"S1L{layer},S2L{layer}" for layer in range(LAYERS)], penalty)
+    lines.append("*BOUNDARY\nRIM2,1,3\nRIM1,3,3\nENDS1,3,3\nENDS2,3,3")
     rim = np.unique(bodies[0].edges["rim"])
-    x, y = MILLIMETRE * bodies[0].points[rim].T
+    levels, nodes = np.nonzero(numbers[:, rim])
+    nodes = rim[nodes]
     for path in approach:
-        angle = path / base_radius
-        lines.append("*STEP, INC=200\n*STATIC\n1.,1.\n*BOUNDARY")
-        for level in numbers[:, rim]:
-            lines += [
-                f"{n},1,1,{-angle * b:.14g}\n{n},2,2,{angle * a:.14g}"
-                for n, a, b in zip(level, x, y, strict=True)
-                if n
-            ]
-        lines += [
-            f"*CONTACT PRINT, SLAVE=S1L{layer}, MASTER=S2L{layer}, FREQUENCY={calculix.LAST}\nCF"
-            for layer in range(LAYERS)
-        ]
+        lines += calculix.turned_input(numbers[levels, nodes], bodies[0].points[nodes], path / base_radius)
+        for layer in range(LAYERS):
+            surfaces = f"SLAVE=S1L{layer}, MASTER=S2L{layer}"
+            lines.append(f"*CONTACT PRINT, {surfaces}, FREQUENCY={calculix.LAST}\nCF")
         lines.append("*END STEP")
     torque = contact_moments(calculix.run("\n".join(lines) + "\n").tables)
     layers = 1e-3 * np.abs(torque).reshape(len(approach), LAYERS)
