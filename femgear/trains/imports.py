@@ -90,7 +90,10 @@ def case_drafts(
             if len(stages) == 1:
                 raise
             refusals.append(error)
-            model.remark(one.id, f"{stage_in_words(model, one)} is not taken: {error.message}", first=True)
+            # with the attribute of the file that stands in the way
+            why = " ".join(str(part) for part in (error.key, error.value) if part is not None)
+            text = f"{stage_in_words(model, one)} is not taken: {f'{why}: ' if why else ''}{error.message}"
+            model.remark(one.id, text, remedy=error.remedy or "", first=True)
     if not texts:
         raise refusals[0]
     return list(_drafts(model, Path(name), stages, found, texts, load_case))

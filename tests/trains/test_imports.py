@@ -82,6 +82,8 @@ def test_a_stage_that_makes_no_case_is_said_first(tmp_path):
     found, findings = drafts_of(box, tmp_path)
     assert list(found) == ["_51"]
     assert "cylindrical_stage 52 20/60" in findings[0].text and "not taken" in findings[0].text
+    # with the attribute of the file that stands in the way, and its value
+    assert "cylindrical_gear 44, tip_diameter" in findings[0].text and " 1 mm: " in findings[0].text
     bevel = ParallelUnit()
     bevel.components[52]["type"] = "bevel_stage"
     found, findings = drafts_of(bevel, tmp_path)
