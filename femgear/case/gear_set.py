@@ -59,7 +59,7 @@ from femgear.gears.modifications import (
     roll_at,
 )
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
-from femgear.gears.profile import BasicRack, PinionCutter, transverse_rack, transverse_tool
+from femgear.gears.profile import BasicRack, PinionCutter, overlap_ratio, transverse_rack, transverse_tool
 from femgear.gears.tips import settled_tips
 
 if TYPE_CHECKING:
@@ -105,9 +105,17 @@ def checked_set(case: Any) -> Any:
     """Make the gears of a case, closed on their centre distance and checked; others register their own."""
     need_set(case)
     closed = _closed_set(case)
-    check_set(closed)
+    check_set(closed, overlap=case_overlap(case, closed))
     check_floating(case, closed)
     return closed
+
+
+def case_overlap(case: Any, gears: Any) -> float:
+    """Compute the overlap ratio of helical teeth on the narrowest face in common; 0 of spur teeth."""
+    if case.helix_angle is None:
+        return 0.0
+    module = gears.gears[0].module * math.cos(case.helix_angle)
+    return abs(overlap_ratio(min(gears.mesh_widths), module, case.helix_angle))
 
 
 def _closed_set(case: Case) -> PlanetarySet:

@@ -259,7 +259,14 @@ def test_clearances_of_the_standard_rack_are_a_quarter_module():
 def test_contact_ratio_under_one_is_refused():
     stub = standard((24, 36, 96), rack=BasicRack(addendum=0.5))
     error = refusal(stub)
-    assert error.code == "E-CONTACT-RATIO"
+    assert error.code == "E-CONTACT-RATIO" and "tip_diameter" not in error.remedy
+    short = replace(stub.sun, tip_diameter=2.0 * stub.sun.tip_radius)
+    assert "leave sun.tip_diameter out" in refusal(replace(stub, sun=short)).remedy
+    # the overlap of helical teeth in slices keeps them in contact
+    said = [one for one in check_set(stub, overlap=0.9) if one.code == "W-CONTACT-RATIO"]
+    assert said and all(one.severity == "doubt" and "0.9000 alone" in one.text for one in said)
+    with pytest.raises(GeometryError, match="contact ratio"):
+        check_set(stub, overlap=0.05)
     assert "W-CONTACT-RATIO" in codes(standard((24, 36, 96), rack=BasicRack(addendum=0.65)))
 
 

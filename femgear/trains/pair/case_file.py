@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field
 from femgear.case.checks import check_face_widths, check_gear_deviations, check_speeds, check_torque
 from femgear.case.csv_columns import embed_profiles
 from femgear.case.gear_set import (
+    case_overlap,
     checked_set,
     driving_torque,
     flank_form,
@@ -171,7 +172,7 @@ def _(case: PairCase) -> GearPair:
         find=tuple(name for name in case.gear_names if getattr(case, name).profile_shift is None),
     )
     settled = settled_tips(pair, free=free_tips(case))
-    check_meshes(settled)
+    check_meshes(settled, overlap=case_overlap(case, settled))
     return settled
 
 

@@ -19,7 +19,7 @@ import numpy as np
 
 from femgear.case.checks import runup_range
 from femgear.case.dependencies import check_entries, modal_entries, static_entries
-from femgear.case.gear_set import materials_of, planetary_set, set_deviations
+from femgear.case.gear_set import case_overlap, materials_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.errors import ConvergenceError, GeometryError
 from femgear.findings import Finding
@@ -161,7 +161,8 @@ def _describe_static(results: Results) -> Block:
 
 def _warnings(case: PairCase) -> Iterator[Finding]:
     """List what is allowed but deserves a look."""
-    yield from (*check_meshes(planetary_set(case)), *case.notices)
+    gears = planetary_set(case)
+    yield from (*check_meshes(gears, overlap=case_overlap(case, gears)), *case.notices)
     yield from load_warnings(case)
     if case.operation.speeds and (why := _no_modes(case)):
         yield Finding("W-UNUSED", "operation.speeds", f"no effect, static results are all: {why}")

@@ -18,7 +18,7 @@ import numpy as np
 
 from femgear.case.checks import steep_helix
 from femgear.case.dependencies import Entries
-from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
+from femgear.case.gear_set import case_overlap, planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
 from femgear.case.sections import face_width, gear_material
 from femgear.contact.bodies import flank_widths
@@ -1138,7 +1138,8 @@ def describe_set(case: Case) -> tuple[Block, ...]:
 
 def set_warnings(case: Case) -> Iterator[Finding]:
     """List what is allowed in any planetary set but deserves a look."""
-    yield from (*check_set(planetary_set(case)), *case.notices)
+    gears = planetary_set(case)
+    yield from (*check_set(gears, overlap=case_overlap(case, gears)), *case.notices)
     yield from load_warnings(case)
 
 

@@ -19,6 +19,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.gear_set import (
+    case_overlap,
     driving_torque,
     material_of,
     materials_of,
@@ -59,7 +60,7 @@ from femgear.gears.iso6336 import (
     root_face_width,
 )
 from femgear.gears.planetary import PlanetarySet
-from femgear.gears.profile import base_helix_angle, overlap_ratio
+from femgear.gears.profile import base_helix_angle
 from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.static.results import (
     SLICES,
@@ -290,11 +291,7 @@ def record_positions(case: Case, gears: PlanetarySet) -> int:
 
 def _overlap(case: Case, gears: PlanetarySet) -> float:
     """Overlap ratio, positive where gear 1 is right-handed and upper slices run ahead; zero of spur teeth."""
-    if case.helix_angle is None:
-        return 0.0
-    first = gears.gears[0]
-    ratio = overlap_ratio(min(gears.mesh_widths), first.module * math.cos(case.helix_angle), case.helix_angle)
-    return math.copysign(ratio, case.helix_angle)
+    return math.copysign(case_overlap(case, gears), case.helix_angle or 1.0)
 
 
 @one_blas_thread()

@@ -9,6 +9,7 @@ import xarray as xr
 from trains.pair.test_pair import INTERNAL, STEEL, TAU, pair_case
 from validation.planetary import reference_set
 
+from femgear.case.gear_set import planetary_set
 from femgear.contact.bodies import Bodies, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.width_waves import width_waves
@@ -16,9 +17,10 @@ from femgear.errors import FemgearError
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadSlope
 from femgear.gears.pair import GearPair
+from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.pair.stages import iso_stiffness
-from femgear.trains.reading import with_values
-from femgear.trains.registry import check_case
+from femgear.trains.reading import read_case, with_values
+from femgear.trains.registry import check_case, train_of
 from femgear.trains.static.figures import contact_pattern
 from femgear.trains.static.results import _helical, load_warnings, static_warnings
 from femgear.trains.static.stages import solve_static
@@ -193,3 +195,23 @@ def test_ends_of_narrow_spur_teeth_are_told_with_their_sizes(modules, told):
         softer, aligned, slope = (float(x) for x in re.findall(r"about ([\d.]+)", found[0].text))
         assert softer == pytest.approx(3.4, abs=0.1) and aligned == pytest.approx(1.032, abs=0.005)
         assert 12.0 <= slope <= 17.0
+
+
+def test_overlap_keeps_teeth_of_a_low_transverse_contact_ratio_in_contact():
+    """A transverse contact ratio of 0.98: always in contact, softer, and the load runs over the width."""
+    whole = read_case(new_case("pair", teeth=(20, 30), form=ToothForm(helix="20 deg")))
+    coarse = with_values(whole, {"static.positions": 8, "static.flank_elements": 6})
+    tips = {
+        f"{gear.name}.tip_diameter": f"{2e3 * gear.tip_radius - 1.5} mm"
+        for gear in planetary_set(coarse).gears
+    }
+    short = with_values(coarse, tips)
+    assert planetary_set(short).contact_ratio == pytest.approx(0.977, abs=1e-3)
+    (said,) = (one for one in train_of(short).case_warnings(short) if one.code == "W-CONTACT-RATIO")
+    assert said.severity == "doubt" and "transverse" in said.text
+    check_case(short, "static")
+    cycle, long = solve_static(short).cycle, solve_static(coarse).cycle
+    assert cycle.residual.max() < 1e-9 and cycle.force.min() == pytest.approx(cycle.force.max(), rel=1e-9)
+    assert 0.7 < cycle.stiffness.min() / long.stiffness.min() < 0.9
+    with pytest.raises(FemgearError, match="E-CONTACT-RATIO"):
+        check_case(with_values(short, {"set.face_width": "0.1 mm", "static.slices": 2}))
