@@ -8,7 +8,7 @@ which kinds of modes these excite; neighbouring tooth numbers are listed with wh
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
 from operator import itemgetter
@@ -206,6 +206,7 @@ STRESS_VARIABLES = {
     ),
     "contact_worst_load": ("mesh", "N", "its load, in slices that of the slice times their number"),
     "contact_worst_curvature": ("mesh", "1", "relative curvature there over that at the pitch point"),
+    "contact_worst_margin": ("mesh", "m", "from it to the end of the path of contact, negative beyond"),
     "contact_start": ("mesh gear", "m", "distance from the base circle at which contact begins, radially"),
     "relief_kink": ("mesh", "1", "whether reliefs of the mesh begin with a kink"),
     "iso_contact_ratio_factor": ("mesh", "1", "contact ratio factor Z_eps in it, ISO 6336-2"),
@@ -225,6 +226,8 @@ _DISTANCE, _TOLERANCE = 3, 0.02
 """How far teeth and ratio of neighbouring sets may lie away."""
 DIFFERS = 1.3
 """Largest stress of finite elements over the nominal one, or that over it, for which a reason is given."""
+_AS_HERTZ = 1.1
+"""Ratio of the largest pressure and that of Hertz up to which cells and deformation explain it."""
 _KINKED = 1.3
 """Largest pressure over that of Hertz with a kink in the contact that is told."""
 UNEQUAL = 1.03
@@ -551,7 +554,7 @@ class StressResult(StageResult):
                 relative_curvature(*pair.gears, working_angle=angle, path=path)
                 for path in (float(np.clip(place, low, high)), 0.0)
             )
-            rows.append((position, place, load, at / pitch))
+            rows.append((position, place, load, at / pitch, min(place - low, high - place)))
             one, two = (gear.base_radius * math.tan(angle) for gear in pair.gears)
             rolls = one + low, (two + low if pair.gear_2.internal else two - high)
             starts.append(
@@ -560,7 +563,7 @@ class StressResult(StageResult):
                     for gear, roll in zip(pair.gears, rolls, strict=True)
                 ]
             )
-        parts = "position", "path", "load", "curvature"
+        parts = "position", "path", "load", "curvature", "margin"
         names = [f"contact_worst_{part}" for part in parts]
         kinks = self.relief_kinks or (False,) * len(s.kinds)
         return dict(zip(names, np.array(rows).T, strict=True)) | {
@@ -1002,18 +1005,25 @@ def shares(data: xr.Dataset) -> tuple[float, float, str]:
     return float(most), float(share.mean("position").max()), held
 
 
-def describe_stress(data: xr.Dataset) -> Block:
+def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block:
     """Tabulate the largest stresses of stress.nc beside the nominal ones, with place and range.
 
-    One row for the contact and one for the root of every kind of gear, each of its worst mesh.
+    One row for the contact and one for the root of every kind of gear, each of its worst mesh. Marked are
+    those that doubts of the file, and ``findings`` of the run, concern.
     """
+    findings = (*findings_in(data.attrs), *findings)
+    marks = Marks(findings)
     names = [str(name) for name in data["mesh"].values]
     contact, roots = [], []
     for kind in dict.fromkeys(map(family, names)):
         meshes = [i for i, name in enumerate(names) if family(name) == kind]
         titles = SIDES.get(kind, tuple(kind.split("-")))
-        contact.append(_contact_row(kind, data.isel(mesh=meshes)))
-        roots += [_root_row(title, data.isel(mesh=meshes, gear=g)) for g, title in enumerate(titles)]
+        doubts = [one.code for one in findings if f"contact pressure of {kind}:" in one.text]
+        contact.append(_contact_row(kind, data.isel(mesh=meshes), partial(_marked, marks, doubts)))
+        for number, title in enumerate(titles):
+            doubts = [one.code for one in findings if _concerns(one, title, titles[1 - number])]
+            one = data.isel(mesh=meshes, gear=number)
+            roots.append(_root_row(title, one, partial(_marked, marks, doubts)))
     equal, against = (
         ("", "") if len(names) == 1 else ("equal load on all planets and ", " against the carrier")
     )
@@ -1038,7 +1048,22 @@ def describe_stress(data: xr.Dataset) -> Block:
         )
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
-    return Block("Stresses", header, (*contact, *roots), tuple(notes))
+    return Block("Stresses", header, (*contact, *roots), (*notes, *marks.notes))
+
+
+def _marked(marks: Marks, codes: list[str], text: str) -> str:
+    """Mark the text of a stress that findings of these codes concern."""
+    return marks(text, *dict.fromkeys(codes))
+
+
+def _concerns(finding: Finding, title: str, mate: str) -> bool:
+    """Tell whether a finding concerns the root stress of a flank, such as "planet, sun side", with a mate."""
+    gear, other = (name.split(",")[0] for name in (title, mate))
+    if finding.code == "W-KINK":
+        corner = finding.key == f"{gear.replace(' ', '_')}.rack.root_radius"
+        return corner or f"root stress of the {title}," in finding.text
+    tip = finding.code == "W-FILLET" and finding.key.startswith(f"{other}.")
+    return tip and f"the {gear}'s root fillet" in finding.text
 
 
 def _reasons(data: xr.Dataset) -> Iterator[str]:
@@ -1065,7 +1090,7 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
                 f"{near if curvature > DIFFERS else ''}; x {math.sqrt(load / nominal_load):.2f} by the load "
                 f"of the tooth pair, {load / nominal_load:.2f} of the nominal one; x "
                 f"{1.0 / _nominal_over_hertz(data)[mesh]:.2f}: sigma_H0 has {factors}; x "
-                f"{excess[mesh]:.2f} by all else (kinks and ends of flanks, deformation of the teeth)"
+                f"{excess[mesh]:.2f} {_beside_hertz(one, float(excess[mesh]), curvature)}"
             )
         for number, title in enumerate(SIDES.get(kind, tuple(kind.split("-")))):
             mesh = meshes[int(data["root_worst"].values[meshes, number].argmax())]
@@ -1084,8 +1109,24 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
                 )
 
 
-def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:
-    """Write the largest contact pressure of a kind of mesh."""
+def _beside_hertz(one: xr.Dataset, excess: float, curvature: float) -> str:
+    """Say why the largest pressure of a mesh is not that of Hertz for its load and curvature."""
+    if 1.0 / _AS_HERTZ < excess < _AS_HERTZ:
+        return "by all else: cells, and teeth that deform"
+    margin = float(one.get("contact_worst_margin", 0.0))
+    if excess > 1.0 and int(one["relief_kink"]):
+        return "by the kink with which a linear relief begins: under it pressure has no limit"
+    if excess > 1.0 and margin < 0.0:
+        return f"by the tip corner: loaded teeth touch {-1e3 * margin:.2g} mm beyond the end of the path"
+    if curvature > DIFFERS:
+        return "by the curvature, which changes over the width of the contact so near to the base circle"
+    if excess > 1.0:
+        return "by the shape of the flanks: modifications, or the end of a flank beside the contact"
+    return "by contact that touches the end of a flank, whose pressure is left out, or by modifications"
+
+
+def _contact_row(kind: str, data: xr.Dataset, marked: Callable[[str], str]) -> tuple[str, ...]:
+    """Write the largest contact pressure of a kind of mesh, marked where it is doubtful."""
     pressure = largest_pressure(data)
     mesh = int(pressure.argmax())
     found, nominal = float(pressure[mesh]), float(data["iso_contact_stress"][mesh])
@@ -1094,11 +1135,12 @@ def _contact_row(kind: str, data: xr.Dataset) -> tuple[str, ...]:
     else:
         position = float(data["position"][int(data["contact_pressure"].values[mesh].argmax())])
     place = f"{position:.3f}" if found else "-"
-    return (f"contact {kind}", *_compared(found, nominal), place, *["-"] * 4)
+    largest, *compared = _compared(found, nominal)
+    return (f"contact {kind}", marked(largest), *compared, place, *["-"] * 4)
 
 
-def _root_row(title: str, data: xr.Dataset) -> tuple[str, ...]:
-    """Write the largest root stress of a gear in its worst mesh."""
+def _root_row(title: str, data: xr.Dataset, marked: Callable[[str], str]) -> tuple[str, ...]:
+    """Write the largest root stress of a gear in its worst mesh, marked where it is doubtful."""
     mesh = int(data["root_worst"].values.argmax())
     one = {name: float(values) for name, values in data.isel(mesh=mesh).items() if not values.dims}
     found, place = one["root_worst"], ["-"] * 3
@@ -1106,9 +1148,11 @@ def _root_row(title: str, data: xr.Dataset) -> tuple[str, ...]:
         arc, slope = one["root_worst_arc"] * 1e3, np.degrees(one["root_worst_slope"])
         place = [f"{one['root_worst_position']:.3f}", f"{arc:.3f}", f"{slope:.1f}"]
     low, high = one["root_range_minimum"] * 1e-6, one["root_range_maximum"] * 1e-6
+    largest, *compared = _compared(found, one["iso_root_stress"])
     return (
         f"root {title}",
-        *_compared(found, one["iso_root_stress"]),
+        marked(largest),
+        *compared,
         *place,
         f"{low:.1f} to {high:.1f}",
         f"{one['load_cycles']:g}",

@@ -525,7 +525,7 @@ STRESS = Stage(
         "root_points": sum(len(root.arc) for root in result.roots),
         "iso": result.nominal.message,
     },
-    describe=lambda results: describe_stress(results.stress),
+    describe=lambda results: describe_stress(results.stress, results.findings),
     warnings=StressResult.warnings,
     wanted=lambda case: case.static.stresses,
     unavailable=lambda case: (

@@ -13,7 +13,9 @@ from femgear.contact.flank_pairs import LEFT, RIGHT
 from femgear.contact.root_stress import LOADED, body_stress, root_stress_cycle
 from femgear.contact.tooth_loads import loaded_teeth
 from femgear.fe.elasticity import Material
+from femgear.findings import Finding
 from femgear.gears.gear import half_thickness_angle
+from femgear.report.tables import unmarked
 from femgear.trains.reading import read_case, with_value
 from femgear.trains.static import stages as static_stages
 from femgear.trains.static.results import describe_stress, stress_warnings
@@ -399,8 +401,18 @@ def test_why_stresses_differ_from_the_nominal_ones_is_told_beyond_30_percent(ref
     # the factors are the ratio
     factors = [float(part.split()[0].rstrip(":")) for part in note.split(" x ")[1:]]
     assert math.prod(factors) == pytest.approx(1.6, rel=0.02)
+    # of a linear relief the factor beside Hertz is named
+    assert "by the kink" in _reason(high.assign(relief_kink=0 * high.relief_kink + 1))
+    assert "by the tip corner" in _reason(
+        high.assign(contact_worst_margin=0 * high.contact_worst_margin - 1e-5)
+    )
     low = data.assign(root_worst=0.5 * data.root_worst)
     assert any(note.startswith("root sun, FE/ISO = 0.") for note in describe_stress(low).notes)
+
+
+def _reason(data):
+    """Why the contact of sun and planet has another pressure than the nominal one."""
+    return next(note for note in describe_stress(data).notes if note.startswith("contact sun-planet, FE"))
 
 
 def test_a_corner_of_the_root_is_told_with_the_entry_that_rounds_it(reference):
@@ -409,6 +421,15 @@ def test_a_corner_of_the_root_is_told_with_the_entry_that_rounds_it(reference):
     corner.root_notch_radius[3:, 1] = 1e-6
     (finding,) = stress_warnings(corner)
     assert finding.code == "W-KINK" and finding.key == "ring.rack.root_radius"
+    # the figure is marked where it stands, and the one whose fillet a tip runs into
+    fillet = Finding(
+        "W-FILLET", "sun.tip_diameter", "the sun's tip runs into the planet's root fillet", severity="doubt"
+    )
+    block = describe_stress(corner, [finding, fillet])
+    marked = {row[0]: row[1] for row in block.rows if unmarked(row[1]) != row[1]}
+    assert set(marked) == {"root ring", "root planet, sun side"}
+    assert [note for note in block.notes if "W-KINK, doubt" in note or "W-FILLET, doubt" in note]
+    assert all(unmarked(row[1]) == row[1] for row in describe_stress(data).rows)
     end = data.assign(root_worst_arc=data.root_worst_arc.copy())
     end.root_worst_arc[0, 0] = 0.0
     (finding,) = stress_warnings(end)
