@@ -25,7 +25,7 @@ from femgear.gears.gear import Gear, flank_points
 from femgear.gears.tooth import HalfSector, half_sector
 
 PROGRAM = shutil.which("ccx")
-TIME_LIMIT = 900.0
+TIME_LIMIT = 3600.0
 """Seconds after which CalculiX is stopped."""
 MILLIMETRE = 1e3
 LAST = 1000
@@ -51,7 +51,7 @@ def run(text: str) -> Output:
     Raises
     ------
     RuntimeError
-        CalculiX is not installed, ended with an error, did not converge or wrote no table.
+        CalculiX is not installed, ended with an error, did not converge, wrote no table or took too long.
     """
     if PROGRAM is None:
         raise RuntimeError("CalculiX (ccx) is not installed")
@@ -59,10 +59,13 @@ def run(text: str) -> Output:
         place = Path(folder)
         (place / "job.inp").write_text(text)
         environment = os.environ | {"OMP_NUM_THREADS": "1"}
-        done = subprocess.run(
-            [PROGRAM, "-i", "job"], cwd=place, env=environment, capture_output=True, text=True,
-            timeout=TIME_LIMIT,
-        )  # fmt: skip
+        try:
+            done = subprocess.run(
+                [PROGRAM, "-i", "job"], cwd=place, env=environment, capture_output=True, text=True,
+                timeout=TIME_LIMIT,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired as error:
+            raise RuntimeError(f"CalculiX: stopped after {TIME_LIMIT:g} s") from error
         table, fields = place / "job.dat", place / "job.frd"
         if done.returncode or not table.is_file() or "Job finished" not in done.stdout:
             raise RuntimeError(f"CalculiX: {done.stdout[-2000:]}{done.stderr[-500:]}")

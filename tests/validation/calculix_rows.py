@@ -16,7 +16,7 @@ from femgear.trains.static.results import StaticResult
 from validation import calculix, fixed_housing
 from validation.cases import reference_case, reference_material, reference_static
 from validation.fixed_housing import FEET_ANGLES, FOOT_WIDTH
-from validation.rows import Row, information, within
+from validation.rows import Row, at_most, information, within
 from validation.whole_ring import whole_grid
 
 SOURCE = "CalculiX"
@@ -78,13 +78,17 @@ PAIRS = {"24/36": EXTERNAL, "24/-60": INTERNAL}
 
 
 def where_installed(rows: Callable[[], tuple[Row, ...]]) -> Callable[[], tuple[Row, ...]]:
-    """Compute rows only where CalculiX is installed, else say that it is not."""
+    """Compute rows only where CalculiX is installed, else say that it is not; a run that fails is a row."""
 
     @wraps(rows)
     def either() -> tuple[Row, ...]:
-        if calculix.installed():
-            return rows()
         name = rows.__name__.replace("_", " ")
+        if calculix.installed():
+            try:
+                return rows()
+            except RuntimeError as error:
+                note = " ".join(str(error).split()[-30:])
+                return (at_most("CalculiX", SOURCE, f"{name} could not be computed", 0.0, np.nan, note=note),)
         note = "needs the program ccx (Debian: calculix-ccx)"
         return (information("CalculiX", SOURCE, f"{name}: not computed", None, float("nan"), note=note),)
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.fe.elasticity import Material
+from validation import calculix
 from validation.calculix import (
     Mates,
     PlaneBody,
@@ -17,6 +18,7 @@ from validation.calculix import (
     tables,
 )
 from validation.calculix_casing import bore_load, hats
+from validation.calculix_rows import where_installed
 from validation.calculix_solid import LAYERS, solid_contact
 
 WITHOUT_CONTRACTION = Material(206e9, 0.0, 7850.0)
@@ -159,3 +161,15 @@ def test_force_on_a_bore():
     resultant = [np.sin(slope + place), -np.cos(slope + place), 0.0]
     assert load.sum(axis=0) == pytest.approx(resultant, abs=5e-3)
     assert hats(np.linspace(0, 7, 50), 56).sum(axis=0) == pytest.approx(np.ones(50))
+
+
+def test_rows_say_that_calculix_is_missing_or_fails(monkeypatch):
+    def some_pair():
+        raise RuntimeError("CalculiX: *ERROR: no solution")
+
+    monkeypatch.setattr(calculix, "PROGRAM", None)
+    (row,) = where_installed(some_pair)()
+    assert row.verdict == "information" and "ccx" in row.note
+    monkeypatch.setattr(calculix, "PROGRAM", "ccx")
+    (row,) = where_installed(some_pair)()
+    assert row.verdict == "FAILS" and "no solution" in row.note
