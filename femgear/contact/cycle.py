@@ -7,7 +7,7 @@ it is the mirror image of a set under a positive one (`femgear.contact.flank_pai
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -60,8 +60,8 @@ from femgear.gears.deviations import SetDeviations, mirrored_deviations
 from femgear.gears.pair import EACH
 from femgear.gears.planetary import GearSet, PlanetarySet, mirrored_set
 
-_TOGETHER = 64
-"""Positions that are solved at once."""
+_TOGETHER, _SAME_PLACE = 64, 1e-6
+"""Positions that are solved at once; distance of two that count as one [mesh periods]."""
 
 
 @dataclass(frozen=True)
@@ -469,15 +469,18 @@ def walk_mesh_cycle(
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
         springs, width = bearing_springs(solved, supports, members), _face_width(solved, options)
-        each = springs or options.both_flanks or options.planet_gaps is not None or (width and width.tilting)
-        alike = 1 if each else planet_symmetry(solved, deviations)
-        images = math.gcd(alike, solved.gears[0].teeth)
+        each, teeth = springs or options.both_flanks or options.planet_gaps is not None, solved.gears[0].teeth
+        turns = 1 if each else planet_symmetry(solved, deviations)
+        alike = 1 if width and width.tilting else turns
+        images, repeats = math.gcd(alike, teeth), turns // math.gcd(turns, teeth)
+        if np.ndim(positions) or periods > 1 or len(position) % repeats:
+            repeats = 1
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
         walk = _Walk(
             solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, width
         )
         peaks = options.peaks and options.ahead is None and not np.ndim(positions)
-        walk = replace(walk, alike=alike if periods == 1 else 1)
+        walk = replace(walk, alike=alike if periods == 1 else 1, repeats=repeats, turns=turns)
         attempt = walk.attempt_with_peaks if peaks else walk.attempt
         found = in_windows(attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
@@ -577,7 +580,9 @@ def _first_planets(
 class _Walk:
     """A set under a torque that is not negative, and the record without load at the positions to solve.
 
-    Where planets are in the same state at all times, those of the first ``sector`` are solved for all.
+    Where planets are in the same state at all times, those of the first ``sector`` are solved for all; where
+    each comes to the state of another ``repeats`` times in a mesh period, the first of these parts is solved:
+    ``turns`` rotations map the planets onto one another.
     """
 
     planetary_set: GearSet
@@ -591,6 +596,14 @@ class _Walk:
     options: CycleOptions
     width: FaceWidth | None = None
     alike: int = 1
+    repeats: int = 1
+    turns: int = 1
+
+    @property
+    def _tilt_names(self) -> tuple[str, ...]:
+        """Names of what tilts."""
+        tilting = None if self.width is None else self.width.tilting
+        return () if tilting is None else tilting.names
 
     @property
     def images(self) -> int:
@@ -617,7 +630,7 @@ class _Walk:
         setup = replace(setup, images=self.images)
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
-        found, overflow, unknowns, P = [], False, 0, len(empty.position)
+        found, overflow, unknowns, P = [], False, 0, len(empty.position) // self.repeats
         together = _TOGETHER if each == 1 else max(_TOGETHER // each, 4)
         for first in range(0, P, together):
             some = np.arange(first, min(first + together, P))
@@ -668,7 +681,8 @@ class _Walk:
         for _ in range(MOST_ROUNDS + 1):
             if not len(places):
                 places, doubt = self._open_places(known)
-            added = len(known["position"]) - equidistant
+            places = self._in_first_part(places)
+            added = (len(known["position"]) - equidistant) // self.repeats
             if not len(places) or added + len(places) > MOST_PLACES:
                 doubt = max(doubt, 1.0) if len(places) else doubt
                 break
@@ -708,11 +722,22 @@ class _Walk:
             return known
         return {name: values[..., ~end] for name, values in known.items()}
 
+    def _in_first_part(self, places: np.ndarray) -> np.ndarray:
+        """Positions in the first of the parts that repeat one another, with the same states of the set."""
+        if self.repeats == 1:
+            return places
+        first, places = self.empty.position[0], places[np.abs(places) < 1.0 - 1e-9]
+        inside = np.sort(first + np.mod(places - first, 1.0 / self.repeats))
+        return inside[np.diff(inside, prepend=-np.inf) > _SAME_PLACE]
+
     def _at(self, places: np.ndarray) -> _Walk:
-        """The same set at other positions (n,), of which nobody is told."""
+        """The same set at other positions (n,) of the first part, and of all parts; nobody is told."""
         options, empty = replace(self.options, progress=None, pressures=False), self.empty
         record = {"periods": empty.periods, "contact": empty.contact, "options": options}
-        return replace(self, options=options, empty=cycle_without_load(self.planetary_set, places, **record))
+        parts = np.arange(self.repeats)[:, None] / self.repeats + places
+        return replace(
+            self, options=options, empty=cycle_without_load(self.planetary_set, parts.ravel(), **record)
+        )
 
     def _curves(self, record: MeshCycle) -> dict[str, np.ndarray]:
         """What has peaks over the positions, and the tooth pairs that carry as `tooth_pair_codes`."""
@@ -814,8 +839,9 @@ class _Walk:
         for axes, names in _AXES.items():
             if axes[0] == "m" and axes[1] != "m":
                 values |= {name: values[name][every] for name in names if name in values}
+        if self.repeats > 1:
+            values |= self._repeated(values)
         record = replace(self.empty, **values)
-        tilting = None if self.width is None else self.width.tilting
         unloaded = record.force[:N] + record.back_force[:N] <= 0.0
         message = "all positions by the active set"
         if unloaded.any():
@@ -832,13 +858,14 @@ class _Walk:
             open_planets=unloaded,
             unknowns=unknowns,
             member_names=self.members.names,
-            tilt_names=() if tilting is None else tilting.names,
+            tilt_names=self._tilt_names,
             message=message,
         )
 
     def _most_pressed(self, values: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Path and load (meshes, P) of the tooth pair with the largest pressure, in slices of the slice."""
-        path, load, pressed = values["path"], values["tooth_load"], values.pop("pressed", None)
+        load, pressed = values["tooth_load"], values.pop("pressed", None)
+        path = values["path"][..., : load.shape[-1]]
         if "slice_pressure" in values:
             load, slices = values["slice_load"], self.options.slices
             ahead = np.zeros(slices) if self.options.ahead is None else self.options.ahead
@@ -851,6 +878,80 @@ class _Walk:
             name: np.take_along_axis(of_pairs, pressed[:, None], axis=1)[:, 0]
             for name, of_pairs in zip(_PRESSED, (path, load), strict=True)
         }
+
+    def _repeated(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Go on from the first part of the positions to all of them, by fields of `MeshCycle`.
+
+        A rotation that maps planets onto one another takes the set, at another position, into itself: planet
+        and tooth pairs are then those of the planet that was there.
+        """
+        N, kinds, P = self.planetary_set.n_planets, len(self.planetary_set.kinds), len(self.empty.position)
+        part, phase = P // self.repeats, np.asarray(self.planetary_set.mesh_phases)
+        step = N // self.turns
+        later = np.arange(self.turns) * (phase[step] - phase[0]) * self.repeats
+        found = {name: list[np.ndarray]() for name in values}
+        pitch = self.planetary_set.base_pitch
+        for number in range(self.repeats):
+            away = np.abs(np.mod(later - number + 0.5 * self.repeats, self.repeats) - 0.5 * self.repeats)
+            turns = int(np.argmin(away))
+            planet = (np.arange(N) + turns * step) % N
+            mesh = np.concatenate([planet + kind * N for kind in range(kinds)])
+            known = {"m": mesh, "n": planet}
+            slots = {
+                back: _same_pairs(values[f"{back}path"], mesh, number * part, pitch) for back in ("", "back_")
+            }
+            for axes, names in _AXES.items():
+                over_positions = (name for name in names if axes[-1] == "t" and name in values)
+                for name in (name for name in over_positions if values[name].shape[-1] == part):
+                    here = values[name]
+                    for place, axis in enumerate(axes[:2]):
+                        here = here.take(known[axis], axis=place) if axis in known else here
+                    if axes[:2] == "ms":
+                        here = _in_slots(here, slots["back_" if name.startswith("back_") else ""])
+                    found[name].append(here)
+            angle = -2.0 * math.pi * turns / self.turns
+            moved = {"member_motion": self.members.names, "member_tilt": self._tilt_names}
+            for name in (name for name in moved if name in values):
+                found[name].append(_turned(moved[name], values[name], planet, angle))
+        return {name: np.concatenate(parts, axis=-1) for name, parts in found.items() if parts}
+
+
+def _same_pairs(path: np.ndarray, mesh: np.ndarray, later: int, pitch: float) -> np.ndarray:
+    """Slots (M, T) of meshes ``mesh`` that hold the pairs of all meshes so many positions later.
+
+    Paths are (M, T, P) [m]; T where there is no such slot.
+    """
+    count = path.shape[1]
+    apart = (path[:, :1, later] - path[mesh, :1, 0]) / pitch
+    if count > 1:
+        apart *= np.sign(path[mesh, 1:2, 0] - path[mesh, :1, 0])
+    slot = np.arange(count) + np.rint(apart).astype(int)
+    return np.where((slot >= 0) & (slot < count), slot, count)
+
+
+def _in_slots(values: np.ndarray, slot: np.ndarray) -> np.ndarray:
+    """Values (M, T, ...) from the slots (M, T), zero where the slot is T."""
+    padded = np.concatenate([values, np.zeros_like(values[:, :1])], axis=1)
+    return padded[np.arange(len(values))[:, None], slot]
+
+
+def _turned(names: Sequence[str], values: np.ndarray, planet: np.ndarray, angle: float) -> np.ndarray:
+    """Displacements of members (m, P) of a set that is turned by an angle [rad].
+
+    Planet ``planet[i]`` is then where planet i stands.
+    """
+    pairs, turn = [name for name in names if name.endswith((": x", ": y"))][::2], _turn(angle)
+    vectors, rest = np.split(values, [2 * len(pairs)])
+    found = np.einsum("ij,mjp->mip", turn, vectors.reshape(-1, 2, vectors.shape[1]))
+    own = [i for i, name in enumerate(pairs) if name.startswith("planet")]
+    if own:
+        found[own] = found[own][planet]
+    return np.concatenate([found.reshape(vectors.shape), rest])
+
+
+def _turn(angle: float) -> np.ndarray:
+    """Rotation (2, 2) by an angle [rad]."""
+    return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
 
 
 def _between_meshes(setup: MeshWindows, tangents: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -1,15 +1,17 @@
 """The mesh cycle of whole sets: equilibrium, symmetry, sharing, limits."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
+from femgear.contact import cycle as cycle_module
 from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.solve import solve_contact
+from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
@@ -231,6 +233,52 @@ def test_face_width_scales_out(gears, bodies):
     two = walk_mesh_cycle(wide_gears, wide, sun_torque=2 * TORQUE, positions=8)
     assert two.deflection == pytest.approx(one.deflection, rel=1e-9)
     assert two.stiffness == pytest.approx(2 * one.stiffness, rel=1e-9)
+
+
+@pytest.fixture(scope="module")
+def five():
+    """Five planets out of phase, and their bodies."""
+    common = dict(module=2e-3, pressure_angle=ALPHA, face_width=0.024, profile_shift=0.0)
+    gears = PlanetarySet(
+        Gear(teeth=36, rim_radius=0.018, **common), Gear(teeth=24, rim_radius=0.012, **common),
+        Gear(teeth=84, rim_radius=0.1, internal=True, **common),
+        centre_distance=0.06, planet_angles=equal_planet_angles(5),
+    )  # fmt: skip
+    return gears, make_bodies(make_sectors(gears, STEEL, flank_elements=6), STEEL)
+
+
+@pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
+def test_planets_that_come_to_the_same_states_are_solved_once(five, torque, monkeypatch):
+    gears, bodies = five
+    solved, options = [], CycleOptions(pressures=True, cells=20, held_bodies=bodies)
+    given = {"sun_torque": torque, "supports": Supports(sun=0.0, planet=1e8), "options": options}
+    every = walk_mesh_cycle(gears, bodies, positions=np.arange(20) / 20, **given)
+    batch = cycle_module.solve_batch
+    monkeypatch.setattr(
+        cycle_module,
+        "solve_batch",
+        lambda found, *rest: solved.append(len(found.position)) or batch(found, *rest),
+    )
+    once = walk_mesh_cycle(gears, bodies, positions=20, **given)
+    assert set(solved) == {4} and np.abs(once.member_motion).max() > 1e-8
+    for field in fields(once):
+        values, expected = getattr(once, field.name), getattr(every, field.name)
+        if field.name not in ("residual", "iterations") and isinstance(values, np.ndarray):
+            size = np.abs(np.asarray(expected, float)).max(initial=0.0)
+            apart = np.asarray(values, float) - np.asarray(expected, float)
+            assert np.abs(apart).max(initial=0.0) <= 1e-9 * size, field.name
+
+
+def test_peaks_between_positions_are_those_of_every_planet(five):
+    gears, bodies = five
+    peaks = walk_mesh_cycle(
+        gears, bodies, sun_torque=TORQUE, positions=20, options=CycleOptions(peaks=True, cells=20)
+    )
+    fine = walk_mesh_cycle(
+        gears, bodies, sun_torque=TORQUE, positions=np.arange(400) / 400, options=CycleOptions(cells=20)
+    )
+    assert np.allclose(peaks.peak_to_peak(), np.ptp(fine.deflection, axis=1), rtol=3e-3)
+    assert np.allclose(peaks.peak_to_peak("sun_arc"), np.ptp(fine.sun_arc), rtol=3e-3)
 
 
 def test_progress_tells_the_positions_done(gears, bodies, monkeypatch):
