@@ -677,11 +677,11 @@ class _Walk:
             return record, wider, further
         equidistant, doubt = len(record.position), 0.0
         records: list[MeshCycle] = []
-        known, places = self._curves(record), self._first_places(record.position)
+        known, places = self._curves(record), self._in_first_part(self._first_places(record.position))
         for _ in range(MOST_ROUNDS + 1):
             if not len(places):
                 places, doubt = self._open_places(known)
-            places = self._in_first_part(places)
+                places = self._in_first_part(places)
             added = (len(known["position"]) - equidistant) // self.repeats
             if not len(places) or added + len(places) > MOST_PLACES:
                 doubt = max(doubt, 1.0) if len(places) else doubt
