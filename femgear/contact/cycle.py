@@ -726,7 +726,8 @@ class _Walk:
         """Positions in the first of the parts that repeat one another, with the same states of the set."""
         if self.repeats == 1:
             return places
-        first, places = self.empty.position[0], places[np.abs(places) < 1.0 - 1e-9]
+        # the record of a mirror image ends at zero
+        first, places = -1.0 if self.empty.position[-1] <= 0.0 else 0.0, places[np.abs(places) < 1.0 - 1e-9]
         inside = np.sort(first + np.mod(places - first, 1.0 / self.repeats))
         return inside[np.diff(inside, prepend=-np.inf) > _SAME_PLACE]
 
