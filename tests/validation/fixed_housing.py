@@ -738,7 +738,7 @@ def reference_set_in_its_ring() -> tuple[Row, ...]:
 
 
 def _in_its_ring(case, modes, ratio: float, frequency, kept) -> tuple[np.ndarray, np.ndarray]:
-    """Differences of both routes, see `_apart`, at mesh frequencies (n,) [Hz] with harmonics (excited, kept)."""
+    """Differences of both routes, see `_apart`, at mesh frequencies (n,) [Hz], (excited, kept) harmonics."""
     n_max, ring, model = 14, modes.ring, modes.model
     low = {name: getattr(ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
     drive, flexibility = mesh_springs(planetary_set(case), replace(ring, **low), modes.state)
