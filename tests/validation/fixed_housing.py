@@ -721,7 +721,8 @@ def reference_set_in_its_ring() -> tuple[Row, ...]:
     few = (np.array([540.0, 1116.0]), (6, 12), "1500 and 3100 rpm, six harmonics")
     every = ((250, (250, 262)), (1000, (62, 74)), (3100, (20, 32)))
     speeds = (few, *(
-        (np.array([0.36 * rpm]), kept, f"{rpm} rpm, {kept[0]} harmonics up to 22.5 kHz") for rpm, kept in every
+        (np.array([0.36 * rpm]), kept, f"{rpm} rpm, {kept[0]} harmonics up to 22.5 kHz")
+        for rpm, kept in every
     ))  # fmt: skip
     case, rows = with_values(reference_case(), {"housing.form": "exact"}), list[Row]()
     modes = elastic.solve_modes(case, solve_static(case))
