@@ -469,10 +469,9 @@ def walk_mesh_cycle(
     if sun_torque or options.both_flanks:
         members = moving_members(solved, supports, both_flanks=options.both_flanks)
         springs, width = bearing_springs(solved, supports, members), _face_width(solved, options)
-        each, teeth = springs or options.both_flanks or options.planet_gaps is not None, solved.gears[0].teeth
+        each = springs or options.both_flanks or options.planet_gaps is not None
         turns = 1 if each else planet_symmetry(solved, deviations)
-        alike = 1 if width and width.tilting else turns
-        images, repeats = math.gcd(alike, teeth), turns // math.gcd(turns, teeth)
+        images, repeats = _sharing(solved, turns, bool(width and width.tilting))
         if np.ndim(positions) or periods > 1 or len(position) % repeats:
             repeats = 1
         sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
@@ -480,7 +479,8 @@ def walk_mesh_cycle(
             solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, width
         )
         peaks = options.peaks and options.ahead is None and not np.ndim(positions)
-        walk = replace(walk, alike=alike if periods == 1 else 1, repeats=repeats, turns=turns)
+        alike = 1 if periods > 1 or (width and width.tilting) else turns
+        walk = replace(walk, alike=alike, repeats=repeats, turns=turns)
         attempt = walk.attempt_with_peaks if peaks else walk.attempt
         found = in_windows(attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
@@ -546,6 +546,15 @@ def planet_symmetry(planetary_set: GearSet, deviations: SetDeviations | None = N
     errors = np.column_stack((d.pin_errors, d.planet_thickness, d.planet_misalignment, *pitches, runouts))
     same = (n for n in range(symmetry, 0, -1) if symmetry % n == 0)
     return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
+
+
+def _sharing(planetary_set: GearSet, turns: int, tilting: bool) -> tuple[int, int]:
+    """Count the sectors that are in the same state, and the parts of a mesh period that repeat one another.
+
+    Of a set that so many turns map onto itself; of tilting members every sector is solved.
+    """
+    in_phase = math.gcd(turns, planetary_set.gears[0].teeth)
+    return 1 if tilting else in_phase, turns // in_phase
 
 
 def _face_width(planetary_set: GearSet, options: CycleOptions) -> FaceWidth | None:
