@@ -467,28 +467,40 @@ def walk_mesh_cycle(
         position, options = -position[::-1], options.mirrored(order)
     record = cycle_without_load(solved, position, periods=periods, contact=contact, options=options)
     if sun_torque or options.both_flanks:
-        members = moving_members(solved, supports, both_flanks=options.both_flanks)
-        springs, width = bearing_springs(solved, supports, members), _face_width(solved, options)
-        each = springs or options.both_flanks or options.planet_gaps is not None
-        turns = 1 if each else planet_symmetry(solved, deviations)
-        images, repeats = _sharing(solved, turns, bool(width and width.tilting))
-        if np.ndim(positions) or periods > 1 or len(position) % repeats:
-            repeats = 1
-        sector, deviations = _first_planets(solved, solved.n_planets // images, deviations)
-        walk = _Walk(
-            solved, sector, bodies, abs(sun_torque), deviations, members, springs, record, options, width
+        found = _under_load(
+            solved, bodies, abs(sun_torque), deviations, supports, record, options, not np.ndim(positions)
         )
-        peaks = options.peaks and options.ahead is None and not np.ndim(positions)
-        alike = 1 if periods > 1 or (width and width.tilting) else turns
-        walk = replace(walk, alike=alike, repeats=repeats, turns=turns)
-        attempt = walk.attempt_with_peaks if peaks else walk.attempt
-        found = in_windows(attempt, *first_windows(solved, bodies, abs(sun_torque)))
         record = found if found.force.any() else record
     if options.ahead is not None and not np.ndim(positions):
         record = replace(record, **over_slices(record, options.ahead, periods=periods))
         pins = pin_forces(solved, record.force, record.back_force)
         record = replace(record, bearing_force=pins)
     return _seen_from_front(record, planetary_set, order) if mirrored else record
+
+
+def _under_load(  # noqa: PLR0913
+    gears: GearSet, bodies: Bodies, torque: float, deviations: SetDeviations | None, supports: Supports,
+    empty: MeshCycle, options: CycleOptions, equidistant: bool,
+) -> MeshCycle:  # fmt: skip
+    """Solve the positions of a record without load under a torque on the sun that is not negative [N m]."""
+    members = moving_members(gears, supports, both_flanks=options.both_flanks)
+    springs, width = bearing_springs(gears, supports, members), _face_width(gears, options)
+    each = springs or options.both_flanks or options.planet_gaps is not None
+    tilting, one_period = bool(width and width.tilting), empty.periods == 1
+    turns = 1 if each else planet_symmetry(gears, deviations)
+    in_phase = math.gcd(turns, gears.gears[0].teeth)
+    # tilting members are unknowns of the whole set
+    images, repeats = 1 if tilting else in_phase, turns // in_phase
+    if not equidistant or not one_period or len(empty.position) % repeats:
+        repeats = 1
+    sector, deviations = _first_planets(gears, gears.n_planets // images, deviations)
+    walk = _Walk(
+        gears, sector, bodies, torque, deviations, members, springs, empty, options, width,
+        alike=turns if one_period and not tilting else 1, repeats=repeats, turns=turns,
+    )  # fmt: skip
+    peaks = options.peaks and options.ahead is None and equidistant
+    attempt = walk.attempt_with_peaks if peaks else walk.attempt
+    return in_windows(attempt, *first_windows(gears, bodies, torque))
 
 
 def cycle_without_load(
@@ -546,15 +558,6 @@ def planet_symmetry(planetary_set: GearSet, deviations: SetDeviations | None = N
     errors = np.column_stack((d.pin_errors, d.planet_thickness, d.planet_misalignment, *pitches, runouts))
     same = (n for n in range(symmetry, 0, -1) if symmetry % n == 0)
     return next(n for n in same if (np.roll(errors, N // n, axis=0) == errors).all())
-
-
-def _sharing(planetary_set: GearSet, turns: int, tilting: bool) -> tuple[int, int]:
-    """Count the sectors that are in the same state, and the parts of a mesh period that repeat one another.
-
-    Of a set that so many turns map onto itself; of tilting members every sector is solved.
-    """
-    in_phase = math.gcd(turns, planetary_set.gears[0].teeth)
-    return 1 if tilting else in_phase, turns // in_phase
 
 
 def _face_width(planetary_set: GearSet, options: CycleOptions) -> FaceWidth | None:
