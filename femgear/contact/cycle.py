@@ -478,7 +478,7 @@ def walk_mesh_cycle(
     return _seen_from_front(record, planetary_set, order) if mirrored else record
 
 
-def _under_load(  # noqa: PLR0913
+def _under_load(
     gears: GearSet, bodies: Bodies, torque: float, deviations: SetDeviations | None, supports: Supports,
     empty: MeshCycle, options: CycleOptions, equidistant: bool,
 ) -> MeshCycle:  # fmt: skip
