@@ -23,6 +23,8 @@ REST = 0.01
 MOST_DRAWS = 25
 # of spur teeth, and of sets on supports: 500 sets are solved in less than an hour
 MOST_SLICES, HARMONICS = 8, 12.0
+# mesh frequency times module of sets on supports at least [m/s]
+SLOWEST = 1.0
 
 
 @dataclass(frozen=True)
@@ -245,10 +247,13 @@ def _features(rng, case: Case) -> dict[str, object]:
 
 
 def _few_harmonics(case: Case) -> dict[str, object]:
-    """Entries that leave the highest speed and few mesh harmonics: a housing that stands still takes long."""
-    speed = case.operation.speeds[-1]
+    """Entries that leave one speed and few mesh harmonics: a housing that stands still takes long.
+
+    So does the comparison with the whole excitation, whose end is in proportion to 1/module, at low speeds.
+    """
     sun, ring = case.sun.teeth, case.ring.teeth
     a_turn = sun * ring / (sun + ring) if case.operation.input == "sun" else ring
+    speed = max(case.operation.speeds[-1], 2.0 * math.pi / a_turn * SLOWEST / case.module)
     end = HARMONICS * a_turn * speed / (2.0 * math.pi)
     return {"operation.speeds": [f"{speed!r} rad/s"], "dynamics.up_to": f"{end!r} Hz"}
 
