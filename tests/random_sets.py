@@ -24,7 +24,7 @@ MOST_DRAWS = 25
 # of spur teeth, and of sets on supports: 500 sets are solved in less than an hour
 MOST_SLICES, HARMONICS = 8, 12.0
 # mesh frequency times module of sets on supports at least [m/s]
-SLOWEST = 1.0
+SLOWEST = 2.5
 
 
 @dataclass(frozen=True)
