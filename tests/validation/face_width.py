@@ -307,10 +307,10 @@ class SunLikePair:
     across: dict[str, np.ndarray]
     waves: np.ndarray
 
-    def face_load_factor(self, across: np.ndarray, *, crowned: bool = False) -> float:
-        """Largest load of a slice over the mean, all in contact, under a misalignment or a crowning."""
+    def face_load_factor(self, across: np.ndarray, *, crowned: bool = False, slope: float = SLOPE) -> float:
+        """Largest load of a slice over the mean, all in contact, under a misalignment or a crowning [m]."""
         N, place = len(across), (np.arange(len(across)) + 0.5) / len(across) - 0.5
-        apart = SLOPE * (2.0 * place**2 if crowned else place)
+        apart = slope * (2.0 * place**2 if crowned else place)
         whole = np.ones((N + 1, N + 1)) - np.diag(np.append(np.zeros(N), 1.0))
         whole[:N, :N] = across + self.plane * np.eye(N)
         load = np.linalg.solve(whole, np.append(-apart, LINE_LOAD * N))[:N]
@@ -384,6 +384,12 @@ def ends_of_teeth() -> tuple[Row, ...]:
         within("ends", trial, text, 0.7, apart, 0.6, relative=False, note=EXPECTED, explanation=ENDS),
         information("ends", trial, f"{name} less 1, mirror planes over no coupling", 1.107, ratios[0]),
         information("ends", trial, f"{name} less 1, free ends over mirror planes", 1.013, ratios[1]),
+        information(
+            "ends",
+            SOLID,
+            f"teeth of {1e3 * NARROW:g} mm, aligned: K_Hbeta",
+            *(narrow.face_load_factor(narrow.across[ends], slope=0.0) for ends in ("free", "mirror")),
+        ),
         *(
             information(
                 "ends",
