@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from trains.pair.test_pair import INTERNAL, STEEL, TAU, pair_case
+from trains.pair.test_pair import CASE, INTERNAL, STEEL, TAU, pair_case
 from validation.planetary import reference_set
 
 from femgear.case.gear_set import planetary_set
@@ -215,3 +215,22 @@ def test_overlap_keeps_teeth_of_a_low_transverse_contact_ratio_in_contact():
     assert 0.7 < cycle.stiffness.min() / long.stiffness.min() < 0.9
     with pytest.raises(FemgearError, match="E-CONTACT-RATIO"):
         check_case(with_values(short, {"set.face_width": "0.1 mm", "static.slices": 2}))
+
+
+@pytest.mark.slow
+def test_slices_with_leads_against_the_most_slices_and_512_positions():
+    """Twelve slices at 16 positions: errors, stiffness, K_H-beta, pressures under slope and crowning."""
+    leads = [{"kind": "lead slope", "amount": "8 um"}, {"kind": "lead crowning", "amount": "4 um"}]
+    case = with_values(
+        read_case(CASE),
+        {"gear_1.modifications": leads, "static.flank_elements": 6, "static.stresses": False},
+    )
+    few, many = (
+        solve_static(with_values(case, {"static.slices": slices, "static.positions": positions})).cycle
+        for slices, positions in ((12, 16), (26, 512))
+    )
+    assert few.peak_to_peak() == pytest.approx(np.ptp(many.deflection, axis=1), rel=0.01)
+    assert few.mean("deflection") == pytest.approx(many.deflection.mean(axis=1), rel=0.005)
+    assert few.mean() == pytest.approx(many.stiffness.mean(axis=1), rel=0.005)
+    assert few.face_load_factor == pytest.approx(many.face_load_factor, rel=0.005)
+    assert few.extremes("max_pressure")[1] == pytest.approx(many.max_pressure.max(axis=1), rel=0.01)
