@@ -19,7 +19,8 @@ case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")
 teeth, standard, elements = [20, 26, 36], [], []
 for z in teeth:
     bores = {"gear_1.bore_radius": f"{0.625 * z} mm", "gear_2.bore_radius": f"{1.25 * z} mm"}
-    pair = {"gear_1.teeth": z, "gear_2.teeth": 2 * z, "set.centre_distance": f"{4.5 * z + 1} mm"}
+    tips = dict.fromkeys(["gear_1.tip_diameter", "gear_2.tip_diameter"])  # those of the rack
+    pair = {"gear_1.teeth": z, "gear_2.teeth": 2 * z, "set.centre_distance": f"{4.5 * z + 1} mm"} | tips
     static = solve_static(with_values(case, pair | bores | {"static.positions": 16}))
     width = static.planetary_set.gear_1.face_width
     standard.append(1e-9 * pair_mesh_stiffness(static.planetary_set)[1])
