@@ -317,13 +317,14 @@ def test_harris_map_of_one_negative_torque(quick_case, tmp_path):
 def test_the_optimum_of_a_coarse_map_has_no_way_down(quick_case, tmp_path):
     """The smallest amount of this map is 2.7 um, on which the simplex collapses; the valley is at 3.0 um."""
     arguments = ("--points", "3", "--positions", "16", "--largest", "8 um", "--also", "150 N m")
+    arguments = (*arguments, "--shape", "linear")
     done = run("tip_relief_design.py", quick_case, *arguments, "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     slopes = re.findall(r"([+-][0-9.]+) um per", done.stdout)
     assert len(slopes) == 4 and min(map(float, slopes)) >= 0
     assert "NOT A MINIMUM" not in done.stdout
-    ratio = float(re.search(r"([0-9.]+)% of", done.stdout)[1])
-    assert ratio < 14
+    # as with four and eight times the positions
+    assert float(re.search(r"([0-9.]+)% of", done.stdout)[1]) == pytest.approx(14.2, abs=0.2)
 
 
 def test_tip_relief_at_the_end_of_its_range_is_no_minimum(quick_case, tmp_path):
