@@ -603,7 +603,7 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
     ring, limit, notes = case.ring, dynamics, list[str]()
     if housing and "one_way_difference" in results.housing:
         apart = results.housing["one_way_difference"].values
-        columns["level [m/s²]"] = lambda i: f"{level(i)} ({in_decibels(apart[i])})"
+        columns["level [m/s²]"] = lambda i: f"{level(i)} ({in_decibels(float(apart[i]))})"
         notes.append(f"level: in brackets how far from {_ONE_WAY} (one way)")
     if housing:
         limit = results.housing
