@@ -101,7 +101,7 @@ def contact_over_width(
         "force": force,
         "member_motion": motion,
         "mesh_misalignment": rise,
-        "lead_offset": apart.reshape(P, -1, len(force), W // len(force)).min(axis=(1, 3)).T,
+        "lead_offset": _smallest(apart, found.candidate.any(axis=-1).reshape(P, -1, W), len(force)),
         "member_tilt": angles,
     }
     # the slice that comes nearest decides which pairs may touch; a row of helical teeth is a slice
@@ -116,6 +116,13 @@ def contact_over_width(
     if over.held is not None:
         values["held_tangents"] = plane.get("held_tangents", 0.0) + sliced.joint
     return values
+
+
+def _smallest(apart: np.ndarray, near: np.ndarray, meshes: int) -> np.ndarray:
+    """Smallest separation (meshes, P) of slices (P, S, W) in those windows that may touch; zero where none."""
+    found = np.where(near, apart, np.inf).reshape(len(apart), -1, meshes, apart.shape[2] // meshes)
+    found = found.min(axis=(1, 3)).T
+    return np.where(np.isfinite(found), found, 0.0)
 
 
 def _solve(
