@@ -292,9 +292,12 @@ def test_housing_has_only_the_orders_of_the_symmetry(moving):
     place = dynamics.ring_teeth, carrier, housing.exact.sensor_angle
     field = mesh_and_ring_outputs(replace(moving.modes, symmetry=1), dynamics.response)[1]
     lines = fixed_sensor_lines(field, *place)
-    spectrum = OrderSpectrum(lines.order, lines.acceleration)
+    spectrum, moved = (OrderSpectrum(lines.order, one) for one in (lines.acceleration, lines.displacement))
     assert (spectrum.amplitude.max(axis=-1) > 0).all()
-    assert symmetry_leakage(spectrum, g).max() < 1e-8
+    # nearly at rest the acceleration is rounding of the deflection, times the square of orders up to 45,000
+    turning = np.abs(dynamics.input_speed) > 1.0
+    assert symmetry_leakage(spectrum, g)[turning].max() < 1e-8
+    assert symmetry_leakage(moved, g).max() < 1e-8
     # others are left out where every planet is like every other
     assert housing.symmetry == g
     if moving.case.housing.support:
