@@ -119,7 +119,7 @@ def contact_over_width(
 
 
 def _smallest(apart: np.ndarray, near: np.ndarray, meshes: int) -> np.ndarray:
-    """Smallest separation (meshes, P) of slices (P, S, W) in those windows that may touch; zero where none."""
+    """Smallest separation (meshes, P) of slices (P, S, W) in windows that may touch; zero where none."""
     found = np.where(near, apart, np.inf).reshape(len(apart), -1, meshes, apart.shape[2] // meshes)
     found = found.min(axis=(1, 3)).T
     return np.where(np.isfinite(found), found, 0.0)
