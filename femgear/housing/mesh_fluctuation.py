@@ -12,7 +12,7 @@ import numpy as np
 
 from femgear.housing.carrier_orders import CarrierOrders
 
-_FEW, _STEPS, _CYCLES, _RITZ = 3000, 250, 3, 60
+_FEW, _STEPS, CYCLES, _RITZ = 3000, 250, 3, 60
 """Unknowns up to which a cycle of GMRES takes as many steps as it needs; steps of the first cycle of more of
 them at most, of each one after it twice as many; cycles; steps that tell the spectral radius."""
 _TWICE, _TINY = 0.7, np.finfo(float).tiny
@@ -83,7 +83,9 @@ class MeshFluctuation:
         return np.tensordot(self.leaders, every, axes=1) / self.orders.paths.symmetry
 
 
-def gmres(answer, right: np.ndarray, start, tolerance: float) -> tuple[np.ndarray, float, float, int]:
+def gmres(
+    answer, right: np.ndarray, start, tolerance: float, cycles: int = CYCLES
+) -> tuple[np.ndarray, float, float, int]:
     """Solve ``x - answer(x) = right`` (n,) by GMRES.
 
     Y. Saad, M. H. Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856-869.
@@ -92,7 +94,7 @@ def gmres(answer, right: np.ndarray, start, tolerance: float) -> tuple[np.ndarra
     """
     found, size = (right if start is None else start), max(float(np.linalg.norm(right)), _TINY)
     rest, products, radius = right - found + answer(found), 1, 0.0
-    for cycle in range(_CYCLES):
+    for cycle in range(cycles):
         if not float(np.linalg.norm(rest)) > tolerance * size:
             break
         steps = len(rest) if len(rest) <= _FEW else _STEPS * 2**cycle

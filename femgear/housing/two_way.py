@@ -44,7 +44,7 @@ from femgear.housing.carrier_orders import (
     ring_load,
 )
 from femgear.housing.harmonic_blocks import HarmonicBlocks, blocks_of_speed
-from femgear.housing.mesh_fluctuation import MeshFluctuation, gmres
+from femgear.housing.mesh_fluctuation import CYCLES, MeshFluctuation, gmres
 from femgear.housing.sensor import ReadOnlyArrays, carrier_turns
 from femgear.housing.set_damping import DampingForces, SetDamping, set_damping
 from femgear.housing.structure import FixedStructure
@@ -124,6 +124,7 @@ def solve_two_way(  # noqa: PLR0913
     side_bands: int | None = None,
     damping=None,
     tolerance: float = 1e-10,
+    cycles: int = CYCLES,
 ) -> TwoWayResponse:
     """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
 
@@ -152,6 +153,8 @@ def solve_two_way(  # noqa: PLR0913
         gears and structure have each the modal damping of its own.
     tolerance : float
         Relative residual of GMRES, and change of the forces by damping in their last pass.
+    cycles : int
+        Of GMRES, each of twice the steps of the one before; equations that take more are nearly singular.
     """
     n_max = structure.max_diameter
     coupled = n_max if coupled_diameters is None else min(coupled_diameters, n_max)
@@ -163,7 +166,7 @@ def solve_two_way(  # noqa: PLR0913
     def problem_of(i: int) -> _Problem:
         size = int(kept[i]) * periods, n_max, bands, sense, periods, 1 if periods == 1 else paths.symmetry
         orders = CarrierOrders(paths, *size)
-        return _Problem(gears, excitation, structure, orders, int(excited[i]), coupled, damping)
+        return _Problem(gears, excitation, structure, orders, int(excited[i]), coupled, damping, cycles)
 
     found = _Lines(problem_of(int(kept.argmax())), len(speeds))
 
@@ -200,9 +203,9 @@ class _Problem:
 
     def __init__(
         self, gears: Modes, excitation: MeshExcitation, structure: FixedStructure, orders: CarrierOrders,
-        excited: int, coupled: int, damping,
+        excited: int, coupled: int, damping, cycles: int,
     ):  # fmt: skip
-        self.structure, self.orders, self.coupled = structure, orders, coupled
+        self.structure, self.orders, self.coupled, self.cycles = structure, orders, coupled, cycles
         paths, angles = orders.paths, np.asarray(orders.paths.planet_angles, float)
         groups = planet_groups(angles, paths.symmetry)
         leaders, group, turn = groups
@@ -254,7 +257,9 @@ class _Problem:
             return self.fluctuation(_over_ring(*motion)).ravel().view(float)
 
         first = None if start is None else start.ravel().view(float)
-        flat, residual, radius, products = gmres(answer, right.ravel().view(float), first, tolerance)
+        flat, residual, radius, products = gmres(
+            answer, right.ravel().view(float), first, tolerance, self.cycles
+        )
         extra = flat.view(complex).reshape(shape)
         deflection, way = blocks.deflections(extra, moved, given)
         return _Solution(extra, way, blocks.forces(extra, deflection, way), residual, radius, products)
@@ -271,7 +276,8 @@ class _Problem:
             apart = _over_ring(made.still - forces.still, made.way - forces.way).astype(complex)
             apart *= self.gears.mean[:, None, None]
             change = float(np.linalg.norm(apart) / max(np.linalg.norm(found.force), _TINY))
-            if max(change, found.residual) <= tolerance:
+            # what GMRES leaves unsolved no further pass will mend
+            if max(change, found.residual) <= tolerance or found.residual > accuracy:
                 break
             if not passes and tolerance > _SINGLE * change:
                 damping = damping.single()
