@@ -177,14 +177,8 @@ def solve_two_way(  # noqa: PLR0913
     workers = max(min(os.cpu_count() or 1, int(_MOST / 4 / found.size)), 1)
     with ThreadPoolExecutor(workers) as pool:  # BLAS and LAPACK do not hold up one another
         list(pool.map(solve, range(len(speeds))))
-    residual, tail, radius, products = found.figures
-    _check_residual(residual, speeds, max(_RESIDUAL, 10.0 * tolerance))
-    paths, turns = paths if periods == 1 else replace(paths, symmetry=1), found.turns
-    order = found.number if turns == 1 else found.number / turns
-    counts = products.astype(int), kept
-    return TwoWayResponse(
-        speeds, order, found.force, residual, tail, radius, *counts, paths, found.drag, turns
-    )
+    _check_residual(found.figures[0], speeds, max(_RESIDUAL, 10.0 * tolerance))
+    return found.response(speeds, kept, paths if periods == 1 else replace(paths, symmetry=1))
 
 
 @dataclass(frozen=True)
@@ -317,6 +311,15 @@ class _Lines:
         """Orders (n_orders,) of the forces, multiples of 1/turns from 0, and places (Q + 1, R) among them."""
         number, place = np.unique(np.abs(orders.numbers(self.turns)), return_inverse=True)
         return number, place.reshape(-1, len(orders.bands))
+
+    def response(self, speeds: np.ndarray, harmonics: np.ndarray, paths: MeshPaths) -> TwoWayResponse:
+        """Response at speeds (n_speeds,) [rad/s] with so many harmonics (n_speeds,)."""
+        residual, tail, radius, products = self.figures
+        order = self.number if self.turns == 1 else self.number / self.turns
+        counts = products.astype(int), harmonics
+        return TwoWayResponse(
+            speeds, order, self.force, residual, tail, radius, *counts, paths, self.drag, self.turns
+        )
 
     def keep(self, i: int, problem: _Problem, answer: _Answer) -> None:
         """Write down what is found at the speed number i."""
