@@ -925,7 +925,7 @@ class _Walk:
             angle = -2.0 * math.pi * turns / self.turns
             moved = {"member_motion": self.members.names, "member_tilt": self._tilt_names}
             for name in (name for name in moved if name in values):
-                found[name].append(_turned(moved[name], values[name], planet, angle))
+                found[name].append(np.concatenate(_mapped(moved[name], values[name], planet, _turn(angle))))
         return {name: np.concatenate(parts, axis=-1) for name, parts in found.items() if parts}
 
 
@@ -948,23 +948,30 @@ def _in_slots(values: np.ndarray, slot: np.ndarray) -> np.ndarray:
     return padded[np.arange(len(values))[:, None], slot]
 
 
-def _turned(names: Sequence[str], values: np.ndarray, planet: np.ndarray, angle: float) -> np.ndarray:
-    """Displacements of members (m, P) of a set that is turned by an angle [rad].
+def _mapped(
+    names: Sequence[str], values: np.ndarray, planet: np.ndarray, matrix: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Map vectors of members (m, P), named in pairs of x and y, by a matrix (2, 2), and give what follows.
 
-    Planet ``planet[i]`` is then where planet i stands.
+    Planet ``planet[i]`` of the values is planet i of what is found.
     """
-    pairs, turn = [name for name in names if name.endswith((": x", ": y"))][::2], _turn(angle)
+    pairs = [name for name in names if name.endswith((": x", ": y"))][::2]
     vectors, rest = np.split(values, [2 * len(pairs)])
-    found = np.einsum("ij,mjp->mip", turn, vectors.reshape(-1, 2, vectors.shape[1]))
-    own = [i for i, name in enumerate(pairs) if name.startswith("planet")]
-    if own:
-        found[own] = found[own][planet]
-    return np.concatenate([found.reshape(vectors.shape), rest])
+    found = np.einsum("ij,mjp->mip", matrix, vectors.reshape(-1, 2, vectors.shape[1]))
+    planets = [i for i, name in enumerate(pairs) if name.startswith("planet")]
+    if planets:
+        found[planets] = found[planets][planet]
+    return found.reshape(vectors.shape), rest
 
 
 def _turn(angle: float) -> np.ndarray:
     """Rotation (2, 2) by an angle [rad]."""
     return np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+
+
+def _reflection(angle: float) -> np.ndarray:
+    """Reflection (2, 2) in the line at an angle [rad]."""
+    return _turn(2.0 * angle) * np.array([1.0, -1.0])
 
 
 def _between_meshes(setup: MeshWindows, tangents: np.ndarray, force: np.ndarray) -> np.ndarray:
@@ -1023,23 +1030,14 @@ def _seen_from_front(cycle: MeshCycle, planetary_set: GearSet, order) -> MeshCyc
     return replace(
         cycle,
         position=0.0 - cycle.position[::-1],
-        bearing_force=_reflected(cycle.bearing_force, angle)[planet][:, :, ::-1],
+        bearing_force=np.einsum("ij,njp->nip", _reflection(angle), cycle.bearing_force)[planet][:, :, ::-1],
         **found,
     )
 
 
-def _in_mirror(names, values: np.ndarray, planet: np.ndarray, angle: float) -> np.ndarray:
+def _in_mirror(
+    names: Sequence[str], values: np.ndarray, planet: np.ndarray, angle: float
+) -> np.ndarray:  # fmt: skip
     """Vectors of members (m, P), and what turns them last, of the mirror image in the original's order."""
-    pairs = [name for name in names if name.endswith((": x", ": y"))][::2]
-    vectors, turned = np.split(values, [2 * len(pairs)])
-    found = _reflected(vectors.reshape(-1, 2, vectors.shape[1]), angle)
-    own = [i for i, name in enumerate(pairs) if name.startswith("planet")]
-    if own:
-        found[own] = found[own][planet]
-    return np.concatenate([found.reshape(vectors.shape), -turned])[:, ::-1]
-
-
-def _reflected(vectors: np.ndarray, angle: float) -> np.ndarray:
-    """Vectors (m, 2, P) reflected in the line at an angle [rad]."""
-    c, s = np.cos(2 * angle), np.sin(2 * angle)
-    return np.einsum("ij,mjp->mip", np.array([[c, s], [s, -c]]), vectors)
+    vectors, turned = _mapped(names, values, planet, _reflection(angle))
+    return np.concatenate([vectors, -turned])[:, ::-1]

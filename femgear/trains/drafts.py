@@ -325,11 +325,11 @@ def _sections(
         rack = of_all.get("rack", {})
         dedendum, addendum = rack.get("dedendum", 1.25), rack.get("addendum", 1.0)
         shift = section.pop("rim_shift", section.get("profile_shift", 0.0))
-        radius, _ = usual_rim(
+        radius, root = usual_rim(
             gear["teeth"], size, dedendum, shift, internal=internal, helix=beta, addendum=addendum
         )
         key = "outer_radius" if internal else "bore_radius"
-        rim = max(4.0 if internal else 3.0, 1.25 * (addendum + dedendum))
+        rim = round(abs(radius - root) / size, 9)
         notes[f"{name}.{key}"] = f"estimated: a rim of {_MODULES.get(rim, f'{rim:.4g}')} modules"
         found[name] = {**section, key: LENGTH.show(radius), "tip_diameter": FREE}
     return found
