@@ -309,7 +309,7 @@ class ContinuationProblem:
     def _residual(self, y, parameter: float) -> np.ndarray:
         balance = self.balance_at(parameter)
         lines = balance.lines(y)
-        value = balance.receptance(self.frequency_at(parameter))[0]
+        value = balance.receptance_at(self.frequency_at(parameter))
         return balance.unknowns(balance.residual(lines, balance.forces(lines)[0], value))
 
     def first(self, parameter: float, start) -> PeriodicSolution:

@@ -27,7 +27,14 @@ from scipy import linalg
 from scipy.sparse.linalg import ArpackError, LinearOperator, eigs, gmres
 
 from femgear.errors import CaseError, ConvergenceError, checked_count
-from femgear.solvers.linear.receptance import Reduction, reduce_problem, source_columns
+from femgear.solvers.linear.receptance import (
+    FEW_FREQUENCIES,
+    DirectReduction,
+    Reduction,
+    reduce_directly,
+    reduce_problem,
+    source_columns,
+)
 from femgear.solvers.periodic.phase_grid import (
     PhaseGrid,
     coupled_pairs,
@@ -53,6 +60,8 @@ _MOST_DOFS = 1500
 MANY = 600
 # Stiffness of a column, relative to the largest one, that counts as none.
 _NO_STIFFNESS = 1e-9
+# Where a problem keeps its reduction for few lines.
+_KEPT = "_reduction_for_few_lines"
 # Relative accuracy of a Newton step, and products after which the matrix is taken instead.
 _ACCURACY, _PRODUCTS = 1e-3, 60
 
@@ -79,7 +88,7 @@ class HarmonicBalance:
 
     problem: NonlinearSystem
     orders: np.ndarray
-    reduction: Reduction
+    reduction: Reduction | DirectReduction
     grid: PhaseGrid
     elements: tuple[Element, ...]
     pairs: np.ndarray
@@ -130,6 +139,10 @@ class HarmonicBalance:
         frequency = np.atleast_1d(np.asarray(frequency, float))
         return self.reduction.at(self.orders @ frequency)
 
+    def receptance_at(self, frequency) -> np.ndarray:
+        """Compute the receptance (L, n_columns, n_columns + n_loads) [m/N] alone at bases [rad/s]."""
+        return self.reduction.value(self.orders @ np.atleast_1d(np.asarray(frequency, float)))
+
     def residual(self, lines, force, receptance) -> np.ndarray:
         """Compute the residual ``X + T (F - reference X) - T_load S`` (n_columns, L) [m]."""
         return lines + self._respond(receptance, force)
@@ -167,7 +180,7 @@ class HarmonicBalance:
         Largest modulus of the eigenvalues of ``T d(F - reference X)/dX``, the Jacobian of the residual less
         one; all are computed up to 600 unknowns. Beyond, Arnoldi's method finds it to 1 %.
         """
-        receptance = self.receptance(frequency)[0]
+        receptance = self.receptance_at(frequency)
         if self.size > MANY:
             found = krylov_radius(linearised(self, receptance, np.asarray(y, float))[1])
             if found is not None:
@@ -179,7 +192,7 @@ class HarmonicBalance:
 
     def linear_start(self, frequency) -> np.ndarray:
         """Compute the unknowns (n_y,) [m] of the response with reference springs, forced as at its mean."""
-        value, _ = self.receptance(frequency)
+        value = self.receptance_at(frequency)
         static = -self._respond(value, np.zeros((len(self.reduction.reference), len(self.orders))))
         mean = np.zeros_like(static)
         mean[:, 0] = static[:, 0]
@@ -214,7 +227,7 @@ class HarmonicBalance:
         beyond, products = self.forces(lines) if forces is None else forces
 
         def residual() -> np.ndarray:
-            return self.residual(lines, beyond, self.receptance(frequency)[0])
+            return self.residual(lines, beyond, self.receptance_at(frequency))
 
         if "residual" not in what_happened:
             what_happened["residual"] = relative_residual(self, self.unknowns(residual()), y)
@@ -242,7 +255,8 @@ def harmonic_balance(
     harmonics: int | None = None,
     orders=None,
     samples=None,
-    reduction: Reduction | None = None,
+    reduction: Reduction | DirectReduction | None = None,
+    frequencies: int | None = None,
 ) -> HarmonicBalance:
     """Make the harmonic equations of a problem.
 
@@ -259,6 +273,8 @@ def harmonic_balance(
         Points of the phase grid along every base; see `sample_counts` for the default.
     reduction : Reduction, optional
         Of the same problem, from `reduce_problem`; made here when not given.
+    frequencies : int, optional
+        At how many base frequencies the equations are asked for where these are few, which saves modes.
     """
     if (harmonics is None) == (orders is None):
         words = "give the number of harmonics or the lines"
@@ -279,7 +295,8 @@ def harmonic_balance(
         samples = (samples,) * bases if np.ndim(samples) == 0 else tuple(samples)
         if len(samples) != bases or any(int(count) != count for count in samples):
             raise CaseError(f"samples {samples} for {bases} base frequencies", code="E-HARMONICS")
-    reduction = reduced(problem) if reduction is None else reduction
+    if reduction is None:
+        reduction = reduced(problem, None if frequencies is None else frequencies * len(orders))
     columns, loads = len(reduction.reference), 1 + 2 * len(problem.forces)
     if reduction.static.shape != (columns, columns + loads) or columns != problem.system.W.shape[1]:
         raise CaseError("the reduction belongs to another problem", code="E-SHAPE", key="reduction")
@@ -293,11 +310,17 @@ def harmonic_balance(
     return HarmonicBalance(problem, orders, reduction, grid, elements, pairs, source, scale, longest)
 
 
-def reduced(problem: NonlinearSystem) -> Reduction:
+def reduced(problem: NonlinearSystem, lines: int | None = None) -> Reduction | DirectReduction:
     """Reduce a problem at its elements' own reference; a refusal names the element without stiffness there.
 
-    ConvergenceError: a motion without stiffness strains an element (E-RIGID-MODE).
+    For so many ``lines`` alone, where that is known, in the way that is cheaper for them; the problem keeps
+    that reduction. ConvergenceError: a motion without stiffness strains an element (E-RIGID-MODE).
     """
+    if lines is not None and lines <= FEW_FREQUENCIES:
+        # a frozen dataclass: `replace` makes problems without it
+        kept = vars(problem)[_KEPT] = vars(problem).get(_KEPT) or reduce_directly(problem)
+        if kept is not None:
+            return kept
     try:
         return reduce_problem(problem)
     except ConvergenceError as error:

@@ -13,7 +13,7 @@ import numpy as np
 from femgear.errors import CaseError, ConvergenceError, checked_count, checked_numbers, checked_tolerance
 from femgear.solvers.continuation.arclength import continue_curve
 from femgear.solvers.continuation.corrector import StepOptions
-from femgear.solvers.linear.receptance import Reduction, respond, source_columns
+from femgear.solvers.linear.receptance import DirectReduction, Reduction, respond, source_columns
 from femgear.solvers.periodic.equations import (
     MANY,
     HarmonicBalance,
@@ -88,7 +88,7 @@ def solve_harmonic_balance(
     ConvergenceError
         An undamped resonance of the system with reference springs at a line.
     """
-    balance = harmonic_balance(problem, **equations)
+    balance = harmonic_balance(problem, frequencies=1, **equations)
     frequency = _checked_frequency(balance, frequency)
     wanted = {"tolerance": checked_tolerance(tolerance), "radius": stability if radius is None else radius}
     wanted["max_iterations"] = checked_count(max_iterations, "max_iterations", code="E-RANGE")
@@ -107,7 +107,8 @@ def solve_harmonic_balance(
 
 
 def displacements(
-    problem: NonlinearSystem, solution: PeriodicSolution, outputs=None, *, reduction: Reduction | None = None
+    problem: NonlinearSystem, solution: PeriodicSolution, outputs=None, *,
+    reduction: Reduction | DirectReduction | None = None,
 ) -> np.ndarray:
     """Compute the lines of the outputs ``L q`` [m per unit of L] of a solution.
 
@@ -125,7 +126,7 @@ def displacements(
     (n_outputs, L) complex array
         Rigid motions without support have no mean position: theirs is zero.
     """
-    reduction = reduced(problem) if reduction is None else reduction
+    reduction = reduced(problem, len(solution.orders)) if reduction is None else reduction
     outputs = np.eye(len(problem.system.M)) if outputs is None else np.atleast_2d(np.asarray(outputs, float))
     forcing = reduction.reference[:, None] * solution.deflection - solution.force
     table = np.concatenate([forcing, source_columns(problem, solution.orders)])
@@ -157,7 +158,7 @@ def _newton(
     balance: HarmonicBalance, frequency, y, *, tolerance: float, max_iterations: int, radius: bool
 ) -> PeriodicSolution:
     """Solve harmonic equations by Newton's method with backtracking, from the unknowns y (n_y,) [m] on."""
-    receptance = balance.receptance(frequency)[0]
+    receptance = balance.receptance_at(frequency)
     evaluate = linearised if balance.size > MANY else _with_matrix
     error, tangent = evaluate(balance, receptance, y)
     history, trouble, forced = [relative_residual(balance, error, y)], "", 0
@@ -197,7 +198,7 @@ def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **want
     springs turn gradually into the elements, through limit points if there are any (Allgower and Georg,
     Introduction to Numerical Continuation Methods, 2003, chapters 2 and 6).
     """
-    receptance = balance.receptance(frequency)[0]
+    receptance = balance.receptance_at(frequency)
     nothing = np.zeros((len(balance.reduction.reference), len(balance.orders)), complex)
     linear = -balance.unknowns(balance.residual(nothing, nothing, receptance))
 

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError, ConvergenceError, FemgearError
-from femgear.solvers.linear.receptance import reduce_problem, respond, source_columns
+from femgear.solvers.linear.receptance import (
+    DirectReduction,
+    Reduction,
+    reduce_directly,
+    reduce_problem,
+    respond,
+    source_columns,
+)
+from femgear.solvers.periodic.equations import reduced
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.system.force_laws import PolynomialSprings
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
 
@@ -83,6 +92,48 @@ def test_derivative_by_the_frequency(options):
         change = 1j * problem.damping - 2.0 * omega * problem.system.M
         wanted = -problem.system.W.T @ inner @ change @ inner @ columns(problem)
         assert np.abs(slope[number] - wanted).max() < 1e-10 * np.abs(wanted).max()
+
+
+HELD_AND_COUPLED = ["single dampers", "gyroscopic", "gyroscopic with dampers"]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_few_frequencies_are_solved_directly_where_modes_are_coupled_and_nothing_is_free(name):
+    problem = chain(**CASES[name])
+    reduction = reduce_directly(problem)
+    assert (reduction is not None) == (name in HELD_AND_COUPLED)
+    if reduction is None:
+        return
+    omega, modes = np.array([0.0, *OMEGA]), reduce_problem(problem)
+    for found, wanted in zip(reduction.at(omega), modes.at(omega)):
+        assert np.abs(found[1:] - wanted[1:]).max() < 1e-12 * np.abs(wanted).max()
+    np.testing.assert_allclose(reduction.static, modes.static, atol=1e-12)
+    np.testing.assert_allclose(reduction.value(0.0), modes.static, atol=1e-12)
+    inputs = np.ones((5, len(omega)), complex)
+    lines, wanted = (respond(one, np.eye(6), omega, inputs) for one in (reduction, modes))
+    assert np.abs(lines - wanted).max() < 1e-12 * np.abs(wanted).max()
+
+
+def test_harmonic_balance_of_a_gyroscopic_system_takes_no_modes_and_has_the_lines_of_theirs():
+    problem, options = chain(gyroscopic=True), {"harmonics": 4, "stability": False}
+    found = solve_harmonic_balance(problem, 0.9, **options)
+    modes = reduce_problem(problem)
+    wanted = solve_harmonic_balance(problem, 0.9, reduction=modes, **options)
+    lines, of_modes = displacements(problem, found), displacements(problem, wanted, reduction=modes)
+    assert np.abs(lines - of_modes).max() < 1e-11 * np.abs(of_modes).max()
+    assert reduced(problem, 5) is reduced(problem, 5)
+    assert isinstance(reduced(problem, 5), DirectReduction)
+    assert isinstance(reduced(problem, 500), Reduction)
+
+
+def test_a_resonance_without_damping_is_refused_where_frequencies_are_solved_directly():
+    problem = chain(gyroscopic=True)
+    problem = replace(problem, system=replace(problem.system, C=np.zeros((6, 6))))
+    reduction = reduce_directly(problem)
+    assert reduction is not None
+    pole = reduce_problem(problem).constant
+    with pytest.raises(ConvergenceError, match="undamped resonance"):
+        reduction.value(np.abs(pole[np.abs(pole.imag).argmin()].imag))
 
 
 @pytest.mark.parametrize("options", CASES.values(), ids=CASES.keys())
