@@ -227,7 +227,7 @@ class Reduction:
         return gain, change * gain * gain
 
     def value(self, omega) -> np.ndarray:
-        """Compute ``W^T Z^-1 [W, loads]`` (..., n_columns, n_columns + n_loads) [m/N] at omega (...) [rad/s]."""
+        """Compute ``W^T Z^-1 [W, loads]`` (..., n_columns, n_columns + n_loads) [m/N] at omega [rad/s]."""
         return self.at(omega)[0]
 
     def outputs(self, outputs, omega, inputs) -> np.ndarray:
@@ -296,7 +296,7 @@ class DirectReduction:
         return {}
 
     def value(self, omega) -> np.ndarray:
-        """Compute ``W^T Z^-1 [W, loads]`` (..., n_columns, n_columns + n_loads) [m/N] at omega (...) [rad/s]."""
+        """Compute ``W^T Z^-1 [W, loads]`` (..., n_columns, n_columns + n_loads) [m/N] at omega [rad/s]."""
         omega = np.asarray(omega, float)
         motions, resolved = self._motions(omega.ravel())
         if not resolved:
