@@ -107,7 +107,10 @@ def solve_harmonic_balance(
 
 
 def displacements(
-    problem: NonlinearSystem, solution: PeriodicSolution, outputs=None, *,
+    problem: NonlinearSystem,
+    solution: PeriodicSolution,
+    outputs=None,
+    *,
     reduction: Reduction | DirectReduction | None = None,
 ) -> np.ndarray:
     """Compute the lines of the outputs ``L q`` [m per unit of L] of a solution.
