@@ -61,6 +61,7 @@ from femgear.gears.modifications import (
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack, PinionCutter, overlap_ratio, transverse_rack, transverse_tool
 from femgear.gears.tips import settled_tips
+from femgear.remembered import remembered
 
 if TYPE_CHECKING:
     from femgear.case.sections import CarrierSection, MaterialSection, ModificationSection
@@ -80,6 +81,7 @@ def need_set(case: Any) -> None:
         )  # fmt: skip
 
 
+@remembered(latest=16)
 def planetary_set(case: Any) -> PlanetarySet:
     """Make the gears of a case, closed on their centre distance [m] and checked.
 

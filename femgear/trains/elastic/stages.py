@@ -35,6 +35,7 @@ from femgear.gears.deviations import common_period, rotational_symmetry
 from femgear.gears.planetary import PlanetarySet
 from femgear.housing.sensor import component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound
+from femgear.remembered import remembered
 from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.linear.resonances import (
@@ -329,7 +330,7 @@ def dynamics_parts(
     basis, excitation, gears = modes.modes, modes.excitation, static.planetary_set
     speeds, (frequency, carrier) = np.array(case.operation.speeds), _turning_speeds(case, modes)
     some, heard_lines = _compared_speeds(case), _heard_lines(case, modes)
-    up_to, beyond, change = excitation_end(case, modes, heard_lines, frequency[some], carrier[some])
+    up_to, beyond, change = _excitation_end(case, modes)
     limit = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics)
     level_change = np.full(len(speeds), np.nan)
     level_change[some] = change
@@ -383,6 +384,13 @@ def _compared_speeds(case: Case) -> np.ndarray:
     return checked_speeds(len(case.operation.speeds), *([_COMPARED] if case.housing.stands_still else []))
 
 
+@remembered(latest=2)
+def _excitation_end(case: Case, modes: ModesResult) -> tuple[float, float, np.ndarray]:
+    """Choose where the excitation ends by the operating speeds, for run-up and dynamics alike."""
+    compared = (values[_compared_speeds(case)] for values in _turning_speeds(case, modes))
+    return excitation_end(case, modes, _heard_lines(case, modes), *compared)
+
+
 def _heard_lines(case: Case, modes: ModesResult) -> Heard:
     """Choose what computes the lines of the sensor that has the level."""
     lines = lines_at_sensor if case.housing.stands_still else lines_on_foundation
@@ -430,9 +438,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
     one, basis, excitation = member_speeds(case, planetary_set(case)), modes.modes, modes.excitation
     operating, given = np.array(case.operation.speeds), case.dynamics.mesh_harmonics
-    some = checked_speeds(len(operating))
-    at_operating = [one[_compared_speeds(case)] for one in _turning_speeds(case, modes)]
-    up_to = excitation_end(case, modes, _heard_lines(case, modes), *at_operating)[0]
+    some, up_to = checked_speeds(len(operating)), _excitation_end(case, modes)[0]
     first, last = _runup_ends(case, modes)
     slowest, fastest = first * one.mesh_frequency, last * one.mesh_frequency
     count = int(limited(case, [slowest], up_to, given=given).excitation[0])
