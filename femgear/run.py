@@ -7,7 +7,7 @@ import os
 import time
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib.util import find_spec
@@ -129,6 +129,8 @@ _LIBRARIES = {
 }
 """Libraries of formats that need one of the extra ``nvh``."""
 """Formats of what a test bench would record."""
+_WORTH_KEEPING = 10.0
+"""Seconds of stages after which they are kept for a run that is killed: less is computed again as soon."""
 _LOSS = -0.1
 """Change of the level that is told when a rate leaves lines out [dB]."""
 
@@ -137,7 +139,8 @@ _LOSS = -0.1
 class _Run:
     """What a run has written into its folder: files with checksums, seconds and verdicts of the stages.
 
-    ``findings`` are those of the stages by name, under "" those of the case.
+    ``findings`` are those of the stages by name, under "" those of the case; ``pending`` are results that a
+    run could go on from and that are not written yet.
     """
 
     folder: Path
@@ -146,6 +149,16 @@ class _Run:
     convergence: dict[str, Any] = field(default_factory=dict)
     data: dict[str, xr.Dataset] = field(default_factory=dict)
     findings: dict[str, tuple[Finding, ...]] = field(default_factory=dict)
+    pending: dict[str, Any] = field(default_factory=dict)
+
+    def keep(self, case: Any, *, least: float = 0.0) -> None:
+        """Write the pending results of a case, those of ``least`` seconds or more."""
+        if not self.pending or sum(self.timings[name] for name in self.pending) < least:
+            return
+        for name, result in self.pending.items():
+            write_result(result, self.folder / _kept_name(name), fingerprint=_fingerprint(case))
+        self.record(*map(_kept_name, self.pending))
+        self.pending.clear()
 
     def record(self, *names: str, complete: bool = False) -> Manifest:
         """Write the manifest with some more files."""
@@ -186,16 +199,22 @@ def run_case(
     run.findings[""] = train_of(case).case_warnings(case)
     run.record("case.toml")
     own_files(folder / KEPT, ["*"])
-    for stage in stages:
-        if stage.name not in run.timings:
-            _compute(run, asked, stage, stages, results, progress)
-    if pictures or computed is not None:
-        files = (stage.name for stage in stages if stage.name not in run.data)
-        run.data |= {name: read_dataset(folder / f"{name}.nc") for name in files}
-    if computed is not None:
-        computed(_results_so_far(run))
-    if pictures:
-        _draw(run, case, {name: one for name, one in results.items() if one is not None}, progress)
+    try:
+        for stage in stages:
+            if stage.name not in run.timings:
+                _compute(run, asked, stage, stages, results, progress)
+                run.keep(asked, least=_WORTH_KEEPING)
+        if pictures or computed is not None:
+            files = (stage.name for stage in stages if stage.name not in run.data)
+            run.data |= {name: read_dataset(folder / f"{name}.nc") for name in files}
+        if computed is not None:
+            computed(_results_so_far(run))
+        if pictures:
+            _draw(run, case, {name: one for name, one in results.items() if one is not None}, progress)
+    except BaseException:
+        with suppress(StorageError):  # what ended the run is what is said
+            run.keep(asked)
+        raise
     run.files = _without_kept(run.files)
     run.record(complete=True)
     return run.data
@@ -264,8 +283,8 @@ def _compute(
         run.timings[one.name] = seconds[one.name]
         codes = [finding.code for finding in run.findings[one.name] if finding.code]
         run.convergence[one.name] = joint_verdict(verdicts[one.name]) | {"findings": codes}
-        names += _file_names(one)
-        write_result(results[one.name], run.folder / names[-1], fingerprint=_fingerprint(case))
+        names.append(f"{one.name}.nc")
+        run.pending[one.name] = results[one.name]
         progress(one.name, 1, 1)
     run.record(*names)
 
@@ -278,9 +297,9 @@ def _findings_of_file(stage: Stage, path: Path) -> tuple[Finding, ...]:
     return findings
 
 
-def _file_names(stage: Stage) -> tuple[str, str]:
-    """Files of a stage: its results, and what a run goes on from when it was interrupted."""
-    return f"{stage.name}.nc", f"{KEPT}/{stage.name}.npz"
+def _kept_name(stage: str) -> str:
+    """Name the file of a stage that a run goes on from when it was interrupted."""
+    return f"{KEPT}/{stage}.npz"
 
 
 def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, dict[str, Any]]:
@@ -289,7 +308,7 @@ def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, di
     manifest = read_manifest(folder) if (folder / MANIFEST).is_file() else Manifest(complete=False)
     files = {name: digest for name, digest in manifest.files.items() if name == "case.toml"}
     for stage in stages:
-        names = _file_names(stage)
+        names = f"{stage.name}.nc", _kept_name(stage.name)
         if not {*names} <= manifest.files.keys() or stage.name not in manifest.timings:
             break
         try:
