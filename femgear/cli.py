@@ -344,7 +344,6 @@ def run(
     _warn(train.case_warnings(data))
     place = run_folder(output, case=data.source, force=force)
     with resumable(output, completed_since_now(output)):
-        _load_xarray()
         with place as folder, Progress() as progress:
 
             def tell_numbers(results) -> None:
@@ -353,6 +352,8 @@ def run(
                     _print(train.describe_results(results))
                     _warn(train.result_warnings(results))
                     sys.stdout.flush()
+                if pictures:
+                    _load_xarray()
 
             run_case(data, folder, only=only, pictures=pictures, progress=progress, computed=tell_numbers)
         _say(f"results: {output}")

@@ -31,6 +31,7 @@ from femgear.exchange.formats import (
 from femgear.findings import Finding, as_text, once, remark, tell
 from femgear.housing.sound import sound_quality
 from femgear.report.page import page, write_pictures
+from femgear.storage.contents import Contents, Datasets, as_dataset
 from femgear.storage.files import (
     append_dataset,
     checked_name,
@@ -59,7 +60,15 @@ from femgear.storage.results import (
     versions,
     write_csv_tables,
 )
-from femgear.trains.protocol import Drawn, Progress, Stage, joint_verdict, one_blas_thread, silent
+from femgear.trains.protocol import (
+    Drawn,
+    Progress,
+    Stage,
+    StageResult,
+    joint_verdict,
+    one_blas_thread,
+    silent,
+)
 from femgear.trains.reading import open_results, read_case
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -147,7 +156,7 @@ class _Run:
     files: dict[str, str] = field(default_factory=dict)
     timings: dict[str, float] = field(default_factory=dict)
     convergence: dict[str, Any] = field(default_factory=dict)
-    data: dict[str, xr.Dataset] = field(default_factory=dict)
+    data: dict[str, Contents | xr.Dataset] = field(default_factory=dict)
     findings: dict[str, tuple[Finding, ...]] = field(default_factory=dict)
     pending: dict[str, Any] = field(default_factory=dict)
 
@@ -217,7 +226,7 @@ def run_case(
         raise
     run.files = _without_kept(run.files)
     run.record(complete=True)
-    return run.data
+    return Datasets(run.data)
 
 
 def _results_so_far(run: _Run, *names: str) -> Results:
@@ -230,8 +239,10 @@ def _results_so_far(run: _Run, *names: str) -> Results:
 def _draw(run: _Run, case: Case, results: dict[str, Any], progress: Progress) -> None:
     """Write the page with its charts, then the pictures, and the page with these."""
     start, train = time.perf_counter(), train_of(case)
+    data = {name: as_dataset(contents) for name, contents in run.data.items()}
+    run.data |= data
     write_text(page(train, _results_so_far(run)), run.folder / "report.html")
-    drawn = Drawn(case, run.data, results, grid_cache())
+    drawn = Drawn(case, data, results, grid_cache())
     names = write_pictures(run.folder, train, drawn, progress=progress)
     run.timings["pictures"] = time.perf_counter() - start
     write_text(page(train, _results_so_far(run, *names)), run.folder / "report.html")
@@ -260,7 +271,7 @@ def _compute(
         for part, first in parts:
             for one in members:
                 found = first if one is stage else one.solve(part, first, **_options(one, progress))
-                path, data = run.folder / f"{one.name}.nc", found.dataset()
+                path, data = run.folder / f"{one.name}.nc", _contents(found)
                 if part is case:
                     run.findings[one.name] = one.findings(data)
                     data.attrs["findings"] = as_text(run.findings[one.name])
@@ -287,6 +298,11 @@ def _compute(
         run.pending[one.name] = results[one.name]
         progress(one.name, 1, 1)
     run.record(*names)
+
+
+def _contents(result: Any) -> Contents | xr.Dataset:
+    """Contents of the file of a stage, of results of trains without `StageResult` as a dataset."""
+    return result.contents() if isinstance(result, StageResult) else result.dataset()
 
 
 def _findings_of_file(stage: Stage, path: Path) -> tuple[Finding, ...]:

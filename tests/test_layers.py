@@ -183,6 +183,16 @@ def test_checking_a_case_loads_no_library_that_draws_or_solves():
     assert heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])") == set()
 
 
+def test_a_run_without_pictures_loads_neither_xarray_nor_what_draws(tmp_path):
+    case, wanted = tmp_path / "case.toml", HEAVY - {"skfem"}
+    text = (PACKAGE.parent / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
+    coarse = text.replace("positions = 64", "positions = 14\nflank_elements = 6", 1)
+    assert coarse != text
+    case.write_text(coarse, encoding="utf-8")
+    arguments = ["run", str(case), "-o", str(tmp_path / "out"), "--no-pictures"]
+    assert heavy_after(f"from femgear.cli import main; main({arguments!r})", wanted) == set()
+
+
 def test_reading_a_case_loads_no_stage():
     case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
     assert heavy_after(f"import femgear; femgear.read_case({str(case)!r})", HEAVY | SOLVING) == set()

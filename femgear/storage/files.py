@@ -43,6 +43,8 @@ except ImportError:  # Windows, where no open file can be removed
 if TYPE_CHECKING:
     import xarray as xr
 
+    from femgear.storage.contents import Contents, Labelled
+
 _NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
 _RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
 """Names that some file system gives a meaning of its own, or takes for others."""
@@ -72,8 +74,8 @@ _COMPRESSED = 4_000_000
 _LARGE = 200_000_000
 
 
-def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
-    """Write a dataset as NetCDF-4 with a checksum (Fletcher-32) on every chunk.
+def write_dataset(dataset: Contents | xr.Dataset, path: str | os.PathLike) -> None:
+    """Write contents, or a dataset, as NetCDF-4 with a checksum (Fletcher-32) on every chunk.
 
     Its variables are real, text or boolean; they and the numeric coordinates have the attributes ``units``
     and ``long_name``.
@@ -84,7 +86,7 @@ def write_dataset(dataset: xr.Dataset, path: str | os.PathLike) -> None:
         _to_netcdf(dataset, temporary)
 
 
-def _to_netcdf(dataset: xr.Dataset, path: Path, *, growing: bool = False) -> None:
+def _to_netcdf(dataset: Contents | xr.Dataset, path: Path, *, growing: bool = False) -> None:
     """Write a dataset as `write_dataset` does, under the name itself; its numbers may have to grow."""
     free = [name for name, one in dataset.coords.items() if growing and one.dtype.kind not in "OUS"]
     for name, variable in dataset.variables.items():
@@ -92,7 +94,7 @@ def _to_netcdf(dataset: xr.Dataset, path: Path, *, growing: bool = False) -> Non
     write_hdf5(path, lambda stream: _create(dataset, stream, free))
 
 
-def _create(dataset: xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> None:
+def _create(dataset: Contents | xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> None:
     """Write a dataset into an open file in the form of NetCDF-4, whose dimensions are scales of HDF5."""
     import h5py
 
@@ -126,7 +128,7 @@ def _create(dataset: xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> N
                 made[name].dims[axis].attach_scale(made[dim])
 
 
-def _chunk(variable: xr.Variable, free: Sequence[Any]) -> tuple[int, ...]:
+def _chunk(variable: Labelled | xr.Variable, free: Sequence[Any]) -> tuple[int, ...]:
     """Shape of the pieces in which a variable is stored that grows along some dimensions: 16 000 numbers."""
     sizes = dict(list(variable.sizes.items())[1:])
     fixed = math.prod(size for name, size in sizes.items() if name not in free)
@@ -135,7 +137,7 @@ def _chunk(variable: xr.Variable, free: Sequence[Any]) -> tuple[int, ...]:
     return (first if variable.dims[0] in free else variable.shape[0], *inner)
 
 
-def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
+def append_dataset(dataset: Contents | xr.Dataset, path: Path, along: str) -> None:
     """Append a dataset to a file of its kind along one dimension; the other numbers are those of the latest.
 
     Dimensions that are longer than before grow, and what is missing of a shorter one is zero; coordinates
@@ -148,7 +150,7 @@ def append_dataset(dataset: xr.Dataset, path: Path, along: str) -> None:
         _to_netcdf(dataset, path, growing=True)
 
 
-def _append(dataset: xr.Dataset, stream: io.RawIOBase, along: str) -> None:
+def _append(dataset: Contents | xr.Dataset, stream: io.RawIOBase, along: str) -> None:
     """Append as `append_dataset` to an open file."""
     import h5py
 
@@ -703,7 +705,9 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
     )
 
 
-def _check_variable(name: str, variable: xr.Variable, *, coordinate: bool, path: str | os.PathLike) -> None:
+def _check_variable(
+    name: str, variable: Labelled | xr.Variable, *, coordinate: bool, path: str | os.PathLike
+) -> None:
     """Refuse a variable of a type that no file holds, or without unit or text."""
     if variable.dtype.kind not in "fiubOU":
         raise StorageError(

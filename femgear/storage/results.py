@@ -1,4 +1,4 @@
-"""Results as xarray datasets with units, and on disk: one folder a run, one NetCDF file a stage, a manifest.
+"""Results as contents with units, and on disk: one folder a run, one NetCDF file a stage, a manifest.
 
 The manifest holds the checksum of every file and whether the run came to its end.
 """
@@ -27,6 +27,7 @@ import numpy as np
 from femgear import __version__
 from femgear.errors import StorageError
 from femgear.findings import Finding, as_data, from_data, remark, tell
+from femgear.storage.contents import Contents
 from femgear.storage.files import (
     WRITTEN,
     checked_name,
@@ -100,19 +101,7 @@ def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
 
     ``variables`` and ``coords`` map names to entries, ``attrs`` are those of the dataset.
     """
-    import xarray as xr
-
-    def made(entries):
-        return {
-            name: (
-                dims.split() if isinstance(dims, str) else dims,
-                np.asarray(values),
-                {"units": units, "long_name": words},
-            )
-            for name, (dims, values, units, words) in entries.items()
-        }
-
-    return xr.Dataset(made(variables), coords=made(coords), attrs=attrs)
+    return Contents(variables, coords, attrs).to_xarray()
 
 
 def coordinates(**values: Any) -> dict[str, tuple]:
@@ -298,7 +287,7 @@ class Results:
     def __getitem__(self, name: str) -> xr.Dataset:
         return getattr(self, name)
 
-    def with_known(self, data: Mapping[str, xr.Dataset]) -> Results:
+    def with_known(self, data: Mapping[str, Contents | xr.Dataset]) -> Results:
         """Take the contents of some files, by stage, from memory instead of reading them."""
         vars(self).update(data)
         return self

@@ -17,6 +17,7 @@ import scipy
 from femgear.errors import FemgearError
 from femgear.findings import by_severity, once
 from femgear.report.tables import Block, listed
+from femgear.storage.contents import Contents, as_dataset
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -93,16 +94,22 @@ class StageResult:
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
         """What the result says against itself, each once."""
-        return once(self.warnings(self.dataset()))
+        return once(self.warnings(self.contents()))
 
     @staticmethod
-    def warnings(data: xr.Dataset) -> Iterable[Finding]:
-        """List what the contents of the stage's file say against themselves."""
+    def warnings(data: Any) -> Iterable[Finding]:
+        """List what the contents of the stage's file, or a dataset of them, say against themselves."""
         return ()
 
+    def contents(self) -> Contents | xr.Dataset:
+        """Collect the contents of the stage's file; a class has these, or `dataset` where it needs xarray."""
+        if type(self).dataset is StageResult.dataset:
+            raise NotImplementedError
+        return self.dataset()
+
     def dataset(self) -> xr.Dataset:
-        """Collect the contents of the stage's file."""
-        raise NotImplementedError
+        """Collect the contents of the stage's file as dataset, with units."""
+        return as_dataset(self.contents())
 
 
 @dataclass(frozen=True)
@@ -211,7 +218,7 @@ class Stage:
         known = {"converged": said.converged, "residual": said.residual, "message": said.message}
         return known | self.verdict(result)
 
-    def findings(self, data: xr.Dataset) -> tuple[Finding, ...]:
+    def findings(self, data: Any) -> tuple[Finding, ...]:
         """List what the contents of the stage's file say against themselves, each once."""
         return once(self.warnings(data), self.name)
 

@@ -22,7 +22,8 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
-from femgear.storage.results import coordinates, dataset, mode_entries, shape_entries
+from femgear.storage.contents import Contents
+from femgear.storage.results import coordinates, mode_entries, shape_entries
 from femgear.system.force_laws import GearMeshes, RadialBearings
 from femgear.system.fourier import FourierSeries, Series, StepSeries, SummedSeries, series_of, tooth_lines
 from femgear.system.mesh_directions import (
@@ -37,8 +38,6 @@ from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, RigidSet, flank_s
 from femgear.system.system import HarmonicForce, MechanicalSystem, Modes, NonlinearSystem
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from femgear.gears.planetary import PlanetarySet
 
 Entry = TypeVar("Entry")
@@ -550,7 +549,7 @@ def modes_dataset(
     attrs: dict,
     phasing: tuple[str, ...] = (),
     along: str = "",
-) -> xr.Dataset:
+) -> Contents:
     """Collect modes.nc: frequencies, kinds and shapes of all bodies, mesh deflections, no elastic ring.
 
     The number of unknowns is added behind the title in the attributes of the file; ``phasing`` (m,) is that
@@ -568,7 +567,7 @@ def modes_dataset(
     variables |= shape_entries(shape, stiffness, deflection, along)
     coords = coordinates(mode=np.arange(len(modes.frequency)), dof=dofs, mesh=gears.mesh_names)
     named = {"title": attrs["title"], "unknowns": len(modes.shape)}
-    return dataset(variables, coords=coords, attrs=named | attrs)
+    return Contents(variables, coords=coords, attrs=named | attrs)
 
 
 def in_space(data: RigidSet, shape: np.ndarray) -> tuple[np.ndarray, list[str]]:

@@ -16,7 +16,8 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.findings import Finding
 from femgear.report.tables import Block, describe_modes, pull, tabulate
-from femgear.storage.results import coordinates, dataset, mode_entries, shape_entries
+from femgear.storage.contents import Contents
+from femgear.storage.results import coordinates, mode_entries, shape_entries
 from femgear.trains.drivetrain.case_file import DrivetrainCase, torque_histories
 from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, record_rate
 from femgear.trains.drivetrain.model import DrivetrainModel
@@ -62,7 +63,7 @@ class DrivetrainModesResult(StageResult):
     campbell: CampbellData
     speed: float
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
         modes, model, found = self.modes, self.model, self.campbell
         members, energy, rotation = _energies(model, modes.shape)
@@ -92,7 +93,7 @@ class DrivetrainModesResult(StageResult):
             "campbell_speed": (("campbell_speed",), found.speed / RPM, "rpm", "speed of the first body"),
         }
         attrs = {"title": "modes of the drivetrain, mean mesh stiffness", "unknowns": len(modes.shape)}
-        return dataset(variables, coords, attrs)
+        return Contents(variables, coords, attrs)
 
 
 @dataclass(frozen=True)
@@ -123,7 +124,7 @@ class TransientResult(StageResult):
         """List what transient.nc says against itself, see `transient_warnings`."""
         return transient_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of transient.nc."""
         runs = list(self.runs.values())
         first, model = runs[0], next(iter(self.models.values()))
@@ -177,7 +178,7 @@ class TransientResult(StageResult):
             "damping_ratio": model.train.damping_ratio,
             "filter": _LOW_PASS if every > 1 else "none",
         }
-        return dataset(variables, coords, attrs)
+        return Contents(variables, coords, attrs)
 
 
 @dataclass(frozen=True)
@@ -237,7 +238,7 @@ class SpectrumResult(StageResult):
         """How the solutions were found."""
         return "spectra of the record in time"
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of spectrum.nc."""
         transient = self.transient
         model, variants = next(iter(transient.models.values())), list(self.spectra)
@@ -284,7 +285,7 @@ class SpectrumResult(StageResult):
             "speed": self.speed,
             "planetary_stages": len(model.train.planetary),
         }
-        return dataset(variables, coords, attrs)
+        return Contents(variables, coords, attrs)
 
 
 def _names(name: str, values, long_name: str) -> tuple:

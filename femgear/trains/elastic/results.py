@@ -49,11 +49,11 @@ from femgear.housing.sound import (
 from femgear.report.response import harmonics_of
 from femgear.report.tables import MANY, Block, Marks, chosen, in_decibels, lower_bound, tabulate
 from femgear.solvers.periodic.solution import CIRCLE
+from femgear.storage.contents import Contents
 from femgear.storage.results import (
     FOURIER,
     complex_entries,
     coordinates,
-    dataset,
     mode_entries,
     response_entries,
 )
@@ -148,7 +148,7 @@ class ModesResult(StageResult):
         """Largest nodal diameter of the ring model."""
         return len(self.ring.compliance) - 1
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
         modes, model, state, n_max = self.modes, self.model, self.state, self.max_diameter
         record, supported = "mesh supported_position", "static transmission error of the set on its supports"
@@ -186,7 +186,7 @@ class ModesResult(StageResult):
                 variables[f"{name}_{part}"] = ("mode circumferential", getattr(field, part), "kg^-1/2", words)
         names, diameters = mesh_names(len(modes.mesh_stiffness) // 2), np.arange(-n_max, n_max + 1)
         denser = "position in mesh periods, denser near jumps of the stiffness"
-        return dataset(
+        return Contents(
             variables,
             coords={
                 "other_mesh": ("other_mesh", names, "1", "gear mesh"),
@@ -271,7 +271,7 @@ class DynamicsResult(StageResult):
         """List what dynamics.nc says against itself, see `dynamics_warnings`."""
         return dynamics_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of dynamics.nc."""
         response, lines, field = self.response, "speed mesh harmonic", "harmonic circumferential"
         words = "outer tangential displacement of the ring at the last speed"
@@ -288,7 +288,7 @@ class DynamicsResult(StageResult):
             "level_change": ("speed", self.level_change, "dB", change),
         }
         harmonic, periods = np.arange(response.force.shape[-1]), response.periods
-        return dataset(
+        return Contents(
             response_entries(self) | reach | complex_entries(entries, single=True),
             coords=coordinates(
                 speed=self.input_speed / RPM, mesh=mesh_names(self.dte.shape[1] // 2),
@@ -345,7 +345,7 @@ class HousingResult(StageResult):
         """List what housing.nc says against itself, see `housing_warnings`."""
         return housing_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of housing.nc; `femgear.housing.sensor.stored_lines` reads the lines."""
         exact, words, rounding = self.exact, "radial displacement at the sensor", "none"
         values = exact.displacement
@@ -384,7 +384,7 @@ class HousingResult(StageResult):
         supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in self.supported.items()}
         names = {kind: (kind, one[0], "1", f"name of the {kind}") for kind, one in self.outputs.items()}
         order = {"order": ("order", exact.order, "1", "carrier order")}
-        return dataset(
+        return Contents(
             variables | supported, coords=coordinates(speed=self.input_speed / RPM) | order | names,
             attrs=({"missing_compliance": self.missing} if self.missing else {})
             | ({"turns": exact.turns} if exact.turns > 1 else {}) | {

@@ -22,7 +22,8 @@ from femgear.housing.orders import order_level
 from femgear.housing.sound import REFERENCE_ACCELERATION
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.solvers.linear.resonances import EXCITED
-from femgear.storage.results import as_written, complex_entries, coordinates, dataset, declared
+from femgear.storage.contents import Contents
+from femgear.storage.results import as_written, complex_entries, coordinates, declared
 from femgear.system.fourier import fluctuation, sample
 from femgear.trains.protocol import StageResult
 
@@ -194,7 +195,7 @@ class RunupResult(StageResult):
         """List what runup.nc says against itself, see `runup_warnings`."""
         return runup_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of runup.nc."""
         heard, kinds = self.heard, "speed mesh_kind"
         words = "acceleration at the sensor, single-sided amplitude"
@@ -215,7 +216,7 @@ class RunupResult(StageResult):
             **complex_entries((("lines", "speed order", heard.lines, "m/s^2", words),), single=True),
             **declared(_RESONANCE, {**self.resonances, **there}),
         }
-        return dataset(
+        return Contents(
             variables,
             coords=coordinates(speed=self.input_speed / RPM) | {
                 "mesh_kind": ("mesh_kind", list(KINDS), "1", "kind of mesh"),

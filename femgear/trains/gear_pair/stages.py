@@ -19,7 +19,8 @@ from femgear.solvers.continuation.branches import Branch, parameter_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.stability.lyapunov import LyapunovExponents, lyapunov_exponents
 from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
-from femgear.storage.results import FOURIER, complex_entries, dataset
+from femgear.storage.contents import Contents
+from femgear.storage.results import FOURIER, complex_entries
 from femgear.trains.gear_pair.case_file import GearPairCase, pair_of, scales_of
 from femgear.trains.gear_pair.figures import FIGURES
 from femgear.trains.gear_pair.model import (
@@ -93,7 +94,7 @@ class ResponseResult(StageResult):
         """List what response.nc says against itself."""
         return _response_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of response.nc."""
         branch = self.branch
         variables = _motions("point", self.lowest, self.highest, np.real(branch.lines[:, 0, 0]))
@@ -113,7 +114,7 @@ class ResponseResult(StageResult):
         coords |= _numbers("line", line=(branch.orders[:, 0], "harmonic of the tooth frequency"))
         attrs = {"message": branch.message, "complete": int(branch.complete), "fourier_convention": FOURIER}
         title = "periodic motions by harmonic balance"
-        return dataset(variables | complex_entries(lines), coords, _units(self.case, title) | attrs)
+        return Contents(variables | complex_entries(lines), coords, _units(self.case, title) | attrs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +140,7 @@ class SweepResult(StageResult):
         """List what sweep.nc says against itself."""
         return _sweep_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of sweep.nc; both directions over the ascending ratio."""
 
         def both(name: str) -> np.ndarray:
@@ -160,7 +161,7 @@ class SweepResult(StageResult):
         )
         coords = _ratios(self.case, "ratio", self.up.frequency)
         coords |= _numbers("direction", direction=(["up", "down"], "direction of the sweep"))
-        return dataset(variables, coords, _units(self.case, "settled motions, ratio up and down"))
+        return Contents(variables, coords, _units(self.case, "settled motions, ratio up and down"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,7 +178,7 @@ class ChaosResult(StageResult):
         """How the solutions were found."""
         return "integrated in time; the error of every exponent stands beside it"
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
         ratio, found = self.ratio, self.found
         variables = _numbers(
@@ -206,7 +207,7 @@ class ChaosResult(StageResult):
                 section_velocity=(velocity, f"velocity {_LENGTH}, {_RATE}"),
             )
         title = "Lyapunov exponents and sections once a period"
-        return dataset(variables, _ratios(self.case, "ratio", ratio), _units(self.case, title))
+        return Contents(variables, _ratios(self.case, "ratio", ratio), _units(self.case, title))
 
 
 def _numbers(dims: str, **entries: tuple) -> dict[str, tuple]:

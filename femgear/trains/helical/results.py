@@ -15,7 +15,8 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.gears.planetary import virtual_teeth
 from femgear.report.tables import Block, response_warnings
-from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, response_entries
+from femgear.storage.contents import Contents
+from femgear.storage.results import FOURIER, complex_entries, coordinates, response_entries
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness
@@ -57,7 +58,7 @@ class HelicalModesResult(StageResult):
     excitation: MeshExcitation | None = None
     whole: MeshExcitation | None = None
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
         found = modes_dataset(
             self.data,
@@ -77,7 +78,7 @@ class HelicalModesResult(StageResult):
             "helical_ste": (where, whole.deflection / along, "m",
                             "static transmission error along the transverse line of action, centres fixed"),
         }  # fmt: skip
-        return found.merge(dataset(curves, coords=coordinates(position=position), attrs={}))
+        return found.merge(Contents(curves, coords=coordinates(position=position), attrs={}))
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,7 @@ class HelicalDynamicsResult(StageResult):
         """List what dynamics.nc says against itself, see `response_warnings`."""
         return response_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of dynamics.nc of a helical case."""
         response, basis, lines = self.response, self.modes, ("speed", "mesh", "harmonic")
         data = basis.data
@@ -138,7 +139,7 @@ class HelicalDynamicsResult(StageResult):
             ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
             ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
         )  # fmt: skip
-        return dataset(
+        return Contents(
             response_entries(self) | complex_entries(entries),
             coords=_coordinates(self),
             attrs={

@@ -15,7 +15,8 @@ from femgear.case.quantities import RPM
 from femgear.findings import Finding
 from femgear.gears.planetary import mesh_names
 from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
-from femgear.storage.results import FOURIER, complex_entries, coordinates, dataset, mode_entries
+from femgear.storage.contents import Contents
+from femgear.storage.results import FOURIER, complex_entries, coordinates, mode_entries
 from femgear.trains.multistage.case_file import MultistageCase, multistage_of, stage_warnings
 from femgear.trains.multistage.model import (
     MultistageSet,
@@ -71,7 +72,7 @@ class MultistageModes(StageResult):
             for kind, stage, share in zip(self.modes.kind, self.stage.tolist(), self.share.T)
         )
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
         modes = self.modes
         parts = [
@@ -95,7 +96,7 @@ class MultistageModes(StageResult):
         coords = _coordinates(self.data) | coordinates(mode=numbers, dof=dofs)
         coords["part"] = ("part", parts, "1", "part of the train")
         attrs = {"title": "modes of the train at rest, mean mesh stiffness", "unknowns": len(modes.shape)}
-        return dataset(variables, coords, attrs)
+        return Contents(variables, coords, attrs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +116,7 @@ class ResponseResult(StageResult):
         total = {"all stages": np.sqrt(sum(squares.values()))}
         return total | {text: np.sqrt(square) for text, square in squares.items()}
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of response.nc."""
         answers, along = list(self.answers.values()), ("excited_by", "speed")
         total, *single = self.forces.values()
@@ -134,7 +135,7 @@ class ResponseResult(StageResult):
         }
         attrs = {"title": "response to the transmission errors by modal summation"}
         attrs["fourier_convention"] = FOURIER
-        return dataset(variables | complex_entries(lines), coords, attrs)
+        return Contents(variables | complex_entries(lines), coords, attrs)
 
 
 @dataclass(frozen=True, eq=False)
@@ -172,7 +173,7 @@ class BalanceResult(StageResult):
         """List what balance.nc says against itself, see `balance_warnings`."""
         return balance_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of balance.nc."""
         words = "r.m.s. of the force in sun-planet 1 of every stage"
         variables = {
@@ -182,7 +183,7 @@ class BalanceResult(StageResult):
         }
         lines = [("mesh_force", ("speed", "mesh", "line"), self.force, "N", "mesh force")]
         attrs = {"title": "response with the mesh stiffnesses k(t) by harmonic balance"}
-        return dataset(variables | complex_entries(lines), _coordinates(self.data, self.speed), attrs)
+        return Contents(variables | complex_entries(lines), _coordinates(self.data, self.speed), attrs)
 
 
 def _first_meshes(data: MultistageSet) -> list[int]:

@@ -15,12 +15,12 @@ from femgear.findings import Finding, tell
 from femgear.gears.pair import GearPair
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
 from femgear.report.tables import Block, chosen, first_speeds, response_warnings, tabulate
+from femgear.storage.contents import Contents
 from femgear.storage.results import (
     FOURIER,
     as_written,
     complex_entries,
     coordinates,
-    dataset,
     declared,
     mode_entries,
     response_entries,
@@ -73,14 +73,14 @@ class PairModesResult(StageResult):
     modes: Modes
     entries: Entries
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
         modes, play = self.modes, self.excitation.backlash
         shapes = shape_entries(modes.shape, modes.mesh_stiffness, modes.mesh_deflection)
         variables = mode_entries(modes) | shapes | {"backlash": ("mesh", play, *_PLAY)}
         axes = {"mode": np.arange(len(modes.frequency)), "dof": modes.dofs, "mesh": self.gears.mesh_names}
         title = "modes of the pair with its mean mesh stiffness"
-        return dataset(variables, coordinates(**axes), {"title": title})
+        return Contents(variables, coordinates(**axes), {"title": title})
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class PairDynamicsResult(StageResult):
         """List what dynamics.nc says against itself, see `dynamics_warnings`."""
         return dynamics_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of dynamics.nc."""
         motion, lines = self.motion, "speed mesh harmonic"
         entries = (
@@ -167,7 +167,7 @@ class PairDynamicsResult(StageResult):
         known = response_entries(self) | {"excitation_limit": reach} | motion.levels("speed")
         known["backlash"] = ("mesh", self.backlash, *_PLAY)
         title = {"title": "periodic response of the pair", "message": self.response.message}
-        return dataset(
+        return Contents(
             known | complex_entries(entries),
             _coordinates(self, axis=["x", "y"], harmonic=np.arange(motion.dte.shape[-1])),
             title | {"fourier_convention": FOURIER},
@@ -210,7 +210,7 @@ class PairRunupResult(StageResult):
         """List what runup.nc says against itself, see `runup_warnings`."""
         return runup_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of runup.nc."""
         levels, known = self.motion.levels("speed"), dict(self.resonances)
         for name, of in (("resonance_dte", "dte_rms"), ("resonance_factor", "dynamic_factor")):
@@ -237,7 +237,7 @@ class PairRunupResult(StageResult):
             **self.verdict,
         }
         axes = {"axis": ["x", "y"], "harmonic": np.arange(self.motion.dte.shape[-1])}
-        return dataset(variables, _coordinates(self, **axes), attrs | {"fourier_convention": FOURIER})
+        return Contents(variables, _coordinates(self, **axes), attrs | {"fourier_convention": FOURIER})
 
     @property
     def verdict(self) -> dict:

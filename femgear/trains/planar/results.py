@@ -21,7 +21,8 @@ from femgear.findings import NOTE, Finding, findings_in
 from femgear.gears.kinematics import torques
 from femgear.report.response import harmonics_of
 from femgear.report.tables import Block, Marks, chosen, first_speeds, tabulate
-from femgear.storage.results import complex_entries, coordinates, dataset
+from femgear.storage.contents import Contents
+from femgear.storage.results import complex_entries, coordinates
 from femgear.system.fourier import fluctuation
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.planar.model import (
@@ -88,7 +89,7 @@ class PlanarModesResult(StageResult):
     data: PlanarSet
     modes: Modes
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of modes.nc: translations and rotations of all bodies, no elastic ring."""
         attrs = {
             "title": "modes of the planar set at standstill, bearings closed, back flanks open",
@@ -132,7 +133,7 @@ class BranchResult(StageResult):
         """List what branch.nc says against itself, see `branch_warnings`."""
         return branch_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of branch.nc."""
         branch, verdicts = self.branch, self.branch.verdicts
         count = len(branch.parameter)
@@ -168,7 +169,7 @@ class BranchResult(StageResult):
             "harmonic": (("harmonic",), branch.orders[:, 0], "1", "harmonic of the weight's frequency"),
             "phase": (("phase",), np.linspace(0.0, 2.0 * np.pi, _PHASES), "rad", "phase of the weight"),
         }
-        data = dataset(
+        data = Contents(
             variables,
             coords=coords,
             attrs={
@@ -213,7 +214,7 @@ class PlanarResponseResult(StageResult):
         """List what response.nc says against itself, see `response_warnings`."""
         return response_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of response.nc."""
         found, speed = self.solutions, ("speed",)
         mesh = [one.mesh_frequency for one in self.speeds]
@@ -235,7 +236,7 @@ class PlanarResponseResult(StageResult):
             "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
             "mesh_order": (line, orders[:, 1], "1", "multiple of the mesh frequency"),
         }
-        return dataset(
+        return Contents(
             variables,
             coords=coords,
             attrs={

@@ -36,7 +36,8 @@ from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.gears.tooth import ROOT_RADIUS_LIMIT, root_notches
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, chosen, significant, tabulate
-from femgear.storage.results import coordinates, dataset, declared
+from femgear.storage.contents import Contents
+from femgear.storage.results import coordinates, declared
 from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
@@ -275,7 +276,7 @@ class StaticResult(StageResult):
         """List what static.nc says against itself, see `static_warnings`."""
         return static_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of static.nc."""
         cycle, gears = self.cycle, self.planetary_set
         bodies = [body for body in self.bodies.gears if body is not None]
@@ -296,7 +297,7 @@ class StaticResult(StageResult):
         values |= self._peaks()
         variables = variables | {name: PEAK_VARIABLES[name] for name in PEAK_VARIABLES if name in values}
         teeth, planets = cycle.tooth_load.shape[1], np.arange(1, gears.n_planets + 1)
-        return dataset(
+        return Contents(
             declared(variables, values),
             coords=self._over_width(width)
             | self._places_between()
@@ -467,7 +468,7 @@ class StressResult(StageResult):
         """List what stress.nc says against itself, see `stress_warnings`."""
         return stress_warnings(data)
 
-    def dataset(self) -> xr.Dataset:
+    def contents(self) -> Contents:
         """Collect the contents of stress.nc."""
         cycle, edges = self.cycle, self.spectrum.edges
         values: dict[str, Any] = root_values(self.roots) | self.worst_roots() | self._ranges() | self._loads()
@@ -504,7 +505,7 @@ class StressResult(StageResult):
             "load_counting": _COUNTING,
             "iso": self.nominal.message,
         }
-        return dataset(declared(STRESS_VARIABLES, values), coords, attributes)
+        return Contents(declared(STRESS_VARIABLES, values), coords, attributes)
 
     def worst_roots(self) -> dict[str, np.ndarray]:
         """Find the largest stress in the root of the loaded flank of every gear in every mesh, and its place.
