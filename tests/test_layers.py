@@ -11,7 +11,7 @@ import pytest
 
 PACKAGE = Path(__file__).parents[1] / "femgear"
 LAYERS = (
-    ("errors", "remembered"),
+    ("curves", "errors", "remembered"),
     ("findings",),
     ("gears", "fe"),
     ("contact", "system"),

@@ -27,6 +27,7 @@ from femgear.contact.cycle import (
 )
 from femgear.contact.face_width import over_slices
 from femgear.contact.supports import RIGID, Supports
+from femgear.curves import makima
 from femgear.gears.deviations import SetDeviations, common_period, planet_shift, without_turning
 from femgear.gears.planetary import GearSet
 
@@ -75,17 +76,14 @@ class LoadedPeriod:
         Between jumps by cubics (Akima's, modified): straight lines would make harmonics of their own, images
         of the low ones beside the number of positions.
         """
-        from scipy.interpolate import Akima1DInterpolator
-
         whole = self.periods
         at, values, tau = np.arange(count) / count * whole, getattr(self, name), self.position
         found = np.array([np.interp(at, tau, row, period=whole) for row in values])
         for piece, place, ends in self._smooth_pieces():
-            curve = Akima1DInterpolator(place, values[:, piece], axis=1, method="makima")
             for turn in (-whole, 0, whole):
                 first, last = np.searchsorted(at + turn, ends, side="left")
                 inside = slice(first, last + (last < count and at[last % count] + turn == ends[1]))
-                found[:, inside] = curve(at[inside] + turn)
+                found[:, inside] = makima(place, values[:, piece].T, at[inside] + turn).T
         return found
 
     def _smooth_pieces(self):

@@ -45,6 +45,7 @@ from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks, mesh_count
 from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
 from femgear.contact.width_waves import cosines
+from femgear.curves import not_a_knot
 from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import Material, plane_modulus, stiffness, wave_stiffness
 from femgear.fe.grid import Grid
@@ -333,12 +334,10 @@ def computed_waves(slices: int) -> np.ndarray:
 
 def _between_slices(slices: int) -> np.ndarray:
     """Parts (1 + K, N, N) of a slice's load in the stress of a slice, of the plane response and of waves."""
-    from scipy.interpolate import CubicSpline
-
     if slices == 1:
         return np.ones((1, 1, 1))
     T, known = cosines(slices), computed_waves(slices)
-    weights = CubicSpline(np.log(known), np.eye(len(known)))(np.log(np.arange(1, slices)))
+    weights = not_a_knot(np.log(known), np.eye(len(known)), np.log(np.arange(1, slices)))
     waves = np.einsum("mk,ms,mt->kst", weights, T[1:], T[1:])
     return np.concatenate([np.full((1, slices, slices), 1.0 / slices), waves])
 

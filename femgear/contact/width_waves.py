@@ -48,6 +48,7 @@ from femgear.contact.bodies import (
     station_weights,
 )
 from femgear.contact.local_compliance import depth_displacement, tip_corner
+from femgear.curves import not_a_knot
 from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import Material, material_of_each, stiffness, wave_stiffness
 from femgear.gears.pair import EACH
@@ -196,14 +197,12 @@ def slice_compliance(found: Candidates, rows: np.ndarray, waves: WidthWaves, sli
 
     (I, P, N, W, N, W), images as of `Candidates`; ``rows`` are positions (P, 1), of helical teeth (P, N).
     """
-    from scipy.interpolate import CubicSpline
-
     setup, W, (P, each) = found.setup, len(found.mesh), rows.shape
     if slices == 1:
         return np.zeros((setup.images, P, 1, W, 1, W))
     wanted = np.pi / waves.width * np.arange(1, slices)
     # weights of the waves that were computed in those of the slices, which are cubics between them
-    between = CubicSpline(np.log(waves.wave_number), np.eye(len(waves.wave_number)))(np.log(wanted))
+    between = not_a_knot(np.log(waves.wave_number), np.eye(len(waves.wave_number)), np.log(wanted))
     T = cosines(slices)[1:]
     if each > 1:
         return _along_helix(found, rows, waves, wanted, between)

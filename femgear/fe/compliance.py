@@ -156,9 +156,14 @@ def boundary_nodes(grid: Grid, name: str) -> np.ndarray:
 
 def mirror_nodes(grid: Grid) -> np.ndarray:
     """Permutation that maps every node of a symmetric grid to its mirror image in the x axis, shape (n,)."""
-    from scipy.spatial import KDTree
+    points, mirrored = np.asarray(grid.points), grid.points * np.array([1.0, -1.0])
+    image = np.empty(len(points), int)
+    image[np.lexsort(mirrored.T)] = np.lexsort(points.T)
+    if np.array_equal(points[image], mirrored):
+        return image
+    from scipy.spatial import KDTree  # takes long to import, and grids of `mirror` are symmetric to the bit
 
-    return np.asarray(KDTree(grid.points).query(grid.points * np.array([1.0, -1.0]))[1])
+    return np.asarray(KDTree(points).query(mirrored)[1])
 
 
 def mirrored_columns(columns: np.ndarray, image: np.ndarray) -> np.ndarray:

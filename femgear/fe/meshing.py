@@ -146,11 +146,16 @@ def _join(curves, inner, size):
 
 def _check_distinct(points, size):
     """Refuse corners that coincide."""
-    from scipy.spatial import KDTree
-
-    pairs = KDTree(points).query_pairs(CLOSE * size, output_type="ndarray")
+    order, pairs = np.argsort(points[:, 0], kind="stable"), np.zeros((0, 2), int)
+    for after in range(1, len(points)):
+        one, other = order[:-after], order[after:]
+        near = points[other, 0] - points[one, 0] <= CLOSE * size
+        if not near.any():  # nor are any further apart in this order
+            break
+        same = near & (np.hypot(*(points[one] - points[other]).T) <= CLOSE * size)
+        pairs = np.concatenate([pairs, np.stack([one[same], other[same]], axis=1)])
     if len(pairs):
-        a, b = points[pairs[0]]
+        a, b = points[np.sort(pairs[0])]
         raise GridError(
             f"{len(pairs)} pairs of corners coincide, the first at ({a[0]:.9g}, {a[1]:.9g}) m, "
             f"{np.hypot(*(a - b)):.3e} m apart",

@@ -26,6 +26,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from femgear.curves import not_a_knot
 from femgear.errors import CaseError, nvh_library
 from femgear.housing.sensor import SensorLines, carrier_components, carrier_turns, stored_lines
 
@@ -144,8 +145,6 @@ def _over_frequency(n: np.ndarray, x: np.ndarray, computed, most: float = np.inf
 
     At more than ``most`` x splines of the logarithm go through the values at as many.
     """
-    from scipy.interpolate import CubicSpline
-
     values, moving = np.zeros(x.shape, complex), x > 0
     n, x = n[moving], x[moving]
     if not len(x):
@@ -162,8 +161,8 @@ def _over_frequency(n: np.ndarray, x: np.ndarray, computed, most: float = np.inf
     for m, row in zip(range(int(n.max()) + 1), computed(nodes)):
         if between and (n == m).any():
             size = np.log(np.maximum(np.abs(row), 1e-300))
-            logarithm = CubicSpline(np.log(nodes), size + 1j * np.unwrap(np.angle(row)))
-            found[n == m] = np.exp(logarithm(np.log(x[n == m])))
+            logarithm = size + 1j * np.unwrap(np.angle(row))
+            found[n == m] = np.exp(not_a_knot(np.log(nodes), logarithm, np.log(x[n == m])))
         elif not between:
             found[n == m] = row[places[n == m]]
     values[moving] = found

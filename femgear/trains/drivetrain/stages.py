@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.curves import not_a_knot
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import campbell_data
@@ -268,12 +269,10 @@ def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> Averag
     per_turn : int
         Samples a turn, more than twice the highest order; orders above a half of it alias.
     """
-    from scipy.interpolate import CubicSpline
-
     angle = np.asarray(angle, float)
     count = int((angle[-1] - angle[0]) / (2.0 * np.pi) * per_turn)
     even = angle[0] + 2.0 * np.pi / per_turn * np.arange(count)
-    tracked = CubicSpline(angle, np.asarray(signal, float))(even)
+    tracked = not_a_knot(angle, np.asarray(signal, float), even)
     return averaged_spectrum(tracked, 1.0 / per_turn, resolution=resolution)
 
 
