@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from femgear.case.gear_set import planetary_set
     from femgear.case.sections import Case
     from femgear.errors import FemgearError
-    from femgear.run import solve
+    from femgear.run import live, solve
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
     from femgear.trains.reading import open_results, read_case, with_value, with_values
     from femgear.trains.static.stages import solve_static, solve_stress
@@ -18,6 +18,7 @@ __all__ = [
     "Case",
     "FemgearError",
     "__version__",
+    "live",
     "open_results",
     "planetary_set",
     "read_case",
@@ -34,6 +35,7 @@ __all__ = [
 _HOME = {
     "Case": "case.sections",
     "FemgearError": "errors",
+    "live": "run",
     "open_results": "trains.reading",
     "planetary_set": "case.gear_set",
     "read_case": "trains.reading",

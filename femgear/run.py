@@ -60,6 +60,7 @@ from femgear.storage.results import (
     versions,
     write_csv_tables,
 )
+from femgear.trains.live import Live
 from femgear.trains.protocol import (
     Drawn,
     Progress,
@@ -117,6 +118,15 @@ def solve(case: Any, only: str | None = None, *, progress: Progress = silent) ->
     return results
 
 
+def live(case: Any, *, progress: Progress = silent) -> Live:
+    """Make a handle of a case that answers again after changes, and keeps what they leave as it was.
+
+    ``handle = live("case.toml")``, and then ``handle.change({"operation.torque": "90 N m"}).housing``: see
+    `femgear.trains.live.Live`. The case is one from `femgear.read_case`, or what that reads.
+    """
+    return Live(case, cache=grid_cache(), progress=progress)
+
+
 def _asked(case: Any, only: str | None) -> tuple[Any, tuple[Stage, ...]]:
     """The case as it is computed up to its last stage, and the stages; refuses what they cannot represent."""
     check_case(case, only)
@@ -127,7 +137,7 @@ def _asked(case: Any, only: str | None) -> tuple[Any, tuple[Stage, ...]]:
 def _options(stage: Stage, progress: Progress) -> dict[str, Any]:
     """Options of a stage: folder of grids, and whom to tell how far it has come."""
     known = {"cache": grid_cache(), "progress": progress}
-    return {name: known[name] for name in stage.options}
+    return {name: known[name] for name in stage.options if name in known}
 
 
 _RECORDED = "wav", "uff", "quality"

@@ -1,7 +1,7 @@
-"""Entries of the case file on which a result depends.
+"""Entries of the case file on which a result depends: the one place that knows.
 
 No stage takes the result of another case (`check_entries`), and what many cases have in common is computed
-once (`Steps`).
+once (`Steps`): of equal entries a result is the same to the last digit.
 """
 
 from __future__ import annotations
@@ -10,10 +10,12 @@ import hashlib
 import json
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Set
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from femgear.case.gear_set import driving_torque
 from femgear.errors import CaseError
+from femgear.remembered import remembered
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -61,9 +63,16 @@ def static_entries(case: Any) -> Entries:
     return {"operation.torque": f"{sun:.9g} N m on the sun", **_entries(case, left_out, parts, kept=kept)}
 
 
+def solution_entries(case: Any) -> Entries:
+    """List all that decides the last digit of static solution and stresses: the torque as it is given too."""
+    given = {"operation.input": case.operation.input, "operation.torque": case.operation.torque}
+    return {**static_entries(case), **given, "static.stresses": case.static.stresses}
+
+
 def state_entries(case: Case) -> Entries:
-    """List the entries that decide the loaded state on the supports: of the modes, but for dynamics."""
-    return _entries(case, _DYNAMIC | {"operation.speeds", "dynamics"})
+    """List the entries that decide the loaded state on the supports: neither masses nor what turns fast."""
+    left_out = _DYNAMIC | {"operation.speeds", "dynamics", "motor", "brake"}
+    return _entries(case, left_out, {"mass", "inertia", "density"})
 
 
 def modal_entries(case: Any) -> Entries:
@@ -77,6 +86,26 @@ def dynamic_entries(case: Case) -> Entries:
     # a casing is known by the checksum of its files
     heard = ("form", "points", "sensor_angle", "microphone", "published", "structure.file", "structure.nodes")
     return _entries(case, (_DYNAMIC - {"housing"}) | {f"housing.{name}" for name in heard})
+
+
+def response_entries(case: Case) -> Entries:
+    """List the entries that decide the last digit of the response and of the level that it is judged by."""
+    return {**dynamic_entries(case), "housing.sensor_angle": case.housing.sensor_angle}
+
+
+def heard_entries(case: Case) -> Entries:
+    """List the entries that decide what the housing's sensors and microphone hear: not what is published."""
+    return _entries(case, (_DYNAMIC - {"housing"}) | {"housing.published"})
+
+
+def runup_entries(case: Case) -> Entries:
+    """List the entries that decide the run-up: those of what is heard, and its own."""
+    return _entries(case, (_DYNAMIC - {"housing", "runup"}) | {"housing.published"})
+
+
+def every_entry(case: Any) -> Entries:
+    """List all entries, of which a stage that names none may take any."""
+    return {key: value for key, value, *_ in _entries_of(case)}
 
 
 def compliance_entries(case: Case) -> Entries:
@@ -97,10 +126,19 @@ def _entries(
     """Entries without tables and keys that are left out, but for those kept, and without parts of keys."""
     return {
         key: value
-        for key, value in _flat(case.model_dump())
-        if (key in kept or not any(f"{key}.".startswith(f"{name}.") for name in left_out))
-        and parts.isdisjoint(key.split("."))
+        for key, value, within, own in _entries_of(case)
+        if (key in kept or left_out.isdisjoint(within)) and parts.isdisjoint(own)
     }
+
+
+@remembered(latest=16)
+def _entries_of(case: Any) -> list[tuple[str, object, list[str], list[str]]]:
+    """Dotted keys and values, with the keys of the tables around each and its own, and its parts."""
+    found = []
+    for key, value in _flat(case.model_dump()):
+        parts = key.split(".")
+        found.append((key, value, [*accumulate(parts, "{}.{}".format)], parts))
+    return found
 
 
 def check_entries(result: Any, kind: type, case_entries: Entries, words: str) -> None:

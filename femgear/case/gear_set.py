@@ -240,6 +240,7 @@ def _largest_root_radius(case: Case, key: str, codes: tuple[str, ...]) -> float 
     return (first - 1) / 1e4 if first else None
 
 
+@remembered(latest=16)
 def set_deviations(case: Any) -> SetDeviations:
     """Turn modifications and errors of a case into separations of the loaded flanks [m].
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import sys
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from functools import cached_property
 
 import numpy as np
 
@@ -71,11 +72,23 @@ class LoadedPeriod:
     periods: int = 1
 
     def resampled(self, name: str, count: int) -> np.ndarray:
-        """Values (meshes, count) of one of the arrays (meshes, P) at equidistant positions.
+        """Values (meshes, count) of one of the arrays (meshes, P) at equidistant positions, made once.
 
         Between jumps by cubics (Akima's, modified): straight lines would make harmonics of their own, images
         of the low ones beside the number of positions.
         """
+        known = self._resampled
+        if (name, count) not in known:
+            known[name, count] = self._curves(name, count)
+            known[name, count].setflags(write=False)
+        return known[name, count]
+
+    @cached_property
+    def _resampled(self) -> dict[tuple[str, int], np.ndarray]:
+        """What was resampled: variants of a set take the same arrays."""
+        return {}
+
+    def _curves(self, name: str, count: int) -> np.ndarray:
         whole = self.periods
         at, values, tau = np.arange(count) / count * whole, getattr(self, name), self.position
         found = np.array([np.interp(at, tau, row, period=whole) for row in values])

@@ -27,14 +27,15 @@ from pathlib import Path
 import numpy as np
 
 from femgear import __version__
-from femgear.case.dependencies import Steps, compliance_entries
+from femgear.case.dependencies import Steps
 from femgear.case.sections import Case
 from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.findings import Finding, tell
 from femgear.storage.files import exclusive_lock, storage_errors
-from femgear.study.objectives import STAGES, Quantity, Variant
+from femgear.study.objectives import STAGES, Quantity
 from femgear.study.problem import Limit, Point, Problem, Variable, Vector
 from femgear.study.runner import Runner, check_complete
+from femgear.trains.live import Answer
 from femgear.trains.protocol import Progress
 from femgear.trains.reading import to_toml, with_values
 
@@ -245,9 +246,10 @@ class Designs:
         self.case, self.journal, self.runner = case, journal, runner or Runner()
         self.seconds = 0.0
         self._computed: set[str] = set()
-        self._keys, self._cache, self._progress = keys, cache, progress
-        self._steps, self._own = Steps(), compliance_entries(case)
-        self._last: tuple[str, Variant] | None = None
+        self._keys, self._progress = keys, progress
+        # grids of other geometries are not left in the folder
+        self._first = Answer(case, Steps(), cache=cache)
+        self._last = json.dumps(()), self._first
         self._packed = pickle.dumps((case, keys, cache))
 
     def __reduce__(self):
@@ -274,14 +276,11 @@ class Designs:
         pairs = zip(self._keys, point, strict=True)
         return with_values(self.case, {key: value for keys, value in pairs for key in keys})
 
-    def variant(self, point: Point) -> Variant:
+    def answer(self, point: Point) -> Answer:
         """Give the stages of a point; those of the last one are kept for further questions."""
         key = json.dumps(point)
-        if self._last is None or self._last[0] != key:
-            case = self.at(point)
-            # grids of other geometries would fill the folder
-            cache = self._cache if compliance_entries(case) == self._own else None
-            self._last = key, Variant(case, self._steps, cache)
+        if self._last[0] != key:
+            self._last = key, self._first.of(self.at(point))
         return self._last[1]
 
     def values(self, point: Point, quantities: Sequence[Quantity]) -> dict[str, float]:
@@ -325,7 +324,7 @@ class Designs:
         def values(quantities: Sequence[Quantity]) -> dict[str, float]:
             missing = [quantity for quantity in quantities if quantity.name not in found]
             for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
-                found[quantity.name] = float(_finite(quantity, quantity.compute(self.variant(point))))
+                found[quantity.name] = float(_finite(quantity, quantity.compute(self.answer(point))))
             return found
 
         record: dict = {"values": found}

@@ -1,35 +1,31 @@
 """What can be minimised or limited: numbers that follow from a case, each from as few stages as it needs.
 
-`Variant` holds the stages of one case, `Quantity` takes a number from them, and `named_quantity` finds it by
-the words of a command line.
+`femgear.trains.live.Answer` holds the stages of one case, `Quantity` takes a number from them, and
+`named_quantity` finds it by the words of a command line.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property, partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from functools import partial
+from typing import TYPE_CHECKING, Literal, get_args
 
 import numpy as np
 
 from femgear.case.checks import LEAST_TORQUE
-from femgear.case.dependencies import Steps, static_entries
+from femgear.case.dependencies import response_entries
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import ACCELERATION, FREQUENCY, SPEED, TORQUE, Dimension, to_si
 from femgear.case.sections import LARGEST_TORQUE, Case
 from femgear.errors import CaseError
 from femgear.gears.gear import tooth_thickness
 from femgear.trains.elastic import stages as elastic_stages
-from femgear.trains.reading import with_value
-from femgear.trains.static import stages as static_stages
+from femgear.trains.live import Answer
+from femgear.trains.reading import with_values
 
 if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
     from femgear.system.system import Response
-    from femgear.trains.elastic.results import HousingResult, ModesResult
-    from femgear.trains.static.results import StaticResult, StressResult
 
 Mesh = Literal["largest", "overall", "sun-planet", "planet-ring"]
 _MeshKind = Literal["sun-planet", "planet-ring"]
@@ -46,84 +42,21 @@ STAGES = ("gears", "static", "stress", "modes", "dynamics", "housing")
 """In the order of their effort."""
 
 
-class Variant:
-    """The stages of one case, each computed when it is first asked for.
+def under_torque(answer: Answer, torque: float | None) -> Answer:
+    """Give the answer under a torque on the input [N m], by default that of the case."""
+    if torque is None:
+        return answer
+    operation = answer.case.operation.model_copy(update={"torque": torque})
+    return answer.of(answer.case.model_copy(update={"operation": operation}))
 
-    Parameters
-    ----------
-    steps : Steps
-        What variants of a case share: flank compliances, static solutions, loaded states, ring models.
-    cache : path, optional
-        Folder of generated grids.
-    """
 
-    def __init__(self, case: Case, steps: Steps, cache: Path | None = None):
-        self.case, self._steps, self._cache = case, steps, cache
-        self._found: dict[tuple, Any] = {}
-
-    def _once(self, *key, compute: Callable[[], Any]):
-        """What was found under a key, else computed now."""
-        if key not in self._found:
-            self._found[key] = compute()
-        return self._found[key]
-
-    @cached_property
-    def gears(self) -> PlanetarySet:
-        """Gears, closed and checked."""
-        return planetary_set(self.case)
-
-    def static(self, torque: float | None = None) -> StaticResult:
-        """Solve the static problem under a torque on the input [N m], by default that of the case."""
-        case, steps = self.case, self._steps
-        if torque is not None:
-            operation = case.operation.model_copy(update={"torque": torque})
-            case = case.model_copy(update={"operation": operation})
-
-        def compute():
-            # the torque to its last digit: which case came first decides nothing
-            known = {**static_entries(case), "static.stresses": case.static.stresses}
-            known |= {"operation": (case.operation.input, case.operation.torque)}
-            return steps.kept("static", known) or steps.keep(
-                "static", known, static_stages.solve_static(case, cache=self._cache, steps=steps)
-            )
-
-        return self._once("static", case.operation.torque, compute=compute)
-
-    def stress(self) -> StressResult:
-        """Compute root stresses [Pa] under the torque of the case."""
-        return self._once("stress", compute=lambda: static_stages.solve_stress(self.case, self.static()))
-
-    def modes(self) -> ModesResult:
-        """Solve for the modal basis at the speeds of the case."""
-        return self._once(
-            "modes", compute=lambda: elastic_stages.solve_modes(self.case, self.static(), steps=self._steps)
-        )
-
-    def response(self, speeds: Range) -> Response:
-        """Compute the periodic response at a range of speeds [rad/s], without verdict on its stability."""
-        return self._once(
-            "response", speeds, compute=lambda: elastic_stages.solve_response(*self._modes(speeds))
-        )
-
-    def housing(self, speeds: Range) -> HousingResult:
-        """Compute the acceleration [m/s^2] at the sensor on the ring at a range of speeds."""
-
-        def compute():
-            case, modes = self._modes(speeds)
-            return elastic_stages.solve_housing(
-                case, elastic_stages.solve_dynamics(case, self.static(), modes)
-            )
-
-        return self._once("housing", speeds, compute=compute)
-
-    def _modes(self, speeds: Range) -> tuple[Case, ModesResult]:
-        """The case at a range of speeds, and its modal basis."""
-
-        def compute():
-            case = at_speeds(self.case, speeds)
-            return case, elastic_stages.solve_modes(case, self.static(), steps=self._steps)
-
-        return self._once("modes", speeds, compute=compute)
+def response_at(answer: Answer, speeds: Range) -> Response:
+    """Compute the periodic response at a range of speeds [rad/s], without verdict on its stability."""
+    there = answer.of(at_speeds(answer.case, speeds))
+    entries = response_entries(there.case)
+    return answer.steps.kept("response", entries) or answer.steps.keep(
+        "response", entries, elastic_stages.solve_response(there.case, there.modes)
+    )
 
 
 def at_speeds(case: Case, speeds: Range) -> Case:
@@ -134,8 +67,8 @@ def at_speeds(case: Case, speeds: Range) -> Case:
     need_elastic_ring(case, "mesh forces over speed and housing levels need")
     first, last, count = speeds
     low, high = (f"{value / SPEED.scale:.12g} rpm" for value in (first, last))
-    case = with_value(case, "housing.published", None)
-    return with_value(case, "operation.speeds", {"from": low, "to": high, "count": count})
+    there = {"from": low, "to": high, "count": count}
+    return with_values(case, {"housing.published": None, "operation.speeds": there})
 
 
 def need_elastic_ring(case: Case, subject: str) -> None:
@@ -161,7 +94,7 @@ class Quantity:
     stage : str
         Last stage that it needs: "gears", "static", "stress", "modes", "dynamics" or "housing".
     compute : callable
-        ``(Variant) -> float`` in SI units.
+        ``(Answer) -> float`` in SI units.
     signal : callable, optional
         Of a transmission error [m] ``(sun_arc, deflection, N) -> (K, P) array``: its largest peak to peak.
     torque : float, optional
@@ -171,7 +104,7 @@ class Quantity:
     name: str
     dimension: Dimension
     stage: str
-    compute: Callable[[Variant], float]
+    compute: Callable[[Answer], float]
     signal: Callable | None = None
     torque: float | None = None
 
@@ -212,8 +145,8 @@ def _signal(mesh: Mesh, arc: np.ndarray, deflection: np.ndarray, n: int) -> np.n
     return np.vstack([arc, deflection]) if mesh == "largest" else kinds[mesh]
 
 
-def _peak_to_peak(signal: Callable, torque: float | None, variant: Variant) -> float:
-    cycle = variant.static(torque).cycle
+def _peak_to_peak(signal: Callable, torque: float | None, answer: Answer) -> float:
+    cycle = under_torque(answer, torque).static.cycle
     arc, meshes = (cycle.extremes(name) for name in ("sun_arc", "deflection"))
     low, high = (signal(arc[i], meshes[i][:, None], len(meshes[i]) // 2) for i in (0, 1))
     return float((high - low).max())
@@ -234,8 +167,8 @@ def mesh_force(
     )
 
 
-def _largest_force(at: Range, dynamic: bool, variant: Variant) -> float:
-    return float(forces_over_time(variant.response(at).force, dynamic=dynamic).max())
+def _largest_force(at: Range, dynamic: bool, answer: Answer) -> float:
+    return float(forces_over_time(response_at(answer, at).force, dynamic=dynamic).max())
 
 
 def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
@@ -267,8 +200,9 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     )
 
 
-def _largest_level(at: Range, variant: Variant) -> float:
-    return float(np.abs(variant.housing(at).exact.acceleration).max())
+def _largest_level(at: Range, answer: Answer) -> float:
+    there = answer.of(at_speeds(answer.case, at))
+    return float(np.abs(there.housing.exact.acceleration).max())
 
 
 def natural_frequency(mode: int) -> Quantity:
@@ -283,8 +217,8 @@ def natural_frequency(mode: int) -> Quantity:
     return Quantity(f"natural frequency {mode}", FREQUENCY, "modes", partial(_frequency, mode))
 
 
-def _frequency(mode: int, variant: Variant) -> float:
-    found = variant.modes().modes.frequency
+def _frequency(mode: int, answer: Answer) -> float:
+    found = answer.modes.modes.frequency
     if mode > len(found):
         raise CaseError(
             f"the modal basis ends before this mode, with number {len(found)} at {found[-1]:.5g} Hz",
@@ -303,8 +237,8 @@ def contact_ratio(mesh: _MeshKind) -> Quantity:
     return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", partial(_of_gears, name))
 
 
-def _of_gears(name: str, variant: Variant) -> float:
-    return float(getattr(variant.gears, name))
+def _of_gears(name: str, answer: Answer) -> float:
+    return float(getattr(planetary_set(answer.case), name))
 
 
 def tip_thickness(gear: _GearName) -> Quantity:
@@ -313,8 +247,8 @@ def tip_thickness(gear: _GearName) -> Quantity:
     return Quantity(f"tip thickness over module, {gear}", NUMBER, "gears", partial(_tip_thickness, name))
 
 
-def _tip_thickness(name: str, variant: Variant) -> float:
-    found = getattr(variant.gears, name)
+def _tip_thickness(name: str, answer: Answer) -> float:
+    found = getattr(planetary_set(answer.case), name)
     return float(tooth_thickness(found, found.tip_radius)) / found.module
 
 
@@ -323,8 +257,8 @@ def contact_pressure() -> Quantity:
     return Quantity("contact pressure", _STRESS, "static", _largest_pressure)
 
 
-def _largest_pressure(variant: Variant) -> float:
-    return float(variant.static().cycle.extremes("max_pressure")[1].max())
+def _largest_pressure(answer: Answer) -> float:
+    return float(answer.static.cycle.extremes("max_pressure")[1].max())
 
 
 def root_stress(gear: _GearName) -> Quantity:
@@ -334,8 +268,8 @@ def root_stress(gear: _GearName) -> Quantity:
     return Quantity(f"root stress, {gear}", _STRESS, "stress", partial(_largest_stress, wanted))
 
 
-def _largest_stress(wanted: tuple[tuple[int, int], ...], variant: Variant) -> float:
-    n, largest = variant.gears.n_planets, variant.stress().worst_roots()["root_worst"]
+def _largest_stress(wanted: tuple[tuple[int, int], ...], answer: Answer) -> float:
+    n, largest = planetary_set(answer.case).n_planets, answer.stress.worst_roots()["root_worst"]
     return max(float(largest[k * n : (k + 1) * n, gear].max()) for k, gear in wanted)
 
 

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.dependencies import Steps
 from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.flank_pairs import mesh_pairs
@@ -24,7 +25,7 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.modifications import FlankForm, TipRelief
 from femgear.trains.protocol import Progress, one_blas_thread
-from femgear.trains.static.stages import flank_compliances, static_supports
+from femgear.trains.static.stages import known_compliances, static_supports
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -99,10 +100,11 @@ class DesignBasis:
 
 
 @one_blas_thread()
-def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
+def design_basis(case: Case, *, cache: Path | None = None, steps: Steps | None = None) -> DesignBasis:
     """Collect gears, compliances, deviations, supports and positions of the static problem of a case.
 
-    ``cache`` is the folder of generated grids.
+    ``cache`` is the folder of generated grids; flank compliances of other cases are taken from ``steps``
+    where they are those of this one, as in `femgear.trains.static.stages.solve_static`.
     """
     if case.static.slices > 1:
         raise CaseError(
@@ -110,7 +112,7 @@ def design_basis(case: Case, *, cache: Path | None = None) -> DesignBasis:
             file=case.location("static.slices"), remedy="leave static.slices and modifications of leads out",
         )  # fmt: skip
     gears, deviations = planetary_set(case), set_deviations(case)
-    bodies = flank_compliances(case, gears, cache=cache)[1]
+    bodies = known_compliances(case, gears, steps or Steps(), cache=cache)[1]
     own = None if deviations.ideal else deviations
     return DesignBasis(gears, bodies, static_supports(case), own, case.static.positions, case.static.contact)
 

@@ -29,6 +29,7 @@ from femgear.case.gear_set import set_deviations
 from femgear.case.sections import Case
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
 from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Tolerance, evaluations, tolerances
+from femgear.study.objectives import under_torque
 from femgear.study.problem import Point, Problem, Variable, Vector, start_point
 from femgear.study.relief import DesignBasis
 from femgear.study.runner import Runner
@@ -493,8 +494,9 @@ def signals(evaluations: Evaluations, x: Vector) -> tuple[np.ndarray, np.ndarray
 def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     """As `signals`, from the contact problem at the point."""
     problem = evaluations.problem
-    variant, objective = evaluations.designs.variant(problem.point(x)), problem.objective
-    case, static = variant.case, variant.static(objective.torque)
+    objective = problem.objective
+    answer = under_torque(evaluations.designs.answer(problem.point(x)), objective.torque)
+    case, static = answer.case, answer.static
     basis = DesignBasis(
         static.planetary_set, static.bodies, static_supports(case), set_deviations(case),
         case.static.positions, case.static.contact,

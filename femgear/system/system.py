@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -101,6 +102,15 @@ class MeshExcitation:
 
     def __post_init__(self):
         freeze(self)
+
+    @cached_property
+    def every_harmonic(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """All harmonics of stiffness, deflection and force that the record holds, see `mesh_harmonics`."""
+        most = (self.stiffness.shape[1] - 1) // 2
+        stiffness, deflection, force = (
+            harmonics_of(array, most) for array in (self.stiffness, self.deflection, self.force)
+        )
+        return stiffness, deflection, force
 
 
 @dataclass(frozen=True)
@@ -259,7 +269,10 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
     if excitation.periods < 1:
         raise CaseError("the record spans no period", code="E-HARMONICS", value=excitation.periods)
     lines = int(count) * excitation.periods
-    stiffness, deflection, force = (harmonics_of(array, lines) for array in arrays)
+    most = (excitation.stiffness.shape[1] - 1) // 2
+    if lines > most:
+        harmonics_of(excitation.stiffness, lines)  # says so
+    stiffness, deflection, force = (found[:, : lines + 1].copy() for found in excitation.every_harmonic)
     return stiffness, deflection, force
 
 

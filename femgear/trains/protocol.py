@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import scipy
 
+from femgear.case.dependencies import Entries, every_entry
 from femgear.errors import FemgearError
 from femgear.findings import by_severity, once
 from femgear.report.tables import Block, listed
@@ -174,7 +175,8 @@ class Stage:
     takes : tuple of str
         Stages whose results it goes on from.
     options : tuple of str
-        Of ``"cache"``, the folder of generated grids, and ``"progress"``, whom to tell how far it has come.
+        Of ``"cache"``, the folder of generated grids, ``"progress"``, whom to tell how far it has come, and
+        ``"steps"``, what other cases have left (`femgear.case.dependencies.Steps`).
     wanted : callable
         ``(case) -> bool``: whether a run without ``only`` computes it.
     unavailable : callable
@@ -190,6 +192,8 @@ class Stage:
     warnings : callable
         ``(Dataset) -> findings``: what the solver says against the contents of the stage's file, the
         `StageResult.warnings` of its results.
+    decided_by : callable
+        ``(case) -> entries``: all of the case that decides the result; of equal ones it is the same.
     """
 
     name: str
@@ -207,6 +211,7 @@ class Stage:
     check: Callable[[Any], object] | None = None
     tables: Callable[[Results], Iterable[Block]] = lambda results: ()
     warnings: Callable[[xr.Dataset], Iterable[Finding]] = lambda data: ()
+    decided_by: Callable[[Any], Entries] = every_entry
 
     def before(self, case: Any) -> tuple[str, ...]:
         """List the stages that must come before this one."""

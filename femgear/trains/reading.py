@@ -179,9 +179,14 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     CaseError
         As `read_case`; unknown keys are refused with the nearest valid one.
     """
-    data = case_text.parse(case.source, case.name)
+    data, problems = case_text.parse(case.source, case.name), list[CaseError]()
     for key, value in values.items():
-        _change(data, key, value, case.name)
+        try:
+            _change(data, key, value, case.name)
+        except CaseError as error:
+            problems.append(error)
+    if problems:
+        raise combine(problems, "", case.name)
     try:
         text = case_text.write(data)
     except CaseError as error:

@@ -9,8 +9,9 @@ from femgear.case.dependencies import Steps
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.peaks import TOLERANCE, open_places, peak_doubt, tooth_pair_codes
-from femgear.study.objectives import Variant, transmission_error
+from femgear.study.objectives import transmission_error
 from femgear.study.relief import design_basis, harris_map, sun_torque, with_tip_relief
+from femgear.trains.live import Answer
 from femgear.trains.reading import with_values
 from femgear.trains.static.stages import solve_static, solve_stress
 
@@ -158,7 +159,7 @@ def test_maps_have_the_numbers_of_a_run(tmp_path):
     stored = data["ste_peak_to_peak"].values.reshape(2, -1).max(axis=1)
     assert found.peak_to_peak[0, :, 0] == pytest.approx(stored, rel=1e-9)
     assert found.overall[0, 0] == pytest.approx(data["ste_overall_peak_to_peak"].values[0], rel=1e-9)
-    variant = Variant(case, Steps(), tmp_path)
+    variant = Answer(case, Steps(), cache=tmp_path)
     assert transmission_error("sun-planet").compute(variant) == pytest.approx(stored[0], rel=1e-9)
     assert 0.05 < data.attrs["peaks_cut_off"] < 0.6
     assert (stored > np.ptp(data["ste"].values, axis=1).reshape(2, -1).max(axis=1)).all()

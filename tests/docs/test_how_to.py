@@ -18,11 +18,11 @@ from page_examples import ROOT, read_page, run_examples
 from femgear import cli, open_results, read_case, solve, with_values
 from femgear.trains import registry
 
-PAGES = ("pin_errors", "faq", "api", pytest.param("silent_without_load", marks=pytest.mark.slow))
+PAGES = ("pin_errors", "faq", "api", "live", pytest.param("silent_without_load", marks=pytest.mark.slow))
 TUTORIAL = ("drawing_to_ste",)
 HOW_TO = (
     "how_to", "silent_without_load", "choosing_teeth", "optimise", "side_bands", "pin_errors", "misaligned",
-    "crowning", "bolts", "casings", "run_up_sound", "samples", "cluster", "plugin", "faq",
+    "crowning", "bolts", "casings", "run_up_sound", "samples", "live", "cluster", "plugin", "faq",
 )  # fmt: skip
 
 

@@ -11,7 +11,6 @@ from femgear.case.quantities import FREQUENCY, SPEED
 from femgear.errors import CaseError
 from femgear.study.objectives import (
     Quantity,
-    Variant,
     at_speeds,
     contact_pressure,
     contact_ratio,
@@ -20,12 +19,14 @@ from femgear.study.objectives import (
     mesh_force,
     named_quantity,
     natural_frequency,
+    response_at,
     root_stress,
     tip_thickness,
     transmission_error,
 )
 from femgear.study.problem import parse_limit, parse_variable, tip_reliefs
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.live import Answer
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.static.stages import solve_static
 
@@ -55,11 +56,11 @@ def steps():
 @pytest.fixture(scope="module")
 def reused(coarse, grids, steps):
     """A variant with reliefs that takes compliances and dynamic model from the one without."""
-    first = Variant(coarse, steps, grids)
-    first.response(RANGE)
+    first = Answer(coarse, steps, cache=grids)
+    response_at(first, RANGE)
     changes = {"sun.modifications[0].amount": "5 um", "planet.modifications[0].amount": "5 um"}
-    variant = Variant(with_values(coarse, changes), steps, grids)
-    variant.response(RANGE)
+    variant = Answer(with_values(coarse, changes), steps, cache=grids)
+    response_at(variant, RANGE)
     return first, variant
 
 
@@ -76,11 +77,13 @@ def whole(reused, grids):
 def test_variants_are_what_the_pipeline_computes(reused, whole):
     first, variant = reused
     _, static, dynamics, _ = whole
-    assert variant.static().bodies is first.static().bodies
+    assert variant.static.bodies is first.static.bodies
     for name in ("sun_arc", "deflection", "force", "stiffness"):
-        np.testing.assert_array_equal(getattr(variant.static().cycle, name), getattr(static.cycle, name))
-    np.testing.assert_allclose(variant.response(RANGE).force, dynamics.response.force, rtol=1e-9, atol=1e-7)
-    assert np.ptp(variant.static().cycle.sun_arc) < 0.9 * np.ptp(first.static().cycle.sun_arc)
+        np.testing.assert_array_equal(getattr(variant.static.cycle, name), getattr(static.cycle, name))
+    np.testing.assert_allclose(
+        response_at(variant, RANGE).force, dynamics.response.force, rtol=1e-9, atol=1e-7
+    )
+    assert np.ptp(variant.static.cycle.sun_arc) < 0.9 * np.ptp(first.static.cycle.sun_arc)
 
 
 def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
@@ -134,13 +137,13 @@ def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
 def test_shared_steps_change_no_number(coarse, grids, steps, changes):
     """A variant that differs in masses, loads or supports, with all that others left behind."""
     case = with_values(coarse, changes)
-    shared, alone = Variant(case, steps, grids), Variant(case, Steps(), grids)
-    np.testing.assert_array_equal(shared.static().cycle.deflection, alone.static().cycle.deflection)
-    np.testing.assert_array_equal(shared.response(RANGE).force, alone.response(RANGE).force)
+    shared, alone = Answer(case, steps, cache=grids), Answer(case, Steps(), cache=grids)
+    np.testing.assert_array_equal(shared.static.cycle.deflection, alone.static.cycle.deflection)
+    np.testing.assert_array_equal(response_at(shared, RANGE).force, response_at(alone, RANGE).force)
 
 
 def test_quantities_of_the_gears(coarse):
-    variant = Variant(coarse, Steps())
+    variant = Answer(coarse, Steps())
     gears = planetary_set(coarse)
     assert contact_ratio("sun-planet").compute(variant) == gears.contact_ratio_sun_planet
     # tooth thickness at the tip after ISO 21771: d_a (s/d + inv a - inv a_a)
@@ -249,14 +252,14 @@ def test_the_optimum_of_the_page_is_one():
     assert len(values) == 8
     case, _ = tip_reliefs(read_case(CASE))
     case = with_values(case, {"static.positions": 40, "static.stresses": False})
-    steps, cache = Steps(), grid_cache()
-    before, after = Variant(case, steps, cache), Variant(with_values(case, values), steps, cache)
+    before = Answer(case, Steps(), cache=grid_cache())
+    after = before.of(with_values(case, values))
     for mesh in ("largest", "overall", "sun-planet"):
         ste = transmission_error(mesh)
         assert ste.compute(after) < 0.4 * ste.compute(before)
     ste = transmission_error("planet-ring")
     assert ste.compute(after) < ste.compute(before)
     forces = [
-        forces_over_time(one.response(RANGE).force, dynamic=True).max(axis=1) for one in (before, after)
+        forces_over_time(response_at(one, RANGE).force, dynamic=True).max(axis=1) for one in (before, after)
     ]
     assert np.all(forces[1] < forces[0]) and forces[1].max() < 0.5 * forces[0].max()

@@ -184,7 +184,7 @@ def test_derivatives_are_differences(relief_problem, grids):
     assert has_derivatives(relief_problem)
     with evaluations(relief_problem, cache=grids) as run:
         value, slopes = signals(run, [3.0])
-        cycles = [run.designs.variant(relief_problem.point([a])).static().cycle for a in (2.99, 3.0, 3.01)]
+        cycles = [run.designs.answer(relief_problem.point([a])).static.cycle for a in (2.99, 3.0, 3.01)]
     # the linearisation has the positions between as well, where the extremes lie
     common = np.isin(np.sort(np.append(cycles[1].position, cycles[1].between.position)), cycles[1].position)
     np.testing.assert_allclose(value[:, common], cycles[1].deflection[:3], rtol=1e-9)

@@ -46,6 +46,7 @@ def solve_spectral(
     tolerance: float = 1e-6,
     method: str = "auto",
     max_iterations: int = 100,
+    radius: bool = True,
 ) -> Response:
     """Solve for the periodic response of the gear meshes at all mesh frequencies.
 
@@ -76,6 +77,8 @@ def solve_spectral(
         the direct solution of the same equations elsewhere.
     max_iterations : int
         Of the fixed point.
+    radius : bool
+        Compute the spectral radius of the fixed point, which is else NaN; nothing else depends on it.
 
     Returns
     -------
@@ -98,12 +101,11 @@ def solve_spectral(
     lines: Any = [np.zeros((speeds, size, own + 1), complex) for size in (n, n, len(modes.frequency))]
     numbers: Any = [np.zeros(speeds, kind) for kind in (float, float, float, float, int, bool)]
     found = _Solved(*lines, *numbers)
+    how = _How(method, tolerance, max_iterations, radius)
     # speeds of similar numbers of harmonics stand together
     along = np.lexsort((frequency, kept[1]))
     for part in np.split(along, np.flatnonzero(np.diff(np.cumsum(kept[1, along] + 1) // _BATCH)) + 1):
-        _solve_batch(
-            modes, data, part, frequency / excitation.periods, kept, found, method, tolerance, max_iterations
-        )
+        _solve_batch(modes, data, part, frequency / excitation.periods, kept, found, how)
     return _response(frequency, found, method, tolerance, excitation.periods)
 
 
@@ -441,9 +443,17 @@ def _alone(n: int, count: int) -> Twins:
     return Twins(np.arange(n), np.arange(n), np.ones((n, count + 1), complex))
 
 
-def _solve_batch(
-    modes, data: _Data, part, fundamental, kept, found: _Solved, method, tolerance, max_iterations
-):
+@dataclass(frozen=True)
+class _How:
+    """What `solve_spectral` is asked for."""
+
+    method: str
+    tolerance: float
+    max_iterations: int
+    radius: bool
+
+
+def _solve_batch(modes, data: _Data, part, fundamental, kept, found: _Solved, how: _How):
     """Solve at some speeds, numbers ``part``, and write down what is found."""
     excited, own = kept[:, part]
     lines, leaders, group = np.arange(own.max() + 1), data.twins.leaders, data.twins.group
@@ -464,8 +474,8 @@ def _solve_batch(
     source = -transfer(receptance, forcing)
     source[..., 0] += modes.load_deflection[leaders, None]
     problem = HarmonicProblem(receptance, Product(stiffness), source)
-    found.radius[part] = spectral_radius(problem)
-    solution, found.iterations[part], found.direct[part] = _solve(problem, method, tolerance, max_iterations)
+    found.radius[part] = spectral_radius(problem) if how.radius else np.nan
+    solution, found.iterations[part], found.direct[part] = _solve(problem, how)
     total = (forcing + problem.product(solution)) * heard
     shift = data.twins.shift[:, None, :size]
     every, deflection = total[group] * shift, solution[group] * shift
@@ -486,23 +496,25 @@ def _solve_batch(
     found.tail[part] = _tail(deflection.transpose(1, 0, 2), own)
     found.lowest[part] = sample(force[leaders], 4 * size).min(axis=(0, 2))
     # the full equations decide: planets equal to 1e-9 only, or a last iteration that grew again
-    rough = ~(found.residual[part] <= tolerance)
-    if (rough.any() and method == "auto") or (rough.any() and method == "direct" and groups < n):
+    rough = ~(found.residual[part] <= how.tolerance)
+    if rough.any() and (how.method == "auto" or (how.method == "direct" and groups < n)):
         twins = _alone(n, data.stiffness.shape[1] - 1)
         whole = replace(data, twins=twins, classes=_classes(modes, twins))
-        _solve_batch(modes, whole, part[rough], fundamental, kept, found, "direct", tolerance, max_iterations)
+        _solve_batch(modes, whole, part[rough], fundamental, kept, found, replace(how, method="direct"))
 
 
-def _solve(problem: HarmonicProblem, method: str, tolerance: float, max_iterations: int):
+def _solve(problem: HarmonicProblem, how: _How):
     """Deflections, iterations and where the direct solution was used."""
     speeds = problem.source.shape[1]
-    if method == "direct":
+    if how.method == "direct":
         return solve_direct(problem), np.zeros(speeds, int), np.ones(speeds, bool)
-    deflection, iterations, done = _fixed_point(problem, tolerance, max_iterations, patient=method != "auto")
-    direct = (method == "auto") & ~done
+    deflection, iterations, done = _fixed_point(
+        problem, how.tolerance, how.max_iterations, patient=how.method != "auto"
+    )
+    direct = (how.method == "auto") & ~done
     chosen = np.flatnonzero(direct)
     if len(chosen):
-        deflection[:, chosen] = solve_direct(problem.take(chosen), max(0.5 * tolerance, _ROUNDING))
+        deflection[:, chosen] = solve_direct(problem.take(chosen), max(0.5 * how.tolerance, _ROUNDING))
     return deflection, iterations, direct
 
 

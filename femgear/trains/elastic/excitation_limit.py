@@ -94,22 +94,29 @@ def lines_on_foundation(
     case: Case, modes: ModesResult, frequency: np.ndarray, carrier: np.ndarray, limit: FrequencyLimit
 ) -> SensorLines:
     """Lines of the sensor of a ring on its foundation, see `Heard`."""
-    response = solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
+    response = solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case), radius=False)
     return sensor_lines(case, modes, response, carrier)
 
 
+def first_limit(case: Case, modes: ModesResult, frequency: np.ndarray) -> FrequencyLimit:
+    """Choose the limit (n_speeds,) of the excitation before levels are compared; frequencies in Hz."""
+    return limited(case, frequency, case.dynamics.up_to or modes.reach, given=case.dynamics.mesh_harmonics)
+
+
 def excitation_end(
-    case: Case, modes: ModesResult, heard: Heard, frequency: np.ndarray, carrier: np.ndarray
-) -> tuple[float, float, np.ndarray]:
+    case: Case, modes: ModesResult, heard: Heard, frequency: np.ndarray, carrier: np.ndarray,
+    level: np.ndarray | None = None,
+) -> tuple[float, float, np.ndarray]:  # fmt: skip
     """Choose where the excitation ends, from some speeds, so that the level has converged if it may.
 
     Frequency [Hz], that to which the level was compared [Hz], and its changes at the speeds [dB], nan where
     the equations with more excitation are nearly singular; mesh frequencies [Hz] and speeds of the carrier
-    [rad/s] are (n_speeds,).
+    [rad/s] are (n_speeds,). ``level`` (n_speeds,) is that with `first_limit` where it is known.
     """
     given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
-    limit = limited(case, frequency, up_to, given=given)
-    level = order_level(heard(frequency, carrier, limit))
+    limit = first_limit(case, modes, frequency)
+    if level is None:
+        level = order_level(heard(frequency, carrier, limit))
     while True:
         beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
         limit = limited(case, frequency, beyond)

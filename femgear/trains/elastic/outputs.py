@@ -20,10 +20,13 @@ if TYPE_CHECKING:
 
 def sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np.ndarray) -> SensorLines:
     """Lines of the fixed sensor at speeds of the carrier [rad/s]."""
-    field = mesh_and_ring_outputs(modes, response)[1]
-    angle = case.housing.sensor_angle
-    known = {"symmetry": modes.symmetry, "periods": response.periods}
-    return component_lines(field, case.ring.teeth, carrier, angle, **known)
+    return lines_of_field(case, modes, mesh_and_ring_outputs(modes, response)[1], carrier)
+
+
+def lines_of_field(case: Case, modes: ModesResult, field: np.ndarray, carrier: np.ndarray) -> SensorLines:
+    """Lines of the fixed sensor by the radial field of the ring, see `mesh_and_ring_outputs`."""
+    known = {"symmetry": modes.symmetry, "periods": modes.excitation.periods}
+    return component_lines(field, case.ring.teeth, carrier, case.housing.sensor_angle, **known)
 
 
 def mesh_and_ring_outputs(

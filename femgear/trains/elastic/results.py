@@ -49,6 +49,7 @@ from femgear.housing.sound import (
 from femgear.report.response import harmonics_of
 from femgear.report.tables import MANY, Block, Marks, chosen, in_decibels, lower_bound, tabulate
 from femgear.solvers.periodic.solution import CIRCLE
+from femgear.solvers.stability.parametric import stability
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
     FOURIER,
@@ -61,7 +62,7 @@ from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import NOTICEABLE, checked_speeds, dynamics_warnings, housing_warnings
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 from femgear.trains.elastic.runup import KINDS, loudest, meeting_columns
-from femgear.trains.protocol import StageResult
+from femgear.trains.protocol import StageResult, one_blas_thread
 from femgear.trains.static.results import HELD, LARGE, UNEQUAL, largest_pressure, peak_to_peak, shares
 
 if TYPE_CHECKING:
@@ -222,6 +223,19 @@ class FixedHousing:
 
 
 @dataclass(frozen=True)
+class Judged:
+    """What the Floquet verdict on a response is made of: `femgear.solvers.stability.parametric.stability`.
+
+    At mesh frequencies (speeds,) [Hz], with so many mesh harmonics of the stiffness.
+    """
+
+    modes: Modes
+    excitation: MeshExcitation
+    mesh_frequency: np.ndarray
+    harmonics: int
+
+
+@dataclass(frozen=True)
 class DynamicsResult(StageResult):
     """Periodic response at every ``input_speed`` (speeds,) [rad/s], stability, and field of the ring.
 
@@ -238,7 +252,7 @@ class DynamicsResult(StageResult):
     input_speed: np.ndarray
     speeds: tuple[Speeds, ...]
     response: Response
-    stability: Stability
+    judged: Judged
     dte: np.ndarray
     ring_radial: np.ndarray
     ring_tangential: np.ndarray
@@ -250,6 +264,13 @@ class DynamicsResult(StageResult):
     compared_to: float
     entries: Entries
     fixed: FixedHousing | None = None
+
+    @cached_property
+    @one_blas_thread()
+    def stability(self) -> Stability:
+        """Floquet verdict at every speed, computed when it is first asked for: what is heard needs none."""
+        of = self.judged
+        return stability(of.modes, of.excitation, of.mesh_frequency, excitation_harmonics=of.harmonics)
 
     @property
     def converged(self) -> bool:

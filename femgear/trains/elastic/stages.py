@@ -15,11 +15,15 @@ from functools import partial
 import numpy as np
 
 from femgear.case.dependencies import (
+    Entries,
     Steps,
     check_entries,
     dynamic_entries,
+    heard_entries,
     modal_entries,
+    response_entries,
     ring_entries,
+    runup_entries,
     state_entries,
     static_entries,
 )
@@ -33,6 +37,7 @@ from femgear.fe.elasticity import mass
 from femgear.findings import Finding
 from femgear.gears.deviations import common_period, rotational_symmetry
 from femgear.gears.planetary import PlanetarySet
+from femgear.housing.orders import order_level
 from femgear.housing.sensor import component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound
 from femgear.remembered import remembered
@@ -46,7 +51,7 @@ from femgear.solvers.linear.resonances import (
     unresolved,
 )
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
-from femgear.solvers.stability.parametric import decisive_harmonics, stability
+from femgear.solvers.stability.parametric import decisive_harmonics
 from femgear.system.mode_kinds import mode_kinds
 from femgear.system.system import Response
 from femgear.trains.elastic.checks import (
@@ -68,6 +73,7 @@ from femgear.trains.elastic.excitation_limit import (
     FrequencyLimit,
     Heard,
     excitation_end,
+    first_limit,
     highest_excitation,
     limited,
     lines_on_foundation,
@@ -94,12 +100,18 @@ from femgear.trains.elastic.model import (
     ring_field,
     ring_model,
 )
-from femgear.trains.elastic.outputs import mesh_and_ring_outputs, named_sensors, sensor_lines
+from femgear.trains.elastic.outputs import (
+    lines_of_field,
+    mesh_and_ring_outputs,
+    named_sensors,
+    sensor_lines,
+)
 from femgear.trains.elastic.results import (
     BEARING_FACTORS,
     DynamicsResult,
     FixedHousing,
     HousingResult,
+    Judged,
     ModesResult,
     describe_housing,
     level_changes,
@@ -145,6 +157,8 @@ _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
 _LINES_TOGETHER = 8000
 """Harmonics of the run-up's speeds that are in memory at a time."""
+_MOSTLY_COMPARED = 5
+"""Operating speeds over those that are compared up to which all are solved before."""
 _COMPARED = 4
 """Operating speeds at most at which levels in a housing that stands still are compared."""
 _BELOW_WAVES = 0.9
@@ -194,8 +208,9 @@ def solve_modes(
     stiffness = state.resampled("held_stiffness", RECORD * state.periods).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
     reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
-    ring = _ring_of_case(case, static, bodies, steps, reach)
-    excitation, flexibility = mesh_springs(gears, ring, state)
+    ring, known = _ring_of_case(case, static, bodies, steps, reach), {**known, "reach": reach}
+    springs = steps.kept("mesh springs", known)
+    excitation, flexibility = springs or steps.keep("mesh springs", known, mesh_springs(gears, ring, state))
     model = elastic_set(case, gears, ring, sun_torque=torque, flexibility=flexibility)
     modes = solve_eigenproblem(
         model.system,
@@ -330,8 +345,15 @@ def dynamics_parts(
     basis, excitation, gears = modes.modes, modes.excitation, static.planetary_set
     speeds, (frequency, carrier) = np.array(case.operation.speeds), _turning_speeds(case, modes)
     some, heard_lines = _compared_speeds(case), _heard_lines(case, modes)
-    up_to, beyond, change = _excitation_end(case, modes)
+    first, early, level = first_limit(case, modes, frequency), None, None
+    if _solved_before(case, modes, first, memory):
+        response = solve_spectral(basis, excitation, frequency, **first.options(case))
+        early = response, *mesh_and_ring_outputs(modes, response)
+        level = order_level(lines_of_field(case, modes, early[2][some], carrier[some]))
+    up_to, beyond, change = _excitation_end(case, modes, level)
     limit = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics)
+    if (first.excitation != limit.excitation).any():
+        early = None
     level_change = np.full(len(speeds), np.nan)
     level_change[some] = change
     slow = frequency * HARMONICS < beyond - frequency
@@ -342,17 +364,20 @@ def dynamics_parts(
     if case.housing.stands_still:
         room = room + housing_memory(case, modes, limit)
     for own, part in parts_of_speeds(case, room, memory):
-        response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
+        if early is None:
+            response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
+            dte, radial = mesh_and_ring_outputs(modes, response)
+        else:
+            response, dte, radial = early
         told.append(response.without_lines())
         if own[-1] + 1 == len(speeds) and part is not case:
             response = replace(response, message=joint_message(told))
         last = replace(response, **{name: getattr(response, name)[-1:] for name in _LINES})
         heard = response if any(math.sin(one.direction) for one in case.housing.sensor) else last
-        dte, radial = mesh_and_ring_outputs(modes, response)
         yield part, DynamicsResult(
             input_speed=speeds[own], response=response, dte=dte, ring_radial=radial,
             speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
-            stability=stability(basis, excitation, frequency[own], excitation_harmonics=decisive),
+            judged=Judged(basis, excitation, frequency[own], decisive),
             ring_tangential=mesh_and_ring_outputs(modes, heard, TANGENTIAL)[1],
             ring_teeth=gears.ring.teeth, symmetry=modes.symmetry, harmonics=int(limit.response.max()),
             excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
@@ -369,7 +394,7 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     CaseError: E-SPEED, as `solve_dynamics`.
     """
     frequency = _turning_speeds(case, modes)[0]
-    limit = limited(case, frequency, case.dynamics.up_to or modes.reach, given=case.dynamics.mesh_harmonics)
+    limit = first_limit(case, modes, frequency)
     return solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
 
 
@@ -384,11 +409,30 @@ def _compared_speeds(case: Case) -> np.ndarray:
     return checked_speeds(len(case.operation.speeds), *([_COMPARED] if case.housing.stands_still else []))
 
 
+def _solved_before(case: Case, modes: ModesResult, limit: FrequencyLimit, memory: float) -> bool:
+    """Whether all speeds are solved before levels are compared, so that most are not solved twice."""
+    room = _HARMONIC * limit.response.max() * modes.excitation.periods * len(limit.response)
+    few = len(limit.response) <= _MOSTLY_COMPARED * len(_compared_speeds(case))
+    return not (case.housing.stands_still or _known_ends(case, modes)) and few and room <= memory
+
+
+def _excitation_end(
+    case: Case, modes: ModesResult, level: np.ndarray | None = None
+) -> tuple[float, float, np.ndarray]:
+    """Choose where the excitation ends by the operating speeds, for run-up and dynamics alike.
+
+    With the ``level`` (n,) at those that are compared where it is known.
+    """
+    if not (known := _known_ends(case, modes)):
+        compared = (values[_compared_speeds(case)] for values in _turning_speeds(case, modes))
+        known.append(excitation_end(case, modes, _heard_lines(case, modes), *compared, level))
+    return known[0]
+
+
 @remembered(latest=2)
-def _excitation_end(case: Case, modes: ModesResult) -> tuple[float, float, np.ndarray]:
-    """Choose where the excitation ends by the operating speeds, for run-up and dynamics alike."""
-    compared = (values[_compared_speeds(case)] for values in _turning_speeds(case, modes))
-    return excitation_end(case, modes, _heard_lines(case, modes), *compared)
+def _known_ends(case: Case, modes: ModesResult) -> list[tuple[float, float, np.ndarray]]:
+    """Where the excitation ends, once that is found."""
+    return []
 
 
 def _heard_lines(case: Case, modes: ModesResult) -> Heard:
@@ -525,6 +569,12 @@ def _warnings(case: Case) -> Iterator[Finding]:
     yield from turning_errors_time(case)
 
 
+def _basis_entries(case: Case) -> Entries:
+    """List all that decides the last digit of the modal basis: its entries, and the excitation it is for."""
+    fastest = fastest_mesh_frequency(case, planetary_set(case))
+    return {**modal_entries(case), "excitation": highest_excitation(case, 0.0, fastest)}
+
+
 _FORMATS = {"wav": ("housing",), "uff": ("housing", "modes"), "quality": ("housing",)}
 """Formats of what a test bench would record, and the stages that they take."""
 
@@ -535,8 +585,9 @@ ELASTIC = Train(
         STATIC,
         STRESS,
         Stage(
-            name="modes", title="Modes", solve=solve_modes, takes=("static",), options=("progress",),
-            verdict=modes_verdict, describe=lambda results: describe_modes(results.modes),
+            name="modes", title="Modes", solve=solve_modes, takes=("static",), options=("progress", "steps"),
+            decided_by=_basis_entries, verdict=modes_verdict,
+            describe=lambda results: describe_modes(results.modes),
             needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
             check=lambda case: check_dynamic_case(case, planetary_set(case)),
         ),
@@ -546,6 +597,7 @@ ELASTIC = Train(
             solve=solve_runup,
             takes=("modes",),
             options=("progress",),
+            decided_by=runup_entries,
             verdict=lambda result: {"speeds": len(result.input_speed)},
             describe=lambda results: describe_runup(results.runup),
             warnings=RunupResult.warnings,
@@ -553,12 +605,13 @@ ELASTIC = Train(
         ),
         Stage(
             name="dynamics", title="Dynamics", solve=solve_dynamics, parts=dynamics_parts,
-            takes=("static", "modes"), options=("progress",), verdict=response_verdict,
-            describe=lambda results: describe_response(results.dynamics), warnings=DynamicsResult.warnings,
+            takes=("static", "modes"), options=("progress",), decided_by=response_entries,
+            verdict=response_verdict, describe=lambda results: describe_response(results.dynamics),
+            warnings=DynamicsResult.warnings,
         ),
         Stage(
             name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
-            verdict=lambda result: {"form": result.form},
+            decided_by=heard_entries, verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(
                 results.housing, level_changes(results), results.findings
             ),

@@ -17,7 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
+from femgear.case.dependencies import (
+    Steps,
+    check_entries,
+    compliance_entries,
+    solution_entries,
+    static_entries,
+)
 from femgear.case.gear_set import (
     case_overlap,
     driving_torque,
@@ -93,10 +99,7 @@ def solve_static(
     GridError, ContactError.
     """
     gears, deviations = planetary_set(case), set_deviations(case)
-    steps, known = steps or Steps(), compliance_entries(case)
-    sectors, bodies = steps.kept("flank compliances", known) or steps.keep(
-        "flank compliances", known, flank_compliances(case, gears, cache=cache)
-    )
+    sectors, bodies = known_compliances(case, gears, steps or Steps(), cache=cache)
     sun_torque = driving_torque(case)
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
     cycle = walk_mesh_cycle(
@@ -159,6 +162,16 @@ def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:
                 limit=f"{modules:g} modules, {modules * module * 1e3:.4g} mm",
                 remedy=remedy,
             )
+
+
+def known_compliances(
+    case: Case, gears: PlanetarySet, steps: Steps, *, cache: Path | None = None
+) -> tuple[Sectors, Bodies]:
+    """Take sector grids and flank compliances of a case from what others have left, or make them."""
+    known = compliance_entries(case)
+    return steps.kept("flank compliances", known) or steps.keep(
+        "flank compliances", known, flank_compliances(case, gears, cache=cache)
+    )
 
 
 def flank_compliances(
@@ -507,7 +520,8 @@ STATIC = Stage(
     name="static",
     title="Static",
     solve=solve_static,
-    options=("cache", "progress"),
+    options=("cache", "progress", "steps"),
+    decided_by=solution_entries,
     verdict=lambda result: {"contact": result.cycle.contact},
     describe=lambda results: describe_static(results.static),
     warnings=StaticResult.warnings,
@@ -521,6 +535,7 @@ STRESS = Stage(
     solve=solve_stress,
     takes=("static",),
     options=("progress",),
+    decided_by=solution_entries,
     verdict=lambda result: {
         "root_points": sum(len(root.arc) for root in result.roots),
         "iso": result.nominal.message,

@@ -53,7 +53,7 @@ def before():
 def uncompared(monkeypatch):
     """No comparison with more excitation, which takes most of the time: see test_frequency_limit.py."""
 
-    def end(case, modes, heard, frequency, carrier):
+    def end(case, modes, heard, frequency, carrier, level=None):
         return modes.reach, 2 * modes.reach, 0 * frequency
 
     monkeypatch.setattr(stages, "excitation_end", end)

@@ -130,9 +130,10 @@ def test_the_torque_passes_fourteen_functions(tmp_path):
 def test_no_function_after_reading_goes_back_to_the_text(tmp_path):
     """Once a case is read, neither its run nor a variant under another torque writes or reads a case text."""
     from femgear.case.dependencies import Steps
-    from femgear.study.objectives import Variant
+    from femgear.study.objectives import under_torque
+    from femgear.trains.live import Answer
 
-    variant = Variant(small_case(tmp_path), Steps())
+    answer = Answer(small_case(tmp_path), Steps())
     texts = {code_of(one) for one in (read_case, parse_case, to_si, femgear.with_values)}
     again = []
 
@@ -140,9 +141,10 @@ def test_no_function_after_reading_goes_back_to_the_text(tmp_path):
         if event == "call" and frame.f_code in texts:
             again.append(name_of(frame.f_code))
 
-    traced(watch, lambda: run_case(variant.case, tmp_path, pictures=False))
-    traced(watch, lambda: variant.static(50.0))
-    assert again == [] and variant.static(50.0).sun_torque == 50.0
+    traced(watch, lambda: run_case(answer.case, tmp_path, pictures=False))
+    other = under_torque(answer, 50.0)
+    traced(watch, lambda: other.static)
+    assert again == [] and other.static.sun_torque == 50.0
 
 
 if __name__ == "__main__":

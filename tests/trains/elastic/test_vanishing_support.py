@@ -32,7 +32,7 @@ NONE = 1e-7
     "seed", [seed if seed == SHOWN else pytest.param(seed, marks=pytest.mark.slow) for seed in range(29)]
 )
 def test_a_support_that_is_none_changes_nothing(seed, monkeypatch):
-    monkeypatch.setattr(stages, "excitation_end", lambda case, modes, heard, f, c: (modes.reach, 1.0, 0 * f))
+    monkeypatch.setattr(stages, "excitation_end", lambda case, modes, heard, f, *_: (modes.reach, 1.0, 0 * f))
     case = random_set(seed).case
     case = with_values(case, FEW | {"operation.speeds": [f"{case.operation.speeds[-1]} rad/s"]})
     ring = case.ring
