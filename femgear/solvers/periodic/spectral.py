@@ -101,10 +101,9 @@ def solve_spectral(
     lines: Any = [np.zeros((speeds, size, own + 1), complex) for size in (n, n, len(modes.frequency))]
     numbers: Any = [np.zeros(speeds, kind) for kind in (float, float, float, float, int, bool)]
     found = _Solved(*lines, *numbers)
-    how = _How(method, tolerance, max_iterations, radius)
-    # speeds of similar numbers of harmonics stand together
-    along = np.lexsort((frequency, kept[1]))
+    along = np.lexsort((frequency, kept[1]))  # speeds of similar numbers of harmonics stand together
     for part in np.split(along, np.flatnonzero(np.diff(np.cumsum(kept[1, along] + 1) // _BATCH)) + 1):
+        how = _How(method, tolerance, max_iterations, radius)
         _solve_batch(modes, data, part, frequency / excitation.periods, kept, found, how)
     return _response(frequency, found, method, tolerance, excitation.periods)
 
