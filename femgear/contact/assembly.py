@@ -44,6 +44,8 @@ HELD = 2.56
 ROUGH_STIFFNESS = 10e9
 """Stiffness of a mesh per face width, to size windows [N/m^2]."""
 
+MOST_ENLARGEMENTS = 11
+"""Of windows that do not contain the contact."""
 _SAME = 1e-9
 """Part of a mesh period that is none."""
 
@@ -436,12 +438,17 @@ def in_windows(
     share, nearest : float
         Of the first windows, as `mesh_windows` takes them [N], [m].
     """
-    for _ in range(12):
+    for _ in range(MOST_ENLARGEMENTS + 1):
         found, *wider = attempt(share, nearest)
         if found is not None and wider == [share, nearest]:
             return found
         share, nearest = wider
-    raise ContactError(
+    raise not_contained()
+
+
+def not_contained() -> ContactError:
+    """Make the refusal (E-CONTACT) of windows that do not contain the contact, however large."""
+    return ContactError(
         "the contact windows do not contain the contact after eleven enlargements",
         code="E-CONTACT",
         remedy="reduce operation.torque or the errors",

@@ -30,18 +30,10 @@ LARGEST_RESIDUAL = 1e-9
 """Of contact conditions and equilibrium; rounding leaves 1e-14."""
 _MOST_STEPS = 30
 """Linear solutions before a position is left to the single solver."""
-_FAINT = 1e-9
+FAINT = 1e-9
 """Share of the largest load below which a touching cell may be no contact at all."""
 _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
-_REFRESHED = 3
-"""Steps of Newton's method for which the moments of tooth pairs follow their forces."""
-_BOLD, _MOST_NEWTON = 10, 100
-"""Steps after which pairs open and close one at a time, and steps in all."""
-_SETTLED = 1e-8
-"""Share of the load by which forces of tooth pairs may still change in the last step."""
-_SOFTEST = 1e-13
-"""Spring on every motion, over that of a tooth pair: it holds what no loaded pair holds."""
 
 
 @dataclass(frozen=True)
@@ -281,7 +273,7 @@ class _ActiveSets:
             # cells of planets that carry nothing may touch all the same: they are released
             idle = done[~solved[done]]
             largest = self.loads[idle].max(axis=(1, 2), keepdims=True)
-            self.active[idle] &= self.loads[idle] > _FAINT * largest
+            self.active[idle] &= self.loads[idle] > FAINT * largest
             self._pivot(idle, 1, solved)
             idle = idle[solved[idle]]
             if len(idle):
@@ -363,7 +355,7 @@ class _ActiveSets:
         self.iterations[todo] += 1
         rounding = ROUNDING * (self.clearance + 10 * turned[:, None] + np.abs(closed))
         # a closed spring without force would hold a planet that nothing presses at the end of its clearance
-        spring_flips = np.where(springs, carried <= _FAINT * largest[..., 0], closed > rounding)
+        spring_flips = np.where(springs, carried <= FAINT * largest[..., 0], closed > rounding)
         return flips & ~blocked[0] | forced[0], spring_flips & ~blocked[1] | forced[1]
 
     def _settled(self, todo, separation, motions, null):
@@ -400,7 +392,7 @@ class _ActiveSets:
         conditions = self._conditions(done, self.loads[done] + loads, self.motions[done] + motions, null)
         loads = self.loads[done]
         largest = loads.max(axis=(1, 2), keepdims=True)
-        doubtful = (active & (loads <= _FAINT * largest)) | conditions[0]
+        doubtful = (active & (loads <= FAINT * largest)) | conditions[0]
         carries = active & (loads > 10 * ROUNDING * largest)
         self.active[done], self.motions[done] = carries, self.motions[done] / self.arm
         self.loads[done] = np.where(carries, loads, 0.0)
@@ -491,8 +483,13 @@ class PairLaws:
     motions: np.ndarray
     pressure: np.ndarray
 
+    @property
+    def step(self) -> float:
+        """Logarithm of the ratio of the forces."""
+        return float(np.log(self.force[1] / self.force[0]))
+
     @cached_property
-    def _cubics(self) -> np.ndarray:
+    def cubics(self) -> np.ndarray:
         """Coefficients of cubic splines of `yields` over the logarithm of the force, (K - 1, P, W, 4)."""
         from scipy.interpolate import CubicSpline
 
@@ -500,7 +497,7 @@ class PairLaws:
 
     def _between(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Interval of the curves in which forces lie, and the logarithm of the ratio to its first force."""
-        step = np.log(self.force[1] / self.force[0])
+        step = self.step
         x = np.log(np.clip(force, *self.force[[0, -1]]) / self.force[0])
         interval = np.minimum((x / step).astype(int), len(self.force) - 2)
         return interval, x - interval * step
@@ -508,7 +505,7 @@ class PairLaws:
     def approaches(self, force: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Approach [m] under forces (t, W) [N] at some positions (t,), and its slope [m/N]."""
         interval, x = self._between(force)
-        a, b, c, d = np.moveaxis(self._cubics[interval, position[:, None], np.arange(force.shape[1])], -1, 0)
+        a, b, c, d = np.moveaxis(self.cubics[interval, position[:, None], np.arange(force.shape[1])], -1, 0)
         yields, inside = ((a * x + b) * x + c) * x + d, (self.force[0] < force) & (force < self.force[-1])
         return force * yields, yields + np.where(inside, (3.0 * a * x + 2.0 * b) * x + c, 0.0)
 
@@ -523,7 +520,7 @@ class PairLaws:
     def _by_lines(self, curves: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Values (..., P, W, n) of curves (P, W, K, n) under forces (..., P, W) [N], by straight lines."""
         interval, x = self._between(force)
-        share = (x / np.log(self.force[1] / self.force[0]))[..., None]
+        share = (x / self.step)[..., None]
         place = np.arange(force.shape[-2])[:, None], np.arange(force.shape[-1])
         low, high = (curves[*place, interval + one] for one in (0, 1))
         return low + share * (high - low)
@@ -591,133 +588,3 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
         motions=state.motions,
         pressure=np.moveaxis(pressure, 0, -1),
     )
-
-
-def solve_laws(
-    laws: PairLaws, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None = None
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Solve the contact of all tooth pairs as springs at P positions of n sets.
-
-    Newton's method on all of them: pairs that pull open, pairs that overlap close, all at once; where that
-    does not end, steps stop at the first pair that opens, and the deepest closes when they have settled. A
-    soft spring holds planets that carry nothing.
-
-    Parameters
-    ----------
-    load : (m,) array
-        External load on the motions [N].
-    separations : (n, P, W) array
-        ``e``: what every set adds to whole pairs [m].
-    tilts : (n, P, W, 3) array, optional
-        What it adds at the nodes of the windows [m].
-
-    Returns
-    -------
-    force, motions, stiffness : (n, P, W), (n, P, m), (n, P, meshes) arrays
-        [N]; [m]; tangent stiffness of every mesh at constant loads of the others [N/m].
-    solved : (n, P) bool array
-        Whether the iteration ended.
-    """
-    newton = _SpringNewton(laws, np.asarray(load, float), separations, tilts)
-    newton.solve()
-    shape, force = (*separations.shape[:2], -1), newton.carried()
-    motions, stiffness = newton.motions * newton.unit, newton.stiffness(force)
-    solved = newton.solved.reshape(shape[:2])
-    return force.reshape(shape), motions.reshape(shape), stiffness.reshape(shape), solved
-
-
-class _SpringNewton:
-    """Newton's method of `solve_laws` on all positions of all sets, n P in a row.
-
-    Motions and approaches are over ``unit``, a mean compliance. ``todo`` are the positions that go on.
-    """
-
-    def __init__(self, laws: PairLaws, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None):
-        (n, P, W), m = separations.shape, len(load)
-        self.laws, self.load, self.sets, self.own = laws, load, n, np.arange(W)
-        self.unit = float(laws.yields[np.isfinite(laws.separation)].mean())
-        self.position, self.S = np.tile(np.arange(P), n), laws.smooth.swapaxes(3, 4).reshape(P, W, 3, -1)
-        field = (self.S @ laws.loads.swapaxes(1, 2).reshape(P, 1, -1, 1))[..., 0]
-        field += (laws.loads.sum(axis=-1) @ laws.supports)[..., None]
-        self.field = -field if tilts is None else tilts - field
-        self.apart = laws.separation + separations
-        self.first = np.tile(laws.loads.sum(axis=-1), (n, 1))
-        self.force, self.motions = self.first.copy(), np.tile(laws.motions, (n, 1)) / self.unit
-        self.solved, self.closed = np.zeros(n * P, bool), self.first > 0.0
-        self.system = np.zeros((n * P, W + m, W + m))
-        self.system[:, W:, :W], self.system[:, :W, W:] = laws.approach.T, -laws.approach
-        self.system[:, range(W, W + m), range(W, W + m)] = _SOFTEST
-        self.limit = _SETTLED * np.abs(load).max()
-
-    def refresh(self) -> None:
-        """Take the moments of the pressures from the forces as they are."""
-        P, W = self.field.shape[-3], len(self.own)
-        mu = self.laws.moments_under(self.force.reshape(self.sets, P, W))
-        half = (mu.transpose(1, 2, 0, 3) @ self.S).reshape(P, W, self.sets, 3, W)
-        between = (half * mu.transpose(1, 0, 3, 2)[:, None]).sum(axis=-2).transpose(2, 0, 1, 3)
-        self.between = (between.reshape(-1, W, W) + self.laws.supports) / self.unit
-        self.bent = (self.apart + (mu * self.field).sum(axis=-1)).reshape(-1, W) / self.unit
-
-    def solve(self) -> None:
-        """Iterate until all positions are solved, or for `_MOST_NEWTON` steps."""
-        todo, late, again = np.arange(len(self.position)), np.arange(0), False
-        for step in range(_MOST_NEWTON):
-            if step == _BOLD:
-                self.force[todo], self.closed[todo], late = self.first[todo], self.first[todo] > 0.0, todo
-            if step < _REFRESHED or step == _BOLD or again:
-                self.refresh()
-                again = False
-            ended = self.step(todo, careful=step >= _BOLD) & (step >= _REFRESHED)
-            self.solved[todo[ended]], todo = True, todo[~ended]
-            if not len(todo):
-                if not len(late):
-                    return
-                # once more with the moments of the forces that were found
-                todo, late, again = late, todo, True
-        self.solved[late] = False
-
-    def step(self, todo: np.ndarray, *, careful: bool) -> np.ndarray:
-        """Take a step at some positions; whether each of them has come to its end."""
-        laws, W, F = self.laws, len(self.own), self.force[todo]
-        matrix, G, own = self.system[: len(todo)], laws.approach, self.own
-        value, slope = laws.approaches(F, self.position[todo])
-        matrix[:, :W, :W] = self.between[todo]
-        gap = self.bent[todo] + value / self.unit - self.motions[todo] @ G.T
-        gap += (matrix[:, :W, :W] @ F[..., None])[..., 0]
-        on = self.closed[todo] if careful else (F > 0.0) | (gap < 0.0)
-        matrix[:, own, own] += slope / self.unit
-        balance = self.load - F @ G - _SOFTEST * self.motions[todo]
-        right, free = np.concatenate([-gap, balance], axis=1), np.ones(balance.shape, bool)
-        # what is open carries nothing before and after
-        change = _local_solution(matrix, np.concatenate([on, free], axis=1), right[..., None])[..., 0]
-        length = np.ones(len(todo))
-        if careful:
-            falls = on & (change[:, :W] < 0.0)
-            reach = np.divide(-F, change[:, :W], out=np.full(F.shape, np.inf), where=falls)
-            length = np.minimum(reach.min(axis=1), 1.0)
-            self.closed[todo] = on & (reach > length[:, None])
-        # what is open carries nothing at all: an absent window would close under the last bit of a force
-        carries = self.closed[todo] if careful else on
-        self.force[todo] = np.where(carries, np.maximum(F + length[:, None] * change[:, :W], 0.0), 0.0)
-        self.motions[todo] += length[:, None] * change[:, W:]
-        ended = (np.abs(change[:, :W]).max(axis=1) < self.limit) & (length == 1.0)
-        if careful:
-            overlap = np.where(on, 0.0, gap)
-            more = ended & (overlap.min(axis=1) < -self.limit)
-            self.closed[todo[more], overlap.argmin(axis=1)[more]] = True
-            ended &= ~more
-        return ended
-
-    def carried(self) -> np.ndarray:
-        """Forces (n P, W) [N], zero where they are of the size of rounding."""
-        return np.where(self.force > _FAINT * np.abs(self.load).max(), self.force, 0.0)
-
-    def stiffness(self, force: np.ndarray) -> np.ndarray:
-        """Tangent stiffness (n P, meshes) of every mesh at constant loads of the others [N/m]."""
-        loaded, meshes, W = force > 0.0, int(self.laws.mesh[-1]) + 1, len(self.own)
-        between, each = self.between - self.laws.supports / self.unit, np.arange(meshes)
-        between[:, self.own, self.own] = self.laws.approaches(force, self.position)[1] / self.unit
-        between = np.where(loaded[:, :, None] & loaded[:, None], between, np.eye(W))
-        own_mesh = between.reshape(-1, meshes, W // meshes, meshes, W // meshes)[:, each, :, each]
-        ones, own_mesh = loaded.reshape(-1, meshes, W // meshes, 1).astype(float), own_mesh.swapaxes(0, 1)
-        return (ones * np.linalg.solve(own_mesh, ones)).sum(axis=(2, 3)) / self.unit

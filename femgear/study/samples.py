@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from pydantic import ValidationError, ValidationInfo, model_validator
+from scipy.sparse import csr_array
 
 from femgear.case import text as case_text
 from femgear.case.gear_set import need_set
@@ -31,12 +32,14 @@ from femgear.case.mistakes import combine, translate
 from femgear.case.quantities import Section
 from femgear.case.sections import LARGEST_DEVIATION, Amplitude, Case, Deviation
 from femgear.contact.assembly import (
+    MOST_ENLARGEMENTS,
     Candidates,
     contact_candidates,
     cycle_positions,
     first_windows,
     in_windows,
     mesh_windows,
+    not_contained,
 )
 from femgear.contact.batch import (
     ContactTangents,
@@ -44,9 +47,9 @@ from femgear.contact.batch import (
     check_residual,
     pair_laws,
     solve_batch,
-    solve_laws,
 )
 from femgear.contact.flank_pairs import pair_separations
+from femgear.contact.pair_springs import solve_laws
 from femgear.contact.peaks import mean_weights
 from femgear.contact.supports import MovingMembers, moving_members
 from femgear.errors import CaseError, FemgearError, StorageError
@@ -81,8 +84,9 @@ _FORCES, _LEAST = 48, 1e-3
 """Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
 _STRAIGHT = 0.005
 """Share of a peak to peak that straight lines between positions may miss, of the set without drawn errors."""
-_TOGETHER, _EXACT_TOGETHER, _CHECKED = 32, 64, 8
-"""Samples as springs and positions of the whole problem solved at once; samples solved again exactly."""
+_TOGETHER, _EXACT_TOGETHER, _CHECKED, _TRIED = 128, 64, 8, 32
+"""Samples as springs and positions of the whole problem solved at once; samples solved again exactly; those
+of seed 0 that windows are tried with."""
 _BLOCKS = {"spring": 256, "exact": 64}
 """Samples of a task."""
 _MOST = 10_000_000
@@ -222,10 +226,14 @@ class _Level:
 
     found: Candidates
     laws: PairLaws
-    # separations of all pairs per error (K, meshes, P, pairs); at the nodes of windows (K, P, W, 3), or None
-    shifts: np.ndarray
-    tilts: np.ndarray | None
+    # separations per error: of the windows (P W, K), at their nodes (P W 3, K) or None
+    shifts: csr_array
+    tilts: csr_array | None
     overflows: bool
+    # pairs that are no candidates: separations, those per error, and at which position of which mesh they are
+    other_gap: np.ndarray
+    other_shifts: csr_array
+    other_place: tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True, eq=False)
@@ -339,10 +347,21 @@ class SampleModel:
             if tilted:
                 kinds = [profile_separation(own, s.gears, kind, *rolls) / unit for kind in (0, 1)]
                 tilts.append(np.where((found.mesh < N)[:, None], *kinds))
-        overflows = found.touches_window_end(state.active)
-        made = _Level(found, laws, np.array(shifts), np.array(tilts) if tilted else None, overflows)
+        overflows, listed = found.touches_window_end(state.active), setup.listed
+        of_windows = found.mesh, found.position[:, None], found.pair + listed.first[found.mesh]
+        # errors move few pairs each
+        mesh, at, pair = np.nonzero(np.isfinite(listed.gap) & ~listed.near & (s.contact == "profile"))
+        by_pairs = np.moveaxis(shifts, 0, -1)
+        of_errors = _sparse(by_pairs[of_windows]), _sparse(np.moveaxis(tilts, 0, -1)) if tilted else None
+        others = listed.gap[mesh, at, pair], _sparse(by_pairs[mesh, at, pair]), (at, mesh)
+        made = _Level(found, laws, *of_errors, overflows, *others)
         self._levels[share, nearest] = made
         return made
+
+
+def _sparse(values: np.ndarray) -> csr_array:
+    """Matrix of values (..., K), a row for each of the first ones."""
+    return csr_array(values.reshape(-1, values.shape[-1]))
 
 
 @one_blas_thread()
@@ -376,7 +395,7 @@ def sample_model(
         level = model.level(share, nearest)
         if level.overflows:
             return None, 4.0 * share, nearest
-        _, unsolved, missed = _solved(model, level, model.draw(0, 0, _TOGETHER), False)
+        _, unsolved, missed = _solved(model, level, model.draw(0, 0, _TRIED), False)
         return (share, nearest), share, nearest * (2.0 if (missed & ~unsolved).any() else 1.0)
 
     windows = in_windows(attempt, *first_windows(gears, solved.bodies, abs(sun_torque)))
@@ -425,26 +444,35 @@ def solve_samples(model: SampleModel, errors: np.ndarray, *, exact: bool) -> dic
 
     The results are those of `_NUMBERS`, (n,) or (n, N) of planets, over the positions.
     """
+    return _in_windows(model, errors, model.windows, exact)
+
+
+def _in_windows(
+    model: SampleModel, errors: np.ndarray, size: tuple[float, float], exact: bool, enlargements: int = 0
+) -> dict[str, np.ndarray]:
+    """Numbers of samples in windows of a size; of those that these do not hold in larger ones, exactly."""
+    level, (share, nearest) = model.level(*size), size
     together = max(1, _EXACT_TOGETHER // len(model.position)) if exact else _TOGETHER
-    parts, level = [], model.level(*model.windows)
-    for some in np.split(errors, range(together, len(errors), together)):
-        numbers, unsolved, missed = _solved(model, level, some, exact)
-        for i in np.flatnonzero(unsolved | missed):
-
-            def attempt(share: float, nearest: float, one=some[i : i + 1]):
-                found, over, away = _solved(model, model.level(share, nearest), one, True)
-                return found, share * (4.0 if over[0] else 1.0), nearest * (2.0 if away[0] else 1.0)
-
-            for name, values in in_windows(attempt, *model.windows).items():
-                numbers[name][i] = values[0]
-        parts.append(numbers)
-    return _joined(parts)
+    blocks = np.split(errors, range(together, len(errors), together))
+    parts, unsolved, missed = zip(*(_solved(model, level, block, exact) for block in blocks))
+    numbers, unsolved, missed = _joined(parts), np.concatenate(unsolved), np.concatenate(missed)
+    if (unsolved | missed).any() and enlargements == MOST_ENLARGEMENTS:
+        raise not_contained()
+    for over, away in ((True, False), (False, True), (True, True)):
+        these = np.flatnonzero((unsolved == over) & (missed == away))
+        if len(these):
+            # springs that do not end say nothing of the windows
+            wider = share * (4.0 if over and exact else 1.0), nearest * (2.0 if away else 1.0)
+            solved = _in_windows(model, errors[these], wider, True, enlargements + 1)
+            for name, values in solved.items():
+                numbers[name][these] = values
+    return numbers
 
 
 spring_numbers, exact_numbers = partial(solve_samples, exact=False), partial(solve_samples, exact=True)
 
 
-def _joined(parts: list[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+def _joined(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -455,44 +483,49 @@ def _solved(
 
     Springs do not solve those whose iteration does not end, windows those whose contact they do not contain.
     """
-    found, setup, N = level.found, level.found.setup, model.solved.gears.n_planets
-    (n, P), back = (len(errors), len(model.position)), np.argsort(model.order)
-    shifts = np.tensordot(errors, level.shifts, 1)
-    tilts = None if level.tilts is None else np.tensordot(errors, level.tilts, 1)
-    of_windows = found.pair + setup.listed.first[found.mesh]
-    separations = shifts[:, found.mesh, found.position[:, None], of_windows]
+    found, N = level.found, model.solved.gears.n_planets
+    (n, P), back, by_error = (len(errors), len(model.position)), np.argsort(model.order), errors.T.copy()
+    separations = (level.shifts @ by_error).reshape(P, -1, n)
+    tilts = None if level.tilts is None else (level.tilts @ by_error).reshape(P, -1, 3, n)
     force, motions, stiffness, ended = solve_laws(level.laws, model.load, separations, tilts)
-    unsolved = ~ended.all(axis=1)
+    unsolved = ~ended.all(axis=0)
     if exact:
         force, motions, stiffness, unsolved = _contacts(model, level, separations, tilts, force)
-    missed = np.zeros((n, 1), bool)
-    if model.solved.contact == "profile":
-        of_mesh = force.reshape(n, P, len(found.approach), -1).sum(axis=-1)
-        approach = motions @ found.approach.T - of_mesh @ found.supports
-        inside = setup.listed.gap + shifts < np.moveaxis(approach, 1, 2)[..., None]
-        missed = (inside & ~setup.listed.near).reshape(n, -1)
-    share = force.reshape(n, P, 2, N, -1).sum(axis=-1)[:, :, 0, back] / model.load[N]
-    stiffness = np.einsum("p,npk->nk", mean_weights(model.position, 1), stiffness.reshape(n, P, 2, N).mean(3))
-    numbers = np.ptp(motions[..., N], axis=1), share.max(axis=(1, 2)), *stiffness.T
-    planets = share.max(axis=1), (share <= 0.0).any(axis=1)
-    all_numbers = dict(zip(_NUMBERS, (*numbers, *planets), strict=True))
-    return all_numbers, np.asarray(unsolved), np.asarray(missed.any(axis=1))
+    of_mesh = force.reshape(P, 2 * N, -1, n).sum(axis=2)
+    approach = found.approach @ motions - found.supports.T @ of_mesh
+    others = level.other_gap[:, None] + level.other_shifts @ by_error
+    missed = (others < approach[level.other_place]).any(axis=0)
+    share = of_mesh[:, back] / model.load[N]
+    stiffness = np.einsum("p,pkn->kn", mean_weights(model.position, 1), stiffness.reshape(P, 2, N, n).mean(2))
+    numbers = np.ptp(motions[:, N], axis=0), share.max(axis=(0, 1)), *stiffness
+    planets = share.max(axis=0).T, (share <= 0.0).any(axis=0).T
+    return dict(zip(_NUMBERS, (*numbers, *planets), strict=True)), unsolved, missed
 
 
 def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts, force):
-    """Forces, motions and stiffness of samples from those of springs; whether (n,) windows are too small."""
-    n, P, W = separations.shape
-    found, gap = _repeated(level, n), separations.reshape(-1, W, 1)
+    """Forces, motions and stiffness of samples from those of springs; whether (n,) windows are too small.
+
+    Samples are the last axis, as of `femgear.contact.pair_springs.solve_laws`.
+    """
+    P, W, n = separations.shape
+    found, gap = _repeated(level, n), _by_samples(separations).reshape(n * P, W, 1)
     if tilts is not None:
-        gap = gap + (found.polynomials @ tilts.reshape(-1, W, 3, 1))[..., 0]
+        gap = gap + (found.polynomials @ _by_samples(tilts).reshape(-1, W, 3, 1))[..., 0]
     found = replace(found, gap=np.where(found.candidate, found.gap + gap, 0.0))
+    force = _by_samples(force)
     start = (force > 0.0)[..., None] & (force[..., None] >= level.laws.touching)
     state = solve_batch(found, model.load, start=start.reshape(found.gap.shape))
     check_residual(found, state)
     stiffness = ContactTangents(found, state).of_meshes(found.smooth)
     overflows = state.active[..., [0, -1]] & ~np.moveaxis(found.at_edge, 0, -1)
     values = state.loads.sum(axis=-1), state.motions, stiffness
-    return *(a.reshape(n, P, -1) for a in values), overflows.reshape(n, -1).any(axis=1)
+    by_positions = (np.moveaxis(a.reshape(n, P, -1), 0, -1) for a in values)
+    return *by_positions, overflows.reshape(n, -1).any(axis=1)
+
+
+def _by_samples(values: np.ndarray) -> np.ndarray:
+    """Values (..., n) as (n, ...)."""
+    return np.ascontiguousarray(np.moveaxis(values, -1, 0))
 
 
 @lru_cache(maxsize=2)
@@ -563,14 +596,16 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
     where = setup.tooth, np.tile(setup.turns, len(periods)) + turns, tau
     own = pair_separations(s.gears, model.image(model.deviations(errors)), *where, back=False)
     case = pair_separations(s.gears, s.deviations, setup.tooth, setup.turns, model.position, back=False)
-    own = np.moveaxis(own.reshape(len(own), len(periods), P, -1) - case[:, None], 1, 0)
-    found = level.found
-    separations = own[:, found.mesh, found.position[:, None], found.pair]
-    tilts = None if level.tilts is None else np.tensordot(errors, level.tilts, 1)[None]
+    own = np.moveaxis(own.reshape(len(own), len(periods), P, -1) - case[:, None], 1, -1)
+    found, N = level.found, s.gears.n_planets
+    separations = own[found.mesh, found.position[:, None], found.pair]
+    tilts = None
+    if level.tilts is not None:
+        of_nodes = (level.tilts @ errors).reshape(P, -1, 3, 1)
+        tilts = np.repeat(of_nodes, len(periods), axis=-1)
     force, motions, _, _ = solve_laws(level.laws, model.load, separations, tilts)
-    N = s.gears.n_planets
-    share = force.reshape(*force.shape[:2], 2, N, -1).sum(axis=-1)[:, :, 0].max() / model.load[N]
-    return float(np.ptp(motions[..., N])), float(share)
+    share = force.reshape(P, 2, N, -1, len(periods)).sum(axis=3)[:, 0].max() / model.load[N]
+    return float(np.ptp(motions[:, N])), float(share)
 
 
 def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:

@@ -14,8 +14,9 @@ from soak import programs
 
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.cli import main
-from femgear.contact.batch import PairLaws, solve_laws
+from femgear.contact.batch import PairLaws
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.pair_springs import solve_laws
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError, StorageError
@@ -126,9 +127,9 @@ def spring_shares(laws, load, errors):
     """Shares (S, N) under tangential pin errors (S, N) [m], positive away from the path."""
     right = np.zeros(laws.approach.shape[1])
     right[0] = load
-    found = solve_laws(laws, right, 2 * math.cos(ALPHA) * np.asarray(errors, float)[:, None])
+    found = solve_laws(laws, right, 2 * math.cos(ALPHA) * np.transpose(errors)[None])
     assert found[3].all()
-    return found[0][:, 0] / load
+    return found[0][0].T / load
 
 
 @pytest.mark.parametrize("floating", [True, False])
