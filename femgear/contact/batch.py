@@ -74,9 +74,7 @@ def solve_batch(
     start : (P, W, C) bool array, optional
         Cells thought to touch; guessed for equal mesh forces when left out.
     """
-    batch = _ActiveSets(found, np.asarray(load, float), springs)
-    if start is not None:
-        batch.active = start & found.candidate
+    batch = _ActiveSets(found, np.asarray(load, float), springs, start)
     batch.solve()
     state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
     return BatchState(*state)
@@ -107,7 +105,9 @@ def check_definite(found: Candidates) -> None:
     for matrix, cells in zip(local, some, strict=True):
         factor(matrix[np.ix_(cells, cells)])
     values = found.polynomials[0, filled] * some[..., None]
-    size, axes = np.linalg.eigh(values.swapaxes(1, 2) @ _local_solution(local, some, values))
+    size, axes = np.linalg.eigh(
+        values.swapaxes(1, 2) @ _local_solution(local, (np.arange(len(local)),), some, values)
+    )
     root = axes * np.sqrt(np.maximum(size, 0.0))[:, None] @ axes.swapaxes(1, 2)
     size = 3 * len(filled)
     for smooth in cyclic_harmonics(found.images[:, 0, filled][:, :, :, filled]):
@@ -148,7 +148,7 @@ class ContactTangents:
         np.put_along_axis(right[..., 3:5], ends[:, :, None], 1.0, axis=2)
         right[..., 5:] = np.take_along_axis(found.local, beside[:, :, None], axis=3)
         right *= active[..., None]
-        columns[rows] = _local_solution(found.local[rows], active[rows], right[rows])
+        columns[rows] = _local_solution(found.local, rows, active[rows], right[rows])
         moments = found.polynomials.swapaxes(-1, -2) @ columns
         self.Q, self.unit, self.reach = np.split(moments, [3, 5], axis=-1)
         # products of unit loads on the last cells, and of the columns of L beside them, within the window
@@ -224,7 +224,10 @@ class ContactTangents:
 class _ActiveSets:
     """Active sets of all positions on their way to the solution; motions over their largest arms."""
 
-    def __init__(self, found: Candidates, load: np.ndarray, springs: BearingSprings | None):
+    def __init__(
+        self, found: Candidates, load: np.ndarray, springs: BearingSprings | None,
+        start: np.ndarray | None = None,
+    ):  # fmt: skip
         P, W, C = found.gap.shape
         self.found, self.bearings, self.given = found, springs, load
         G, arms = found.approach[found.mesh], np.zeros((0, len(load)))
@@ -239,14 +242,18 @@ class _ActiveSets:
         self.loads, self.gaps = np.zeros((2, P, W, C))
         self.motions, self.imbalance = np.zeros((2, P, len(load)))
         self.iterations, self.residual = np.zeros(P, int), np.zeros(P)
-        self.active, self.springs = self._first()
+        self.active, self.springs = self._first(start)
 
-    def _first(self) -> tuple[np.ndarray, np.ndarray]:
+    def _first(self, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Cells (P, W, C) and springs (P, n) that equal mesh forces, shared by the near pairs, would press.
 
-        Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
+        Of cells the candidates among those that are given, if any. Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
         """
         found, meshes = self.found, self.found.setup.meshes
+        pushed = -self.arms @ (found.approach[:meshes] / self.arm).sum(axis=0)
+        springs = np.tile(pushed > 0.8 * pushed.max(initial=0.0), (len(found.gap), 1))
+        if start is not None:
+            return start & found.candidate, springs
         kind = found.setup.kind(np.arange(len(found.approach)))[:, None]
         width, modulus = np.array(found.bodies.widths)[kind], found.bodies.contact_moduli[kind]
         share = self.given.sum() / found.setup.n_planets
@@ -257,9 +264,7 @@ class _ActiveSets:
         reached[:, meshes:] = False
         force = share / np.maximum(reached.sum(axis=-1, keepdims=True), 1)
         edge = np.where(reached, smallest + 2 * force / (np.pi * modulus * width), -np.inf if share else 0.0)
-        pushed = -self.arms @ (found.approach[:meshes] / self.arm).sum(axis=0)
-        springs = pushed > 0.8 * pushed.max(initial=0.0)
-        return gap <= edge.reshape(*gap.shape[:2], 1), np.tile(springs, (len(gap), 1))
+        return gap <= edge.reshape(*gap.shape[:2], 1), springs
 
     def solve(self) -> None:
         """Solve all positions: together, and those that are left one by one."""
@@ -287,8 +292,11 @@ class _ActiveSets:
         for _ in range(steps if len(todo) else 0):
             rows, window = np.nonzero(changed)
             place = todo[rows], window
+            self.offset[place], self.columns[place] = 0.0, 0.0
+            touching = self.active[place].any(axis=-1)
+            place = place[0][touching], place[1][touching]
             right = np.dstack([found.gap[place], found.polynomials[place]])
-            columns = _local_solution(found.local[place], self.active[place], right)
+            columns = _local_solution(found.local, place, self.active[place], right)
             self.offset[place], self.columns[place] = columns[..., 0], columns[..., 1:]
             step = self._linear(todo, self.offset[todo], self.load, self.clearance)
             flips, spring_flips = self._conditions(todo, *step)
@@ -311,9 +319,19 @@ class _ActiveSets:
         T, n = len(todo), 3 * S.shape[1]
         onto, G = self.found.polynomials[todo].swapaxes(-1, -2), np.repeat(self.G, 3, axis=0)
         Q, moments = onto @ columns, onto @ offset[..., None]
-        matrix = (Q @ S.reshape(T, -1, 3, n)).reshape(T, n, n) + np.eye(n)
         right = np.concatenate([Q.sum(axis=-1)[..., None] * self.G[:, None], moments], axis=-1)
-        solved = np.linalg.solve(matrix, right.reshape(T, n, -1))
+        # windows in which nothing touches have no moments
+        solved, touching = np.zeros((T, n // 3, *right.shape[2:])), self.active[todo].any(axis=-1)
+        count = touching.sum(axis=1)
+        for most in np.unique(count[count > 0]):
+            some = np.flatnonzero(count == most)
+            windows, some = np.nonzero(touching[some])[1].reshape(-1, most), some[:, None]
+            between = S[some[..., None], windows[..., None], :, windows[:, None]]
+            matrix = Q[some, windows][:, :, None] @ between
+            matrix = matrix.swapaxes(2, 3).reshape(len(some), 3 * most, -1) + np.eye(3 * most)
+            moments = right[some, windows].reshape(len(some), 3 * most, -1)
+            solved[some, windows] = np.linalg.solve(matrix, moments).reshape(len(some), most, 3, -1)
+        solved = solved.reshape(T, n, -1)
         springs = self.springs[todo] / self.softness
         stiffness = G.T @ solved[..., :-1] + np.swapaxes(self.arms * springs[..., None], -1, -2) @ self.arms
         balance = load + solved[..., -1] @ G + clearance * (springs @ self.arms)
@@ -333,7 +351,10 @@ class _ActiveSets:
         T, n = len(todo), 3 * values.shape[1]
         moments = (values.swapaxes(-1, -2) @ loads[..., None]).reshape(T, n, 1)
         bodies = (self.S[todo].reshape(T, n, n) @ moments).reshape(T, -1, 3, 1)
-        elastic = np.where(candidate, (found.local[todo] @ loads[..., None] + values @ bodies)[..., 0], 0.0)
+        elastic = (values @ bodies)[..., 0]
+        rows = np.nonzero(loads.any(axis=-1))
+        elastic[rows] += (found.local[todo[rows[0]], rows[1]] @ loads[rows][..., None])[..., 0]
+        elastic = np.where(candidate, elastic, 0.0)
         separation = np.where(candidate, gap + elastic, np.inf)
         motions, turned, blocked, forced = self._settled(todo, separation, motions, null)
         approach = (motions @ self.G.T)[..., None]
@@ -387,7 +408,8 @@ class _ActiveSets:
         active = self.active[done]
         rows = np.nonzero(active.any(axis=-1))
         at, offset = (done[rows[0]], rows[1]), np.zeros(active.shape)
-        offset[rows] = _local_solution(self.found.local[at], active[rows], self.gaps[at][..., None])[..., 0]
+        gaps = self.gaps[at][..., None]
+        offset[rows] = _local_solution(self.found.local, at, active[rows], gaps)[..., 0]
         loads, motions, null = self._linear(done, offset, self.imbalance[done], 0.0)
         conditions = self._conditions(done, self.loads[done] + loads, self.motions[done] + motions, null)
         loads = self.loads[done]
@@ -418,8 +440,8 @@ class _ActiveSets:
         self.iterations[at] += state.iterations
 
 
-def _local_solution(local, active, right) -> np.ndarray:
-    """Solve ``L_AA Y = right_A`` in many windows: (w, C, C), (w, C), (w, C, k); zero outside A."""
+def _local_solution(local, place, active, right) -> np.ndarray:
+    """Solve ``L_AA Y = right_A`` in windows at some places of (..., C, C): (w, C), (w, C, k); zero outside A."""
     columns, count = np.zeros(right.shape), active.sum(axis=-1)
     # windows of about the same number of cells together, their active cells first
     order, size = np.argsort(~active, axis=-1, kind="stable"), -(-count // 4) * 4
@@ -427,7 +449,8 @@ def _local_solution(local, active, right) -> np.ndarray:
         rows = np.flatnonzero(size == most)[:, None]
         cells = order[rows[:, 0], :most]
         real = np.arange(cells.shape[1]) < count[rows]
-        matrix = local[rows[..., None], cells[:, :, None], cells[:, None, :]]
+        where = (index[rows][..., None] for index in place)
+        matrix = local[*where, cells[:, :, None], cells[:, None, :]]
         matrix = np.where(real[:, :, None] & real[:, None, :], matrix, np.eye(cells.shape[1]))
         columns[rows, cells] = np.linalg.solve(matrix, np.where(real[..., None], right[rows, cells], 0.0))
     return columns
@@ -558,7 +581,7 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
         some: Any = slice(None)
         for _ in range(_MOST_STEPS):
             again = np.flatnonzero(changed)
-            solved = _local_solution(local[again], active[again], right[again])
+            solved = _local_solution(local, (again,), active[again], right[again])
             per[again], offset[again] = np.moveaxis(solved, -1, 0)
             approach[some] = (one + offset[some].sum(axis=1)) / per[some].sum(axis=1)
             pressed[some] = per[some] * approach[some, None] - offset[some]

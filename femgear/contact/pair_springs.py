@@ -302,19 +302,24 @@ class _Problems:
             np.arange(len(problem)) - (np.cumsum(count) - count)[problem],
         )
         slots[rank, problem] = slot
-        real = np.arange(size)[:, None] < count
-        system = np.empty((size + m, size + m + 1, n))
-        upper, other = np.triu_indices(size)
-        own, cells = np.arange(size), slots * N + some
-        pairs = (slots * (self.springs.count * N))[upper] + cells[other]
-        system[upper, other] = self.between.ravel().take(pairs) * real[other]
-        system[own, own] = np.where(real, system[own, own] + slope.ravel().take(cells), 1.0)
+        # problems of fewer slots than others have equations of nothing
+        absent = np.arange(size)[:, None] >= count
+        cells, rows = slots * N + some, slots * (self.springs.count * N)
+        system, between = np.empty((size + m, size + m + 1, n)), self.between.ravel()
+        for k in range(size):
+            between.take(rows[k] + cells[k:], out=system[k, k:size], mode="clip")
+        own = np.arange(size)
+        system[own, own] += slope.ravel().take(cells)
+        place = slots + self.place[some] * self.springs.count
         for motion in range(m):
-            arms = self.springs.arms[..., motion].ravel()
-            system[:size, size + motion] = arms.take(self.place[some] * self.springs.count + slots) * real
-        system[size:, size:] = 0.0
+            self.springs.arms[..., motion].ravel().take(place, out=system[:size, size + motion], mode="clip")
+        np.negative(gap.ravel().take(cells), out=system[:size, -1])
+        for k in range(size if absent.any() else 0):
+            system[k, k:size] *= ~absent[k:]
+            system[k, size:] *= ~absent[k]
+            system[k, k] += absent[k]
+        system[size:, size:-1] = 0.0
         system[range(size, size + m), range(size, size + m)] = -_SOFTEST
-        system[:size, -1] = np.where(real, -gap.ravel().take(cells), 0.0)
         system[size:, -1] = balance[:, some]
         solution = solved_side_by_side(system)
         change[slot, some[problem]] = solution[rank, problem]
