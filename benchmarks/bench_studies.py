@@ -60,7 +60,7 @@ def test_tasks_of_a_second(benchmark, medians, runner):
     ("method", "count"), [(name, count) for name, counts in SIZES.items() for count in counts]
 )
 def test_samples(benchmark, medians, runner, model, method, count):
-    from femgear.study.samples import _BLOCKS, _block
+    from femgear.study.sample_results import _BLOCKS, _block
 
     size, block = _BLOCKS[method], partial(_block, model, 1, method == "exact")
     items = [(first, min(first + size, count)) for first in range(0, count, size)]

@@ -805,7 +805,8 @@ def samples(
     from femgear.run import grid_cache
     from femgear.storage.files import own_files, write_text
     from femgear.study.runner import open_runner
-    from femgear.study.samples import checked, prepared, sample_case, samples_into
+    from femgear.study.sample_results import samples_into
+    from femgear.study.samples import checked, prepared, sample_case
     from femgear.trains.reading import read_case, to_toml
 
     drawn = drawn or Drawn()

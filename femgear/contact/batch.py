@@ -247,7 +247,9 @@ class _ActiveSets:
     def _first(self, start: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Cells (P, W, C) and springs (P, n) that equal mesh forces, shared by the near pairs, would press.
 
-        Of cells the candidates among those that are given, if any. Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
+        Of cells the candidates among those that are given, if any.
+
+        Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
         """
         found, meshes = self.found, self.found.setup.meshes
         pushed = -self.arms @ (found.approach[:meshes] / self.arm).sum(axis=0)
@@ -321,13 +323,14 @@ class _ActiveSets:
         Q, moments = onto @ columns, onto @ offset[..., None]
         right = np.concatenate([Q.sum(axis=-1)[..., None] * self.G[:, None], moments], axis=-1)
         # windows in which nothing touches have no moments
-        solved, touching = np.zeros((T, n // 3, *right.shape[2:])), self.active[todo].any(axis=-1)
+        solved, touching = np.zeros((T, n // 3, *right.shape[2:])), np.asarray(self.active[todo].any(axis=-1))
         count = touching.sum(axis=1)
         for most in np.unique(count[count > 0]):
             some = np.flatnonzero(count == most)
-            windows, some = np.nonzero(touching[some])[1].reshape(-1, most), some[:, None]
+            windows = np.reshape(np.nonzero(touching[some])[1], (-1, most))
+            some = some[:, None]
             between = S[some[..., None], windows[..., None], :, windows[:, None]]
-            matrix = Q[some, windows][:, :, None] @ between
+            matrix = Q[some, windows, None] @ between
             matrix = matrix.swapaxes(2, 3).reshape(len(some), 3 * most, -1) + np.eye(3 * most)
             moments = right[some, windows].reshape(len(some), 3 * most, -1)
             solved[some, windows] = np.linalg.solve(matrix, moments).reshape(len(some), most, 3, -1)
@@ -441,7 +444,7 @@ class _ActiveSets:
 
 
 def _local_solution(local, place, active, right) -> np.ndarray:
-    """Solve ``L_AA Y = right_A`` in windows at some places of (..., C, C): (w, C), (w, C, k); zero outside A."""
+    """Solve ``L_AA Y = right_A`` at w places of windows (..., C, C): (w, C), (w, C, k); zero outside A."""
     columns, count = np.zeros(right.shape), active.sum(axis=-1)
     # windows of about the same number of cells together, their active cells first
     order, size = np.argsort(~active, axis=-1, kind="stable"), -(-count // 4) * 4

@@ -26,7 +26,7 @@ _CROWD = 0.5
 
 
 def solve_laws(
-    laws: PairLaws, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None = None
+    springs: PairSprings, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Solve the contact of all tooth pairs as springs at P positions of n sets.
 
@@ -50,7 +50,6 @@ def solve_laws(
     solved : (P, n) bool array
         Whether the iteration ended.
     """
-    springs = _Slots(laws)
     newton = _SpringNewton(springs, np.asarray(load, float), separations, tilts)
     newton.solve()
     newton.force = newton._carried(newton.force)
@@ -63,8 +62,10 @@ def solve_laws(
     return force, motions * springs.unit, stiffness / springs.unit, newton.solved.reshape(P, n)
 
 
-class _Slots:
-    """The windows that there are at every position, in U slots: curves, compliance and arms of each.
+class PairSprings:
+    """Tooth pairs as springs: of the windows that there are at every position curves, compliance and arms.
+
+    They stand in U slots a position, those of every `PairLaws` window that has a tooth pair.
 
     Approaches and compliance are over ``unit``, a mean one. At positions with fewer windows some slots are
     those of windows that are not there: they never close.
@@ -150,7 +151,9 @@ class _SpringNewton:
     ``stiffness`` (meshes, N) and ``solved`` (N,).
     """
 
-    def __init__(self, springs: _Slots, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None):
+    def __init__(
+        self, springs: PairSprings, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None
+    ):
         (P, _, n), at = separations.shape, np.arange(len(separations))[:, None]
         self.springs, self.load, self.limit = springs, load, _SETTLED * np.abs(load).max()
         self.place = np.repeat(np.arange(P), n)

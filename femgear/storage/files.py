@@ -110,7 +110,7 @@ def _create(dataset: Contents | xr.Dataset, stream: io.RawIOBase, free: Sequence
         for name, one in dataset.variables.items():
             kind = stored.get(one.dtype.kind, one.dtype)
             options = {"maxshape": [longest[dim] for dim in one.dims], "fletcher32": kind.kind != "O"}
-            if (free or one.nbytes > _COMPRESSED) and one.dtype.kind not in "OUS":
+            if one.dims and (free or one.nbytes > _COMPRESSED) and one.dtype.kind not in "OUS":
                 pieces = _chunk(one, free) if free else True
                 options |= {"chunks": pieces, "compression": 1, "shuffle": True}
             values = one.values.astype(kind, copy=False)

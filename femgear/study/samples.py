@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
@@ -43,17 +43,15 @@ from femgear.contact.assembly import (
 )
 from femgear.contact.batch import (
     ContactTangents,
-    PairLaws,
     check_residual,
     pair_laws,
     solve_batch,
 )
 from femgear.contact.flank_pairs import pair_separations
-from femgear.contact.pair_springs import solve_laws
+from femgear.contact.pair_springs import PairSprings, solve_laws
 from femgear.contact.peaks import mean_weights
 from femgear.contact.supports import MovingMembers, moving_members
-from femgear.errors import CaseError, FemgearError, StorageError
-from femgear.findings import Finding, tell
+from femgear.errors import CaseError
 from femgear.gears.deviations import (
     Runout,
     SetDeviations,
@@ -63,38 +61,28 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import FlankForm, ProfileSlope
-from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figure, save_figure
-from femgear.report.tables import Block
-from femgear.storage.files import own_files, resumable, write_dataset, write_text
-from femgear.storage.results import dataset
-from femgear.study.designs import Journal, fingerprint, open_journal
 from femgear.study.relief import DesignBasis, design_basis, sun_torque
-from femgear.study.runner import Runner, check_complete
-from femgear.trains.protocol import Progress, one_blas_thread, silent
-from femgear.trains.reading import to_toml, with_values
-from femgear.trains.static.results import HELD, LARGEST_PEAK_DOUBT, SERIES
+from femgear.trains.protocol import one_blas_thread
+from femgear.trains.reading import with_values
 
 if TYPE_CHECKING:
-    import xarray as xr
+    pass
 
-QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
 POSITIONS = 16
 """Of a mesh period."""
 _FORCES, _LEAST = 48, 1e-3
 """Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
 _STRAIGHT = 0.005
 """Share of a peak to peak that straight lines between positions may miss, of the set without drawn errors."""
-_TOGETHER, _EXACT_TOGETHER, _CHECKED, _TRIED = 128, 64, 8, 32
-"""Samples as springs and positions of the whole problem solved at once; samples solved again exactly; those
+_TOGETHER, _EXACT_TOGETHER, _TRIED = 128, 64, 32
+"""Samples as springs and positions of the whole problem solved at once; those
 of seed 0 that windows are tried with."""
-_BLOCKS = {"spring": 256, "exact": 64}
-"""Samples of a task."""
-_MOST = 10_000_000
+MOST_SAMPLES = 10_000_000
 _REACH = 5.0
 """Standard deviations within which all values of a normal law count as lying."""
 _FLANKS = {"sun": ("sun",), "planet": ("planet_sun_side", "planet_ring_side"), "ring": ("ring",)}
 """Of the gears, those with a profile slope of their own, as `SetDeviations` names them."""
-_NUMBERS = {
+NUMBERS = {
     "transmission_error": ("sample", "m", "static transmission error from sun to ring, peak to peak"),
     "largest_share": ("sample", "1", "largest share of a planet in the torque"),
     "stiffness_sun_planet": ("sample", "N/m", "mean tangent stiffness of the sun-planet meshes"),
@@ -103,9 +91,6 @@ _NUMBERS = {
     "opens": ("sample planet", "1", "whether the planet loses its load at a position"),
 }
 """What is computed of a sample: dimensions, unit and words."""
-_SHOWN = tuple(_NUMBERS)[:4]
-FILES, _JOURNAL = ("samples.nc", "samples.png", "worst.toml"), "samples.jsonl"
-"""What a command writes, and what it goes on from."""
 
 
 class Law(Section):
@@ -225,7 +210,9 @@ class _Level:
     """All that samples share in windows of one size."""
 
     found: Candidates
-    laws: PairLaws
+    springs: PairSprings
+    # force under which every cell begins to touch, as `PairLaws` has it (P, W, C)
+    touching: np.ndarray
     # separations per error: of the windows (P W, K), at their nodes (P W 3, K) or None
     shifts: csr_array
     tilts: csr_array | None
@@ -351,10 +338,12 @@ class SampleModel:
         of_windows = found.mesh, found.position[:, None], found.pair + listed.first[found.mesh]
         # errors move few pairs each
         mesh, at, pair = np.nonzero(np.isfinite(listed.gap) & ~listed.near & (s.contact == "profile"))
-        by_pairs = np.moveaxis(shifts, 0, -1)
-        of_errors = _sparse(by_pairs[of_windows]), _sparse(np.moveaxis(tilts, 0, -1)) if tilted else None
-        others = listed.gap[mesh, at, pair], _sparse(by_pairs[mesh, at, pair]), (at, mesh)
-        made = _Level(found, laws, *of_errors, overflows, *others)
+        by_pairs = np.moveaxis(np.array(shifts), 0, -1)
+        at_nodes = _sparse(np.moveaxis(np.array(tilts), 0, -1)) if tilted else None
+        made = _Level(
+            found, PairSprings(laws), laws.touching, _sparse(by_pairs[of_windows]), at_nodes, overflows,
+            listed.gap[mesh, at, pair], _sparse(by_pairs[mesh, at, pair]), (at, mesh),
+        )  # fmt: skip
         self._levels[share, nearest] = made
         return made
 
@@ -442,7 +431,7 @@ def solve_samples(model: SampleModel, errors: np.ndarray, *, exact: bool) -> dic
     sets start from the springs. Samples that springs do not solve, or whose contact the windows do not
     contain, are solved exactly by themselves, in larger windows as in `femgear.contact.cycle`.
 
-    The results are those of `_NUMBERS`, (n,) or (n, N) of planets, over the positions.
+    The results are those of `NUMBERS`, (n,) or (n, N) of planets, over the positions.
     """
     return _in_windows(model, errors, model.windows, exact)
 
@@ -455,7 +444,7 @@ def _in_windows(
     together = max(1, _EXACT_TOGETHER // len(model.position)) if exact else _TOGETHER
     blocks = np.split(errors, range(together, len(errors), together))
     parts, unsolved, missed = zip(*(_solved(model, level, block, exact) for block in blocks))
-    numbers, unsolved, missed = _joined(parts), np.concatenate(unsolved), np.concatenate(missed)
+    numbers, unsolved, missed = joined(parts), np.concatenate(unsolved), np.concatenate(missed)
     if (unsolved | missed).any() and enlargements == MOST_ENLARGEMENTS:
         raise not_contained()
     for over, away in ((True, False), (False, True), (True, True)):
@@ -472,7 +461,8 @@ def _in_windows(
 spring_numbers, exact_numbers = partial(solve_samples, exact=False), partial(solve_samples, exact=True)
 
 
-def _joined(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+def joined(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
+    """Join the numbers of samples that follow one another."""
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
@@ -487,7 +477,7 @@ def _solved(
     (n, P), back, by_error = (len(errors), len(model.position)), np.argsort(model.order), errors.T.copy()
     separations = (level.shifts @ by_error).reshape(P, -1, n)
     tilts = None if level.tilts is None else (level.tilts @ by_error).reshape(P, -1, 3, n)
-    force, motions, stiffness, ended = solve_laws(level.laws, model.load, separations, tilts)
+    force, motions, stiffness, ended = solve_laws(level.springs, model.load, separations, tilts)
     unsolved = ~ended.all(axis=0)
     if exact:
         force, motions, stiffness, unsolved = _contacts(model, level, separations, tilts, force)
@@ -499,7 +489,7 @@ def _solved(
     stiffness = np.einsum("p,pkn->kn", mean_weights(model.position, 1), stiffness.reshape(P, 2, N, n).mean(2))
     numbers = np.ptp(motions[:, N], axis=0), share.max(axis=(0, 1)), *stiffness
     planets = share.max(axis=0).T, (share <= 0.0).any(axis=0).T
-    return dict(zip(_NUMBERS, (*numbers, *planets), strict=True)), unsolved, missed
+    return dict(zip(NUMBERS, (*numbers, *planets), strict=True)), np.asarray(unsolved), missed
 
 
 def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts, force):
@@ -513,7 +503,7 @@ def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts,
         gap = gap + (found.polynomials @ _by_samples(tilts).reshape(-1, W, 3, 1))[..., 0]
     found = replace(found, gap=np.where(found.candidate, found.gap + gap, 0.0))
     force = _by_samples(force)
-    start = (force > 0.0)[..., None] & (force[..., None] >= level.laws.touching)
+    start = (force > 0.0)[..., None] & (force[..., None] >= level.touching)
     state = solve_batch(found, model.load, start=start.reshape(found.gap.shape))
     check_residual(found, state)
     stiffness = ContactTangents(found, state).of_meshes(found.smooth)
@@ -603,7 +593,7 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
     if level.tilts is not None:
         of_nodes = (level.tilts @ errors).reshape(P, -1, 3, 1)
         tilts = np.repeat(of_nodes, len(periods), axis=-1)
-    force, motions, _, _ = solve_laws(level.laws, model.load, separations, tilts)
+    force, motions, _, _ = solve_laws(level.springs, model.load, separations, tilts)
     share = force.reshape(P, 2, N, -1, len(periods)).sum(axis=3)[:, 0].max() / model.load[N]
     return float(np.ptp(motions[:, N])), float(share)
 
@@ -619,118 +609,6 @@ def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, fl
     sample = replace(basis, deviations=model.deviations(errors), positions=model.equidistant)
     cycle = sample.walk(torque if model.solved.gears is basis.gears else -torque)
     return float(cycle.peak_to_peak("sun_arc")), float(cycle.extremes("load_share")[1].max())
-
-
-@one_blas_thread()
-def samples_into(
-    case: Case, folder: Path, basis: tuple[SampleModel, str], *, count: int = 1000, seed: int = 1,
-    exact: bool = False, force: bool = False, progress: Progress = silent, runner: Runner | None = None
-) -> tuple[list[Block], list[str]]:  # fmt: skip
-    """Compute samples 0 to ``count - 1``; write numbers, a figure and the worst of them as a case file.
-
-    The worst has the largest transmission error. ``basis`` is what `prepared` gives. What there is to say
-    comes back with the names of the files; what keeps samples from being computed is raised (`Runner.map`).
-    Blocks of samples are kept in a journal until the end: an interrupted command goes on from it. Complete
-    results are refused (StorageError, E-OUTPUT), or replaced with ``force``.
-    """
-    model, text = basis
-    checked(count, "--number", 1)
-    own_files(folder, FILES)
-    if (folder / FILES[0]).exists() and not (force or (folder / _JOURNAL).exists()):
-        raise StorageError(
-            "the folder holds results already", code="E-OUTPUT", file=str(folder),
-            remedy="name a new folder, or replace them with --force",
-        )  # fmt: skip
-    method = "exact" if exact else "spring"
-    more = {"tolerances": fingerprint(text), "seed": seed, "method": method, "positions": len(model.position)}
-    with resumable(folder), open_journal(folder / _JOURNAL, case, more, _is_block) as journal:
-        values = _computed(model, more, count, journal, progress, runner or Runner())
-        data, ideal = _checked_again(case, model, text, values, more)
-        _tell_of_peaks(data)
-        write_dataset(data, folder / FILES[0])
-        save_figure(figure(data), folder / FILES[1])
-        write_text(to_toml(sample_case(case, model, seed, data.attrs["worst"])), folder / FILES[2])
-    (folder / _JOURNAL).unlink(missing_ok=True)
-    return [_described(data, ideal, _limits(case, model))], list(FILES)
-
-
-def _ratios(larger: np.ndarray, smaller: np.ndarray) -> tuple[float, float]:
-    """Smallest and largest ratio of numbers (n,) to others; one where the others are zero."""
-    ratio = np.divide(larger, smaller, out=np.ones(len(larger)), where=smaller > 0.0)
-    return float(ratio.min()), float(ratio.max())
-
-
-def _tell_of_peaks(data: xr.Dataset) -> None:
-    """Tell (W-POSITIONS) where the positions of the samples miss much of what lies between them."""
-    missed = {
-        name: 1.0 - 1.0 / _ratios(data[f"{name}_between"].values, data[f"{name}_exact"].values)[1]
-        for name in _SHOWN
-        if f"{name}_between" in data
-    }
-    name = max(missed, key=missed.__getitem__)
-    if missed[name] > LARGEST_PEAK_DOUBT:
-        text = (
-            f"{data.attrs['positions']} positions of a mesh period miss up to {missed[name]:.0%} of the "
-            f"{name.replace('_', ' ')} of the samples that were solved again"
-        )
-        tell(Finding("W-POSITIONS", "--positions", text, remedy="take more positions"))
-
-
-def _limits(case: Case, model: SampleModel) -> Iterator[str]:
-    """Say what the numbers of all samples assume."""
-    elastic = '; static.members = "elastic" lets them move on their supports and bearings' * (not case.rigid)
-    yield f"stiffness {SERIES}" if case.static.members == "elastic" else f"{HELD}{elastic}"
-    if model.level(*model.windows).tilts is not None:
-        yield "profile slopes do not move the windows here (some tenths of a per cent)"
-
-
-def _computed(model, more, count, journal: Journal, progress, runner: Runner) -> dict[str, np.ndarray]:
-    """Numbers of all samples; blocks that the journal has not are computed, and kept in it."""
-    seed, size = more["seed"], _BLOCKS[more["method"]]
-    blocks = [(first, min(first + size, count)) for first in range(0, count, size)]
-    keys = [f"{first}-{end}" for first, end in blocks]
-    left = [(key, block) for key, block in zip(keys, blocks) if key not in journal]
-    block_of = partial(_block, model, seed, more["method"] == "exact")
-    found = runner.map(block_of, [block for _, block in left])
-    for done, (index, outcome) in enumerate(found, len(keys) - len(left) + 1):
-        if isinstance(outcome, FemgearError):
-            raise outcome
-        journal.add(left[index][0], {name: part.tolist() for name, part in outcome.items()})
-        progress("samples", done, len(keys))
-    check_complete(keys, journal)
-    return _joined([journal[key] for key in keys])
-
-
-def _is_block(key: str, record: dict) -> bool:
-    """Tell whether a record of a journal has the numbers of a block of samples."""
-    first, end = map(int, key.split("-"))
-    parts = [np.array(record[name], float) for name in _NUMBERS]
-    return all(len(part) == end - first and np.isfinite(part).all() for part in parts)
-
-
-def _checked_again(case: Case, model: SampleModel, text: str, values, more) -> tuple[xr.Dataset, dict]:
-    """Numbers of all samples with those of some that are solved exactly; those of the set without errors."""
-    count, seed = len(values["transmission_error"]), more["seed"]
-    order = np.argsort(values["transmission_error"], kind="stable")
-    chosen = order[np.linspace(0, count - 1, min(_CHECKED, count)).astype(int)]
-    chosen = np.unique(np.append(chosen, values["largest_share"].argmax()))
-    errors = np.concatenate([model.draw(seed, int(i), 1) for i in chosen])
-    again = exact_numbers(model, errors)
-    turn, between = (
-        dict(zip(_SHOWN, np.transpose([numbers(model, one) for one in errors])))
-        for numbers in (over_a_turn, between_positions)
-    )
-    ideal = exact_numbers(model, np.zeros((1, model.size)))
-    # those of a run of the case
-    ideal |= dict(zip(_SHOWN, np.transpose([between_positions(model, np.zeros(model.size))])))
-    attrs = {"seed": seed, "tolerances": text, "case": to_toml(case), "worst": int(order[-1])}
-    attrs["method"] = more["method"]
-    more = {"turn": turn, "between": between}
-    return _dataset(model, values, chosen, again, more, attrs), ideal
-
-
-def _block(model: SampleModel, seed: int, exact: bool, ends: tuple[int, int]) -> dict[str, np.ndarray]:
-    return sample_block(model, seed, ends[0], ends[1] - ends[0], exact=exact)
 
 
 def prepared(
@@ -756,91 +634,8 @@ def prepared(
     return replace(model, equidistant=basis.gears.equal_positions(positions)), text
 
 
-def checked(value: int, key: str, least: int, most: int = _MOST) -> None:
+def checked(value: int, key: str, least: int, most: int = MOST_SAMPLES) -> None:
     """Refuse (E-RANGE) a number under the least or over the most."""
     if not least <= value <= most:
         message = "the number is out of range"
         raise CaseError(message, code="E-RANGE", key=key, value=value, limit=f"{least} to {most}")
-
-
-def _dataset(model: SampleModel, values, chosen, again, more, attrs) -> xr.Dataset:
-    """Numbers of all samples; of those solved `again`, also over a ``turn``, and ``between`` positions."""
-    entries: dict[str, tuple] = {
-        n: (dims, values[n], unit, words) for n, (dims, unit, words) in _NUMBERS.items()
-    }
-    for name in _SHOWN:
-        _, unit, words = _NUMBERS[name]
-        quantiles, exact = np.quantile(values[name], QUANTILES), again[name]
-        error = np.abs(values[name][chosen] - exact).max() / np.abs(exact).max()
-        entries[f"{name}_quantile"] = ("quantile", quantiles, unit, f"{words}, quantiles")
-        entries[f"{name}_exact"] = ("check", exact, unit, f"{words}, whole contact problem")
-        entries[f"{name}_error"] = ("", error, "1", f"{words}: largest error of the checked samples")
-        for where, told in (("turn", "over a turn of the carrier"), ("between", "with the peaks between")):
-            if name in more[where]:
-                entries[f"{name}_{where}"] = ("check", more[where][name], unit, f"{words}, {told}")
-    samples, planets = values["opens"].shape
-    coords = {
-        "sample": ("sample", np.arange(samples), "1", "sample of the seed"),
-        "planet": ("planet", np.arange(planets) + 1, "1", "planet"),
-        "quantile": ("quantile", QUANTILES, "1", "share of the samples below"),
-        "check": ("check", chosen, "1", "sample of the seed that was solved again"),
-    }
-    attrs |= {"equidistant": model.equidistant}
-    attrs |= {"positions": len(model.position), "mesh_periods": 1, "turn": model.basis.gears.ring.teeth}
-    return dataset(entries, coords, attrs)
-
-
-def figure(data: xr.Dataset):
-    """Draw transmission error against largest share of all samples, and the distributions of both."""
-    ste, share = 1e6 * data.transmission_error.values, data.largest_share.values
-    found, axes = new_figure(columns=3, width=12.0, height=4.2)
-    names = "transmission error, peak to peak [µm]", "largest share of a planet [1]"
-    # points of tens of thousands of samples would hide one another
-    counts = axes[0].hexbin(share, ste, gridsize=50, bins="log", mincnt=1, cmap="cividis", linewidths=0.2)
-    found.colorbar(counts, ax=axes[0], label="samples in a cell", pad=0.02, format="%d").minorticks_off()
-    worst = int(data.attrs["worst"])
-    axes[0].plot(share[worst], ste[worst], "D", color=VERMILION, label=f"worst: sample {worst}")
-    label(axes[0], names[1], names[0], f"{len(ste)} samples, seed {data.attrs['seed']}")
-    for ax, name, values in zip(axes[1:], names, (ste, share), strict=True):
-        # limits below rounding leave samples that differ by less than bins can
-        middle, spread = float(np.mean(values)), float(np.ptp(values))
-        reach = max(0.5 * spread, 1e-6 * abs(middle), 1e-12) if spread < 1e-6 * abs(middle) else None
-        ends = None if reach is None else (middle - reach, middle + reach)
-        ax.hist(values, 80, range=ends, weights=np.full(len(values), 100.0 / len(values)), color=BLUE)
-        for part, dash in ((0.5, "-"), (0.95, "--"), (0.99, ":")):
-            at = np.quantile(values, part)
-            ax.axvline(at, color=VERMILION, linestyle=dash, label=f"{part:.0%} of the samples below")
-        label(ax, name, "samples [%]")
-    legend_below(found, columns=4)
-    return found
-
-
-def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[str]) -> Block:
-    """Quantiles of all numbers, and how far to trust them; what they assume."""
-    scales = {"m": (1e6, " [um]"), "N/m": (1e-6, " [N/um]"), "1": (1.0, "")}
-    rows, errors, turns, between = [], [], [], []
-    for name in _SHOWN:
-        one, (scale, shown) = data[name], scales[data[name].units]
-        values = [ideal[name][0], *data[f"{name}_quantile"].values, one.values.max()]
-        rows.append((f"{one.long_name}{shown}", *(f"{scale * value:.5g}" for value in values)))
-        errors.append(f"{float(data[f'{name}_error']):.1e} ({name.replace('_', ' ')})")
-        for where, told in (("turn", turns), ("between", between)):
-            if (compared := data.get(f"{name}_{where}")) is not None:
-                low, high = _ratios(compared.values, data[f"{name}_exact"].values)
-                told.append(f"{low:.3g} to {high:.3g} times the {name.replace('_', ' ')}")
-    worst, at, check = int(data.attrs["worst"]), int(data.largest_share.values.argmax()), data.check.values
-    of_worst = 1e6 * float(data.transmission_error_between.values[check == worst][0])
-    notes = (
-        f"method {data.attrs['method']}; {len(check)} samples solved again exactly differ by at most "
-        f"{', '.join(errors)} of the largest",
-        f"{data.attrs['positions']} positions of one mesh period: {data.attrs['equidistant']} equidistant, "
-        "others where the set without drawn errors has its peaks, and the end; over the "
-        f"{data.attrs['turn']} of a turn of the carrier these samples have {' and '.join(turns)}",
-        f"with the peaks of the samples themselves, as femgear run has them, {' and '.join(between)}",
-        f"a planet loses its load in {float(data.opens.any('planet').mean()):.2%} of the samples",
-        f"worst.toml (femgear run --only static): sample {worst}, STE {of_worst:.6g} um; "
-        f"largest share: sample {at}",
-        *limits,
-    )
-    header = ("number", "ideal", *(f"{q:.0%}" for q in QUANTILES), "largest")
-    return Block(f"{len(data.sample)} samples, seed {data.attrs['seed']}", header, tuple(rows), notes)

@@ -16,7 +16,7 @@ from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.cli import main
 from femgear.contact.batch import PairLaws
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
-from femgear.contact.pair_springs import solve_laws
+from femgear.contact.pair_springs import PairSprings, solve_laws
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError, StorageError
@@ -25,8 +25,8 @@ from femgear.run import grid_cache, solve
 from femgear.storage.files import read_dataset
 from femgear.study.relief import design_basis
 from femgear.study.runner import Runner, open_runner
+from femgear.study.sample_results import FILES, samples_into
 from femgear.study.samples import (
-    FILES,
     Law,
     Tolerances,
     exact_numbers,
@@ -37,7 +37,6 @@ from femgear.study.samples import (
     sample_case,
     sample_model,
     sample_positions,
-    samples_into,
     spring_numbers,
 )
 from femgear.trains.reading import read_case, with_value, with_values
@@ -127,7 +126,7 @@ def spring_shares(laws, load, errors):
     """Shares (S, N) under tangential pin errors (S, N) [m], positive away from the path."""
     right = np.zeros(laws.approach.shape[1])
     right[0] = load
-    found = solve_laws(laws, right, 2 * math.cos(ALPHA) * np.transpose(errors)[None])
+    found = solve_laws(PairSprings(laws), right, 2 * math.cos(ALPHA) * np.transpose(errors)[None])
     assert found[3].all()
     return found[0][0].T / load
 
@@ -370,6 +369,26 @@ def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, 
     assert planetary_set(again).n_planets == 3
 
 
+def test_samples_drawn_at_random_are_solved_exactly(case, tmp_path, monkeypatch):
+    """And many samples are drawn as points of a grid that weigh as many as lie there."""
+    monkeypatch.setattr("femgear.study.sample_results._SHARE_AGAIN", 10)
+    monkeypatch.setattr("femgear.study.sample_results._DRAWN", 20)
+    basis = prepared(case, TOLERANCES, positions=8, cache=grid_cache())
+    blocks, _ = samples_into(case, tmp_path, basis, count=40, seed=2)
+    data = read_dataset(tmp_path / "samples.nc")
+    drawn = data.drawn.values
+    assert len(np.unique(drawn)) == 4 and "4 samples drawn at random" in blocks[1].title
+    exact = exact_numbers(basis[0], np.concatenate([basis[0].draw(2, int(i), 1) for i in drawn]))
+    for row, name in zip(blocks[1].rows, ("transmission_error", "largest_share"), strict=False):
+        np.testing.assert_allclose(data[f"{name}_drawn"], exact[name], rtol=1e-9)
+        difference = data[name].values[drawn] / exact[name] - 1.0
+        np.testing.assert_allclose(data[f"{name}_difference"], difference, atol=1e-9)
+        assert 0.0 < np.abs(difference).max() < 0.01
+        assert float(row[-1]) == pytest.approx(100.0 * np.abs(difference).max(), rel=0.05)
+        assert float(data[f"{name}_quantile"].sel(quantile=0.5)) == np.median(data[name].values)
+    assert (tmp_path / "samples.png").read_bytes()[:4] == b"\x89PNG"
+
+
 def test_errors_below_rounding_are_computed_and_drawn(case, tmp_path):
     path, out, laws = tmp_path / "case.toml", tmp_path / "out", tmp_path / "laws.toml"
     path.write_text(case.source, encoding="utf-8")
@@ -385,7 +404,9 @@ def test_members_that_move_share_better_and_are_told(case, tmp_path):
     medians = []
     for members, note in (("fixed", "all centres held"), ("elastic", "planet-ring with the ring on its fou")):
         one = with_value(case, "static.members", members)
-        (block,), _ = samples_into(one, tmp_path / members, prepared(one, path, cache=grid_cache()), count=20)
+        (block, *_), _ = samples_into(
+            one, tmp_path / members, prepared(one, path, cache=grid_cache()), count=20
+        )
         assert [note in line for line in block.notes].count(True) == 1
         # the column "ideal" is what a run of the case finds
         of_run = 1e6 * solve(one, "static")["static"].cycle.peak_to_peak("sun_arc")
@@ -409,7 +430,7 @@ class Interrupted(Runner):
 
 
 def test_two_processes_and_an_interrupted_command_give_the_same_bits(case, tmp_path, monkeypatch):
-    monkeypatch.setattr("femgear.study.samples._BLOCKS", {"spring": 8, "exact": 4})
+    monkeypatch.setattr("femgear.study.sample_results._BLOCKS", {"spring": 8, "exact": 4})
     basis, journal = prepared(case, TOLERANCES, positions=8, cache=grid_cache()), tmp_path / "samples.jsonl"
     with open_runner(2) as runner:
         samples_into(case, tmp_path, basis, count=20, runner=runner)

@@ -1,0 +1,45 @@
+"""Numbers of samples in a file: blocks in any order, what was half written, columns."""
+
+import numpy as np
+import pytest
+
+from femgear.errors import StorageError
+from femgear.study import columns as columns_module
+from femgear.study.columns import open_columns
+
+WIDTHS = {"error": 0, "share": 3}
+
+
+def numbers(first, end):
+    sample = np.arange(first, end, dtype=float)
+    return {"error": 1e-6 * sample, "share": sample[:, None] + [0.0, 0.1, 0.2]}
+
+
+def test_blocks_come_back_whatever_their_order(tmp_path, monkeypatch):
+    monkeypatch.setattr(columns_module, "_ROWS", 7)
+    path = tmp_path / "part"
+    with open_columns(path, WIDTHS) as columns:
+        late, early = columns.write(10, numbers(10, 25)), columns.write(0, numbers(0, 10))
+        assert columns.holds(10, 25, late) and columns.holds(0, 10, early) and not columns.holds(0, 10, late)
+    with open_columns(path, WIDTHS) as columns:
+        assert columns.holds(10, 25, late)
+        for name, values in numbers(0, 25).items():
+            np.testing.assert_array_equal(columns.column(name, 25), values)
+        assert [first for first, _ in columns.blocks(25)] == [0, 7, 14, 21]
+        np.testing.assert_array_equal(columns.rows(12, 13)["share"], [[12.0, 12.1, 12.2]])
+
+
+def test_what_is_damaged_or_missing_is_not_held(tmp_path):
+    path = tmp_path / "part"
+    with open_columns(path, WIDTHS) as columns:
+        checksum = columns.write(0, numbers(0, 10))
+    data = bytearray(path.read_bytes())
+    data[100] ^= 1
+    for damaged in (bytes(data), bytes(data[:-1]), b""):
+        path.write_bytes(damaged)
+        with open_columns(path, WIDTHS) as columns:
+            assert not columns.holds(0, 10, checksum)
+    path.unlink()
+    path.mkdir()
+    with pytest.raises(StorageError, match="no regular file"), open_columns(path, WIDTHS):
+        pass
