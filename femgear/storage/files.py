@@ -164,7 +164,8 @@ def _append(dataset: Contents | xr.Dataset, stream: io.RawIOBase, along: str) ->
                 stored[...] = np.zeros(stored.shape, stored.dtype)
             start = [size if one == along else 0 for one, size in zip(variable.dims, stored.shape)]
             end = [first + size for first, size in zip(start, variable.shape)]
-            stored.resize(np.maximum(stored.shape, end))
+            if end != list(stored.shape):
+                stored.resize(np.maximum(stored.shape, end))
             stored[tuple(map(slice, start, end))] = variable.values
         file.attrs.update({str(name): text for name, text in dataset.attrs.items() if isinstance(text, str)})
 

@@ -62,7 +62,11 @@ class Columns:
 
     def column(self, name: str, count: int) -> np.ndarray:
         """One number of the first ``count`` samples."""
-        return np.concatenate([block[name] for _, block in self.blocks(count)])
+        width = self._widths[name]
+        found = np.empty((count, width) if width else count)
+        for first, rows in self.blocks(count):
+            found[first : first + _ROWS] = rows[name]
+        return found
 
     def _read(self, first: int, end: int) -> bytes:
         with storage_errors(self._path):
