@@ -27,7 +27,8 @@ from femgear.storage.files import read_dataset
 from femgear.study.objectives import transmission_error
 from femgear.study.problem import Problem, Variable
 from femgear.study.runner import Dask, Processes, Runner
-from femgear.study.samples import prepared, samples_into
+from femgear.study.sample_results import samples_into
+from femgear.study.samples import prepared
 from femgear.study.search import SearchOptions, minimise
 from femgear.study.sweep import sweep
 from femgear.trains.reading import read_case, to_toml, with_values
