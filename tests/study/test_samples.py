@@ -373,7 +373,7 @@ def test_samples_drawn_at_random_are_solved_exactly(case, tmp_path, monkeypatch)
     """And many samples are drawn as points of a grid that weigh as many as lie there."""
     monkeypatch.setattr("femgear.study.sample_results._SHARE_AGAIN", 10)
     monkeypatch.setattr("femgear.study.sample_results._DRAWN", 20)
-    monkeypatch.setattr("femgear.study.columns._ROWS", 15)
+    monkeypatch.setattr("femgear.study.sample_results._ROWS", 15)
     basis = prepared(case, TOLERANCES, positions=8, cache=grid_cache())
     blocks, _ = samples_into(case, tmp_path, basis, count=40, seed=2)
     data = read_dataset(tmp_path / "samples.nc")

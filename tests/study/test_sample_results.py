@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import StorageError
-from femgear.study import columns as columns_module
-from femgear.study.columns import open_columns
+from femgear.study import sample_results
+from femgear.study.sample_results import open_columns
 
 WIDTHS = {"error": 0, "share": 3}
 
@@ -16,7 +16,7 @@ def numbers(first, end):
 
 
 def test_blocks_come_back_whatever_their_order(tmp_path, monkeypatch):
-    monkeypatch.setattr(columns_module, "_ROWS", 7)
+    monkeypatch.setattr(sample_results, "_ROWS", 7)
     path = tmp_path / "part"
     with open_columns(path, WIDTHS) as columns:
         late, early = columns.write(10, numbers(10, 25)), columns.write(0, numbers(0, 10))
