@@ -182,8 +182,9 @@ class Steps:
 
     def keep(self, step: str, entries: Entries, result: Result) -> Result:
         """Keep the result of a step for these entries, and return it."""
-        found = self._found.setdefault(step, OrderedDict())
-        found[fingerprint(entries)] = result
+        key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
+        found[key] = result
+        found.move_to_end(key)
         if len(found) > _KEPT:
             found.popitem(last=False)
         return result

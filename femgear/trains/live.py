@@ -77,6 +77,11 @@ class Answer(Mapping[str, Any]):
         cache = self.cache if same else None
         return Answer(case, self.steps, cache=cache, progress=self._progress)
 
+    def keep(self) -> None:
+        """Keep the results of this answer as the latest ones, whatever others came after it."""
+        for name, result in self._results.items():
+            self.steps.keep(name, stages_of(self.case, name)[-1].decided_by(self.case), result)
+
     def unknown(self) -> dict[str, bool]:
         """Tell of every stage of a whole run whether it has yet to be computed: none is kept."""
         return {
@@ -158,6 +163,7 @@ class Live:
         return self.back_to(self._first.of(changed))
 
     def back_to(self, answer: Answer) -> Answer:
-        """Go back to an earlier answer: later changes go on from its case."""
+        """Go back to an earlier answer: later changes go on from its case and its results."""
+        answer.keep()
         self.answer, self.changed = answer, answer.unknown()
         return answer

@@ -205,7 +205,8 @@ def test_answers_are_those_of_a_fresh_computation(coarse, grids):
         before, answer = handle.answer, apply(handle, changes, coarse)
         stages = [stage for stage in STAGES if stage != "stress" or "stress" in answer]
         assert_equal(answer, Answer(answer.case, Steps(), cache=grids), stages)
-        if draw.random() < 0.7:
+        # the response on supports takes minutes in all
+        if draw.random() < 0.7 or "housing.support" in changes:
             handle.back_to(before)
 
 
