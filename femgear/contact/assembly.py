@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TypeVar
 
 import numpy as np
@@ -678,16 +678,24 @@ def _contact_half_width(pair: FlankPair, line_load: float, modulus: float) -> fl
     return hertz_half_width(line_load, radius, modulus)
 
 
-def _window_compliance(width: float, cells: int, bodies: Bodies, kind: int) -> np.ndarray:
-    """Half-plane compliance of both flanks between the cells of a window, shape (4, cells, cells) [m/N]."""
+@lru_cache(maxsize=64)
+def _window_compliance(
+    width: float, cells: int, materials: tuple[tuple[float, float], ...], common: float
+) -> np.ndarray:
+    """Half-plane compliance of both flanks between the cells of a window, shape (4, cells, cells) [m/N].
+
+    Of shear modulus [Pa] and Poisson's ratio of each, and their face width in common [m]. All walks of a set
+    under one torque have windows of one width.
+    """
     centre, half = width * cell_centres(cells), 0.5 * width * np.diff(cell_edges(cells))
     distance, yielding = centre[:, :, None] - centre[:, None, :], []
-    for flank in bodies.mates[kind]:
-        constants = flank.corner.shear_modulus, flank.corner.poisson_ratio
+    for constants in materials:
         # of both cells of a pair: reciprocal between cells of different widths
         loaded = surface_displacement(distance, half[:, :, None], *constants)
         yielding.append(0.5 * (loaded + surface_displacement(distance, half[:, None, :], *constants)))
-    return (yielding[0] + yielding[1]) / bodies.widths[kind]
+    found = (yielding[0] + yielding[1]) / common
+    found.setflags(write=False)
+    return found
 
 
 def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int) -> MeshWindows:
@@ -721,8 +729,13 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
         turns=turns,
         local=np.stack(
             [
-                _window_compliance(w.cell[0] * cells, cells, bodies, kind)
-                for kind, w in enumerate(found[: len(gears.kinds)])
+                _window_compliance(
+                    float(w.cell[0] * cells),
+                    cells,
+                    tuple((flank.corner.shear_modulus, flank.corner.poisson_ratio) for flank in flanks),
+                    common,
+                )
+                for w, flanks, common in zip(found, bodies.mates, bodies.widths, strict=False)
             ]
         ),
         cell_area=area[:, None, None] * np.diff(cell_edges(cells)),

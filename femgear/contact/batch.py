@@ -109,9 +109,10 @@ def check_definite(found: Candidates) -> None:
         values.swapaxes(1, 2) @ _local_solution(local, (np.arange(len(local)),), some, values)
     )
     root = axes * np.sqrt(np.maximum(size, 0.0))[:, None] @ axes.swapaxes(1, 2)
-    size = 3 * len(filled)
+    W, size = len(filled), 3 * len(filled)
     for smooth in cyclic_harmonics(found.images[:, 0, filled][:, :, :, filled]):
-        coupled = np.einsum("wab,wbvc,vcd->wavd", root, smooth, root, optimize=True).reshape(size, size)
+        half = (root @ smooth.reshape(W, 3, size)).reshape(W * 3, W, 3).swapaxes(0, 1)
+        coupled = (half @ root).swapaxes(0, 1).reshape(size, size)
         whole = np.block([[coupled.real, -coupled.imag], [coupled.imag, coupled.real]])
         factor(np.eye(2 * size) + whole)
 

@@ -15,6 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -136,6 +137,14 @@ class FlankCompliance:
     root: ObservedRoot | None = None
     surface: SectorSchur | None = None
     free: FreeSector | None = None
+
+    @cached_property
+    def least(self) -> float:
+        """Most negative compliance between flanks that a pair which is left out may share [m/N], or zero."""
+        regular, n = self.regular, len(self.roll)
+        # a pair that is left out shares no flank with one that carries
+        own = regular[0, :n, n:].min(), regular[0, n:, :n].min()
+        return float(min(0.0, regular[1:].min(), *own))
 
 
 @dataclass(frozen=True)

@@ -43,13 +43,7 @@ def needed_nearest(found: Candidates, approach, force) -> np.ndarray:
 
 def _largest_closing(found: Candidates) -> float:
     """How far flanks of both gears of a mesh come nearer to one another at most, per load elsewhere [m/N]."""
-    least = 0.0
-    for body in (one for one in found.bodies.gears if one is not None):
-        regular, n = body.regular, len(body.roll)
-        # a pair that is left out shares no flank with one that carries
-        own = regular[0, :n, n:].min(), regular[0, n:, :n].min()
-        least = min(least, regular[1:].min(), *own)
-    return -2.0 * least
+    return -2.0 * min(body.least for body in found.bodies.gears if body is not None)
 
 
 def yielding(found: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarray:
@@ -77,7 +71,6 @@ def yielding(found: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarra
         for image in range(images):
             lag = (away - image * count // images) % count
             values = body.regular[lag[..., None, None], place[:, None, :, None], index[:, :, None, :]]
-            total[these] += np.einsum(
-                "oa,owab,owb,ow->o", share, values, weight, loads[these][:, own], optimize=True
-            )
+            moved = (share[:, None, None] @ values @ weight[..., None])[..., 0, 0]
+            total[these] += (moved * loads[these][:, own]).sum(axis=1)
     return total / np.sqrt(found.bodies.of_kinds(setup.kind(mesh)))

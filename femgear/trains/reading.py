@@ -212,6 +212,9 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
 def _change(data: dict, key: str, value: Any, name: str) -> None:
     """Change one entry of the tables of a case file; None takes it out."""
+    if not isinstance(key, str):
+        limit = 'keys such as "operation.torque" or "sun.modifications[0].amount"'
+        raise CaseError(f"a key is a text, not {described(key)}", code="E-TYPE", value=key, limit=limit)
     parts = re.findall(r"\[\d{1,9}\]|[^.\[\]]+", key) or [key]
     *tables, last = parts
     table: Any = data

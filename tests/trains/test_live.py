@@ -249,6 +249,8 @@ def test_a_refused_change_leaves_the_case_as_it_was(coarse, grids):
         handle.change({"operation.torque": "0 N m"})
     with pytest.raises(GeometryError, match="overlap"):
         handle.change({"set.planets": 9})
+    with pytest.raises(CaseError, match="a key is a text"):
+        handle.change({1: 2})
     with pytest.raises(CaseError, match="by a mapping"):
         handle.change("operation.torque")
     assert handle.answer is before
