@@ -269,8 +269,10 @@ def _show_warning(message, category, filename, lineno, file=None, line=None) -> 
 
 
 @app.command
-def check(case: Path, /, *, neighbours: Annotated[bool, Parameter(negative="")] = False) -> int:
-    """Read a case, check its gears and print what they are.
+def check(
+    case: Path, /, *, neighbours: Annotated[bool, Parameter(negative="")] = False, only: str | None = None
+) -> int:
+    """Read a case, check its gears, print what they are, and refuse what a run would refuse.
 
     Parameters
     ----------
@@ -278,24 +280,36 @@ def check(case: Path, /, *, neighbours: Annotated[bool, Parameter(negative="")] 
         TOML case file.
     neighbours
         Print which neighbouring tooth numbers would fit, too.
+    only
+        Refuse only what femgear run --only with this stage would refuse.
     """
     from femgear.trains.reading import read_case
-    from femgear.trains.registry import check_case, stages_of, train_of
+    from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
     _print(block for block in train_of(data).describe_case(data) if neighbours or not block.beside)
     try:
-        check_case(data)
-    except FemgearError as error:
-        works = []
-        for stage in train_of(data).stages:
-            with contextlib.suppress(FemgearError):
-                check_case(data, stage.name)
-                works.append(stage.name)
-        refused = ", ".join(stage.name for stage in stages_of(data) if stage.name not in works)
-        others = f"; it takes --only {' or '.join(works)}" if works else ""
-        print(f"\nfemgear run without --only refuses this case ({refused}){others}:\n{error}")
+        check_case(data, only)
+    except FemgearError:
+        if only is None:
+            sys.stdout.flush()
+            print(_refused_stages(data), file=sys.stderr)
+        raise
     return 0
+
+
+def _refused_stages(case: Any) -> str:
+    """Say which stages of a run without ``--only`` cannot represent a case, and which can."""
+    from femgear.trains.registry import check_case, stages_of, train_of
+
+    works = []
+    for stage in train_of(case).stages:
+        with contextlib.suppress(FemgearError):
+            check_case(case, stage.name)
+            works.append(stage.name)
+    refused = ", ".join(stage.name for stage in stages_of(case) if stage.name not in works)
+    others = f"; it takes --only {' or '.join(works)}" if works else ""
+    return f"femgear run without --only refuses this case ({refused}){others}:"
 
 
 @app.command

@@ -73,10 +73,10 @@ def standard(sun: int, planet: int, ring: int, planets: int = 3) -> str:
 def check(tmp_path, capsys):
     """Run ``femgear check`` on a text; gives exit code, standard output and standard error."""
 
-    def run(text: str):
+    def run(text: str, *options: str):
         path = tmp_path / "case.toml"
         path.write_text(text, encoding="utf-8")
-        code = cli.main(["check", str(path)])
+        code = cli.main(["check", str(path), *options])
         printed = capsys.readouterr()
         return code, printed.out, printed.err
 
@@ -132,8 +132,9 @@ def test_check_echoes_negative_ring_teeth(check):  # bad input 32
     ],
 )
 def test_check_warns(check, change, words):
-    code, out, _ = check(edited(change))
-    assert code == 0 and words in out
+    code, out, err = check(edited(change))
+    # without torque it can be looked at, and not be run
+    assert code == (2 if "[E-NO-LOAD]" in err else 0) and words in out
 
 
 def test_check_flags_undercut_with_the_shift_that_avoids_it(check):  # bad input 33
@@ -594,14 +595,33 @@ def test_export_writes_every_number_with_its_unit(tmp_path, capsys, pipeline):
     assert not (out / "exported").exists()
 
 
-def test_check_says_what_a_run_would_refuse(check):
+def test_check_refuses_what_a_run_would_refuse(check):
     swapped = with_values(read_case(CASE), {"operation.input": "ring", "operation.fixed": "sun"})
-    code, out, _ = check(to_toml(swapped))
-    assert code == 0 and "E-FIXED-MEMBER" in out
+    code, out, err = check(to_toml(swapped))
+    assert code == 2 and "contact ratio" in out and re.search(r"\[E-FIXED-MEMBER\] \S*case.toml:\d+: ", err)
     refused, works = "(modes, runup, dynamics, housing)", "it takes --only static or stress:"
-    assert f"femgear run without --only refuses this case {refused}; {works}" in out
-    assert "refuses" not in check(to_toml(swapped) + "\n[planar]\n")[1]
-    assert "refuses" not in check(TEXT)[1]
+    assert f"femgear run without --only refuses this case {refused}; {works}" in err
+    assert check(to_toml(swapped), "--only", "static")[::2] == (0, "")
+    assert check(to_toml(swapped), "--only", "modes")[0] == 2
+    assert check(to_toml(swapped) + "\n[planar]\n")[0] == 0
+    assert check(TEXT)[::2] == (0, "")
+
+
+def test_check_refuses_housings_that_a_run_would_refuse_with_file_and_line(check, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    idle = (
+        TEXT
+        + '\n[[housing.support]]\nangle = "0 deg"\nradial_stiffness = "0 N/m"\ntangential_stiffness = "0 N/m"\n'
+    )
+    code, _, err = check(idle)
+    line = idle.splitlines().index("[[housing.support]]") + 1
+    assert code == 2 and "[E-SUPPORT]" in err and f"case.toml:{line}: housing.support[0]: " in err
+    angle = np.linspace(0.0, 6.0, 40)
+    arrays = {"natural_frequency": [2e3], "damping_ratio": 0.02, "ring_shape": np.ones((1, 40, 2))}
+    arrays |= {"sensor_shape": np.ones((1, 2)), "ring_angle": np.where(angle > 5.0, np.nan, angle)}
+    np.savez(tmp_path / "casing.npz", **arrays)
+    code, _, err = check(TEXT + '\n[housing.structure]\nfile = "casing.npz"\ndamping_ratio = 0.02\n')
+    assert code == 2 and "[E-FINITE]" in err and "casing.npz: housing.structure.file: ring_angle" in err
 
 
 def test_an_interrupt_that_python_drops_comes_once_more(tmp_path, capsys, pipeline):

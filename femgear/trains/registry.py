@@ -163,7 +163,13 @@ def check_case(case, only: str | None = None) -> None:
     Raises
     ------
     CaseError, GeometryError
+        They name the file of the case, and the line of the entry.
     """
     for check in dict.fromkeys(stage.check for stage in stages_of(case, only)):
         if check is not None:
-            check(case)
+            try:
+                check(case)
+            except FemgearError as error:
+                for problem in (error, *error.problems):
+                    problem.file = problem.file or case.location(problem.key or "")
+                raise

@@ -140,8 +140,11 @@ def _check_housing_supports(case: Case) -> None:
     found, circle = case.housing.support, 2 * math.pi * case.ring.outer_radius
     idle = next((i for i, one in enumerate(found) if not _acts(one)), None)
     if idle is not None:
-        message, key = "a support without stiffness and mass does nothing", f"housing.support[{idle}]"
-        raise CaseError(message, code="E-SUPPORT", key=key, limit="a stiffness or mass above zero")
+        raise CaseError(
+            "a support without stiffness and mass does nothing", code="E-SUPPORT",
+            key=f"housing.support[{idle}]", limit="a stiffness or mass above zero",
+            remedy="give one of them, or leave the support out",
+        )  # fmt: skip
     angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in found]
     again = next((i for i, angle in enumerate(angles) if angle in angles[:i]), None)
     if again is not None:
