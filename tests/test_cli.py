@@ -609,10 +609,8 @@ def test_check_refuses_what_a_run_would_refuse(check):
 
 def test_check_refuses_housings_that_a_run_would_refuse_with_file_and_line(check, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    idle = (
-        TEXT
-        + '\n[[housing.support]]\nangle = "0 deg"\nradial_stiffness = "0 N/m"\ntangential_stiffness = "0 N/m"\n'
-    )
+    none = 'radial_stiffness = "0 N/m"\ntangential_stiffness = "0 N/m"'
+    idle = TEXT + f'\n[[housing.support]]\nangle = "0 deg"\n{none}\n'
     code, _, err = check(idle)
     line = idle.splitlines().index("[[housing.support]]") + 1
     assert code == 2 and "[E-SUPPORT]" in err and f"case.toml:{line}: housing.support[0]: " in err

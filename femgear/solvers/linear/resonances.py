@@ -26,6 +26,8 @@ EXCITED = 1e-3
 """Share of the largest modal force of a harmonic from which on a mode counts as excited by it."""
 ONE_FREQUENCY = 1e-6
 """Modes closer than this (relative) are one: any mixture of them is a mode."""
+ONE_SPEED = 1e-9
+"""Speeds closer than this (relative) are one: they differ by rounding."""
 _REFINED = 40
 """Resonances that get speeds of their own, at most."""
 
@@ -150,7 +152,21 @@ def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray,
     strongest = narrow[np.argsort(-heard[narrow] / damping[narrow], kind="stable")[:_REFINED]]
     around = resonance[strongest, None] * (1.0 + damping[strongest, None] * np.array([-1.0, 0.0, 1.0]))
     inside = (around >= speeds[0]) & (around <= speeds[-1])
-    return np.unique(np.concatenate([speeds, around[inside]]))
+    return merged_speeds(speeds, around[inside])
+
+
+def merged_speeds(*lists: np.ndarray) -> np.ndarray:
+    """Merge speeds, ascending; of those that differ by rounding alone the one of the earliest list is kept.
+
+    Several harmonics meet different modes at one speed where natural frequencies have whole ratios, which
+    gives that speed again but for its last digits.
+    """
+    merged = np.empty(0)
+    for speeds in map(np.unique, lists):
+        new = speeds[np.diff(speeds, prepend=-np.inf) > ONE_SPEED * np.abs(speeds)]
+        distance = np.abs(new[:, None] - merged).min(axis=1, initial=np.inf)
+        merged = np.sort(np.concatenate([merged, new[distance > ONE_SPEED * np.abs(new)]]))
+    return merged
 
 
 def unresolved(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray) -> int:

@@ -46,6 +46,7 @@ from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.linear.resonances import (
     ONE_FREQUENCY,
     crossings,
+    merged_speeds,
     modal_forces,
     refined_speeds,
     unresolved,
@@ -493,7 +494,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     resonance = met.mesh_frequency / one.mesh_frequency
     heard, damping = forces.heard[met.row, met.harmonic - 1], forces.damping_ratio[met.row]
     speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, heard, damping)
-    speeds = np.union1d(speeds, operating[some][(operating[some] >= first) & (operating[some] <= last)])
+    speeds = merged_speeds(operating[some][(operating[some] >= first) & (operating[some] <= last)], speeds)
     beside = operating[np.abs(operating[:, None] - resonance).argmin(axis=0)]
     found = resonances(basis, forces, met, resonance, beside)
     alike = np.abs(basis.frequency[:, None] / found["frequency"] - 1.0) <= ONE_FREQUENCY

@@ -31,7 +31,13 @@ from femgear.report.tables import Block, chosen, describe_modes, tabulate
 from femgear.solvers.continuation.branches import frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import output_load, output_response, residual_output, solve_modes
-from femgear.solvers.linear.resonances import crossings, modal_forces, refined_speeds, unresolved
+from femgear.solvers.linear.resonances import (
+    crossings,
+    merged_speeds,
+    modal_forces,
+    refined_speeds,
+    unresolved,
+)
 from femgear.solvers.periodic.equations import reduced
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.solution import PeriodicSolution
@@ -325,9 +331,7 @@ def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
     resonance, mode = met.mesh_frequency / per_speed, forces.mode[met.row]
     heard, damping = forces.heard[met.row, met.harmonic - 1], forces.damping_ratio[met.row]
     speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, heard, damping)
-    speeds = np.union1d(speeds, operating[(operating >= first) & (operating <= last)])
-    # equal but for rounding
-    speeds = speeds[np.diff(speeds, prepend=0.0) > 1e-9 * speeds]
+    speeds = merged_speeds(operating[(operating >= first) & (operating <= last)], speeds)
     harmonics = _harmonics(case, basis, speeds * per_speed)
     response, motion = _linear(case, modes, speeds * per_speed, harmonics)
     nearest, beside = (np.abs(one[:, None] - resonance).argmin(axis=0) for one in (speeds, operating))

@@ -7,7 +7,7 @@ import pytest
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
-from femgear.solvers.linear.resonances import EXCITED, crossings, modal_forces
+from femgear.solvers.linear.resonances import EXCITED, crossings, merged_speeds, modal_forces, refined_speeds
 from femgear.solvers.periodic.spectral import solve_spectral
 
 HARMONICS = 12
@@ -122,3 +122,16 @@ def test_other_meshes_are_refused(planet_set, planet_excitation):
     modes = basis(planet_set(3), planet_excitation(phases(3, 27)))
     with pytest.raises(CaseError, match="modes of 6 meshes, excitation of 8"):
         modal_forces(modes, planet_excitation(phases(4, 28)), 3)
+
+
+def test_speeds_that_differ_by_rounding_are_one():
+    speeds = np.linspace(10.0, 20.0, 5)
+    # a mode at 30 meets harmonic 2 at 15, and one at 45 harmonic 3, in other digits
+    resonance = np.array([15.0 * (1.0 + 3e-16), 45.0 / 3.0 * (1.0 - 2e-12), 13.3])
+    refined = refined_speeds(speeds, resonance, np.ones(3), np.full(3, 0.01))
+    assert np.diff(refined).min() > 1e-3 and len(refined) == 5 + 2 + 3
+    assert set(speeds) <= set(refined)
+    operating = np.array([17.5 * (1.0 + 1e-12), 18.0])
+    merged = merged_speeds(operating, refined)
+    assert len(merged) == len(refined) + 1 and set(operating) <= set(merged)
+    np.testing.assert_array_equal(merged_speeds(np.empty(0), speeds), speeds)
