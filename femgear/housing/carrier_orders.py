@@ -86,6 +86,8 @@ class CarrierOrders:
         Mesh periods after which the meshes repeat.
     patterns : int
         Patterns of the planets that are solved for: the first, or all N.
+    spacing : int
+        Side bands are its multiples: the equal sectors of the structure.
     """
 
     paths: MeshPaths
@@ -95,6 +97,7 @@ class CarrierOrders:
     sense: int
     periods: int = 1
     patterns: int = 1
+    spacing: int = 1
 
     @cached_property
     def diameters(self) -> np.ndarray:
@@ -104,7 +107,12 @@ class CarrierOrders:
     @cached_property
     def bands(self) -> np.ndarray:
         """Side bands r (R,)."""
-        return np.arange(-self.side_bands, self.side_bands + 1)
+        return self.spacing * np.arange(-self.middle, self.middle + 1)
+
+    @property
+    def middle(self) -> int:
+        """Place of the side band 0."""
+        return self.side_bands // self.spacing
 
     @cached_property
     def pattern(self) -> np.ndarray:
@@ -140,7 +148,7 @@ class CarrierOrders:
 
     def structure_bands(self, residue: int) -> np.ndarray:
         """Side bands (S,) at which the structure moves in blocks of a residue."""
-        reach, N = self.side_bands + self.max_diameter, self.paths.symmetry
+        reach, N = int(self.bands[-1]) + self.max_diameter, self.paths.symmetry
         first = -reach + (reach - residue) % N
         return first + N * np.arange(2 * reach // N + 1)
 
@@ -152,11 +160,12 @@ class CarrierOrders:
         N, known, waves = self.paths.symmetry, self.structure_bands(residue), self.sense * self.diameters
         apart = self.bands[:, None] - waves - known[0]
         inside = (apart % N == 0) & (apart >= 0) & (apart // N < len(known))
-        back = known[:, None] + waves + self.side_bands
-        return (
-            np.where(inside, apart // N, len(known)),
-            np.where((back >= 0) & (back < len(self.bands)), back, len(self.bands)),
-        )
+        return np.where(inside, apart // N, len(known)), self.place(known[:, None] + waves)
+
+    def place(self, band: np.ndarray) -> np.ndarray:
+        """Places of side bands r of any shape, their number R where there is none."""
+        there = (np.abs(band) <= self.bands[-1]) & (band % self.spacing == 0)
+        return np.where(there, band // self.spacing + self.middle, len(self.bands))
 
     def blocks(self, residue: int) -> np.ndarray:
         """Numbers of the blocks of a residue."""
@@ -231,7 +240,12 @@ def _meshes(groups) -> tuple[np.ndarray, np.ndarray]:
 
 def receptance(structure: FixedStructure, omega: np.ndarray) -> np.ndarray:
     """Compute modal receptances (..., m) [s^2] of a structure at angular frequencies (...) [rad/s]."""
-    natural, omega = structure.natural_frequency, np.asarray(omega)[..., None]
+    return modal_receptance(structure.natural_frequency, structure.damping_ratio, omega)
+
+
+def modal_receptance(natural: np.ndarray, ratio: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """Compute receptances (..., m) [s^2] of modes (m,) [rad/s] at angular frequencies (...) [rad/s]."""
+    omega = np.asarray(omega)[..., None]
     found = np.empty((*omega.shape[:-1], len(natural)), complex)
-    found.real, found.imag = natural**2 - omega**2, 2.0 * structure.damping_ratio * natural * omega
+    found.real, found.imag = natural**2 - omega**2, 2.0 * ratio * natural * omega
     return np.reciprocal(found, out=found)

@@ -15,7 +15,6 @@ each acts on itself alone: u at a side band by the force at the same one.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -82,18 +81,8 @@ class HarmonicBlocks:
     def load(self) -> np.ndarray:
         """Deflections (J, B, R) by the constant load [m]."""
         found = np.zeros(self.compliance.shape[1:], complex)
-        found[:, 0, self.orders.side_bands] = self.gears.load
+        found[:, 0, self.orders.middle] = self.gears.load
         return found
-
-    @cached_property
-    def on_gears(self) -> np.ndarray:
-        """Receptances (B, R, n_modes) of the modes of the gears [s^2]."""
-        return compliance(self.gears.modes, self.speed * self.orders.order)
-
-    @cached_property
-    def on_structure(self) -> np.ndarray:
-        """Receptances (B, S, m) of the modes of the structure [s^2]."""
-        return receptance(self.structure, self.speed * self.orders.structure_order)
 
 
 def blocks_of_speed(
@@ -163,28 +152,47 @@ def _ring(
             for j in range(G):
                 found[:, g, r, j, at] += N * wave[g, i] * wave[j, k].conj() * values
 
-    low, top = np.triu_indices(near.sum())  # of (n', n) the modes' product is conjugate
-    inner, own = P[:, near], structure.residual[np.ix_(near, near)]
-    pairs = inner[:, low] * inner[:, top].conj()
-    pairs, count = np.hstack([np.real(pairs), np.imag(pairs)]), len(low)
-    where, inside = np.flatnonzero(near), np.abs(known) <= orders.side_bands + coupled
-    both = complex_times(modal[:, inside], pairs)
-    every = np.empty((*both.shape[:2], near.sum(), near.sum()), complex)
+    for sector in range(orders.spacing):  # at an order of the structure only every such wave
+        here = (known - sector) % orders.spacing == 0
+        waves = (sector + orders.sense * n) % orders.spacing == 0
+        if not here.any() or not waves.any():
+            continue
+        modes = structure.moved_by(waves)
+        part = modal[:, here][..., modes]
+        inside = np.abs(known[here]) <= orders.bands[-1] + coupled
+        both = modes, np.flatnonzero(waves & near)
+        _add_coupled(add, structure, orders, known[here][inside], part[:, inside], both)
+        far = np.flatnonzero(waves & ~near)
+        alone = complex_times(part, np.abs(P[np.ix_(modes, far)]) ** 2)
+        alone += np.real(structure.residual[far, far])
+        for i, wave_number in enumerate(far):
+            r = orders.place(known[here] + orders.sense * n[wave_number])
+            met = np.flatnonzero(r < bands)
+            add((r[met], wave_number), (r[met], wave_number), alone[:, met, i])
+    return found
+
+
+def _add_coupled(add, structure: FixedStructure, orders: CarrierOrders, known, modal, near) -> None:
+    """Add receptances of waves that act on one another, at side bands ``known`` (k,) of the structure.
+
+    By receptances (b, k, m) of modes, and ``near``: the numbers of these and of the waves.
+    """
+    modes, waves = near
+    if not len(waves):
+        return
+    shape, n = structure.ring_shape[np.ix_(modes, waves)], orders.diameters[waves]
+    low, top = np.triu_indices(len(waves))  # of (n', n) the modes' product is conjugate
+    pairs, count = shape[:, low] * shape[:, top].conj(), len(low)
+    both = complex_times(modal, np.hstack([np.real(pairs), np.imag(pairs)]))
+    every = np.empty((*both.shape[:2], len(waves), len(waves)), complex)
     every[..., top, low] = both[..., :count] - 1j * both[..., count:]
     every[..., low, top] = both[..., :count] + 1j * both[..., count:]
-    every += own
-    for k, band in enumerate(known[inside]):
-        r = band + orders.sense * n[near] + orders.side_bands
-        met = np.flatnonzero((r >= 0) & (r < bands))
-        r, waves = r[met], where[met]
-        add((r[:, None], waves[:, None]), (r, waves), every[:, k, met[:, None], met])
-    far = np.flatnonzero(~near)
-    alone = complex_times(modal, np.abs(P[:, far]) ** 2) + np.real(structure.residual[far, far])
-    for i, wave_number in enumerate(far):
-        r = known + orders.sense * n[wave_number] + orders.side_bands
-        met = np.flatnonzero((r >= 0) & (r < bands))
-        add((r[met], wave_number), (r[met], wave_number), alone[:, met, i])
-    return found
+    every += structure.residual[np.ix_(waves, waves)]
+    for k, band in enumerate(known):
+        r = orders.place(band + orders.sense * n)
+        met = np.flatnonzero(r < len(orders.bands))
+        r, there = r[met], waves[met]
+        add((r[:, None], there[:, None]), (r, there), every[:, k, met[:, None], met])
 
 
 def _times(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ class MeshFluctuation:
 
     def __call__(self, values: np.ndarray) -> np.ndarray:
         """Products (J, B, R) of the leading meshes with values of that shape."""
-        lines, middle = self.orders.lines, self.orders.side_bands
+        lines, middle = self.orders.lines, self.orders.middle
         meshes = self.of_meshes(values)
         two = np.zeros((len(meshes), middle + 1, self.points), complex)
         two[..., : lines + 1] = meshes[:, :, middle:].swapaxes(1, 2)

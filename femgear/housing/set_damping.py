@@ -15,17 +15,19 @@ turns of the ring acts on each order of the structure alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.housing.carrier_orders import CarrierOrders, LeadingMeshes, ring_load
+from femgear.housing.carrier_orders import CarrierOrders, LeadingMeshes, modal_receptance
 from femgear.housing.harmonic_blocks import HarmonicBlocks
 from femgear.housing.structure import FixedStructure, ring_waves
+from femgear.solvers.periodic.spectral import compliance
 from femgear.system.system import Modes
 
-_TOGETHER = 16
-"""Blocks that are answered together: what lies between forces and motion stays in the cache."""
+_TOGETHER = 0.5e6
+"""Size of forces that are answered together [bytes]: what lies between them and motion stays in the cache."""
 _NOTHING = 1e-11
 """Part of the largest number that is nothing in single precision."""
 _MOST_RATIO = 0.999
@@ -37,28 +39,51 @@ class _Class:
     """Side bands of a block in which the same waves meet the gears, and the damping between both."""
 
     bands: np.ndarray
-    waves: np.ndarray
-    place: np.ndarray  # (bands, waves) of L - s n among the orders of the structure
     matrix: np.ndarray  # of modes of the gears and these waves
     rows: np.ndarray  # (J, n_modes) deflections of the leading meshes by the modes of the gears
+    number: np.ndarray  # (waves,) orders s n
+    place: np.ndarray  # (bands, waves) of L - s n of each wave among what sectors have of them
+    diameters: np.ndarray  # (path_waves,) waves of the path among the circumferential orders
+    path_place: np.ndarray  # (bands, path_waves) the same of the path
+
+
+@dataclass(frozen=True)
+class _Sector:
+    """Orders of the structure at which the same of its modes and waves move, with the shapes of these."""
+
+    orders: np.ndarray
+    modes: np.ndarray
+    shape: np.ndarray  # (modes, waves)
+    own: np.ndarray  # (modes, modes) what acts on each order alone
+    place: np.ndarray  # (orders, waves) of K + s n of each wave among what classes have of them
+    path: np.ndarray  # (modes, path_waves)
+    diameters: np.ndarray  # (path_waves,) waves of the path among the circumferential orders
+    bands: np.ndarray  # (orders, path_waves) places of K + s n among the side bands
+
+    def of_modes(self, values: np.ndarray) -> np.ndarray:
+        """Of values (b, S, M) those at these orders."""
+        return values[:, self.orders, : len(self.modes)]
 
 
 @dataclass(frozen=True)
 class _Residue:
-    """Blocks of one residue: classes of their side bands, and places of K + s n among these."""
+    """Blocks of one residue: classes of their side bands, and sectors of the orders of the structure.
 
+    A place that there is not is the number of those that there are.
+    """
+
+    residue: int
     blocks: np.ndarray
     classes: tuple[_Class, ...]
-    path_back: np.ndarray  # (S, W) for the circumferential orders of the path
-    wave_back: np.ndarray  # (S, n_waves)
-    path_to: np.ndarray  # (R, W) of L - s n among the orders of the structure
+    sectors: tuple[_Sector, ...]
 
 
 @dataclass(frozen=True)
 class DampingForces:
-    """Modal forces of the damping on gears (B, R, n_modes) and structure (B, S, m), and what they move.
+    """Modal forces of the damping on gears (B, R, n_modes) and structure (B, S, M), and what they move.
 
-    Deflections of the meshes ``still`` (J, B, R) and of the ring ``way`` (G, B, R) by them [m].
+    Of the structure at every order the M modes, at most, that move there. Deflections of the meshes
+    ``still`` (J, B, R) and of the ring ``way`` (G, B, R) by them [m].
     """
 
     on_gears: np.ndarray
@@ -78,86 +103,140 @@ class SetDamping:
 
     orders: CarrierOrders
     residues: tuple[_Residue, ...]
-    wave: np.ndarray  # (n_waves,) place of each wave among the circumferential orders
-    shape: np.ndarray  # (m, n_waves) modes of the structure in these waves
-    own: np.ndarray  # (m, m) what acts on each order alone
-    path: np.ndarray  # (m, W) modes of the structure on the path of the meshes
+    structure: FixedStructure
     rows: np.ndarray  # (J, n_modes) deflections of the leading meshes by the modes of the gears
+
+    @cached_property
+    def most_modes(self) -> int:
+        """Modes M of the structure that move at one of its orders, at most."""
+        return max((len(one.modes) for residue in self.residues for one in residue.sectors), default=0)
+
+    def of(self, orders: CarrierOrders) -> SetDamping:
+        """Take the same with other lines."""
+        residues = tuple(replace(one, blocks=orders.blocks(one.residue)) for one in self.residues)
+        return replace(self, orders=orders, residues=residues)
 
     def none(self, leaders: int) -> DampingForces:
         """No forces yet, of a set with so many leading planets."""
         orders, (J, modes) = self.orders, self.rows.shape
-        size = len(orders.base), len(orders.bands)
-        shapes = (*size, modes), (size[0], len(orders.structure_bands(0)), len(self.own)), (J, *size)
-        return DampingForces(*(np.zeros(shape, complex) for shape in (*shapes, (leaders, *size))))
+        size, moved = (len(orders.base), len(orders.bands)), len(orders.structure_bands(0))
+        shapes = (*size, modes), (size[0], moved, self.most_modes), (J, *size), (leaders, *size)
+        return DampingForces(*(np.zeros(shape, complex) for shape in shapes))
+
+    def on_all_modes(self, values: np.ndarray) -> np.ndarray:
+        """Forces (B, S, m) on all modes of the structure by those (B, S, M) of `DampingForces`."""
+        found = np.zeros((*values.shape[:2], len(self.structure.natural_frequency)), values.dtype)
+        for residue in self.residues:
+            for one in residue.sectors:
+                at = np.ix_(residue.blocks, one.orders, one.modes)
+                found[at] = one.of_modes(values[residue.blocks])
+        return found
+
+    def receptances(self, blocks: HarmonicBlocks) -> tuple[np.ndarray, np.ndarray]:
+        """Receptances of the modes of gears (B, R, n_modes) and structure (B, S, M) at a speed [s^2]."""
+        orders = self.orders.structure_order
+        found = np.zeros((*orders.shape, self.most_modes), complex)
+        for residue in self.residues:
+            for one in residue.sectors:
+                own = self.structure.natural_frequency[one.modes], self.structure.damping_ratio[one.modes]
+                at = np.ix_(residue.blocks, one.orders, range(len(one.modes)))
+                omega = blocks.speed * orders[np.ix_(residue.blocks, one.orders)]
+                found[at] = modal_receptance(*own, omega)
+        return compliance(blocks.gears.modes, blocks.speed * self.orders.order), found
 
     def single(self) -> SetDamping:
         """The same in single precision."""
+        names = "shape", "own", "path"
         residues = tuple(
-            replace(one, classes=tuple(
-                replace(part, matrix=_single(part.matrix), rows=_single(part.rows)) for part in one.classes
-            ))
+            replace(
+                one,
+                classes=tuple(
+                    replace(part, matrix=_single(part.matrix), rows=_single(part.rows))
+                    for part in one.classes
+                ),
+                sectors=tuple(
+                    replace(part, **{name: _single(getattr(part, name)) for name in names})
+                    for part in one.sectors
+                ),
+            )
             for one in self.residues
-        )  # fmt: skip
-        given = {name: _single(getattr(self, name)) for name in ("shape", "own", "path", "rows")}
-        return replace(self, residues=residues, **given)
+        )
+        return replace(self, residues=residues, rows=_single(self.rows))
 
-    def answer(self, blocks: HarmonicBlocks, extra, way, force, before: DampingForces) -> DampingForces:
+    def answer(
+        self, blocks: HarmonicBlocks, receptances, motion, before: DampingForces
+    ) -> DampingForces:  # fmt: skip
         """Compute the forces of the damping by the motion at a speed, part by part of the blocks.
 
-        By forces e (J, B, R) beyond k0, u (G, B, R), forces f (J, B, R) of the meshes, and the forces of the
-        damping in that motion.
+        By the `receptances`, and by the motion: forces e (J, B, R) beyond k0, u (G, B, R), forces f (J, B, R)
+        of the meshes, and the forces of the damping in that motion.
         """
+        extra, way, force = motion
         G = len(blocks.place)
         excess, ring = np.array(extra), force[G:]
         excess[G:] -= blocks.gears.mean[G:, None, None] * way
         turned = np.exp(1j * np.outer(self.orders.diameters, blocks.place))
-        if self.path.dtype == np.complex64:
+        if self.rows.dtype == np.complex64:
             excess, ring, turned = _single(excess), _single(ring), _single(turned)
+            receptances = tuple(one.astype(np.complex64) for one in receptances)
             before = DampingForces(*(_single(part) for part in before.parts))
         found = DampingForces(*(np.empty_like(part) for part in before.parts))
+        size = sum(one[0].nbytes for one in found.parts[:2])
         for residue in self.residues:
-            for some in np.array_split(residue.blocks, -(-len(residue.blocks) // _TOGETHER)):
+            parts = int(np.ceil(len(residue.blocks) * size / _TOGETHER))
+            for some in np.array_split(residue.blocks, parts) if parts else ():
                 loads = excess[:, some], ring[:, some], before.on_gears[some], before.on_structure[some]
-                self._answer_part(blocks, residue, some, loads, turned, found)
+                answers = receptances[0][some], receptances[1][some]
+                self._answer_part(blocks, residue, some, (loads, answers), turned, found)
         return found
 
     def _answer_part(
         self, blocks: HarmonicBlocks, residue: _Residue, some, loads, turned, found: DampingForces
     ) -> None:  # fmt: skip
         """Write the answer of some blocks of a residue to loads on meshes, ring and modes into ``found``."""
-        orders, kind, (excess, ring, load, on_modes) = self.orders, self.path.dtype, loads
-        gears, structure = blocks.on_gears[some].astype(kind), blocks.on_structure[some].astype(kind)
+        (excess, ring, load, on_modes), (gears, structure) = loads
+        orders, kind = self.orders, found.still.dtype
         for one in residue.classes:
             load[:, one.bands] -= np.moveaxis(excess[:, :, one.bands], 0, -1) @ one.rows
-        waves = ring_load(orders.paths.symmetry, ring, blocks.place, orders.diameters, residue.path_back)
-        moved = (waves.astype(kind) @ self.path.conj().T + on_modes) * structure
-        on_gears, on_waves = self._on_waves(residue, blocks.speed, some, load * gears, moved @ self.shape)
+        ring, moved, waves = _padded(np.moveaxis(ring, 0, -1)), list[np.ndarray](), list[np.ndarray]()
+        for one in residue.sectors:
+            path = np.sum(ring[:, one.bands] * turned[one.diameters].conj(), axis=-1)
+            motion = (orders.paths.symmetry * path) @ one.path.conj().T + one.of_modes(on_modes)
+            moved.append(motion * one.of_modes(structure))
+            waves.append(moved[-1] @ one.shape)
+        on_gears, on_waves = self._on_waves(residue, blocks.speed, some, load * gears, _joined(waves))
         order = (1j * blocks.speed * orders.structure_order[some, :, None]).astype(kind)
-        on_structure = on_waves @ self.shape.conj().T - order * (moved @ self.own)
+        on_structure, waves = np.zeros_like(structure), list[np.ndarray]()
+        for one, motion in zip(residue.sectors, moved):
+            made = on_waves[:, one.place] @ one.shape.conj().T
+            made -= order[:, one.orders] * (motion @ one.own)
+            on_structure[:, one.orders, : len(one.modes)] = made
+            waves.append((made * one.of_modes(structure)) @ one.path)
+        path = _joined(waves)
+        for one in residue.classes:
+            moved = path[:, one.path_place] @ turned[one.diameters]
+            found.way[:, some[:, None], one.bands] = np.moveaxis(moved, -1, 0)
         found.on_gears[some], found.on_structure[some] = on_gears, on_structure
         found.still[:, some] = np.moveaxis((on_gears * gears) @ self.rows.T, -1, 0)
-        waves = _padded((on_structure * structure) @ self.path)
-        waves = waves[:, residue.path_to, np.arange(self.path.shape[1])]
-        found.way[:, some] = np.moveaxis(waves @ turned, -1, 0)
 
     def _on_waves(self, residue: _Residue, speed: float, some, gears: np.ndarray, waves: np.ndarray):
-        """Forces on the modes of the gears (b, R, n_modes) and on waves (b, S, n_waves) by their motions."""
+        """Forces on the modes of the gears (b, R, n_modes) and on waves (b, n + 1) by their motions.
+
+        Of the waves those of all sectors follow one another, the forces of all classes.
+        """
         modes, kind = gears.shape[2], gears.dtype
-        number = self.orders.sense * self.orders.diameters[self.wave]
         order = -1j * speed * self.orders.order[some][..., None]
-        on_gears, moved = np.empty_like(gears), _padded(waves)
-        on_waves = np.zeros((len(gears), gears.shape[1] + 1, waves.shape[2]), kind)
+        on_gears, on_waves = np.empty_like(gears), list[np.ndarray]()
         for one in residue.classes:
             turning = order[:, one.bands]
-            of_waves = (turning + 1j * speed * number[one.waves]).astype(kind)
             motion = np.concatenate([
-                turning.astype(kind) * gears[:, one.bands], of_waves * moved[:, one.place, one.waves],
+                turning.astype(kind) * gears[:, one.bands],
+                (turning + 1j * speed * one.number).astype(kind) * waves[:, one.place],
             ], axis=2)  # fmt: skip
             made = motion @ one.matrix.T
             on_gears[:, one.bands] = made[..., :modes]
-            on_waves[:, one.bands[:, None], one.waves] = made[..., modes:]
-        return on_gears, on_waves[:, residue.wave_back, np.arange(waves.shape[2])]
+            on_waves.append(made[..., modes:])
+        return on_gears, _joined(on_waves)
 
 
 def _single(values: np.ndarray) -> np.ndarray:
@@ -169,6 +248,12 @@ def _single(values: np.ndarray) -> np.ndarray:
     size = np.abs(found)
     found[size < _NOTHING * size.max(initial=0.0)] = 0.0
     return found
+
+
+def _joined(parts: list[np.ndarray]) -> np.ndarray:
+    """Values (b, n + 1) of parts (b, ...), one after the other, and a zero that stands for none."""
+    none = np.zeros((len(parts[0]), 1), parts[0].dtype)
+    return np.concatenate([*(part.reshape(len(part), -1) for part in parts), none], axis=1)
 
 
 def _padded(values: np.ndarray) -> np.ndarray:
@@ -237,26 +322,87 @@ def set_damping(
     near = np.flatnonzero(np.abs(n) <= top)
     own = np.real((shape.conj() * mean) @ shape.T) - np.diag(modal)
     kept = np.append(np.arange(modes), modes + near)
-    whole, number = whole[np.ix_(kept, kept)], n[near]
-    residues = tuple(_residue(orders, residue, leading, whole, number) for residue in range(N))
-    return SetDamping(
-        orders, tuple(one for one in residues if len(one.blocks)), number + top, shape[:, near], own,
-        structure.ring_shape, leading.rows,
-    )  # fmt: skip
+    waves = _Waves(orders, structure, near, whole[np.ix_(kept, kept)], own)
+    residues = tuple(_residue(waves, leading, residue) for residue in range(N))
+    return SetDamping(orders, residues, structure, leading.rows)
 
 
-def _residue(orders: CarrierOrders, residue: int, leading: LeadingMeshes, whole, number) -> _Residue:
-    """Sort the side bands in blocks of a residue by the waves of orders ``number`` (n_waves,) that meet them.
+@dataclass(frozen=True)
+class _Waves:
+    """Waves of the ring on its path, ``near`` of its waves, and damping between them, gears and modes."""
 
-    ``whole`` is the damping of the modes of the gears and these waves.
+    orders: CarrierOrders
+    structure: FixedStructure
+    near: np.ndarray
+    whole: np.ndarray  # of modes of the gears and these waves
+    own: np.ndarray  # (m, m) of the modes of the structure
+
+    @cached_property
+    def number(self) -> np.ndarray:
+        """Orders s n of the waves."""
+        return self.orders.sense * self.structure.wave_order[self.near]
+
+    @cached_property
+    def path_number(self) -> np.ndarray:
+        """Orders s n of the path."""
+        return self.orders.sense * self.orders.diameters
+
+
+def _table(parts, shape: tuple[int, int]) -> np.ndarray:
+    """Places (r + 1, n) of pairs of rows and columns in parts of (rows, columns) that follow one another.
+
+    In the last row, and of pairs that no part has, the number of those that there are.
     """
-    N, modes, wave = orders.paths.symmetry, leading.rows.shape[1], number + orders.max_diameter
+    found, count = np.full((shape[0] + 1, shape[1]), -1), 0
+    for rows, columns in parts:
+        size = len(rows) * len(columns)
+        found[np.ix_(rows, columns)] = count + np.arange(size).reshape(len(rows), len(columns))
+        count += size
+    return np.where(found < 0, count, found)
+
+
+def _residue(waves: _Waves, leading: LeadingMeshes, residue: int) -> _Residue:
+    """Sort the side bands in blocks of a residue by the waves that meet them, the orders by those there."""
+    orders, structure, N, modes = (
+        waves.orders,
+        waves.structure,
+        waves.orders.paths.symmetry,
+        leading.rows.shape[1],
+    )
+    known, bands, spacing = orders.structure_bands(residue), orders.bands, orders.spacing
+    number, path = waves.number, waves.path_number
+    met = [
+        [np.flatnonzero(there) for there in (
+            (residue + bands) % N == c, (c - number) % N == 0, (c - path) % N == 0
+        )]
+        for c in range(N)
+    ]  # fmt: skip
+    here = [
+        [np.flatnonzero((known - first) % spacing == 0),
+         *(np.flatnonzero((first + one) % spacing == 0) for one in (number, path)), first]
+        for first in range(spacing)
+    ]  # fmt: skip
+    here = [one for one in here if len(one[0]) and len(one[2])]
     to, back = orders.meeting(residue)
-    classes = list[_Class]()
-    for c in range(N):
-        bands = np.flatnonzero((residue + orders.bands) % N == c)
-        met = np.flatnonzero((c - orders.sense * number) % N == 0)
-        kept = np.append(np.arange(modes), modes + met)
-        place = to[np.ix_(bands, wave[met])]
-        classes.append(_Class(bands, met, place, whole[np.ix_(kept, kept)], leading.folded[c]))
-    return _Residue(orders.blocks(residue), tuple(classes), back, back[:, wave], to)
+    place = np.searchsorted(orders.diameters, structure.wave_order[waves.near])
+    S, R, W, n = len(known), len(bands), len(number), len(path)
+    at_orders = _table([one[:2] for one in here], (S, W))
+    path_at_orders = _table([(one[0], one[2]) for one in here], (S, n))
+    at_bands = _table([one[:2] for one in met], (R, W))
+    classes, sectors = list[_Class](), list[_Sector]()
+    for c, (rows, own, on_path) in enumerate(met):
+        kept = np.append(np.arange(modes), modes + own)
+        classes.append(_Class(
+            rows, waves.whole[np.ix_(kept, kept)], leading.folded[c], number[own],
+            at_orders[to[np.ix_(rows, place[own])], own], on_path,
+            path_at_orders[to[np.ix_(rows, on_path)], on_path],
+        ))  # fmt: skip
+    for rows, own, on_path, first in here:
+        moved = structure.moved_by((first + path) % spacing == 0)
+        shape = structure.wave_shape[np.ix_(moved, waves.near[own])]
+        sectors.append(_Sector(
+            rows, moved, shape, waves.own[np.ix_(moved, moved)],
+            at_bands[back[np.ix_(rows, place[own])], own], structure.ring_shape[np.ix_(moved, on_path)],
+            on_path, back[np.ix_(rows, on_path)],
+        ))  # fmt: skip
+    return _Residue(residue, orders.blocks(residue), tuple(classes), tuple(sectors))

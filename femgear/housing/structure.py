@@ -27,6 +27,10 @@ if TYPE_CHECKING:
 
 _ROUNDING, _FREE = 1e-9, 1e-12
 """Part of an array by which it may miss a symmetry; of the largest omega^2 below which a motion is free."""
+_NOTHING = 1e-8
+"""Part of a wave in a mode that is rounding: what such waves do to one another is its square."""
+_SAME_PLACE = 1e-9
+"""Angle within which supports stand at one place [rad]."""
 _CONDITION = 1e3
 """Of the Fourier matrix of points around the ring, beyond which they leave gaps."""
 
@@ -60,6 +64,9 @@ class FixedStructure(ReadOnlyArrays):
         The modes in the waves of a ring alone, see `ring_waves`; no waves where there is no such ring.
     wave_order : (n_waves,) int array
         Circumferential order n of every wave ``exp(i n phi)``.
+    sectors : int
+        Equal sectors around the ring: waves of the orders n and n' act on one another only where the number
+        divides ``n - n'``.
     """
 
     natural_frequency: np.ndarray
@@ -71,6 +78,7 @@ class FixedStructure(ReadOnlyArrays):
     sensor_area: np.ndarray | None = None
     wave_shape: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
     wave_order: np.ndarray = field(default_factory=lambda: np.zeros(0, int))
+    sectors: int = 1
 
     def __post_init__(self):
         super().__post_init__()
@@ -120,6 +128,17 @@ class FixedStructure(ReadOnlyArrays):
     def max_diameter(self) -> int:
         """Largest nodal diameter n_max of the path."""
         return self.ring_shape.shape[1] // 2
+
+    def moved_by(self, waves: np.ndarray) -> np.ndarray:
+        """Numbers of the modes that have some of the waves (2 n_max + 1,) bool of the path or of the ring."""
+        n = np.arange(-self.max_diameter, self.max_diameter + 1)
+        moved = np.zeros(len(self.natural_frequency), bool)
+        for shape, order in ((self.ring_shape, n), (self.wave_shape, self.wave_order)):
+            if len(order):
+                size = np.abs(shape)
+                own = size[:, np.isin(order, n[waves])].max(axis=1, initial=0.0)
+                moved |= own > _NOTHING * size.max(axis=1, initial=0.0)
+        return np.flatnonzero(moved)
 
     def combined(self, weights) -> FixedStructure:
         """Replace the sensors by k weighted sums of them, ``weights`` (n_sensors, k)."""
@@ -420,6 +439,22 @@ def _held(
     return K, M, carried
 
 
+def equal_sectors(supports: Sequence[Support], most: int) -> int:
+    """Count the equal sectors of a ring on supports, up to a number that rings without supports have."""
+    if not supports:
+        return most
+    kinds = dict[tuple[float, ...], list[float]]()
+    for one in supports:
+        kind = one.radial_stiffness, one.tangential_stiffness, one.mass, one.width
+        kinds.setdefault(kind, []).append(one.angle)
+    places = [np.array(angles) for angles in kinds.values()]
+    for sectors in range(min(len(one) for one in places), 1, -1):
+        turned = [np.subtract.outer(one + 2 * np.pi / sectors, one) for one in places]
+        if all((np.abs(np.sin(0.5 * one)).min(axis=1) < _SAME_PLACE).all() for one in turned):
+            return sectors
+    return 1
+
+
 def _modes_of(K: np.ndarray, M: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Squares of the natural frequencies [rad^2/s^2] and mode shapes; refuses free motions (E-MECHANISM)."""
     square, shape = eigh(K, M)
@@ -497,5 +532,6 @@ def supported_ring(  # noqa: PLR0913
         ring_shape=waves, sensor_shape=sensors, residual=np.zeros((n_waves, n_waves), complex),
         sensor_residual=np.zeros((sensors.shape[1], n_waves), complex),
         wave_shape=(ring_waves(order) @ shape).T, wave_order=order,
+        sectors=equal_sectors(supports, 2 * top + 1),
     )  # fmt: skip
     return every.below(max_frequency)

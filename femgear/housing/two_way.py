@@ -163,12 +163,16 @@ def solve_two_way(  # noqa: PLR0913
     bands = 2 * coupled if side_bands is None else side_bands
     sense, periods = int(np.sign(speeds[0])), excitation.periods
 
-    def problem_of(i: int) -> _Problem:
+    def orders_of(i: int) -> CarrierOrders:
         size = int(kept[i]) * periods, n_max, bands, sense, periods, 1 if periods == 1 else paths.symmetry
-        orders = CarrierOrders(paths, *size)
-        return _Problem(gears, excitation, structure, orders, int(excited[i]), coupled, damping, cycles)
+        return CarrierOrders(paths, *size, structure.sectors)
 
-    found = _Lines(problem_of(int(kept.argmax())), len(speeds))
+    def problem_of(i: int) -> _Problem:
+        return _Problem(turning, orders_of(i), int(excited[i]), coupled, cycles)
+
+    widest = int(kept.argmax())
+    turning = _TurningSet(gears, excitation, structure, orders_of(widest), int(excited.max()), damping)
+    found = _Lines(problem_of(widest), len(speeds))
 
     def solve(i: int) -> None:
         problem = problem_of(i)
@@ -192,31 +196,46 @@ class _Answer:
     products: int
 
 
+class _TurningSet:
+    """Set in a structure, as all speeds have it.
+
+    With the leading meshes, the harmonics of all meshes up to a number, and the damping for the most lines.
+    """
+
+    def __init__(
+        self, gears: Modes, excitation: MeshExcitation, structure: FixedStructure, orders: CarrierOrders,
+        most: int, damping,
+    ):  # fmt: skip
+        paths, angles = orders.paths, np.asarray(orders.paths.planet_angles, float)
+        self.groups = leaders, group, turn = planet_groups(angles, paths.symmetry)
+        self.structure, self.periods = structure, excitation.periods
+        self.harmonics, self.mean = mesh_harmonics(excitation, most), gears.mesh_stiffness
+        self.leading = np.concatenate([leaders, len(angles) + leaders])
+        self.owner, self.turns = np.concatenate([group, len(leaders) + group]), np.tile(turn, 2)
+        self.gears = LeadingMeshes.build(gears, paths, orders.sense, self.groups)
+        self.place = angles[leaders] + paths.load_angle
+        self.damping = None if damping is None else set_damping(damping, self.gears, structure, orders)
+
+
 class _Problem:
     """Set and structure with some harmonics of the excitation, at any speed."""
 
     def __init__(
-        self, gears: Modes, excitation: MeshExcitation, structure: FixedStructure, orders: CarrierOrders,
-        excited: int, coupled: int, damping, cycles: int,
+        self, turning: _TurningSet, orders: CarrierOrders, excited: int, coupled: int, cycles: int
     ):  # fmt: skip
-        self.structure, self.orders, self.coupled, self.cycles = structure, orders, coupled, cycles
-        paths, angles = orders.paths, np.asarray(orders.paths.planet_angles, float)
-        groups = planet_groups(angles, paths.symmetry)
-        leaders, group, turn = groups
-        stiffness, deflection, force = mesh_harmonics(excitation, excited)
-        leading = np.concatenate([leaders, len(angles) + leaders])
-        owner, turns = np.concatenate([group, len(leaders) + group]), np.tile(turn, 2)
-        mean = gears.mesh_stiffness
+        self.structure, self.orders, self.coupled, self.cycles = turning.structure, orders, coupled, cycles
+        self.gears, self.place, mean = turning.gears, turning.place, turning.mean
+        lines = excited * turning.periods + 1
+        stiffness, deflection, force = (one[:, :lines] for one in turning.harmonics)
+        leading, owner, turns = turning.leading, turning.owner, turning.turns
         if orders.patterns == 1 and orders.periods == 1:
-            _check_repeated((stiffness, deflection, force), orders, *groups)
+            _check_repeated((stiffness, deflection, force), orders, *turning.groups)
             stiffness, deflection, force = (one[leading] for one in (stiffness, deflection, force))
             owner, turns, mean = np.arange(len(leading)), np.zeros(len(leading), int), mean[leading]
         elif (apart := np.abs(mean - mean[leading][owner]).max()) > _EQUAL * mean.max():
             message = f"the mean stiffness of planets that repeat one another differs by {apart:.3g} N/m"
             raise CaseError(message, code="E-SYMMETRY", remedy="take the modes of `mean_excitation`")
-        self.gears = LeadingMeshes.build(gears, paths, orders.sense, groups)
-        self.place = angles[leaders] + paths.load_angle
-        J, (B, R) = 2 * len(leaders), (len(orders.base), len(orders.bands))
+        J, (B, R) = len(leading), (len(orders.base), len(orders.bands))
         self.size = 16.0 * B * (R * R * (J / 2) ** 2 + R * J * (J + 60))
         if self.size > _MOST:
             message = f"{B} lines with {R} side bands of {J // 2} planets need {self.size / 1e9:.2g} GB"
@@ -228,10 +247,10 @@ class _Problem:
         varying[:, 0] -= mean
         self.fluctuation = MeshFluctuation(varying, orders, owner, turns)
         source = np.zeros((len(forcing), lines + 1, R), complex)
-        source[..., orders.side_bands] = 0.5 * forcing
-        source[:, 0, orders.side_bands] = np.real(forcing[:, 0])
+        source[..., orders.middle] = 0.5 * forcing
+        source[:, 0, orders.middle] = np.real(forcing[:, 0])
         self.source = self.fluctuation.of_leaders(source)
-        self.damping = None if damping is None else set_damping(damping, self.gears, structure, orders)
+        self.damping = turning.damping and turning.damping.of(orders)
 
     def solve(self, speed: float, tolerance: float) -> _Answer:
         """Solve at a speed of the carrier [rad/s], positive."""
@@ -260,13 +279,13 @@ class _Problem:
 
     def _damped(self, blocks: HarmonicBlocks, damping: SetDamping, tolerance: float) -> _Answer:
         """Solve with the damping of the set, whose forces follow the motion, pass by pass."""
-        load, forces = blocks.load(), damping.none(len(self.place))
+        load, forces, answers = blocks.load(), damping.none(len(self.place)), damping.receptances(blocks)
         start, products, radius, change, passes = None, 0, 0.0, 1.0, list[_Pass]()
         for _ in range(_PASSES):
             accuracy = max(0.5 * tolerance, min(_INNER * change, 1e-4))
             found = self._solved(blocks, load + forces.still, forces.way, start, accuracy)
             start, products, radius = found.extra, products + found.products, max(radius, found.radius)
-            made = damping.answer(blocks, found.extra, found.way, found.force, forces)
+            made = damping.answer(blocks, answers, (found.extra, found.way, found.force), forces)
             apart = _over_ring(made.still - forces.still, made.way - forces.way).astype(complex)
             apart *= self.gears.mean[:, None, None]
             change = float(np.linalg.norm(apart) / max(np.linalg.norm(found.force), _TINY))
@@ -277,13 +296,14 @@ class _Problem:
                 damping = damping.single()
             passes = [*passes[1 - _MIXED :], _Pass(made, apart)]
             forces = _blend(_shares([one.change for one in passes]), [one.forces for one in passes])
-        return _Answer(found.force, made.on_structure, max(found.residual, change), radius, products)
+        drag = damping.on_all_modes(made.on_structure)
+        return _Answer(found.force, drag, max(found.residual, change), radius, products)
 
     def tail(self, force: np.ndarray) -> float:
         """Share (root of energies) of the fluctuating ring forces that is at the outer side bands."""
         energy = np.abs(force[len(self.place) :]) ** 2
         energy[:, self.orders.base + self.orders.seed == 0] *= 0.5
-        energy[:, 0, self.orders.side_bands] = 0.0
+        energy[:, 0, self.orders.middle] = 0.0
         outer = 2 * np.abs(self.orders.bands) > self.orders.side_bands
         return float(np.sqrt(energy[..., outer].sum() / max(energy.sum(), _TINY)))
 
@@ -332,7 +352,7 @@ class _Lines:
 
     def _one_sided(self, problem: _Problem, force: np.ndarray, place: np.ndarray, count: int) -> np.ndarray:
         """Amplitudes (n, n_orders) of all meshes by two-sided forces (J, B, R) of the leaders."""
-        every, middle = problem.fluctuation.of_meshes(force), problem.orders.side_bands
+        every, middle = problem.fluctuation.of_meshes(force), problem.orders.middle
         values = 2.0 * np.where(problem.orders.numbers(self.turns) < 0, every.conj(), every)
         # the other half of line 0 is its conjugate
         values[:, 0, :middle] = 0.0
@@ -349,7 +369,12 @@ class _Lines:
         used = (np.tile(line, orders.patterns) > 0)[:, None] | (number >= 0)
         at = np.minimum(np.searchsorted(self.reached, np.abs(number)), len(self.reached) - 1)
         used &= self.reached[at] == np.abs(number)
-        np.add.at(drag, at[used], np.where((number < 0)[..., None], values.conj(), values)[used])
+        both = np.where((number < 0)[..., None], values.conj(), values)[used]
+        # lines that meet others are few: sums of equal places would be slow
+        places, first, count = np.unique(at[used], return_index=True, return_counts=True)
+        drag[places] += both[first]
+        more = np.setdiff1d(np.flatnonzero((count > 1)[np.searchsorted(places, at[used])]), first)
+        np.add.at(drag, at[used][more], both[more])
 
 
 @dataclass(frozen=True)

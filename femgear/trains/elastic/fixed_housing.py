@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,7 +24,7 @@ from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines
 from femgear.housing.set_damping import with_set_damping
 from femgear.housing.sound import equivalent_sound, surface_sound
-from femgear.housing.structure import FixedStructure, supported_ring
+from femgear.housing.structure import FixedStructure, equal_sectors, supported_ring
 from femgear.housing.turn_stability import turn_stability
 from femgear.housing.two_way import TwoWayResponse, solve_two_way, structure_lines
 from femgear.solvers.linear.modal import modal_damping, solve_modes
@@ -121,6 +122,7 @@ class HousingModel:
         """The set in the ring on its foundation, without supports or casing."""
         return self._surroundings(self.ring, (self.modes.excitation, self.modes.model.system.flexibility), 0)
 
+    @cache  # noqa: B019 (lives as long as the model)
     def in_housing(self, *, even: bool = False) -> _Surroundings:
         """The set in its housing; with the mean of errors that turn if ``even``."""
         found = self._surroundings(self.structure, self.springs, fixed_diameters(self.case))
@@ -150,24 +152,20 @@ class HousingModel:
 
 
 def fixed_housing(
-    case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit, *, judged_at: Any = (),
-    both: bool = True,
+    case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit, *, judged_at: Any = ()
 ) -> FixedHousing:  # fmt: skip
     """Make the structure of ring and casing, and solve for forces at speeds of the carrier [rad/s].
 
-    Of the set in it, and if ``both`` in the ring on its foundation alone; the excitation has a limit at every
-    speed. Those number ``judged_at`` get a Floquet verdict.
+    Of the set in it, and in the ring on its foundation alone; the excitation has a limit at every speed.
+    Those number ``judged_at`` get a Floquet verdict.
     """
     model = HousingModel(case, modes, carrier[0])
-    housing, tolerance, one_way = model.in_housing(), _ACCURACY * case.dynamics.tolerance, None
-    if both:
-        ring = model.in_ring()
-        one_way = ring.solve(carrier, limit, tolerance, side_bands=0)
-        drag = None
-        if housing.damping is not None and one_way.drag is not None:
-            drag = one_way.drag @ (ring.structure.wave_shape @ housing.structure.wave_shape.conj().T)
-        paths = replace(model.lines_paths, symmetry=one_way.paths.symmetry)
-        one_way = replace(one_way, paths=paths, drag=drag)
+    housing, ring, tolerance = model.in_housing(), model.in_ring(), _ACCURACY * case.dynamics.tolerance
+    one_way, drag = ring.solve(carrier, limit, tolerance, side_bands=0), None
+    if housing.damping is not None and one_way.drag is not None:
+        drag = one_way.drag @ (ring.structure.wave_shape @ housing.structure.wave_shape.conj().T)
+    paths = replace(model.lines_paths, symmetry=one_way.paths.symmetry)
+    one_way = replace(one_way, paths=paths, drag=drag)
     two_way, multiplier = housing.solve(carrier, limit, tolerance), np.full(len(carrier), np.nan)
     if len(judged_at):
         multiplier[judged_at] = turn_stability(
@@ -258,7 +256,6 @@ def lines_in_housing(
     lines = replace(exact, order=order, displacement=moved[:, 0], method=fixed_method(case))
     by_kind = moved[:, 1:][:, : len(fixed.sensors)], moved[:, 1 + len(fixed.sensors) :]
     outputs = dict(zip(("sensor", "force"), zip((fixed.sensors, fixed.forces), by_kind)))
-    assert fixed.one_way is not None
     order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
     if points:
         around = structure.combined(np.eye(count)[:, :points])
@@ -300,13 +297,12 @@ def _radial_sensor(structure: FixedStructure, named, angle: float, top: int) -> 
     return weights
 
 
-def heard_in_housing(
-    case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit
-) -> HeardSpeeds:
+def heard_in_housing(model: HousingModel, carrier: np.ndarray, limit: FrequencyLimit) -> HeardSpeeds:
     """What is kept of the run-up at speeds of the carrier [rad/s] in a housing that stands still."""
-    fixed = fixed_housing(case, modes, carrier, limit, both=False)
-    lines = _first_lines(case, modes, fixed, fixed.structure, fixed.two_way)
-    orders, some = fixed.two_way.order, fixed.two_way.force
+    case, housing = model.case, model.in_housing()
+    two_way = housing.solve(carrier, limit, _ACCURACY * case.dynamics.tolerance)
+    lines = _first_lines(case, model.modes, model, housing.structure, two_way)
+    orders, some = two_way.order, two_way.force
     force = np.zeros((*some.shape[:2], orders[-1] + 1), complex)
     force[..., orders] = some
     return heard_speeds(force, lines)
@@ -334,8 +330,11 @@ def _sound_around(
 def housing_memory(case: Case, modes: ModesResult, limit: FrequencyLimit) -> np.ndarray:
     """Estimate what the results of each speed (n_speeds,) take in a housing that stands still [bytes]."""
     gears, periods = planetary_set(case), modes.excitation.periods
-    of_meshes = 4 * fixed_diameters(case) + 1
-    moved = of_meshes + 2 * modes.max_diameter
+    reach, sectors = 2 * fixed_diameters(case), 1
+    if not case.housing.structure:
+        sectors = equal_sectors(housing_supports(case), reach + 1)
+    of_meshes = 2 * (reach // sectors) + 1
+    moved = 2 * reach + 1 + 2 * modes.max_diameter
     alike = modes.symmetry if periods == 1 else 1
     lines = moved * (2 * len(modes.ring.modes.frequency) + 4 * (modes.max_diameter + 1)) / alike
     return 16.0 * limit.response * periods * (2 * of_meshes * gears.n_planets / alike + 2 * lines)

@@ -215,7 +215,7 @@ class FixedHousing:
 
     structure: FixedStructure
     two_way: TwoWayResponse
-    one_way: TwoWayResponse | None
+    one_way: TwoWayResponse
     sensors: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     missing: str = ""

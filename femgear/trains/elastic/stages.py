@@ -82,6 +82,7 @@ from femgear.trains.elastic.excitation_limit import (
 )
 from femgear.trains.elastic.figures import FIGURES
 from femgear.trains.elastic.fixed_housing import (
+    HousingModel,
     fixed_housing,
     fixed_method,
     heard_in_housing,
@@ -515,9 +516,10 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
             level += mode_levels(response, field, alike, met.harmonic, turning, inside)
         progress("runup", float(own[-1] + 1), float(len(speeds)))
     if case.housing.stands_still:
+        model = HousingModel(case, modes, carrier[0])
         room = np.cumsum(housing_memory(case, modes, limit)) // _PART
         for own in np.split(np.arange(len(speeds)), np.flatnonzero(np.diff(room)) + 1):
-            parts.append(heard_in_housing(case, modes, carrier[own], limit.at(own)))
+            parts.append(heard_in_housing(model, carrier[own], limit.at(own)))
             progress("runup", float(own[-1] + 1), float(len(speeds)))
     return RunupResult(
         input_speed=speeds,
