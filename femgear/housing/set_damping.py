@@ -139,7 +139,7 @@ class SetDamping:
         for residue in self.residues:
             for one in residue.sectors:
                 own = self.structure.natural_frequency[one.modes], self.structure.damping_ratio[one.modes]
-                at = np.ix_(residue.blocks, one.orders, range(len(one.modes)))
+                at = np.ix_(residue.blocks, one.orders, np.arange(len(one.modes)))
                 omega = blocks.speed * orders[np.ix_(residue.blocks, one.orders)]
                 found[at] = modal_receptance(*own, omega)
         return compliance(blocks.gears.modes, blocks.speed * self.orders.order), found

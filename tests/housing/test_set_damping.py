@@ -8,7 +8,7 @@ import pytest
 from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.housing.structure import circumferential, ring_waves, supported_ring
+from femgear.housing.structure import Support, circumferential, equal_sectors, ring_waves, supported_ring
 from femgear.housing.turn_stability import _extrapolated, turn_stability
 from femgear.housing.two_way import MeshPaths, solve_two_way, structure_lines
 from femgear.solvers.linear.modal import modal_damping, solve_modes
@@ -45,6 +45,37 @@ def test_one_planet_stands_for_three():
     size = np.abs(lines).max()
     np.testing.assert_allclose(all_lines[..., np.isin(order, kept)], lines, rtol=0, atol=1e-9 * size)
     assert np.abs(all_lines[..., ~np.isin(order, kept)]).max() < 1e-10 * size
+
+
+@pytest.mark.parametrize(("sectors", "symmetry"), [(2, 3), (4, 3), (6, 3), (6, 1), (3, 1)])
+def test_equal_sectors_couple_waves_of_their_number_alone(sectors, symmetry):
+    """Every other side band is found to be nothing where all of them are solved for."""
+    bolts = [Support(0.4 + 2 * np.pi * i / sectors, 4e8, 1e8, 0.1, 0.2) for i in range(sectors)]
+    structure = supported_ring(
+        RING, bolts[::-1], max_diameter=4, max_frequency=1e6, damping_ratio=0.04, sensor_angles=(0.3, 2.0)
+    )
+    assert structure.sectors == sectors
+    few, every = (solved(symmetry, structure=replace(structure, sectors=count)) for count in (sectors, 1))
+    size = np.abs(every.force).max(axis=(1, 2), keepdims=True)
+    kept = np.isin(every.order, few.order)
+    assert 0.1 < kept.mean() < 0.7
+    np.testing.assert_allclose(few.force / size, (every.force / size)[..., kept], rtol=0, atol=1e-10)
+    assert (np.abs(every.force)[..., ~kept] < 1e-10 * size).all()
+    (order, lines), (all_orders, all_lines) = (structure_lines(structure, one) for one in (few, every))
+    size = np.abs(all_lines).max()
+    kept = np.isin(all_orders, order)
+    np.testing.assert_allclose(lines, all_lines[..., kept], rtol=0, atol=1e-9 * size)
+    assert np.abs(all_lines[..., ~kept]).max(initial=0.0) < 1e-9 * size
+
+
+def test_sectors_of_supports():
+    """Supports of different kinds, at places that do not fit, or none."""
+    bolts = [Support(2 * np.pi * i / 6, 4e8, 4e8) for i in range(6)]
+    assert equal_sectors(bolts, 29) == 6
+    assert equal_sectors([replace(one, mass=0.1 * (i % 2)) for i, one in enumerate(bolts)], 29) == 3
+    assert equal_sectors([replace(bolts[0], angle=1e-6), *bolts[1:]], 29) == 1
+    assert equal_sectors([replace(bolts[0], angle=-2 * np.pi), *bolts[1:]], 29) == 6
+    assert equal_sectors(bolts[:5], 29) == 1 and equal_sectors([], 29) == 29
 
 
 def test_it_is_not_that_of_gears_and_ring_apart():

@@ -207,7 +207,7 @@ class ModesResult(StageResult):
 class FixedHousing:
     """Ring and casing that stand still, the forces in them, and those in the ring on its foundation alone.
 
-    The latter where they are asked for. Sensors of the structure: some at equal distances around the outer
+    Sensors of the structure: some at equal distances around the outer
     surface of a ring on supports, then the displacements ``sensors`` and the forces ``forces`` by name;
     ``missing`` as in `HousingResult`. ``multiplier`` (speeds,) is the modulus of the largest Floquet
     multiplier over a turn of the carrier, nan where none was computed.
