@@ -8,9 +8,6 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import solve_banded
 
-_FLAT = 1e-9
-"""Change of slopes, relative to the largest, below which a slope is the mean of those beside it."""
-
 
 def not_a_knot(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Compute the cubic spline through points (n,), (n, ...) at places (m,), with all outside: (m, ...).
@@ -21,27 +18,13 @@ def not_a_knot(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
     return _hermite(x, y, _spline_slopes(x, y), at)
 
 
-def makima(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Compute Akima's modified curve through points (n,), (n, ...) at places (m,) between them: (m, ...).
+def parabolas(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Compute cubics through points (n,), (n, ...) at places (m,), with all outside: (m, ...).
 
-    Slopes are means of those of neighbours, weighted by the changes of slope on the other side (H. Akima, J.
-    ACM 17 (1970) 589-602), with half the mean slopes added to these, which keeps flat pieces flat.
+    Their slopes are those of parabolas through three neighbours: F. Bessel's (C. de Boor, A Practical Guide
+    to Splines, revised edition, 2001, chapter IV). Far points have no part in a curve, as in a spline.
     """
-    step = _steps(x, y)
-    if len(x) == 2:
-        return _hermite(x, y, np.repeat(np.diff(y, axis=0) / step, 2, axis=0), at)
-    m = np.empty((len(x) + 3, *y.shape[1:]), np.result_type(y, float))
-    m[2:-2] = np.diff(y, axis=0) / step
-    m[1] = 2.0 * m[2] - m[3]
-    m[0] = 2.0 * m[1] - m[2]
-    m[-2] = 2.0 * m[-3] - m[-4]
-    m[-1] = 2.0 * m[-2] - m[-3]
-    change, sum_of = np.abs(np.diff(m, axis=0)), np.abs(m[1:] + m[:-1])
-    after, before = (change[some] + 0.5 * sum_of[some] for some in (slice(2, None), slice(None, -2)))
-    both, slopes = after + before, 0.5 * (m[3:] + m[:-3])
-    sharp = both > _FLAT * both.max()
-    weighted = m[1:-2] + before / np.where(sharp, both, 1.0) * (m[2:-1] - m[1:-2])
-    return _hermite(x, y, np.where(sharp, weighted, slopes), at)
+    return _hermite(x, y, _parabola_slopes(x, y), at)
 
 
 def _steps(x: np.ndarray, y: np.ndarray) -> np.ndarray:
@@ -53,11 +36,8 @@ def _spline_slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Slopes (n, ...) of the cubic spline at its points."""
     dx, step = np.diff(x), _steps(x, y)
     slope = np.diff(y, axis=0) / step
-    if len(x) == 2:
-        return np.repeat(slope, 2, axis=0)
-    if len(x) == 3:
-        middle = (step[1] * slope[0] + step[0] * slope[1]) / (step[0] + step[1])
-        return np.stack([2.0 * slope[0] - middle, middle, 2.0 * slope[1] - middle])
+    if len(x) <= 3:
+        return _parabola_slopes(x, y)
     bands, right = np.zeros((3, len(x))), np.empty(y.shape, np.result_type(y, float))
     bands[1, 1:-1] = 2.0 * (dx[:-1] + dx[1:])
     bands[0, 2:], bands[2, :-2] = dx[:-1], dx[1:]
@@ -68,6 +48,16 @@ def _spline_slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     bands[1, -1], bands[2, -2] = dx[-2], last
     right[-1] = (dx[-1] ** 2 * slope[-2] + (2.0 * last + dx[-1]) * dx[-2] * slope[-1]) / last
     return solve_banded((1, 1), bands, right.reshape(len(x), -1)).reshape(right.shape)
+
+
+def _parabola_slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Slopes (n, ...) at points of parabolas through them and their neighbours; two have a straight line."""
+    step = _steps(x, y)
+    slope = np.diff(y, axis=0) / step
+    if len(x) == 2:
+        return np.repeat(slope, 2, axis=0)
+    middle = (step[1:] * slope[:-1] + step[:-1] * slope[1:]) / (step[:-1] + step[1:])
+    return np.concatenate([2.0 * slope[:1] - middle[:1], middle, 2.0 * slope[-1:] - middle[-1:]])
 
 
 def _hermite(x: np.ndarray, y: np.ndarray, slopes: np.ndarray, at: np.ndarray) -> np.ndarray:

@@ -28,7 +28,7 @@ from femgear.contact.cycle import (
 )
 from femgear.contact.face_width import over_slices
 from femgear.contact.supports import RIGID, Supports
-from femgear.curves import makima
+from femgear.curves import parabolas
 from femgear.gears.deviations import SetDeviations, common_period, planet_shift, without_turning
 from femgear.gears.planetary import GearSet
 
@@ -74,8 +74,9 @@ class LoadedPeriod:
     def resampled(self, name: str, count: int) -> np.ndarray:
         """Values (meshes, count) of one of the arrays (meshes, P) at equidistant positions, made once.
 
-        Between jumps by cubics (Akima's, modified): straight lines would make harmonics of their own, images
-        of the low ones beside the number of positions.
+        Between jumps by cubics with the slopes of parabolas through three positions: straight lines would
+        make harmonics of their own, images of the low ones beside the number of positions. They are linear in
+        the values: deflections remain those by the forces, and a response at rest is the static solution.
         """
         known = self._resampled
         if (name, count) not in known:
@@ -96,7 +97,7 @@ class LoadedPeriod:
             for turn in (-whole, 0, whole):
                 first, last = np.searchsorted(at + turn, ends, side="left")
                 inside = slice(first, last + (last < count and at[last % count] + turn == ends[1]))
-                found[:, inside] = makima(place, values[:, piece].T, at[inside] + turn).T
+                found[:, inside] = parabolas(place, values[:, piece].T, at[inside] + turn).T
         return found
 
     def _smooth_pieces(self):

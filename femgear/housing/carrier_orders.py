@@ -135,12 +135,12 @@ class CarrierOrders:
         """Residue (B,) of base and pattern modulo N."""
         return (self.base + self.pattern) % self.paths.symmetry
 
-    @property
+    @cached_property
     def order(self) -> np.ndarray:
         """Orders L (B, R) of the forces."""
         return self.base[:, None] + self.bands + self.seed[:, None]
 
-    @property
+    @cached_property
     def structure_order(self) -> np.ndarray:
         """Orders (B, S) of the structure, some of them beyond what any wave reaches."""
         bands = np.array([self.structure_bands(one) for one in range(self.paths.symmetry)])

@@ -167,15 +167,13 @@ def solve_two_way(  # noqa: PLR0913
         size = int(kept[i]) * periods, n_max, bands, sense, periods, 1 if periods == 1 else paths.symmetry
         return CarrierOrders(paths, *size, structure.sectors)
 
-    def problem_of(i: int) -> _Problem:
-        return _Problem(turning, orders_of(i), int(excited[i]), coupled, cycles)
-
     widest = int(kept.argmax())
     turning = _TurningSet(gears, excitation, structure, orders_of(widest), int(excited.max()), damping)
-    found = _Lines(problem_of(widest), len(speeds))
+    known = coupled, cycles
+    found = _Lines(_Problem(turning, orders_of(widest), int(excited[widest]), *known), len(speeds))
 
     def solve(i: int) -> None:
-        problem = problem_of(i)
+        problem = _Problem(turning, orders_of(i), int(excited[i]), *known)
         found.keep(i, problem, problem.solve(abs(float(speeds[i])), tolerance))
 
     workers = max(min(os.cpu_count() or 1, int(_MOST / 4 / found.size)), 1)
@@ -357,9 +355,9 @@ class _Lines:
         # the other half of line 0 is its conjugate
         values[:, 0, :middle] = 0.0
         values[:, 0, middle] = np.real(every[:, 0, middle])
-        found = np.zeros((len(every), count), complex)
-        for mesh, own in zip(found, values):
-            np.add.at(mesh, place, own)
+        found = np.zeros((count, len(every)), complex)
+        _add_at(found, place, np.moveaxis(values, 0, -1))
+        found = found.T
         found[:, 0] = np.real(found[:, 0])
         return found
 
@@ -369,12 +367,17 @@ class _Lines:
         used = (np.tile(line, orders.patterns) > 0)[:, None] | (number >= 0)
         at = np.minimum(np.searchsorted(self.reached, np.abs(number)), len(self.reached) - 1)
         used &= self.reached[at] == np.abs(number)
-        both = np.where((number < 0)[..., None], values.conj(), values)[used]
-        # lines that meet others are few: sums of equal places would be slow
-        places, first, count = np.unique(at[used], return_index=True, return_counts=True)
-        drag[places] += both[first]
-        more = np.setdiff1d(np.flatnonzero((count > 1)[np.searchsorted(places, at[used])]), first)
-        np.add.at(drag, at[used][more], both[more])
+        _add_at(drag, at[used], np.where((number < 0)[..., None], values.conj(), values)[used])
+
+
+def _add_at(total: np.ndarray, place: np.ndarray, values: np.ndarray) -> None:
+    """Add values (n, ...) to places (n,) of a total, most of which get one of them."""
+    number = place.ravel()
+    values = values.reshape(len(number), *total.shape[1:])
+    places, first, count = np.unique(number, return_index=True, return_counts=True)
+    total[places] += values[first]
+    again = np.setdiff1d(np.flatnonzero((count > 1)[np.searchsorted(places, number)]), first)
+    np.add.at(total, number[again], values[again])
 
 
 @dataclass(frozen=True)
@@ -405,11 +408,14 @@ class _Pass:
 
 def _blend(share: np.ndarray, passes: list[DampingForces]) -> DampingForces:
     """Blend the forces of the passes by the shares (n,) of these."""
+    from scipy.linalg.blas import get_blas_funcs
+
     blended = list[np.ndarray]()
     for parts in zip(*(one.parts for one in passes)):
         total = parts[0] * parts[0].dtype.type(share[0])
         for times, part in zip(share[1:], parts[1:]):
-            total += part * part.dtype.type(times)
+            add = get_blas_funcs("axpy", (total, part))
+            total = add(part.ravel(), total.ravel(), a=times).reshape(total.shape)
         blended.append(total)
     return DampingForces(*blended)
 

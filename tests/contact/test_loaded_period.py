@@ -262,7 +262,7 @@ def test_runout_of_the_sun_shares_the_load_as_the_meshes_are_soft(bodies, coarse
     """
     gears, size = small_set(equal_planet_angles(4)), 0.05e-6
     d = replace(no_deviations(gears), sun_runout=Runout(size))
-    options = dict(sun_torque=TORQUE, positions=24)
+    options = dict(sun_torque=TORQUE, positions=48)
     found = loaded_period(gears, bodies, bodies, deviations=d, **options)
     force = np.fft.rfft(found.resampled("force", 21 * 840), axis=1)[:, 1] * 2 / (21 * 840)
     position = np.arange(84) / 84

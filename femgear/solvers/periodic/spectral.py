@@ -27,6 +27,8 @@ _STILL = 1e-12
 _UNDAMPED = 1e-10
 # Harmonics of speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 4000
+# Part of the deflections with their mean that fluctuations are at least taken to be.
+_LEAST = 1e-4
 # Krylov steps of the first cycle at most, of each one after it twice as many; cycles, their residual, and
 # that which single precision reaches.
 _KRYLOV, _CYCLES, _ROUNDING, _SINGLE = 250, 4, 1e-13, 1e-7
@@ -70,8 +72,8 @@ def solve_spectral(
         Mesh harmonics kept in the data and in the response, of all speeds or one a speed; products are formed
         without aliasing. The result has as many harmonics as the speed with the most, zeros beyond its own.
     tolerance : float
-        Relative change at which the fixed point stops; the full equations of a converged solution then hold
-        to ten times that.
+        Change, relative to what fluctuates, at which the fixed point stops; the full equations of a converged
+        solution then hold to ten times that.
     method : {"auto", "fixed point", "direct"}
         ``"auto"`` uses the fixed point where its changes promise convergence within `max_iterations`, and
         the direct solution of the same equations elsewhere.
@@ -196,6 +198,15 @@ def _norm(deflection: np.ndarray) -> np.ndarray:
     return np.sqrt(np.einsum("jsh,jsh->s", deflection, deflection.conj()).real)
 
 
+def _moving(deflection: np.ndarray) -> np.ndarray:
+    """Euclidean norm (n_speeds,) of what fluctuates, at least `_LEAST` of that with the mean.
+
+    Gears of stiff teeth move by a hundredth of what their load deflects them.
+    """
+    whole = np.maximum(_norm(deflection), np.finfo(float).tiny)
+    return np.maximum(_norm(deflection[..., 1:]), _LEAST * whole)
+
+
 def solve_direct(problem: HarmonicProblem, accuracy: float = _ROUNDING) -> np.ndarray:
     """Solve ``(I + T G) E = S`` for the harmonics (n, n_speeds, H + 1) of the mesh deflections [m].
 
@@ -204,7 +215,7 @@ def solve_direct(problem: HarmonicProblem, accuracy: float = _ROUNDING) -> np.nd
     rounding none depends on the others.
     """
     found = problem.source.copy()
-    limit = accuracy * _norm(problem.source)
+    limit = accuracy * _moving(problem.source)
     for cycle in range(_CYCLES):
         rest = problem.source - found - _apply(problem, found)
         todo = np.flatnonzero(_norm(rest) > limit)
@@ -487,8 +498,7 @@ def _solve_batch(modes, data: _Data, part, fundamental, kept, found: _Solved, ho
     predicted[..., 0] += modes.load_deflection[:, None]
     if modes.modal_load is not None:
         found.modal[part, :, 0] += modes.modal_load * compliance(modes, np.zeros(()))
-    size_of = np.maximum(_norm(deflection), np.finfo(float).tiny)
-    found.residual[part] = _norm(deflection - predicted) / size_of
+    found.residual[part] = _norm(deflection - predicted) / _moving(deflection)
     found.deflection[part, :, :size], found.force[part, :, :size] = (
         one.transpose(1, 0, 2) for one in (deflection, force)
     )
@@ -529,15 +539,16 @@ def _fixed_point(problem: HarmonicProblem, tolerance: float, max_iterations: int
     value, history = values, []
     for step in range(1, max_iterations + 1):
         new = problem.source - _apply(problem, value)
-        size, change = np.maximum(_norm(new), np.finfo(float).tiny), _norm(new - value)
+        size, change = _norm(new), _norm(new - value)
         value, history = new, [change, *history[:_FIRST]]
-        small = change <= tolerance * size
+        enough = tolerance * _moving(new)
+        small = change <= enough
         stop = small | ~(size < limit[active]) | (step == max_iterations)
         if not patient and step > _FIRST:
             shrink = change / np.maximum(history[_FIRST], np.finfo(float).tiny)
             # as many times the shrinking of the last iterations as are left
             left = (max_iterations - step) / _FIRST
-            stop |= change * np.minimum(shrink, 1.0) ** left > tolerance * size
+            stop |= change * np.minimum(shrink, 1.0) ** left > enough
         if stop.any():
             at, rest = active[stop], ~stop
             values[:, at], iterations[at], done[at] = new[:, stop], step, small[stop]
