@@ -33,6 +33,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg.blas import get_blas_funcs
 
 from femgear.errors import CaseError, ConvergenceError, checked_count
 from femgear.housing.carrier_orders import (
@@ -408,8 +409,6 @@ class _Pass:
 
 def _blend(share: np.ndarray, passes: list[DampingForces]) -> DampingForces:
     """Blend the forces of the passes by the shares (n,) of these."""
-    from scipy.linalg.blas import get_blas_funcs
-
     blended = list[np.ndarray]()
     for parts in zip(*(one.parts for one in passes)):
         total = parts[0] * parts[0].dtype.type(share[0])
