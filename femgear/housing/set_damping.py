@@ -168,7 +168,7 @@ class SetDamping:
     ) -> DampingForces:  # fmt: skip
         """Compute the forces of the damping by the motion at a speed, part by part of the blocks.
 
-        By the `receptances`, and by the motion: forces e (J, B, R) beyond k0, u (G, B, R), forces f (J, B, R)
+        By the `receptances`, in its precision, and by the motion: forces e (J, B, R) beyond k0, u (G, B, R), forces f (J, B, R)
         of the meshes, and the forces of the damping in that motion.
         """
         extra, way, force = motion
@@ -178,8 +178,8 @@ class SetDamping:
         turned = np.exp(1j * np.outer(self.orders.diameters, blocks.place))
         if self.rows.dtype == np.complex64:
             excess, ring, turned = _single(excess), _single(ring), _single(turned)
-            receptances = tuple(one.astype(np.complex64) for one in receptances)
-            before = DampingForces(*(_single(part) for part in before.parts))
+            if before.still.dtype != np.complex64:
+                before = DampingForces(*(_single(part) for part in before.parts))
         found = DampingForces(*(np.empty_like(part) for part in before.parts))
         size = sum(one[0].nbytes for one in found.parts[:2])
         for residue in self.residues:

@@ -54,7 +54,7 @@ from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
 
 _EQUAL, _RESIDUAL = 1e-9, 1e-6
 """Part of the largest harmonic by which meshes that repeat others may differ; residual that is refused."""
-_PASSES, _MIXED = 60, 5
+_PASSES, _MIXED = 60, 3
 """Passes of the damping at most, and those that are extrapolated together."""
 _INNER, _SINGLE = 3e-2, 1e-6
 """Accuracy of a solution over the change by its pass; of the forces of the damping in single precision."""
@@ -293,6 +293,7 @@ class _Problem:
                 break
             if not passes and tolerance > _SINGLE * change:
                 damping = damping.single()
+                answers = tuple(one.astype(np.complex64) for one in answers)
             passes = [*passes[1 - _MIXED :], _Pass(made, apart)]
             forces = _blend(_shares([one.change for one in passes]), [one.forces for one in passes])
         drag = damping.on_all_modes(made.on_structure)
