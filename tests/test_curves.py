@@ -25,7 +25,7 @@ def test_slopes_are_those_of_parabolas(count):
     x, y = np.cumsum(rng.uniform(0.1, 2.0, count)), rng.standard_normal((count, 3))
     slopes = np.empty_like(y)
     for i in range(count):
-        near = np.clip(np.arange(3) + i - 1 + (i == 0) - (i == count - 1), 0, count - 1)[: min(count, 3)]
+        near = np.unique(np.clip(np.arange(3) + i - 1 + (i == 0) - (i == count - 1), 0, count - 1))
         for k in range(3):
             curve = np.polynomial.Polynomial.fit(x[near], y[near, k], len(near) - 1)
             slopes[i, k] = curve.deriv()(x[i])

@@ -168,8 +168,8 @@ class SetDamping:
     ) -> DampingForces:  # fmt: skip
         """Compute the forces of the damping by the motion at a speed, part by part of the blocks.
 
-        By the `receptances`, in its precision, and by the motion: forces e (J, B, R) beyond k0, u (G, B, R), forces f (J, B, R)
-        of the meshes, and the forces of the damping in that motion.
+        By the `receptances`, in its precision, and by the motion: forces e (J, B, R) beyond k0, u (G, B, R),
+        forces f (J, B, R) of the meshes, and the forces of the damping in that motion.
         """
         extra, way, force = motion
         G = len(blocks.place)
