@@ -5,6 +5,7 @@ from __future__ import annotations
 import _thread
 import atexit
 import contextlib
+import gc
 import os
 import re
 import shlex
@@ -19,6 +20,8 @@ from dataclasses import dataclass
 from itertools import takewhile
 
 _INTERRUPTED = 130
+_RARELY = 50_000
+"""New objects after which garbage is looked for: more than by default, since what a run makes is kept."""
 _MEMORY = 600_000_000
 """Memory that a process needs to load the libraries of a run [bytes]; with less they end or stop it."""
 _LOADING = "install femgear with its libraries; where memory is limited (ulimit -v, -d), raise the limit"
@@ -868,6 +871,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def call(program_app: App, arguments: Sequence[str] | None, *, program: str) -> int:
     """Call a program as `main` does, its warnings and errors as lines on standard error; remedies name it."""
+    if arguments is None:  # a process of its own
+        gc.set_threshold(_RARELY)
     for descriptor in range(3):  # a file that takes the number of a closed one would hold what is printed
         try:
             os.fstat(descriptor)

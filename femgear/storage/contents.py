@@ -363,7 +363,7 @@ class Datasets(Mapping[str, Any]):
 
 def _is_one(place: Any) -> bool:
     """Tell whether a place along a dimension is one number."""
-    return isinstance(place, int | np.integer) or (isinstance(place, np.ndarray) and place.ndim == 0)
+    return isinstance(place, (int, np.integer)) or (isinstance(place, np.ndarray) and place.ndim == 0)
 
 
 def _place(place: Any) -> Any:

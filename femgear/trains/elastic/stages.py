@@ -505,7 +505,8 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     limit = limited(case, frequency, up_to, given=given)
     cuts = np.flatnonzero(np.diff(np.cumsum(limit.response) // _LINES_TOGETHER)) + 1
     for own in np.split(np.arange(len(speeds)), cuts):
-        response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
+        options = limit.options(case, own)
+        response = solve_spectral(basis, excitation, frequency[own], radius=False, **options)
         if not case.housing.stands_still:
             lines = sensor_lines(case, modes, response, carrier[own])
             parts.append(heard_speeds(response.force, lines, response.lowest_force))

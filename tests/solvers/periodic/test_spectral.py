@@ -399,6 +399,16 @@ def test_bad_excitation_is_refused(geared_chain, chain_excitation):
             solve_spectral(modes, bad, 0.1)
 
 
+def test_the_radius_is_left_out_where_it_is_not_wanted(geared_chain, chain_excitation):
+    excitation = chain_excitation(0.3)
+    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    frequency = np.linspace(0.05, 0.5, 7)
+    whole, without = (solve_spectral(modes, excitation, frequency, radius=radius) for radius in (True, False))
+    np.testing.assert_array_equal(without.deflection, whole.deflection)
+    assert np.isnan(without.spectral_radius).all() and "radius" not in without.message
+    assert "largest spectral radius" in whole.message and without.converged.all()
+
+
 def test_too_few_harmonics_are_told_of_converged_speeds_only():
     response = SimpleNamespace(
         mesh_frequency=np.array([10.0, 20.0, 30.0]),
