@@ -6,7 +6,6 @@ To import that takes longer than all curves of a run: SciPy's optimisation and s
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 
 def not_a_knot(x: np.ndarray, y: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -34,6 +33,8 @@ def _steps(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 def _spline_slopes(x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Slopes (n, ...) of the cubic spline at its points."""
+    from scipy.linalg import solve_banded
+
     dx, step = np.diff(x), _steps(x, y)
     slope = np.diff(y, axis=0) / step
     if len(x) <= 3:

@@ -167,6 +167,11 @@ def test_heavy_libraries_are_imported_late(code):
     assert heavy_after(code) == set()
 
 
+def test_help_loads_no_part_of_scipy():
+    code = "from femgear.cli import main; main(['--help'])"
+    assert heavy_after(code, {"scipy.linalg", "scipy.sparse", "scipy.special", "scipy.interpolate"}) == set()
+
+
 def test_a_run_loads_xarray_without_dask_and_pint():
     """Which come when somebody asks for them; xarray reads and computes as before."""
     code = (
