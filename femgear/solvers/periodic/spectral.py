@@ -578,10 +578,13 @@ def joint_message(responses: Sequence[Response]) -> str:
         np.concatenate([getattr(one, name) for one in responses]) for name in names
     )
     direct = np.concatenate([np.array(one.method) == "direct" for one in responses])
+    largest = ""
+    if not np.all(np.isnan(radius)):
+        worst = int(np.nanargmax(radius))
+        largest = f"; largest spectral radius {radius[worst]:.3g} at {frequency[worst]:.6g} Hz"
     parts = [
         f"{len(frequency)} speeds: fixed point at {int(np.sum(~direct & converged))}, direct solution at "
-        f"{int(np.sum(direct))}; largest spectral radius {np.max(radius):.3g} "
-        f"at {frequency[int(np.argmax(radius))]:.6g} Hz."
+        f"{int(np.sum(direct))}{largest}."
     ]
     if not np.all(converged):
         first = int(np.argmin(converged))
