@@ -29,9 +29,9 @@ _UNDAMPED = 1e-10
 _BATCH = 4000
 # Part of the deflections with their mean that fluctuations are at least taken to be.
 _LEAST = 1e-4
-# Krylov steps of the first cycle at most, of each one after it twice as many; cycles, their residual, and
-# that which single precision reaches.
-_KRYLOV, _CYCLES, _ROUNDING, _SINGLE = 250, 4, 1e-13, 1e-7
+# Krylov steps of the first cycle at most, of each one after it twice as many; cycles, their residual, that
+# for which single precision is used, and the part of its residual to which a cycle of it gets without delay.
+_KRYLOV, _CYCLES, _ROUNDING, _SINGLE, _REACHED = 250, 4, 1e-13, 1e-7, 3e-6
 # Unknowns of one speed up to which the spectral radius is exact.
 _FEW = 60
 # Iterations of the fixed point after which it may be given up.
@@ -215,14 +215,17 @@ def solve_direct(problem: HarmonicProblem, accuracy: float = _ROUNDING) -> np.nd
     rounding none depends on the others.
     """
     found = problem.source.copy()
-    limit = accuracy * _moving(problem.source)
+    limit, single = accuracy * _moving(problem.source), accuracy >= _SINGLE
     for cycle in range(_CYCLES):
         rest = problem.source - found - _apply(problem, found)
-        todo = np.flatnonzero(_norm(rest) > limit)
+        size = _norm(rest)
+        todo = np.flatnonzero(size > limit)
         if not len(todo):
             break
-        part = problem.take(todo, np.complex64 if accuracy >= _SINGLE else complex)
-        found[:, todo] += _cycle(part, _rows(rest[:, todo]), limit[todo], _KRYLOV * 2**cycle)
+        part = problem.take(todo, np.complex64 if single else complex)
+        # the next cycle takes over where rounding would hold this one up
+        near = np.maximum(limit, _REACHED * size) if single else limit
+        found[:, todo] += _cycle(part, _rows(rest[:, todo]), near[todo], _KRYLOV * 2**cycle)
     return found
 
 

@@ -277,8 +277,9 @@ def test_krylov_steps_in_single_precision_are_as_exact_as_asked(planet_set, plan
     problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
     found = spectral.solve_direct(problem, accuracy)
     rest = spectral._norm(problem.source - found - spectral._apply(problem, found))
-    assert np.all(rest <= accuracy * spectral._norm(problem.source))
-    assert rest.max() > 1e-3 * accuracy * spectral._norm(problem.source).max()
+    # relative to what fluctuates, and no finer than that asks for
+    assert np.all(rest <= accuracy * spectral._moving(problem.source))
+    assert rest.max() > 1e-3 * accuracy * spectral._moving(problem.source).max()
 
 
 def test_nearly_identical_planets_meet_the_full_equations(planet_set, planet_excitation):
