@@ -214,29 +214,35 @@ def make_sectors(
     flank_elements: int = 24,
     refine: float = 1.0,
     cache: Path | None = None,
+    known: Sequence[Sector | None] = (),
 ) -> Sectors:
     """Mesh one sector of each gear and assemble its stiffness matrix.
 
     ``material`` is that of all gears or one for each, ``flank_elements`` are the element edges along a flank,
     ``refine`` divides all element sizes, ``cache`` is the folder of generated grids. Teeth are as wide as the
     face that they have in common with their mates (ISO 6336-1 has the stiffness of a pair for that width), of
-    two mates the wider one; bodies below them have their own width.
+    two mates the wider one; bodies below them have their own width. Sectors that are ``known`` are taken,
+    None stands for the others.
     """
-    gears = planetary_set.gears
-    halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in gears]
+    gears, known = planetary_set.gears, known or [None] * len(planetary_set.gears)
+    new = [gear for gear, one in zip(gears, known, strict=True) if one is None]
+    halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in new]
     try:
         grids = mesh_outlines(halves, cache=cache)
     except GridError as error:
-        thin = min(gears, key=lambda gear: abs(gear.root_radius - gear.rim_radius))
+        thin = min(new, key=lambda gear: abs(gear.root_radius - gear.rim_radius))
         rim = abs(thin.root_radius - thin.rim_radius) / thin.module
         if rim < _THIN:
             error.key = f"{thin.name}.{'outer' if thin.internal else 'bore'}_radius"
             error.remedy = f"the rim is {rim:.2g} modules thick; give it {_THIN:g} or more"
         raise
-    sectors, materials = [], material_of_each(material, len(gears))
+    sectors, materials, grids = [], material_of_each(material, len(gears)), iter(grids)
     widths = flank_widths([gear.face_width for gear in gears])
-    for gear, grid, own, teeth in zip(gears, grids, materials, widths, strict=True):
-        whole = mirror(grid)
+    for gear, one, own, teeth in zip(gears, known, materials, widths, strict=True):
+        if one is not None:
+            sectors.append(one)
+            continue
+        whole = mirror(next(grids))
         state: Any = RING_STATE if gear.internal else TEETH_STATE
         thickness: Any = gear.face_width
         if max(teeth) < thickness:
@@ -262,6 +268,7 @@ def make_bodies(
     *,
     depth: float | None = None,
     ring_foundation=None,
+    known: Sequence[FlankCompliance | None] = (),
 ) -> Bodies:
     """Compute the flank compliances, sun and planets held at their bores and the ring at its outer surface.
 
@@ -273,12 +280,16 @@ def make_bodies(
         Largest depth at which body and half plane are joined [m].
     ring_foundation : (2n, 2n) sparse matrix, optional
         Stiffness of an elastic foundation of the ring, which then is not held [N/m].
+    known : sequence, optional
+        Compliances of gears that are there already; None stands for the others.
     """
+    known = known or [None] * len(sectors.gears)
     # roots of sectors of two plane states or widths need a solution of their own, see `root_stress`
     own = [s.gear.face_width for s in sectors.gears]
     widths = flank_widths(own)
     found = [
-        flank_compliance(
+        before
+        or flank_compliance(
             s.grid,
             s.gear,
             one,
@@ -288,8 +299,8 @@ def make_bodies(
             foundation=ring_foundation if s.gear.internal else None,
             widths=teeth,
         )
-        for s, one, teeth in zip(
-            sectors.gears, material_of_each(material, len(sectors.gears)), widths, strict=True
+        for s, before, one, teeth in zip(
+            sectors.gears, known, material_of_each(material, len(sectors.gears)), widths, strict=True
         )
     ]
     ring = found[2] if len(found) > 2 else None

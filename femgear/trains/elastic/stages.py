@@ -150,6 +150,8 @@ from femgear.trains.static.stages import (
     STATIC,
     STRESS,
     case_supports,
+    foundation_entries,
+    gear_entries,
     over_width,
     record_positions,
     ring_foundation,
@@ -278,12 +280,14 @@ def _shares(force: np.ndarray) -> np.ndarray:
 
 def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
     """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
-    fixed, known = case.static.members == "fixed", ring_entries(case)
-    other = steps.kept("ring compliances", known) or steps.keep(
-        "ring compliances",
+    fixed, gears = case.static.members == "fixed", static.planetary_set
+    known = {**gear_entries(case, gears, 2), **(foundation_entries(case) if fixed else {})}
+    ring = steps.kept("flanks of the ring", known) or steps.keep(
+        "flanks of the ring",
         known,
-        with_ring(static.bodies, ring_foundation(case, static.sectors.ring) if fixed else None),
+        with_ring(static.bodies, ring_foundation(case, static.sectors.ring) if fixed else None).ring,
     )
+    other = replace(static.bodies, ring=ring)
     return (other, static.bodies) if fixed else (static.bodies, other)
 
 
@@ -426,8 +430,9 @@ def _excitation_end(
     With the ``level`` (n,) at those that are compared where it is known.
     """
     if not (known := _known_ends(case, modes)):
-        compared = (values[_compared_speeds(case)] for values in _turning_speeds(case, modes))
-        known.append(excitation_end(case, modes, _heard_lines(case, modes), *compared, level))
+        frequency, carrier = (values[_compared_speeds(case)] for values in _turning_speeds(case, modes))
+        found = excitation_end(case, modes, _heard_lines(case, modes), frequency, carrier, level)
+        known.append(found)
     return known[0]
 
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from femgear.case.dependencies import (
+    Entries,
     Steps,
     check_entries,
     compliance_entries,
@@ -170,23 +171,63 @@ def known_compliances(
     """Take sector grids and flank compliances of a case from what others have left, or make them."""
     known = compliance_entries(case)
     return steps.kept("flank compliances", known) or steps.keep(
-        "flank compliances", known, flank_compliances(case, gears, cache=cache)
+        "flank compliances", known, flank_compliances(case, gears, cache=cache, steps=steps)
     )
 
 
 def flank_compliances(
-    case: Case, gears: PlanetarySet, *, cache: Path | None = None
+    case: Case, gears: PlanetarySet, *, cache: Path | None = None, steps: Steps | None = None
 ) -> tuple[Sectors, Bodies]:
     """Make the sector grids of all gears and their flank compliances, the ring held or on its foundation.
 
-    The gears are those of the case; ``cache`` is the folder of generated grids.
+    The gears are those of the case; ``cache`` is the folder of generated grids. What other cases with some of
+    the same gears have left is taken from ``steps``.
     """
-    materials = materials_of(case)
-    sectors = make_sectors(gears, materials, flank_elements=case.static.flank_elements, cache=cache)
-    foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
-    bodies = make_bodies(sectors, materials, depth=case.static.depth, ring_foundation=foundation)
+    steps, materials = steps or Steps(), materials_of(case)
+    names = [gear.name for gear in gears.gears]
+    entries = [gear_entries(case, gears, number) for number in range(len(names))]
+    sectors = make_sectors(
+        gears,
+        materials,
+        flank_elements=case.static.flank_elements,
+        cache=cache,
+        known=[steps.kept(f"sector of the {name}", one) for name, one in zip(names, entries)],
+    )
+    for name, one, sector in zip(names, entries, sectors.gears, strict=True):
+        steps.keep(f"sector of the {name}", one, sector)
+    elastic = case.static.members == "elastic"
+    foundation = ring_foundation(case, sectors.ring) if elastic else None
+    if elastic:
+        entries[-1] = {**entries[-1], **foundation_entries(case)}
+    bodies = make_bodies(
+        sectors,
+        materials,
+        depth=case.static.depth,
+        ring_foundation=foundation,
+        known=[steps.kept(f"flanks of the {name}", one) for name, one in zip(names, entries)],
+    )
+    for name, one, body in zip(names, entries, bodies.gears):
+        steps.keep(f"flanks of the {name}", one, body)
     base, softer = _helical(case, gears)
     return sectors, replace(bodies, helical=softer, base_helix_angle=base)
+
+
+def gear_entries(case: Case, gears: PlanetarySet, number: int) -> Entries:
+    """List all that decides sector and flanks of a gear of a set, whatever the others are."""
+    gear = gears.gears[number]
+    return {
+        "gear": repr(gear),
+        "material": repr(materials_of(case)[number]),
+        "widths": flank_widths([one.face_width for one in gears.gears])[number],
+        "static.flank_elements": case.static.flank_elements,
+        "static.depth": case.static.depth,
+    }
+
+
+def foundation_entries(case: Case) -> Entries:
+    """List what decides the foundation of the ring."""
+    ring = case.ring
+    return {"foundation": (ring.foundation_radial, ring.foundation_tangential)}
 
 
 def _helical(case: Case, gears: PlanetarySet) -> tuple[float, tuple[float, ...]]:
