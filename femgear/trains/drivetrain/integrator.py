@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy import linalg
@@ -34,6 +35,10 @@ _TABLE = 8192
 _OVERLAP_ROUNDING = 1e-12
 # Rounds of changing all wrong contacts, and of changing one.
 _ROUNDS, _SINGLE = 12, 10_000
+# Instants whose matrices are made side by side, so that they stay in a cache.
+_SIDE_BY_SIDE = 256
+# Steps that go two at a time, whose maps are made together.
+_TOGETHER = 256
 # Steps that are tried at once with all drive flanks and no others in touch, first and last.
 _FEW, _MANY = 8, 64
 
@@ -151,6 +156,15 @@ class Scheme:
             -whole[2 * n :, ends[4] :], U, n,
         )  # fmt: skip
 
+    @cached_property
+    def of_pairs(self) -> np.ndarray:
+        """Map of `_march_pairs`, (2 n + 2 m, 2 n + 2 m)."""
+        at = 2 * self.n
+        of_state, of_forces = self.advance[:at], self.advance[at:]
+        later = self.advance[:, :at] @ of_state
+        whole = np.hstack([later[:, :at], self.advance[:, at:], later[:, at:]])
+        return np.vstack([whole[:at], of_forces[:, :at] @ whole[:at], whole[at:]])
+
     def states(self, rows) -> np.ndarray:
         """Compute states ``(q, v, g)`` of rows ``z``, (..., 2 n + m) both."""
         out = np.array(rows)
@@ -180,14 +194,41 @@ class MeshBlock:
     @classmethod
     def of(cls, scheme: Scheme, block: Block, meshes: int) -> MeshBlock:
         """Make the matrices of a block whose first `meshes` contacts are drive flanks."""
-        S, k = np.ascontiguousarray(block.selection[1:, :, :meshes]), block.stiffness[1:, :meshes]
-        St = np.swapaxes(S, 1, 2)
-        # transposed: x S k (1 + (S^T F S)^T k)^-1 S^T
-        inner = np.matmul(np.swapaxes(np.matmul(scheme.flexibility, S), 1, 2), S) * k[:, None, :]
-        inner[:, np.arange(inner.shape[1]), np.arange(inner.shape[1])] += 1.0
-        forces = np.linalg.solve(np.swapaxes(inner, 1, 2), k[:, :, None] * St)
-        closed = np.matmul(np.swapaxes(forces, 1, 2), St)
-        return cls(block.selection[1:], block.stiffness[1:], closed)
+        selection, stiffness = block.selection[1:], block.stiffness[1:]
+        closed = np.empty((len(selection), *scheme.flexibility.shape))
+        for first in range(0, len(closed), _SIDE_BY_SIDE):
+            these = slice(first, first + _SIDE_BY_SIDE)
+            # closed = Y (1 + Y^T F^T Y)^-1 Y^T with Y = S k^(1/2)
+            Y = selection[these, :, :meshes] * np.sqrt(stiffness[these, None, :meshes])
+            across = np.ascontiguousarray(np.swapaxes(Y, 1, 2))
+            # of every instant Y^T F, by one product
+            rows = across.reshape(np.prod(across.shape[:2]), across.shape[2])
+            yielded = (rows @ scheme.flexibility).reshape(across.shape)
+            inner = np.matmul(yielded, Y)
+            np.matmul(Y, _solved_side_by_side(np.swapaxes(inner, 1, 2), across), out=closed[these])
+        return cls(selection, stiffness, closed)
+
+
+def _solved_side_by_side(matrix, right) -> np.ndarray:
+    """Solve ``(1 + matrix) x = right`` for many instants at once: (t, c, c), (t, c, m).
+
+    The symmetric part of 1 + matrix is positive definite, so that no rows are exchanged (G. H. Golub and
+    C. F. Van Loan, Matrix Computations, section 4.2).
+    """
+    t, c, m = right.shape
+    system = np.empty((c, c + m, t))
+    system[:, :c], system[:, c:] = matrix.transpose(1, 2, 0), right.transpose(1, 2, 0)
+    system[range(c), range(c)] += 1.0
+    for k in range(c):
+        # row k of U over its pivot, and column k of L
+        if k:
+            system[k, k:] -= np.einsum("jt,jwt->wt", system[k, :k], system[:k, k:])
+            system[k + 1 :, k] -= np.einsum("ijt,jt->it", system[k + 1 :, :k], system[:k, k])
+        system[k, k + 1 :] *= 1.0 / system[k, k]
+    solution = system[:, c:]
+    for k in range(c - 2, -1, -1):
+        solution[k] -= np.einsum("jt,jwt->wt", system[k, k + 1 : c], solution[k + 1 :])
+    return np.ascontiguousarray(solution.transpose(2, 0, 1))
 
 
 def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
@@ -203,6 +244,50 @@ def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -
         after[0] += loads[i]
         drawn = after[:, at:]
         drawn[:] = dot(drawn, closed[i])
+
+
+def march_pairs(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+    """Fill rows as `march_closed`, two steps at a time; the free motion is left out between them."""
+    even = len(steps) // 2 * 2
+    for first in range(0, even, _TOGETHER):
+        _march_pairs(scheme, meshes, loads, rows, steps[first : min(first + _TOGETHER, even)])
+    march_closed(scheme, meshes, loads, rows, steps[even:])
+
+
+def _march_pairs(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+    """Fill rows by pairs of steps, each of which is one linear map.
+
+    Its rows ``(q, v, g, g)`` have the mesh forces g at the ends of both steps; those of the first one enter
+    ``(q, v)`` with the next map. The states between are computed at the end, all at once.
+    """
+    at, start, stop, pairs = 2 * scheme.n, steps.start, steps.stop, len(steps) // 2
+    of_state, of_forces = scheme.advance[:at], scheme.advance[at:]
+    m = len(of_forces)
+    first, second = meshes.closed[start:stop:2], meshes.closed[start + 1 : stop : 2]
+    forces = np.zeros((pairs, 2 * m, 2 * m))
+    forces[:, :m, :m], forces[:, m:, m:] = first, second
+    forces[:, :m, m:] = (first.reshape(pairs * m, m) @ of_forces[:, at:]).reshape(first.shape) @ second
+    early, late = loads[start:stop:2], loads[start + 1 : stop : 2]
+    begun = early[:, :at] @ of_state
+    added = np.hstack([begun[:, :at] + late[:, :at], early[:, at:], begun[:, at:] + late[:, at:]])
+    found = np.zeros((pairs + 1, 2, at + 2 * m))
+    found[0, :, :at], found[0, :, at + m :] = rows[start, :, :at], rows[start, :, at:]
+    dot, double, after = np.dot, scheme.of_pairs, found[1:]
+    for before, end, motion, drawn, load, closed in zip(
+        found, after, after[:, 0], after[:, :, at:], added, forces
+    ):
+        dot(before, double, out=end)
+        motion += load
+        drawn[:] = dot(drawn, closed)
+    for row in (0, 1):
+        ends, between = rows[start + 2 : stop + 1 : 2, row], after[:, row, at : at + m]
+        np.matmul(between, of_forces[:, :at], out=ends[:, :at])
+        ends[:, :at] += after[:, row, :at]
+        ends[:, at:] = after[:, row, at + m :]
+    middle = rows[start + 1 : stop : 2, 0]
+    np.matmul(rows[start:stop:2, 0], scheme.advance, out=middle)
+    middle += early
+    middle[:, at:] = after[:, 0, at : at + m]
 
 
 def solve_overlaps(

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from femgear.trains.drivetrain.integrator import (
     Scheme,
     Separating,
     Spin,
-    march_closed,
+    march_pairs,
     solve_overlaps,
 )
 from femgear.trains.drivetrain.kinematics import FlankContacts
@@ -203,9 +204,9 @@ class _Motion:
         self.state = _start_state(model, scheme, spin, start, model.contacts if contact_loss else None)
         self.free = FreeMotion(model, scheme)
         self.free_row = self.free.start()
-        self.march = march_closed
+        self.march, self.whole = march_pairs, self.piece % 2 == 0
         if contact_loss and model.meshes:
-            self.march = Separating(model.contacts.gap, self.meshes).march
+            self.march, self.whole = Separating(model.contacts.gap, self.meshes).march, False
 
     def block(self, first: int, number: int):
         """States (number + 1, 2 n + m) of the next steps, and their loads and meshes."""
@@ -215,11 +216,10 @@ class _Motion:
         loads = block.loads[:-1] @ scheme.loads_before + block.loads[1:] @ scheme.loads_after
         rows = np.empty((number + 1, 2, len(scheme.advance)))
         rows[0] = scheme.row(self.state), self.free_row
-        for begin in range(0, number, self.piece):
-            end = min(begin + self.piece, number)
+        ends = np.append(np.arange(self.piece, number, self.piece), number)
+        for begin, end in pairwise([0, number] if self.whole else [0, *ends]):
             self.march(scheme, meshes, loads, rows, range(begin, end))
-            rows[end, 1] = self.free.renewed(rows[end, 1], h * (first + end))
-        self.free_row = rows[-1, 1].copy()
+        self.free_row = self.free.renewed(rows[ends, 1], h * (first + ends))
         return scheme.states(rows[:, 0]), block
 
 
@@ -289,24 +289,27 @@ class FreeMotion:
         n = self.scheme.n
         state = np.zeros(len(self.scheme.advance))
         state[n : 2 * n] = np.random.default_rng(0).standard_normal(n) / np.sqrt(np.diag(self.system.M))
-        return self._scaled(state)[0]
+        return self._scaled(state[None])[0]
 
-    def renewed(self, row, time: float) -> np.ndarray:
-        """Bring a row (2 n + m,) back to size one; its size at this time [s] is kept."""
-        row, size = self._scaled(self.scheme.states(row))
-        self.times.append(time)
+    def renewed(self, rows, times) -> np.ndarray:
+        """Bring the last of rows (k, 2 n + m) back to size one; all sizes, at times (k,) [s], are kept."""
+        state, size = self._scaled(self.scheme.states(rows))
+        self.times += times.tolist()
         with np.errstate(divide="ignore"):
-            self.sizes.append(self.sizes[-1] + np.log(size))
-        return row
+            self.sizes += (self.sizes[-1] + np.log(size)).tolist()
+        return state
 
-    def _scaled(self, state):
+    def _scaled(self, states) -> tuple[np.ndarray, np.ndarray]:
+        """Row of the last of some states (k, 2 n + m) at size one, and the sizes of all (k,)."""
         n, system = self.scheme.n, self.system
-        q, v, g = state[:n], state[n : 2 * n], state[2 * n :]
-        q -= (self.carried @ q) / self.inertia * self.rigid
-        v -= (self.carried @ v) / self.inertia * self.rigid
-        twice = v @ system.M @ v + q @ system.K @ q + (q @ self.scheme.basic) @ g
-        size = np.sqrt(max(twice, 0.0))
-        return self.scheme.row(state / size if size > 0.0 else 0.0 * state), size
+        q, v, g = states[:, :n], states[:, n : 2 * n], states[:, 2 * n :]
+        for part in (q, v):
+            part -= np.outer(part @ self.carried / self.inertia, self.rigid)
+        twice = ((v @ system.M) * v + (q @ system.K) * q).sum(axis=1)
+        twice += ((q @ self.scheme.basic) * g).sum(axis=1)
+        size = np.sqrt(np.maximum(twice, 0.0))
+        state = states[-1]
+        return self.scheme.row(state / size[-1] if size[-1] > 0.0 else 0.0 * state), size
 
     def gain(self) -> float:
         """Find the largest growth between two instants of the run, as a factor; NaN without a free motion.
@@ -516,23 +519,32 @@ class Decimator:
 
     def _filtered(self) -> np.ndarray:
         """Records whose whole window is in the buffer."""
-        from scipy.signal import upfirdn
-
         reach = self.first + len(self.buffer) - 1 - self.half
         stop = min(reach // self.every + 1, self.rows)
         if stop <= self.done:
             return np.empty((0, self.buffer.shape[1]))
         begin, number = self.done * self.every - self.half - self.first, stop - self.done
         wanted = self.buffer[begin : begin + (number - 1) * self.every + 2 * self.half + 1]
-        # only every so many values of the convolution are computed: the padding makes the first one of them
-        pad = -2 * self.half % self.every
-        padded = np.vstack([np.zeros((pad, wanted.shape[1])), wanted])
-        start = (2 * self.half + pad) // self.every
-        found = upfirdn(self.weights, padded, down=self.every, axis=0)[start : start + number]
+        found = _weighted(wanted, self.weights, self.every)
         self.done = stop
         keep = max(stop * self.every - self.half - self.first, 0)
         self.buffer, self.first = self.buffer[keep:].copy(), self.first + keep
         return found
+
+
+def _weighted(rows, weights, every: int) -> np.ndarray:
+    """Sums (k, c) of rows (n, c) weighted (w,) from every so many of them on, as far as the rows go.
+
+    Rows in groups of ``every`` are weighted by products of matrices, whose parts then add up.
+    """
+    number, groups = (len(rows) - len(weights)) // every + 1, -(-len(weights) // every)
+    filled = np.zeros(((number - 1 + groups) * every, rows.shape[1]))
+    filled[: min(len(rows), len(filled))] = rows[: len(filled)]
+    by_group = np.pad(weights, (0, groups * every - len(weights))).reshape(groups, every)
+    parts = by_group @ filled.reshape(-1, every, rows.shape[1])
+    along, across, column = parts.strides
+    shape, strides = (number, groups, rows.shape[1]), (along, along + across, column)
+    return np.lib.stride_tricks.as_strided(parts, shape, strides).sum(axis=1)
 
 
 class _Record:
