@@ -284,7 +284,7 @@ def _compute(
                 path, data = run.folder / f"{one.name}.nc", _contents(found)
                 if part is case:
                     run.findings[one.name] = one.findings(data)
-                    data.attrs["findings"] = as_text(run.findings[one.name])
+                    data.attrs["findings"] = as_text(one.carried(run.findings))
                     write_dataset(data, path)
                     run.data[one.name] = data
                 else:
@@ -298,7 +298,9 @@ def _compute(
                 start = time.perf_counter()
         for one in members:
             if one.name in files:
-                run.findings[one.name] = _findings_of_file(one, files[one.name])
+                with read_dataset(files[one.name]) as data:
+                    run.findings[one.name] = one.findings(data)
+                write_attribute(files[one.name], "findings", as_text(one.carried(run.findings)))
     names = []
     for one in members:
         run.timings[one.name] = seconds[one.name]
@@ -313,14 +315,6 @@ def _compute(
 def _contents(result: Any) -> Contents | xr.Dataset:
     """Contents of the file of a stage, of results of trains without `StageResult` as a dataset."""
     return result.contents() if isinstance(result, StageResult) else result.dataset()
-
-
-def _findings_of_file(stage: Stage, path: Path) -> tuple[Finding, ...]:
-    """Findings of a stage whose parts are all in its file, which is given them."""
-    with read_dataset(path) as data:
-        findings = stage.findings(data)
-    write_attribute(path, "findings", as_text(findings))
-    return findings
 
 
 def _kept_name(stage: str) -> str:

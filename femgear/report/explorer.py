@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.report.style import GREY
+from femgear.report.style import GREY, NOTICEABLE
+from femgear.report.tables import level_change_at
 from femgear.report.waterfall import KIND_COLOURS
 
 if TYPE_CHECKING:
@@ -38,8 +39,9 @@ def explorer(runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None =
     Returns
     -------
     dict
-        What JSON can hold: speeds in rpm, frequencies in Hz, accelerations in m/s^2, pressures in Pa. Of the
-        lines those with the largest amplitudes, and the share of the power that they leave out at most.
+        What JSON can hold: speeds in rpm, frequencies in Hz, accelerations in m/s^2, pressures in Pa, and
+        ``short``, whether the excitation ends too early. Of the lines those with the largest amplitudes, and
+        the share of the power that they leave out at most.
     """
     lines = np.asarray(runup["lines_real"].values) + 1j * np.asarray(runup["lines_imag"].values)
     speeds = _chosen_speeds(runup)
@@ -59,6 +61,7 @@ def explorer(runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None =
         "carrier": (np.abs(runup["carrier_speed"].values[speeds]) / (2 * np.pi)).tolist(),
         "mesh": runup["mesh_frequency"].values[speeds].tolist(),
         "level": runup["level"].values[speeds].tolist(),
+        "short": (np.abs(level_change_at(runup, runup["speed"].values[speeds])) >= NOTICEABLE).tolist(),
         "teeth": int(runup.attrs["ring_teeth"]),
         "harmonics": _HARMONICS,
         "order": runup["order"].values[kept].tolist(),

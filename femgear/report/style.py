@@ -310,11 +310,20 @@ def runs(chosen) -> list[slice]:
     return [slice(first, last + 1) for first, last in zip(edges[::2], edges[1::2])]
 
 
+NOTICEABLE = 1.0
+"""Change of the level by a longer excitation that is worth a warning [dB]."""
+
+
 def excited_to(data, speed_index: int) -> str:
-    """Write the highest frequency of the excitation [kHz] at a speed, for a title; empty if not known."""
+    """Write the highest frequency of the excitation [kHz] at a speed, for a title; empty if not known.
+
+    And that it ends short, where ``level_change`` is known and `NOTICEABLE`.
+    """
     if "excitation_limit" not in data:
         return ""
-    return f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
+    words = f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
+    short = "level_change" in data and abs(data["level_change"].values[speed_index]) >= NOTICEABLE
+    return f"{words} alone (W-EXCITATION)" if short else words
 
 
 def digits(value: float) -> str:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.findings import CATALOGUE, NOTE, Finding, by_severity
+from femgear.findings import CATALOGUE, NOTE, Finding, by_severity, findings_in
 from femgear.report.response import harmonics_of, some_at_a_time
+from femgear.report.style import NOTICEABLE
 from femgear.system.fourier import fluctuation, sample
 
 if TYPE_CHECKING:
@@ -22,6 +23,8 @@ WARNINGS = "Warnings"
 """Title of the table of findings."""
 _MARKS = "†‡§¶‖◊"
 """Marks of doubtful numbers, in the order in which a table needs them."""
+RESPONSE_DOUBTS = "W-PULL", "W-CONVERGENCE", "W-UNSTABLE"
+"""Findings of a periodic response that concern the numbers of the speeds at which they are."""
 _MODES = 16
 """Rows of the table of modes."""
 _NUMBERED = re.compile(r"(.*?)((?<![\d.])\d{1,9}(?![\d.]))?(\D*)", re.DOTALL)
@@ -99,20 +102,29 @@ class Marks:
     Parameters
     ----------
     findings : iterable of Finding
-        Of the stages that the numbers come from.
+        Of the stages that the numbers come from, and of the case.
     """
 
     def __init__(self, findings: Iterable[Finding]) -> None:
-        self._known = {one.code: one for one in findings if one.severity != NOTE}
+        self._known = dict[str, list[Finding]]()
+        for finding in findings:
+            if finding.severity != NOTE:
+                self._known.setdefault(finding.code, []).append(finding)
         self._used = dict[str, str]()
 
-    def raised(self, *codes: str) -> bool:
-        """Tell whether one of some findings was raised."""
-        return not self._known.keys().isdisjoint(codes)
+    def raised(self, *codes: str, of: tuple[str, ...] = ()) -> bool:
+        """Tell whether one of some findings was raised, by the case, or by the stages ``of`` if given."""
+        known = (finding for code in codes for finding in self._known.get(code, ()))
+        return any(not of or finding.stage in ("", *of) for finding in known)
 
-    def __call__(self, text: str, *codes: str) -> str:
-        """Mark the text of a number that findings of these codes concern; a dash needs no mark."""
-        raised = [code for code in codes if code in self._known] if text.strip("-") else []
+    def __call__(self, text: str, *codes: str, of: tuple[str, ...] = ()) -> str:
+        """Mark the text of a number that findings of these codes concern; a dash needs no mark.
+
+        ``of`` are the stages whose findings concern it, beside those of the case, where not all do.
+        """
+        if not text.strip("-"):
+            return text
+        raised = [code for code in dict.fromkeys(codes) if self.raised(code, of=of)]
         for code in raised:
             repeats, number = divmod(len(self._used), len(_MARKS))
             self._used.setdefault(code, _MARKS[number] * (repeats + 1))
@@ -122,7 +134,7 @@ class Marks:
     def notes(self) -> tuple[str, ...]:
         """What the marks that were used mean."""
         return tuple(
-            f"{mark} {code}, {self._known[code].severity}: {CATALOGUE[code][1]}"
+            f"{mark} {code}, {self._known[code][0].severity}: {CATALOGUE[code][1]}"
             for code, mark in self._used.items()
         )
 
@@ -138,6 +150,33 @@ def lower_bound(value: float) -> str:
     digit = np.floor(value / unit * (1.0 + 1e-12)) * unit
     # %g has exponents from ten on where one digit is asked for
     return f"> {digit:.1g}" if digit < 10.0 else f"> {digit:.0f}"
+
+
+def level_change_at(data: xr.Dataset, speed) -> np.ndarray:
+    """Find what a longer excitation changes the level of runup.nc at speeds [rpm] [dB], NaN unknown.
+
+    Between the speeds that were looked at on a straight line.
+    """
+    change = data["level_change"].values if "level_change" in data else np.full(data.sizes["speed"], np.nan)
+    known = np.isfinite(change)
+    if not known.any():
+        return np.full(np.shape(speed), np.nan)
+    return np.interp(speed, data["speed"].values[known], change[known])
+
+
+def shown_level(value: float, change: float, marks: Marks, *codes: str, of: tuple[str, ...] = ()) -> str:
+    """Write a level, a bound where a longer excitation raises it by much, marked where it is doubtful.
+
+    ``codes`` are those of further findings that concern it, ``of`` the stages whose findings do.
+    """
+    if change >= NOTICEABLE:
+        return marks(lower_bound(value), *(code for code in codes if code != "W-EXCITATION"), of=of)
+    return marks(f"{value:.4g}", *doubtful_excitation(change), *codes, of=of)
+
+
+def doubtful_excitation(change: float) -> tuple[str, ...]:
+    """Codes of the findings that concern numbers at a speed whose level a longer excitation changes [dB]."""
+    return () if abs(change) < NOTICEABLE else ("W-EXCITATION",)
 
 
 def in_decibels(change: float) -> str:
@@ -186,13 +225,19 @@ def describe_response(data: xr.Dataset) -> Block:
     The file has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m] and, for every speed, what
     `femgear.storage.results.response_entries` lists; of many speeds the first and the last are shown.
     """
-    largest = np.abs(data.floquet_multiplier.values)
+    largest, marks = np.abs(data.floquet_multiplier.values), Marks(findings_in(data.attrs))
+
+    def dte(i: int) -> str:
+        one = data.isel(speed=i)
+        doubts = response_doubts(one) if marks.raised(*RESPONSE_DOUBTS) else ()
+        return marks(f"{fluctuation(harmonics_of(one, 'dte')).max() * 1e6:.4f}", *doubts, "W-DAMPING")
+
     stable = data.stable.values.astype(bool)
     columns = {
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.2f}",
         "mesh [Hz]": lambda i: f"{float(data.mesh_frequency[i]):.2f}",
         "excited up to [kHz]": lambda i: f"{data.excitation_limit.values[i] / 1e3:.2f}",
-        "DTE rms [um]": lambda i: f"{fluctuation(harmonics_of(data.isel(speed=i), 'dte')).max() * 1e6:.4f}",
+        "DTE rms [um]": dte,
         "method": lambda i: str(data.method.values[i]),
         "iterations": lambda i: str(int(data.iterations[i])),
         "radius": lambda i: f"{float(data.spectral_radius[i]):.4f}",
@@ -215,7 +260,14 @@ def describe_response(data: xr.Dataset) -> Block:
             f"level of the housing with excitation up to {data.attrs['compared_to'] / 1e3:.4g} kHz: "
             f"{np.nanmax(change):.2g} dB away at most, at {int(np.isfinite(change).sum())} speeds looked at"
         )
-    return tabulate("Dynamics", chosen(data.sizes["speed"]), columns, notes)
+    return tabulate("Dynamics", chosen(data.sizes["speed"]), columns, notes, marks)
+
+
+def response_doubts(data: xr.Dataset) -> tuple[str, ...]:
+    """Codes of the findings that concern the response at one speed, of dynamics.nc."""
+    pulling = pulls_of(harmonics_of(data, "mesh_force")[None])[1].any()
+    doubts = zip(RESPONSE_DOUBTS, (pulling, not data["converged"], not data["stable"]))
+    return tuple(code for code, doubtful in doubts if doubtful)
 
 
 def chosen(count: int) -> Iterator[int]:

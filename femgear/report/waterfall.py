@@ -14,6 +14,7 @@ from femgear.report.style import (
     BLUE,
     GREEN,
     GREY,
+    NOTICEABLE,
     ORANGE,
     PURPLE,
     SIZE,
@@ -24,6 +25,7 @@ from femgear.report.style import (
     name_curves,
     new_figure,
 )
+from femgear.report.tables import level_change_at
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -199,11 +201,17 @@ def runup_levels(runup: xr.Dataset) -> Figure:
     """Draw level, fluctuation of the mesh forces and dynamic factors of runup.nc over the speed."""
     figure, axes = new_figure(rows=3, height=7.4, sharex=True)
     speed, level = runup["speed"].values, runup["level"].values
-    axes[0].plot(speed, level, color=BLACK, linewidth=1.6)
+    short = np.abs(level_change_at(runup, speed)) >= NOTICEABLE
+    _curve(axes[0], speed, level, short, color=BLACK)
     axes[0].set_ylim(0.0, 1.45 * level.max(initial=0.0) or 1.0)
     words = "a × b: mode a at mesh harmonic b; dots: operating speeds"
     if runup.attrs.get("method", "exact") != "exact":
         words += f"\nexcited up to {1e-3 * runup['excitation_limit'].values.max():.4g} kHz"
+    if short.any():
+        ends = 1e-3 * runup["excitation_limit"].values[short]
+        words += (
+            f"\ndotted: the excitation ends short, at {ends.min():.3g} to {ends.max():.3g} kHz (W-EXCITATION)"
+        )
     label(axes[0], y="level, r.m.s. [m/s²]", title=words)
     _name_resonances(axes[0], runup)
     operating = np.atleast_1d(runup.attrs["operating_speeds"])
@@ -213,7 +221,7 @@ def runup_levels(runup: xr.Dataset) -> Figure:
     for ax, name in zip(axes[1:], ("force_rms", "dynamic_factor")):
         curves = runup[name].values.T
         for curve, text, colour in zip(curves, names, _MESHES):
-            ax.plot(speed, curve, color=colour, linewidth=1.6, label=text)
+            _curve(ax, speed, curve, short, color=colour, label=text)
             ax.plot(operating, np.interp(operating, speed, curve), "o", color=ORANGE, markersize=7, zorder=3)
     axes[1].set_ylim(bottom=0.0)
     axes[2].set_ylim(bottom=1.0)
@@ -223,6 +231,17 @@ def runup_levels(runup: xr.Dataset) -> Figure:
     label(axes[1], y="mesh force, r.m.s.\nabout its mean [N]")
     label(axes[2], "speed of the input [rpm]", "dynamic factor K_v [1]")
     return figure
+
+
+def _curve(
+    ax, speed: np.ndarray, values: np.ndarray, short: np.ndarray, *, label: str = "_", **style
+) -> None:
+    """Draw a curve over the speed, dotted where the excitation ends short (bool, of every speed)."""
+    starts = [0, *(np.flatnonzero(np.diff(short)) + 1)]
+    for first, end in zip(starts, [*starts[1:], len(speed)]):
+        part, look = slice(first, end + 1), ":" if short[first] else "-"
+        name = label if end == len(speed) else "_"
+        ax.plot(speed[part], values[part], linestyle=look, linewidth=1.6, label=name, **style)
 
 
 def _name_resonances(ax, runup: xr.Dataset) -> None:

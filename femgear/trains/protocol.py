@@ -194,6 +194,9 @@ class Stage:
         `StageResult.warnings` of its results.
     decided_by : callable
         ``(case) -> entries``: all of the case that decides the result; of equal ones it is the same.
+    concerned_by : mapping of str to tuple of str
+        Codes of findings of stages before, under "" those of the case, that concern numbers of this one too:
+        its file carries them beside its own.
     """
 
     name: str
@@ -212,6 +215,7 @@ class Stage:
     tables: Callable[[Results], Iterable[Block]] = lambda results: ()
     warnings: Callable[[xr.Dataset], Iterable[Finding]] = lambda data: ()
     decided_by: Callable[[Any], Entries] = every_entry
+    concerned_by: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
     def before(self, case: Any) -> tuple[str, ...]:
         """List the stages that must come before this one."""
@@ -226,6 +230,19 @@ class Stage:
     def findings(self, data: Any) -> tuple[Finding, ...]:
         """List what the contents of the stage's file say against themselves, each once."""
         return once(self.warnings(data), self.name)
+
+    def carried(self, findings: Mapping[str, Iterable[Finding]]) -> tuple[Finding, ...]:
+        """List what the file of the stage carries: its own findings, and those that concern its numbers too.
+
+        ``findings`` are those of all stages so far by name, under "" those of the case.
+        """
+        before = (
+            finding
+            for name, codes in self.concerned_by.items()
+            for finding in findings.get(name, ())
+            if finding.code in codes
+        )
+        return once((*findings[self.name], *before))
 
 
 @dataclass(frozen=True)

@@ -32,6 +32,8 @@ page.explorer = (root) => {
   slider.max = data.speed.length - 1;
   Object.keys(lines).forEach((name) => source.add(new Option({ acceleration: "accelerometer", pressure: "microphone" }[name], name)));
   if (lines.pressure) source.value = "pressure";
+  // runs of former versions do not tell
+  const short = (i) => Boolean(data.short && data.short[i]);
   let index = data.level.indexOf(Math.max(...data.level));
   slider.value = index;
 
@@ -82,8 +84,12 @@ page.explorer = (root) => {
   const levels = () => {
     const values = data.speed.map((_, i) => shownOf(at(i, source.value)));
     const end = finite(values), deep = chosen().reference ? (end - Math.min(...values)) / 20 : Math.log10(end / Math.min(...values));
-    Plotly.react(part("level"), [{ x: data.speed, y: values, mode: "lines", line: { color: page.colour("#0072b2"), width: 1.8 }, hovertemplate: "%{x:.5g} rpm: %{y:.4g}<extra></extra>" }],
-      { ...look("Level over the speed"), xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(end, deep + 0.2, true).axis }, quiet);
+    // dotted where the excitation ends short, which joins what is on either side
+    const curve = (dotted) => ({ x: data.speed, y: values.map((value, i) => (short(i) === dotted || (dotted && (short(i - 1) || short(i + 1))) ? value : null)), mode: "lines",
+      line: { color: page.colour("#0072b2"), width: 1.8, dash: dotted ? "dot" : "solid" }, hovertemplate: `%{x:.5g} rpm: %{y:.4g}${dotted ? "<br>the excitation ends short" : ""}<extra></extra>` });
+    const doubtful = data.speed.some((_, i) => short(i));
+    Plotly.react(part("level"), doubtful ? [curve(false), curve(true)] : [curve(false)],
+      { ...look(`Level over the speed${doubtful ? "; dotted: the excitation ends short (W-EXCITATION)" : ""}`), xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(end, deep + 0.2, true).axis }, quiet);
   };
   const spectrum = () => {
     const found = at(index, source.value), x = [], y = [], values = found.map((one) => shownOf([one])), { low, axis: upright } = scaled(finite(values), 4, false);
@@ -224,7 +230,7 @@ page.explorer = (root) => {
   const walk = () => {
     index = Number(slider.value);
     const mesh = data.mesh[index];
-    shown.value = `${data.speed[index].toPrecision(6)} rpm, mesh ${mesh.toPrecision(5)} Hz, ${told(shownOf(at(index, source.value)))} ${detector(false)}`;
+    shown.value = `${data.speed[index].toPrecision(6)} rpm, mesh ${mesh.toPrecision(5)} Hz, ${told(shownOf(at(index, source.value)))} ${detector(false)}${short(index) ? ": the excitation ends short (W-EXCITATION)" : ""}`;
     slider.setAttribute("aria-valuetext", shown.value);
     const cursor = [{ type: "line", x0: data.speed[index], x1: data.speed[index], yref: "paper", y0: 0, y1: 1, line: { color: page.colour("#d55e00"), width: 1.5 } }];
     const campbellDiv = part("campbell");

@@ -25,6 +25,7 @@ from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.housing.casing_files import named_outputs, read_casing
 from femgear.housing.structure import FixedStructure, Support
+from femgear.report.style import NOTICEABLE
 from femgear.report.tables import first_speeds, response_warnings
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.trains.elastic.model import MAX_DIAMETER
@@ -43,8 +44,6 @@ _DIAMETERS = 14
 """Nodal diameters of a ring on supports."""
 _CHECKED = 12
 """Speeds at which the level is computed again, at most."""
-NOTICEABLE = 1.0
-"""Change of the level that is worth a warning [dB]."""
 _FAR = 3.0
 """Change of the level by supports or casing that is worth a warning [dB]."""
 MOST_WINDING = 1.0
@@ -387,7 +386,7 @@ def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("W-RESIDUAL", "housing.structure.file", missing, remedy=remedy)
 
 
-def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[Finding, ...]:
+def missing_level(rpm, level_change, limit, compared_to: float, *, of: str = "") -> tuple[Finding, ...]:
     """Warn where the level of the housing would change by `NOTICEABLE` or more.
 
     Parameters
@@ -397,19 +396,21 @@ def missing_level(rpm, level_change, limit, compared_to: float) -> tuple[Finding
         excitation frequencies [Hz].
     compared_to : float
         Frequency to which the excitation reached in the comparison [Hz].
+    of : str
+        What the speeds are of, such as ``"run-up: "``.
     """
     known = np.where(np.isfinite(level_change), np.abs(level_change), 0.0)
     if not np.isfinite(level_change).any():
         text = (
-            f"the excitation ends at {limit.min():.4g} Hz at the slowest speed; what it loses is unknown: "
-            f"equations with excitation up to {compared_to:.4g} Hz are nearly singular"
+            f"{of}the excitation ends at {limit.min():.4g} Hz at the slowest speed; what it loses is "
+            f"unknown: equations with excitation up to {compared_to:.4g} Hz are nearly singular"
         )
         return (Finding("W-EXCITATION", "dynamics.damping_ratio", text, remedy="give the set some damping"),)
     if known.max(initial=0.0) < NOTICEABLE:
         return ()
     worst = int(known.argmax())
     text = (
-        f"at {rpm[worst]:.6g} rpm the excitation ends at {limit[worst]:.4g} Hz; up to "
+        f"{of}at {rpm[worst]:.6g} rpm the excitation ends at {limit[worst]:.4g} Hz; up to "
         f"{compared_to:.4g} Hz the level of the housing changes by {level_change[worst]:+.1f} dB. It does by "
         f"{NOTICEABLE:g} dB or more at {int((known >= NOTICEABLE).sum())} of the "
         f"{int(np.isfinite(level_change).sum())} speeds looked at: raise dynamics.up_to or "

@@ -18,8 +18,9 @@ import numpy as np
 from femgear.errors import ConvergenceError
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines
+from femgear.report.style import NOTICEABLE
 from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.trains.elastic.checks import HIGHEST_RESPONSE, NOTICEABLE
+from femgear.trains.elastic.checks import HIGHEST_RESPONSE
 from femgear.trains.elastic.outputs import sensor_lines
 
 if TYPE_CHECKING:

@@ -524,6 +524,8 @@ def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
     angles, supports = planetary_set(drawn.case).planet_angles, housing_supports(drawn.case)
     for s in shown_speeds(housing):
         one, speed = housing.isel(speed=[s]), f"{round(float(housing['speed'][s]))}_rpm"
+        if dynamics is not None and "level_change" in dynamics:
+            one = one.assign(level_change=("speed", dynamics["level_change"].values[[s]]))
         model = None if dynamics is None else hanning_spectrum(dynamics, housing, angles, s)
         figures |= {
             f"housing_signal_{speed}": housing_signal(one),

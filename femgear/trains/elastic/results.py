@@ -6,9 +6,10 @@ belong to real motions by ``x(t) = Re sum_h X_h exp(i h omega t)``.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -47,7 +48,17 @@ from femgear.housing.sound import (
     whole_turns,
 )
 from femgear.report.response import harmonics_of
-from femgear.report.tables import MANY, Block, Marks, chosen, in_decibels, lower_bound, tabulate
+from femgear.report.tables import (
+    MANY,
+    Block,
+    Marks,
+    chosen,
+    doubtful_excitation,
+    in_decibels,
+    response_doubts,
+    shown_level,
+    tabulate,
+)
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.solvers.stability.parametric import stability
 from femgear.storage.contents import Contents
@@ -59,11 +70,21 @@ from femgear.storage.results import (
     response_entries,
 )
 from femgear.system.fourier import sample
-from femgear.trains.elastic.checks import NOTICEABLE, checked_speeds, dynamics_warnings, housing_warnings
+from femgear.trains.elastic.checks import checked_speeds, dynamics_warnings, housing_warnings
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
-from femgear.trains.elastic.runup import KINDS, loudest, meeting_columns
+from femgear.trains.elastic.runup import KINDS, LEVEL_CHANGE, largest_factors, loudest, meeting_columns
 from femgear.trains.protocol import StageResult, one_blas_thread
-from femgear.trains.static.results import HELD, LARGE, UNEQUAL, largest_pressure, peak_to_peak, shares
+from femgear.trains.static.results import (
+    HELD,
+    LARGE,
+    SIDES,
+    UNEQUAL,
+    largest_pressure,
+    peak_to_peak,
+    pressure_doubts,
+    root_doubts,
+    shares,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -88,6 +109,8 @@ _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimat
 _PARTS = ("sun", "planet, sun side", "planet, ring side", "ring")
 """Flanks in the order of their meshes."""
 _FORMS = ("sun", "planet_sun_side", "planet_ring_side", "ring")
+_OF_LEVEL = "dynamics", "housing"
+"""Stages whose findings concern what is heard at operating speeds."""
 _HEARD = {"microphone [dB(A)]": "pressure_level", "sound power [dB(A)]": "power_level"}
 BEARING_FACTORS = 0.5, 2.0
 """Multiples of the bearing stiffness of planets between which load sharing is shown."""
@@ -303,10 +326,9 @@ class DynamicsResult(StageResult):
             ("ring", field, self.ring_radial[-1], "m", words.replace("tangential", "radial")),
             ("ring_tangential", field, self.ring_tangential[-1], "m", words),
         )
-        change = "change of the housing level with excitation up to the frequency compared_to"
         reach = {
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
-            "level_change": ("speed", self.level_change, "dB", change),
+            "level_change": ("speed", self.level_change, "dB", LEVEL_CHANGE),
         }
         harmonic, periods = np.arange(response.force.shape[-1]), response.periods
         return Contents(
@@ -428,41 +450,50 @@ def verdict(results: Results) -> Iterator[Block]:
     if "static" in stages:
         static = results.static
         error = _by_kind(static["mesh"].values, peak_to_peak(static, "ste") * 1e6)
-        text = marks(_kinds("{:.3f} um", error), *LARGE, "W-POSITIONS")
+        text = _kinds("{:.3f} um", error, lambda text: marks(text, *LARGE, "W-POSITIONS", of=("static",)))
         rows.append((f"transmission error, peak to peak{_where(static, '')}", text))
-    factors, known = np.ones((1, 2)), dict[str, np.ndarray]()
+    factors, known, doubts = np.ones((1, 2)), dict[str, np.ndarray](), dict[int, tuple[str, ...]]()
     if "dynamics" in stages:
         factors, sharing = _load_factors(results.dynamics)
+        doubts = level_doubts(results)
         rows.append(("planet load factor K_gamma", _kinds("{:.3f}", sharing)))
         rows += _unequal(results, sharing, notes)
-        rows.append(
-            (
-                "largest dynamic factor K_v",
-                marks(_kinds("{:.3f}", factors.max(axis=0)), *_pulls(results, "dynamics")),
-            )
-        )
+        codes = _all_of(doubts)
+        text = _kinds("{:.3f}", factors.max(axis=0), lambda text: marks(text, *codes, of=_OF_LEVEL))
+        rows.append(("largest dynamic factor K_v, at operating speeds", text))
         known = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
     if "stress" in stages:
         static = results.static
         if "face_load_factor" in static:
             known["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
-            text = marks(_kinds("{:.3f}", known["K_Hβ"]), "W-FACE-LOAD", "W-THRUST")
+            text = _kinds("{:.3f}", known["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
             rows.append(("face load factor K_Hβ", text))
-        rows += _strength(results, known, notes)
+        rows += _strength(results, known, notes, marks, _all_of(doubts))
     if "runup" in stages:
-        text = marks(loudest(results.runup), "W-STEPS", *_pulls(results, "runup"))
-        rows.append(("largest level of the run-up", text))
+        rows.append(("largest dynamic factor K_v of the run-up", largest_factors(results.runup, marks)))
+        rows.append(("largest level of the run-up", loudest(results.runup, marks)))
     if rows:
         yield Block("Verdict", rows=tuple(rows), notes=(*notes, *marks.notes))
     if "dynamics" in stages:
-        yield _operating_points(results, factors)
+        yield _operating_points(results, factors, doubts)
     if "runup" in stages:
-        yield _near_resonances(results.runup)
+        yield _near_resonances(results.runup, Marks(results.findings))
 
 
-def _pulls(results: Results, stage: str) -> list[str]:
-    """Code of meshes that pull, where they do so in the results of a stage."""
-    return [one.code for one in results.findings if (one.code, one.stage) == ("W-PULL", stage)]
+def level_doubts(results: Results) -> dict[int, tuple[str, ...]]:
+    """Codes of findings that concern dynamic factors and levels, by number of the speeds that tables show."""
+    if "dynamics" not in results.stages:
+        return {}
+    dynamics, changes = results.dynamics, level_changes(results)
+    return {
+        i: (*doubtful_excitation(changes[i]), *response_doubts(dynamics.isel(speed=i)), "W-DAMPING")
+        for i in chosen(dynamics.sizes["speed"])
+    }
+
+
+def _all_of(doubts: Mapping[int, tuple[str, ...]]) -> tuple[str, ...]:
+    """Codes of any of some speeds, each once."""
+    return tuple(dict.fromkeys(code for codes in doubts.values() for code in codes))
 
 
 def _unequal(results: Results, sharing: np.ndarray, notes: list[str]) -> Iterator[tuple[str, str]]:
@@ -507,9 +538,9 @@ def _by_kind(names, values: np.ndarray) -> np.ndarray:
     return np.array([values[~ring].max(), values[ring].max()])
 
 
-def _kinds(form: str, values) -> str:
-    """Write a value of either kind of mesh."""
-    return ", ".join(f"{kind} {form.format(value)}" for kind, value in zip(KINDS, values))
+def _kinds(form: str, values, marked: Callable[[str], str] = str) -> str:
+    """Write a value of either kind of mesh, each ``marked`` where it is doubtful."""
+    return ", ".join(f"{kind} {marked(form.format(value))}" for kind, value in zip(KINDS, values))
 
 
 def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
@@ -527,8 +558,13 @@ def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return np.array(factors), sharing
 
 
-def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> Iterator[tuple[str, str]]:
-    """Rows of the largest stresses, and of the safeties of ISO 6336 with known load factors (2,)."""
+def _strength(
+    results: Results, known: Mapping[str, Any], notes: list[str], marks: Marks, doubts: tuple[str, ...]
+) -> Iterator[tuple[str, str]]:
+    """Rows of the largest stresses, and of the safeties of ISO 6336 with known load factors (2,).
+
+    ``doubts`` are codes of the findings that concern the dynamic factors.
+    """
     stress = results.stress
 
     def largest(name: str) -> np.ndarray:
@@ -538,9 +574,16 @@ def _strength(results: Results, known: Mapping[str, Any], notes: list[str]) -> I
     contact, worst = largest_pressure(stress).reshape(2, -1).max(axis=1), int(root.argmax())
     nominals, factors = largest("iso_contact_stress"), np.prod([np.ones(2), *known.values()], axis=0)
     where = _where(results.static, ", static")
-    yield f"largest root stress{where}", f"{root[worst] * 1e-6:.1f} MPa, {_PARTS[worst]}"
-    yield f"largest contact pressure{where}", _kinds("{:.1f} MPa", contact * 1e-6)
-    yield from _safeties(results.case, nominal, nominals, factors, " ".join(known), notes)
+    titles, number = SIDES[KINDS[worst // 2]], worst % 2
+    kinked = root_doubts(results.findings, titles[number], titles[1 - number])
+    yield f"largest root stress{where}", marks(f"{root[worst] * 1e-6:.1f} MPa, {_PARTS[worst]}", *kinked)
+    pressures = [
+        marks(f"{kind} {one * 1e-6:.1f} MPa", *pressure_doubts(results.findings, kind, one))
+        for kind, one in zip(KINDS, contact)
+    ]
+    yield f"largest contact pressure{where}", ", ".join(pressures)
+    for name, text in _safeties(results.case, nominal, nominals, factors, " ".join(known), notes):
+        yield name, marks(text, *doubts, "W-FACE-LOAD", "W-THRUST", of=("static", *_OF_LEVEL))
 
 
 def _safeties(
@@ -607,18 +650,30 @@ def _limits(limits: list[float | None]) -> str:
     )
 
 
-def _operating_points(results: Results, factors: np.ndarray) -> Block:
-    """Tabulate dynamic factors and level at the operating speeds, with what they assume."""
+def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int, tuple[str, ...]]) -> Block:
+    """Tabulate dynamic factors (n, 2) and level at the operating speeds, with what they assume.
+
+    ``doubts`` are codes of the findings that concern them, by number of the speed.
+    """
     dynamics, housing, case = results.dynamics, "housing" in results.stages, results.case
     speeds, shown = dynamics["speed"].values, list(chosen(dynamics.sizes["speed"]))
     marks = Marks(results.findings)
 
+    changes = level_changes(results)
+
+    def marked(text: str, i: int) -> str:
+        return marks(text, *doubts[i], of=_OF_LEVEL)
+
     def level(i: int) -> str:
-        return _level(float(results.housing["level"][i]), level_changes(results)[i], marks)
+        value, codes = float(results.housing["level"][i]), [*doubts[i], "W-POINTS"]
+        return shown_level(value, changes[i], marks, *codes, of=_OF_LEVEL)
 
     columns = {
         "speed [rpm]": lambda i: f"{speeds[i]:.6g}",
-        **{f"K_v {kind}": lambda i, k=k: f"{factors[shown.index(i), k]:.3f}" for k, kind in enumerate(KINDS)},
+        **{
+            f"K_v {kind}": lambda i, k=k: marked(f"{factors[shown.index(i), k]:.3f}", i)
+            for k, kind in enumerate(KINDS)
+        },
         "level [m/s²]": lambda i: level(i) if housing else "-",
     }
     ring, limit, notes = case.ring, dynamics, list[str]()
@@ -630,7 +685,7 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
         limit = results.housing
         for text, name in _HEARD.items():
             if name in limit:
-                columns[text] = lambda i, name=name: f"{float(limit[name][i]):.1f}"
+                columns[text] = lambda i, name=name: marked(f"{float(limit[name][i]):.1f}", i)
         if limit.attrs.get("method") == "casing" and "pressure_level" in limit:
             notes.append(f"microphone: {_ESTIMATE}")
     ends = sorted({f"{1e-3 * float(one):.4g}" for one in limit["excitation_limit"][[0, -1]]}, key=float)
@@ -647,22 +702,10 @@ def _operating_points(results: Results, factors: np.ndarray) -> Block:
 
 def level_changes(results: Results) -> np.ndarray:
     """Find how far a longer excitation changes the level of the housing at every speed [dB], NaN unknown."""
-    changes = [np.full(results.housing.sizes["speed"], np.nan)]
-    if "dynamics" in results.stages and "level_change" in results.dynamics:
-        changes.append(results.dynamics["level_change"].values)
-    if "harmonics_change" in results.housing:
-        changes.append(results.housing["harmonics_change"].values)
-    largest = np.array(changes)
-    worst = np.where(np.isfinite(largest), np.abs(largest), -1.0).argmax(axis=0)
-    return np.take_along_axis(largest, worst[None], axis=0)[0]
-
-
-def _level(value: float, change: float, marks: Marks) -> str:
-    """Write a level, a bound where a longer excitation raises it by much, marked where it is doubtful."""
-    if change >= NOTICEABLE:
-        return lower_bound(value)
-    text = f"{value:.4g}"
-    return text if abs(change) < NOTICEABLE else marks(text, "W-EXCITATION")
+    if "dynamics" not in results.stages:
+        return np.full(results.housing.sizes["speed"], np.nan)
+    known = results.dynamics.get("level_change")
+    return np.full(results.dynamics.sizes["speed"], np.nan) if known is None else known.values
 
 
 def _passing(housing: xr.Dataset) -> float:
@@ -673,7 +716,7 @@ def _passing(housing: xr.Dataset) -> float:
     return float(np.ptp(np.real(lines.displacement[:, low] @ turned), axis=-1).max())
 
 
-def _near_resonances(runup: xr.Dataset) -> Block:
+def _near_resonances(runup: xr.Dataset, marks: Marks) -> Block:
     """Tabulate the resonances nearest to the operating speeds, of those that count there."""
     value = {str(name): one.values for name, one in runup.items() if one.dims[:1] == ("resonance",)}
     level = np.interp(value["operating_speed"], runup["speed"].values, runup["level"].values)
@@ -686,39 +729,59 @@ def _near_resonances(runup: xr.Dataset) -> Block:
         "operating [rpm]": lambda i: f"{value['operating_speed'][i]:.6g}",
         "resonance": lambda i: f"{np.round(value['distance'][i], 1) + 0.0:+.1f} %",
         **meeting_columns(value),
-        "alone [m/s²]": lambda i: f"{value['operating_alone'][i]:.3g}",
+        "alone [m/s²]": lambda i: marks(f"{value['operating_alone'][i]:.3g}", "W-DAMPING"),
     }
     note = (
         f"mesh harmonics within {_NEAR:g} % of a mode that they excite, the nearest {_FEW} of those that "
         f"give {100 * _COUNTS:g} % of the level or more; alone: level there by that mode at that harmonic"
     )
     rows = found[: 2 * MANY]
-    return tabulate("Resonances near the operating speeds", rows, columns, (note if rows else "none",))
-
-
-def _one_way(one: xr.Dataset) -> str:
-    """Write the level of one speed by the forces of one way, and how far that of both ways is from it."""
-    return f"{float(one.one_way_level):.4g} ({in_decibels(float(one.one_way_difference))})"
+    notes = (note if rows else "none",)
+    return tabulate("Resonances near the operating speeds", rows, columns, notes, marks)
 
 
 def describe_housing(
-    data: xr.Dataset, changes: np.ndarray | None = None, findings: Iterable[Finding] = ()
+    data: xr.Dataset,
+    changes: np.ndarray | None = None,
+    findings: Iterable[Finding] = (),
+    doubts: Mapping[int, tuple[str, ...]] = MappingProxyType({}),
 ) -> Block:
     """Tabulate level and largest lines [m/s^2] at every speed [rpm] of housing.nc.
 
-    ``changes`` (n_speeds,) [dB] are those of `level_changes`; the findings mark levels that are doubtful.
+    ``changes`` (n_speeds,) [dB] are those of `level_changes`; the findings mark levels that are doubtful,
+    those of a periodic response at the speeds whose numbers have their codes in ``doubts``.
     """
-    marks = Marks(findings)
-    changes = np.full(data.sizes["speed"], np.nan) if changes is None else changes
-    data = data.assign(_change=("speed", changes))
+    marks, count = Marks(findings), data.sizes["speed"]
+    changes = np.full(count, np.nan) if changes is None else changes
+
+    def codes(i: int) -> tuple[str, ...]:
+        unstable = "turn_multiplier" in data and float(data["turn_multiplier"][i]) > 1.0 + CIRCLE
+        return (*doubts.get(i, ()), *(["W-UNSTABLE"] if unstable else []), "W-DAMPING", "W-POINTS")
+
+    def level(value: Any, i: int) -> str:
+        return shown_level(float(value[i]), changes[i], marks, *codes(i), of=_OF_LEVEL)
+
+    def marked(text: str, i: int) -> str:
+        return marks(text, *doubtful_excitation(changes[i]), *codes(i), of=_OF_LEVEL)
+
+    def one_way(i: int) -> str:
+        """Write the level by the forces of one way, and how far that of both ways is from it."""
+        return f"{level(data.one_way_level, i)} ({in_decibels(float(data.one_way_difference[i]))})"
+
     audible, both = "pressure_level" in data, "one_way_difference" in data
     columns = {
-        "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
-        "excited up to [kHz]": lambda one: f"{float(one.excitation_limit) / 1e3:.2f}",
-        "rms [m/s^2]": lambda one: _level(float(one.level), float(one["_change"]), marks),
-        **({"one way [m/s^2]": _one_way} if both else {}),
-        **({"microphone [dB(A)]": lambda one: f"{float(one.pressure_level):.1f}"} if audible else {}),
-        "largest lines: carrier order (amplitude [m/s^2])": _largest_lines,
+        "speed [rpm]": lambda i: f"{float(data.speed[i]):.2f}",
+        "excited up to [kHz]": lambda i: f"{float(data.excitation_limit[i]) / 1e3:.2f}",
+        "rms [m/s^2]": lambda i: level(data.level, i),
+        **({"one way [m/s^2]": one_way} if both else {}),
+        **(
+            {"microphone [dB(A)]": lambda i: marked(f"{float(data.pressure_level[i]):.1f}", i)}
+            if audible
+            else {}
+        ),
+        "largest lines: carrier order (amplitude [m/s^2])": lambda i: marked(
+            _largest_lines(data.isel(speed=i)), i
+        ),
     }
     form = data.attrs["form"]
     note = f"form of the signal: {form}" + (f", {data.attrs['points']} points" if form == "linear" else "")
@@ -737,8 +800,7 @@ def describe_housing(
         judged = judged[np.isfinite(judged)]
         heard += f"; {int((judged <= 1.0 + CIRCLE).sum())} of {len(judged)} speeds looked at are stable: "
         heard += "largest Floquet multiplier over a turn of the carrier at most 1"
-    speeds = (data.isel(speed=i) for i in chosen(data.sizes["speed"]))
-    return tabulate("Housing", speeds, columns, (note, heard), marks)
+    return tabulate("Housing", chosen(count), columns, (note, heard), marks)
 
 
 def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:

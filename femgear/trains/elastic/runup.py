@@ -20,11 +20,19 @@ from femgear.case.quantities import RPM
 from femgear.findings import Finding, findings_in
 from femgear.housing.orders import order_level
 from femgear.housing.sound import REFERENCE_ACCELERATION
-from femgear.report.tables import Block, Marks, tabulate
+from femgear.report.tables import (
+    Block,
+    Marks,
+    doubtful_excitation,
+    level_change_at,
+    shown_level,
+    tabulate,
+)
 from femgear.solvers.linear.resonances import EXCITED
 from femgear.storage.contents import Contents
 from femgear.storage.results import as_written, complex_entries, coordinates, declared
 from femgear.system.fourier import fluctuation, sample
+from femgear.trains.elastic.checks import missing_level
 from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
@@ -37,6 +45,9 @@ if TYPE_CHECKING:
 KINDS = ("sun-planet", "planet-ring")
 _SILENT = 1e-6
 """Lines below this share of the largest one of all speeds are left out."""
+LEVEL_CHANGE = "change of the housing level with excitation up to the frequency compared_to"
+_RUN_UP_DOUBTS = "W-PULL", "W-DAMPING"
+"""Findings that concern every number of a run-up."""
 _SHOWN = 12
 """Rows of the table of resonances."""
 
@@ -169,13 +180,16 @@ class RunupResult(StageResult):
     """Levels, mesh forces and lines over ``input_speed`` (s,) [rad/s], and the resonances between its ends.
 
     Mesh frequency and end of the excitation (s,) [Hz], speed of the carrier (s,) and operating
-    speeds (n,) [rad/s]. ``resonances`` are the variables of runup.nc, (c,) each; ``method`` as in
-    `SensorLines`.
+    speeds (n,) [rad/s]. ``level_change`` (s,) [dB] is what the level changes when the excitation ends at
+    ``compared_to`` [Hz] instead, nan at speeds that were not looked at. ``resonances`` are the variables of
+    runup.nc, (c,) each; ``method`` as in `SensorLines`.
     """
 
     input_speed: np.ndarray
     mesh_frequency: np.ndarray
     excitation_limit: np.ndarray
+    level_change: np.ndarray
+    compared_to: float
     carrier_speed: np.ndarray
     heard: HeardSpeeds
     resonances: Mapping[str, Any]
@@ -208,6 +222,7 @@ class RunupResult(StageResult):
             "mesh_frequency": ("speed", self.mesh_frequency, "Hz", "mesh frequency"),
             "carrier_speed": ("speed", self.carrier_speed, "rad/s", "speed of the carrier"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation"),
+            "level_change": ("speed", self.level_change, "dB", LEVEL_CHANGE),
             "level": ("speed", heard.level, "m/s^2", "root mean square of the acceleration at the sensor"),
             "force_rms": (kinds, heard.force_rms, "N", "root mean square of the mesh force about its mean"),
             "force_peak": (kinds, heard.force_peak, "N", "largest mesh force"),
@@ -225,6 +240,7 @@ class RunupResult(StageResult):
             attrs={
                 "title": "run-up: sensor, mesh forces and resonances over the speed",
                 "sensor_angle": self.sensor_angle, "method": self.method, "ring_teeth": self.ring_teeth,
+                "compared_to": self.compared_to,
                 "reference_acceleration": REFERENCE_ACCELERATION, "unresolved_resonances": self.unresolved,
                 "operating_speeds": as_written(self.operating_speeds / RPM),
             },
@@ -241,33 +257,54 @@ def meeting_columns(value: Mapping[str, np.ndarray]) -> dict[str, Callable[[int]
     }
 
 
-def loudest(data: xr.Dataset) -> str:
+def loudest(data: xr.Dataset, marks: Marks) -> str:
     """Write the largest level of runup.nc, its speed, and whether the level may rise beyond that."""
     speed, level = data["speed"].values, data["level"].values
     worst = int(level.argmax())
     end = ", the end of its range" if worst in (0, len(speed) - 1) else ""
-    return f"{level[worst]:.4g} m/s² at {speed[worst]:.6g} rpm{end}"
+    change = float(level_change_at(data, speed[worst]))
+    text = shown_level(level[worst], change, marks, "W-STEPS", *_RUN_UP_DOUBTS, of=("runup",))
+    return f"{text} m/s² at {speed[worst]:.6g} rpm{end}"
+
+
+def largest_factors(data: xr.Dataset, marks: Marks) -> str:
+    """Write the largest dynamic factors K_v of runup.nc for either kind of mesh, with their speeds."""
+    speed, factors = data["speed"].values, data["dynamic_factor"].values
+    texts, change = list[str](), level_change_at(data, speed)
+    for kind, factor in zip(KINDS, factors.T):
+        worst = int(factor.argmax())
+        codes = *doubtful_excitation(float(change[worst])), "W-STEPS", *_RUN_UP_DOUBTS
+        text = marks(f"{factor[worst]:.3f}", *codes, of=("runup",))
+        texts.append(f"{kind} {text} at {speed[worst]:.6g} rpm")
+    return ", ".join(texts)
 
 
 def describe_runup(data: xr.Dataset) -> Block:
     """Tabulate the strongest resonances of runup.nc by speed."""
     speed = data["speed"].values
     strongest, marks = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN], _marks(data)
+    change = level_change_at(data, data["resonance_speed"].values)
+    codes = "W-STEPS", *_RUN_UP_DOUBTS
     value = {str(name): one.values for name, one in data.items() if one.dims[:1] == ("resonance",)}
     columns = {
         "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
         "from operating": lambda i: f"{np.round(value['distance'][i], 1) + 0.0:+.1f} %",
         **meeting_columns(value),
         "force share": lambda i: f"{value['share'][i]:.3f}",
-        "alone [m/s²]": lambda i: f"{value['resonance_alone'][i]:.4g}",
-        "level [m/s²]": lambda i: marks(f"{value['resonance_level'][i]:.4g}", "W-STEPS", "W-PULL"),
-        "K_v": lambda i: marks(f"{value['resonance_factor'][i].max():.3f}", "W-STEPS", "W-PULL"),
+        "alone [m/s²]": lambda i: marks(f"{value['resonance_alone'][i]:.4g}", "W-DAMPING"),
+        "level [m/s²]": lambda i: shown_level(
+            float(value["resonance_level"][i]), float(change[i]), marks, *codes
+        ),
+        "K_v": lambda i: marks(
+            f"{value['resonance_factor'][i].max():.3f}", *doubtful_excitation(float(change[i])), *codes
+        ),
     }
     notes = [
         f"{len(strongest)} of {data.sizes['resonance']} meetings of a mode with a mesh harmonic that excites "
         "it: those with the highest level by this mode at this harmonic alone; modes together may give less",
         f"excited: modal force of {EXCITED:g} or more of the largest of that harmonic (force share)",
-        f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; largest level {loudest(data)}",
+        f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; "
+        f"largest level {loudest(data, marks)}",
     ]
     if data.attrs.get("method", "exact") != "exact":
         notes.append("levels and K_v in the housing that stands still; modes, and alone, on the foundation")
@@ -280,7 +317,11 @@ def _marks(data: xr.Dataset) -> Marks:
 
 
 def runup_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """Say how many peaks lie between the speeds of runup.nc (W-STEPS), and where meshes pull (W-PULL)."""
+    """Say where the excitation of runup.nc ends too early, how many peaks it misses, and what pulls."""
+    if "level_change" in data and "compared_to" in data.attrs:
+        change, limit = data["level_change"].values, data["excitation_limit"].values
+        beyond = float(data.attrs["compared_to"])
+        yield from missing_level(data["speed"].values, change, limit, beyond, of="run-up: ")
     if missed := int(data.attrs.get("unresolved_resonances", 0)):
         text = (
             f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels there may be higher"

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -33,6 +34,7 @@ from femgear.contact.bodies import Bodies, with_ring
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
 from femgear.contact.supports import Supports
+from femgear.errors import ConvergenceError
 from femgear.fe.elasticity import mass
 from femgear.findings import Finding
 from femgear.gears.deviations import common_period, rotational_symmetry
@@ -41,7 +43,7 @@ from femgear.housing.orders import order_level
 from femgear.housing.sensor import component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound
 from femgear.remembered import remembered
-from femgear.report.tables import describe_modes, describe_response
+from femgear.report.tables import RESPONSE_DOUBTS, describe_modes, describe_response
 from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
 from femgear.solvers.linear.resonances import (
     ONE_FREQUENCY,
@@ -117,6 +119,7 @@ from femgear.trains.elastic.results import (
     ModesResult,
     describe_housing,
     level_changes,
+    level_doubts,
     mesh_bands,
     order_cuts,
     ring_shapes,
@@ -164,7 +167,7 @@ _LINES_TOGETHER = 8000
 _MOSTLY_COMPARED = 5
 """Operating speeds over those that are compared up to which all are solved before."""
 _COMPARED = 4
-"""Operating speeds at most at which levels in a housing that stands still are compared."""
+"""Operating speeds at most at which levels in a housing that stands still are compared, and of a run-up."""
 _BELOW_WAVES = 0.9
 """The run-up ends, unless the case says otherwise, so far below the slowest wave around the ring."""
 _NOTICED, _PACKED, _SECONDS = 2e9, 2.5, 1.5e-5
@@ -527,12 +530,16 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         for own in np.split(np.arange(len(speeds)), np.flatnonzero(np.diff(room)) + 1):
             parts.append(heard_in_housing(model, carrier[own], limit.at(own)))
             progress("runup", float(own[-1] + 1), float(len(speeds)))
+    levels = joined(parts)
+    change, compared_to = _run_up_change(case, modes, speeds, limit, levels.level)
     return RunupResult(
         input_speed=speeds,
         mesh_frequency=frequency,
         excitation_limit=limit.frequency,
+        level_change=change,
+        compared_to=compared_to,
         carrier_speed=carrier,
-        heard=joined(parts),
+        heard=levels,
         resonances={**found, "resonance_alone": alone[0], "operating_alone": alone[1]},
         ring_teeth=case.ring.teeth,
         sensor_angle=case.housing.sensor_angle,
@@ -540,6 +547,35 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         unresolved=unresolved(speeds, resonance, heard, damping),
         method=fixed_method(case),
     )
+
+
+def _run_up_change(
+    case: Case, modes: ModesResult, speeds: np.ndarray, limit: FrequencyLimit, level: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Compute what a longer excitation changes the levels (n_speeds,) of a run-up [dB], and its end [Hz].
+
+    At operating speeds as there, at slow ones as `lost_level` has it, at some others and the loudest one by
+    solving again; NaN at all others. Speeds are those of the input [rad/s], in ascending order.
+    """
+    of_speed, heard_lines = member_speeds(case, planetary_set(case)), _heard_lines(case, modes)
+    _, beyond, known = _excitation_end(case, modes)
+    frequency, carrier = of_speed.mesh_frequency * speeds, of_speed.carrier * speeds
+    change = np.full(len(speeds), np.nan)
+    for speed, value in zip(np.array(case.operation.speeds)[_compared_speeds(case)], known):
+        change[speeds == speed] = value
+    slow = frequency * HARMONICS < beyond - frequency
+    if slow.any():
+        change[slow] = lost_level(
+            case, heard_lines, limit.frequency[slow], beyond, float(np.sign(of_speed.carrier))
+        )
+    some = np.union1d(checked_speeds(len(speeds), _COMPARED), level.argmax())
+    some = some[np.isnan(change[some]) & (limit.frequency[some] < beyond - frequency[some])]
+    if len(some):
+        longer = limited(case, frequency[some], beyond)
+        with suppress(ConvergenceError):  # nearly singular: what these lose is not known
+            wider = order_level(heard_lines(frequency[some], carrier[some], longer))
+            change[some] = 20.0 * np.log10(wider / level[some])
+    return change, beyond
 
 
 def _runup_ends(case: Case, modes: ModesResult) -> tuple[float, float]:
@@ -610,21 +646,23 @@ ELASTIC = Train(
             verdict=lambda result: {"speeds": len(result.input_speed)},
             describe=lambda results: describe_runup(results.runup),
             warnings=RunupResult.warnings,
+            concerned_by={"": ("W-DAMPING",)},
             unavailable=no_runup,
         ),
         Stage(
             name="dynamics", title="Dynamics", solve=solve_dynamics, parts=dynamics_parts,
             takes=("static", "modes"), options=("progress",), decided_by=response_entries,
             verdict=response_verdict, describe=lambda results: describe_response(results.dynamics),
-            warnings=DynamicsResult.warnings,
+            warnings=DynamicsResult.warnings, concerned_by={"": ("W-DAMPING",)},
         ),
         Stage(
             name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
             decided_by=heard_entries, verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(
-                results.housing, level_changes(results), results.findings
+                results.housing, level_changes(results), results.findings, level_doubts(results)
             ),
             tables=lambda results: (mesh_bands(results),), warnings=HousingResult.warnings,
+            concerned_by={"": ("W-DAMPING", "W-POINTS"), "dynamics": ("W-EXCITATION", *RESPONSE_DOUBTS)},
         ),
     ),
     describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,

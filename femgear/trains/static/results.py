@@ -994,8 +994,7 @@ def _pressure(pressure: float, marks: Marks) -> str:
     """Write the largest contact pressure of a mesh [MPa], a dash without any, marked where it is doubtful."""
     if pressure <= 0.0:
         return "-"
-    codes = ["W-PRESSURE"] if pressure > LARGEST_PRESSURE else []
-    return marks(significant(pressure / 1e6, 1), *codes, "W-EDGE")
+    return marks(significant(pressure / 1e6, 1), *pressure_doubts((), "", pressure))
 
 
 def shares(data: xr.Dataset) -> tuple[float, float, str]:
@@ -1019,10 +1018,11 @@ def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block
     for kind in dict.fromkeys(map(family, names)):
         meshes = [i for i, name in enumerate(names) if family(name) == kind]
         titles = SIDES.get(kind, tuple(kind.split("-")))
-        doubts = [one.code for one in findings if f"contact pressure of {kind}:" in one.text]
-        contact.append(_contact_row(kind, data.isel(mesh=meshes), partial(_marked, marks, doubts)))
+        one = data.isel(mesh=meshes)
+        doubts = pressure_doubts(findings, kind, float(largest_pressure(one).max()))
+        contact.append(_contact_row(kind, one, partial(_marked, marks, doubts)))
         for number, title in enumerate(titles):
-            doubts = [one.code for one in findings if _concerns(one, title, titles[1 - number])]
+            doubts = root_doubts(findings, title, titles[1 - number])
             one = data.isel(mesh=meshes, gear=number)
             roots.append(_root_row(title, one, partial(_marked, marks, doubts)))
     equal, against = (
@@ -1050,6 +1050,17 @@ def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block
     if not data.attrs.get("repeats", 1):
         notes.append("the record does not repeat: stress ranges are those that it shows")
     return Block("Stresses", header, (*contact, *roots), (*notes, *marks.notes))
+
+
+def pressure_doubts(findings: Iterable[Finding], kind: str, pressure: float) -> list[str]:
+    """Codes of findings that concern the largest contact pressure [Pa] of a kind of mesh."""
+    kinked = [one.code for one in findings if f"contact pressure of {kind}:" in one.text]
+    return [*kinked, *(["W-PRESSURE"] if pressure > LARGEST_PRESSURE else []), "W-EDGE"]
+
+
+def root_doubts(findings: Iterable[Finding], title: str, mate: str) -> list[str]:
+    """Codes of findings that concern the root stress of a flank, such as "planet, sun side", with a mate."""
+    return [one.code for one in findings if _concerns(one, title, mate)]
 
 
 def _marked(marks: Marks, codes: list[str], text: str) -> str:

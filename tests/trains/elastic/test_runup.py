@@ -8,16 +8,22 @@ import pytest
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError
+from femgear.findings import Finding, as_text, findings_in, once
 from femgear.housing.orders import order_level
+from femgear.report.explorer import explorer
+from femgear.report.style import excited_to
+from femgear.report.tables import Marks, describe_response
+from femgear.report.waterfall import runup_levels
 from femgear.solvers.linear.resonances import unresolved
 from femgear.storage.results import Manifest, Results
 from femgear.system.fourier import fluctuation, sample
 from femgear.trains.elastic.checks import runup_ends
-from femgear.trains.elastic.results import verdict
+from femgear.trains.elastic.results import describe_housing, level_changes, level_doubts, verdict
 from femgear.trains.elastic.runup import describe_runup, loudest, runup_warnings
-from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
+from femgear.trains.elastic.stages import ELASTIC, solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value, with_values
 from femgear.trains.registry import check_case, stages_of
+from femgear.trains.static.results import describe_stress
 from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).parents[3]
@@ -220,7 +226,10 @@ def test_the_verdict_states_factors_stresses_and_what_they_assume(case, files, f
     assert "static.members" not in notes and "at one instant" not in notes + " ".join(told)
     at_3100 = np.argmin(np.abs(found.input_speed / RPM - 3100.0))
     sun, ring = found.heard.dynamic_factor[at_3100]
-    assert told["largest dynamic factor K_v"] == f"sun-planet {sun:.3f}, planet-ring {ring:.3f}"
+    assert (
+        told["largest dynamic factor K_v, at operating speeds"]
+        == f"sun-planet {sun:.3f}, planet-ring {ring:.3f}"
+    )
     assert told["planet load factor K_gamma"] == "sun-planet 1.000, planet-ring 1.000"
     nominal = files["stress"]["iso_root_stress"].values[0, 1]
     safety = 2 * 0.7 * 430e6 / (nominal * sun)
@@ -314,4 +323,183 @@ def test_the_verdict_says_where_the_run_up_ends(case, files):
     points = list(verdict(results_of(case, files | {"housing": housing})))[1]
     assert any(note.startswith("microphone: by equivalent radiated power") for note in points.notes)
     runup["level"][20] = 1999.0
-    assert loudest(runup) == f"1999 m/s² at {float(runup['speed'][20]):.6g} rpm"
+    assert loudest(runup, Marks(())) == f"1999 m/s² at {float(runup['speed'][20]):.6g} rpm"
+
+
+THREE = {"dynamics.mesh_harmonics": 3, "runup.count": 12}
+
+
+@pytest.fixture(scope="module")
+def short_files(case, static, modes, files):
+    """Contents of the files of a run with three mesh harmonics, with the findings of each."""
+    few = with_values(case, THREE)
+    dynamics = solve_dynamics(few, static, modes)
+    found = {
+        "dynamics": dynamics,
+        "housing": solve_housing(few, dynamics),
+        "runup": solve_runup(few, modes),
+    }
+    data = {name: result.dataset() for name, result in found.items()}
+    for name, result in found.items():
+        data[name].attrs["findings"] = as_text(once(result.findings, name))
+    return {name: files[name] for name in ("static", "stress", "modes")} | data
+
+
+def with_findings(case, files) -> Results:
+    """Results with the findings that their files have."""
+    findings = tuple(one for data in files.values() for one in findings_in(data.attrs))
+    names = Manifest(complete=True, files={f"{name}.nc": "" for name in files}, findings=findings)
+    results = Results(Path(), names, lambda path: case).with_known(files)
+    vars(results)["case"] = case
+    return results
+
+
+def test_a_run_up_judges_the_speeds_whose_excitation_ends_short(found, short_files):
+    """Three harmonics reach 3.8 kHz at most; by hand: the level with excitation up to the meshes' modes."""
+    runup = short_files["runup"]
+    change, speed = runup["level_change"].values, runup["speed"].values
+    looked = np.flatnonzero(np.isfinite(change))
+    full = found.dataset()
+    assert runup.attrs["compared_to"] == pytest.approx(full["excitation_limit"].values.max(), rel=0.05)
+    assert {0, len(speed) - 1, int(runup["level"].values.argmax())} <= {*looked.tolist()}
+    there = [i for i in looked if np.isclose(full["speed"].values, speed[i]).any()]
+    assert len(there) >= 3
+    for i in there:
+        level = float(full["level"][np.abs(full["speed"].values - speed[i]).argmin()])
+        assert change[i] == pytest.approx(20.0 * np.log10(level / float(runup["level"][i])), abs=0.1)
+    (finding,) = findings_in(runup.attrs)
+    assert finding.code == "W-EXCITATION" and finding.stage == "runup"
+    assert finding.text.startswith("run-up: at 900 rpm the excitation ends at 972 Hz")
+    assert "W-EXCITATION" not in [one.code for one in runup_warnings(full)]
+
+
+def test_slow_speeds_of_a_run_up_are_judged_as_operating_speeds_are(case, static, modes):
+    """At 60 rpm the record's 512 harmonics end below the modes of the meshes, whoever asks for that speed."""
+    slow = {"runup.from": "50 rpm", "runup.to": "60 rpm", "runup.count": 2, "dynamics.damping_ratio": 0.05}
+    runup = solve_runup(with_values(case, slow), modes)
+    (finding,) = (one for one in runup.findings if one.code == "W-EXCITATION")
+    assert finding.text.startswith("run-up: at 50 rpm the excitation ends at 9216 Hz")
+    operating = with_values(case, {"operation.speeds": ["60 rpm", "250 rpm"], "housing.published": None})
+    assert runup.level_change[-1] == pytest.approx(solve_dynamics(operating, static, modes).level_change[0])
+
+
+def test_numbers_whose_excitation_ends_short_are_marked_where_they_stand(case, short_files):
+    """Level as bound; factors, sound and lines by a dagger; in verdict, tables of run-up and housing."""
+    results = with_findings(with_values(case, THREE), short_files)
+    first, points, _ = verdict(results)
+    rows = dict(first.rows)
+    assert rows["largest level of the run-up"].startswith("> ")
+    for name in (
+        "largest dynamic factor K_v, at operating speeds",
+        "largest dynamic factor K_v of the run-up",
+    ):
+        assert rows[name].count("†") == 2, rows[name]
+    assert sum("W-EXCITATION, doubt" in note for note in first.notes) == 1
+    bare = [cell for row in points.rows for cell in row[1:] if not cell.startswith("> ") and "†" not in cell]
+    assert bare == [] and len(points.header) == 6
+    runup = describe_runup(short_files["runup"])
+    level, factor = runup.header.index("level [m/s²]"), runup.header.index("K_v")
+    assert all(row[level].startswith("> ") and row[factor].endswith("†") for row in runup.rows)
+    assert "largest level > " in " ".join(runup.notes)
+    housing = describe_housing(
+        results.housing, level_changes(results), results.findings, level_doubts(results)
+    )
+    assert all(row[2].startswith("> ") and row[3][-1] == row[4][-1] == "†" for row in housing.rows)
+
+
+def test_a_level_by_forces_of_one_way_has_the_mark_of_the_other(short_files):
+    """Both have the same excitation."""
+    level = short_files["housing"]["level"]
+    both = short_files["housing"].assign(
+        one_way_level=("speed", 0.5 * level.values),
+        one_way_difference=("speed", [6.02, 6.02]),
+        turn_multiplier=("speed", [0.5, 0.5]),
+    )
+    block = describe_housing(both, np.array([20.0, 0.1]), [Finding("W-EXCITATION", "", "ends early")])
+    column = block.header.index("one way [m/s^2]")
+    short, whole = (row[column] for row in block.rows)
+    assert short.startswith("> ") and short.endswith(" (+6.0 dB)")
+    assert whole == f"{0.5 * float(level[1]):.4g} (+6.0 dB)"
+
+
+@pytest.mark.parametrize(
+    ("code", "changed"),
+    [
+        ("W-PULL", {}),
+        ("W-UNSTABLE", {"stable": [1, 0]}),
+        ("W-CONVERGENCE", {"converged": [1, 0]}),
+        ("W-DAMPING", {}),
+        ("W-POINTS", {}),
+    ],
+)
+def test_doubts_of_the_response_are_marked_at_their_speeds(case, files, code, changed):
+    """The second speed alone pulls, is unstable or did not converge; what the case draws concerns all."""
+    stage = "" if code in ("W-DAMPING", "W-POINTS") else "dynamics"
+    dynamics = files["dynamics"].copy(deep=True)
+    for name, values in changed.items():
+        dynamics[name] = ("speed", np.array(values, bool))
+    if code == "W-PULL":
+        dynamics["mesh_force_real"][1, :, 1] -= 3.0 * dynamics["mesh_force_real"][1, :, 0]
+    finding = as_text([Finding(code, "", "for this test", stage=stage)])
+    dynamics.attrs["findings"] = finding
+    results = with_findings(case, files | {"dynamics": dynamics})
+    first, points, _ = verdict(results)
+    level = points.header.index("level [m/s²]")
+    marked = ["†" in row[level] for row in points.rows]
+    assert marked == ([True, True] if stage == "" else [False, True])
+    factor = dict(first.rows)["largest dynamic factor K_v, at operating speeds"]
+    assert ("†" in factor) == (code != "W-POINTS") == ("†" in points.rows[1][1] + points.rows[1][2])
+    heard = points.header.index("microphone [dB(A)]")
+    assert ("†" in points.rows[1][heard]) == (code != "W-POINTS")
+    if code != "W-POINTS":
+        dte = describe_response(dynamics)
+        column = dte.header.index("DTE rms [um]")
+        assert ["†" in row[column] for row in dte.rows] == marked
+    # what the dynamics doubt says nothing of the run-up
+    assert ("†" in dict(first.rows)["largest level of the run-up"]) == (code == "W-DAMPING")
+
+
+def test_pressures_at_the_end_of_a_flank_are_marked_in_verdict_and_stresses(case, files):
+    static = files["static"].copy(deep=True)
+    static.attrs["findings"] = as_text([Finding("W-EDGE", "", "at the end of a flank", stage="static")])
+    results = with_findings(case, files | {"static": static})
+    (pressure,) = (text for name, text in next(verdict(results)).rows if "contact pressure" in name)
+    assert pressure.count("†") == 2
+    block = describe_stress(results.stress, results.findings)
+    assert all(("†" in row[1]) == row[0].startswith("contact") for row in block.rows)
+
+
+def test_the_file_of_the_housing_carries_what_concerns_its_numbers():
+    """Of dynamics.nc and the case; not what the run-up says of its own speeds."""
+    found = {
+        "": (Finding("W-DAMPING", "", "none"), Finding("W-BEARING", "", "linear")),
+        "runup": (Finding("W-EXCITATION", "", "run-up: ends early", stage="runup"),),
+        "dynamics": (Finding("W-EXCITATION", "", "ends early", stage="dynamics"),),
+        "housing": (Finding("W-RESIDUAL", "", "missing", stage="housing"),),
+    }
+    carried = stage_of("housing").carried(found)
+    assert [(one.code, one.stage) for one in carried] == [
+        ("W-RESIDUAL", "housing"),
+        ("W-DAMPING", ""),
+        ("W-EXCITATION", "dynamics"),
+    ]
+    assert [one.code for one in stage_of("runup").carried(found)] == ["W-EXCITATION", "W-DAMPING"]
+
+
+def stage_of(name: str):
+    stage = ELASTIC.stage(name)
+    assert stage is not None
+    return stage
+
+
+def test_pictures_of_a_run_up_say_where_the_excitation_ends_short(files, short_files):
+    """Curves are dotted there, and the page tells it at every speed; with the whole excitation neither."""
+    whole, short = (runup_levels(one["runup"]) for one in (files, short_files))
+    styles = [{line.get_linestyle() for line in figure.axes[0].get_lines()} for figure in (whole, short)]
+    assert ":" not in styles[0] and ":" in styles[1] and "-" not in styles[1]
+    assert "W-EXCITATION" in short.axes[0].get_title(loc="left") + short.axes[0].get_title()
+    assert not any(explorer(files["runup"], files["modes"])["short"])
+    assert all(explorer(short_files["runup"], short_files["modes"])["short"])
+    one = short_files["housing"].isel(speed=[0]).assign(level_change=("speed", [20.0]))
+    assert excited_to(one, 0).endswith("kHz alone (W-EXCITATION)")
+    assert excited_to(one.assign(level_change=("speed", [0.3])), 0).endswith("kHz")
