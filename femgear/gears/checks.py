@@ -137,7 +137,7 @@ def _neighbours(s: PlanetarySet):
     """Refuse planets that overlap, and warn where little room is left between them."""
     if s.n_planets == 1:
         return
-    room, gap, pair = _closest(s, s.planet_angles)
+    room, gap, pair = planet_room(s, s.planet_angles)
     if room <= 0.0:
         least = math.asin(min(s.planet.tip_radius / s.centre_distance, 1.0))
         most = math.ceil(math.pi / least) - 1
@@ -158,7 +158,7 @@ def _neighbours(s: PlanetarySet):
         )  # fmt: skip
 
 
-def _closest(s: PlanetarySet, angles: tuple[float, ...]) -> tuple[float, float, str]:
+def planet_room(s: PlanetarySet, angles: tuple[float, ...]) -> tuple[float, float, str]:
     """Room between the tips of the nearest two planets [m] at some angles, their angle [rad], and words."""
     around = pairwise((*angles, angles[0] + 2.0 * math.pi))
     gap, n = min((round(b - a, 12), n) for n, (a, b) in enumerate(around, start=1))
@@ -172,7 +172,7 @@ def _assembly(s: PlanetarySet) -> None:
     try:
         assembly_positions(sun, ring, s.planet_angles)
     except GeometryError as error:
-        room, _, pair = _closest(s, feasible_angles(sun + ring, s.planet_angles))
+        room, _, pair = planet_room(s, feasible_angles(sun + ring, s.planet_angles))
         if room <= 0.0:
             error.remedy = (
                 f"use fewer planets, or z_s + z_r a multiple of {s.n_planets}: the nearest angles that "

@@ -33,6 +33,8 @@ _TRIED = 30
 _APART = 0.04
 _WEIGHTS = 1e3, 2.0
 """Of what teeth lack and of the centre distance, in the cost of a choice."""
+_LOST_RATIO, _LOST_WEIGHT = 1.02, 4.0
+"""Contact ratio below which contact may be lost, and what that weighs beside a contact ratio that is low."""
 
 
 @dataclass(frozen=True)
@@ -45,10 +47,13 @@ class SharedShifts:
         Of module 1 mm in the transverse section, tips as long as run free of their mates.
     rule : str
         How the shift is shared, in words; empty where there is none to share.
+    lacks : tuple of str
+        Codes of what the meshes and gears are still warned of.
     """
 
     gears: PlanetarySet | GearPair
     rule: str
+    lacks: tuple[str, ...] = ()
 
     @property
     def shifts(self) -> tuple[float, ...]:
@@ -92,7 +97,7 @@ def share_shifts(
     GeometryError
         The first fault of the best choice, where none closes.
     """
-    best, fault, fewest = None, None, math.inf
+    best, fault, fewest = None, None, None
     roundings = [rack.root_radius, *(r for r in RING_ROUNDINGS if r < rack.root_radius)][: 4 * len(teeth) - 7]
     for rounding in roundings:
         ring_rack, no_room = replace(rack, root_radius=rounding), math.inf
@@ -103,18 +108,18 @@ def share_shifts(
                 continue
             try:
                 gears = _closed(teeth, pressure_angle, (rack, rack, ring_rack), a, shift, backlash)
-                said = {one.code for one in check_meshes(gears)} - {"W-TIP", "W-RIM"}
+                said = [one.code for one in check_meshes(gears) if one.code not in ("W-TIP", "W-RIM")]
             except GeometryError as error:
                 fault = fault or error
                 if error.code == "E-ROOT-RADIUS" and error.message.startswith("ring"):
                     no_room = float(shifts[2])
                 continue
-            if len(said) < fewest:
-                best, fewest = gears, len(said)
+            if fewest is None or len(said) < len(fewest):
+                best, fewest = gears, said
             if not said:
                 return _shared(gears)
-    if best is not None:
-        return _shared(best)
+    if best is not None and fewest is not None:
+        return _shared(best, tuple(dict.fromkeys(fewest)))
     if fault is not None:
         raise fault
     raise GeometryError(
@@ -126,9 +131,9 @@ def share_shifts(
     )  # fmt: skip
 
 
-def _shared(gears: PlanetarySet | GearPair) -> SharedShifts:
+def _shared(gears: PlanetarySet | GearPair, lacks: tuple[str, ...] = ()) -> SharedShifts:
     shifted = any(abs(gear.profile_shift) > 1e-9 for gear in gears.gears)
-    return SharedShifts(gears, "equal sliding" if shifted else "")
+    return SharedShifts(gears, "equal sliding" if shifted else "", lacks)
 
 
 def _closed(teeth, pressure_angle, racks, a: float, shift: float, backlash: float) -> PlanetarySet | GearPair:
@@ -219,7 +224,7 @@ def _judged(teeth, alpha: float, rack: BasicRack, a, shift, preferred: float) ->
     tip = [np.minimum(roll, length - other) for roll, other in zip(tip, form[::-1], strict=True)]
     pitch = math.pi * math.cos(alpha)
     lacking = [np.maximum(-one, 0.0) for one in form]
-    lacking += [np.maximum(LEAST_RATIO - (tip[0] + tip[1] - length) / pitch, 0.0)]
+    lacking += [_short_contact((tip[0] + tip[1] - length) / pitch)]
     lacking += [
         np.maximum(LEAST_LAND - _land(z, one, alpha, roll, rb, 1.0), 0.0)
         for z, one, roll, rb in zip(teeth[:2], x[:2], tip, base, strict=False)
@@ -239,10 +244,15 @@ def _ring_lacks(teeth, alpha: float, rack: BasicRack, a, x, form, tip) -> list[n
     ring = np.maximum(rack_tip, length + np.maximum(form, 0.0))
     ratio = (tip - ring + length) / (math.pi * math.cos(alpha))
     return [
-        np.maximum(LEAST_RATIO - ratio, 0.0),
+        _short_contact(ratio),
         np.maximum(LEAST_LAND - _land(teeth[2], x[2], alpha, ring, base, -1.0), 0.0),
         np.maximum(np.abs(x[2]) - LARGEST_RING_SHIFT, 0.0),
     ]
+
+
+def _short_contact(ratio) -> np.ndarray:
+    """What contact ratios lack, more where contact may be lost."""
+    return np.maximum(LEAST_RATIO - ratio, 0.0) + _LOST_WEIGHT * np.maximum(_LOST_RATIO - ratio, 0.0)
 
 
 def _form_roll(teeth: int, shift, alpha: float, rack: BasicRack):

@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
-from itertools import pairwise
 from textwrap import wrap
 from typing import Annotated, Any, get_args
 
@@ -23,14 +22,28 @@ from femgear.case.estimates import (
     usual_torque,
 )
 from femgear.case.gear_set import planetary_set
-from femgear.case.quantities import ANGLE, FREE, INERTIA, LENGTH, MASS, STIFFNESS, TORSION, Quantity
+from femgear.case.quantities import (
+    ANGLE,
+    FREE,
+    FREQUENCY,
+    INERTIA,
+    LENGTH,
+    MASS,
+    STIFFNESS,
+    TORSION,
+    Quantity,
+)
 from femgear.case.sections import LARGEST_HELIX, FaceWidth, Module
-from femgear.errors import CaseError
+from femgear.errors import CaseError, GeometryError
+from femgear.gears.checks import planet_room
 from femgear.gears.phasing import neighbouring_teeth
-from femgear.gears.planetary import equal_planet_angles, feasible_angles
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles, virtual_set
 from femgear.gears.profile import BasicRack, overlap_ratio, transverse_rack, transverse_tool
-from femgear.gears.shifts import share_shifts
+from femgear.gears.shifts import SharedShifts, share_shifts
 from femgear.gears.tips import SEEN, typed_diameter
+from femgear.trains.drivetrain.case_file import SimulationSection
+from femgear.trains.drivetrain.checks import usual_rate
+from femgear.trains.drivetrain.model import case_model
 from femgear.trains.reading import parse_case
 
 
@@ -86,12 +99,23 @@ KINDS = {
     "drivetrain": (23, 71),
 }  # fmt: skip
 """Kinds of cases that `new_case` writes, with the teeth of their gears."""
+ADDENDA = (1.0, 1.1, 1.2, 0.9, 0.8)
+"""Addenda [modules] that are tried until teeth leave nothing to warn of, where none is given."""
 BACKLASH = 0.04
 """Backlash of new cases on the reference circles [normal modules]."""
 Angle = Annotated[float, Quantity(ANGLE, -LARGEST_HELIX, LARGEST_HELIX)]
 CentreDistance = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 _HEAD = "Written by femgear new {}. What is estimated says so: give what is known instead."
 _LEAVE = " Masses and inertias stay when teeth change: delete their lines to have them estimated anew."
+_USUAL = {
+    "W-BACKLASH": "the same backlash in all meshes",
+    "W-CLEARANCE": "a tip clearance of 0.1 modules",
+    "W-CONTACT-RATIO": "a transverse contact ratio of 1.2",
+    "W-FILLET": "tips that are free of all fillets",
+    "W-TIP-THIN": "tips of usual thickness",
+    "W-UNDERCUT": "flanks without undercut",
+}
+"""What teeth have that are not warned of, by the code of the warning."""
 _STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"}
 
 
@@ -107,7 +131,8 @@ class ToothForm:
     helix : str, optional
         Helix angle of planetary sets, pairs and helical cases, of these by default 20 deg.
     addendum : float, optional
-        Of the basic rack [modules], by default 1; the dedendum is a quarter more.
+        Of the basic rack [modules], by default the first of `ADDENDA` that leaves nothing to warn of; the
+        dedendum is a quarter more.
     """
 
     shifts: tuple[float, ...] = ()
@@ -138,8 +163,8 @@ def new_case(
     speed : str, optional
         By default 1000 rpm.
     planets : int, optional
-        By default the first of 3, 4 and 5 that equal spacing allows and that have room; else three as near
-        to it as they assemble, or fewer.
+        By default the first of 3, 4 and 5 that equal spacing allows and that have a module of room between
+        their tips; else three as near to it as they assemble, or fewer.
     face_width : str, optional
         By default twelve modules.
     form : ToothForm, optional
@@ -160,32 +185,65 @@ def new_case(
     size, beta = _read(Module, module, "--module"), math.radians(20.0) if kind == "helical" else 0.0
     beta = beta if form.helix is None else _read(Angle, form.helix, "--helix")
     width = 12.0 * size if face_width is None else _read(FaceWidth, face_width, "--face-width")
-    gears, of_all = _gears(teeth, size, beta, form, notes)
-    count, angles = _planets(teeth, planets, gears) if of_set else (1, None)
+    gears, of_all, lacks = _gears(teeth, size, beta, form, notes)
+    of_all["set"] |= {"backlash": _millimetres(BACKLASH * size), "face_width": LENGTH.show(width)}
+    tables: dict[str, Any] = {"format": 1, "title": f"{kind.capitalize()} {'/'.join(map(str, teeth))}"}
+    tables |= {**of_all, "material": _STEEL, **_sections(gears, of_all, size, beta, notes)}
+    tables["operation"] = {"torque": "1 N m" if torque is None else torque, "speeds": [speed]}
+    if beta and kind != "helical":
+        tables["set"]["helix_angle"] = ANGLE.show(beta)
+        tables["static"] = {"slices": _slices(width, size, beta)}
+    shared, count = {"module": module, "pressure_angle": "20 deg"}, 1
+    if of_set:
+        tables["sun"] = {"teeth": teeth[0], **shared, **tables["sun"]}
+        tables["operation"] = {"input": "sun", "fixed": "ring", **tables["operation"]}
+        tables |= _of_kind(kind, beta, notes)
+        made = _with_tips(tables | {"set": {"planets": planets or 1, **tables["set"]}}, notes)
+        count, angles = _planets(made) if planets is None else (planets, {})
+        tables["set"] = {"planets": count, **angles, **tables["set"]}
+    else:
+        tables |= {"model": "pair", "set": {**shared, **tables["set"]}}
+        _with_tips(tables, notes)
     load = f"{usual_torque(teeth[0], teeth[1], size, width, count):.3g} N m" if torque is None else torque
+    tables["operation"]["torque"] = load
+    if kind == "helical" and not _has_normal_section(tables, beta):
+        tables["helical"]["section"] = "transverse"
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
     head = [_HEAD.format(kind) + ("" if kind == "drivetrain" else _LEAVE)]
     head += [f"Assumed: {' '.join(left)}"] if left else []
-    of_all["set"] |= {"backlash": _millimetres(BACKLASH * size), "face_width": LENGTH.show(width)}
-    tables: dict[str, Any] = {"format": 1, "title": f"{kind.capitalize()} {'/'.join(map(str, teeth))}"}
-    tables |= {**of_all, "material": _STEEL, **_sections(gears, of_all, size, beta, notes)}
-    tables["operation"] = {"torque": load, "speeds": [speed]}
-    if beta and kind != "helical":
-        tables["set"]["helix_angle"] = ANGLE.show(beta)
-        tables["static"] = {"slices": _slices(width, size, beta)}
-    shared = {"module": module, "pressure_angle": "20 deg"}
-    if not of_set:
-        tables = _with_tips(tables | {"model": "pair", "set": {**shared, **tables["set"]}}, notes)
-        tables = _chain(tables, notes) if kind == "drivetrain" else tables
-        return draft_text(tables, notes, word="estimated", head=head)
-    tables["sun"] = {"teeth": teeth[0], **shared, **tables["sun"]}
-    tables["set"] = {"planets": count, **({"planet_angles": angles} if angles else {}), **tables["set"]}
-    tables["operation"] = {"input": "sun", "fixed": "ring", **tables["operation"]}
-    more = {"planar": {"response": {}}, "helical": {"helix_angle": ANGLE.show(beta)}}
-    tables |= {kind: more[kind]} if kind in more else {}
-    return draft_text(_with_tips(tables, notes), notes, word="estimated", head=head)
+    head += [_no_better(lacks, form)] if lacks else []
+    tables = _chain(tables, notes) if kind == "drivetrain" else tables
+    return draft_text(tables, notes, word="estimated", head=head)
+
+
+def _of_kind(kind: str, beta: float, notes: dict[str, str]) -> dict[str, Any]:
+    """Sections that a kind of sets has beside those of all sets."""
+    if kind == "planar":
+        notes["dynamics.response_harmonics"] = (
+            "estimated: twice as many as by default: the last ones are small"
+        )
+        return {"dynamics": {"response_harmonics": 36}, "planar": {"response": {}}}
+    return {"helical": {"helix_angle": ANGLE.show(beta)}} if kind == "helical" else {}
+
+
+def _has_normal_section(tables: dict[str, Any], beta: float) -> bool:
+    """Whether the virtual gears of the normal section of a helical set can be made."""
+    gears: Any = planetary_set(parse_case(case_text.write(tables)))
+    try:
+        virtual_set(gears, beta)
+    except GeometryError:
+        return False
+    return True
+
+
+def _no_better(lacks: Iterable[str], form: ToothForm) -> str:
+    """Say what teeth are still warned of, whatever their shifts."""
+    place = "" if form.centre_distance is None else " at this centre distance"
+    racks = f" with addenda of {min(ADDENDA):g} to {max(ADDENDA):g} modules" if form.addendum is None else ""
+    missing = " and ".join(_USUAL.get(code, code) for code in lacks)
+    return f"No profile shifts{racks}{place} were found that give these teeth {missing}: femgear check warns."
 
 
 def _usual_notes(given: Mapping[str, Any]) -> dict[str, str]:
@@ -199,6 +257,7 @@ def _usual_notes(given: Mapping[str, Any]) -> dict[str, str]:
         "set.backlash": f"estimated: {BACKLASH:g} modules",
         "set.planet_angles": "estimated: nearest to equal spacing, which these teeth do not allow",
         "static.slices": "estimated: helical teeth need slices over the face width",
+        "helical.section": "estimated: the normal section has no gears that close; the teeth are too stiff",
     }
 
 
@@ -245,49 +304,47 @@ def _no_such(kind: str, option: str, words: str) -> CaseError:
 
 def _gears(
     teeth: tuple[int, ...], size: float, beta: float, form: ToothForm, notes: dict[str, str]
-) -> tuple[list[dict[str, Any]], dict[str, Any]]:
-    """Teeth, shift (that for the rim too) and rack of every gear, and tables of all of them."""
+) -> tuple[list[dict[str, Any]], dict[str, Any], tuple[str, ...]]:
+    """Teeth, shift (that for the rim too) and rack of every gear, tables of all of them, what they lack."""
     names = ("sun", "planet", "ring") if len(teeth) == 3 else ("gear_1", "gear_2")
     gears: list[dict[str, Any]] = [{"name": n, "teeth": z} for n, z in zip(names, teeth, strict=True)]
     of_all: dict[str, Any] = {"set": {}}
-    rack, shifts, addendum = BasicRack(), form.shifts, form.addendum
-    if addendum is not None:
-        rack = BasicRack(addendum, addendum + 0.25, 0.25)
-        of_all["rack"] = {"addendum": addendum, "dedendum": rack.dedendum, "root_radius": rack.root_radius}
-        notes["rack.root_radius"] = "estimated: a quarter of a module"
-        notes["rack.dedendum"] = "estimated: a quarter of a module below the mate's tips"
-        check_rack(of_all["rack"])
+    if form.addendum is not None:
+        check_rack({"addendum": form.addendum})
     distance = None
     if form.centre_distance is not None:
         distance = _read(CentreDistance, form.centre_distance, "--centre-distance")
         of_all["set"]["centre_distance"] = form.centre_distance
-    if shifts:
-        if len(shifts) not in (len(teeth), 2):
+    if form.shifts:
+        if len(form.shifts) not in (len(teeth), 2):
             raise CaseError(
-                f"{len(shifts)} profile shifts of {len(teeth)} gears", code="E-COUNT", key="--shifts",
+                f"{len(form.shifts)} profile shifts of {len(teeth)} gears", code="E-COUNT", key="--shifts",
                 limit="those of sun and planet, or of all three gears" if len(teeth) == 3 else "two",
             )  # fmt: skip
-        for gear, shift in zip(gears, shifts, strict=False):
+        for gear, shift in zip(gears, form.shifts, strict=False):
             gear["profile_shift"] = shift
-        return gears, of_all
+        return gears, of_all | _rack_table(form.addendum, notes), ()
     module, alpha = transverse_tool(size, math.radians(20.0), beta)
     step = 10.0 ** (math.floor(math.log10(1e3 * size)) - 5) / module
-    shared = share_shifts(
-        teeth, alpha, transverse_rack(rack, beta), backlash=BACKLASH * math.cos(beta), step=step,
-        centre_distance=None if distance is None else distance / module,
-    )  # fmt: skip
+    addendum, shared = _shared_shifts(
+        teeth, alpha, beta, form, step=step, distance=None if distance is None else distance / module
+    )
+    if form.addendum is not None or addendum != ADDENDA[0]:
+        of_all |= _rack_table(addendum, notes)
+    if form.addendum is None:
+        notes["rack.addendum"] = f"estimated: {ADDENDA[0]:g} leaves undercut or too little contact"
     found = [round(shift / math.cos(beta), 4) + 0.0 for shift in shared.shifts]
     for gear, shift in zip(gears, found, strict=True):
         gear["rim_shift"] = shift
     rounding = shared.gears.gears[-1].rack.root_radius / math.cos(beta)
-    if rounding < rack.root_radius - 1e-9:
-        gears[-1]["rack"] = {"addendum": rack.addendum, "dedendum": rack.dedendum}
+    if rounding < 0.25 - 1e-9:
+        gears[-1]["rack"] = {"addendum": addendum, "dedendum": _dedendum(addendum)}
         gears[-1]["rack"]["root_radius"] = round(rounding, 4)
         notes[f"{names[-1]}.rack.root_radius"] = "estimated: what its pinion cutter has room for"
     if not any(found) and distance is None:
         for gear in gears:
             gear["profile_shift"] = 0.0
-        return gears, of_all
+        return gears, of_all, shared.lacks
     # the other shifts are found, so that the set closes to the last digit
     own = 1 if len(teeth) == 3 else 0
     gears[own]["profile_shift"] = found[own]
@@ -299,7 +356,46 @@ def _gears(
     if distance is None:
         of_all["set"]["centre_distance"] = _millimetres(shared.centre_distance * module)
         notes["set.centre_distance"] = "estimated: with these shifts the gears close"
-    return gears, of_all
+    return gears, of_all, shared.lacks
+
+
+def _shared_shifts(
+    teeth: tuple[int, ...], alpha: float, beta: float, form: ToothForm, *, step: float, distance: float | None
+) -> tuple[float, SharedShifts]:
+    """Addendum and shifts of which the gears are warned least; GeometryError where none closes."""
+    best, addendum, fault = None, ADDENDA[0], None
+    for tried in ADDENDA if form.addendum is None else (form.addendum,):
+        rack = BasicRack(tried, _dedendum(tried), 0.25)
+        try:
+            shared = share_shifts(
+                teeth, alpha, transverse_rack(rack, beta), backlash=BACKLASH * math.cos(beta), step=step,
+                centre_distance=distance,
+            )  # fmt: skip
+        except GeometryError as error:
+            fault = fault or error
+            continue
+        if best is None or len(shared.lacks) < len(best.lacks):
+            best, addendum = shared, tried
+        if not best.lacks:
+            break
+    if best is None:
+        assert fault is not None
+        raise fault
+    return addendum, best
+
+
+def _rack_table(addendum: float | None, notes: dict[str, str]) -> dict[str, Any]:
+    """Table of the basic rack with an addendum; none of the usual one."""
+    if addendum is None:
+        return {}
+    notes["rack.root_radius"] = "estimated: a quarter of a module"
+    notes["rack.dedendum"] = "estimated: a quarter of a module below the mate's tips"
+    return {"rack": {"addendum": addendum, "dedendum": _dedendum(addendum), "root_radius": 0.25}}
+
+
+def _dedendum(addendum: float) -> float:
+    """Dedendum of a basic rack [modules]: a quarter of a module below the mate's tips."""
+    return round(addendum + 0.25, 12)
 
 
 def check_rack(rack: Mapping[str, float]) -> None:
@@ -335,8 +431,8 @@ def _sections(
     return found
 
 
-def _with_tips(tables: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
-    """Tables with the diameters of free tips, where they are not those of the rack."""
+def _with_tips(tables: dict[str, Any], notes: dict[str, str]) -> Any:
+    """Write the diameters of free tips into tables, where they are not those of the rack; gives the gears."""
     case = parse_case(case_text.write(tables))
     gears: Any = planetary_set(case)
     for gear in gears.gears:
@@ -348,7 +444,7 @@ def _with_tips(tables: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
             notes[f"{gear.name}.tip_diameter"] = (
                 f"estimated: {less:.4f} modules shorter than of the rack, for clearance and free fillets"
             )
-    return tables
+    return gears
 
 
 def _millimetres(length: float) -> str:
@@ -362,23 +458,17 @@ def _slices(width: float, size: float, beta: float) -> int:
     return max(min(25, most), math.ceil(6.0 * overlap_ratio(width, size, beta)) + 1)
 
 
-def _planets(
-    teeth: tuple[int, ...], planets: int | None, gears: list[dict[str, Any]]
-) -> tuple[int, list[str] | None]:
-    """Number of planets, and their angles where equal spacing does not go."""
-    if planets is not None:
-        return planets, None
-    total = teeth[0] + teeth[2]
-    # reference circles and an addendum, with one module between neighbours
-    distance = 0.5 * max(teeth[0] + teeth[1], teeth[2] - teeth[1])
-    reach = 0.5 * teeth[1] + 1.5 + max(gears[1].get("profile_shift", 0.0), 0.0)
+def _planets(gears: PlanetarySet) -> tuple[int, dict[str, list[str]]]:
+    """Number of planets with room between them, and their angles where equal spacing does not go."""
+    total = gears.sun.teeth + gears.ring.teeth
     for count, equal in ((3, True), (4, True), (5, True), (3, False), (2, True), (2, False)):
         angles = equal_planet_angles(count) if equal else feasible_angles(total, equal_planet_angles(count))
-        gap = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
-        if (total % count and equal) or distance * math.sin(0.5 * min(gap, math.pi)) < reach:
+        room = planet_room(gears, angles)[0]
+        if (total % count and equal) or room < gears.planet.module:
             continue
-        return count, None if equal else [f"{math.degrees(one):.10g} deg" for one in angles]
-    return 1, None
+        around = {"planet_angles": [f"{math.degrees(one):.10g} deg" for one in angles]}
+        return count, {} if equal else around
+    return 1, {}
 
 
 def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:
@@ -446,4 +536,9 @@ def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     notes["operation.torque[0].torque"] = notes.pop("operation.torque", "")
     torques = [{"body": "motor", "torque": pair["operation"]["torque"]}, {"body": "load", "share": 1.0}]
     tables["operation"] = {"speed": pair["operation"]["speeds"][0], "torque": torques}
-    return tables | {"simulation": {"duration": "1 s", "damping_ratio": 0.03}}
+    tables["simulation"] = {"duration": "1 s", "damping_ratio": 0.03}
+    chain = parse_case(case_text.write(tables | {"simulation": {**tables["simulation"], "rate": "1e7 Hz"}}))
+    if (rate := usual_rate(chain, case_model(chain))) > SimulationSection.model_fields["rate"].default:
+        tables["simulation"]["rate"] = FREQUENCY.show(rate)
+        notes["simulation.rate"] = "estimated: steps that follow the meshes and the modes that they drive"
+    return tables
