@@ -566,7 +566,7 @@ class _ToothForm:
     helix
         Helix angle of planetary sets, pairs and helical cases. Default: none, of helical cases 20 deg.
     addendum
-        Of the basic rack, in modules. Default: 1.
+        Of the basic rack, in modules. Default: 1, or what leaves less to warn of.
     """
 
     teeth: Annotated[tuple[str, ...], Parameter(consume_multiple=True, negative="")] = ()

@@ -25,7 +25,6 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import (
     ANGLE,
     FREE,
-    FREQUENCY,
     INERTIA,
     LENGTH,
     MASS,
@@ -41,10 +40,8 @@ from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_
 from femgear.gears.profile import BasicRack, overlap_ratio, transverse_rack, transverse_tool
 from femgear.gears.shifts import SharedShifts, share_shifts
 from femgear.gears.tips import SEEN, typed_diameter
-from femgear.trains.drivetrain.case_file import SimulationSection
-from femgear.trains.drivetrain.checks import usual_rate
-from femgear.trains.drivetrain.model import case_model
 from femgear.trains.reading import parse_case
+from femgear.trains.registry import train_of
 
 
 def draft_text(
@@ -190,14 +187,12 @@ def new_case(
     tables: dict[str, Any] = {"format": 1, "title": f"{kind.capitalize()} {'/'.join(map(str, teeth))}"}
     tables |= {**of_all, "material": _STEEL, **_sections(gears, of_all, size, beta, notes)}
     tables["operation"] = {"torque": "1 N m" if torque is None else torque, "speeds": [speed]}
-    if beta and kind != "helical":
-        tables["set"]["helix_angle"] = ANGLE.show(beta)
-        tables["static"] = {"slices": _slices(width, size, beta)}
+    tables |= _of_kind(kind, beta, _slices(width, size, beta), notes)
+    of_all["set"] |= {"helix_angle": ANGLE.show(beta)} if beta and kind != "helical" else {}
     shared, count = {"module": module, "pressure_angle": "20 deg"}, 1
     if of_set:
         tables["sun"] = {"teeth": teeth[0], **shared, **tables["sun"]}
         tables["operation"] = {"input": "sun", "fixed": "ring", **tables["operation"]}
-        tables |= _of_kind(kind, beta, notes)
         made = _with_tips(tables | {"set": {"planets": planets or 1, **tables["set"]}}, notes)
         count, angles = _planets(made) if planets is None else (planets, {})
         tables["set"] = {"planets": count, **angles, **tables["set"]}
@@ -211,21 +206,18 @@ def new_case(
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
-    head = [_HEAD.format(kind) + ("" if kind == "drivetrain" else _LEAVE)]
-    head += [f"Assumed: {' '.join(left)}"] if left else []
-    head += [_no_better(lacks, form)] if lacks else []
     tables = _chain(tables, notes) if kind == "drivetrain" else tables
-    return draft_text(tables, notes, word="estimated", head=head)
+    return draft_text(tables, notes, word="estimated", head=_head(kind, left, lacks, form))
 
 
-def _of_kind(kind: str, beta: float, notes: dict[str, str]) -> dict[str, Any]:
-    """Sections that a kind of sets has beside those of all sets."""
+def _of_kind(kind: str, beta: float, slices: int, notes: dict[str, str]) -> dict[str, Any]:
+    """Sections that a kind of cases has beside those of all."""
+    if kind == "helical":
+        return {"helical": {"helix_angle": ANGLE.show(beta)}}
     if kind == "planar":
-        notes["dynamics.response_harmonics"] = (
-            "estimated: twice as many as by default: the last ones are small"
-        )
+        notes["dynamics.response_harmonics"] = "estimated: twice the default, so that the last ones are small"
         return {"dynamics": {"response_harmonics": 36}, "planar": {"response": {}}}
-    return {"helical": {"helix_angle": ANGLE.show(beta)}} if kind == "helical" else {}
+    return {"static": {"slices": slices}} if beta else {}
 
 
 def _has_normal_section(tables: dict[str, Any], beta: float) -> bool:
@@ -238,12 +230,19 @@ def _has_normal_section(tables: dict[str, Any], beta: float) -> bool:
     return True
 
 
-def _no_better(lacks: Iterable[str], form: ToothForm) -> str:
-    """Say what teeth are still warned of, whatever their shifts."""
-    place = "" if form.centre_distance is None else " at this centre distance"
-    racks = f" with addenda of {min(ADDENDA):g} to {max(ADDENDA):g} modules" if form.addendum is None else ""
-    missing = " and ".join(_USUAL.get(code, code) for code in lacks)
-    return f"No profile shifts{racks}{place} were found that give these teeth {missing}: femgear check warns."
+def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm) -> list[str]:
+    """Paragraphs before the first entry: what is assumed, and what teeth lack whatever their shifts."""
+    head = [_HEAD.format(kind) + ("" if kind == "drivetrain" else _LEAVE)]
+    head += [f"Assumed: {' '.join(left)}"] if left else []
+    if lacks:
+        place = "" if form.centre_distance is None else " at this centre distance"
+        addenda = f" with addenda of {min(ADDENDA):g} to {max(ADDENDA):g} modules"
+        racks = addenda if form.addendum is None else ""
+        missing = " and ".join(_USUAL.get(code, code) for code in lacks)
+        head.append(
+            f"No profile shifts{racks}{place} were found that give these teeth {missing}: femgear check warns"
+        )
+    return head
 
 
 def _usual_notes(given: Mapping[str, Any]) -> dict[str, str]:
@@ -496,6 +495,16 @@ def _read(kind: Any, text: str, key: str) -> float:
         raise
 
 
+def _follows(tables: dict[str, Any]) -> bool:
+    """Whether the steps of a drivetrain follow its motion, so that no rate is refused or warned of."""
+    case = parse_case(case_text.write(tables))
+    try:
+        codes = [finding.code for finding in train_of(case).case_warnings(case)]
+    except CaseError as error:
+        codes = [error.code]
+    return not {"E-RATE", "W-RATE"} & set(codes)
+
+
 def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     """Tables of a drivetrain: motor, shaft, the pair, shaft and load."""
     case = parse_case(case_text.write(pair))
@@ -537,8 +546,9 @@ def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     torques = [{"body": "motor", "torque": pair["operation"]["torque"]}, {"body": "load", "share": 1.0}]
     tables["operation"] = {"speed": pair["operation"]["speeds"][0], "torque": torques}
     tables["simulation"] = {"duration": "1 s", "damping_ratio": 0.03}
-    chain = parse_case(case_text.write(tables | {"simulation": {**tables["simulation"], "rate": "1e7 Hz"}}))
-    if (rate := usual_rate(chain, case_model(chain))) > SimulationSection.model_fields["rate"].default:
-        tables["simulation"]["rate"] = FREQUENCY.show(rate)
+    for rate in ("50 kHz", "100 kHz", "200 kHz", "500 kHz", "1 MHz", "2 MHz", "5 MHz", "10 MHz"):
+        if _follows(tables):
+            break
+        tables["simulation"]["rate"] = rate
         notes["simulation.rate"] = "estimated: steps that follow the meshes and the modes that they drive"
     return tables

@@ -360,13 +360,6 @@ def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> 
         )
 
 
-def usual_rate(case: DrivetrainCase, model: DrivetrainModel) -> float:
-    """Compute the least rate of steps [Hz] of which nothing is warned, rounded up to three digits."""
-    top = highest_mesh(model, case_speeds(case, model).fastest)[1]
-    mode = mesh_mode(model, top * case.simulation.harmonics)
-    return float(_up(max(_GOOD_STEPS * top, shift_rate(mode, _SHIFT))))
-
-
 def _up(value: float) -> str:
     """Three digits, rounded up."""
     unit = 10.0 ** (math.floor(math.log10(value)) - 2)
