@@ -21,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import count, pairwise
 from typing import Any, cast
 
@@ -90,21 +91,21 @@ def pressure_transfer(n, frequency, cylinder: Cylinder, distance: float = 0.0) -
     phase = -1j * wave * distance
     if np.isinf(cylinder.length):
         impedance, spread = -1j * cylinder.density * cylinder.sound_speed, 1 + distance / cylinder.radius
-        ratios = _over_frequency(n, wave * cylinder.radius, lambda ka: _ratios(ka, spread))
+        ratios = _over_frequency(n, wave * cylinder.radius, _ratios, spread)
         return impedance * ratios * np.exp(phase)
-    known = cylinder, distance
     pressure = _over_frequency(
-        n, wave * cylinder.radius, lambda ka: _ring_transfer(ka / cylinder.radius, *known), _FREQUENCIES
+        n, wave * cylinder.radius, _ring_transfer, cylinder, distance, most=_FREQUENCIES
     )
     return pressure * np.exp(phase)
 
 
-def _ring_transfer(k: np.ndarray, cylinder: Cylinder, distance: float) -> Iterator[np.ndarray]:
-    """Pressure over velocity times exp(i k distance) of n = 0, 1, ..., at wave numbers, each (n_k,).
+def _ring_transfer(ka: np.ndarray, cylinder: Cylinder, distance: float) -> Iterator[np.ndarray]:
+    """Pressure over velocity times exp(i k distance) of n = 0, 1, ..., at ka = k radius, each (n_k,).
 
     The path of the axial wave numbers leaves the real axis for where the integrand decays as a Gaussian
     without oscillation, so that the trapezoidal rule converges exponentially.
     """
+    k = ka / cylinder.radius
     width, kd = cylinder.length, k[:, None] * distance
     scale, bend = np.minimum(1, 3 / np.sqrt(kd)), np.minimum(1, 40 / (k[:, None] * width))
     last = np.arcsinh((1.5 + 30 / kd) / scale)
@@ -129,44 +130,56 @@ def radiation_efficiency(n, ka, slenderness: float = np.inf) -> np.ndarray:
     n, ka = np.broadcast_arrays(np.abs(n), np.asarray(ka, float))
     if np.isinf(slenderness):
         return np.real(_over_frequency(n, ka, _efficiencies))
-    nodes, weights = np.polynomial.legendre.leggauss(64 + int(slenderness * ka.max(initial=0.0)))
+    points = 64 + int(slenderness * ka.max(initial=0.0))
+    return np.real(_over_frequency(n, ka, _ring_efficiencies, slenderness, points, most=_FREQUENCIES))
+
+
+def _ring_efficiencies(ka: np.ndarray, slenderness: float, points: int) -> Iterator[np.ndarray]:
+    """Radiation efficiency of a ring of width over radius for n = 0, 1, ..., by so many directions."""
+    nodes, weights = np.polynomial.legendre.leggauss(points)
     angle, weights = np.pi / 4 * (1 + nodes), np.pi / 2 * weights
-
-    def efficiencies(x):
-        width = x[:, None] * slenderness
-        share = width / (2 * np.pi) * np.sinc(width * np.sin(angle) / (2 * np.pi)) ** 2 * weights
-        return ((share * one).sum(axis=1) for one in _efficiencies(x[:, None] * np.cos(angle)))
-
-    return np.real(_over_frequency(n, ka, efficiencies, _FREQUENCIES))
+    width = ka[:, None] * slenderness
+    share = width / (2 * np.pi) * np.sinc(width * np.sin(angle) / (2 * np.pi)) ** 2 * weights
+    return ((share * one).sum(axis=1) for one in _efficiencies(ka[:, None] * np.cos(angle)))
 
 
-def _over_frequency(n: np.ndarray, x: np.ndarray, computed, most: float = np.inf) -> np.ndarray:
-    """Values of orders n at x = ka, of ``computed(x)`` which yields those of n = 0, 1, ...; none at x = 0.
+def _over_frequency(n: np.ndarray, x: np.ndarray, computed, *given, most: float = np.inf) -> np.ndarray:
+    """Values of orders n at x = ka of ``computed(x, *given)``, which yields n = 0, 1, ...; none at x = 0.
 
-    At more than ``most`` x splines of the logarithm go through the values at as many.
+    At more than ``most`` x splines of the logarithm go through the values at as many, which are kept.
     """
     values, moving = np.zeros(x.shape, complex), x > 0
     n, x = n[moving], x[moving]
     if not len(x):
         return values
-    if between := len(x) > most:
-        # even in the logarithm at low frequency, where powers rule, and in x where waves interfere
-        fine = np.geomspace(x.min(), x.max(), 20 * int(most))
-        scale = np.log(fine) + fine / 4
-        nodes = np.interp(np.linspace(scale[0], scale[-1], int(most)), scale, fine)
-        places = np.zeros(0, int)
+    found, orders = np.zeros(len(x), complex), int(n.max()) + 1
+    if len(x) > most:
+        nodes, logarithms = _logarithms(float(x.min()), float(x.max()), int(most), orders, computed, *given)
+        for m in np.unique(n):
+            found[n == m] = np.exp(not_a_knot(np.log(nodes), logarithms[m], np.log(x[n == m])))
     else:
         nodes, places = np.unique(x, return_inverse=True)
-    found = np.zeros(len(x), complex)
-    for m, row in zip(range(int(n.max()) + 1), computed(nodes)):
-        if between and (n == m).any():
-            size = np.log(np.maximum(np.abs(row), 1e-300))
-            logarithm = size + 1j * np.unwrap(np.angle(row))
-            found[n == m] = np.exp(not_a_knot(np.log(nodes), logarithm, np.log(x[n == m])))
-        elif not between:
+        for m, row in zip(range(orders), computed(nodes, *given)):
             found[n == m] = row[places[n == m]]
     values[moving] = found
     return values
+
+
+@lru_cache(maxsize=8)
+def _logarithms(
+    first: float, last: float, places: int, orders: int, computed, *given
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Places x = ka from first to last, and there the logarithms of the values of n = 0, 1, ..., (places,).
+
+    Variants of a set at the same speeds have the same places.
+    """
+    # even in the logarithm at low frequency, where powers rule, and in x where waves interfere
+    fine = np.geomspace(first, last, 20 * places)
+    scale = np.log(fine) + fine / 4
+    nodes = np.interp(np.linspace(scale[0], scale[-1], places), scale, fine)
+    rows = [row for _, row in zip(range(orders), computed(nodes, *given))]
+    sizes = [np.log(np.maximum(np.abs(row), 1e-300)) for row in rows]
+    return nodes, [size + 1j * np.unwrap(np.angle(row)) for size, row in zip(sizes, rows)]
 
 
 def _ratios(x: np.ndarray, spread: float) -> Iterator[np.ndarray]:
