@@ -27,6 +27,7 @@ from pydantic import ValidationError, ValidationInfo, model_validator
 from scipy.sparse import csr_array
 
 from femgear.case import text as case_text
+from femgear.case.dependencies import Steps
 from femgear.case.gear_set import need_set
 from femgear.case.mistakes import combine, translate
 from femgear.case.quantities import Section
@@ -612,8 +613,9 @@ def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, fl
 
 
 def prepared(
-    case: Case, tolerances: Path, *, positions: int = POSITIONS, cache: Path | None = None
-) -> tuple[SampleModel, str]:
+    case: Case, tolerances: Path, *, positions: int = POSITIONS, cache: Path | None = None,
+    steps: Steps | None = None
+) -> tuple[SampleModel, str]:  # fmt: skip
     """Prepare the samples of a case for a file of tolerances, whose text comes with the model.
 
     Refused is (CaseError) what `read_tolerances` and `sample_model` refuse, and back flanks (E-SUPPORT).
@@ -627,7 +629,7 @@ def prepared(
             value=True, limit="false", remedy="set it to false, or solve single samples by femgear run",
             file=case.location("static.back_flanks"),
         )  # fmt: skip
-    basis = design_basis(case, cache=cache)
+    basis = design_basis(case, cache=cache, steps=steps)
     torque = sun_torque(case, basis.gears)
     places = sample_positions(basis, torque, positions)
     model = sample_model(basis, found, sun_torque=torque, positions=places)
