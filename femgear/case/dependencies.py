@@ -65,7 +65,8 @@ def static_entries(case: Any) -> Entries:
 
 def solution_entries(case: Any) -> Entries:
     """List all that decides the last digit of static solution and stresses: the torque as it is given too."""
-    given = {"operation.input": case.operation.input, "operation.torque": case.operation.torque}
+    given = {key: value for key, value in every_entry(case).items() if key.startswith("operation.")}
+    given.pop("operation.speeds", None)
     return {**static_entries(case), **given, "static.stresses": case.static.stresses}
 
 

@@ -269,6 +269,28 @@ def test_answers_are_mappings_of_the_stages(coarse):
         answer["transient"]
 
 
+@pytest.mark.parametrize(
+    ("name", "kept", "anew"),
+    [
+        (
+            "helical_30_20_70",
+            {"helical.hand": "left"},
+            {"helical.helix_angle": "21 deg"},
+        ),
+        ("nrel_pgb_static", {"planar.torsion.sun": "3e6 N m/rad"}, {"operation.torque": "170000 N m"}),
+        ("spur_pair", {"dynamics.damping_ratio": 0.03}, {"operation.torque": "150 N m"}),
+    ],
+)
+def test_handles_of_other_trains_keep_their_static_solution(name, kept, anew, grids):
+    coarse = {"static.flank_elements": 4, "static.positions": 12}
+    handle = Live(with_values(read_case(CASES / f"{name}.toml"), coarse), cache=grids)
+    first = handle.answer.static
+    assert handle.change(kept).static is first and not handle.changed["static"]
+    answer = handle.change(anew)
+    assert handle.changed["static"]
+    assert_equal(answer, Answer(answer.case, Steps(), cache=grids), ("static",))
+
+
 def test_handles_of_other_trains_answer_too():
     """A train that names no entries computes its stages anew after every change."""
     handle = femgear.live(CASES / "four_stage_reducer.toml")

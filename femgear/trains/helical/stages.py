@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.dependencies import check_entries, static_entries
+from femgear.case.dependencies import Steps, check_entries, static_entries
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears import profile
@@ -73,10 +73,14 @@ _SPUR_TEETH = ("static_transmission_error", "mesh_stiffness", "load_sharing", "t
 
 
 def solve_helical_static(
-    case: HelicalCase, *, cache: Path | None = None, progress: Progress = silent
+    case: HelicalCase,
+    *,
+    cache: Path | None = None,
+    progress: Progress = silent,
+    steps: Steps | None = None,
 ) -> StaticResult:
     """Solve the spur gears of the transverse section, the whole face width loaded at once."""
-    return solve_static(_drive_flanks(case), cache=cache, progress=progress)
+    return solve_static(_drive_flanks(case), cache=cache, progress=progress, steps=steps)
 
 
 def solve_helical_stress(
