@@ -99,6 +99,8 @@ class ListedPairs:
         Smallest separation [m]; infinite where the flanks have no points in common.
     roll : (2, ...) array
         Roll lengths of the middle of the window on gear 1 and gear 2 [m].
+    centre : (...) array
+        As of `Windows` [m].
     tooth : (2, meshes, pairs) int array
         Tooth numbers in the first mesh period.
     first : (meshes,) int array
@@ -108,6 +110,7 @@ class ListedPairs:
     near: np.ndarray
     gap: np.ndarray
     roll: np.ndarray
+    centre: np.ndarray
     tooth: np.ndarray
     first: np.ndarray
 
@@ -380,13 +383,7 @@ def mesh_windows(
     both_flanks : bool
         Back flanks as well, as the second half of the meshes.
     """
-    tau = cycle_positions(positions)
-    # a tooth pair has one number in all slices; what is rounded off their mean belongs to the same period
-    middle = tau.reshape(len(tau), -1).mean(axis=1)
-    # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
-    ends = middle[-1] <= _SAME
-    turns = (np.ceil(middle - _SAME) if ends else np.floor(middle + _SAME)).astype(int)
-    tau, turns = tau.ravel(), np.repeat(turns, tau.size // len(tau))
+    tau, turns = _in_periods(cycle_positions(positions))
     N, pairs = planetary_set.n_planets, mesh_pairs(planetary_set)
     widths = [
         WIDTH * _contact_half_width(pair, share / width, modulus)
@@ -410,6 +407,27 @@ def mesh_windows(
             found.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
         teeth.append(tooth)
     return _gathered(found, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
+
+
+def pair_paths(planetary_set: GearSet, positions, *, both_flanks: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Compute path coordinates (meshes, P, pairs) [m] and teeth (2, meshes, pairs) of `mesh_windows`."""
+    tau, turns = _in_periods(cycle_positions(positions))
+    found = list[tuple[np.ndarray, np.ndarray]]()
+    for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
+        phase = flank_side(planetary_set, direction)[0]
+        found.append(_tooth_pairs(planetary_set, mesh_pairs(planetary_set), phase, direction, tau - turns))
+    zeta, tooth = zip(*found)
+    return np.concatenate(zeta), np.concatenate(tooth, axis=1)
+
+
+def _in_periods(tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (P,), of slices one after the other, by (P,) or (P, S), and the mesh periods passed."""
+    # a tooth pair has one number in all slices; what is rounded off their mean belongs to the same period
+    middle = tau.reshape(len(tau), -1).mean(axis=1)
+    # mesh periods are those of the record: one that ends at zero has its seams just after whole positions
+    ends = middle[-1] <= _SAME
+    turns = (np.ceil(middle - _SAME) if ends else np.floor(middle + _SAME)).astype(int)
+    return tau.ravel(), np.repeat(turns, tau.size // len(tau))
 
 
 def first_windows(planetary_set: GearSet, bodies: Bodies, sun_torque: float) -> tuple[float, float]:
@@ -700,13 +718,8 @@ def _window_compliance(
 
 def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int) -> MeshWindows:
     """Join all meshes; leading and trailing pairs that never come near are listed, but have no windows."""
-    used = np.concatenate([w.near.any(axis=1) for w in found])
-    # every mesh keeps the same number of pairs, starting at its own first candidate
-    first = used.argmax(axis=1)
-    count = int((used.shape[1] - used[:, ::-1].argmax(axis=1) - first).max())
-    first = np.minimum(first, used.shape[1] - count)
-    take = first[:, None] + np.arange(count)
-    mesh = np.arange(len(used))
+    take = kept_pairs(np.concatenate([w.near.any(axis=1) for w in found]))
+    first, mesh = take[:, 0], np.arange(len(take))
     places = mesh[:, None, None], np.arange(len(turns))[:, None], take[:, None, :]
     parts = {}
     for name in (f.name for f in fields(Windows)):
@@ -719,6 +732,7 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
         near=np.concatenate([w.near for w in found]),
         gap=np.concatenate([w.gap.min(axis=-1) for w in found]),
         roll=np.concatenate([w.roll[..., 1] for w in found], axis=1),
+        centre=np.concatenate([w.centre for w in found]),
         tooth=tooth,
         first=first,
     )
@@ -741,6 +755,16 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
         cell_area=area[:, None, None] * np.diff(cell_edges(cells)),
         listed=listed,
     )
+
+
+def kept_pairs(used: np.ndarray) -> np.ndarray:
+    """Numbers (meshes, kept) of the pairs that have windows, by which of all (meshes, pairs) are used.
+
+    Every mesh keeps the same number of pairs, starting at its own first candidate.
+    """
+    first = used.argmax(axis=1)
+    count = int((used.shape[1] - used[:, ::-1].argmax(axis=1) - first).max())
+    return np.minimum(first, used.shape[1] - count)[:, None] + np.arange(count)
 
 
 def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):

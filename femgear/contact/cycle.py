@@ -21,7 +21,9 @@ from femgear.contact.assembly import (
     enlarged,
     first_windows,
     in_windows,
+    kept_pairs,
     mesh_windows,
+    pair_paths,
 )
 from femgear.contact.batch import (
     BatchState,
@@ -628,12 +630,13 @@ class _Walk:
         tau, each = empty.position, 1
         if options.ahead is not None:
             tau, each = tau[:, None] + options.ahead, len(options.ahead)
+        P = len(empty.position) // self.repeats
         setup = mesh_windows(
             self.sector,
             self.bodies,
             share=share,
             nearest=nearest,
-            positions=tau,
+            positions=tau[:P],
             contact=empty.contact,
             cells=options.cells,
             deviations=self.deviations,
@@ -642,7 +645,7 @@ class _Walk:
         setup = replace(setup, images=self.images)
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
-        found, overflow, unknowns, P = [], False, 0, len(empty.position) // self.repeats
+        found, overflow, unknowns = [], False, 0
         together = _TOGETHER if each == 1 else max(_TOGETHER // each, 4)
         for first in range(0, P, together):
             some = np.arange(first, min(first + together, P))
@@ -676,7 +679,7 @@ class _Walk:
             overflow |= candidates.touches_window_end(state.active)
             if options.progress is not None:
                 options.progress(int(some[-1]) + 1, P)
-        record = self._record(found, setup, unknowns)
+        record = self._record(found, setup, tau, unknowns)
         if overflow:
             largest = 0.0 if record.slice_load is None else record.slice_load.max()
             share = enlarged(share, max(record.force.max(), record.back_force.max(), largest))
@@ -824,13 +827,18 @@ class _Walk:
             values["held_tangents"] = tangents.between_meshes(held, meshes)
         return values
 
-    def _record(self, found: list[dict], setup: MeshWindows, unknowns: int) -> MeshCycle:
-        """The record from what was found at its positions: with places of the tooth pairs, pins, message."""
+    def _record(self, found: list[dict], setup: MeshWindows, tau: np.ndarray, unknowns: int) -> MeshCycle:
+        """The record from what was found at its positions: with places of the tooth pairs, pins, message.
+
+        ``tau`` are all positions, of every slice.
+        """
         N, cells, every = self.planetary_set.n_planets, setup.cells, setup.places[0]
         meshes = mesh_count(self.planetary_set)
         drive, back = slice(0, meshes), slice(meshes, 2 * meshes)
         values = {name: np.concatenate([some[name] for some in found], axis=-1) for name in found[0]}
         path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
+        if self.repeats > 1:
+            values, path, tooth = self._with_all_pairs(values, setup, tau)
         path = path.reshape(*path.shape[:2], len(self.empty.position), -1).mean(axis=-1)
         if self.images > 1:
             s, turned = self.planetary_set, np.zeros((2, meshes), int)
@@ -848,12 +856,13 @@ class _Walk:
         values["back_tooth"] = tooth[:, back] if looked else np.zeros_like(tooth)
         if self.options.pressures:
             values["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
-            values["pressure_centre"] = np.moveaxis(setup.centre[drive], 2, 1)
+            values.setdefault("pressure_centre", np.moveaxis(setup.centre[drive], 2, 1))
         for axes, names in _AXES.items():
             if axes[0] == "m" and axes[1] != "m":
                 values |= {name: values[name][every] for name in names if name in values}
         if self.repeats > 1:
             values |= self._repeated(values)
+            values = self._with_near_pairs(values)
         record = replace(self.empty, **values)
         unloaded = record.force[:N] + record.back_force[:N] <= 0.0
         message = "all positions by the active set"
@@ -892,6 +901,47 @@ class _Walk:
             for name, of_pairs in zip(_PRESSED, (path, load), strict=True)
         }
 
+    def _with_all_pairs(self, values: dict, setup: MeshWindows, tau: np.ndarray) -> tuple[dict, Any, Any]:
+        """Values of the first part with slots for the tooth pairs of all parts, their paths and teeth.
+
+        And which of them had windows, as ``near`` (M, T, P).
+        """
+        zeta, tooth = pair_paths(self.sector, tau, both_flanks=False)
+        pitch, (M, T), kept = self.planetary_set.base_pitch, zeta.shape[::2], setup.zeta.shape[2]
+        first = np.rint((setup.zeta[:, 0, 0] - zeta[:, 0, 0]) / pitch).astype(int)
+        near = np.moveaxis(setup.listed.near.reshape(M, -1, tau[0].size, setup.listed.near.shape[2]), 3, 1)
+        slots = (
+            first[:, None] + np.arange(kept),
+            (first - setup.listed.first)[:, None] + np.arange(near.shape[1]),
+        )
+        values = dict(values)
+        if "pressed" in values:
+            values["pressed"] = values["pressed"] + first[:, None]
+        wide = {"near": (near.any(axis=-1), slots[1])}
+        if self.options.pressures:
+            wide["pressure_centre"] = np.moveaxis(setup.listed.centre, 2, 1), slots[1]
+        wide |= {
+            name: (values[name], slots[0]) for axes, names in _AXES.items() if axes[:2] == "ms"
+            for name in names if name in values
+        }  # fmt: skip
+        for name, (some, places) in wide.items():
+            values[name] = np.zeros((M, T, *some.shape[2:]), some.dtype)
+            inside = (places >= 0) & (places < T)
+            mesh, slot = np.nonzero(inside)
+            values[name][mesh, places[inside]] = some[mesh, slot]
+        return values, np.moveaxis(zeta, 2, 1), tooth
+
+    def _with_near_pairs(self, values: dict[str, Any]) -> dict[str, Any]:
+        """Values without the slots of pairs that never come near."""
+        values = dict(values)
+        take = kept_pairs(values.pop("near").any(axis=-1))
+        mesh = np.arange(len(take))[:, None]
+        for axes, names in _AXES.items():
+            for name in names if "s" in axes else ():
+                if name in values:
+                    values[name] = values[name][:, mesh, take] if axes == "gms" else values[name][mesh, take]
+        return values
+
     def _repeated(self, values: dict[str, Any]) -> dict[str, Any]:
         """Go on from the first part of the positions to all of them, by fields of `MeshCycle`.
 
@@ -914,6 +964,7 @@ class _Walk:
                 back: _same_pairs(values[f"{back}path"], mesh, number * part, pitch) for back in ("", "back_")
             }
             for axes, names in _AXES.items():
+                names = (*names, "near") if axes == "mst" else names
                 over_positions = (name for name in names if axes[-1] == "t" and name in values)
                 for name in (name for name in over_positions if values[name].shape[-1] == part):
                     here = values[name]
