@@ -859,6 +859,7 @@ class _Walk:
             values.setdefault("pressure_centre", np.moveaxis(setup.centre[drive], 2, 1))
         for axes, names in _AXES.items():
             if axes[0] == "m" and axes[1] != "m":
+                names = (*names, "near") if axes == "mst" else names
                 values |= {name: values[name][every] for name in names if name in values}
         if self.repeats > 1:
             values |= self._repeated(values)
