@@ -856,7 +856,7 @@ class _Walk:
         values["back_tooth"] = tooth[:, back] if looked else np.zeros_like(tooth)
         if self.options.pressures:
             values["pressure_offset"] = (np.arange(cells) + 0.5 - 0.5 * cells) * setup.cell[drive, None]
-            values.setdefault("pressure_centre", np.moveaxis(setup.centre[drive], 2, 1))
+            values.setdefault("pressure_centre", _over_positions(setup.centre[drive], tau[0].size))
         for axes, names in _AXES.items():
             if axes[0] == "m" and axes[1] != "m":
                 names = (*names, "near") if axes == "mst" else names
@@ -920,7 +920,7 @@ class _Walk:
             values["pressed"] = values["pressed"] + first[:, None]
         wide = {"near": (near.any(axis=-1), slots[1])}
         if self.options.pressures:
-            wide["pressure_centre"] = np.moveaxis(setup.listed.centre, 2, 1), slots[1]
+            wide["pressure_centre"] = _over_positions(setup.listed.centre, tau[0].size), slots[1]
         wide |= {
             name: (values[name], slots[0]) for axes, names in _AXES.items() if axes[:2] == "ms"
             for name in names if name in values
@@ -979,6 +979,11 @@ class _Walk:
             for name in (name for name in moved if name in values):
                 found[name].append(np.concatenate(_mapped(moved[name], values[name], planet, _turn(angle))))
         return {name: np.concatenate(parts, axis=-1) for name, parts in found.items() if parts}
+
+
+def _over_positions(values: np.ndarray, slices: int) -> np.ndarray:
+    """Values (M, T, P), means over slices, by those (M, P slices, T) of all slices one after the other."""
+    return np.moveaxis(values.reshape(len(values), -1, slices, values.shape[2]).mean(axis=2), 2, 1)
 
 
 def _same_pairs(path: np.ndarray, mesh: np.ndarray, later: int, pitch: float) -> np.ndarray:
