@@ -13,6 +13,7 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import lru_cache
 from importlib import metadata
 from pathlib import Path
 
@@ -329,14 +330,6 @@ def mesh_outline(outline, *, cache: Path | None = None) -> Grid:
         libraries is missing (E-GRID-GMSH), or an element is inverted (E-GRID).
     """
     plan = check_outline(outline)
-    expected = estimate_elements(plan)
-    if expected > MAX_ELEMENTS:
-        raise GridError(
-            f"the grid would have about {expected:.3g} elements",
-            code="E-GRID",
-            limit=f"at most {MAX_ELEMENTS}",
-            remedy="use fewer points along the outline",
-        )
     return _mesh_plan(plan) if cache is None else _mesh_cached(plan, Path(cache))
 
 
@@ -394,10 +387,13 @@ def mesh_outlines(outlines, *, cache: Path | None = None) -> tuple[Grid, ...]:
         return tuple(pool.map(lambda outline: mesh_outline(outline, cache=cache), outlines))
 
 
+_version = lru_cache(metadata.version)
+
+
 def _content_hash(plan: Plan) -> str:
     """Name of the grid in a cache: hash of the plan and of what makes the grid."""
     try:
-        gmsh = metadata.version("gmsh")
+        gmsh = _version("gmsh")
     except metadata.PackageNotFoundError as error:
         raise _library_error("the package gmsh is not installed") from error
     digest = hashlib.sha256(f"femgear grid {FORMAT} gmsh {gmsh}".encode())
@@ -408,7 +404,15 @@ def _content_hash(plan: Plan) -> str:
 
 
 def _mesh_plan(plan: Plan) -> Grid:
-    """A new grid of a plan, checked."""
+    """A new grid of a plan, checked; refused where it would have too many elements."""
+    expected = estimate_elements(plan)
+    if expected > MAX_ELEMENTS:
+        raise GridError(
+            f"the grid would have about {expected:.3g} elements",
+            code="E-GRID",
+            limit=f"at most {MAX_ELEMENTS}",
+            remedy="use fewer points along the outline",
+        )
     result = _run_gmsh(plan)
     points = np.vstack([plan.points, result["points"][len(plan.points) :]])
     grid = _second_order(plan, points, result["triangles"], result["face"])

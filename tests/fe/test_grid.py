@@ -168,6 +168,23 @@ def test_file_round_trip_is_exact(half, tmp_path):
     assert [p.name for p in tmp_path.iterdir()] == ["sector.msh"]
 
 
+def test_files_say_the_same_to_meshio(half, tmp_path):
+    import meshio
+
+    path = tmp_path / "a.msh"
+    write_grid(path, half)
+    found, read = meshio.read(path, file_format="gmsh"), read_grid(path)
+    np.testing.assert_array_equal(found.points[:, :2], read.points)
+    np.testing.assert_array_equal(found.get_cells_type("triangle6"), read.triangles)
+    edges, tags = found.get_cells_type("line3"), found.get_cell_data("gmsh:physical", "line3")
+    regions = found.get_cell_data("gmsh:physical", "triangle6")
+    assert found.field_data.keys() == {*read.boundaries, *read.regions}
+    for name, one in read.boundaries.items():
+        np.testing.assert_array_equal(edges[tags == found.field_data[name][0]], one)
+    for name, one in read.regions.items():
+        np.testing.assert_array_equal(np.flatnonzero(regions == found.field_data[name][0]), one)
+
+
 def test_unreadable_and_unwritable_files(half, tmp_path):
     (tmp_path / "bad.msh").write_bytes(b"$MeshFormat\n2.2 1 8\n")
     for name in ("bad.msh", "missing.msh"):

@@ -46,6 +46,26 @@ def plate():
     return rectangle(2.0, 1.0, 4)
 
 
+@pytest.mark.parametrize("grid", [rectangle(2.0, 1.0, 3, origin=(50.0, 7.0)), quarter_ring(0.05, 0.09)])
+def test_matrices_are_those_that_scikit_fem_assembles(grid):
+    """Of straight elements far from the origin, and of curved ones, at the same quadrature points."""
+    from skfem import BilinearForm
+    from skfem.helpers import dot, grad
+
+    from femgear.fe.elasticity import basis, node_of_dof
+
+    scalar = basis(grid)
+    order = np.argsort(node_of_dof(grid, scalar))
+    wanted = BilinearForm(lambda u, v, _: u * v).assemble(scalar).tocsr()[order][:, order]
+    found = mass(grid, Material(1.0, 0.0, 1.0)).tocsr()[::2, ::2]
+    assert abs(found - wanted).max() < 1e-11 * abs(wanted).max()
+    # with lam = 0 the trace of both directions is 3 mu times the Laplacian
+    wanted = BilinearForm(lambda u, v, _: dot(grad(u), grad(v))).assemble(scalar).tocsr()[order][:, order]
+    K = stiffness(grid, Material(2.0, 0.0, 1.0)).tocsr()
+    found = (K[::2, ::2] + K[1::2, 1::2]) / 3.0
+    assert abs(found - wanted).max() < 1e-10 * abs(wanted).max()
+
+
 @pytest.mark.parametrize("state", ["plane strain", "plane stress"])
 def test_stiffness_is_symmetric_and_has_three_rigid_motions(plate, state):
     K = stiffness(plate, STEEL, state=state, thickness=0.02)
