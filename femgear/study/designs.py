@@ -215,6 +215,7 @@ def _is_design(count: int, key: str, record: dict) -> bool:
     point, values = json.loads(key), record["values"].values()
     error = record.get("error", {"code": "", "key": None, "message": ""})
     texts = (error["code"], error["message"], "" if error["key"] is None else error["key"])
+    texts += tuple(code for codes in record.get("doubts", {}).values() for code in codes)
     return (
         len(point) in (0, count)
         and all(type(value) is float and math.isfinite(value) for value in values)
@@ -237,12 +238,15 @@ class Designs:
     ----------
     seconds : float
         What the designs computed now took, all together.
+    telling : bool
+        Whether findings that concern the quantities are looked for and kept: `doubts`.
     """
 
     def __init__(
         self, case: Case, keys, journal: Journal, *, cache: Path | None = None,
-        progress: Progress | None = None, runner: Runner | None = None
+        progress: Progress | None = None, runner: Runner | None = None, telling: bool = False
     ):  # fmt: skip
+        self.telling = telling
         self.case, self.journal, self.runner = case, journal, runner or Runner()
         self.seconds = 0.0
         self._computed: set[str] = set()
@@ -250,7 +254,7 @@ class Designs:
         # grids of other geometries are not left in the folder
         self._first = Answer(case, Steps(), cache=cache)
         self._last = json.dumps(()), self._first
-        self._packed = pickle.dumps((case, keys, cache))
+        self._packed = pickle.dumps((case, keys, cache, telling))
 
     def __reduce__(self):
         return _designs, (self._packed,)
@@ -298,6 +302,11 @@ class Designs:
             raise Failure(self.journal[key]["error"])
         return {q.name: found[q.name] for q in quantities}
 
+    def doubts(self, point: Point, quantities: Sequence[Quantity]) -> dict[str, list[str]]:
+        """Codes of the doubts and faults that concern quantities at a point that was computed, by name."""
+        known = self.journal.get(json.dumps(point), {}).get("doubts", {})
+        return {quantity.name: known.get(quantity.name, []) for quantity in quantities}
+
     def ahead(
         self, points: Iterable[Point], quantities: Sequence[Quantity], limits: Sequence[Limit] = ()
     ) -> Iterator[int]:
@@ -319,12 +328,14 @@ class Designs:
     def record(self, ask: Callable[[_Values], None], task: tuple[Point, Mapping[str, float]]) -> dict:
         """Record of a point of which some values are known, with what is asked or the reason why not."""
         (point, known), start = task, time.perf_counter()
-        found = dict(known)
+        found, doubts = dict(known), dict[str, list[str]]()
 
         def values(quantities: Sequence[Quantity]) -> dict[str, float]:
             missing = [quantity for quantity in quantities if quantity.name not in found]
             for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
                 found[quantity.name] = float(_finite(quantity, quantity.compute(self.answer(point))))
+            for quantity in quantities if self.telling else ():
+                doubts[quantity.name] = quantity.doubts(self.answer(point))
             return found
 
         record: dict = {"values": found}
@@ -336,6 +347,7 @@ class Designs:
             if not point:
                 raise
             record["error"] = _told(error)
+        record |= {"doubts": doubts} if self.telling else {}
         return record | {"seconds": round(time.perf_counter() - start, 3)}
 
     def _known(self, key: str) -> dict[str, float]:
@@ -343,16 +355,26 @@ class Designs:
 
     def _lacks(self, key: str, ask: Callable[[_Values], None]) -> bool:
         """Tell whether a point that has not failed lacks what is asked."""
-        known = self._known(key)
+        known, record = self._known(key), self.journal.get(key, {})
+        doubts = record.get("doubts", {})
+
+        def values(quantities: Sequence[Quantity]) -> dict[str, float]:
+            if self.telling and not all(quantity.name in doubts for quantity in quantities):
+                raise KeyError
+            return {quantity.name: known[quantity.name] for quantity in quantities}
+
         try:
-            ask(lambda quantities: {q.name: known[q.name] for q in quantities})
+            ask(values)
         except KeyError:
-            return "error" not in self.journal.get(key, {})
+            return "error" not in record
         return False
 
     def _store(self, key: str, record: dict, left: int) -> None:
         self.seconds += record["seconds"]
         self._computed.add(key)
+        if self.telling:
+            before = self.journal.get(key, {}).get("doubts", {})
+            record = record | {"doubts": before | record.get("doubts", {})}
         self.journal.add(key, record)
         if self._progress is not None:
             self._progress("designs", self.computed, self.computed + left)
@@ -361,8 +383,8 @@ class Designs:
 @lru_cache(maxsize=1)
 def _designs(packed: bytes) -> Designs:
     """The designs of a worker, which keeps from task to task what they share."""
-    case, keys, grids = pickle.loads(packed)
-    return Designs(case, keys, Journal(), cache=grids)
+    case, keys, grids, telling = pickle.loads(packed)
+    return Designs(case, keys, Journal(), cache=grids, telling=telling)
 
 
 def _told(error: FemgearError) -> dict:
@@ -396,7 +418,8 @@ def _finite(quantity: Quantity, value: float) -> float:
 @contextmanager
 def open_designs(
     case: Case, keys: Sequence[tuple[str, ...]], *, journal: str | Path | None = None,
-    cache: Path | None = None, progress: Progress | None = None, runner: Runner | None = None
+    cache: Path | None = None, progress: Progress | None = None, runner: Runner | None = None,
+    telling: bool = False
 ) -> Iterator[Designs]:  # fmt: skip
     """Open the designs of a case, with a journal on disk where one is named.
 
@@ -406,6 +429,8 @@ def open_designs(
         Entries of the case file that every value of a point sets.
     journal, cache, progress, runner
         As for `search.minimise`; only grids of the case itself are kept.
+    telling : bool
+        Look for findings that concern the quantities, see `Designs.doubts`.
 
     Raises
     ------
@@ -415,7 +440,9 @@ def open_designs(
     """
     more = {"keys": [" = ".join(entries) for entries in keys]}
     with open_journal(journal, case, more, partial(_is_design, len(keys))) as records:
-        yield Designs(case, tuple(keys), records, cache=cache, progress=progress, runner=runner)
+        yield Designs(
+            case, tuple(keys), records, cache=cache, progress=progress, runner=runner, telling=telling
+        )
 
 
 class Enough(Exception):

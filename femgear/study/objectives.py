@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Literal, get_args
@@ -19,10 +19,13 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import ACCELERATION, FREQUENCY, SPEED, TORQUE, Dimension, to_si
 from femgear.case.sections import LARGEST_TORQUE, Case
 from femgear.errors import CaseError
+from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness
 from femgear.trains.elastic import stages as elastic_stages
+from femgear.trains.elastic.checks import case_warnings, response_findings
 from femgear.trains.live import Answer
 from femgear.trains.reading import with_values
+from femgear.trains.static.results import LARGE
 
 if TYPE_CHECKING:
     from femgear.system.system import Response
@@ -81,6 +84,36 @@ def need_elastic_ring(case: Case, subject: str) -> None:
         )  # fmt: skip
 
 
+def _no_findings(answer: Answer) -> Iterable[Finding]:
+    return ()
+
+
+def _of_static(codes: tuple[str, ...], torque: float | None, answer: Answer) -> Iterator[Finding]:
+    """Findings of some codes of the static solution."""
+    return (one for one in under_torque(answer, torque).static.findings if one.code in codes)
+
+
+def _of_stresses(answer: Answer) -> Iterator[Finding]:
+    """Findings of stresses at kinks."""
+    return (one for one in (*answer.static.findings, *answer.stress.findings) if one.code == "W-KINK")
+
+
+def _of_response(at: Range, answer: Answer) -> Iterator[Finding]:
+    """Findings of the response over speeds, and of its damping."""
+    there = answer.of(at_speeds(answer.case, at))
+    yield from (one for one in case_warnings(there.case) if one.code == "W-DAMPING")
+    yield from elastic_stages.findings_of_response(there.case, there.modes, response_at(answer, at))
+
+
+def _of_level(at: Range, answer: Answer) -> Iterator[Finding]:
+    """Findings of the level of the housing over speeds, and of its damping."""
+    there = answer.of(at_speeds(answer.case, at))
+    yield from (one for one in case_warnings(there.case) if one.code == "W-DAMPING")
+    dynamics = there.dynamics
+    known = dynamics.level_change, dynamics.excitation_limit, dynamics.compared_to
+    yield from response_findings(there.case, dynamics.response, *known)
+
+
 @dataclass(frozen=True)
 class Quantity:
     """A number that follows from a case.
@@ -99,6 +132,8 @@ class Quantity:
         Of a transmission error [m] ``(sun_arc, deflection, N) -> (K, P) array``: its largest peak to peak.
     torque : float, optional
         Of a transmission error: on the input [N m]; None means that of the case.
+    findings : callable
+        ``(Answer) -> findings`` that concern the number.
     """
 
     name: str
@@ -107,9 +142,14 @@ class Quantity:
     compute: Callable[[Answer], float]
     signal: Callable | None = None
     torque: float | None = None
+    findings: Callable[[Answer], Iterable[Finding]] = _no_findings
 
     def __post_init__(self):
         _chosen(self.stage, {name: name for name in STAGES}, "stage")
+
+    def doubts(self, answer: Answer) -> list[str]:
+        """Codes of the doubts and faults that concern the number, each once."""
+        return list(dict.fromkeys(one.code for one in self.findings(answer) if one.severity != NOTE))
 
     def show(self, value: float) -> str:
         """Write an SI value in the unit of tables."""
@@ -135,7 +175,9 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
         )  # fmt: skip
     compute = partial(_peak_to_peak, signal, value)
     where = "" if value is None else f" at {TORQUE.show(value)}"
-    return Quantity(f"STE peak to peak, {mesh}{where}", _MICROMETRES, "static", compute, signal, value)
+    findings = partial(_of_static, (*LARGE, "W-POSITIONS"), value)
+    name = f"STE peak to peak, {mesh}{where}"
+    return Quantity(name, _MICROMETRES, "static", compute, signal, value, findings)
 
 
 def _signal(mesh: Mesh, arc: np.ndarray, deflection: np.ndarray, n: int) -> np.ndarray:
@@ -162,9 +204,8 @@ def mesh_force(
     """
     at = _range(first, last, speeds)
     of_mean = _chosen(part, {"dynamic": True, "peak": False}, "part")
-    return Quantity(
-        f"{part} mesh force, {_words(at)}", _FORCE, "dynamics", partial(_largest_force, at, of_mean)
-    )
+    name, compute = f"{part} mesh force, {_words(at)}", partial(_largest_force, at, of_mean)
+    return Quantity(name, _FORCE, "dynamics", compute, findings=partial(_of_response, at))
 
 
 def _largest_force(at: Range, dynamic: bool, answer: Answer) -> float:
@@ -195,9 +236,8 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     `femgear.housing.sensor.component_lines`.
     """
     at = _range(first, last, speeds)
-    return Quantity(
-        f"largest carrier order, {_words(at)}", ACCELERATION, "housing", partial(_largest_level, at)
-    )
+    name, compute = f"largest carrier order, {_words(at)}", partial(_largest_level, at)
+    return Quantity(name, ACCELERATION, "housing", compute, findings=partial(_of_level, at))
 
 
 def _largest_level(at: Range, answer: Answer) -> float:
@@ -254,7 +294,8 @@ def _tip_thickness(name: str, answer: Answer) -> float:
 
 def contact_pressure() -> Quantity:
     """Define the largest contact pressure away from the ends of the flanks [Pa]."""
-    return Quantity("contact pressure", _STRESS, "static", _largest_pressure)
+    findings = partial(_of_static, ("W-PRESSURE", "W-EDGE", "W-KINK"), None)
+    return Quantity("contact pressure", _STRESS, "static", _largest_pressure, findings=findings)
 
 
 def _largest_pressure(answer: Answer) -> float:
@@ -265,7 +306,8 @@ def root_stress(gear: _GearName) -> Quantity:
     """Define the largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
     places = {"sun": ((0, 0),), "planet": ((0, 1), (1, 0)), "ring": ((1, 1),)}
     wanted = _chosen(gear, places, "gear")
-    return Quantity(f"root stress, {gear}", _STRESS, "stress", partial(_largest_stress, wanted))
+    compute = partial(_largest_stress, wanted)
+    return Quantity(f"root stress, {gear}", _STRESS, "stress", compute, findings=_of_stresses)
 
 
 def _largest_stress(wanted: tuple[tuple[int, int], ...], answer: Answer) -> float:

@@ -19,9 +19,9 @@ import numpy as np
 
 from femgear.case.sections import Case
 from femgear.errors import FemgearError, StorageError
-from femgear.findings import Finding, tell
+from femgear.findings import Finding, as_text, findings_in, tell
 from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figure, save_figure
-from femgear.report.tables import Block
+from femgear.report.tables import Block, Marks
 from femgear.storage.files import (
     append_dataset,
     own_files,
@@ -103,7 +103,10 @@ def samples_into(
         tasks = _Tasks(model, seed, journal, columns, progress, runner or Runner())
         tasks.compute(count, method)
         data, ideal = _checked_again(case, model, text, tasks, count, again, more)
-        _tell_of_peaks(data)
+        missed = _missed_peaks(data)
+        for finding in _findings_of_peaks(data, missed):
+            tell(finding)
+            data.attrs["findings"] = as_text([finding])
         _write(data, columns, folder / FILES[0])
         save_figure(figure(data, columns), folder / FILES[1])
         write_text(to_toml(sample_case(case, model, seed, data.attrs["worst"])), folder / FILES[2])
@@ -118,20 +121,24 @@ def _ratios(larger: np.ndarray, smaller: np.ndarray) -> tuple[float, float]:
     return float(ratio.min()), float(ratio.max())
 
 
-def _tell_of_peaks(data: xr.Dataset) -> None:
-    """Tell (W-POSITIONS) where the positions of the samples miss much of what lies between them."""
-    missed = {
+def _missed_peaks(data: xr.Dataset) -> dict[str, float]:
+    """Find the share of every number that the positions of the samples miss at most, by name."""
+    return {
         name: 1.0 - 1.0 / _ratios(data[f"{name}_between"].values, data[f"{name}_exact"].values)[1]
         for name in SHOWN
         if f"{name}_between" in data
     }
+
+
+def _findings_of_peaks(data: xr.Dataset, missed: Mapping[str, float]) -> Iterator[Finding]:
+    """Say (W-POSITIONS) where positions miss much of what lies between them: shares of `_missed_peaks`."""
     name = max(missed, key=missed.__getitem__)
     if missed[name] > LARGEST_PEAK_DOUBT:
         text = (
             f"{data.attrs['positions']} positions of a mesh period miss up to {missed[name]:.0%} of the "
             f"{name.replace('_', ' ')} of the samples that were solved again"
         )
-        tell(Finding("W-POSITIONS", "--positions", text, remedy="take more positions"))
+        yield Finding("W-POSITIONS", "--positions", text, remedy="take more positions")
 
 
 def _limits(case: Case, model: SampleModel) -> Iterator[str]:
@@ -366,14 +373,17 @@ def _grid(columns: Columns, count: int) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[str]) -> list[Block]:
-    """Quantiles of all numbers, and how far to trust them; what they assume."""
+    """Quantiles of all numbers, marked where doubtful, and how far to trust them; what they assume."""
+    of_peaks, marks = _missed_peaks(data), Marks(findings_in(data.attrs))
     scales = {"m": (1e6, " [um]"), "N/m": (1e-6, " [N/um]"), "1": (1.0, "")}
     rows, errors, turns, between, missed = [], [], [], [], []
     for name in SHOWN:
         _, unit, words = NUMBERS[name]
         scale, shown = scales[unit]
-        values = [ideal[name][0], *data[f"{name}_quantile"].values, float(data[f"{name}_largest"])]
-        rows.append((f"{words}{shown}", *(f"{scale * value:.5g}" for value in values)))
+        values = [*data[f"{name}_quantile"].values, float(data[f"{name}_largest"])]
+        codes = ["W-POSITIONS"] if of_peaks.get(name, 0.0) > LARGEST_PEAK_DOUBT else []
+        texts = (marks(f"{scale * value:.5g}", *codes) for value in values)
+        rows.append((f"{words}{shown}", f"{scale * ideal[name][0]:.5g}", *texts))
         errors.append(f"{float(data[f'{name}_error']):.1e} ({name.replace('_', ' ')})")
         for where, told in (("turn", turns), ("between", between)):
             if (compared := data.get(f"{name}_{where}")) is not None:
@@ -395,6 +405,7 @@ def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[
         f"worst.toml (femgear run --only static): sample {worst}, STE {of_worst:.6g} um; "
         f"largest share: sample {data.attrs['largest']}",
         *limits,
+        *marks.notes,
     )
     shares = tuple(f"{q:.0%}" for q in QUANTILES)
     title = f"{data.attrs['samples']} samples, seed {data.attrs['seed']}"

@@ -17,7 +17,7 @@ import numpy as np
 
 from femgear.case.sections import Case
 from femgear.errors import CaseError
-from femgear.findings import Finding, tell
+from femgear.findings import CATALOGUE, Finding, tell
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
 from femgear.report.tables import Block
 from femgear.storage.files import own_files, resumable, write_csv
@@ -50,6 +50,8 @@ class Sweep:
         [SI]; NaN where a case cannot be computed.
     errors : tuple of str
         Why, one a point; empty where it can.
+    doubts : tuple of dict
+        Codes of the findings that make a quantity doubtful, by its name, one a point.
     computed : int
         Cases computed now; a journal held the others.
     """
@@ -60,16 +62,23 @@ class Sweep:
     values: np.ndarray
     errors: tuple[str, ...]
     computed: int
+    doubts: tuple[Mapping[str, Sequence[str]], ...] = ()
 
     @property
     def header(self) -> tuple[str, ...]:
         """Names of the columns of `records`, units of quantities in brackets."""
-        return (*self.keys, *(f"{q.name} [{q.dimension.si}]" for q in self.quantities), "error")
+        return (*self.keys, *(f"{q.name} [{q.dimension.si}]" for q in self.quantities), "findings", "error")
+
+    def codes(self, point: int) -> str:
+        """Write the codes of the findings that make numbers of a point doubtful."""
+        doubts = self.doubts[point].values() if self.doubts else ()
+        return " ".join(dict.fromkeys(code for codes in doubts for code in codes))
 
     def records(self) -> Iterator[tuple[object, ...]]:
         """Give the rows of a table, quantities in SI units."""
-        for point, values, error in zip(self.points, self.values, self.errors, strict=True):
-            yield (*point, *(float(value) for value in values), error)
+        rows = zip(self.points, self.values, self.errors, strict=True)
+        for i, (point, values, error) in enumerate(rows):
+            yield (*point, *(float(value) for value in values), self.codes(i), error)
 
 
 @one_blas_thread()
@@ -99,9 +108,9 @@ def sweep(
     keys, quantities = tuple(over), tuple(quantities)
     count = _check_sweep(case, over, quantities)
     points = tuple(itertools.product(*over.values()))
-    table, errors = np.full((count, len(quantities)), np.nan), []
+    table, errors, doubts = np.full((count, len(quantities)), np.nan), list[str](), list[dict]()
     keyed, warned = [(key,) for key in keys], count < _MANY
-    with open_designs(case, keyed, journal=journal, cache=cache, runner=runner) as designs:
+    with open_designs(case, keyed, journal=journal, cache=cache, runner=runner, telling=True) as designs:
         for done in designs.ahead(points, quantities):
             if progress is not None:
                 progress("cases", done, count)
@@ -115,7 +124,26 @@ def sweep(
                 errors.append("")
             except Failure as failure:
                 errors.append(f"[{failure.error['code']}] {failure}")
-        return Sweep(keys, points, quantities, table, tuple(errors), designs.computed)
+            doubts.append({} if errors[-1] else designs.doubts(point, quantities))
+        found = Sweep(keys, points, quantities, table, tuple(errors), designs.computed, tuple(doubts))
+    _tell_of_doubts(found)
+    return found
+
+
+def _tell_of_doubts(found: Sweep) -> None:
+    """Tell once each finding that makes numbers of a sweep doubtful: which quantities, how many cases."""
+    concerned = dict[str, dict[str, set[int]]]()
+    for point, doubts in enumerate(found.doubts):
+        for name, codes in doubts.items():
+            for code in codes:
+                concerned.setdefault(code, {}).setdefault(name, set()).add(point)
+    for code, quantities in concerned.items():
+        cases = len(set.union(*quantities.values()))
+        text = (
+            f"{cases} of {len(found.points)} cases (column findings), {' and '.join(quantities)}: "
+            f"{CATALOGUE[code][1][:1].lower()}{CATALOGUE[code][1][1:].rstrip('.')}"
+        )
+        tell(Finding(code, "", text, remedy="femgear run of such a case says more"), stacklevel=3)
 
 
 def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity]) -> int:
@@ -255,6 +283,8 @@ def describe_sweep(found: Sweep) -> Block:
         (*map(str, point), *(f"{value / unit.scale:.5g}" for value, unit in zip(values, units)))
         for point, values in zip(found.points, found.values)
     ]
+    if any(map(found.codes, range(len(rows)))):
+        header, rows = (*header, "findings"), [(*row, found.codes(i) or "-") for i, row in enumerate(rows)]
     if len(rows) > 2 * _SHOWN:
         gap = ("...", *("" for _ in header[1:]))
         rows = [*rows[:_SHOWN], gap, *rows[-_SHOWN:]]

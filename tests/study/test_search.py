@@ -7,6 +7,7 @@ import sys
 import textwrap
 import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ import pytest
 from femgear import cli
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, ConvergenceError, StorageError
+from femgear.findings import Finding
 from femgear.study.designs import Designs, Failure, Journal, evaluations, open_designs
 from femgear.study.front import check_second, non_dominated, pareto_front
 from femgear.study.objectives import (
@@ -27,7 +29,8 @@ from femgear.study.objectives import (
 )
 from femgear.study.problem import Limit, Problem, Variable
 from femgear.study.search import SearchOptions, _linear_program, has_derivatives, minimise, signals
-from femgear.study.sweep import parse_over, sweep, sweep_into
+from femgear.study.sweep import describe_sweep, parse_over, sweep, sweep_into
+from femgear.trains.live import Live
 from femgear.trains.reading import read_case, with_value, with_values
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
@@ -318,6 +321,57 @@ def test_sweep_of_all_combinations(case, tmp_path):
     assert wider.computed == 2 and len(list(wider.records())) == 8
     bad = sweep(case, {"sun.profile_shift": [0.52681, 0.9]}, [contact_ratio("sun-planet")])
     assert bad.errors[0] == "" and bad.errors[1].startswith("[E-") and np.isnan(bad.values[1, 0])
+
+
+def test_doubtful_numbers_of_a_sweep_have_the_codes_of_their_findings(case, tmp_path, capsys):
+    """In table, file and journal, from memory as from the journal; told once, with how many cases."""
+
+    def doubts(answer):
+        yield Finding("W-LOAD", "", "a note is no doubt")
+        if answer.case.dynamics.damping_ratio < 0.15:
+            yield Finding("W-EXCITATION", "", "ends early")
+
+    doubtful = replace(function("doubtful", lambda x, y: x), findings=doubts)
+    over, journal = {"dynamics.damping_ratio": [0.1, 0.12, 0.2]}, tmp_path / "s.jsonl"
+    # values that were kept without a look at what concerns them
+    with open_designs(case, [("dynamics.damping_ratio",)], journal=journal) as designs:
+        assert designs.values((0.1,), [doubtful]) == {"doubtful": 0.1}
+    for computed in (3, 0):
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            found = sweep(case, over, [doubtful, X_ALONE], journal=journal)
+        assert found.computed == computed
+        assert [row[-2] for row in found.records()] == ["W-EXCITATION", "W-EXCITATION", ""]
+        assert found.header[-2:] == ("findings", "error")
+        (text,) = (str(one.message.args[0]) for one in told)
+        assert text.startswith("[W-EXCITATION] 2 of 3 cases (column findings), doubtful: the excitation ends")
+    block = describe_sweep(found)
+    assert block.header[-1] == "findings"
+    assert [row[-1] for row in block.rows] == ["W-EXCITATION", "W-EXCITATION", "-"]
+    with warnings.catch_warnings(action="error"):
+        assert describe_sweep(sweep(case, over, [X_ALONE])).header[-1] == "x [1]"
+
+
+def test_forces_and_levels_over_speeds_tell_where_their_excitation_ends_short(case):
+    """Three mesh harmonics, against none given; whatever finds the response."""
+    coarse = {"static.flank_elements": 6, "static.positions": 16}
+    speeds = {"speeds": ("900 rpm", "1500 rpm")}
+    quantities = [replace_speeds(named_quantity(name, **speeds)) for name in ("mesh force", "housing")]
+    few = Live(with_values(case, coarse | {"dynamics.mesh_harmonics": 3})).answer
+    assert [quantity.doubts(few) for quantity in quantities] == [["W-EXCITATION"], ["W-EXCITATION"]]
+    enough = few.of(with_values(few.case, {"dynamics.mesh_harmonics": None, "dynamics.damping_ratio": 0}))
+    assert all("W-DAMPING" in quantity.doubts(enough) for quantity in quantities)
+
+
+def replace_speeds(quantity):
+    """The quantity at three speeds, so that it takes less time."""
+    compute, findings = quantity.compute, quantity.findings
+    at = (*compute.args[0][:2], 3)
+    return replace(
+        quantity,
+        compute=partial(compute.func, at, *compute.args[1:]),
+        findings=partial(findings.func, at),
+    )
 
 
 def test_a_sweep_writes_a_table_and_a_figure(case, tmp_path):

@@ -23,10 +23,11 @@ from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import mesh_normals, torques
+from femgear.gears.planetary import mesh_names
 from femgear.housing.casing_files import named_outputs, read_casing
 from femgear.housing.structure import FixedStructure, Support
 from femgear.report.style import NOTICEABLE
-from femgear.report.tables import first_speeds, response_warnings
+from femgear.report.tables import first_speeds, pulling_meshes, pulls_of, response_warnings
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.trains.elastic.model import MAX_DIAMETER
 from femgear.trains.rigid import check_one_period, member_speeds
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 
     from femgear.fe.reduction import CyclicModes
     from femgear.gears.planetary import PlanetarySet
+    from femgear.system.system import Response
 
 HIGHEST_RESPONSE = 200e3
 """The wavelength of shear in steel there is 16 mm: shorter waves are no matter of plane gear bodies [Hz]."""
@@ -362,6 +364,21 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
         change, limit = data["level_change"].values, data["excitation_limit"].values
         yield from missing_level(data["speed"].values, change, limit, float(data.attrs["compared_to"]))
     yield from response_warnings(data)
+
+
+def response_findings(
+    case: Case, response: Response, change: np.ndarray, limit: np.ndarray, compared_to: float
+) -> Iterator[Finding]:
+    """List what a response at the speeds of a case says against itself before its stability is known.
+
+    ``change`` (n_speeds,) [dB], ``limit`` (n_speeds,) and ``compared_to`` [Hz] as for `missing_level`.
+    """
+    rpm = np.array(case.operation.speeds) / RPM
+    yield from missing_level(rpm, change, limit, compared_to)
+    yield from pulling_meshes(rpm, mesh_names(response.force.shape[1] // 2), [pulls_of(response.force)])
+    if (bad := ~np.asarray(response.converged, bool)).any():
+        text = f"the periodic solution did not converge at {first_speeds(rpm[bad])}"
+        yield Finding("W-CONVERGENCE", "operation.speeds", text)
 
 
 def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:

@@ -756,13 +756,13 @@ def describe_housing(
 
     def codes(i: int) -> tuple[str, ...]:
         unstable = "turn_multiplier" in data and float(data["turn_multiplier"][i]) > 1.0 + CIRCLE
-        return (*doubts.get(i, ()), *(["W-UNSTABLE"] if unstable else []), "W-DAMPING", "W-POINTS")
+        return (*doubts.get(i, ()), *(["W-UNSTABLE"] if unstable else []), "W-DAMPING")
 
     def level(value: Any, i: int) -> str:
-        return shown_level(float(value[i]), changes[i], marks, *codes(i), of=_OF_LEVEL)
+        return shown_level(float(value[i]), changes[i], marks, *codes(i), "W-POINTS", of=_OF_LEVEL)
 
-    def marked(text: str, i: int) -> str:
-        return marks(text, *doubtful_excitation(changes[i]), *codes(i), of=_OF_LEVEL)
+    def marked(text: str, i: int, *more: str) -> str:
+        return marks(text, *doubtful_excitation(changes[i]), *codes(i), *more, of=_OF_LEVEL)
 
     def one_way(i: int) -> str:
         """Write the level by the forces of one way, and how far that of both ways is from it."""
@@ -780,7 +780,7 @@ def describe_housing(
             else {}
         ),
         "largest lines: carrier order (amplitude [m/s^2])": lambda i: marked(
-            _largest_lines(data.isel(speed=i)), i
+            _largest_lines(data.isel(speed=i)), i, "W-POINTS"
         ),
     }
     form = data.attrs["form"]

@@ -67,6 +67,7 @@ from femgear.trains.elastic.checks import (
     fastest_mesh_frequency,
     max_nodal_diameter,
     no_runup,
+    response_findings,
     runup_ends,
     slowest_wave,
 )
@@ -365,9 +366,7 @@ def dynamics_parts(
         early = None
     level_change = np.full(len(speeds), np.nan)
     level_change[some] = change
-    slow = frequency * HARMONICS < beyond - frequency
-    if slow.any():
-        level_change[slow] = lost_level(case, heard_lines, limit.frequency[slow], beyond, np.sign(carrier[0]))
+    _estimate_slow(level_change, heard_lines, case, frequency, carrier, limit, beyond)
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     room = _HARMONIC * limit.response * excitation.periods
     if case.housing.stands_still:
@@ -405,6 +404,27 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     frequency = _turning_speeds(case, modes)[0]
     limit = first_limit(case, modes, frequency)
     return solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
+
+
+@one_blas_thread()
+def findings_of_response(case: Case, modes: ModesResult, response: Response) -> Iterator[Finding]:
+    """List what speaks against the result of `solve_response`: levels are compared as in `solve_dynamics`."""
+    frequency, carrier = _turning_speeds(case, modes)
+    limit, change = first_limit(case, modes, frequency), np.full(len(frequency), np.nan)
+    up_to, beyond, change[_compared_speeds(case)] = _excitation_end(case, modes)
+    _estimate_slow(change, _heard_lines(case, modes), case, frequency, carrier, limit, beyond)
+    wider = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics)
+    if (wider.excitation != limit.excitation).any():
+        text = f"the excitation ends at {limit.frequency.max():.4g} Hz; a run takes it up to {up_to:.4g} Hz"
+        yield Finding("W-EXCITATION", "", text, remedy="give dynamics.up_to")
+    yield from response_findings(case, response, change, limit.frequency, beyond)
+
+
+def _estimate_slow(change, heard_lines: Heard, case: Case, frequency, carrier, limit, beyond: float) -> None:
+    """Put changes [dB] by `lost_level` into those of all speeds where these end with the record."""
+    slow = frequency * HARMONICS < beyond - frequency
+    if slow.any():
+        change[slow] = lost_level(case, heard_lines, limit.frequency[slow], beyond, np.sign(carrier[0]))
 
 
 def _fixed_part(case: Case, modes: ModesResult, carrier, limit: FrequencyLimit, own) -> FixedHousing:
@@ -563,11 +583,7 @@ def _run_up_change(
     change = np.full(len(speeds), np.nan)
     for speed, value in zip(np.array(case.operation.speeds)[_compared_speeds(case)], known):
         change[speeds == speed] = value
-    slow = frequency * HARMONICS < beyond - frequency
-    if slow.any():
-        change[slow] = lost_level(
-            case, heard_lines, limit.frequency[slow], beyond, float(np.sign(of_speed.carrier))
-        )
+    _estimate_slow(change, heard_lines, case, frequency, carrier, limit, beyond)
     some = np.union1d(checked_speeds(len(speeds), _COMPARED), level.argmax())
     some = some[np.isnan(change[some]) & (limit.frequency[some] < beyond - frequency[some])]
     if len(some):
