@@ -139,8 +139,9 @@ class PairSprings:
                 half = np.einsum("nva,an->vn", smooth[place], moments[w]).reshape(U - w, 3, N)
             others = moments[w:].reshape(half.shape)
             row = np.einsum("vb...,vb...->v...", half, others).reshape(U - w, N)
-            row += self.supports[place, w:, w].T
             found[w, w:] = found[w:, w] = row
+        if self.supports.any():
+            found += self.supports.transpose(1, 2, 0)[..., place]
         return found
 
 
