@@ -833,7 +833,9 @@ def samples(
     checked(index or 0, "--index", 0)
     data = read_case(case)
     with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
+        progress("curves of tooth pairs")
         basis = prepared(data, tolerances, positions=positions, cache=grid_cache())
+        progress("curves of tooth pairs", 1.0)
         if index is None:
             options = {"count": number, "seed": seed, "exact": method == "exact", "force": force}
             blocks, names = samples_into(data, output, basis, **options, progress=progress, runner=runner)

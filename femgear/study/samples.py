@@ -75,7 +75,7 @@ _FORCES, _LEAST = 48, 1e-3
 """Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
 _STRAIGHT = 0.005
 """Share of a peak to peak that straight lines between positions may miss, of the set without drawn errors."""
-_TOGETHER, _EXACT_TOGETHER, _TRIED = 128, 64, 32
+_TOGETHER, _EXACT_TOGETHER, _TRIED = 128, 128, 32
 """Samples as springs and positions of the whole problem solved at once; those
 of seed 0 that windows are tried with."""
 MOST_SAMPLES = 10_000_000
