@@ -395,16 +395,21 @@ class _ActiveSets:
         )
         for at, free in null.items():
             candidate = self.found.candidate[todo[at]]
-            arms = np.vstack([self.G[np.nonzero(candidate)[0]], self.arms])
-            gaps = np.append(separation[at][candidate], np.full(len(self.arms), self.clearance))
-            active = np.append(self.active[todo[at]][candidate], self.springs[todo[at]])
+            arms, gaps = self.G[np.nonzero(candidate)[0]], separation[at][candidate]
+            active = self.active[todo[at]][candidate]
+            if len(self.arms):
+                arms = np.vstack([arms, self.arms])
+                gaps = np.append(gaps, np.full(len(self.arms), self.clearance))
+                active = np.append(active, self.springs[todo[at]])
             motions[at] -= free @ (free.T @ motions[at])
             shift, *numbers = settle(arms, self.load, self.arm, free, gaps - arms @ motions[at], active)
             motions[at] += free @ shift
             turned[at] = np.abs(arms @ (free @ shift)).max(initial=0.0)
             for (cells, springs), chosen in zip((blocked, forced), numbers, strict=True):
-                told = np.isin(np.arange(len(gaps)), chosen)
-                cells[at][candidate], springs[at] = np.split(told, [candidate.sum()])
+                if len(chosen):
+                    told = np.zeros(len(gaps), bool)
+                    told[chosen] = True
+                    cells[at][candidate], springs[at] = np.split(told, [candidate.sum()])
         return motions, turned, blocked, forced
 
     def _refined(self, done) -> np.ndarray:
