@@ -27,6 +27,8 @@ _STILL = 1e-12
 _UNDAMPED = 1e-10
 # Harmonics of speeds treated together: their receptances and matrices stay in the cache.
 _BATCH = 4000
+# And the most harmonics of any of them over the fewest.
+_SPREAD = 3.0
 # Part of the deflections with their mean that fluctuations are at least taken to be.
 _LEAST = 1e-4
 # Krylov steps of the first cycle at most, of each one after it twice as many; cycles, their residual, that
@@ -103,11 +105,26 @@ def solve_spectral(
     lines: Any = [np.zeros((speeds, size, own + 1), complex) for size in (n, n, len(modes.frequency))]
     numbers: Any = [np.zeros(speeds, kind) for kind in (float, float, float, float, int, bool)]
     found = _Solved(*lines, *numbers)
-    along = np.lexsort((frequency, kept[1]))  # speeds of similar numbers of harmonics stand together
-    for part in np.split(along, np.flatnonzero(np.diff(np.cumsum(kept[1, along] + 1) // _BATCH)) + 1):
+    for part in _batches(frequency, kept[1]):
         how = _How(method, tolerance, max_iterations, radius)
         _solve_batch(modes, data, part, frequency / excitation.periods, kept, found, how)
     return _response(frequency, found, method, tolerance, excitation.periods)
+
+
+def _batches(frequency: np.ndarray, highest: np.ndarray) -> list[np.ndarray]:
+    """Numbers of speeds that are solved together, of similar numbers of harmonics (n_speeds,).
+
+    All of a batch have as many as the speed with the most.
+    """
+    batches, first, together = list[list[int]](), 0, 0
+    for speed in np.lexsort((frequency, highest)):
+        size = int(highest[speed]) + 1
+        together += size
+        if not batches or size > _SPREAD * first or together > _BATCH:
+            batches.append([])
+            first = together = size
+        batches[-1].append(int(speed))
+    return [np.array(batch) for batch in batches]
 
 
 @dataclass(frozen=True)
