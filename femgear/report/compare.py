@@ -11,7 +11,7 @@ from html import escape
 from typing import TYPE_CHECKING, Any
 
 from femgear.report.page import chart_figure, document, part_of, shown_data, table
-from femgear.report.tables import WARNINGS, Block, unmarked
+from femgear.report.tables import MARKS, WARNINGS, Block, is_bound, unmarked
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -21,6 +21,8 @@ _MEETING = ("operating [rpm]", "mode", "kind", "mesh harmonic")
 """Columns that tell which resonance a row is."""
 _EXCITED = "excited up to"
 """Column of where the excitation ends, on which levels depend."""
+NO_CHANGE = "-"
+"""Change of a number of which only a bound is known."""
 _FADED = 0.55
 """Opacity of the curves of the second run."""
 
@@ -121,6 +123,11 @@ def _differences(first: Block, second: Block) -> Block:
             "NO LIKE LEVELS: their excitation ends at different frequencies; give both cases the same "
             "dynamics.up_to or dynamics.mesh_harmonics",
         )
+    if any(change == NO_CHANGE for *_, change in rows):
+        notes += (f"{NO_CHANGE}: one of both is a bound (>), of which nothing tells how far it is away",)
+    for which, block, column in (("first", first, 2), ("second", second, 3)):
+        shown = "".join(row[column] for row in rows)
+        notes += tuple(f"{which}: {note}" for note in block.notes if note[0] in MARKS and note[0] in shown)
     return Block(first.title, header, tuple(rows), notes)
 
 
@@ -132,11 +139,13 @@ def _shared(block: Block, header: tuple[str, ...]) -> Block:
 
 
 def _change(first: str, second: str, *, decibels: bool) -> str:
-    """Change in per cent, of levels in dB, nothing where a cell is no number."""
+    """Change in per cent, of levels in dB, nothing where a cell is no number, `NO_CHANGE` of a bound."""
     try:
         x, y = (float(unmarked(one)) for one in (first, second))
     except ValueError:
         return ""
+    if is_bound(first) or is_bound(second):
+        return NO_CHANGE
     if decibels:
         return f"{y - x:+.3g} dB"
     return f"{100.0 * (y / x - 1.0):+.3g} %" if x else ""

@@ -21,7 +21,7 @@ MANY = 8
 """Rows of a table that shows the speeds, and speeds that a warning names."""
 WARNINGS = "Warnings"
 """Title of the table of findings."""
-_MARKS = "†‡§¶‖◊"
+MARKS = "†‡§¶‖◊"
 """Marks of doubtful numbers, in the order in which a table needs them."""
 RESPONSE_DOUBTS = "W-PULL", "W-CONVERGENCE", "W-UNSTABLE"
 """Findings of a periodic response that concern the numbers of the speeds at which they are."""
@@ -126,8 +126,8 @@ class Marks:
             return text
         raised = [code for code in dict.fromkeys(codes) if self.raised(code, of=of)]
         for code in raised:
-            repeats, number = divmod(len(self._used), len(_MARKS))
-            self._used.setdefault(code, _MARKS[number] * (repeats + 1))
+            repeats, number = divmod(len(self._used), len(MARKS))
+            self._used.setdefault(code, MARKS[number] * (repeats + 1))
         return text + "".join(self._used[code] for code in raised)
 
     @property
@@ -184,9 +184,14 @@ def in_decibels(change: float) -> str:
     return "below 0.05 dB" if abs(change) < 0.05 else f"{change:+.1f} dB"
 
 
+def is_bound(text: str) -> bool:
+    """Tell whether the text of a number is that of `lower_bound`."""
+    return text.startswith("> ")
+
+
 def unmarked(text: str) -> str:
     """Take the marks of `Marks`, and that of a lower bound, off the text of a number."""
-    return text.rstrip(_MARKS).removeprefix("> ")
+    return text.rstrip(MARKS).removeprefix("> ")
 
 
 def describe_modes(

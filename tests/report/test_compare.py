@@ -101,3 +101,25 @@ def test_curves_lie_over_each_other_within_joint_limits():
     field["panels"][0]["traces"] = [{"type": "heatmap"}]
     assert compare._overlaid(field, field) is None
     json.dumps(found, allow_nan=False)
+
+
+def test_a_bound_has_no_change_and_marks_keep_their_meaning():
+    """More than 1 against 20.14 is no change of +1910 %; a dagger is explained of the run that has it."""
+    header, meaning = (
+        ("speed [rpm]", "level [m/s²]", "K_v"),
+        "W-EXCITATION, doubt: it ends early",
+    )
+    short = Block(
+        "Levels", header, (("1000", "> 1", "1.001†"),), ("1 speed", f"† {meaning}", "‡ W-PULL, ...")
+    )
+    whole = Block("Levels", header, (("1000", "20.14", "1.058"),), ("1 speed",))
+    found = compare._differences(short, whole)
+    assert [row[1:] for row in found.rows] == [
+        ("level [m/s²]", "> 1", "20.14", "-"),
+        ("K_v", "1.001†", "1.058", "+5.69 %"),
+    ]
+    assert found.notes[0].startswith("-: one of both is a bound") and found.notes[1:] == (
+        f"first: † {meaning}",
+    )
+    back = compare._differences(whole, short)
+    assert back.rows[0][-1] == "-" and back.notes[-1] == f"second: † {meaning}"
