@@ -757,13 +757,13 @@ class _Walk:
 
     def _curves(self, record: MeshCycle) -> dict[str, np.ndarray]:
         """What has peaks over the positions, and the tooth pairs that carry as `tooth_pair_codes`."""
-        pitch = self.planetary_set.base_pitch
-        codes, later = (
-            tooth_pair_codes(record.path, record.tooth_load, record.position + after, pitch)
-            for after in (0.0, float(self.empty.periods))
-        )
-        curves = {name: np.asarray(getattr(record, name)) for name in _BETWEEN}
-        return curves | {"codes": codes, "later_codes": later}
+        pitch, curves = self.planetary_set.base_pitch, {n: np.asarray(getattr(record, n)) for n in _BETWEEN}
+        for name, after in (("codes", 0.0), ("later_codes", float(self.empty.periods))):
+            place = record.path, record.position + after
+            curves[name] = tooth_pair_codes(place[0], record.tooth_load, place[1], pitch)
+            if record.slice_load is not None:
+                curves[f"slice_{name}"] = tooth_pair_codes(place[0], record.slice_load, place[1], pitch)
+        return curves
 
     def _open_places(self, known: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
         """Find open peaks, see `open_places`; the first of planets that are alike stands for all."""
@@ -775,14 +775,20 @@ class _Walk:
             np.concatenate([numbers.sum(axis=0)[None], numbers[first]])
             for numbers in (known["codes"], known["later_codes"][:, order[:1]])
         )
-        # which pairs carry changes slopes of deflections; stiffnesses jump there, and are equal on both sides
+        # which pairs carry bends deflections; stiffnesses jump there, and are equal on both sides
+        # but for those of slices that begin to carry one after the other
         same = np.zeros((len(first) + len(share), len(order)), np.int64)
+        later_same = np.zeros(len(same), np.int64)
+        if "slice_codes" in known:
+            same[: len(first)] = known["slice_codes"][first]
+            later_same[: len(first)] = known["slice_later_codes"][first, order[0]]
         curves = np.concatenate([arc, deflection[first], stiffness[first], share])
         still = [1e-3] * (1 + len(first)) + [0.1] * len(same)
         least = np.array(still) * np.abs(curves).max(axis=1)
-        codes, later = np.concatenate([codes, same]), np.append(later[:, 0], same[:, 0])
+        codes, later = np.concatenate([codes, same]), np.append(later[:, 0], later_same)
         position, curves, codes = known["position"][order], curves[:, order], codes[:, order]
-        return open_places(position, curves, codes, least, self.empty.periods, later)
+        jumps = np.arange(len(curves)) > len(first)
+        return open_places(position, curves, codes, least, self.empty.periods, later, jumps)
 
     def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
         """What `MeshCycle` keeps of some positions, by the names of its fields; of the planets solved."""

@@ -5,6 +5,8 @@ equidistant positions cut them off. Between two positions a curve may rise on to
 both sides meet; where tooth pairs come or go between them, by as much as its steepest slope nearby allows.
 Intervals in which that exceeds what is known of a peak by more than half of `TOLERANCE` are halved, and those
 with other pairs at their ends until they are as short as `ENCLOSED`: slopes need not show a narrow peak.
+Stiffnesses jump where a pair begins to carry. Where leads differ that happens in one slice of the width after
+the other: what lies between two such jumps is enclosed as peaks are, by the slices that carry.
 """
 
 from __future__ import annotations
@@ -15,8 +17,8 @@ TOLERANCE = 0.01
 """Share of a peak to peak that what is not resolved may still add to it."""
 ENCLOSED = 1.0 / 64.0
 """Mesh periods between positions at least where tooth pairs come or go between them."""
-SHORTEST = 2.0**-10
-"""Mesh periods that are not halved."""
+SHORTEST, SHORTEST_DOUBTFUL = 2.0**-10, 2.0**-13
+"""Mesh periods that are not halved, and those that are not where they may add more than `TOLERANCE`."""
 MOST_ROUNDS, MOST_PLACES = 12, 512
 """Rounds of halving, and positions that they may add."""
 FEWEST = 16
@@ -37,11 +39,14 @@ def tooth_pair_codes(
 ) -> np.ndarray:
     """Find numbers (M, P) that are equal at positions where the same tooth pairs of a mesh carry.
 
-    From path coordinates [m] and loads, (M, T, P). A tooth pair is known by its place on the path at zero.
+    From path coordinates (M, T, P) [m] and loads, (M, T, P), or (M, T, S, P) in slices: then the same slices
+    carry too. A tooth pair is known by its place on the path at zero.
     """
     place = np.rint((path / base_pitch - position) * 1e6).astype(np.int64)
+    if load.ndim == 4:
+        place = place[:, :, None] * np.int64(1009) + np.arange(load.shape[2])[:, None]
     mixed = (place + 1_000_003) * np.int64(2_654_435_761) % np.int64(2_147_483_647)
-    return np.where(load > 0.0, mixed, 0).sum(axis=1)
+    return np.where(load > 0.0, mixed, 0).sum(axis=tuple(range(1, load.ndim - 1)))
 
 
 def open_places(
@@ -51,6 +56,7 @@ def open_places(
     least: np.ndarray,
     periods: int,
     later: np.ndarray | None = None,
+    jumps: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """Find the middles of intervals (n,) that may hold higher peaks, and what is left beyond them.
 
@@ -66,6 +72,9 @@ def open_places(
         Peak to peak below which a curve counts as constant.
     later : (K,) array, optional
         Numbers of the first position after all ``periods``: those of other teeth. Default: as at first.
+    jumps : (K,) bool array, optional
+        Curves that jump where their codes change, and go on at either side of the jump as before. Default:
+        none; they bend there.
 
     Returns
     -------
@@ -75,9 +84,11 @@ def open_places(
         Largest share of a peak to peak that intervals which are not halved any more may add.
     """
     other = codes != np.column_stack([codes[:, 1:], codes[:, 0] if later is None else later])
-    beyond, length = _beyond(position, values, other, least, periods)
+    jump = other & (np.zeros(len(values), bool) if jumps is None else jumps)[:, None]
+    beyond, length = _beyond(position, values, other, jump, least, periods)
     wanted = (beyond > 0.5 * TOLERANCE) | (other & (length > (1.0 + 1e-9) * ENCLOSED))
     halved = wanted.any(axis=0) & (length > SHORTEST)
+    halved |= (beyond > TOLERANCE).any(axis=0) & (length > SHORTEST_DOUBTFUL)
     left = np.where(halved, 0.0, beyond)
     places = (position + 0.5 * length)[halved]
     if position[-1] <= 1e-9:
@@ -91,14 +102,23 @@ def peak_doubt(position: np.ndarray, values: np.ndarray, least: np.ndarray, peri
 
     Parameters are those of `open_places`, of curves whose tooth pairs are not looked at.
     """
-    beyond, _ = _beyond(position, values, np.zeros(values.shape, bool), least, periods)
+    none = np.zeros(values.shape, bool)
+    beyond, _ = _beyond(position, values, none, none, least, periods)
     return float(beyond.max(initial=0.0))
 
 
 def _beyond(
-    position: np.ndarray, values: np.ndarray, other: np.ndarray, least: np.ndarray, periods: int
+    position: np.ndarray,
+    values: np.ndarray,
+    other: np.ndarray,
+    jump: np.ndarray,
+    least: np.ndarray,
+    periods: int,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Shares (K, P) of peaks to peaks by which curves may rise in intervals, and their lengths (P,)."""
+    """Shares (K, P) of peaks to peaks by which curves may rise in intervals, and their lengths (P,).
+
+    Bool arrays (K, P): intervals in which a curve may bend (``other``), in which it jumps (``jump``).
+    """
     length: np.ndarray = np.diff(np.append(position, position[0] + periods))
     after = np.roll(values, -1, axis=1)
     # a record that does not close ends at its end: nothing goes on from there to its beginning
@@ -107,7 +127,7 @@ def _beyond(
     size = np.maximum(high - low, least[:, None])
     # what is zero throughout, as of planets that carry nothing, has no peaks
     size = np.where(size > 0.0, size, 1.0)
-    steepest = np.abs(slope)
+    steepest = own = np.abs(slope)
     steepest = np.maximum(steepest, np.maximum(np.roll(steepest, 1, axis=1), np.roll(steepest, -1, axis=1)))
     beyond = np.zeros(values.shape)
     for sign, extreme in ((1.0, high), (-1.0, -low)):
@@ -120,6 +140,12 @@ def _beyond(
         most = np.where(meet, begin + rising * at, np.maximum(begin, end))
         by_slope = 0.5 * (begin + end) + 0.5 * steepest * length
         most = np.where(other, np.maximum(most, by_slope), most)
+        # each side goes on as a line up to a jump, which may lie anywhere; a mean slope beyond that of both
+        # neighbours hides a steeper one as a jump does
+        to_jump = np.maximum(
+            begin + np.maximum(rising, 0.0) * length, end + np.maximum(falling, 0.0) * length
+        )
+        most = np.where(jump | (other & (own >= steepest)), np.maximum(most, to_jump), most)
         # stiffnesses and shares that are zero go on no lower
         bounded = (sign < 0.0) & (low == 0.0)
         beyond = np.maximum(beyond, np.where(bounded, 0.0, (most - extreme) / size))
