@@ -18,7 +18,8 @@ def test_stage(benchmark, reference, name):
     for need in (*stage.needs, "grids"):
         getattr(reference, need)
     result = benchmark.pedantic(stage.run, args=(reference,), rounds=stage.rounds, warmup_rounds=1)
-    others = {"demo", "without_pictures", "reading", "help", "package"}  # processes of their own
+    # processes of their own
+    others = {"demo", "without_pictures", "first_line", "script", "reading", "help", "package"}
     memory = {} if name in others else peak_memory(name) or {}
     if memory:
         benchmark.extra_info.update(peak=memory["peak"], added=memory["peak"] - memory["before"])

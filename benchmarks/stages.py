@@ -317,9 +317,29 @@ def without_pictures(reference: Reference):
     _run(reference, "--no-pictures")
 
 
+def first_line(reference: Reference):
+    """``femgear run`` until the first line of its verdict."""
+    command = [sys.executable, "-m", "femgear.cli", *_run_arguments(reference)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert any(line.strip() for line in process.stdout)
+        process.terminate()
+
+
+def script(reference: Reference):
+    """Import femgear, solve for the static state, modes and response, in a new process."""
+    solve = "s = femgear.solve_static(case, cache=cache); m = femgear.solve_modes(case, s)"
+    _in_new_process(
+        f"import femgear; case, cache = femgear.read_case({str(CASE)!r}), {str(reference.cache)!r}; {solve}; "
+        "femgear.solve_dynamics(case, s, m)"
+    )
+
+
+def _run_arguments(reference: Reference, *words: str) -> list[str]:
+    return ["run", str(CASE), "-o", str(reference.cache / "results"), "--force", *words]
+
+
 def _run(reference: Reference, *words: str) -> None:
-    arguments = ["run", str(CASE), "-o", str(reference.cache / "results"), "--force", *words]
-    _in_new_process(f"from femgear.cli import main; main({arguments!r})")
+    _in_new_process(f"from femgear.cli import main; main({_run_arguments(reference, *words)!r})")
 
 
 def _in_new_process(program: str) -> None:
@@ -407,7 +427,16 @@ STAGES = {
     "whole": Stage("whole computation, grids cached", whole, ("grids",), _none, 3, 3.0),
     "whole_cold": Stage("whole computation, new grids", whole_cold, (), _none, 3),
     "demo": Stage("femgear run with pictures and report, as make demo", demo, (), _none, 3, 10.0),
-    "without_pictures": Stage("femgear run --no-pictures", without_pictures, (), _none, 3),
+    "without_pictures": Stage("femgear run --no-pictures", without_pictures, (), _none, 3, 1.5),
+    "first_line": Stage("femgear run until the first line of its verdict", first_line, (), _none, 3, 2.0),
+    "script": Stage(
+        "import femgear, static state, modes and response, in a new process",
+        script,
+        ("grids",),
+        _none,
+        3,
+        1.0,
+    ),
     "reading": Stage("import femgear and read the case", reading, (), _none, 9),
     "help": Stage("femgear --help", help_text, (), _none, 9, 0.3),
     "package": Stage("import femgear, with the start of Python", package, (), _none, 9, 0.1),
