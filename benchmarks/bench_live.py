@@ -28,7 +28,7 @@ CHANGES = {
 }
 # what keeps the set as it was for the changes that follow
 BACK = {"tip relief": {"sun.modifications": None}, "pin error": {"set.pin_errors": None}}
-LIMITS = {"damping": 0.2, "speeds": 0.2}
+LIMITS = {"damping": 0.15, "speeds": 0.15}
 """CPU [s] that the project promises."""
 STAGES = ("static", "modes", "dynamics", "housing")
 

@@ -488,3 +488,13 @@ def test_speeds_of_different_harmonics_together_equal_those_alone(planet_set, pl
             size = np.abs(expected).max()
             np.testing.assert_allclose(found[..., : 3 * h + 1], expected, atol=1e-9 * size, err_msg=name)
         assert together.tail[i] == pytest.approx(alone.tail[0], abs=1e-9)
+
+
+def test_batches_hold_speeds_of_similar_numbers_of_harmonics():
+    random = np.random.default_rng(1)
+    highest, frequency = random.integers(0, 600, 400), random.uniform(10.0, 1e3, 400)
+    batches = spectral._batches(frequency, highest)
+    np.testing.assert_array_equal(np.sort(np.concatenate(batches)), np.arange(400))
+    sizes = [highest[batch] + 1 for batch in batches]
+    assert all(size.max() <= 3 * size.min() and size.sum() <= 4000 for size in sizes)
+    assert [len(batch) for batch in spectral._batches(np.ones(3), np.array([7, 7, 7]))] == [3]
