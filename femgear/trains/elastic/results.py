@@ -55,6 +55,7 @@ from femgear.report.tables import (
     chosen,
     doubtful_excitation,
     in_decibels,
+    level_change_at,
     response_doubts,
     shown_level,
     tabulate,
@@ -846,7 +847,10 @@ def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float
 
 
 def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:
-    """Tabulate levels of the sensor over the speeds of runup.nc: of all lines, of the strongest orders."""
+    """Tabulate levels of the sensor over the speeds of runup.nc: of all lines, of the strongest orders.
+
+    The last column tells what a longer excitation changes the level of all lines [dB], NaN unknown.
+    """
     lines = run_up_lines(results.runup, results.housing.attrs)[0]
     heard = lines.order > 0
     levels = levels_of(lines.acceleration[:, heard], lines.frequency[:, heard], form)
@@ -854,7 +858,10 @@ def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:
     unit = form.replace("dB", "dB re 1e-6 m/s^2")
     names = (f"order {order} [{unit}]" for order in lines.order[heard][strongest])
     header = ["speed [rpm]", f"all lines [{unit.replace('peak', 'peak = sqrt(2) rms')}]", *names]
-    return header, np.column_stack([results.runup["speed"].values, levels[:, -1], levels[:, strongest]])
+    speed = results.runup["speed"].values
+    change = level_change_at(results.runup, speed)
+    columns = [speed, levels[:, -1], levels[:, strongest], change]
+    return [*header, "change by a longer excitation [dB]"], np.column_stack(columns)
 
 
 def sensor_spectra(results: Results) -> Iterator[Spectrum]:
