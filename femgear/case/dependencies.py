@@ -10,6 +10,7 @@ import hashlib
 import json
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Set
+from dataclasses import is_dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
 Entries = Mapping[str, object]
 """Values by dotted key."""
 Result = TypeVar("Result")
-_KEPT = 4
-"""Results of every step."""
+_KEPT, _ROOM = 4, 256e6
+"""Results of every step, and their size beyond which the oldest go [bytes]; the latest one stays."""
 FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"})
 """Entries that do nothing but separate flanks: no grid knows them, and derivatives reach them."""
 
@@ -186,9 +187,18 @@ class Steps:
         key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
         found[key] = result
         found.move_to_end(key)
-        if len(found) > _KEPT:
+        while len(found) > 1 and (len(found) > _KEPT or sum(map(_size, found.values())) > _ROOM):
             found.popitem(last=False)
         return result
+
+
+def _size(result: Any) -> float:
+    """Memory of the arrays of a result [bytes], roughly."""
+    if is_dataclass(result):
+        return sum(_size(value) for value in vars(result).values())
+    if isinstance(result, tuple | list):
+        return sum(map(_size, result))
+    return getattr(result, "nbytes", 0)
 
 
 def fingerprint(entries: Entries) -> str:

@@ -10,6 +10,7 @@ import pytest
 from pydantic import BaseModel
 
 import femgear
+from femgear.case import dependencies
 from femgear.case.dependencies import Steps
 from femgear.case.sections import Case
 from femgear.errors import CaseError, GeometryError
@@ -255,6 +256,19 @@ def test_a_refused_change_leaves_the_case_as_it_was(coarse, grids):
         handle.change("operation.torque")
     assert handle.answer is before
     assert handle.case == coarse
+
+
+def test_large_results_leave_when_others_come(monkeypatch):
+    monkeypatch.setattr(dependencies, "_ROOM", 2.5 * 8000)
+    steps, large = Steps(), [(np.zeros(1000), number) for number in range(6)]
+    for number, result in enumerate(large):
+        assert steps.keep("large", {"number": number}, result) is result
+        steps.keep("small", {"number": number}, (np.zeros(1), number))
+    assert [steps.kept("large", {"number": i}) is not None for i in range(6)] == [False] * 4 + [True] * 2
+    assert [steps.kept("small", {"number": i}) is not None for i in range(6)] == [False] * 2 + [True] * 4
+    monkeypatch.setattr(dependencies, "_ROOM", 1.0)
+    steps.keep("large", {"number": 7}, large[0])
+    assert steps.kept("large", {"number": 7}) is large[0] and steps.kept("large", {"number": 5}) is None
 
 
 def test_answers_are_mappings_of_the_stages(coarse):
