@@ -595,6 +595,27 @@ def test_export_writes_every_number_with_its_unit(tmp_path, capsys, pipeline):
     assert not (out / "exported").exists()
 
 
+def test_python_runs_the_package_as_the_program():
+    done = subprocess.run(
+        [sys.executable, "-m", "femgear", "--version"], capture_output=True, text=True, timeout=60
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, femgear.__version__)
+    refused = [sys.executable, "-m", "femgear", "check", "absent.toml"]
+    assert subprocess.run(refused, capture_output=True, timeout=60).returncode == 2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words", "unsaid"),
+    [
+        ('tip_diameter = "63 mm"', 'tip_diameter = "frei"', 'or "free"', "factor"),
+        ("tolerance = 1e-6", 'tolerance = 1e-6\nup_to = "1e12 Hz"', "E-RANGE", "factor"),
+    ],
+)
+def test_refusals_name_words_that_are_allowed_and_guess_no_absurd_unit(check, old, new, words, unsaid):
+    code, _, err = check(TEXT.replace(old, new))
+    assert code == 2 and words in err and unsaid not in err
+
+
 def test_check_refuses_what_a_run_would_refuse(check):
     swapped = with_values(read_case(CASE), {"operation.input": "ring", "operation.fixed": "sun"})
     code, out, err = check(to_toml(swapped))

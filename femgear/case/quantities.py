@@ -218,7 +218,8 @@ def _factor_hint(number: float, low: float, high: float, dimension: Dimension, t
             if written in text and low <= number * factor <= high:
                 return f"degrees and radians seem to be mixed up: {read} would be plausible"
         return None
-    for factor in (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9):
+    usual = (1e3, 1e-3) if dimension is FREQUENCY else (1e3, 1e-3, 1e6, 1e-6, 1e9, 1e-9)
+    for factor in usual:
         if low <= number * factor <= high:
             shown = dimension.show(number * factor)
             return f"a factor of {factor:g} would make it plausible ({shown}): check the unit"
@@ -378,7 +379,7 @@ def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
     stiffness = Quantity(dimension, low, high)
 
     def rigid_too(value: object) -> object:
-        return math.inf if value == RIGID else stiffness.read(value)
+        return math.inf if value == RIGID else _read_or_word(stiffness, value, RIGID)
 
     return _Reader(rigid_too, {"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
 
@@ -386,12 +387,23 @@ def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
 FREE = "free"
 
 
+def _read_or_word(quantity: _Reader, value: object, word: str) -> object:
+    """Read a quantity in whose place a word may stand; refusals say that it may."""
+    try:
+        return quantity.read(value)
+    except CaseError as error:
+        error.limit = (
+            f'{error.limit}, or "{word}"' if error.limit else f'a quantity with its unit, or "{word}"'
+        )
+        raise
+
+
 def LengthOrFree(low: float, high: float) -> _Reader:
     """Make the reader of a length [m] that may be ``"free"``, which is found; see `Quantity`."""
     length = Quantity(LENGTH, low, high)
 
     def free_too(value: object) -> object:
-        return FREE if value == FREE else length.read(value)
+        return FREE if value == FREE else _read_or_word(length, value, FREE)
 
     return _Reader(
         free_too, {"type": "string", "description": f'{length.schema["description"]}, or "{FREE}"'}

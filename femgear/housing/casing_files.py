@@ -388,7 +388,7 @@ def _ring_angles(place, number: list[int], pitch_radius: float, max_diameter: in
     _check(
         "the points leave a gap in the ring", gap.max() * max_diameter <= np.pi, code="E-RANGE", key="nodes",
         value=f"{np.degrees(gap.max()):.4g} deg between nodes {high}", limit=f"half a wave of {max_diameter} "
-        "nodal diameters", remedy="give points all around, or keep fewer diameters",
+        "nodal diameters", remedy="give points all around, or lower housing.nodal_diameters",
     )  # fmt: skip
     return angle
 
