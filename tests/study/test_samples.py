@@ -467,7 +467,7 @@ def test_two_processes_and_an_interrupted_command_give_the_same_bits(case, tmp_p
 def test_samples_that_are_killed_go_on_with_the_same_command(tmp_path, method):
     """By Ctrl-C and kill -9, in two processes and in one: the same numbers as without."""
     words = ["samples", CASE, "--tolerances", TOLERANCES, "--method", method]
-    words += ["-n", "2000" if method == "spring" else "500", "-o"]
+    words += ["-n", "6000" if method == "spring" else "500", "-o"]
     journal, lines = tmp_path / "killed" / "samples.jsonl", 0
     for way, workers in ((signal.SIGINT, 2), (signal.SIGKILL, 2), (signal.SIGKILL, 1)):
         run = programs.start([*words, "killed", "--workers", workers], tmp_path, fresh=True)
