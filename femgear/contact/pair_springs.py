@@ -17,6 +17,8 @@ _BOLD, _MOST_STEPS = 10, 100
 """Steps after which pairs open and close one at a time, and the most of these."""
 _SETTLED = 1e-8
 """Share of the load by which forces of tooth pairs may still change in the last step."""
+_BALANCED = 1e-6
+"""Share of the load that the forces of a solved position may miss."""
 _SOFTEST = 1e-13
 """Spring on every motion, over that of a tooth pair: it holds what no loaded pair holds."""
 _SIDE_BY_SIDE = 512
@@ -104,7 +106,9 @@ class PairSprings:
     def intervals(self, force: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Find the places in the tables of forces (U, N) at positions (N,), and how far beyond they lie."""
         count = len(self.forces) - 1
-        x = np.log(np.clip(force, *self.forces[[0, -1]]) * (1.0 / self.forces[0]))
+        # what is no number, of a problem that will not be solved, lies in the first interval
+        within = np.fmin(np.fmax(force, self.forces[0]), self.forces[-1])
+        x = np.log(within * (1.0 / self.forces[0]))
         interval = np.minimum((x * (1.0 / self.step)).astype(np.intp), count - 1)
         x -= interval * self.step
         interval += (np.arange(self.count)[:, None] * len(self.window) + place) * count
@@ -179,6 +183,10 @@ class _SpringNewton:
         found = np.setdiff1d(late, left)
         self.solved[found] = False
         self._iterate(found, _MOST_STEPS, careful=True)
+        # what is no number has no forces, and settles
+        arms = self.springs.arms.transpose(1, 2, 0)[..., self.place]
+        balance = self.load[:, None] - np.einsum("wmn,wn->mn", arms, self.force)
+        self.solved &= np.abs(balance).max(axis=0) < _BALANCED * np.abs(self.load).max()
 
     def _restart(self, todo: np.ndarray) -> None:
         """Begin some problems with the forces of the given state."""
@@ -284,12 +292,13 @@ class _Problems:
         settled = np.abs(change).max(axis=0) < self.newton.limit
         self.force = np.where(self.live, np.where(carries, np.maximum(F + length * change, 0.0), 0.0), F)
         self.motions += length * moved
-        ended = settled & (length == 1.0)
+        # a planet whose forces are zero may still have moved into one of its flanks
+        overlap = np.where(on, 0.0, gap - np.einsum("wmn,mn->wn", self.arms, length * moved))
+        fits = overlap.min(axis=0) >= -self.newton.limit
+        ended = settled & (length == 1.0) & fits
         if careful:
-            overlap = np.where(on, 0.0, gap)
-            more = np.flatnonzero(ended & self.live & (overlap.min(axis=0) < -self.newton.limit))
+            more = np.flatnonzero(settled & (length == 1.0) & ~fits & self.live)
             self.closed[overlap[:, more].argmin(axis=0), more] = True
-            ended[more] = False
         return ended
 
     def _eliminate(self, some, on, slope, gap, balance, change, moved) -> None:

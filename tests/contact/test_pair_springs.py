@@ -56,6 +56,12 @@ def test_no_problem_depends_on_those_beside_it(supports, sigma):
     on_sun, on_ring = force.reshape(8, 2, 3, -1, 60).sum(axis=3).swapaxes(0, 1)
     np.testing.assert_allclose(on_sun, on_ring, atol=1e-6 * model.load.max())
     np.testing.assert_allclose(on_sun.sum(axis=1), model.load[3], rtol=1e-7)
+    lost = errors.copy()
+    lost[7] = np.nan
+    with np.errstate(invalid="ignore"):
+        spoiled = solved(lost)
+    assert not spoiled[3][:, 7].any() and spoiled[3][:, np.arange(60) != 7].all()
+    np.testing.assert_allclose(spoiled[0][..., :7], force[..., :7], rtol=0.0, atol=1e-9 * force.max())
     for i in (0, 17, 59):
         for values, alone in zip(together, solved(errors[i : i + 1]), strict=True):
             np.testing.assert_allclose(
