@@ -273,7 +273,7 @@ def test_all_kinds_of_errors_at_a_negative_torque(basis):
 
 
 def test_a_planet_that_is_hardly_pressed_is_not_taken_for_open():
-    """Sample 422 of seed 1: its forces settle before its motion; springs were 3 % off, and open at a position."""
+    """Sample 422 of seed 1: forces settle before motions; springs were 3 % off, and open at a position."""
     model, _ = prepared(read_case(CASE), TOLERANCES, cache=grid_cache())
     errors = np.concatenate([model.draw(1, i, 1) for i in (146, 422)])
     springs, exact = spring_numbers(model, errors), exact_numbers(model, errors)
