@@ -58,6 +58,7 @@ from femgear.report.tables import (
     level_change_at,
     response_doubts,
     shown_level,
+    significant,
     tabulate,
 )
 from femgear.solvers.periodic.solution import CIRCLE
@@ -451,7 +452,8 @@ def verdict(results: Results) -> Iterator[Block]:
     if "static" in stages:
         static = results.static
         error = _by_kind(static["mesh"].values, peak_to_peak(static, "ste") * 1e6)
-        text = _kinds("{:.3f} um", error, lambda text: marks(text, *LARGE, "W-POSITIONS", of=("static",)))
+        shown = [f"{significant(value, 3)} um" for value in map(float, error)]
+        text = _kinds("{}", shown, lambda text: marks(text, *LARGE, "W-POSITIONS", of=("static",)))
         rows.append((f"transmission error, peak to peak{_where(static, '')}", text))
     factors, known, doubts = np.ones((1, 2)), dict[str, np.ndarray](), dict[int, tuple[str, ...]]()
     if "dynamics" in stages:
@@ -579,7 +581,7 @@ def _strength(
     kinked = root_doubts(results.findings, titles[number], titles[1 - number])
     yield f"largest root stress{where}", marks(f"{root[worst] * 1e-6:.1f} MPa, {_PARTS[worst]}", *kinked)
     pressures = [
-        marks(f"{kind} {one * 1e-6:.1f} MPa", *pressure_doubts(results.findings, kind, one))
+        marks(f"{kind} {significant(one * 1e-6, 1)} MPa", *pressure_doubts(results.findings, kind, one))
         for kind, one in zip(KINDS, contact)
     ]
     yield f"largest contact pressure{where}", ", ".join(pressures)

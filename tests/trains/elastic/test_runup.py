@@ -503,3 +503,12 @@ def test_pictures_of_a_run_up_say_where_the_excitation_ends_short(files, short_f
     one = short_files["housing"].isel(speed=[0]).assign(level_change=("speed", [20.0]))
     assert excited_to(one, 0).endswith("kHz alone (W-EXCITATION)")
     assert excited_to(one.assign(level_change=("speed", [0.3])), 0).endswith("kHz")
+
+
+def test_the_verdict_shows_errors_of_tiny_loads(case, files):
+    static = files["static"].copy()
+    for name in [name for name in static.data_vars if str(name).startswith("ste")]:
+        static[name] = static[name] * 1e-5
+    told, _ = told_of(case, {"static": static, "stress": files["stress"]})
+    said = next(text for name, text in told.items() if name.startswith("transmission error"))
+    assert "0.000 um" not in said and "e-06 um" in said
