@@ -33,7 +33,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg.blas import get_blas_funcs
 
 from femgear.errors import CaseError, ConvergenceError, checked_count
 from femgear.housing.carrier_orders import (
@@ -414,8 +413,7 @@ def _blend(share: np.ndarray, passes: list[DampingForces]) -> DampingForces:
     for parts in zip(*(one.parts for one in passes)):
         total = parts[0] * parts[0].dtype.type(share[0])
         for times, part in zip(share[1:], parts[1:]):
-            add = get_blas_funcs("axpy", (total, part))
-            total = add(part.ravel(), total.ravel(), a=times).reshape(total.shape)
+            total += part * part.dtype.type(times)
         blended.append(total)
     return DampingForces(*blended)
 
