@@ -924,7 +924,7 @@ class _Walk:
         values = dict(values)
         if "pressed" in values:
             values["pressed"] = values["pressed"] + first[:, None]
-        wide: dict[str, tuple[np.ndarray, np.ndarray]] = {"near": (near.any(axis=-1), slots[1])}
+        wide: dict[str, tuple[np.ndarray, np.ndarray]] = {"near": (np.asarray(near.any(axis=-1)), slots[1])}
         if self.options.pressures:
             wide["pressure_centre"] = _over_positions(setup.listed.centre, tau[0].size), slots[1]
         wide |= {
