@@ -48,7 +48,9 @@ def printed_in(encoding: str, monkeypatch, command) -> tuple[int, str, str]:
 
 def _nothing(*_, progress, **__):
     progress("static ±", 1, 1)
-    found = SimpleNamespace(points=(), computed=0, errors=(), keys=("sun.teeth",), quantities=(), values=())
+    found = SimpleNamespace(
+        points=(), computed=0, errors=(), keys=("sun.teeth",), quantities=(), values=(), codes=lambda _: ""
+    )
     return found, ["±.csv"]
 
 

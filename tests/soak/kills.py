@@ -10,6 +10,7 @@ import time
 from pathlib import Path
 
 from femgear.errors import FemgearError
+from femgear.storage.results import KEPT
 from femgear.trains.reading import open_results
 from femgear.trains.registry import TRAINS
 from soak.programs import (
@@ -96,14 +97,14 @@ def _unreadable(out: Path, name: str, known: Undisturbed, folder: Path) -> str:
 
 
 def _finished(out: Path) -> set[str]:
-    """Stages that a killed run had written down as done."""
+    """Stages that a killed run had written down for one that goes on: those after ten seconds, as docs say."""
     stages = set()
     for manifest in (out / "manifest.json", out / ".running" / "manifest.json"):
         if manifest.is_file():
             table = json.loads(manifest.read_bytes())
             if table["complete"]:
                 continue  # old results, or new ones that the same command replaces once more
-            stages |= {file.removesuffix(".nc") for file in table["files"] if file.endswith(".nc")}
+            stages |= {Path(file).stem for file in table["files"] if file.startswith(f"{KEPT}/")}
     return stages
 
 

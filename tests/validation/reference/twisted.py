@@ -22,7 +22,7 @@ import scipy.sparse as sp
 from numpy.polynomial import legendre
 
 from femgear.fe.compliance import _sparse_order, boundary_nodes, node_dofs, symmetric_factor
-from femgear.fe.elasticity import Material, _element_nodes, basis
+from femgear.fe.elasticity import Material, basis, node_of_dof
 
 if TYPE_CHECKING:
     from femgear.fe.grid import Grid
@@ -45,7 +45,7 @@ def section_matrices(grid: Grid, material: Material, twist: float) -> tuple[sp.c
         B[..., 1, 1], B[..., 5, 1], B[..., 3, 1], B[..., 4, 1] = across, along, turned, -twist * value
         B[..., 2, 2], B[..., 3, 2], B[..., 4, 2] = turned, across, along
         second[:, :, 4, i, 0] = second[:, :, 3, i, 1] = second[:, :, 2, i, 2] = value
-    dofs = (3 * _element_nodes(grid, scalar)[..., None] + np.arange(3)).reshape(m, 18)
+    dofs = (3 * node_of_dof(grid, scalar)[scalar.element_dofs].T[..., None] + np.arange(3)).reshape(m, 18)
     rows, columns = np.repeat(dofs, 18, axis=1).ravel(), np.tile(dofs, (1, 18)).ravel()
     first, second = first.reshape(*first.shape[:3], 18), second.reshape(*second.shape[:3], 18)
     found = []
