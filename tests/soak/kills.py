@@ -97,7 +97,7 @@ def _unreadable(out: Path, name: str, known: Undisturbed, folder: Path) -> str:
 
 
 def _finished(out: Path) -> set[str]:
-    """Stages that a killed run had written down for one that goes on: those after ten seconds, as docs say."""
+    """Stages that a killed run had written down for one that goes on, once they took ten seconds."""
     stages = set()
     for manifest in (out / "manifest.json", out / ".running" / "manifest.json"):
         if manifest.is_file():
