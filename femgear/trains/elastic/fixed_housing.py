@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -122,7 +122,11 @@ class HousingModel:
         """The set in the ring on its foundation, without supports or casing."""
         return self._surroundings(self.ring, (self.modes.excitation, self.modes.model.system.flexibility), 0)
 
-    @cache  # noqa: B019 (lives as long as the model)
+    @cached_property
+    def housing(self) -> _Surroundings:
+        """The set in its housing, made once for all parts of a run-up."""
+        return self.in_housing()
+
     def in_housing(self, *, even: bool = False) -> _Surroundings:
         """The set in its housing; with the mean of errors that turn if ``even``."""
         found = self._surroundings(self.structure, self.springs, fixed_diameters(self.case))
@@ -299,7 +303,7 @@ def _radial_sensor(structure: FixedStructure, named, angle: float, top: int) -> 
 
 def heard_in_housing(model: HousingModel, carrier: np.ndarray, limit: FrequencyLimit) -> HeardSpeeds:
     """What is kept of the run-up at speeds of the carrier [rad/s] in a housing that stands still."""
-    case, housing = model.case, model.in_housing()
+    case, housing = model.case, model.housing
     two_way = housing.solve(carrier, limit, _ACCURACY * case.dynamics.tolerance)
     lines = _first_lines(case, model.modes, model, housing.structure, two_way)
     orders, some = two_way.order, two_way.force
