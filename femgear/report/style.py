@@ -321,9 +321,10 @@ def excited_to(data, speed_index: int) -> str:
     """
     if "excitation_limit" not in data:
         return ""
-    words = f", excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
+    words = f"excited up to {1e-3 * float(data['excitation_limit'].values[speed_index]):.4g} kHz"
     short = "level_change" in data and abs(data["level_change"].values[speed_index]) >= NOTICEABLE
-    return f"{words} alone (W-EXCITATION)" if short else words
+    # a line of its own: titles are as wide as their pictures already
+    return f"\n{words} alone (W-EXCITATION)" if short else f", {words}"
 
 
 def digits(value: float) -> str:

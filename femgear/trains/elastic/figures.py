@@ -262,9 +262,10 @@ def order_spectrum(housing: xr.Dataset) -> Figure:
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
     for ax in axes:
         label(ax, y=_ACCELERATION)
-    speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
+    speed = rpm(housing["speed"].values[0])
     level = np.sqrt(0.5 * (linear[order > 0] ** 2).sum())
-    figure.suptitle(f"Order spectrum of the fixed sensor, {speed}: {level:.4g} m/s² r.m.s.", fontsize=12)
+    title = f"Order spectrum of the fixed sensor, {speed}: {level:.4g} m/s² r.m.s.{excited_to(housing, 0)}"
+    figure.suptitle(title, fontsize=12)
     if form != _EXACT:
         legend_below(figure)
     return figure
@@ -400,9 +401,9 @@ def microphone_spectrum(housing: xr.Dataset) -> Figure:
     label(axes[0], "frequency [kHz]", "sound pressure level\n[dB re 20 µPa]")
     for ax, harmonic in zip(axes[1:], bands):
         _draw_sensors(ax, lines, {_ACCELEROMETER: acceleration, _MICROPHONE: pressure}, harmonic)
-    speed = rpm(housing["speed"].values[0]) + excited_to(housing, 0)
+    speed, excited = rpm(housing["speed"].values[0]), excited_to(housing, 0)
     how = ", equivalent radiated power" if housing.attrs["method"] == "casing" else ""
-    figure.suptitle(f"Microphone at {place:g} m{how}, {speed}: {total:.1f} dB(A)", fontsize=12)
+    figure.suptitle(f"Microphone at {place:g} m{how}, {speed}: {total:.1f} dB(A){excited}", fontsize=12)
     legend_below(figure)
     return figure
 
