@@ -84,15 +84,15 @@ class MeshFluctuation:
 
 
 def gmres(
-    answer, right: np.ndarray, start, tolerance: float, cycles: int = CYCLES
+    answer, right: np.ndarray, size: float, start, tolerance: float, cycles: int = CYCLES
 ) -> tuple[np.ndarray, float, float, int]:
     """Solve ``x - answer(x) = right`` (n,) by GMRES.
 
     Y. Saad, M. H. Schultz, SIAM J. Sci. Stat. Comput. 7 (1986) 856-869.
 
-    The solution, its relative residual, the largest Ritz value of ``answer``, and the products taken.
+    The solution, its residual over ``size``, the largest Ritz value of ``answer``, and the products taken.
     """
-    found, size = (right if start is None else start), max(float(np.linalg.norm(right)), _TINY)
+    found = right if start is None else start
     rest, products, radius = right - found + answer(found), 1, 0.0
     for cycle in range(cycles):
         if not float(np.linalg.norm(rest)) > tolerance * size:

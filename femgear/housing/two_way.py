@@ -55,10 +55,12 @@ _EQUAL, _RESIDUAL = 1e-9, 1e-6
 """Part of the largest harmonic by which meshes that repeat others may differ; residual that is refused."""
 _PASSES, _MIXED = 60, 3
 """Passes of the damping at most, and those that are extrapolated together."""
-_INNER, _SINGLE = 3e-2, 1e-6
-"""Accuracy of a solution over the change by its pass; of the forces of the damping in single precision."""
-_MOST, _TINY = 4e9, np.finfo(float).tiny
-"""Size of what one speed takes at most [bytes]; what no norm is below."""
+_INNER, _SINGLE, _FIRST = 3e-2, 1e-7, 1e-4
+"""Accuracy of a solution over the change by its pass; of the forces of the damping in single precision; of
+the first solution over what fluctuates in its source."""
+_MOST, _TINY, _LEAST = 4e9, np.finfo(float).tiny, 1e-4
+"""Size of what one speed takes at most [bytes]; what no norm is below; part of the forces with their mean
+that fluctuations are at least taken to be."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +76,7 @@ class TwoWayResponse(ReadOnlyArrays):
     force : (n_speeds, n, n_orders) complex array
         Of the sun-planet, then the planet-ring meshes, of the planets that the others repeat or of all [N].
     residual : (n_speeds,) array
-        Of the forces in their equations, over their norm.
+        Of the forces in their equations, over the norm of what fluctuates.
     tail : (n_speeds,) array
         Share of the fluctuating planet-ring forces beyond half the side bands (root of energies), a measure
         of truncation.
@@ -152,7 +154,7 @@ def solve_two_way(  # noqa: PLR0913
         Of gears and ring as a whole, see `femgear.housing.set_damping.set_damping` [N s/m, ...]; without it
         gears and structure have each the modal damping of its own.
     tolerance : float
-        Relative residual of GMRES, and change of the forces by damping in their last pass.
+        Residual of GMRES, and change of the forces by damping in their last pass, both over what fluctuates.
     cycles : int
         Of GMRES, each of twice the steps of the one before; equations that take more are nearly singular.
     """
@@ -254,12 +256,19 @@ class _Problem:
         """Solve at a speed of the carrier [rad/s], positive."""
         blocks = blocks_of_speed(self.gears, self.structure, self.orders, self.place, speed, self.coupled)
         if self.damping is None:
-            found = self._solved(blocks, blocks.load(), None, None, tolerance)
+            found = self._solved(blocks, blocks.load(), None, None, max(tolerance, _FIRST))
+            found = self._solved(blocks, blocks.load(), None, found, tolerance)
             return _Answer(found.force, None, found.residual, found.radius, found.products)
         return self._damped(blocks, self.damping, tolerance)
 
-    def _solved(self, blocks: HarmonicBlocks, moved, given, start, tolerance: float) -> _Solution:
-        """Solve for forces e beyond k0, near ``start`` if it is given, with deflections d_0 and u_0."""
+    def _solved(
+        self, blocks: HarmonicBlocks, moved, given, before: _Solution | None, tolerance: float
+    ) -> _Solution:
+        """Solve for forces e beyond k0, near a solution before, with deflections d_0 and u_0.
+
+        What fluctuates is known by the solution before; the source alone is many times of it where the mesh
+        hardly feels what excites it.
+        """
         still = _over_ring(*blocks.deflections(np.zeros_like(self.source), moved, given))
         right, shape = self.source + self.fluctuation(still), self.source.shape
 
@@ -267,9 +276,10 @@ class _Problem:
             motion = blocks.deflections(flat.view(complex).reshape(shape))
             return self.fluctuation(_over_ring(*motion)).ravel().view(float)
 
-        first = None if start is None else start.ravel().view(float)
+        first = None if before is None else before.extra.ravel().view(float)
+        size = self._fluctuating(right if before is None else before.force)
         flat, residual, radius, products = gmres(
-            answer, right.ravel().view(float), first, tolerance, self.cycles
+            answer, right.ravel().view(float), size, first, tolerance, self.cycles
         )
         extra = flat.view(complex).reshape(shape)
         deflection, way = blocks.deflections(extra, moved, given)
@@ -278,15 +288,15 @@ class _Problem:
     def _damped(self, blocks: HarmonicBlocks, damping: SetDamping, tolerance: float) -> _Answer:
         """Solve with the damping of the set, whose forces follow the motion, pass by pass."""
         load, forces, answers = blocks.load(), damping.none(len(self.place)), damping.receptances(blocks)
-        start, products, radius, change, passes = None, 0, 0.0, 1.0, list[_Pass]()
+        found, products, radius, change, passes = None, 0, 0.0, 1.0, list[_Pass]()
         for _ in range(_PASSES):
-            accuracy = max(0.5 * tolerance, min(_INNER * change, 1e-4))
-            found = self._solved(blocks, load + forces.still, forces.way, start, accuracy)
-            start, products, radius = found.extra, products + found.products, max(radius, found.radius)
+            accuracy = max(0.5 * tolerance, min(_INNER * change, _FIRST))
+            found = self._solved(blocks, load + forces.still, forces.way, found, accuracy)
+            products, radius = products + found.products, max(radius, found.radius)
             made = damping.answer(blocks, answers, (found.extra, found.way, found.force), forces)
             apart = _over_ring(made.still - forces.still, made.way - forces.way).astype(complex)
             apart *= self.gears.mean[:, None, None]
-            change = float(np.linalg.norm(apart) / max(np.linalg.norm(found.force), _TINY))
+            change = float(np.linalg.norm(apart)) / self._fluctuating(found.force)
             # what GMRES leaves unsolved no further pass will mend
             if max(change, found.residual) <= tolerance or found.residual > accuracy:
                 break
@@ -297,6 +307,12 @@ class _Problem:
             forces = _blend(_shares([one.change for one in passes]), [one.forces for one in passes])
         drag = damping.on_all_modes(made.on_structure)
         return _Answer(found.force, drag, max(found.residual, change), radius, products)
+
+    def _fluctuating(self, forces: np.ndarray) -> float:
+        """Norm of forces (J, B, R) without those constant in time, which are often a thousand times it."""
+        constant = forces[:, self.orders.base + self.orders.seed == 0, self.orders.middle]
+        whole, still = float(np.linalg.norm(forces)), float(np.linalg.norm(constant))
+        return max(np.sqrt(max(whole**2 - still**2, 0.0)), _LEAST * whole, _TINY)
 
     def tail(self, force: np.ndarray) -> float:
         """Share (root of energies) of the fluctuating ring forces that is at the outer side bands."""
