@@ -54,6 +54,8 @@ _RAYS = 10
 _DYNAMIC = 80.0
 """Range of the waterfall [dB]."""
 _PIXELS = (400, 640)
+_NAME, _CIRCLE = np.array([0.1, 0.035]), np.array([0.02, 0.03])
+"""Width and height of the name of a mode, and of a crossing, with what is around it, parts of the axes."""
 _CUTS, _NAMED = 6, 8
 KIND_COLOURS = {
     "rotational": BLUE, "translational": VERMILION, "planet": GREEN, "mixed": PURPLE,
@@ -63,10 +65,16 @@ _MESHES = (BLUE, VERMILION)
 
 
 def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset, *, rays: int = _RAYS) -> Figure:
-    """Draw modes and so many mesh harmonics over the speeds of runup.nc, the excited crossings marked."""
+    """Draw modes and mesh harmonics over the speeds of runup.nc, the excited crossings marked.
+
+    So many harmonics at least, and those of the resonances that `runup_levels` names.
+    """
     figure, (ax,) = new_figure(height=5.8)
     speed, mesh = runup["speed"].values, runup["mesh_frequency"].values * 1e-3
-    top = min(float(runup["excitation_limit"].max()) * 1e-3, (rays - 2) * mesh[-1])
+    named = runup.isel(resonance=_strongest(runup))
+    shown = max((rays - 2) * mesh[-1], 1.05e-3 * float(named["frequency"].max()) if len(named["mode"]) else 0)
+    top = min(float(runup["excitation_limit"].max()) * 1e-3, shown)
+    rays = max(rays, int(named["mesh_harmonic"].max()) if len(named["mode"]) else 0)
     ax.set_xlim(speed[0], speed[-1])
     ax.set_ylim(0.0, top)
     for frequency, kind in zip(modes["frequency"].values * 1e-3, map(str, modes["kind"].values)):
@@ -74,15 +82,15 @@ def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset, *, rays: int = _RAYS)
             name = kind.removeprefix("ring, ")
             style = {"color": KIND_COLOURS.get(name, GREY), "linestyle": "--" if name != kind else "-"}
             ax.axhline(frequency, linewidth=1.2, label=f"{kind} mode", **style)
-    named = np.inf
+    before = np.inf
     for h in range(1, rays + 1):
         ax.plot(speed, h * mesh, color="0.55", linewidth=0.9)
         inside = h * mesh[-1] <= top
         at = (speed[-1], h * mesh[-1]) if inside else (top * speed[-1] / (h * mesh[-1]), top)
         side = {"xytext": (4, 0), "va": "center"} if inside else {"xytext": (0, 3), "ha": "center"}
-        if not inside and named - at[0] < 0.07 * np.ptp(speed):
+        if not inside and before - at[0] < 0.07 * np.ptp(speed):
             continue  # its name would lie on that of the ray before it
-        named = named if inside else at[0]
+        before = before if inside else at[0]
         ax.annotate(f"h = {h}", at, textcoords="offset points", fontsize=SMALL, color="0.35", **side)
     rows = (runup["mesh_harmonic"].values <= rays) & (runup["frequency"].values * 1e-3 <= top)
     level = runup["resonance_alone"].values[rows]
@@ -97,19 +105,22 @@ def campbell_diagram(runup: xr.Dataset, modes: xr.Dataset, *, rays: int = _RAYS)
 
 
 def _name_modes(ax, crossings: xr.Dataset, speed: np.ndarray) -> None:
-    """Write the numbers of the modes before their first crossings, side by side where two are close."""
-    before, low, high = -np.inf, *ax.get_ylim()
-    for mode in np.unique(crossings["mode"].values):
-        own = crossings["mode"].values == mode
-        frequency = float(crossings["frequency"].values[own][0]) * 1e-3
-        column = 0.125 if frequency - before < 0.03 * (high - low) else 0.03
-        first = (crossings["resonance_speed"].values[own].min() - speed[0]) / np.ptp(speed)
-        if first > column + 0.11:
-            before = frequency if column < 0.1 else -np.inf
-            ax.annotate(
-                f"mode {mode}", (column, frequency), xycoords=("axes fraction", "data"), va="center",
-                fontsize=SMALL, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
-            )  # fmt: skip
+    """Write the numbers of the modes on their lines, where neither a crossing nor a name is yet."""
+    low, high = ax.get_ylim()
+    across = (crossings["resonance_speed"].values - speed[0]) / np.ptp(speed)
+    up = (crossings["frequency"].values * 1e-3 - low) / (high - low)
+    circles, names = np.stack([across, up], axis=1), np.empty((0, 2))
+    for mode, first in zip(*np.unique(crossings["mode"].values, return_index=True)):
+        for left in np.arange(0.02, 0.88, 0.03):
+            middle = left + 0.5 * _NAME[0], up[first]
+            apart = [(np.abs(names - middle) > _NAME), np.abs(circles - middle) > 0.5 * (_NAME + _CIRCLE)]
+            if np.concatenate(apart).any(axis=1).all():
+                names = np.append(names, [middle], axis=0)
+                ax.annotate(
+                    f"mode {mode}", (left, up[first]), xycoords="axes fraction", va="center",
+                    fontsize=SMALL, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+                )  # fmt: skip
+                break
 
 
 def _operating(ax, runup: xr.Dataset) -> None:
@@ -244,20 +255,26 @@ def _curve(
         ax.plot(speed[part], values[part], linestyle=look, linewidth=1.6, label=name, **style)
 
 
+def _strongest(runup: xr.Dataset) -> list[int]:
+    """Numbers of the strongest resonances, those within a fortieth of the speeds of one of them left out."""
+    speed, place = runup["speed"].values, runup["resonance_speed"].values
+    named = list[int]()
+    for i in np.argsort(-runup["resonance_alone"].values, kind="stable"):
+        if len(named) < _NAMED and (np.abs(place[named] - place[i]) > 0.025 * np.ptp(speed)).all():
+            named.append(int(i))
+    return named
+
+
 def _name_resonances(ax, runup: xr.Dataset) -> None:
     """Name the strongest resonances above the curve of the level, none over another one."""
-    speed, place = runup["speed"].values, runup["resonance_speed"].values
-    named = list[float]()
-    for i in np.argsort(-runup["resonance_alone"].values, kind="stable"):
-        if len(named) < _NAMED and all(abs(place[i] - other) > 0.025 * np.ptp(speed) for other in named):
-            named.append(float(place[i]))
-            text = f"{runup['mode'].values[i]} × {runup['mesh_harmonic'].values[i]}"
-            at = (place[i], float(runup["resonance_level"].values[i]))
-            style = {"arrowstyle": "-", "color": "0.5", "linewidth": 0.8}
-            ax.annotate(
-                text, at, xytext=(0, 16), textcoords="offset points", rotation=90, ha="center", va="bottom",
-                fontsize=SMALL, arrowprops=style,
-            )  # fmt: skip
+    for i in _strongest(runup):
+        text = f"{runup['mode'].values[i]} × {runup['mesh_harmonic'].values[i]}"
+        at = float(runup["resonance_speed"].values[i]), float(runup["resonance_level"].values[i])
+        style = {"arrowstyle": "-", "color": "0.5", "linewidth": 0.8}
+        ax.annotate(
+            text, at, xytext=(0, 16), textcoords="offset points", rotation=90, ha="center", va="bottom",
+            fontsize=SMALL, arrowprops=style,
+        )  # fmt: skip
 
 
 def runup_figures(runup: xr.Dataset, modes: xr.Dataset) -> dict[str, Figure]:

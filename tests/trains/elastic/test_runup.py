@@ -13,7 +13,7 @@ from femgear.housing.orders import order_level
 from femgear.report.explorer import explorer
 from femgear.report.style import excited_to
 from femgear.report.tables import Marks, describe_response
-from femgear.report.waterfall import runup_levels
+from femgear.report.waterfall import campbell_diagram, runup_levels
 from femgear.solvers.linear.resonances import unresolved
 from femgear.storage.results import Manifest, Results
 from femgear.system.fourier import fluctuation, sample
@@ -503,6 +503,31 @@ def test_pictures_of_a_run_up_say_where_the_excitation_ends_short(files, short_f
     one = short_files["housing"].isel(speed=[0]).assign(level_change=("speed", [20.0]))
     assert excited_to(one, 0).endswith("kHz alone (W-EXCITATION)")
     assert excited_to(one.assign(level_change=("speed", [0.3])), 0).endswith("kHz")
+
+
+def test_the_campbell_diagram_holds_what_the_levels_name(files):
+    """Every resonance named beside the level has its circle there, and names of modes cover none."""
+    named = {text.get_text() for text in runup_levels(files["runup"]).axes[0].texts}
+    figure = campbell_diagram(files["runup"], files["modes"])
+    (ax,) = figure.axes
+    figure.canvas.draw()
+    circles = ax.collections[0].get_offsets().data
+    shown = {
+        f"{mode} × {harmonic}"
+        for mode, harmonic, speed, frequency in zip(
+            *(
+                files["runup"][name].values
+                for name in ("mode", "mesh_harmonic", "resonance_speed", "frequency")
+            )
+        )
+        if (np.abs(circles - [speed, 1e-3 * frequency]) < 1e-9).all(axis=1).any()
+        and 1e-3 * frequency <= ax.get_ylim()[1]
+    }
+    assert len(named) > 3 and named <= shown
+    boxes = [text.get_window_extent() for text in ax.texts if text.get_text().startswith("mode")]
+    places = ax.transData.transform(circles)
+    assert boxes and not any(box.contains(*place) for box in boxes for place in places)
+    assert not any(box.overlaps(other) for box in boxes for other in boxes if other is not box)
 
 
 def test_the_verdict_shows_errors_of_tiny_loads(case, files):
