@@ -175,6 +175,7 @@ def waterfall(runup: xr.Dataset) -> Figure:
     upper.set_xlabel("harmonic of the mesh frequency [1]", fontsize=SIZE - 1)
     bar = figure.colorbar(shown, ax=axes, pad=0.02)
     bar.set_label("level of the acceleration [dB re 1 µm/s²]", fontsize=SIZE)
+    _doubt(figure, runup)
     return figure
 
 
@@ -205,24 +206,29 @@ def order_cuts(runup: xr.Dataset) -> Figure:
         label(ax, "speed of the input [rpm]")
     for ax in axes[::3]:
         label(ax, y="amplitude [m/s²]")
+    _doubt(figure, runup)
     return figure
+
+
+def _doubt(figure: Figure, runup: xr.Dataset) -> None:
+    """Write above a picture of lines where the excitation ends short, if it does."""
+    if words := _ends_short(runup):
+        speed = runup["speed"].values[_short(runup)]
+        figure.suptitle(f"{speed.min():.4g} to {speed.max():.4g} rpm: {words}", fontsize=12)
 
 
 def runup_levels(runup: xr.Dataset) -> Figure:
     """Draw level, fluctuation of the mesh forces and dynamic factors of runup.nc over the speed."""
     figure, axes = new_figure(rows=3, height=7.4, sharex=True)
     speed, level = runup["speed"].values, runup["level"].values
-    short = np.abs(level_change_at(runup, speed)) >= NOTICEABLE
+    short = _short(runup)
     _curve(axes[0], speed, level, short, color=BLACK)
     axes[0].set_ylim(0.0, 1.45 * level.max(initial=0.0) or 1.0)
     words = "a × b: mode a at mesh harmonic b; dots: operating speeds"
     if runup.attrs.get("method", "exact") != "exact":
         words += f"\nexcited up to {1e-3 * runup['excitation_limit'].values.max():.4g} kHz"
     if short.any():
-        ends = 1e-3 * runup["excitation_limit"].values[short]
-        words += (
-            f"\ndotted: the excitation ends short, at {ends.min():.3g} to {ends.max():.3g} kHz (W-EXCITATION)"
-        )
+        words += f"\ndotted: {_ends_short(runup)}"
     label(axes[0], y="level, r.m.s. [m/s²]", title=words)
     _name_resonances(axes[0], runup)
     operating = np.atleast_1d(runup.attrs["operating_speeds"])
@@ -242,6 +248,19 @@ def runup_levels(runup: xr.Dataset) -> Figure:
     label(axes[1], y="mesh force, r.m.s.\nabout its mean [N]")
     label(axes[2], "speed of the input [rpm]", "dynamic factor K_v [1]")
     return figure
+
+
+def _short(runup: xr.Dataset) -> np.ndarray:
+    """Whether (bool, speed) the excitation ends short: more of it would change the level noticeably."""
+    return np.abs(level_change_at(runup, runup["speed"].values)) >= NOTICEABLE
+
+
+def _ends_short(runup: xr.Dataset) -> str:
+    """Say where the excitation ends short; empty if it does so at no speed."""
+    if not (short := _short(runup)).any():
+        return ""
+    ends = 1e-3 * runup["excitation_limit"].values[short]
+    return f"the excitation ends short, at {ends.min():.3g} to {ends.max():.3g} kHz (W-EXCITATION)"
 
 
 def _curve(
