@@ -641,6 +641,16 @@ def test_a_picture_of_shares_says_when_members_move():
     assert title.endswith(", on supports and bearings")
 
 
+def test_the_table_of_meshes_shows_soft_ones():
+    """Teeth of rubber: 0.00497 N/um is no 0.005."""
+    soft = synthetic.static().assign(mesh_stiffness=lambda data: 1e-5 * data["mesh_stiffness"])
+    block = describe_static(soft)
+    column = list(block.header).index("k mean [N/um]")
+    shown = [float(row[column]) for row in block.rows]
+    expected = 1e-6 * soft["mesh_stiffness"].mean("position").values[: len(shown)]
+    np.testing.assert_allclose(shown, expected, rtol=2e-4)
+
+
 def test_tables_explain_what_holds_the_members_and_what_the_solver_says():
     unequal, equal = (describe_static(synthetic.static(defect=one)).notes[0] for one in (0.2, 0.0))
     assert "all centres held, K_gamma = 1.0" in unequal and "K_gamma" not in equal

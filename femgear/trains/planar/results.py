@@ -20,7 +20,7 @@ from femgear.case.sections import output_member
 from femgear.findings import NOTE, Finding, findings_in
 from femgear.gears.kinematics import torques
 from femgear.report.response import harmonics_of
-from femgear.report.tables import Block, Marks, chosen, first_speeds, tabulate
+from femgear.report.tables import Block, Marks, chosen, first_speeds, significant, tabulate
 from femgear.storage.contents import Contents
 from femgear.storage.results import complex_entries, coordinates
 from femgear.system.fourier import fluctuation
@@ -386,9 +386,9 @@ def describe_branch(data: xr.Dataset) -> Block:
     columns = {
         "weight [Hz]": lambda point: f"{hertz[point]:.4f}",
         "": lambda point: named[point],
-        "carrier x rms [um]": lambda point: marks(f"{1e6 * rms[point, 0, 0]:.3f}", *doubtful(point)),
-        "ring x rms [um]": lambda point: marks(f"{1e6 * rms[point, 1, 0]:.3f}", *doubtful(point)),
-        "sun x rms [um]": lambda point: marks(f"{1e6 * rms[point, 2, 0]:.3f}", *doubtful(point)),
+        "carrier x rms [um]": lambda point: marks(significant(1e6 * rms[point, 0, 0], 3), *doubtful(point)),
+        "ring x rms [um]": lambda point: marks(significant(1e6 * rms[point, 1, 0], 3), *doubtful(point)),
+        "sun x rms [um]": lambda point: marks(significant(1e6 * rms[point, 2, 0], 3), *doubtful(point)),
         "back contact": lambda point: marks(
             f"{float(data['back_contact'].values[point].max()):.3f}", *doubtful(point)
         ),

@@ -945,10 +945,10 @@ def describe_static(data: xr.Dataset) -> Block:
         "STE mean [um]": lambda one: marks(error(one, float(mean_over_period(one, "ste"))), *LARGE),
         "STE p-p [um]": lambda one: marks(error(one, float(peak_to_peak(one, "ste"))), *LARGE, "W-POSITIONS"),
         "k mean [N/um]": lambda one: marks(
-            f"{float(mean_over_period(one, 'mesh_stiffness')) / 1e6:.3f}", *LARGE
+            significant(float(mean_over_period(one, "mesh_stiffness")) / 1e6, 3), *LARGE
         ),
         "k p-p [N/um]": lambda one: marks(
-            f"{float(peak_to_peak(one, 'mesh_stiffness')) / 1e6:.3f}", *LARGE, "W-POSITIONS"
+            significant(float(peak_to_peak(one, "mesh_stiffness")) / 1e6, 3), *LARGE, "W-POSITIONS"
         ),
         "force [N]": lambda one: significant(one.mesh_force.values.mean(), 3),
         "p max [MPa]": lambda one: _pressure(float(largest_pressure(one)), marks),
@@ -1166,7 +1166,7 @@ def _root_row(title: str, data: xr.Dataset, marked: Callable[[str], str]) -> tup
         marked(largest),
         *compared,
         *place,
-        f"{low:.1f} to {high:.1f}",
+        f"{significant(low, 1)} to {significant(high, 1)}",
         f"{one['load_cycles']:g}",
         *[f"{one[name]:.3f}" for name in ("root_face_factor", "iso_face_factor") if name in one],
     )
@@ -1176,7 +1176,7 @@ def _compared(found: float, nominal: float) -> tuple[str, str, str]:
     """Write both values in MPa and their ratio; a dash where there is none."""
     known = np.isfinite(nominal)
     ratio = f"{found / nominal:.2f}" if known and nominal else "-"
-    return f"{found * 1e-6:.1f}", f"{nominal * 1e-6:.1f}" if known else "-", ratio
+    return significant(found * 1e-6, 1), significant(nominal * 1e-6, 1) if known else "-", ratio
 
 
 def describe_set(case: Case) -> tuple[Block, ...]:
