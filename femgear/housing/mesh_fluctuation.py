@@ -15,7 +15,9 @@ from femgear.housing.carrier_orders import CarrierOrders
 _FEW, _STEPS, CYCLES, _RITZ = 3000, 250, 3, 60
 """Unknowns up to which a cycle of GMRES takes as many steps as it needs; steps of the first cycle of more of
 them at most, of each one after it twice as many; cycles; steps that tell the spectral radius."""
-_TWICE, _TINY = 0.7, np.finfo(float).tiny
+_TWICE, _TINY, _ROOM = 0.7, np.finfo(float).tiny, 15
+"""Part of its length that a vector keeps if it is orthogonal; what no norm is below; vectors in memory that
+a Krylov space starts with."""
 
 
 def _fft() -> Any:
@@ -111,30 +113,45 @@ def _krylov(answer, rest: np.ndarray, limit: float, most: int) -> tuple[np.ndarr
 
     And ``answer`` on the Krylov space (k, k).
     """
-    basis, hessenberg = np.empty((most + 1, len(rest))), np.zeros((most + 1, most))
-    triangle, right = np.zeros((most + 1, most)), np.zeros(most + 1)
-    turns, right[0] = np.zeros((most, 2)), np.linalg.norm(rest)
-    basis[0] = rest / right[0]
+    size = float(np.linalg.norm(rest))
+    basis, columns, triangle = (rest / size)[None], list[np.ndarray](), list[np.ndarray]()
+    right, turns = [size], list[tuple[float, float]]()
     for k in range(most):
-        image, known = answer(basis[k]), basis[: k + 1]
+        if k + 1 >= len(basis):  # most corrections take few steps: memory grows with them
+            basis = np.concatenate([basis, np.empty((max(k + 1, _ROOM), len(rest)))])
+        image, known, column = answer(basis[k]), basis[: k + 1], np.zeros(k + 2)
         before, length = np.inf, np.linalg.norm(image)
         while length < _TWICE * before:  # what is left is orthogonal only if it is not small
             share = known @ image
             image = image - share @ known
-            hessenberg[: k + 1, k] += share
+            column[: k + 1] += share
             before, length = length, np.linalg.norm(image)
-        hessenberg[k + 1, k] = length
-        basis[k + 1] = image / max(hessenberg[k + 1, k], _TINY)
+        column[k + 1] = length
+        basis[k + 1] = image / max(length, _TINY)
+        columns.append(column)
         # rotations make the equations (1 - answer) triangular
-        column = -hessenberg[: k + 2, k]
-        column[k] += 1.0
-        for i, (c, s) in enumerate(turns[:k]):
-            column[i], column[i + 1] = c * column[i] + s * column[i + 1], c * column[i + 1] - s * column[i]
-        length = max(float(np.hypot(column[k], column[k + 1])), _TINY)
-        turns[k] = c, s = column[k] / length, column[k + 1] / length
-        triangle[: k + 1, k] = column[: k + 1]
-        triangle[k, k], right[k], right[k + 1] = length, c * right[k], -s * right[k]
+        rotated = (-column).tolist()
+        rotated[k] += 1.0
+        for i, (c, s) in enumerate(turns):
+            rotated[i], rotated[i + 1] = (
+                c * rotated[i] + s * rotated[i + 1],
+                c * rotated[i + 1] - s * rotated[i],
+            )
+        length = max(float(np.hypot(rotated[k], rotated[k + 1])), _TINY)
+        c, s = rotated[k] / length, rotated[k + 1] / length
+        turns.append((c, s))
+        triangle.append(np.array([*rotated[:k], length]))
+        right[k:] = [c * right[k], -s * right[k]]
         if abs(right[k + 1]) <= limit:
             break
-    share = np.linalg.solve(triangle[: k + 1, : k + 1], right[: k + 1])
-    return share @ basis[: k + 1], hessenberg[: k + 1, : k + 1]
+    count = len(columns)
+    share = np.linalg.solve(_square(triangle, count), np.array(right[:count]))
+    return share @ basis[:count], _square(columns, count)
+
+
+def _square(columns: list[np.ndarray], count: int) -> np.ndarray:
+    """Matrix (count, count) of columns, some shorter, one longer."""
+    found = np.zeros((count, count))
+    for k, column in enumerate(columns):
+        found[: min(len(column), count), k] = column[:count]
+    return found
