@@ -531,17 +531,7 @@ def _op4(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], dict, dic
 
 def _modes(found, row, place, table: Sequence[Node], length: float, mass: float) -> _Modes:
     """Modes of a reduced stiffness and mass (r, r) in the units of the file, the feet held."""
-    for matrix, name in zip(found, ("stiffness", "mass")):
-        _check(
-            "a complex matrix", not np.iscomplexobj(matrix) or not matrix.imag.any(), code="E-TYPE", key=name,
-            limit="real numbers", remedy="leave structural damping out; give a damping ratio",
-        )  # fmt: skip
-        with np.errstate(invalid="ignore"):
-            apart, largest = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
-        _check(
-            f"the {name} matrix is not symmetric, or not finite", apart <= _ASYMMETRY * largest,
-            code="E-SYMMETRY", key=name, value=f"{apart:.3g} of {largest:.3g}", limit=f"{_ASYMMETRY:g} of it",
-        )  # fmt: skip
+    _check_matrices(found)
     # with time in seconds a stiffness scales as a mass; generalised coordinates take their units with them
     K, M = (0.5 * mass * np.real(matrix + matrix.T) for matrix in found)
     standing = [one for one in table if one.role == "foot"]
@@ -585,6 +575,21 @@ def _modes(found, row, place, table: Sequence[Node], length: float, mass: float)
     places = place | {one.number: one.position for one in table if one.position is not None}
     places = {number: length * x for number, x in places.items()}
     return _Modes(np.sqrt(square), phi, row, places, None, force, direct, compliance if len(light) else None)
+
+
+def _check_matrices(found) -> None:
+    """Refuse stiffness and mass that are complex, not symmetric or not finite."""
+    for matrix, name in zip(found, ("stiffness", "mass")):
+        _check(
+            "a complex matrix", not np.iscomplexobj(matrix) or not matrix.imag.any(), code="E-TYPE", key=name,
+            limit="real numbers", remedy="leave structural damping out; give a damping ratio",
+        )  # fmt: skip
+        with np.errstate(invalid="ignore"):
+            apart, largest = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
+        _check(
+            f"the {name} matrix is not symmetric, or not finite", apart <= _ASYMMETRY * largest,
+            code="E-SYMMETRY", key=name, value=f"{apart:.3g} of {largest:.3g}", limit=f"{_ASYMMETRY:g} of it",
+        )  # fmt: skip
 
 
 def _with_and_without_mass(M: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -656,44 +661,10 @@ def _analysis_data(sets: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 
 def _universal(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
     """Modes of a universal file, datasets 55 or 2414, at the nodes of datasets 15 or 2411."""
-    with nvh_library("universal files"):
-        import pyuff
-    with _foreign("universal file"):
-        content = _without_binary(path.read_bytes())
-        # the library reads a file that breaks off up to its last whole dataset
-        if sum(line.strip() == b"-1" for line in content.splitlines()) % 2:
-            raise ValueError("it breaks off within a dataset")
-        with NamedTemporaryFile(suffix=".uff") as file:
-            file.write(content)
-            file.flush()
-            sets = pyuff.UFF(file.name).read_sets()
-        sets = sets if isinstance(sets, list) else [sets]
-    system = [one["length"] for one in sets if one["type"] == 164]
-    _check(
-        "the file is in other units than told", not system or np.isclose(system[0] * length, 1.0, rtol=1e-3),
-        code="E-UNITS", key="units", value=f"units of length a metre: {system[:1]}", limit=f"{1 / length:g}",
-        remedy="give the units of the file",
-    )  # fmt: skip
+    sets = _datasets(path)
     modes = [one for one in sets if one["type"] == 55] + _analysis_data(sets)
-    real = all(one["analysis_type"] == 2 and not np.iscomplexobj(one["r1"]) for one in modes)
-    _check("complex modes", real, code="E-TYPE", key="modes", limit="real normal modes (analysis type 2)")
-    kinds = sorted({int(one["type"]) for one in sets})
-    _check(
-        "the file holds no modes", len(modes) > 0, code="E-COUNT", key="modes",
-        value=f"datasets {', '.join(map(str, kinds))}", limit="datasets 55, or 2414 of normal modes at nodes",
-        remedy="export normal modes, displacements at nodes, in ASCII",
-    )  # fmt: skip
     weights = np.array([one["modal_m"] for one in modes], float)
-    _check(
-        "modes without modal mass", bool((weights > 0).all()), code="E-MASS",
-        key="modal mass", value=weights.tolist(), limit="above 0 in every dataset 55 or 2414",
-        remedy="export modes with the modal mass that they are normalised to",
-    )  # fmt: skip
-    _check(
-        "modes do not tell the forces on the feet", not _feet(table), code="E-SUPPORT", key="nodes",
-        value=_feet(table), limit="feet with matrices",
-        remedy="leave the feet out of the table, or export reduced matrices",
-    )  # fmt: skip
+    _check_datasets(sets, modes, weights, table, length)
     numbers = sorted({int(number) for one in modes for number in one["node_nums"]})
     row = {(number, c + 1): 3 * i + c for i, number in enumerate(numbers) for c in range(3)}
     shape = np.zeros((len(modes), 3 * len(numbers)))
@@ -711,4 +682,50 @@ def _universal(path: Path, table: Sequence[Node], length: float, mass: float) ->
         2 * np.pi * np.array([one["freq"] for one in modes], float), shape / np.sqrt(mass * weights)[:, None],
         row, {number: length * x for number, x in places.items()}, damping if damping.any() else None,
         np.zeros((len(modes), 0)), np.zeros((0, len(shape.T))),
+    )  # fmt: skip
+
+
+def _datasets(path: Path) -> list[dict]:
+    """Read the datasets of a universal file in ASCII."""
+    with nvh_library("universal files"):
+        import pyuff
+    with _foreign("universal file"):
+        content = _without_binary(path.read_bytes())
+        # the library reads a file that breaks off up to its last whole dataset
+        if sum(line.strip() == b"-1" for line in content.splitlines()) % 2:
+            raise ValueError("it breaks off within a dataset")
+        with NamedTemporaryFile(suffix=".uff") as file:
+            file.write(content)
+            file.flush()
+            sets = pyuff.UFF(file.name).read_sets()
+    return sets if isinstance(sets, list) else [sets]
+
+
+def _check_datasets(
+    sets: Sequence[dict], modes: Sequence[dict], weights: np.ndarray, table: Sequence[Node], length: float
+) -> None:
+    """Refuse other units, and modes that are none, complex, without modal mass, or not those of feet."""
+    system = [one["length"] for one in sets if one["type"] == 164]
+    _check(
+        "the file is in other units than told", not system or np.isclose(system[0] * length, 1.0, rtol=1e-3),
+        code="E-UNITS", key="units", value=f"units of length a metre: {system[:1]}", limit=f"{1 / length:g}",
+        remedy="give the units of the file",
+    )  # fmt: skip
+    real = all(one["analysis_type"] == 2 and not np.iscomplexobj(one["r1"]) for one in modes)
+    _check("complex modes", real, code="E-TYPE", key="modes", limit="real normal modes (analysis type 2)")
+    kinds = sorted({int(one["type"]) for one in sets})
+    _check(
+        "the file holds no modes", len(modes) > 0, code="E-COUNT", key="modes",
+        value=f"datasets {', '.join(map(str, kinds))}", limit="datasets 55, or 2414 of normal modes at nodes",
+        remedy="export normal modes, displacements at nodes, in ASCII",
+    )  # fmt: skip
+    _check(
+        "modes without modal mass", bool((weights > 0).all()), code="E-MASS",
+        key="modal mass", value=weights.tolist(), limit="above 0 in every dataset 55 or 2414",
+        remedy="export modes with the modal mass that they are normalised to",
+    )  # fmt: skip
+    _check(
+        "modes do not tell the forces on the feet", not _feet(table), code="E-SUPPORT", key="nodes",
+        value=_feet(table), limit="feet with matrices",
+        remedy="leave the feet out of the table, or export reduced matrices",
     )  # fmt: skip
