@@ -663,8 +663,7 @@ def _universal(path: Path, table: Sequence[Node], length: float, mass: float) ->
     """Modes of a universal file, datasets 55 or 2414, at the nodes of datasets 15 or 2411."""
     sets = _datasets(path)
     modes = [one for one in sets if one["type"] == 55] + _analysis_data(sets)
-    weights = np.array([one["modal_m"] for one in modes], float)
-    _check_datasets(sets, modes, weights, table, length)
+    weights = _checked_weights(sets, modes, table, length)
     numbers = sorted({int(number) for one in modes for number in one["node_nums"]})
     row = {(number, c + 1): 3 * i + c for i, number in enumerate(numbers) for c in range(3)}
     shape = np.zeros((len(modes), 3 * len(numbers)))
@@ -701,10 +700,10 @@ def _datasets(path: Path) -> list[dict]:
     return sets if isinstance(sets, list) else [sets]
 
 
-def _check_datasets(
-    sets: Sequence[dict], modes: Sequence[dict], weights: np.ndarray, table: Sequence[Node], length: float
-) -> None:
-    """Refuse other units, and modes that are none, complex, without modal mass, or not those of feet."""
+def _checked_weights(
+    sets: Sequence[dict], modes: Sequence[dict], table: Sequence[Node], length: float
+) -> np.ndarray:
+    """Modal masses (m,); other units, no modes, complex ones, without mass or of feet are refused."""
     system = [one["length"] for one in sets if one["type"] == 164]
     _check(
         "the file is in other units than told", not system or np.isclose(system[0] * length, 1.0, rtol=1e-3),
@@ -719,6 +718,7 @@ def _check_datasets(
         value=f"datasets {', '.join(map(str, kinds))}", limit="datasets 55, or 2414 of normal modes at nodes",
         remedy="export normal modes, displacements at nodes, in ASCII",
     )  # fmt: skip
+    weights = np.array([one["modal_m"] for one in modes], float)
     _check(
         "modes without modal mass", bool((weights > 0).all()), code="E-MASS",
         key="modal mass", value=weights.tolist(), limit="above 0 in every dataset 55 or 2414",
@@ -729,3 +729,4 @@ def _check_datasets(
         value=_feet(table), limit="feet with matrices",
         remedy="leave the feet out of the table, or export reduced matrices",
     )  # fmt: skip
+    return weights
