@@ -78,7 +78,7 @@ def bodies_are_computed_once(folder_of_both_workers):
         for module, name in (
             (bodies, "stiffness"),
             (bodies, "flank_compliance"),
-            (width_waves, "_wave_compliance"),
+            (width_waves, "condensed_waves"),
             (stages, "root_stress"),
             (stages, "root_waves"),
         ):

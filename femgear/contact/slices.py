@@ -146,12 +146,17 @@ def solve_slices(
     for first in range(0, P, _TOGETHER):
         some = np.arange(first, min(first + _TOGETHER, P))
         rows = some[:, None] * each + np.arange(each)
-        smooth, across = found.images[:, rows], slice_compliance(found, rows, waves, N)
+        smooth = found.images[:, rows]
+        across, *of_held = slice_compliance(found, rows, (waves,) if held is None else (waves, held[1]), N)
         bodies = [(smooth, across)]
         if held is not None:
-            bodies.append((held[0][:, rows], slice_compliance(found, rows, held[1], N)))
+            bodies.append((held[0][:, rows], *of_held))
         newton = _SliceNewton(laws, rows, load, across.sum(axis=0), separations[some], smooth[0], tilting)
-        before = newton.tangents(bodies) if each == 1 else []
+        before = []
+        if each == 1:
+            before = (
+                newton.tangents(bodies) if tilting is not None else _of_one_slice(laws, rows, load, bodies)
+            )
         if tilting is not None:
             mesh, window = laws.mesh, np.arange(N)[:, None]
             coupling = tilting.coupling[mesh, window][:, :, mesh, window]
@@ -167,6 +172,14 @@ def solve_slices(
         np.concatenate(part) for part in zip(*parts, strict=True)
     )
     return SliceState(force, motions, laws.mesh, iterations, residual, tuple(own), joint.swapaxes(0, 1))
+
+
+def _of_one_slice(laws: PairLaws, rows, load, bodies) -> list[np.ndarray]:
+    """Tangents of `_SliceNewton` in the plane state: slices that are alike do not feel one another."""
+    P, W = len(rows), len(laws.mesh)
+    alone = [(smooth, np.zeros((len(smooth), P, 1, W, 1, W))) for smooth, _ in bodies]
+    plane = _SliceNewton(laws, rows, load, alone[0][1][0], np.zeros((P, 1, W)), alone[0][0][0])
+    return plane.tangents(alone)
 
 
 class _SliceNewton:
@@ -256,6 +269,9 @@ class _SliceNewton:
         """
         P, steps = len(self.rows), np.zeros(len(self.rows), int)
         load = images * np.abs(self.load).max()
+        # with members on springs, which move as a whole
+        N, n = self.shape[1], self.size
+        self.joined = (self.across + self.laws.supports[:, None] / (N * self.unit)).reshape(P, n, n)
         # separations that are large against the load leave their rounding in it
         limit = max(_SETTLED * load, _ROUNDED * self.widest / self.unit)
         todo = np.ones(P, bool)
@@ -289,9 +305,12 @@ class _SliceNewton:
         c, k, rows = at.shape[1], self.tilts.shape[-1], np.arange(P)[:, None]
         ones = (np.tile(self.laws.mesh, N)[at][..., None] == meshes) * on[..., None].astype(float)
         ones = np.concatenate([ones, np.zeros((P, k, len(meshes)))], axis=1)
-        found, A = [], np.zeros((1, P, c + k, c + k))
-        for smooth, across in bodies:
-            A, alone = self._bordered(smooth, across, on, at), []
+        found, A, slope = [], np.zeros((1, P, c + k, c + k)), self.gaps(self.force)[1]
+        moments = self._moments(self.force)
+        for number, (smooth, across) in enumerate(bodies, 1):
+            # the images are those of the last bodies alone
+            images = len(across) if number == len(bodies) else 1
+            A, alone = self._bordered(smooth[:images], across[:images], moments, slope, on, at), []
             for j in meshes:
                 own, some = _first(ones[:, :c, j] > 0.0)
                 own = np.hstack([own, np.ones((P, k), bool)])
@@ -307,34 +326,52 @@ class _SliceNewton:
         joint = ones.swapaxes(1, 2) @ np.linalg.solve(cyclic_harmonics(A), ones)
         return [joint / (N * self.unit), *found]
 
-    def _bordered(self, smooth: np.ndarray, across: np.ndarray, on, at) -> np.ndarray:
+    def _bordered(self, smooth, across, moments, slope, on, at) -> np.ndarray:
         """Compliance between the loaded slices and to their images, (I, P, c + k, c + k), over the unit."""
         (P, N, W), n, L = self.shape, self.size, self.rows.shape[1]
-        mu = self._moments(self.force).reshape(P, L, self.each, W, 3).swapaxes(2, 3)
+        mu = moments.reshape(P, L, self.each, W, 3).swapaxes(2, 3)
         half = mu @ smooth.swapaxes(5, 6).reshape(-1, P, L, W, 3, 3 * W)
         between = half.reshape(-1, P, L, W, self.each, 3, W) * mu.transpose(0, 1, 3, 4, 2)[:, :, None]
         between = between.sum(axis=-2).swapaxes(3, 4)
         # the springs contain what bodies yield under their own window
         own = np.diagonal(self.smooth, axis1=2, axis2=4).transpose(0, 1, 4, 2, 3)
         between[0][..., range(W), range(W)] -= np.einsum("plwsa,plwab,plwsb->plsw", mu, own, mu)
-        A, window = across / self.unit, np.arange(N)
-        A[:, :, window, :, window] += between.reshape(-1, P, N, W, W).transpose(2, 0, 1, 3, 4) / self.unit
-        A = A.reshape(-1, P, n, n)
-        A[0][:, range(n), range(n)] += self.gaps(self.force)[1].reshape(P, n)
-        A = A[:, np.arange(P)[:, None, None], at[:, :, None], at[:, None]]
+        between = between.reshape(-1, P, N, W, W) / self.unit
+        between[0][..., range(W), range(W)] += slope
+        across = across.reshape(-1, P, n, n)
         c, k, tilts = at.shape[1], self.tilts.shape[-1], self.tilts.reshape(n, -1)[at] * on[..., None]
-        found = np.zeros((len(A), P, c + k, c + k))
-        found[..., :c, :c] = np.where(on[:, :, None] & on[:, None], A, 0.0)
+        found = np.zeros((len(across), P, c + k, c + k))
+        for one, part, beside in zip(found, across, between, strict=True):
+            self._gather(one, part, beside, on, at, 1.0 / self.unit)
         found[0][:, range(c), range(c)] += ~on
         # tilts follow the increments: the border of the rows that carry
         found[..., :c, c:], found[..., c:, :c] = -tilts, tilts.swapaxes(1, 2) / N
         found[..., range(c, c + k), range(c, c + k)] = self.springs[len(self.load) - k :]
         return found
 
+    def _gather(self, system, across, between, on, at, factor=1.0) -> None:
+        """Put compliances of the slices that are ``on`` into the first rows and columns of systems (P, ., .).
+
+        Those ``across`` (P, n, n) times a factor, and those ``between`` the windows of a slice (P, N, W, W).
+        """
+        (_, _, W), (P, c) = self.shape, at.shape
+        p, i = np.arange(P)[:, None], np.arange(c)
+        block = system[:, :c, :c]
+        np.multiply(across[p[..., None], at[:, :, None], at[:, None]], factor, out=block)
+        if not on.all():
+            block *= on[:, :, None] & on[:, None]
+        # where the windows of the own slice stand
+        place = np.full((P, self.size), -1)
+        place[p, at] = np.where(on, i, -1)
+        beside = place.reshape(P, -1, W)[p, at // W]
+        p, i, w = np.nonzero((beside >= 0) & on[..., None])
+        own, window = np.divmod(at[p, i], W)
+        block[p, i, beside[p, i, w]] += between[p, own, window, w]
+
     def step(self, *, single: bool) -> np.ndarray:
         """Take a step at all positions; by how much forces change at most [N], endless while sides change."""
         (P, N, W), n, m = self.shape, self.size, len(self.load)
-        gap = self.gaps(self.force)[0]
+        gap, slope = self.gaps(self.force)
         wrong = np.where(self.closed, self.force < 0.0, gap < 0.0).reshape(P, n)
         changed = wrong.any(axis=1)
         if single:
@@ -342,18 +379,15 @@ class _SliceNewton:
             wrong &= np.arange(n) == last[:, None]
         self.closed = self.closed ^ wrong.reshape(P, N, W)
         before, self.force = self.force, np.where(self.closed, self.force, 0.0)
-        gap, slope = self.gaps(self.force)
-        A, window = self.across + self.laws.supports[:, None] / (N * self.unit), np.arange(N)
-        A[:, window, :, window] += self.between.swapaxes(0, 1)
-        A = A.reshape(P, n, n)
-        A[:, range(n), range(n)] += slope.reshape(P, n)
+        if (self.force != before).any():
+            gap, slope = self.gaps(self.force)
         # what is closed alone, and as many of the others as the position with the most of it asks for
         on, at = _first(self.closed.reshape(P, n))
         system, c = np.zeros((P, at.shape[1] + m, at.shape[1] + m)), at.shape[1]
-        rows = np.arange(P)[:, None]
-        system[:, :c, :c] = np.where(
-            on[:, :, None] & on[:, None], A[rows[..., None], at[:, :, None], at[:, None]], np.eye(c)
-        )
+        rows, between = np.arange(P)[:, None], self.between.copy()
+        between[..., range(W), range(W)] += slope
+        self._gather(system, self.joined, between, on, at)
+        system[:, range(c), range(c)] += ~on
         G = np.hstack([np.tile(self.laws.approach, (N, 1)), self.tilts.reshape(n, -1)])[at] * on[..., None]
         system[:, :c, c:], system[:, c:, :c] = -G, G.swapaxes(1, 2) / N
         system[:, range(c, c + m), range(c, c + m)] = self.springs

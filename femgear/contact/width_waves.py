@@ -29,13 +29,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.sparse import coo_array, csc_array
 
-from femgear.contact.assembly import Candidates, body_compliance, windows_of_bodies
+from femgear.contact.assembly import Candidates, windows_of_bodies
 from femgear.contact.bodies import (
     RING_STATE,
     TEETH_STATE,
@@ -49,8 +51,9 @@ from femgear.contact.bodies import (
 )
 from femgear.contact.local_compliance import depth_displacement, tip_corner
 from femgear.curves import not_a_knot
-from femgear.fe.compliance import condense_sector, tooth_compliance
+from femgear.fe.compliance import FreeSector, condense_sector, condense_sums, tooth_compliance
 from femgear.fe.elasticity import Material, material_of_each, stiffness, wave_stiffness
+from femgear.gears.gear import Gear
 from femgear.gears.pair import EACH
 
 _WAVES = 9
@@ -67,10 +70,13 @@ class WidthWaves:
         [1/m], ascending.
     bodies : tuple of Bodies
         One for every wave number: what bodies yield beyond the half space.
+    ring : CondensedWaves, optional
+        Whatever holds the ring.
     """
 
     wave_number: np.ndarray
     bodies: tuple[Bodies, ...]
+    ring: CondensedWaves | None = None
 
     @property
     def width(self) -> float:
@@ -100,6 +106,95 @@ def wave_displacement(x, depth, wave_number: float, material: Material) -> np.nd
     return (1 + nu) / (np.pi * material.youngs_modulus) * wave
 
 
+@dataclass(frozen=True)
+class CondensedWaves:
+    """A gear condensed for waves of load across the width, whatever holds its rim.
+
+    Parameters
+    ----------
+    sector : Sector
+        Its grid may be coarse.
+    material : Material
+    wave_number : (M,) array
+        [1/m], ascending.
+    width : float
+        Face width that all meshes have in common [m].
+    uniform : FreeSector
+        Under a load that is the same over this width.
+    waves : tuple of FreeSector
+        Of one metre of the width, under each wave.
+    """
+
+    sector: Sector
+    material: Material
+    wave_number: np.ndarray
+    width: float
+    uniform: FreeSector
+    waves: tuple[FreeSector, ...]
+
+    @cached_property
+    def held(self) -> list[FlankCompliance]:
+        """Flank compliance to every wave with the rim held, see `supported`."""
+        return self.supported(None)
+
+    def supported(self, foundation) -> list[FlankCompliance]:
+        """Compute the flank compliance to every wave, less that to a uniform load, beyond the half space.
+
+        ``foundation`` (2n, 2n) [N/m] supports the rim over the face width of the gear; held where it is None.
+        Loads are those over the common width.
+        """
+        gear, grid, material = self.sector.gear, self.sector.grid, self.material
+        stations, depths, *_ = observed_flanks(grid, gear)
+        uniform = tooth_compliance(
+            self.uniform.supported(None if foundation is None else foundation / self.width)
+        )
+        support = None
+        if foundation is not None:
+            entries = coo_array(foundation / gear.face_width)
+            place = tuple(3 * (one // 2) + one % 2 for one in entries.coords)
+            support = csc_array((entries.data, place), shape=(3 * grid.n_nodes,) * 2)
+        corner = tip_corner(gear, material)
+        arc = stations.roll**2 / (2 * gear.base_radius)
+        offset, found = arc[:, None] - arc[None, :], []
+        for k, free in zip(self.wave_number, self.waves, strict=True):
+            change = tooth_compliance(free.supported(support)) - uniform
+            once, twice = (
+                wave_displacement(offset, depth, k, material)
+                - depth_displacement(offset, depth, material.shear_modulus, material.poisson_ratio)
+                for depth in (depths, 2 * depths)
+            )
+            local = np.tile((2 * once - twice) / self.width, (2, 1, 1))
+            regular = regular_compliance(change / self.width, local)
+            found.append(
+                FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0)
+            )
+        return found
+
+
+def condensed_waves(sector: Sector, material: Material, slices: int, width: float) -> CondensedWaves:
+    """Condense a gear for the waves of as many slices of a face width that all meshes have in common [m]."""
+    gear, grid = sector.gear, sector.grid
+    _, _, loads, observations = observed_flanks(grid, gear)
+    options: Any = {"count": gear.teeth, "rim": "rim"}
+    state: Any = RING_STATE if gear.internal else TEETH_STATE
+    # a uniform load bends the body of a wider gear over all its width, waves that of the common width
+    thickness: Any = {"tooth": 1.0, "body": gear.face_width / width} if gear.face_width > width else 1.0
+    plane = stiffness(grid, material, state=state, thickness=thickness)
+    uniform = condense_sector(grid, plane, loads=loads, observations=observations, **options)
+    loads, observations = (
+        np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, observations)
+    )
+    k = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
+    parts, powers = wave_stiffness(grid, material), k[:, None] ** np.arange(3)
+    waves = condense_sums(grid, parts, powers, loads=loads, observations=observations, **options)
+    return CondensedWaves(sector, material, k, width, uniform, tuple(waves))
+
+
+def common_width(gears: Sequence[Gear]) -> tuple[float, ...]:
+    """Find the face width that both gears of every kind of mesh have in common [m]."""
+    return tuple(min(pair) for pair in pairwise(one.face_width for one in gears))
+
+
 def width_waves(
     sectors: Sectors,
     material: Material | Sequence[Material],
@@ -109,81 +204,38 @@ def width_waves(
 ) -> WidthWaves:
     """Compute the compliance to the waves of as many slices, from sector grids that may be coarse.
 
-    ``material`` is that of the sectors, or one for each; ``ring_foundation`` (2n, 2n) [N/m] that of the ring
-    over its face width, which otherwise is held; ``helical`` as in `Bodies`.
+    ``material`` is that of the sectors, or one for each; ``ring_foundation`` and ``helical`` as in
+    `waves_of_gears`.
     """
-    common = tuple(min(pair) for pair in pairwise(one.gear.face_width for one in sectors.gears))
-    width, ring = min(common), sectors.ring
-    sun_material, planet_material, *ring_material = material_of_each(material, len(sectors.gears))
-    wave_number = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
-    of_gears = [
-        _wave_compliance(one, None, of, wave_number, width)
-        for one, of in ((sectors.sun, sun_material), (sectors.planet, planet_material))
-    ]
-    of_ring: Any = [None] * len(wave_number)
-    if ring is not None:
-        of_ring = _wave_compliance(ring, ring_foundation, ring_material[0], wave_number, width)
-    return WidthWaves(
-        wave_number,
-        tuple(
-            Bodies(sun, planet, ring, common, helical)
-            for sun, planet, ring in zip(*of_gears, of_ring, strict=True)
-        ),
+    width, gears = common_width([one.gear for one in sectors.gears])[0], sectors.gears
+    materials = material_of_each(material, len(gears))
+    condensed = [condensed_waves(one, of, slices, width) for one, of in zip(gears, materials, strict=True)]
+    return waves_of_gears(condensed, ring_foundation, helical)
+
+
+def waves_of_gears(gears: Sequence[CondensedWaves], ring_foundation=None, helical=(1.0, 1.0)) -> WidthWaves:
+    """Compute the compliance of a set to waves across the width, sun and planets held at their bores.
+
+    ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over its face width, which otherwise is held;
+    ``helical`` as in `Bodies`.
+    """
+    sun, planet, *ring = gears
+    common = common_width([one.sector.gear for one in gears])
+    held: list[Any] = ring[0].held if ring else [None] * len(sun.wave_number)
+    bodies = zip(sun.held, planet.held, held, strict=True)
+    waves = WidthWaves(
+        sun.wave_number, tuple(Bodies(*one, common, helical) for one in bodies), ring[0] if ring else None
     )
+    return waves if ring_foundation is None else with_ring_waves(waves, ring_foundation)
 
 
-def with_held_ring(waves: WidthWaves, sectors: Sectors, material: Material) -> WidthWaves:
-    """Exchange the ring, of this material, for that which is held at its outer surface."""
-    rings = _wave_compliance(sectors.ring, None, material, waves.wave_number, waves.width)
-    bodies = (replace(one, ring=ring) for one, ring in zip(waves.bodies, rings, strict=True))
+def with_ring_waves(waves: WidthWaves, foundation=None) -> WidthWaves:
+    """Exchange the ring: held at its outer surface, or on a foundation (2n, 2n) [N/m]."""
+    ring = waves.ring
+    assert ring is not None
+    rings = ring.held if foundation is None else ring.supported(foundation)
+    bodies = (replace(one, ring=of_wave) for one, of_wave in zip(waves.bodies, rings, strict=True))
     return replace(waves, bodies=tuple(bodies))
-
-
-def _wave_compliance(
-    sector: Sector, foundation, material: Material, wave_number: np.ndarray, width: float
-) -> list[FlankCompliance]:
-    """Flank compliance of a gear to every wave, less that to a uniform load, beyond the half space.
-
-    Loads are those over a width [m].
-    """
-    gear, grid, mu = sector.gear, sector.grid, material.shear_modulus
-    stations, depths, loads, observations = observed_flanks(grid, gear)
-
-    def compliance(matrix, support, loads, observations) -> np.ndarray:
-        options = {"count": gear.teeth, "rim": "rim", "loads": loads, "observations": observations}
-        return tooth_compliance(condense_sector(grid, matrix, **options).supported(support))
-
-    state: Any = RING_STATE if gear.internal else TEETH_STATE
-    # a uniform load bends the body of a wider gear over all its width, waves that of the common width
-    thickness: Any = {"tooth": 1.0, "body": gear.face_width / width} if gear.face_width > width else 1.0
-    plane = stiffness(grid, material, state=state, thickness=thickness)
-    support = None if foundation is None else foundation / width
-    uniform = compliance(plane, support, loads, observations)
-    support = None if foundation is None else foundation / gear.face_width
-    loads, observations = (
-        np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, observations)
-    )
-    if support is not None:
-        support = coo_array(support)
-        place = tuple(3 * (one // 2) + one % 2 for one in support.coords)
-        support = csc_array((support.data, place), shape=(3 * grid.n_nodes,) * 2)
-    parts, corner = wave_stiffness(grid, material), tip_corner(gear, material)
-    arc = stations.roll**2 / (2 * gear.base_radius)
-    offset, found = arc[:, None] - arc[None, :], []
-    for k in wave_number:
-        matrix = (parts[0] + k * parts[1] + k**2 * parts[2]).tocsc()
-        change = compliance(matrix, support, loads, observations) - uniform
-        once, twice = (
-            wave_displacement(offset, depth, k, material)
-            - depth_displacement(offset, depth, mu, material.poisson_ratio)
-            for depth in (depths, 2 * depths)
-        )
-        local = np.tile((2 * once - twice) / width, (2, 1, 1))
-        regular = regular_compliance(change / width, local)
-        found.append(
-            FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0)
-        )
-    return found
 
 
 def cosines(slices: int) -> np.ndarray:
@@ -192,31 +244,73 @@ def cosines(slices: int) -> np.ndarray:
     return np.sqrt(np.where(m == 0, 1.0, 2.0) / slices) * np.cos(np.pi * m * z)
 
 
-def slice_compliance(found: Candidates, rows: np.ndarray, waves: WidthWaves, slices: int) -> np.ndarray:
+def slice_compliance(
+    found: Candidates, rows: np.ndarray, waves: Sequence[WidthWaves], slices: int
+) -> list[np.ndarray]:
     """Compute the compliance between the slices of all windows beyond the plane one [m/N].
 
-    (I, P, N, W, N, W), images as of `Candidates`; ``rows`` are positions (P, 1), of helical teeth (P, N).
+    For each of several ``waves`` of the same material, whose gears may be the same ones. (I, P, N, W, N, W),
+    images as of `Candidates`; ``rows`` are positions (P, 1), of helical teeth (P, N).
     """
     setup, W, (P, each) = found.setup, len(found.mesh), rows.shape
     if slices == 1:
-        return np.zeros((setup.images, P, 1, W, 1, W))
-    wanted = np.pi / waves.width * np.arange(1, slices)
+        return [np.zeros((setup.images, P, 1, W, 1, W)) for _ in waves]
+    wave_number = waves[0].wave_number
+    wanted = np.pi / waves[0].width * np.arange(1, slices)
     # weights of the waves that were computed in those of the slices, which are cubics between them
-    between = not_a_knot(np.log(waves.wave_number), np.eye(len(waves.wave_number)), np.log(wanted))
-    T = cosines(slices)[1:]
+    between = not_a_knot(np.log(wave_number), np.eye(len(wave_number)), np.log(wanted))
     if each > 1:
         return _along_helix(found, rows, waves, wanted, between)
-    middle, place = replace(setup, roll=setup.roll[..., 1:2]), rows[:, 0]
-    windows = found.position[place], found.mesh, found.pair[place]
-    known = np.array([body_compliance(middle, one, *windows)[..., 0, :, 0] for one in waves.bodies])
-    change = np.tensordot(between, known, 1)
-    kind = setup.kind(found.mesh)
-    local = replace(waves, wave_number=wanted).local[:, kind] / waves.bodies[0].of_kinds(kind)
-    change[:, 0][..., range(W), range(W)] += local[:, None]
-    return np.einsum("ms,mt,mipvw->ipsvtw", T, T, change, optimize=True)
+    place, kind = rows[:, 0], setup.kind(found.mesh)
+    windows = found.mesh, found.pair[place], found.position[place]
+    T = cosines(slices)[1:]
+    alone = T[:, :, None] * T[:, None, :]
+    shapes = np.tensordot(between, alone, (0, 0)).reshape(len(wave_number), -1)
+    softer = waves[0].bodies[0].of_kinds(kind)
+    local = np.tensordot(replace(waves[0], wave_number=wanted).local[:, kind] / softer, alone, (0, 0))
+
+    def add(across, bodies: list[FlankCompliance], *on_body) -> None:
+        """Add one body under every wave that was computed."""
+        table = np.stack([body.regular for body in bodies], axis=1)
+        _add_between(across, setup, bodies[0], table, windows, *on_body)
+
+    result = []
+    for change in _over_bodies(found, windows, waves, add, (len(wave_number),)):
+        change = change / np.sqrt(softer[:, None] * softer)[..., None]
+        across = (change @ shapes).reshape(*change.shape[:-1], slices, slices)
+        across[0][:, range(W), range(W)] += local
+        result.append(np.ascontiguousarray(across.transpose(0, 1, 4, 2, 5, 3)))
+    return result
 
 
-def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, between) -> np.ndarray:
+def _over_bodies(
+    found: Candidates, windows, waves: Sequence[WidthWaves], add, further=()
+) -> list[np.ndarray]:
+    """Sum up what all bodies yield between windows and their images under each waves, (I, P, W, W, *further).
+
+    ``add(across, bodies, members, gear, side)`` adds one gear by its compliances under all waves. Gears that
+    are the same in all are added once.
+    """
+    setup, count = found.setup, windows[1].shape[1]
+    shape = setup.images, len(windows[1]), count, count, *further
+    shared, own = np.zeros(shape), [np.zeros(shape) for _ in waves[1:]]
+    own = [np.zeros(shape if own else 1), *own]
+    for number, *on_body in windows_of_bodies(setup.gears, windows[0]):
+        of_waves = [[one.gears[number] for one in of_set.bodies] for of_set in waves]
+        if of_waves[0][0] is None:
+            continue
+        sectors = slice(1) if number == EACH else slice(None)
+        if all(bodies[0] is of_waves[0][0] for bodies in of_waves):
+            add(shared[sectors], of_waves[0], *on_body)
+            continue
+        for across, bodies in zip(own, of_waves, strict=True):
+            add(across[sectors], bodies, *on_body)
+    return [shared + one for one in own]
+
+
+def _along_helix(
+    found: Candidates, rows, waves: Sequence[WidthWaves], wave_number, between
+) -> list[np.ndarray]:
     """`slice_compliance` of helical teeth, whose slices are at positions of their own.
 
     ``between`` (N - 1, K) are the weights of the waves that were computed in those of ``wave_number``.
@@ -228,42 +322,59 @@ def _along_helix(found: Candidates, rows, waves: WidthWaves, wave_number, betwee
     )  # fmt: skip
     # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
     over = np.cos(np.pi / N * np.arange(1, N)[:, None] * np.arange(2 * N)) / N
-    across = np.zeros((setup.images, P, N * W, N * W))
-    for number, *on_body in windows_of_bodies(setup.gears, windows[0]):
-        bodies = [one.gears[number] for one in waves.bodies]
+
+    def add(across, bodies: list[FlankCompliance], *on_body) -> None:
+        """Add one body, by its compliance over distances of slices."""
         table = (between @ [one.regular.ravel() for one in bodies]).T @ over
-        sectors = across[:1] if number == EACH else across
-        _add_along(sectors, setup, bodies[0], table.T.copy(), windows, *on_body)
-    _add_beside(across[0], setup, waves, windows, wave_number, over)
-    root = np.sqrt(waves.bodies[0].of_kinds(setup.kind(windows[0])))
-    return (across / (root[:, None] * root)).reshape(-1, P, N, W, N, W)
+        table = np.ascontiguousarray(table.T).reshape(-1, *bodies[0].regular.shape)
+        _add_between(across, setup, bodies[0], table, windows, *on_body)
+
+    beside = np.zeros((P, N * W, N * W))
+    _add_beside(beside, setup, waves[0], windows, wave_number, over)
+    root, result = np.sqrt(waves[0].bodies[0].of_kinds(setup.kind(windows[0]))), []
+    for across in _over_bodies(found, windows, waves, add):
+        across[0] += beside
+        across /= root[:, None] * root
+        result.append(across.reshape(-1, P, N, W, N, W))
+    return result
 
 
-def _add_along(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:
-    """Add what one body yields between its windows and their images, (I, P, ...).
+def _add_between(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:
+    """Add what one body yields between the middles of its windows and of their images, (I, P, W, W, ...).
 
-    By a table (2 N, ...) over distances of slices.
+    ``windows`` are mesh (W,), pair (P, W), and position (P,); ``table`` (teeth, K, 2n, 2n) are K compliances.
+    Of helical teeth the positions are (P, W), with the slice (W,) behind them, and the one compliance
+    is a ``table`` (2 N, teeth, 2n, 2n) over distances of slices.
     """
-    mesh, pair, position, piece = windows
-    count, stations = body.regular.shape[:2]
+    mesh, pair, position, *piece = windows
+    count, stations = len(body.regular), len(body.roll)
     j, i = mesh[members], pair[:, members]
-    index, weight = station_weights(setup.roll[gear, j, position[:, members], i, 1], body.roll)
-    index, tooth = index + side[:, None] * len(body.roll), setup.tooth[gear, j, i]
-    size, table = table.shape[1], table.ravel()
+    position = position[:, members] if position.ndim > 1 else position[:, None]
+    index, weight = station_weights(setup.roll[gear, j, position, i, 1], body.roll)
+    # the four stations of a place follow one another
+    first, tooth = index[..., 0] + side * stations, setup.tooth[gear, j, i]
+    blocks = sliding_window_view(table, (4, 4), axis=(-2, -1))
     for image in range(len(across) // 2 + 1):
         # what an image does to its original, the original does to the image on the other side
         alone = 2 * image % len(across) == 0
         one, two = np.triu_indices(len(members)) if alone else np.indices((len(members),) * 2).reshape(2, -1)
-        lag = (tooth[:, one] - tooth[:, two] - image * count // len(across)) % count * stations
-        slices = piece[members[one]], piece[members[two]]
-        starts = [size * place for place in (np.abs(slices[0] - slices[1]), sum(slices) + 1)]
-        values = np.zeros(lag.shape)
-        for a, b in np.ndindex(4, 4):
-            place = (lag + index[:, one, a]) * stations + index[:, two, b]
-            values += weight[:, one, a] * weight[:, two, b] * sum(table[place + start] for start in starts)
-        across[image][:, members[one], members[two]] += values
         other = one != two if alone else one >= 0
-        across[-image][:, members[two[other]], members[one[other]]] += values[:, other]
+        distances = []
+        if piece:
+            a, b = piece[0][members[one]], piece[0][members[two]]
+            distances = [np.abs(a - b), a + b + 1]
+        for p in range(len(pair)):
+            lag = (tooth[p, one] - tooth[p, two] - image * count // len(across)) % count
+            places = lag, first[p, one], first[p, two]
+            weights = weight[p, one][:, :, None] * weight[p, two][:, None, :]
+            if piece:
+                values = sum(blocks[distance, *places] for distance in distances)
+                values = np.einsum("nab,nab->n", values, weights)
+            else:
+                lag, *at = places
+                values = np.einsum("nkab,nab->nk", blocks[lag, :, *at], weights)
+            across[image, p, members[one], members[two]] += values
+            across[-image, p, members[two[other]], members[one[other]]] += values[other]
 
 
 def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) -> None:

@@ -29,6 +29,8 @@ from femgear.fe.grid import Grid, boundary_edges, shape_functions
 
 _EDGE_POINTS = np.polynomial.legendre.leggauss(6)
 """Places and weights of the integration along the edge of an element."""
+_BLOCK = 2e7
+"""Size of the matrices of cyclic harmonics that are in memory at a time [bytes]."""
 
 
 @dataclass(frozen=True)
@@ -258,18 +260,35 @@ def condense_sector(
     observations : (2n, mo) array
         Displacement functionals; the images of these are understood.
     """
+    options = {"count": count, "rim": rim, "loads": loads, "observations": observations}
+    return condense_sums(grid, (stiffness,), np.ones((1, 1)), **options)[0]
+
+
+def condense_sums(
+    grid: Grid, parts, factors, *, count: int, rim: str | None, loads: np.ndarray, observations: np.ndarray
+) -> list[FreeSector]:
+    """Condense a sector, as `condense_sector` does, for stiffnesses that are sums of the same parts.
+
+    ``parts`` (k) are sparse matrices, ``factors`` (m, k) those of each of the m sums.
+    """
     cut = np.concatenate([boundary_nodes(grid, f"cut_{side}") for side in ("right", "left")])
-    components = stiffness.shape[0] // grid.n_nodes
+    components = parts[0].shape[0] // grid.n_nodes
     check_loads(loads, node_dofs(cut, components))
     columns = csc_array(np.hstack([loads, observations]))
     nodes = node_dofs(boundary_nodes(grid, rim), components) if rim else []
     edges, on_rim, schurs = [], [], []
     for fields, inner in _half_sector_fields(grid, None, rim, components):
-        schurs.append(_schur_complement(fields.T @ stiffness @ fields, fields.T @ columns, inner))
+        back = csr_array(fields.T)
+        schurs.append(
+            _schur_complements([back @ part @ fields for part in parts], factors, back @ columns, inner)
+        )
         edges.append(fields[:, inner:])
         on_rim.append(abs(csr_array(edges[-1])[nodes]).sum(axis=0) > 0)
     nb, sizes = components * len(boundary_nodes(grid, "cut_left")), (loads.shape[1], observations.shape[1])
-    return FreeSector(count, tuple(edges), tuple(on_rim), tuple(schurs), nb, sizes, components)
+    return [
+        FreeSector(count, tuple(edges), tuple(on_rim), schur, nb, sizes, components)
+        for schur in zip(*schurs, strict=True)
+    ]
 
 
 def check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
@@ -341,28 +360,68 @@ def _sparse_order(triangles, nodes, count: int) -> np.ndarray:
     return np.argsort(symmetric_factor(graph).perm_c)
 
 
-def _schur_complement(matrix, columns, inner: int) -> np.ndarray:
-    """Schur complement of ``[[matrix, columns], [columns^T, 0]]`` on all but the first `inner` unknowns."""
+def _schur_complements(parts, factors, columns, inner: int) -> list[np.ndarray]:
+    """Schur complements of ``[[matrix, columns], [columns^T, 0]]`` on all but the first `inner` unknowns.
+
+    The matrices are sums of the ``parts`` with each row of ``factors`` (m, parts). What is added to the
+    diagonal of the others and the length of the columns are in proportion to them: a part of its own.
+    """
     size, count = columns.shape
-    diagonal = matrix.diagonal()[:inner].mean()
     length = np.sqrt((columns * columns).sum(axis=0))
-    scale = diagonal / np.where(length > 0, length, 1.0)
-    columns = columns @ diags_array(scale)
-    shift = np.where(np.arange(size + count) < size, diagonal, -diagonal)
-    shift[:inner] = 0.0
-    whole = block_array([[matrix, columns], [columns.T, None]], format="csc") + diags_array(shift)
-    factor = symmetric_factor(whole, ordering="NATURAL")
-    last = slice(inner, None)
-    schur = factor.L[:, last][last].toarray() @ factor.U[:, last][last].toarray()
-    # by the factor and by its last part alone
+    length = np.where(length > 0, length, 1.0)
+    columns = csc_array(columns @ diags_array(1.0 / length))
+    signs = np.where(np.arange(size + count) < size, 1.0, -1.0)
+    signs[:inner] = 0.0
+    border = block_array([[diags_array(signs[:size]), columns], [columns.T, diags_array(signs[size:])]])
+    of_diagonal = [part.diagonal()[:inner].mean() for part in parts]
+    whole, values = _one_pattern([*parts, border], size + count)
+    last, found = slice(inner, None), []
     right = np.zeros(size + count)
     right[last] = np.random.default_rng(0).standard_normal(size + count - inner)
-    solution = factor.solve(right)
-    residual = max(np.abs(whole @ solution - right).max(), np.abs(schur @ solution[last] - right[last]).max())
-    _check_residual(residual)
-    schur -= np.diag(shift[last])
-    unscale = np.append(np.ones(size - inner), 1.0 / scale)
-    return unscale[:, None] * schur * unscale
+    for row in np.asarray(factors, float):
+        diagonal = float(row @ of_diagonal)
+        whole.data = np.append(row, diagonal) @ values
+        factor = symmetric_factor(whole, ordering="NATURAL")
+        schur = _last_columns(factor.L, inner) @ _last_columns(factor.U, inner)
+        # by the factor and by its last part alone
+        solution = factor.solve(right)
+        missed = whole @ solution - right, schur @ solution[last] - right[last]
+        _check_residual(max(np.abs(residual).max() for residual in missed))
+        schur -= np.diag(diagonal * signs[last])
+        unscale = np.append(np.ones(size - inner), length / diagonal)
+        found.append(unscale[:, None] * schur * unscale)
+    return found
+
+
+def _one_pattern(parts, size: int) -> tuple[csc_array, np.ndarray]:
+    """Matrix (size, size) with all entries that some part has, and their values in each, (k, entries)."""
+    entries = [csc_array(part) for part in parts]
+    for part in entries:
+        part.sum_duplicates()
+    ones = [_enlarged(one, size) for one in entries]
+    whole = csc_array(sum(ones[1:], start=ones[0]))
+    # entries by their numbers, of which every part picks its own
+    whole.data = np.arange(1.0, whole.nnz + 1.0)
+    values = np.zeros((len(parts), whole.nnz))
+    for row, one, part in zip(values, ones, entries, strict=True):
+        row[one.multiply(whole).tocsc().data.astype(int) - 1] = part.data
+    return whole, values
+
+
+def _enlarged(matrix: csc_array, size: int) -> csc_array:
+    """Ones where a sparse matrix has entries, with rows and columns without any behind them."""
+    starts = np.append(matrix.indptr, np.full(size - matrix.shape[1], matrix.indptr[-1]))
+    return csc_array((np.ones(matrix.nnz), matrix.indices, starts), shape=(size, size))
+
+
+def _last_columns(matrix: csc_array, inner: int) -> np.ndarray:
+    """Entries of a sparse matrix beyond its first `inner` rows and columns, dense."""
+    start, count = matrix.indptr[inner], matrix.shape[1] - inner
+    rows, found = matrix.indices[start:], np.zeros((count, count))
+    columns = np.repeat(np.arange(count), np.diff(matrix.indptr[inner:]))
+    beyond = rows >= inner
+    found[rows[beyond] - inner, columns[beyond]] = matrix.data[start:][beyond]
+    return found
 
 
 @dataclass(frozen=True)
@@ -464,23 +523,31 @@ def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     result = np.empty((len(harmonics), 2, observed, 2, loaded), complex)
     # the image of an observation or a load takes antisymmetric fields the other way
     seen, acting = np.array([1.0, -1.0])[:, None, None, None], np.array([1.0, -1.0])[:, None]
-    for row, n in enumerate(harmonics):  # one at a time: all the matrices of a deep body would take gigabytes
-        ties, A = _tied(schur, n)
-        if n % schur.count in (0, 1, schur.count - 1):  # rotation is the harmonic 0, translation the first
-            values = np.linalg.eigvalsh(A)
-            if values[0] < 1e-13 * values[-1]:
-                raise GridError(
-                    "the body can move without straining: nothing holds it",
-                    code="E-GRID-FREE",
-                    remedy="hold its bore or its rim, or put it on a foundation",
-                )
+    harmonics = np.asarray(harmonics)
+    ties = np.array([cut_ties(n, schur.count, schur.stiffness.shape[1], schur.components) for n in harmonics])
+    # a block at a time: all the matrices of a deep body would take gigabytes
+    size = 8.0 * ties.shape[-1] * (ties.shape[-1] + 4 * (loaded + observed))
+    for rows in np.array_split(np.arange(len(harmonics)), -(-len(harmonics) * size // _BLOCK) or 1):
+        tie = ties[rows][..., None]
+        A = (tie * schur.stiffness * tie.swapaxes(2, 3)).sum(axis=1)
+        # rotation is the harmonic 0, translation the first
+        rigid = np.isin(harmonics[rows] % schur.count, (0, 1, schur.count - 1))
+        values = np.linalg.eigvalsh(A[rigid])
+        if (values[:, 0] < 1e-13 * values[:, -1]).any():
+            raise GridError(
+                "the body can move without straining: nothing holds it",
+                code="E-GRID-FREE",
+                remedy="hold its bore or its rim, or put it on a foundation",
+            )
         loads, observations = (
-            np.concatenate(ties * cut, axis=1) for cut in (schur.load_cut, schur.observation_cut)
+            (tie * cut).swapaxes(1, 2).reshape(*A.shape[:2], -1)
+            for cut in (schur.load_cut, schur.observation_cut)
         )
-        tied = (observations.T @ np.linalg.solve(A, loads)).reshape(2, observed, 1, 2, loaded)
-        symmetric, antisymmetric = (schur.compliance[i, :, None] + tied[i, :, :, i] for i in (0, 1))
-        result[row] = symmetric + seen * acting * antisymmetric
-        result[row] += 1j * (seen * tied[1, :, :, 0] - acting * tied[0, :, :, 1])
+        tied = observations.swapaxes(1, 2) @ np.linalg.solve(A, loads)
+        tied = tied.reshape(-1, 2, observed, 1, 2, loaded)
+        symmetric, antisymmetric = (schur.compliance[i, :, None] + tied[:, i, :, :, i] for i in (0, 1))
+        result[rows] = symmetric[:, None] + seen * acting * antisymmetric[:, None]
+        result[rows] += 1j * (seen * tied[:, None, 1, :, :, 0] - acting * tied[:, None, 0, :, :, 1])
     return result.reshape(len(harmonics), 2 * observed, 2 * loaded)
 
 

@@ -204,11 +204,11 @@ def test_a_residual_counts_whatever_its_sign(wrong, monkeypatch):
             L=csc_array(scale @ factor.L), U=factor.U, solve=lambda b: change(factor.solve(b))
         )
 
-    found = compliance._schur_complement(matrix, columns, 1)
+    (found,) = compliance._schur_complements([matrix], [[1.0]], columns, 1)
     np.testing.assert_allclose(found, [[1.5, 1.0], [1.0, 0.0]], rtol=0, atol=1e-15)
     monkeypatch.setattr(compliance, "symmetric_factor", factored)
     with pytest.raises(GridError, match="E-RESIDUAL"):
-        compliance._schur_complement(matrix, columns, 1)
+        compliance._schur_complements([matrix], [[1.0]], columns, 1)
 
 
 def test_load_on_a_cut_is_refused(gear, sector):

@@ -156,7 +156,7 @@ from femgear.trains.static.stages import (
     case_supports,
     foundation_entries,
     gear_entries,
-    over_width,
+    loaded_over_width,
     record_positions,
     ring_foundation,
 )
@@ -210,7 +210,9 @@ def solve_modes(
             contact=case.static.contact,
             deviations=None if deviations.ideal else deviations,
             supports=linear_supports(case),
-            options=CycleOptions(progress=partial(progress, "modes"), **over_width(case, gears, loaded=True)),
+            options=CycleOptions(
+                progress=partial(progress, "modes"), **loaded_over_width(case, gears, static.waves, steps)
+            ),
         ),
     )
     stiffness = state.resampled("held_stiffness", RECORD * state.periods).mean(axis=1)

@@ -114,7 +114,7 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
 def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
     """Compute mesh stiffness, transmission error and force of the loaded pair over one mesh period."""
     gears: Any = static.planetary_set
-    deviations, slices = set_deviations(case), over_width(cast(Any, case), gears)
+    deviations, slices = set_deviations(case), over_width(cast(Any, case), gears, waves=static.waves)
     if slices:
         slices |= {"held_waves": slices["waves"]}
     state = loaded_period(

@@ -710,7 +710,7 @@ def _left_flanks_loaded(
     if static.sun_torque >= 0:
         return static.planetary_set, np.arange(static.planetary_set.n_planets), static.cycle
     gears, order, deviations = loaded_image(static.planetary_set, static.sun_torque, set_deviations(case))
-    width = over_width(case, static.planetary_set, cache=cache)
+    width = over_width(case, static.planetary_set, waves=static.waves, cache=cache)
     cycle = walk_mesh_cycle(
         gears,
         static.bodies,

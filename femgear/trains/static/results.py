@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.root_stress import RootRange, RootStresses
     from femgear.contact.tooth_loads import LoadSpectrum
+    from femgear.contact.width_waves import WidthWaves
     from femgear.gears.planetary import GearSet, PlanetarySet
 
 _COUNTING = (
@@ -248,7 +249,8 @@ class StaticResult(StageResult):
 
     ``sun_torque`` [N m] keeps its sign, ``period_message`` tells how the errors repeat, and ``entries`` are
     those of the case that it depends on, as in the results that follow. ``overlap_ratio`` and
-    ``base_helix_angle`` [rad] are those of helical teeth, positive where the sun is right-handed.
+    ``base_helix_angle`` [rad] are those of helical teeth, positive where the sun is right-handed; ``waves``
+    what bodies yield across the width, where it is solved in slices.
     """
 
     planetary_set: PlanetarySet
@@ -260,6 +262,7 @@ class StaticResult(StageResult):
     period_message: str = ""
     overlap_ratio: float = 0.0
     base_helix_angle: float = 0.0
+    waves: WidthWaves | None = None
 
     @property
     def residual(self) -> float:

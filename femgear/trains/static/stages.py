@@ -55,7 +55,13 @@ from femgear.contact.root_stress import (
 )
 from femgear.contact.supports import RIGID, UPRIGHT, Supports, WidthSupports, tilting_members
 from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
-from femgear.contact.width_waves import width_waves, with_held_ring
+from femgear.contact.width_waves import (
+    WidthWaves,
+    common_width,
+    condensed_waves,
+    waves_of_gears,
+    with_ring_waves,
+)
 from femgear.errors import CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import Material, foundation, material_of_each
 from femgear.gears.deviations import common_period
@@ -99,8 +105,9 @@ def solve_static(
     compliances of other cases are taken from ``steps`` where they are those of this one. GeometryError,
     GridError, ContactError.
     """
-    gears, deviations = planetary_set(case), set_deviations(case)
-    sectors, bodies = known_compliances(case, gears, steps or Steps(), cache=cache)
+    gears, deviations, steps = planetary_set(case), set_deviations(case), steps or Steps()
+    sectors, bodies = known_compliances(case, gears, steps, cache=cache)
+    width = over_width(case, gears, cache=cache, steps=steps)
     sun_torque = driving_torque(case)
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
     cycle = walk_mesh_cycle(
@@ -119,14 +126,14 @@ def solve_static(
             pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
             peaks=True,
             progress=partial(progress, "contact"),
-            **over_width(case, gears, cache=cache),
+            **width,
         ),
     )
     _check_motions(case, cycle, gears.gears[0].module)
     overlap = _overlap(case, gears) if cycle.helical else 0.0
     base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
     found = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
-    return StaticResult(*found, overlap_ratio=overlap, base_helix_angle=base)
+    return StaticResult(*found, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"))
 
 
 def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:
@@ -304,27 +311,71 @@ def _check_width_entries(case: Case, needed: int, *, helical: bool) -> None:
 
 
 def over_width(
-    case: Case, gears: PlanetarySet, *, loaded: bool = False, cache: Path | None = None
-) -> dict[str, Any]:
+    case: Case, gears: PlanetarySet, *, waves: WidthWaves | None = None, cache: Path | None = None,
+    steps: Steps | None = None,
+) -> dict[str, Any]:  # fmt: skip
     """Compute what bodies yield across the width: options of the mesh cycle, none without slices.
 
-    ``loaded`` for the state on all supports, with the ring held beside it. CaseError: see `check_slices`.
+    ``waves`` where they are there already, as `StaticResult.waves`; what other cases with some of the same
+    gears have left is taken from ``steps``. CaseError: see `check_slices`.
     """
     check_slices(case, gears)
-    static, count = case.static, case.static.slices
+    count = case.static.slices
     if count < 2:
         return {}
-    materials = materials_of(case)
-    # half as fine as in the plane: K_H-beta changes by less than 2e-3
-    sectors = make_sectors(gears, materials, flank_elements=6, refine=0.5, cache=cache)
-    elastic = static.members == "elastic"
-    foundation = ring_foundation(case, sectors.ring) if elastic or loaded else None
-    waves = width_waves(sectors, materials, count, foundation, _helical(case, gears)[1])
-    supports = width_supports(case, gears)
-    found: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": supports}
+    if waves is None:
+        waves = _waves_of_case(case, gears, steps or Steps(), cache)
+    found: dict[str, Any] = {
+        "waves": waves, "slices": count, "width_supports": width_supports(case, gears)
+    }  # fmt: skip
     if overlap := _overlap(case, gears):
         found["ahead"] = slices_ahead(overlap, count)
-    return found | ({"held_waves": with_held_ring(waves, sectors, materials[-1])} if loaded else {})
+    return found
+
+
+def _waves_of_case(case: Case, gears: PlanetarySet, steps: Steps, cache: Path | None) -> WidthWaves:
+    """Condense all gears for waves across the width, and support the ring as the static stage has it."""
+    materials, width = materials_of(case), common_width(gears.gears)[0]
+    kept = []
+    for gear, material in zip(gears.gears, materials, strict=True):
+        entries = {"gear": repr(gear), "material": repr(material), "width": width}
+        kept.append((f"waves of the {gear.name}", {**entries, "static.slices": case.static.slices}))
+    known = [steps.kept(*one) for one in kept]
+    # half as fine as in the plane: K_H-beta changes by less than 2e-3
+    sectors = make_sectors(
+        gears, materials, flank_elements=6, refine=0.5, cache=cache,
+        known=[one and one.sector for one in known],
+    )  # fmt: skip
+    condensed = [
+        steps.keep(*step, before or condensed_waves(sector, material, case.static.slices, width))
+        for step, before, sector, material in zip(kept, known, sectors.gears, materials, strict=True)
+    ]
+    foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
+    return waves_of_gears(condensed, foundation, _helical(case, gears)[1])
+
+
+def loaded_over_width(
+    case: Case, gears: PlanetarySet, waves: WidthWaves | None, steps: Steps
+) -> dict[str, Any]:
+    """Compute the options of `over_width` for the loaded state on all supports, with the ring held beside it.
+
+    ``waves`` are those of the static solution, whose ring is the one or the other.
+    """
+    found = over_width(case, gears, waves=waves, steps=steps)
+    if not found:
+        return {}
+    fixed, waves, ring = case.static.members == "fixed", found["waves"], gears.gears[-1]
+    known = {"waves": repr(ring), "material": repr(materials_of(case)[-1]), "width": waves.width}
+    known |= {"static.slices": case.static.slices, **(foundation_entries(case) if fixed else {})}
+    other = steps.kept("waves of the other ring", known)
+    if other is None:
+        foundation = ring_foundation(case, waves.ring.sector) if fixed else None
+        other = steps.keep("waves of the other ring", known, [
+            one.ring for one in with_ring_waves(waves, foundation).bodies
+        ])  # fmt: skip
+    bodies = (replace(one, ring=of_wave) for one, of_wave in zip(waves.bodies, other, strict=True))
+    other = replace(waves, bodies=tuple(bodies))
+    return found | dict(zip(("waves", "held_waves"), (other, waves) if fixed else (waves, other)))
 
 
 def record_positions(case: Case, gears: PlanetarySet) -> int:
