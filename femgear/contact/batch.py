@@ -32,6 +32,8 @@ _MOST_STEPS = 30
 """Linear solutions before a position is left to the single solver."""
 FAINT = 1e-9
 """Share of the largest load below which a touching cell may be no contact at all."""
+_TOGETHER = 400
+"""Windows by themselves that are solved at once."""
 _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
 
@@ -576,14 +578,103 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
     gap = np.where(found.candidate, found.gap + (Pi @ field)[..., 0], np.inf)
     separation = gap.min(axis=-1)
     rows = np.nonzero(np.isfinite(separation))
-    local, beyond = local[rows], gap[rows] - separation[rows][:, None]
-    cells, right = found.candidate[rows], np.ones((len(rows[0]), C, 2))
-    right[..., 1] = np.where(cells, beyond, 0.0)
+    beyond = gap[rows] - separation[rows][:, None]
+    approach, pressed = _single_pairs(local[rows], beyond, found.candidate[rows], force)
     yields, moments = np.ones((len(force), P, W)), np.zeros((len(force), P, W, 3))
     pressure, carried = np.zeros((len(force), P, W)), np.zeros((P, W, C))
-    touching, active = np.full((P, W, C), np.inf), beyond == 0.0
+    touching = np.full((P, W, C), np.inf)
+    for k, one in enumerate(force):
+        yields[k][rows] = approach[:, k] / one
+        moments[k][rows] = (onto[rows] @ pressed[:, k, :, None])[..., 0] / one
+        carried[rows] = pressed[:, k]
+        pressure[k] = found.equal_cell_pressure(carried).max(axis=-1) / np.sqrt(one)
+        touching[rows] = np.where((pressed[:, k] != 0.0) & np.isinf(touching[rows]), one, touching[rows])
+    return PairLaws(
+        force=force,
+        yields=np.moveaxis(yields, 0, -1),
+        moments=np.moveaxis(moments, 0, 2),
+        touching=touching,
+        smooth=smooth,
+        supports=supports,
+        separation=separation,
+        mesh=found.mesh,
+        approach=found.approach[found.mesh],
+        loads=loads,
+        motions=state.motions,
+        pressure=np.moveaxis(pressure, 0, -1),
+    )
+
+
+def _single_pairs(local, beyond, cells, force) -> tuple[np.ndarray, np.ndarray]:
+    """Solve windows by themselves under rising forces (K,) [N]: approach (R, K) [m], loads (R, K, C) [N].
+
+    From their compliance (R, C, C) [m/N], what cells are apart beyond the nearest one (R, C) [m], and which
+    of them may touch. Cells that touch carry a load.
+    """
+    parts = [slice(first, first + _TOGETHER) for first in range(0, len(beyond), _TOGETHER)]
+    found = [_growing_contacts(local[one], beyond[one], cells[one], force) for one in parts]
+    K, C = len(force), beyond.shape[1]
+    approach = np.concatenate([np.zeros((0, K)), *(one[0] for one in found)])
+    loads = np.concatenate([np.zeros((0, K, C)), *(one[1] for one in found)])
+    # contacts that let go of cells under a rising load
+    again = np.flatnonzero((loads < -10 * ROUNDING * force[:, None]).any(axis=(1, 2)))
+    approach[again], loads[again] = _single_active_sets(local[again], beyond[again], cells[again], force)
+    return approach, loads
+
+
+def _growing_contacts(local, beyond, cells, force) -> tuple[np.ndarray, np.ndarray]:
+    """`_single_pairs` of windows in which one cell after the other comes into contact, and none leaves it.
+
+    Contacts of bodies without kinks grow with the load (J. R. Barber, Int. J. Mech. Sci. 16, 1974, 813-817).
+    Between two cells all is linear in the approach ``a``: separations are ``w + a u``, and a new cell c adds
+    a field d of loads, without displacement of the cells before it,
+
+        d = e_c - sum g_c d / s,    g = L d,    s = g_c,    a = min -w_c / u_c,
+        p = -sum d (a u_c + w_c) / s,    F = sum u_c (a u_c + w_c) / s,
+        u -= g u_c / s,    w -= g w_c / s,    u = -1 and w as beyond the nearest cell at first.
+    """
+    R, C = beyond.shape
+    row, fields = np.arange(R), np.zeros((R, C, 2 * C))
+    u, w, approach = np.full((R, C), -1.0), np.where(cells, beyond, 0.0), np.zeros(R)
+    free, size, slope, apart, begins = cells.copy(), *np.zeros((3, R, C)), np.full((R, C), np.inf)
+    total, offset, n = np.zeros((R, C + 1)), np.zeros((R, C + 1)), 0
+    size += 1.0
+    for n in range(int(cells.sum(axis=1).max(initial=0))):
+        there = free & (u < 0.0)
+        touch = np.where(there, w / np.where(there, -u, 1.0), np.inf)
+        cell = touch.argmin(axis=1)
+        live = np.isfinite(touch[row, cell])
+        approach = np.where(live, np.maximum(approach, touch[row, cell]), approach)
+        begins[:, n] = np.where(live, approach * total[:, n] + offset[:, n], np.inf)
+        if not (begins[:, n] <= force[-1]).any():
+            break
+        share = fields[row, :n, cell] / size[:, :n]
+        fields[:, n] = -(share[:, None] @ fields[:, :n])[:, 0]
+        fields[:, n, :C] += local[row, :, cell]
+        fields[row, n, C + cell] += 1.0
+        free[row, cell] = False
+        size[:, n] = np.where(live, fields[row, n, cell], 1.0)
+        slope[:, n], apart[:, n] = np.where(live, [u[row, cell], w[row, cell]], 0.0)
+        per, rest = slope[:, n] / size[:, n], apart[:, n] / size[:, n]
+        total[:, n + 1] = total[:, n] + slope[:, n] * per
+        offset[:, n + 1] = offset[:, n] + slope[:, n] * rest
+        u, w = u - fields[:, n, :C] * per[:, None], w - fields[:, n, :C] * rest[:, None]
+    touching = begins[:, None, : n + 1] <= force[:, None]
+    count = touching.sum(axis=-1)
+    at = row[:, None], count
+    found = (force - offset[at]) / total[at]
+    carried = (found[..., None] * slope[:, None, : n + 1] + apart[:, None, : n + 1]) / size[:, None, : n + 1]
+    return found, np.where(touching, -carried, 0.0) @ fields[:, : n + 1, C:]
+
+
+def _single_active_sets(local, beyond, cells, force) -> tuple[np.ndarray, np.ndarray]:
+    """`_single_pairs` of any windows, by the cells that touch under the force before."""
+    R, C = beyond.shape
+    right, approaches = np.ones((R, C, 2)), np.zeros((R, len(force)))
+    right[..., 1] = np.where(cells, beyond, 0.0)
+    active, loads = beyond == 0.0, np.zeros((R, len(force), C))
     per, offset, pressed = (np.zeros(active.shape) for _ in range(3))
-    approach = np.zeros(len(active))
+    approach = np.zeros(R)
     # solutions last until cells of their window change sides
     changed = np.ones(len(active), bool)
     for k, one in enumerate(force):
@@ -602,21 +693,5 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
                 break
             active[some] ^= flips
             some = np.flatnonzero(changed)
-        yields[k][rows], moments[k][rows] = approach / one, (onto[rows] @ pressed[..., None])[..., 0] / one
-        carried[rows] = pressed
-        pressure[k] = found.equal_cell_pressure(carried).max(axis=-1) / np.sqrt(one)
-        touching[rows] = np.where(active & np.isinf(touching[rows]), one, touching[rows])
-    return PairLaws(
-        force=force,
-        yields=np.moveaxis(yields, 0, -1),
-        moments=np.moveaxis(moments, 0, 2),
-        touching=touching,
-        smooth=smooth,
-        supports=supports,
-        separation=separation,
-        mesh=found.mesh,
-        approach=found.approach[found.mesh],
-        loads=loads,
-        motions=state.motions,
-        pressure=np.moveaxis(pressure, 0, -1),
-    )
+        approaches[:, k], loads[:, k] = approach, pressed
+    return approaches, loads
