@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -647,8 +648,10 @@ class _Walk:
             setup = setup.with_planet_gaps(options.planet_gaps)
         found, overflow, unknowns = [], False, 0
         together = _TOGETHER if each == 1 else max(_TOGETHER // each, 4)
-        for first in range(0, P, together):
-            some = np.arange(first, min(first + together, P))
+        # windows that are too small show at the first position: slices of all others need not wait for it
+        starts = range(0, P, together) if each == 1 else [0, *range(1, P, together)]
+        for first, end in pairwise([*starts, P]):
+            some = np.arange(first, end)
             rows = (some[:, None] * each + np.arange(each)).ravel()
             candidates = contact_candidates(setup, self.bodies, rows, self.members)
             if first == 0:

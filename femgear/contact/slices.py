@@ -323,8 +323,9 @@ class _SliceNewton:
                 own = np.where(some < c, own, False)
                 alone.append((own * np.linalg.solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
             found.append(np.stack(alone, axis=1) / (N * self.unit))
-        joint = ones.swapaxes(1, 2) @ np.linalg.solve(cyclic_harmonics(A), ones)
-        return [joint / (N * self.unit), *found]
+        harmonics = cyclic_harmonics(A)
+        answers = [np.linalg.solve(harmonics[0].real, ones), *np.linalg.solve(harmonics[1:], ones)]
+        return [ones.swapaxes(1, 2) @ np.array(answers) / (N * self.unit), *found]
 
     def _bordered(self, smooth, across, moments, slope, on, at) -> np.ndarray:
         """Compliance between the loaded slices and to their images, (I, P, c + k, c + k), over the unit."""

@@ -262,7 +262,8 @@ def slice_compliance(
     if each > 1:
         return _along_helix(found, rows, waves, wanted, between)
     place, kind = rows[:, 0], setup.kind(found.mesh)
-    windows = found.mesh, found.pair[place], found.position[place]
+    there = found.candidate.any(axis=-1)
+    windows = found.mesh, found.pair[place], there[place], found.position[place]
     T = cosines(slices)[1:]
     alone = T[:, :, None] * T[:, None, :]
     shapes = np.tensordot(between, alone, (0, 0)).reshape(len(wave_number), -1)
@@ -318,15 +319,18 @@ def _along_helix(
     setup, W, (P, N) = found.setup, len(found.mesh), rows.shape
     windows = (
         np.tile(found.mesh, N), found.pair[rows].reshape(P, N * W),
+        found.candidate.any(axis=-1)[rows].reshape(P, N * W),
         np.repeat(found.position[rows], W, axis=1), np.repeat(np.arange(N), W),
     )  # fmt: skip
     # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
     over = np.cos(np.pi / N * np.arange(1, N)[:, None] * np.arange(2 * N)) / N
+    number = np.arange(N)
+    apart, images = np.abs(number[:, None] - number), number[:, None] + number + 1
 
     def add(across, bodies: list[FlankCompliance], *on_body) -> None:
-        """Add one body, by its compliance over distances of slices."""
-        table = (between @ [one.regular.ravel() for one in bodies]).T @ over
-        table = np.ascontiguousarray(table.T).reshape(-1, *bodies[0].regular.shape)
+        """Add one body, by its compliance between slices."""
+        table = (between.T @ over).T @ [one.regular.ravel() for one in bodies]
+        table = (table[apart] + table[images]).reshape(N, N, *bodies[0].regular.shape)
         _add_between(across, setup, bodies[0], table, windows, *on_body)
 
     beside = np.zeros((P, N * W, N * W))
@@ -340,13 +344,13 @@ def _along_helix(
 
 
 def _add_between(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:
-    """Add what one body yields between the middles of its windows and of their images, (I, P, W, W, ...).
+    """Add what one body yields between middles of its windows and of their images, (I, P, W, W, ...).
 
-    ``windows`` are mesh (W,), pair (P, W), and position (P,); ``table`` (teeth, K, 2n, 2n) are K compliances.
-    Of helical teeth the positions are (P, W), with the slice (W,) behind them, and the one compliance
-    is a ``table`` (2 N, teeth, 2n, 2n) over distances of slices.
+    ``windows`` are mesh (W,), pair (P, W), whether there is a pair (P, W), and position (P,); ``table`` (teeth,
+    K, 2n, 2n) are K compliances. Of helical teeth the positions are (P, W), with the slice (W,) behind them,
+    and the one compliance is a ``table`` (N, N, teeth, 2n, 2n) between slices.
     """
-    mesh, pair, position, *piece = windows
+    mesh, pair, there, position, *piece = windows
     count, stations = len(body.regular), len(body.roll)
     j, i = mesh[members], pair[:, members]
     position = position[:, members] if position.ndim > 1 else position[:, None]
@@ -354,36 +358,34 @@ def _add_between(across, setup, body: FlankCompliance, table, windows, members, 
     # the four stations of a place follow one another
     first, tooth = index[..., 0] + side * stations, setup.tooth[gear, j, i]
     blocks = sliding_window_view(table, (4, 4), axis=(-2, -1))
+    there = there[:, members]
     for image in range(len(across) // 2 + 1):
         # what an image does to its original, the original does to the image on the other side
         alone = 2 * image % len(across) == 0
-        one, two = np.triu_indices(len(members)) if alone else np.indices((len(members),) * 2).reshape(2, -1)
-        other = one != two if alone else one >= 0
-        distances = []
-        if piece:
-            a, b = piece[0][members[one]], piece[0][members[two]]
-            distances = [np.abs(a - b), a + b + 1]
         for p in range(len(pair)):
+            some = np.flatnonzero(there[p])
+            every = np.triu_indices(len(some)) if alone else np.indices((len(some),) * 2).reshape(2, -1)
+            one, two = some[every[0]], some[every[1]]
             lag = (tooth[p, one] - tooth[p, two] - image * count // len(across)) % count
-            places = lag, first[p, one], first[p, two]
+            places = first[p, one], first[p, two]
             weights = weight[p, one][:, :, None] * weight[p, two][:, None, :]
             if piece:
-                values = sum(blocks[distance, *places] for distance in distances)
-                values = np.einsum("nab,nab->n", values, weights)
+                slices = piece[0][members[one]], piece[0][members[two]]
+                values = np.einsum("nab,nab->n", blocks[*slices, lag, *places], weights)
             else:
-                lag, *at = places
-                values = np.einsum("nkab,nab->nk", blocks[lag, :, *at], weights)
+                values = np.einsum("nkab,nab->nk", blocks[lag, :, *places], weights)
+            other = one != two if alone else slice(None)
             across[image, p, members[one], members[two]] += values
             across[-image, p, members[two[other]], members[one[other]]] += values[other]
 
 
 def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) -> None:
     """Add what the half spaces of both flanks yield between the contacts of one tooth pair in all slices."""
-    mesh, pair, position, piece = windows
+    mesh, pair, there, position, piece = windows
     for number in np.unique(mesh):
         members = np.flatnonzero(mesh == number)
         one, two = (members[rows] for rows in np.triu_indices(len(members)))
-        p, same = np.nonzero(pair[:, one] == pair[:, two])
+        p, same = np.nonzero((pair[:, one] == pair[:, two]) & there[:, one] & there[:, two])
         one, two, local = one[same], two[same], np.zeros(len(p))
         shape = over[:, np.abs(piece[one] - piece[two])] + over[:, piece[one] + piece[two] + 1]
         for gear, body in enumerate(setup.gears.mates[setup.kind(number)]):
