@@ -8,7 +8,7 @@ import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
@@ -292,6 +292,29 @@ def slices_modes(reference: Reference):
     return solve_modes(misaligned(reference.case), slices(reference))
 
 
+def helical(planets: int):
+    """Case of a helical set out of phase, 25 slices and the default positions: of three planets or five."""
+    from femgear.trains.reading import read_case, with_values
+
+    case = read_case(ROOT / "cases" / "helical_23_24_73.toml")
+    case = with_values(case, {"static.positions": 64, "static.slices": 25, "static.stresses": False})
+    if planets == 3:
+        return case
+    shifts = dict.fromkeys(("sun.tip_diameter", "planet.tip_diameter"))
+    teeth = {"sun.teeth": 36, "planet.teeth": 24, "ring.teeth": 84, "sun.module": "1.5 mm"}
+    shifts |= {"sun.profile_shift": 0.0, "planet.profile_shift": 0.0, "ring.outer_radius": "80 mm"}
+    return with_values(case, {"set.planets": planets, "sun.bore_radius": "12 mm", **teeth, **shifts})
+
+
+def helical_modes(planets: int, reference: Reference):
+    """Static and modal stage of a helical set out of phase in slices."""
+    from femgear.trains.elastic.stages import solve_modes
+    from femgear.trains.static.stages import solve_static
+
+    case = helical(planets)
+    return solve_modes(case, solve_static(case, cache=reference.cache))
+
+
 def help_text(_):
     """``femgear --help`` in a new process."""
     _in_new_process("from femgear.cli import main; main(['--help'])")
@@ -407,7 +430,16 @@ STAGES = {
         2.0,
     ),
     "slices_cold": Stage("the same, new grids", slices_cold, (), _none, 3, 5.0),
-    "slices_modes": Stage("static and modal stage in 25 slices", slices_modes, ("grids",), _none, 1),
+    "slices_modes": Stage("static and modal stage in 25 slices", slices_modes, ("grids",), _none, 3, 2.0),
+    "helical_3": Stage(
+        "static and modal stage, helical, three planets out of phase, 25 slices",
+        partial(helical_modes, 3),
+        (),
+        _none,
+        1,
+        4.0,
+    ),
+    "helical_5": Stage("the same, five planets", partial(helical_modes, 5), (), _none, 1, 4.0),
     "modes": Stage("modal stage", modes, ("static",), lambda _, r: len(r.model.system.M)),
     "dynamics": Stage(
         "dynamics, 2 speeds, with Floquet verdict", dynamics, ("modes",), lambda r, d: _lines(r, d.response)

@@ -150,7 +150,7 @@ def solve_slices(
         across, *of_held = slice_compliance(found, rows, (waves,) if held is None else (waves, held[1]), N)
         bodies = [(smooth, across)]
         if held is not None:
-            bodies.append((held[0][:, rows], *of_held))
+            bodies.append((held[0][:, rows], of_held[0]))
         newton = _SliceNewton(laws, rows, load, across.sum(axis=0), separations[some], smooth[0], tilting)
         before = []
         if each == 1:

@@ -262,7 +262,7 @@ def slice_compliance(
     if each > 1:
         return _along_helix(found, rows, waves, wanted, between)
     place, kind = rows[:, 0], setup.kind(found.mesh)
-    there = found.candidate.any(axis=-1)
+    there = np.asarray(found.candidate.any(axis=-1))
     windows = found.mesh, found.pair[place], there[place], found.position[place]
     T = cosines(slices)[1:]
     alone = T[:, :, None] * T[:, None, :]
@@ -319,19 +319,27 @@ def _along_helix(
     setup, W, (P, N) = found.setup, len(found.mesh), rows.shape
     windows = (
         np.tile(found.mesh, N), found.pair[rows].reshape(P, N * W),
-        found.candidate.any(axis=-1)[rows].reshape(P, N * W),
+        np.asarray(found.candidate.any(axis=-1))[rows].reshape(P, N * W),
         np.repeat(found.position[rows], W, axis=1), np.repeat(np.arange(N), W),
     )  # fmt: skip
     # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
     over = np.cos(np.pi / N * np.arange(1, N)[:, None] * np.arange(2 * N)) / N
     number = np.arange(N)
     apart, images = np.abs(number[:, None] - number), number[:, None] + number + 1
+    tables: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
     def add(across, bodies: list[FlankCompliance], *on_body) -> None:
-        """Add one body, by its compliance between slices."""
-        table = (between.T @ over).T @ [one.regular.ravel() for one in bodies]
-        table = (table[apart] + table[images]).reshape(N, N, *bodies[0].regular.shape)
-        _add_between(across, setup, bodies[0], table, windows, *on_body)
+        """Add one body, by its compliance between slices; of sun and ring one flank carries."""
+        (members, gear, side), n = on_body, len(bodies[0].roll)
+        known = id(bodies[0])
+        if known not in tables:
+            first = side[0] * n if (side == side[0]).all() else 0
+            part = slice(first, first + n if (side == side[0]).all() else None)
+            regular = np.array([one.regular[:, part, part] for one in bodies])
+            table = ((between.T @ over).T @ regular.reshape(len(bodies), -1)).reshape(-1, *regular.shape[1:])
+            tables[known] = table[apart] + table[images], side - first // n
+        table, side = tables[known]
+        _add_between(across, setup, bodies[0], table, windows, members, gear, side)
 
     beside = np.zeros((P, N * W, N * W))
     _add_beside(beside, setup, waves[0], windows, wave_number, over)
@@ -344,9 +352,9 @@ def _along_helix(
 
 
 def _add_between(across, setup, body: FlankCompliance, table, windows, members, gear, side) -> None:
-    """Add what one body yields between middles of its windows and of their images, (I, P, W, W, ...).
+    """Add what one body yields between its windows and to their images, (I, P, W, W, ...).
 
-    ``windows`` are mesh (W,), pair (P, W), whether there is a pair (P, W), and position (P,); ``table`` (teeth,
+    ``windows`` are mesh (W,), pair (P, W), whether it is there (P, W), and position (P,); ``table`` (teeth,
     K, 2n, 2n) are K compliances. Of helical teeth the positions are (P, W), with the slice (W,) behind them,
     and the one compliance is a ``table`` (N, N, teeth, 2n, 2n) between slices.
     """

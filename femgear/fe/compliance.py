@@ -410,13 +410,14 @@ def _one_pattern(parts, size: int) -> tuple[csc_array, np.ndarray]:
 
 def _enlarged(matrix: csc_array, size: int) -> csc_array:
     """Ones where a sparse matrix has entries, with rows and columns without any behind them."""
-    starts = np.append(matrix.indptr, np.full(size - matrix.shape[1], matrix.indptr[-1]))
+    columns = matrix.indptr.size - 1
+    starts = np.append(matrix.indptr, np.full(size - columns, matrix.indptr[-1]))
     return csc_array((np.ones(matrix.nnz), matrix.indices, starts), shape=(size, size))
 
 
 def _last_columns(matrix: csc_array, inner: int) -> np.ndarray:
     """Entries of a sparse matrix beyond its first `inner` rows and columns, dense."""
-    start, count = matrix.indptr[inner], matrix.shape[1] - inner
+    start, count = matrix.indptr[inner], matrix.indptr.size - 1 - inner
     rows, found = matrix.indices[start:], np.zeros((count, count))
     columns = np.repeat(np.arange(count), np.diff(matrix.indptr[inner:]))
     beyond = rows >= inner

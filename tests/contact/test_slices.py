@@ -223,7 +223,8 @@ def test_the_mirror_image_over_the_width_is_that_of_the_mirrored_lead(gears, bod
 
 
 def _no_coupling(found, some, waves, count):
-    return np.zeros((found.setup.images, len(some), count, len(found.mesh), count, len(found.mesh)))
+    shape = found.setup.images, len(some), count, len(found.mesh), count, len(found.mesh)
+    return [np.zeros(shape) for _ in waves]
 
 
 def test_coupling_raises_the_largest_load(gears, bodies, waves, monkeypatch):

@@ -482,7 +482,8 @@ def whole_sets() -> tuple[Row, ...]:
     ]
 
     def apart(found, some, waves, count):
-        return np.zeros((found.setup.images, len(some), count, len(found.mesh), count, len(found.mesh)))
+        shape = found.setup.images, len(some), count, len(found.mesh), count, len(found.mesh)
+        return [np.zeros(shape) for _ in waves]
 
     for amount in (2, 4):
         lead = [LeadSlope(1e-6 * amount)]

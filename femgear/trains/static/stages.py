@@ -336,7 +336,7 @@ def over_width(
 def _waves_of_case(case: Case, gears: PlanetarySet, steps: Steps, cache: Path | None) -> WidthWaves:
     """Condense all gears for waves across the width, and support the ring as the static stage has it."""
     materials, width = materials_of(case), common_width(gears.gears)[0]
-    kept = []
+    kept: list[tuple[str, Entries]] = []
     for gear, material in zip(gears.gears, materials, strict=True):
         entries = {"gear": repr(gear), "material": repr(material), "width": width}
         kept.append((f"waves of the {gear.name}", {**entries, "static.slices": case.static.slices}))
@@ -347,8 +347,10 @@ def _waves_of_case(case: Case, gears: PlanetarySet, steps: Steps, cache: Path | 
         known=[one and one.sector for one in known],
     )  # fmt: skip
     condensed = [
-        steps.keep(*step, before or condensed_waves(sector, material, case.static.slices, width))
-        for step, before, sector, material in zip(kept, known, sectors.gears, materials, strict=True)
+        before or steps.keep(name, entries, condensed_waves(sector, material, case.static.slices, width))
+        for (name, entries), before, sector, material in zip(
+            kept, known, sectors.gears, materials, strict=True
+        )
     ]
     foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
     return waves_of_gears(condensed, foundation, _helical(case, gears)[1])
@@ -364,18 +366,17 @@ def loaded_over_width(
     found = over_width(case, gears, waves=waves, steps=steps)
     if not found:
         return {}
-    fixed, waves, ring = case.static.members == "fixed", found["waves"], gears.gears[-1]
-    known = {"waves": repr(ring), "material": repr(materials_of(case)[-1]), "width": waves.width}
+    own: Any = found["waves"]
+    fixed = case.static.members == "fixed"
+    known = {"ring": repr(gears.gears[-1]), "material": repr(materials_of(case)[-1]), "width": own.width}
     known |= {"static.slices": case.static.slices, **(foundation_entries(case) if fixed else {})}
-    other = steps.kept("waves of the other ring", known)
-    if other is None:
-        foundation = ring_foundation(case, waves.ring.sector) if fixed else None
-        other = steps.keep("waves of the other ring", known, [
-            one.ring for one in with_ring_waves(waves, foundation).bodies
-        ])  # fmt: skip
-    bodies = (replace(one, ring=of_wave) for one, of_wave in zip(waves.bodies, other, strict=True))
-    other = replace(waves, bodies=tuple(bodies))
-    return found | dict(zip(("waves", "held_waves"), (other, waves) if fixed else (waves, other)))
+    rings = steps.kept("waves of the other ring", known)
+    if rings is None:
+        other = with_ring_waves(own, ring_foundation(case, own.ring.sector) if fixed else None)
+        rings = steps.keep("waves of the other ring", known, [one.ring for one in other.bodies])
+    bodies = (replace(one, ring=ring) for one, ring in zip(own.bodies, rings, strict=True))
+    other = replace(own, bodies=tuple(bodies))
+    return found | dict(zip(("waves", "held_waves"), (other, own) if fixed else (own, other)))
 
 
 def record_positions(case: Case, gears: PlanetarySet) -> int:

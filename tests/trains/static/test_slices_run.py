@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 from page_examples import check_documented
 
+from femgear.case.dependencies import Steps
 from femgear.contact.root_stress import body_stress
 from femgear.contact.tooth_loads import loaded_teeth
+from femgear.contact.width_waves import condensed_waves
 from femgear.errors import CaseError, FemgearError
 from femgear.trains.elastic.stages import solve_modes
-from femgear.trains.reading import read_case, with_values
+from femgear.trains.reading import read_case, with_value, with_values
+from femgear.trains.static import stages
 from femgear.trains.static.figures import contact_pattern, face_load, root_stress_over_width
 from femgear.trains.static.results import HELIX_VARIABLES, describe_static, describe_stress, static_warnings
 from femgear.trains.static.stages import solve_static, solve_stress
@@ -215,3 +218,25 @@ def test_modes_know_tilts_and_twists(case, straight):
         for one in ((yielding, solve_static(yielding)), (case, straight))
     ]
     assert (found[0] < found[1]).all()
+
+
+@pytest.mark.parametrize("members", ["fixed", "elastic"])
+def test_gears_are_condensed_for_waves_once(case, members, monkeypatch):
+    """The modal stage takes them from the static one, and cases with another ring those of sun and planet."""
+    condensed = []
+
+    def counted(sector, *rest):
+        condensed.append(sector.gear.name)
+        return condensed_waves(sector, *rest)
+
+    monkeypatch.setattr(stages, "condensed_waves", counted)
+    steps, case = Steps(), with_values(case, {"sun.modifications": [SLOPE], "static.members": members})
+    static = solve_static(case, steps=steps)
+    modes = solve_modes(case, static)
+    assert condensed == ["sun", "planet", "ring"]
+    other = with_value(case, "ring.outer_radius", "95 mm")
+    solve_static(other, steps=steps)
+    assert condensed[3:] == ["ring"]
+    # the same as with waves of its own
+    alone = solve_modes(case, replace(static, waves=None))
+    assert np.abs(alone.state.stiffness / modes.state.stiffness - 1.0).max() < 1e-12
