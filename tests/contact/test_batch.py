@@ -389,9 +389,9 @@ def test_contacts_that_grow_are_those_of_active_sets(kink):
 
 
 def test_contacts_that_let_go_are_solved_by_active_sets():
-    """A cell whose load lifts its neighbour lets go of it again."""
-    local = np.array([[[1.0, 0.8, 0.6], [0.8, 1.0, 0.95], [0.6, 0.95, 1.0]]])
-    beyond, cells, force = np.array([[0.0, 0.1, 0.18]]), np.ones((1, 3), bool), np.geomspace(0.1, 9.0, 7)
+    """Loads on both sides of a cell take it over."""
+    local = np.array([[[1.0, 0.8, 0.8], [0.8, 1.0, 0.5], [0.8, 0.5, 1.0]]])
+    beyond, cells, force = np.array([[0.0, 0.1, 0.4]]), np.ones((1, 3), bool), np.geomspace(0.1, 9.0, 7)
     approach, loads = batch._single_pairs(local, beyond, cells, force)
     assert (loads >= 0.0).all() and loads[0].sum(axis=-1) == pytest.approx(force)
     gap = beyond + loads[0] @ local[0] - approach[0][:, None]
