@@ -14,7 +14,7 @@ each acts on itself alone: u at a side band by the force at the same one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -71,6 +71,11 @@ class HarmonicBlocks:
         if given is not None:
             way = way + given
         return still + _times(self.compliance[:, G:], mean[G:] * way), way
+
+    def part(self, some: np.ndarray) -> HarmonicBlocks:
+        """Some of the blocks by their numbers, for deflections and forces."""
+        compliance, spring = self.compliance[:, :, some], self.spring[:, :, some]
+        return replace(self, compliance=compliance, spring=spring, yielding=self.yielding[some])
 
     def forces(self, extra: np.ndarray, deflection: np.ndarray, way: np.ndarray) -> np.ndarray:
         """Forces f (J, B, R) of the meshes by the forces e beyond k0, deflections and u."""

@@ -96,6 +96,10 @@ class DampingForces:
         """The four arrays, in their order."""
         return self.on_gears, self.on_structure, self.still, self.way
 
+    def single(self) -> DampingForces:
+        """The same in single precision."""
+        return DampingForces(*(_single(part) for part in self.parts))
+
 
 @dataclass(frozen=True)
 class SetDamping:
@@ -164,12 +168,14 @@ class SetDamping:
         return replace(self, residues=residues, rows=_single(self.rows))
 
     def answer(
-        self, blocks: HarmonicBlocks, receptances, motion, before: DampingForces
-    ) -> DampingForces:  # fmt: skip
+        self, blocks: HarmonicBlocks, receptances, motion, before: DampingForces, found: DampingForces,
+        some: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
         """Compute the forces of the damping by the motion at a speed, part by part of the blocks.
 
         By the `receptances`, in its precision, and by the motion: forces e (J, B, R) beyond k0, u (G, B, R),
-        forces f (J, B, R) of the meshes, and the forces of the damping in that motion.
+        forces f (J, B, R) of the meshes, and the forces of the damping in that motion. Into ``found``, of
+        all blocks or of some by their numbers.
         """
         extra, way, force = motion
         G = len(blocks.place)
@@ -178,17 +184,14 @@ class SetDamping:
         turned = np.exp(1j * np.outer(self.orders.diameters, blocks.place))
         if self.rows.dtype == np.complex64:
             excess, ring, turned = _single(excess), _single(ring), _single(turned)
-            if before.still.dtype != np.complex64:
-                before = DampingForces(*(_single(part) for part in before.parts))
-        found = DampingForces(*(np.empty_like(part) for part in before.parts))
         size = sum(one[0].nbytes for one in found.parts[:2])
         for residue in self.residues:
-            parts = int(np.ceil(len(residue.blocks) * size / _TOGETHER))
-            for some in np.array_split(residue.blocks, parts) if parts else ():
-                loads = excess[:, some], ring[:, some], before.on_gears[some], before.on_structure[some]
-                answers = receptances[0][some], receptances[1][some]
-                self._answer_part(blocks, residue, some, (loads, answers), turned, found)
-        return found
+            here = residue.blocks if some is None else np.intersect1d(residue.blocks, some)
+            parts = int(np.ceil(len(here) * size / _TOGETHER))
+            for part in np.array_split(here, parts) if parts else ():
+                loads = excess[:, part], ring[:, part], before.on_gears[part], before.on_structure[part]
+                answers = receptances[0][part], receptances[1][part]
+                self._answer_part(blocks, residue, part, (loads, answers), turned, found)
 
     def _answer_part(
         self, blocks: HarmonicBlocks, residue: _Residue, some, loads, turned, found: DampingForces

@@ -43,21 +43,22 @@ from femgear.housing.carrier_orders import (
     receptance,
     ring_load,
 )
+from femgear.housing.damping_passes import DampingPasses
 from femgear.housing.harmonic_blocks import HarmonicBlocks, blocks_of_speed
 from femgear.housing.mesh_fluctuation import CYCLES, MeshFluctuation, gmres
 from femgear.housing.sensor import ReadOnlyArrays, carrier_turns
-from femgear.housing.set_damping import DampingForces, SetDamping, set_damping
+from femgear.housing.set_damping import SetDamping, set_damping
 from femgear.housing.structure import FixedStructure
 from femgear.system.fourier import Product, pad
 from femgear.system.system import MeshExcitation, Modes, mesh_harmonics
 
 _EQUAL, _RESIDUAL = 1e-9, 1e-6
 """Part of the largest harmonic by which meshes that repeat others may differ; residual that is refused."""
-_PASSES, _MIXED = 60, 3
-"""Passes of the damping at most, and those that are extrapolated together."""
-_INNER, _SINGLE, _FIRST = 3e-2, 1e-7, 1e-4
-"""Accuracy of a solution over the change by its pass; of the forces of the damping in single precision; of
-the first solution over what fluctuates in its source."""
+_PASSES = 60
+"""Passes of the damping at most."""
+_INNER, _FIRST = 1e-2, 1e-4
+"""Accuracy of a solution over the change by the pass before; of the first one over what fluctuates in its
+source."""
 _MOST, _TINY, _LEAST = 4e9, np.finfo(float).tiny, 1e-4
 """Size of what one speed takes at most [bytes]; what no norm is below; part of the forces with their mean
 that fluctuations are at least taken to be."""
@@ -287,26 +288,19 @@ class _Problem:
 
     def _damped(self, blocks: HarmonicBlocks, damping: SetDamping, tolerance: float) -> _Answer:
         """Solve with the damping of the set, whose forces follow the motion, pass by pass."""
-        load, forces, answers = blocks.load(), damping.none(len(self.place)), damping.receptances(blocks)
-        found, products, radius, change, passes = None, 0, 0.0, 1.0, list[_Pass]()
+        passes, accuracy = DampingPasses(damping, blocks), max(0.5 * tolerance, _FIRST)
+        found, products, radius, change = None, 0, 0.0, 1.0
         for _ in range(_PASSES):
-            accuracy = max(0.5 * tolerance, min(_INNER * change, _FIRST))
-            found = self._solved(blocks, load + forces.still, forces.way, found, accuracy)
+            found = self._solved(blocks, *passes.moved, found, accuracy)
             products, radius = products + found.products, max(radius, found.radius)
-            made = damping.answer(blocks, answers, (found.extra, found.way, found.force), forces)
-            apart = _over_ring(made.still - forces.still, made.way - forces.way).astype(complex)
-            apart *= self.gears.mean[:, None, None]
-            change = float(np.linalg.norm(apart)) / self._fluctuating(found.force)
+            size = self._fluctuating(found.force)
+            change, whole = passes.follow((found.extra, found.way, found.force), tolerance * size)
+            change /= size
             # what GMRES leaves unsolved no further pass will mend
-            if max(change, found.residual) <= tolerance or found.residual > accuracy:
+            if (whole and max(change, found.residual) <= tolerance) or found.residual > accuracy:
                 break
-            if not passes and tolerance > _SINGLE * change:
-                damping = damping.single()
-                answers = tuple(one.astype(np.complex64) for one in answers)
-            passes = [*passes[1 - _MIXED :], _Pass(made, apart)]
-            forces = _blend(_shares([one.change for one in passes]), [one.forces for one in passes])
-        drag = damping.on_all_modes(made.on_structure)
-        return _Answer(found.force, drag, max(found.residual, change), radius, products)
+            accuracy = max(0.5 * tolerance, min(_INNER * change, _FIRST))
+        return _Answer(found.force, passes.drag(), max(found.residual, change), radius, products)
 
     def _fluctuating(self, forces: np.ndarray) -> float:
         """Norm of forces (J, B, R) without those constant in time, which are often a thousand times it."""
@@ -413,40 +407,6 @@ def _over_ring(deflection: np.ndarray, way: np.ndarray) -> np.ndarray:
     """Deflections (J, B, R) of the meshes [m], those of ring meshes without what the ring gives way."""
     deflection[len(way) :] -= way
     return deflection
-
-
-@dataclass(frozen=True)
-class _Pass:
-    """Forces of the damping of the set, and what is new in mesh forces by them."""
-
-    forces: DampingForces
-    change: np.ndarray
-
-
-def _blend(share: np.ndarray, passes: list[DampingForces]) -> DampingForces:
-    """Blend the forces of the passes by the shares (n,) of these."""
-    blended = list[np.ndarray]()
-    for parts in zip(*(one.parts for one in passes)):
-        total = parts[0] * parts[0].dtype.type(share[0])
-        for times, part in zip(share[1:], parts[1:]):
-            total += part * part.dtype.type(times)
-        blended.append(total)
-    return DampingForces(*blended)
-
-
-def _shares(changes: list[np.ndarray]) -> np.ndarray:
-    """Shares (n,) of the passes before, one together, that change least.
-
-    D. G. Anderson, J. ACM 12 (1965) 547-560. Equations of real signals are linear over real numbers alone.
-    """
-    newest = changes[-1]
-    steps = [newest - change for change in changes[:-1]]
-    if not steps:
-        return np.ones(1)
-    product = np.array([[np.vdot(one, other).real for other in steps] for one in steps])
-    wanted = np.array([np.vdot(one, newest).real for one in steps])
-    share = np.linalg.lstsq(product, wanted, rcond=1e-13)[0]
-    return np.append(share, 1.0 - share.sum())
 
 
 def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tuple[np.ndarray, np.ndarray]:
