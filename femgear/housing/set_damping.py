@@ -21,7 +21,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.housing.carrier_orders import CarrierOrders, LeadingMeshes, modal_receptance
-from femgear.housing.harmonic_blocks import HarmonicBlocks
+from femgear.housing.harmonic_blocks import HarmonicBlocks, rows_times
 from femgear.housing.structure import FixedStructure, ring_waves
 from femgear.solvers.periodic.spectral import compliance
 from femgear.system.system import Modes
@@ -200,27 +200,27 @@ class SetDamping:
         (excess, ring, load, on_modes), (gears, structure) = loads
         orders, kind = self.orders, found.still.dtype
         for one in residue.classes:
-            load[:, one.bands] -= np.moveaxis(excess[:, :, one.bands], 0, -1) @ one.rows
+            load[:, one.bands] -= rows_times(np.moveaxis(excess[:, :, one.bands], 0, -1), one.rows)
         ring, moved, waves = _padded(np.moveaxis(ring, 0, -1)), list[np.ndarray](), list[np.ndarray]()
         for one in residue.sectors:
             path = np.sum(ring[:, one.bands] * turned[one.diameters].conj(), axis=-1)
-            motion = (orders.paths.symmetry * path) @ one.path.conj().T + one.of_modes(on_modes)
+            motion = rows_times(orders.paths.symmetry * path, one.path.conj().T) + one.of_modes(on_modes)
             moved.append(motion * one.of_modes(structure))
-            waves.append(moved[-1] @ one.shape)
+            waves.append(rows_times(moved[-1], one.shape))
         on_gears, on_waves = self._on_waves(residue, blocks.speed, some, load * gears, _joined(waves))
         order = (1j * blocks.speed * orders.structure_order[some, :, None]).astype(kind)
         on_structure, waves = np.zeros_like(structure), list[np.ndarray]()
         for one, motion in zip(residue.sectors, moved):
-            made = on_waves[:, one.place] @ one.shape.conj().T
-            made -= order[:, one.orders] * (motion @ one.own)
+            made = rows_times(on_waves[:, one.place], one.shape.conj().T)
+            made -= order[:, one.orders] * rows_times(motion, one.own)
             on_structure[:, one.orders, : len(one.modes)] = made
-            waves.append((made * one.of_modes(structure)) @ one.path)
+            waves.append(rows_times(made * one.of_modes(structure), one.path))
         path = _joined(waves)
         for one in residue.classes:
-            moved = path[:, one.path_place] @ turned[one.diameters]
+            moved = rows_times(path[:, one.path_place], turned[one.diameters])
             found.way[:, some[:, None], one.bands] = np.moveaxis(moved, -1, 0)
         found.on_gears[some], found.on_structure[some] = on_gears, on_structure
-        found.still[:, some] = np.moveaxis((on_gears * gears) @ self.rows.T, -1, 0)
+        found.still[:, some] = np.moveaxis(rows_times(on_gears * gears, self.rows.T), -1, 0)
 
     def _on_waves(self, residue: _Residue, speed: float, some, gears: np.ndarray, waves: np.ndarray):
         """Forces on the modes of the gears (b, R, n_modes) and on waves (b, n + 1) by their motions.
@@ -236,7 +236,7 @@ class SetDamping:
                 turning.astype(kind) * gears[:, one.bands],
                 (turning + 1j * speed * one.number).astype(kind) * waves[:, one.place],
             ], axis=2)  # fmt: skip
-            made = motion @ one.matrix.T
+            made = rows_times(motion, one.matrix.T)
             on_gears[:, one.bands] = made[..., :modes]
             on_waves.append(made[..., modes:])
         return on_gears, _joined(on_waves)
