@@ -14,6 +14,7 @@ each acts on itself alone: u at a side band by the force at the same one.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -208,13 +209,13 @@ def _times(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
 def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Multiply a complex matrix (..., k) by a real one (k, m), half the work of a complex one."""
     found = np.empty((*values.shape[:-1], real.shape[1]), complex)
-    rows = values.reshape(-1, values.shape[-1])
-    # BLAS takes neither parts of complex numbers nor stacks of small matrices at full speed
-    for part, of in ((found.real, rows.real), (found.imag, rows.imag)):
-        part[...] = (np.ascontiguousarray(of) @ real).reshape(part.shape)
+    # BLAS does not take the parts of complex numbers as they lie
+    found.real = rows_times(np.ascontiguousarray(np.real(values)), real)
+    found.imag = rows_times(np.ascontiguousarray(np.imag(values)), real)
     return found
 
 
 def rows_times(values: np.ndarray, matrix: np.ndarray) -> np.ndarray:
     """Multiply rows (..., k) by a matrix (k, m) at once: faster than a stack of small matrices."""
-    return (values.reshape(-1, values.shape[-1]) @ matrix).reshape(*values.shape[:-1], matrix.shape[1])
+    rows = values.reshape(math.prod(values.shape[:-1]), values.shape[-1])
+    return (rows @ matrix).reshape(*values.shape[:-1], matrix.shape[1])

@@ -289,7 +289,8 @@ class _Problem:
     def _damped(self, blocks: HarmonicBlocks, damping: SetDamping, tolerance: float) -> _Answer:
         """Solve with the damping of the set, whose forces follow the motion, pass by pass."""
         passes, accuracy = DampingPasses(damping, blocks), max(0.5 * tolerance, _FIRST)
-        found, products, radius, change = None, 0, 0.0, 1.0
+        products, radius, change = 0, 0.0, 1.0
+        found: Any = None
         for _ in range(_PASSES):
             found = self._solved(blocks, *passes.moved, found, accuracy)
             products, radius = products + found.products, max(radius, found.radius)
