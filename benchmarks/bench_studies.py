@@ -1,12 +1,14 @@
 """Many tasks by one and by two worker processes: tasks of a second, and growth over the number of samples."""
 
 from functools import partial
+from time import process_time
 
 import pytest
 from stages import some_work
 
 TASKS = "Eight tasks of about a second, over the number of worker processes"
 SAMPLES = "As-built sets over their number (reference set, curves of tooth pairs known)"
+SLICED = "As-built sets in slices of the face width (reference set, CPU)"
 SIZES = {"spring": (1000, 2000, 4000, 8000), "exact": (100, 200, 400)}
 
 
@@ -72,3 +74,44 @@ def test_samples(benchmark, medians, runner, model, method, count):
     each = f"{1e3 * medians[key] / count:.3g} ms a sample; {count / first[2]:g} times as many take "
     note = f"{each}{medians[key] / medians[first]:.2f} times as long"
     benchmark.extra_info["note"] = "; ".join(filter(None, (note, benchmark.extra_info["note"])))
+
+
+@pytest.fixture(scope="module")
+def sliced():
+    """Reference set in 25 slices, whose leads and axes are tolerances."""
+    from femgear.run import grid_cache
+    from femgear.study.relief import design_basis, sun_torque
+    from femgear.study.samples import Tolerances, sample_model, sample_positions
+    from femgear.trains.reading import read_case, with_values
+
+    case = with_values(read_case("cases/planetary_27_40_108.toml"), {"static.slices": 25})
+    law = {"distribution": "normal", "sigma": "3 um"}
+    askew = {"distribution": "normal", "sigma": "0.1 mrad"}
+    tolerances = {
+        "sun": {"cumulative_pitch": law, "lead_slope": law, "misalignment": {"x": askew, "y": askew}},
+        "planet": {"lead_slope": law, "misalignment": {"radial": askew, "tangential": askew}},
+        "ring": {"lead_slope": law},
+        "pin_errors": {"radial": law, "tangential": law},
+    }
+    basis = design_basis(case, cache=grid_cache(), slices=True)
+    torque = sun_torque(case, basis.gears)
+    positions = sample_positions(basis, torque, 16)
+    return sample_model(basis, Tolerances.model_validate(tolerances), sun_torque=torque, positions=positions)
+
+
+@pytest.mark.benchmark(group=SLICED, timer=process_time)
+@pytest.mark.parametrize(("method", "count"), [("spring", 512), ("exact", 4)])
+def test_samples_in_slices(benchmark, sliced, method, count):
+    from femgear.study.samples import exact_numbers, solve_samples
+
+    errors = sliced.draw(1, 0, count)
+    found = benchmark.pedantic(
+        lambda: solve_samples(sliced, errors, exact=method == "exact"), rounds=3, warmup_rounds=1
+    )
+    exact = exact_numbers(sliced, errors[:4])
+    missed = abs(found["transmission_error"][:4] / exact["transmission_error"] - 1.0).max()
+    title = f"{count} samples in 25 slices, {'as springs' if method == 'spring' else 'exactly'}"
+    median = benchmark.stats.stats.median if benchmark.stats is not None else 0.0
+    note = f"{1e3 * median / count:.3g} ms a sample at {len(sliced.position)} positions"
+    note += f"; STE of four within {missed:.1e}" if method == "spring" else ""
+    benchmark.extra_info.update(title=title, note=note)

@@ -88,7 +88,8 @@ Speed = Annotated[float, Quantity(SPEED, 1e-3 * RPM, 1e6 * RPM, remedy=_OTHER_FL
 
 _MEASURED = ("file", "roll_angles", "diameters", "places", "deviations")
 _PLACES = ("diameter", "roll_angle", "roll_length")
-Slope = Annotated[float, Quantity(ANGLE, -0.02, 0.02)]
+LARGEST_SLOPE = 0.02
+Slope = Annotated[float, Quantity(ANGLE, -LARGEST_SLOPE, LARGEST_SLOPE)]
 Turning = Annotated[float, Quantity(TORSION, 0.0, 1e13)]
 """Stiffness against tilt or wind-up; 0 leaves it free."""
 End = Literal["front", "back"]

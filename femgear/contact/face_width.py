@@ -83,7 +83,7 @@ def contact_over_width(
     W, driver, turns = len(found.mesh), found.setup.driver, found.setup.gears.rotation_approach
     S, rows, places = over.slices, len(found.position), found.setup.places
     P = rows // S if over.helical else rows
-    lead, apart, every = _leads(found, deviations, S, P)
+    lead, apart, every = lead_separations(found, deviations, S, P)
     laws, sliced = _solve(over, found, state, load, apart)
     force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
     motion = np.zeros((len(members.names), P))
@@ -133,7 +133,7 @@ def _solve(
     if over.held is not None:
         held = found.images_of(over.held[0]), over.held[1]
     whole = found.setup.images * driven
-    curves = np.geomspace(_LEAST * driven / found.setup.n_planets, _MOST * whole, _FORCES)
+    curves = curve_forces(driven, found.setup.n_planets, whole)
     laws = pair_laws(found, state, curves)
     sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
     if sliced.force.max() > curves[-1]:
@@ -143,6 +143,11 @@ def _solve(
         laws = pair_laws(found, state, curves)
         sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
     return laws, sliced
+
+
+def curve_forces(load: float, n_planets: int, whole: float) -> np.ndarray:
+    """Choose forces (K,) of the curves of tooth pairs [N], by the load on planets and on the whole set."""
+    return np.geomspace(_LEAST * load / n_planets, _MOST * whole, _FORCES)
 
 
 def _by_tilts(tilting: TiltingMembers | None, sliced: SliceState, tilts: np.ndarray) -> tuple:
@@ -193,10 +198,10 @@ def _of_pairs(found: Candidates, state: BatchState, laws: PairLaws, sliced: Slic
     }
 
 
-def _leads(
+def lead_separations(
     found: Candidates, d: SetDeviations | None, S: int, P: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Separations by leads and misalignments [m].
+    """Compute separations by leads and misalignments [m].
 
     Of meshes (2N, S), of windows (P, S, W), and of all listed pairs in all slices (2N, rows, pairs, S), which
     may be the same for all rows and pairs.
@@ -241,11 +246,23 @@ def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.
     return found
 
 
+def contacts_are_lines(
+    load: np.ndarray, length: np.ndarray, at_end: np.ndarray, contact: np.ndarray, part: float
+) -> np.ndarray:
+    """Tell whether contacts of spur teeth are lines rather than points, (P, W, ...).
+
+    From loads [N], the length over the width on which they carry [m], whether this reaches an end of it, and
+    widths along the profile [m]; slices are ``part`` [m] wide. One or two slices amid the width may carry
+    less than their length.
+    """
+    amid = ~at_end & (length < 2.5 * part) & (load > 0.25 * load.max(axis=(0, 1)))
+    return ~((contact > 0.4 * length) | amid)
+
+
 def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, slices: int) -> None:
     """Refuse (E-SLICES) contacts that are wider than slices, or of spur teeth points rather than lines.
 
-    Forces are (P, S, W) [N], widths of the contacts along the profile (P, W) [m]. One or two slices amid the
-    width may carry less than their length.
+    Forces are (P, S, W) [N], widths of the contacts along the profile (P, W) [m].
     """
     thinnest = float(contact.max(initial=0.0))
     if width / slices < thinnest:
@@ -258,9 +275,8 @@ def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, sl
     if force is None:
         return
     load, carries = force.mean(axis=1), force > 0.0
-    length, most = carries.mean(axis=1) * width, 2.5 * width / slices
-    amid = ~(carries[:, 0] | carries[:, -1]) & (length < most) & (load > 0.25 * load.max())
-    point = (contact > 0.4 * length) | amid
+    length, at_end = carries.mean(axis=1) * width, carries[:, 0] | carries[:, -1]
+    point = ~contacts_are_lines(load, length, at_end, contact, width / slices)
     if point.any():
         raise ContactError(
             f"a tooth pair touches over no more than {length[point].min() * 1e3:.3g} mm of the width and "

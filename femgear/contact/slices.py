@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from femgear.contact.assembly import Candidates
 from femgear.contact.batch import PairLaws, cyclic_harmonics
@@ -48,8 +49,8 @@ class SliceState:
         For the bodies, and others that were asked for: increments of the mesh forces per unit approach of
         every mesh at constant loads of the others [N/m]. Of spur teeth less those of the plane solution.
     joint : (H, P, meshes, meshes) array
-        Of the last of these bodies: the same per unit approach of each mesh while the others hold theirs, in
-        every harmonic over the images.
+        Of the bodies that were asked for: the same per unit approach of each mesh while the others hold
+        theirs, in every harmonic over the images; empty without them.
     """
 
     force: np.ndarray
@@ -152,11 +153,8 @@ def solve_slices(
         if held is not None:
             bodies.append((held[0][:, rows], of_held[0]))
         newton = _SliceNewton(laws, rows, load, across.sum(axis=0), separations[some], smooth[0], tilting)
-        before = []
-        if each == 1:
-            before = (
-                newton.tangents(bodies) if tilting is not None else _of_one_slice(laws, rows, load, bodies)
-            )
+        # in the plane nothing tilts or winds up
+        before = _of_one_slice(laws, rows, load, bodies) if each == 1 else []
         if tilting is not None:
             mesh, window = laws.mesh, np.arange(N)[:, None]
             coupling = tilting.coupling[mesh, window][:, :, mesh, window]
@@ -298,7 +296,7 @@ class _SliceNewton:
 
         ``bodies`` are pairs of compliances between all windows and their images, (I, P, L, W, 3, W, 3) and
         across the width, (I, P, N, W, N, W) [m/N]. The list begins with ``joint`` (H, P, meshes, meshes) of
-        the last bodies; ``own`` (P, meshes) of each follow [N/m].
+        the last of several bodies; ``own`` (P, meshes) of each follow [N/m].
         """
         (P, N, _), meshes = self.shape, np.arange(int(self.laws.mesh[-1]) + 1)
         on, at = _first((self.force > 0.0).reshape(P, self.size))
@@ -323,6 +321,8 @@ class _SliceNewton:
                 own = np.where(some < c, own, False)
                 alone.append((own * np.linalg.solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
             found.append(np.stack(alone, axis=1) / (N * self.unit))
+        if len(bodies) == 1:
+            return [np.zeros((1, P, 0, 0)), *found]
         harmonics = cyclic_harmonics(A)
         answers = [np.linalg.solve(harmonics[0].real, ones), *np.linalg.solve(harmonics[1:], ones)]
         return [ones.swapaxes(1, 2) @ np.array(answers) / (N * self.unit), *found]
@@ -396,14 +396,32 @@ class _SliceNewton:
         carried = np.hstack([self.force.sum(axis=1) @ self.laws.approach, tilted]) / N
         balance = self.load - carried - self.springs * self.motions
         right = np.concatenate([np.where(on, -gap.reshape(P, n)[rows, at], 0.0), balance], axis=1)
-        solved = np.linalg.solve(system, right[..., None])[..., 0]
         change = np.zeros((P, n + m))
-        change[rows, at], change[:, n:] = solved[:, :c], solved[:, c:]
+        for place, count in enumerate(on.sum(axis=1)):
+            # what is closed comes first
+            closed = np.append(np.arange(count), np.arange(c, c + m))
+            some = np.append(at[place, :count], np.arange(n, n + m))
+            change[place, some] = _bordered_solution(
+                system[place][np.ix_(closed, closed)], right[place, closed], m
+            )
         # pulls stay until the next step: motions belong to them
         self.force = np.where(self.closed, self.force + change[:, :n].reshape(P, N, W), 0.0)
         self.motions = self.motions + change[:, n:]
         moved = np.abs(self.force - before).reshape(P, -1).max(axis=1)
         return np.where(changed, np.inf, moved)
+
+
+def _bordered_solution(system: np.ndarray, right: np.ndarray, motions: int) -> np.ndarray:
+    """Solve a system (c + m, c + m) whose first block, a compliance, is symmetric and mostly definite."""
+    count = len(right) - motions
+    sides = np.column_stack([system[:count, count:], right[:count]])
+    try:
+        solved = cho_solve(cho_factor(system[:count, :count], check_finite=False), sides, check_finite=False)
+    except LinAlgError:
+        return np.linalg.solve(system, right)
+    below, by_motions, alone = system[count:, :count], solved[:, :motions], solved[:, motions]
+    moved = np.linalg.solve(system[count:, count:] - below @ by_motions, right[count:] - below @ alone)
+    return np.append(alone - by_motions @ moved, moved)
 
 
 def _first(on: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,10 +9,10 @@ finds the least peak to peak at one torque and says whether it is a minimum. All
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,7 +25,7 @@ from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.modifications import FlankForm, TipRelief
 from femgear.trains.protocol import Progress, one_blas_thread
-from femgear.trains.static.stages import known_compliances, static_supports
+from femgear.trains.static.stages import known_compliances, over_width, static_supports
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -52,16 +52,20 @@ class DesignBasis:
         Members whose axes move; by default all are fixed.
     deviations : SetDeviations, optional
         That the variants add to; None for ideal gears.
-    positions, contact : int, {"profile", "line_of_action"}
-        Equidistant positions of one mesh period and candidates, see `contact.cycle.walk_mesh_cycle`.
+    positions, contact : int or (P,) array, {"profile", "line_of_action"}
+        Equidistant positions of one mesh period, or those themselves, and candidates, see
+        `contact.cycle.walk_mesh_cycle`.
+    over : mapping
+        What the contact over the face width takes of `CycleOptions`, by name; empty of the plane contact.
     """
 
     gears: PlanetarySet
     bodies: Bodies
     supports: Supports = RIGID
     deviations: SetDeviations | None = None
-    positions: int = 64
+    positions: int | np.ndarray = 64
     contact: str = "profile"
+    over: Mapping[str, Any] = field(default_factory=dict)
 
     def walk(self, sun_torque: float, *, periods: int = 1, options: CycleOptions | None = None) -> MeshCycle:
         """Solve the static problem over some mesh periods under a torque on the sun [N m].
@@ -77,7 +81,7 @@ class DesignBasis:
             deviations=self.deviations,
             supports=self.supports,
             periods=periods,
-            options=options or CycleOptions(peaks=True),
+            options=replace(options or CycleOptions(peaks=True), **self.over),
         )
 
     def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
@@ -100,21 +104,33 @@ class DesignBasis:
 
 
 @one_blas_thread()
-def design_basis(case: Case, *, cache: Path | None = None, steps: Steps | None = None) -> DesignBasis:
+def design_basis(
+    case: Case, *, cache: Path | None = None, steps: Steps | None = None, slices: bool = False
+) -> DesignBasis:
     """Collect gears, compliances, deviations, supports and positions of the static problem of a case.
 
     ``cache`` is the folder of generated grids; flank compliances of other cases are taken from ``steps``
     where they are those of this one, as in `femgear.trains.static.stages.solve_static`.
+
+    CaseError: E-SLICES: slices over the width, which ``slices`` allows, but for those of helical teeth.
     """
-    if case.static.slices > 1:
+    if case.static.slices > 1 and not slices:
         raise CaseError(
             "this study solves the plane contact", code="E-SLICES", key="static.slices",
             file=case.location("static.slices"), remedy="leave static.slices and modifications of leads out",
         )  # fmt: skip
+    if case.set.helix_angle:
+        raise CaseError(
+            "this study is one of spur teeth", code="E-SLICES", key="set.helix_angle",
+            file=case.location("set.helix_angle"), remedy="leave set.helix_angle out",
+        )  # fmt: skip
     gears, deviations = planetary_set(case), set_deviations(case)
     bodies = known_compliances(case, gears, steps or Steps(), cache=cache)[1]
     own = None if deviations.ideal else deviations
-    return DesignBasis(gears, bodies, static_supports(case), own, case.static.positions, case.static.contact)
+    return DesignBasis(
+        gears, bodies, static_supports(case), own, case.static.positions, case.static.contact,
+        over_width(case, gears, cache=cache),
+    )  # fmt: skip
 
 
 def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:

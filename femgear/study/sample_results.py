@@ -53,9 +53,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 QUANTILES = (0.01, 0.05, 0.5, 0.95, 0.99)
-_BLOCKS = {"spring": 512, "exact": 64}
-"""Samples of a task."""
-_CHECKED = 8
+_BLOCKS, _SLICED_BLOCKS = {"spring": 512, "exact": 64}, {"spring": 256, "exact": 5}
+"""Samples of a task, and of one in slices of the face width."""
+_CHECKED, _SLICED_CHECKED = 8, 3
 """Samples from the least to the largest transmission error that are solved again in every way."""
 _MOST_AGAIN, _SHARE_AGAIN = 1000, 100
 """Samples drawn at random that are solved again exactly: at most so many, and one in so many."""
@@ -65,6 +65,8 @@ _ROWS = 2**16
 """Samples that are read at once."""
 SHOWN = tuple(NUMBERS)[:4]
 """What is told of all samples."""
+_EVERY_WAY = "in every way "
+"""Beginning of the keys of samples that are solved again in every way."""
 FILES, _JOURNAL, _COLUMNS = ("samples.nc", "samples.png", "worst.toml"), "samples.jsonl", ".samples.part"
 """What a command writes, and what it goes on from: a journal of the blocks, and their numbers."""
 
@@ -155,10 +157,11 @@ class _Tasks:
     def __init__(self, model, seed: int, journal: Journal, columns: Columns, progress, runner: Runner):
         self.model, self.seed, self.columns = model, seed, columns
         self._journal, self._progress, self._runner = journal, progress, runner
+        self._sizes = _SLICED_BLOCKS if model.basis.over else _BLOCKS
 
     def compute(self, count: int, method: str) -> None:
         """Compute all samples that are missing, and put them into the columns."""
-        size = _BLOCKS[method]
+        size = self._sizes[method]
         blocks = {f"{first}-{min(first + size, count)}": first for first in range(0, count, size)}
 
         def kept(key: str) -> bool:
@@ -175,7 +178,7 @@ class _Tasks:
 
     def exactly(self, chosen: np.ndarray) -> dict[str, np.ndarray]:
         """Numbers of some samples (n,), solved exactly."""
-        size = _BLOCKS["exact"]
+        size = self._sizes["exact"]
         items = [tuple(map(int, part)) for part in np.split(chosen, range(size, len(chosen), size))]
         keys = [f"exact {fingerprint(str(item))[:16]} {len(item)}" for item in items]
 
@@ -187,6 +190,21 @@ class _Tasks:
             partial(_exact_block, self.model, self.seed), keys, items, "samples again, exactly", kept, keep
         )
         return joined([{name: np.array(part) for name, part in self._journal[key].items()} for key in keys])
+
+    def in_every_way(self, chosen: np.ndarray) -> tuple[dict[str, np.ndarray], list[dict[str, np.ndarray]]]:
+        """Numbers of some samples (n,), solved exactly; and over a turn and between positions."""
+        keys = [f"{_EVERY_WAY}{index}" for index in chosen.tolist()]
+
+        def keep(key: str, numbers: tuple[dict[str, np.ndarray], list]) -> dict:
+            return {"exact": {name: part.tolist() for name, part in numbers[0].items()}, "ways": numbers[1]}
+
+        kept = self._journal.__contains__
+        solve = partial(_every_way, self.model, self.seed)
+        self._map(solve, keys, chosen.tolist(), "samples again, in every way", kept, keep)
+        records = [self._journal[key] for key in keys]
+        exact = joined([{name: np.array(part) for name, part in one["exact"].items()} for one in records])
+        ways = np.array([one["ways"] for one in records])
+        return exact, [dict(zip(SHOWN, ways[:, way].T)) for way in (0, 1)]
 
     def _map(self, function, keys: list[str], items: list, stage: str, kept, keep) -> None:
         """Compute the items of keys that are not kept."""
@@ -203,6 +221,9 @@ class _Tasks:
 
 def _is_block(key: str, record: dict) -> bool:
     """Tell whether a record of a journal belongs to a block of samples, or has the numbers of exact ones."""
+    if key.startswith(_EVERY_WAY):
+        numbers = [*record["exact"].values(), *record["ways"]]
+        return record["exact"].keys() == NUMBERS.keys() and all(np.isfinite(part).all() for part in numbers)
     if not key.startswith("exact "):
         first, end = map(int, key.split("-"))
         return first < end and type(record["checksum"]) is str
@@ -217,14 +238,10 @@ def _checked_again(
     seed, columns = more["seed"], tasks.columns
     order = np.argsort(columns.column("transmission_error", count), kind="stable")
     largest, worst = columns.column("largest_share", count).argmax(), int(order[-1])
-    chosen = np.unique(np.append(order[np.linspace(0, count - 1, min(_CHECKED, count)).astype(int)], largest))
+    checks = min(_SLICED_CHECKED if model.basis.over else _CHECKED, count)
+    chosen = np.unique(np.append(order[np.linspace(0, count - 1, checks).astype(int)], largest))
     del order
-    errors = np.concatenate([model.draw(seed, int(i), 1) for i in chosen])
-    exact = exact_numbers(model, errors)
-    turn, between = (
-        dict(zip(SHOWN, np.transpose([numbers(model, one) for one in errors])))
-        for numbers in (over_a_turn, between_positions)
-    )
+    exact, (turn, between) = tasks.in_every_way(chosen)
     ideal = exact_numbers(model, np.zeros((1, model.size)))
     # those of a run of the case
     ideal |= dict(zip(SHOWN, np.transpose([between_positions(model, np.zeros(model.size))])))
@@ -316,6 +333,12 @@ def _write(data: xr.Dataset, columns: Columns, path: Path) -> None:
 
 def _block(model: SampleModel, seed: int, exact: bool, ends: tuple[int, int]) -> dict[str, np.ndarray]:
     return sample_block(model, seed, ends[0], ends[1] - ends[0], exact=exact)
+
+
+def _every_way(model: SampleModel, seed: int, index: int) -> tuple[dict[str, np.ndarray], list]:
+    """Numbers of a sample solved exactly; the first of them over a turn, and with the peaks between."""
+    errors = model.draw(seed, index, 1)
+    return exact_numbers(model, errors), [over_a_turn(model, errors[0]), between_positions(model, errors[0])]
 
 
 def _exact_block(model: SampleModel, seed: int, chosen: tuple[int, ...]) -> dict[str, np.ndarray]:

@@ -3,7 +3,8 @@
 Sample ``i`` of a seed adds errors to the deviations of the case, drawn by NumPy's default generator of
 ``[seed, i]``: it is the same whatever is drawn beside it. Errors of position separate flanks linearly, so one
 matrix, made of unit errors, gives the separations of all samples. A profile slope tilts them within the
-windows of the case, which it does not move.
+windows of the case, which it does not move. In slices of the face width (`static.slices`) leads and axes
+askew part flanks by straight lines and parabolas, which are as linear.
 
 The positions span one mesh period with the teeth that mesh in the first one, from one end to the other: where
 teeth have errors of their own the record does not close. They are equidistant ones and those at which the set
@@ -20,7 +21,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache, partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import ValidationError, ValidationInfo, model_validator
@@ -30,8 +31,8 @@ from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import need_set
 from femgear.case.mistakes import combine, translate
-from femgear.case.quantities import Section
-from femgear.case.sections import LARGEST_DEVIATION, Amplitude, Case, Deviation
+from femgear.case.quantities import ANGLE, Quantity, Section
+from femgear.case.sections import LARGEST_DEVIATION, LARGEST_SLOPE, Amplitude, Case, Deviation, Slope
 from femgear.contact.assembly import (
     MOST_ENLARGEMENTS,
     Candidates,
@@ -44,45 +45,60 @@ from femgear.contact.assembly import (
 )
 from femgear.contact.batch import (
     ContactTangents,
+    PairLaws,
     check_residual,
     pair_laws,
     solve_batch,
 )
+from femgear.contact.cycle import CycleOptions
+from femgear.contact.face_width import contacts_are_lines, curve_forces, lead_separations
 from femgear.contact.flank_pairs import pair_separations
 from femgear.contact.pair_springs import PairSprings, solve_laws
 from femgear.contact.peaks import mean_weights
-from femgear.contact.supports import MovingMembers, moving_members
+from femgear.contact.slice_springs import SliceSolutions, SliceSprings, solve_slice_springs
+from femgear.contact.supports import MovingMembers, TiltingMembers, moving_members, tilting_members
 from femgear.errors import CaseError
 from femgear.gears.deviations import (
     Runout,
     SetDeviations,
+    lead_separation,
     mirrored_deviations,
     no_deviations,
     profile_separation,
 )
 from femgear.gears.gear import Gear
-from femgear.gears.modifications import FlankForm, ProfileSlope
+from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope, ProfileSlope
 from femgear.study.relief import DesignBasis, design_basis, sun_torque
 from femgear.trains.protocol import one_blas_thread
 from femgear.trains.reading import with_values
-
-if TYPE_CHECKING:
-    pass
+from femgear.trains.static.results import SLICES
 
 POSITIONS = 16
 """Of a mesh period."""
 _FORCES, _LEAST = 48, 1e-3
 """Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
-_STRAIGHT = 0.005
-"""Share of a peak to peak that straight lines between positions may miss, of the set without drawn errors."""
-_TOGETHER, _EXACT_TOGETHER, _TRIED = 128, 128, 32
+_STRAIGHT, _STRAIGHT_IN_SLICES = 0.005, 0.05
+"""Share of a peak to peak that straight lines between positions may miss, of the set without drawn errors.
+
+In slices, which come into contact one after the other where leads are drawn, kinks of all slices at once are
+none of the samples'.
+"""
+_TOGETHER, _SLICED_TOGETHER, _EXACT_TOGETHER, _TRIED = 128, 256, 128, 32
 """Samples as springs and positions of the whole problem solved at once; those
 of seed 0 that windows are tried with."""
 MOST_SAMPLES = 10_000_000
+_MARGIN = 1.5
+"""Forces and approaches in slices that windows hold, over the largest of the samples that are tried."""
 _REACH = 5.0
 """Standard deviations within which all values of a normal law count as lying."""
 _FLANKS = {"sun": ("sun",), "planet": ("planet_sun_side", "planet_ring_side"), "ring": ("ring",)}
-"""Of the gears, those with a profile slope of their own, as `SetDeviations` names them."""
+"""Of the gears, those with slopes and leads of their own, as `SetDeviations` names them."""
+_FORMS: dict[str, tuple[str, type[Any]]] = {
+    "profile_slope": ("profile slope", ProfileSlope),
+    "lead_slope": ("lead slope", LeadSlope),
+    "lead_crowning": ("lead crowning", LeadCrowning),
+}
+"""Modifications that are drawn, by key: as the case file names them, and as flanks have them."""
 NUMBERS = {
     "transmission_error": ("sample", "m", "static transmission error from sun to ring, peak to peak"),
     "largest_share": ("sample", "1", "largest share of a planet in the torque"),
@@ -94,13 +110,23 @@ NUMBERS = {
 """What is computed of a sample: dimensions, unit and words."""
 
 
+SlopeAmplitude = Annotated[float, Quantity(ANGLE, 0.0, LARGEST_SLOPE)]
+
+
 class Law(Section):
     """Distribution of an error: normal, cut off at mean -+ limit where one is given, or uniform there."""
 
+    _shown: ClassVar[tuple[float, str]] = (1e6, "um")
     distribution: Literal["normal", "uniform"]
     mean: Deviation = 0.0
     sigma: Amplitude | None = None
     limit: Amplitude | None = None
+
+    @classmethod
+    def _largest(cls, module: float) -> tuple[float, str]:
+        """Largest plausible error, and how it is written."""
+        most = LARGEST_DEVIATION * module
+        return most, f"{LARGEST_DEVIATION} modules, {most * 1e6:.6g} um"
 
     @model_validator(mode="after")
     def _possible(self, info: ValidationInfo):
@@ -114,11 +140,10 @@ class Law(Section):
             message = "a uniform distribution has no sigma"
             raise CaseError(message, code="E-CHOICE", limit="mean and limit", remedy="leave sigma out")
         reach = abs(self.mean) + (_REACH * (self.sigma or 0.0) if self.limit is None else self.limit)
-        if info.context and reach > (most := LARGEST_DEVIATION * info.context["module"]):
+        if info.context and reach > (most := self._largest(info.context["module"]))[0]:
             raise CaseError(
-                f"errors of {reach * 1e6:.6g} um are not plausible", code="E-RANGE", remedy="check the unit",
-                limit=f"mean and limit, or {_REACH:g} sigma, within {LARGEST_DEVIATION} modules, "
-                f"{most * 1e6:.6g} um",
+                f"errors of {reach * self._shown[0]:.6g} {self._shown[1]} are not plausible", code="E-RANGE",
+                limit=f"mean and limit, or {_REACH:g} sigma, within {most[1]}", remedy="check the unit",
             )  # fmt: skip
         return self
 
@@ -132,28 +157,76 @@ class Law(Section):
         return self.mean + (self.sigma or 0.0) * ndtri(np.maximum(below + share * (1.0 - 2.0 * below), 1e-17))
 
 
-class CarrierTolerances(Section):
-    """Of the circle of the planet pins: eccentricity, in a direction that is uniformly distributed."""
+class SlopeLaw(Law):
+    """Distribution of the slope of an axis."""
+
+    _shown: ClassVar[tuple[float, str]] = (1e3, "mrad")
+    mean: Slope = 0.0
+    sigma: SlopeAmplitude | None = None
+    limit: SlopeAmplitude | None = None
+
+    @classmethod
+    def _largest(cls, module: float) -> tuple[float, str]:
+        """Largest plausible slope, and how it is written."""
+        return LARGEST_SLOPE, f"{1e3 * LARGEST_SLOPE:g} mrad"
+
+
+class AxisTolerances(Section):
+    """Slopes of the axis of sun or carrier along x and y of the carrier frame."""
+
+    x: SlopeLaw | None = None
+    y: SlopeLaw | None = None
+
+
+class PinTiltTolerances(Section):
+    """Slopes of the axis of every planet: radial outwards, tangential counter-clockwise, towards z > 0."""
+
+    radial: SlopeLaw | None = None
+    tangential: SlopeLaw | None = None
+
+
+class RunoutTolerances(Section):
+    """Of what turns with a member: eccentricity, in a direction that is uniformly distributed."""
 
     runout_amplitude: Law | None = None
 
 
-class GearTolerances(CarrierTolerances):
+class CarrierTolerances(RunoutTolerances):
+    """Of the circle of the planet pins, and of the axis of the carrier."""
+
+    misalignment: AxisTolerances = AxisTolerances()
+
+
+class GearTolerances(RunoutTolerances):
     """Of a gear, as the case file has its errors; every tooth and every planet has a draw of its own.
 
-    The profile slope is one draw for all teeth of sun or ring, and one for each flank of all planets.
+    Slopes and crowning are one draw for all teeth of sun or ring, and one for each flank of all planets.
     """
 
     pitch: Law | None = None
     cumulative_pitch: Law | None = None
     thickness_reduction: Law | None = None
     profile_slope: Law | None = None
+    lead_slope: Law | None = None
+    lead_crowning: Law | None = None
 
     @model_validator(mode="after")
     def _pitch_once(self):
         if self.pitch is not None and self.cumulative_pitch is not None:
             raise CaseError("pitch and cumulative_pitch say the same", code="E-DUPLICATE", remedy="keep one")
         return self
+
+
+class SunTolerances(GearTolerances):
+    """Of the sun, whose axis may stand askew."""
+
+    misalignment: AxisTolerances = AxisTolerances()
+
+
+class PlanetTolerances(GearTolerances):
+    """Of the planets, each of whose axes may stand askew."""
+
+    misalignment: PinTiltTolerances = PinTiltTolerances()
 
 
 class PinTolerances(Section):
@@ -166,8 +239,8 @@ class PinTolerances(Section):
 class Tolerances(Section):
     """Distributions of manufacturing errors, some of them given."""
 
-    sun: GearTolerances = GearTolerances()
-    planet: GearTolerances = GearTolerances()
+    sun: SunTolerances = SunTolerances()
+    planet: PlanetTolerances = PlanetTolerances()
     ring: GearTolerances = GearTolerances()
     carrier: CarrierTolerances = CarrierTolerances()
     pin_errors: PinTolerances = PinTolerances()
@@ -183,8 +256,16 @@ class Tolerances(Section):
 
     def laws(self) -> Iterator[tuple[str, Law]]:
         """Give the keys of the errors that are drawn, and their laws."""
+
+        def of(name: str, section: Section) -> Iterator[tuple[str, Law]]:
+            for key, value in section:
+                if isinstance(value, Law):
+                    yield f"{name}.{key}", value
+                elif isinstance(value, Section):
+                    yield from of(f"{name}.{key}", value)
+
         for name, section in self:
-            yield from ((f"{name}.{key}", law) for key, law in section if law is not None)
+            yield from of(name, section)
 
 
 def read_tolerances(path: str | os.PathLike, module: float) -> tuple[Tolerances, str]:
@@ -207,6 +288,19 @@ def read_tolerances(path: str | os.PathLike, module: float) -> tuple[Tolerances,
 
 
 @dataclass(frozen=True, eq=False)
+class _OverWidth:
+    """What samples in slices of the face width share besides, in windows of one size."""
+
+    springs: SliceSprings
+    tilting: TiltingMembers | None
+    # separations of the case by leads and axes askew: of windows (P, W, S), of meshes (2N, S)
+    apart: np.ndarray
+    lead: np.ndarray
+    # of meshes per error, (2N S, K)
+    shifts: csr_array
+
+
+@dataclass(frozen=True, eq=False)
 class _Level:
     """All that samples share in windows of one size."""
 
@@ -222,6 +316,7 @@ class _Level:
     other_gap: np.ndarray
     other_shifts: csr_array
     other_place: tuple[np.ndarray, np.ndarray]
+    over: _OverWidth | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,6 +339,12 @@ class SampleModel:
     equidistant: int
     windows: tuple[float, float] = (0.0, 0.0)
     _levels: dict[tuple[float, float], _Level] = field(default_factory=dict)
+
+    @property
+    def sun_torque(self) -> float:
+        """Torque on the sun [N m]."""
+        torque = float(self.load[self.basis.gears.n_planets]) * self.basis.gears.sun.base_radius
+        return torque if self.solved.gears is self.basis.gears else -torque
 
     @property
     def size(self) -> int:
@@ -294,10 +395,19 @@ class SampleModel:
             for g in (gears.sun, gears.planet, gears.ring)
         )
         forms = {
-            flank: FlankForm((*getattr(d, flank).modifications, ProfileSlope(float(slope))))
+            flank: FlankForm((*getattr(d, flank).modifications, *drawn))
             for gear, flanks in _FLANKS.items()
-            for flank, slope in zip(flanks, of(f"{gear}.profile_slope")[0])
-            if slope
+            for i, flank in enumerate(flanks)
+            if (drawn := [
+                kind(float(amount))
+                for key, (_, kind) in _FORMS.items()
+                if (amount := np.append(of(f"{gear}.{key}")[0], 0.0)[i])
+            ])
+        }  # fmt: skip
+        askew = {
+            name: getattr(d, f"{name}_misalignment")
+            + np.concatenate([of(f"{name}.misalignment.{along}")[0] for along in "xy"])
+            for name in ("sun", "carrier")
         }
         return replace(
             d, **forms, sun_pitch=d.sun_pitch - sun[0], planet_pitch=d.planet_pitch - planet,
@@ -305,6 +415,9 @@ class SampleModel:
             sun_runout=moved("sun", d.sun_runout)[0], planet_runout=moved("planet", *d.planet_runout),
             ring_runout=moved("ring", d.ring_runout)[0], carrier_runout=moved("carrier", d.carrier_runout)[0],
             pin_errors=d.pin_errors + of("pin_errors.radial") * [1, 0] + of("pin_errors.tangential") * [0, 1],
+            planet_misalignment=d.planet_misalignment + of("planet.misalignment.radial") * [1, 0]
+            + of("planet.misalignment.tangential") * [0, 1],
+            sun_misalignment=askew["sun"], carrier_misalignment=askew["carrier"],
             sun_thickness=d.sun_thickness + float(of("sun.thickness_reduction")[0, 0]),
             planet_thickness=d.planet_thickness + of("planet.thickness_reduction")[:, 0],
             ring_thickness=d.ring_thickness + float(of("ring.thickness_reduction")[0, 0]),
@@ -324,14 +437,19 @@ class SampleModel:
         setup = mesh_windows(s.gears, s.bodies, **sizes, deviations=s.deviations)
         found = contact_candidates(setup, s.bodies, np.arange(len(self.position)), self.members)
         state = solve_batch(found, self.load)
-        laws = pair_laws(found, state, np.geomspace(_LEAST * self.load[N] / N, self.load[N], _FORCES))
+        curves = np.geomspace(_LEAST * self.load[N] / N, self.load[N], _FORCES)
+        if s.over:
+            curves = curve_forces(self.load[N], N, self.load[N])
+        laws = pair_laws(found, state, curves)
         rolls = setup.roll[:, found.mesh, found.position[:, None], found.pair]
         tilted = any(key.endswith("profile_slope") for key, *_ in self.errors)
-        shifts, tilts, unit, ideal = [], [], 1e-6, no_deviations(self.basis.gears)
+        shifts, tilts, leads, unit, ideal = [], [], [], 1e-6, no_deviations(self.basis.gears)
         for one in np.eye(self.size):
             own = self.image(self.deviations(unit * one, ideal))
             where = setup.listed.tooth, setup.turns, self.position
             shifts.append(pair_separations(s.gears, own, *where, back=False) / unit)
+            if s.over:
+                leads.append(lead_separation(own, s.gears, s.over["slices"]) / unit)
             if tilted:
                 kinds = [profile_separation(own, s.gears, kind, *rolls) / unit for kind in (0, 1)]
                 tilts.append(np.where((found.mesh < N)[:, None], *kinds))
@@ -341,12 +459,22 @@ class SampleModel:
         mesh, at, pair = np.nonzero(np.isfinite(listed.gap) & ~listed.near & (s.contact == "profile"))
         by_pairs = np.moveaxis(np.array(shifts), 0, -1)
         at_nodes = _sparse(np.moveaxis(np.array(tilts), 0, -1)) if tilted else None
+        over = _over_width(s, found, laws, np.moveaxis(np.array(leads), 0, -1)) if s.over else None
         made = _Level(
             found, PairSprings(laws), laws.touching, _sparse(by_pairs[of_windows]), at_nodes, overflows,
-            listed.gap[mesh, at, pair], _sparse(by_pairs[mesh, at, pair]), (at, mesh),
+            listed.gap[mesh, at, pair], _sparse(by_pairs[mesh, at, pair]), (at, mesh), over,
         )  # fmt: skip
         self._levels[share, nearest] = made
         return made
+
+
+def _over_width(s: DesignBasis, found: Candidates, laws: PairLaws, leads: np.ndarray) -> _OverWidth:
+    """What samples of a solved set share over its width; ``leads`` (2N, S, K) are separations per error."""
+    slices, waves = s.over["slices"], s.over["waves"]
+    tilting = tilting_members(s.gears, s.over["width_supports"], slices)
+    lead, apart, _ = lead_separations(found, s.deviations, slices, len(found.position))
+    springs = SliceSprings(found, laws, waves, slices, tilting)
+    return _OverWidth(springs, tilting, apart, lead, _sparse(leads))
 
 
 def _sparse(values: np.ndarray) -> csr_array:
@@ -364,8 +492,10 @@ def sample_model(
     number of equidistant ones in one mesh period, more where planets would be met unequally, or the positions
     themselves (P,) [mesh periods].
 
-    CaseError: E-TORQUE: no torque; E-SUPPORT: bearings with clearance. ContactError.
+    CaseError: E-TORQUE: no torque; E-SUPPORT: bearings with clearance; E-SLICES: leads and axes askew
+    without slices. ContactError.
     """
+    _check_over_width(basis, tolerances)
     solved, order = basis.loaded(sun_torque)
     gears, members = solved.gears, moving_members(solved.gears, solved.supports)
     N, errors = gears.n_planets, []
@@ -373,7 +503,7 @@ def sample_model(
         name, _, kind = key.partition(".")
         values = getattr(gears, name).teeth if "pitch" in kind else 2 if "runout" in kind else 1
         each = (N if name in ("planet", "pin_errors") else 1, values)
-        errors.append((key, law, (1, len(_FLANKS[name])) if "slope" in kind else each))
+        errors.append((key, law, (1, len(_FLANKS[name])) if kind in _FORMS else each))
     load = np.zeros(N + 1 + int(members.free.sum()))
     load[N] = abs(sun_torque) / gears.sun.base_radius
     position = cycle_positions(gears.equal_positions(positions) if isinstance(positions, int) else positions)
@@ -385,11 +515,28 @@ def sample_model(
         level = model.level(share, nearest)
         if level.overflows:
             return None, 4.0 * share, nearest
-        _, unsolved, missed = _solved(model, level, model.draw(0, 0, _TRIED), False)
+        tried = model.draw(0, 0, _TRIED)
+        if level.over is None:
+            _, unsolved, missed = _solved(model, level, tried, False)
+        else:
+            state = _in_slices(model, level, tried)
+            if _overflows(level, _MARGIN * state.largest).any():
+                return None, 4.0 * share, nearest
+            _, unsolved, missed = _of_slices(model, level, tried, state, _MARGIN)
         return (share, nearest), share, nearest * (2.0 if (missed & ~unsolved).any() else 1.0)
 
     windows = in_windows(attempt, *first_windows(gears, solved.bodies, abs(sun_torque)))
     return replace(model, windows=windows)
+
+
+def _check_over_width(basis: DesignBasis, tolerances: Tolerances) -> None:
+    """Refuse (CaseError, E-SLICES) tolerances that only slices of the face width can show."""
+    for key, _ in tolerances.laws():
+        if ("lead" in key or "misalignment" in key) and not basis.over:
+            raise CaseError(
+                "leads and axes askew need slices over the width", code="E-SLICES", key=key,
+                remedy=f"give static.slices = {SLICES} in the case file, or leave the tolerance out",
+            )  # fmt: skip
 
 
 def sample_positions(basis: DesignBasis, sun_torque: float, positions: int) -> np.ndarray:
@@ -412,7 +559,7 @@ def sample_positions(basis: DesignBasis, sun_torque: float, positions: int) -> n
     while True:
         straight = np.array([np.interp(position, position[kept], row[kept], period=1.0) for row in curves])
         apart = np.where(kept, 0.0, np.abs(straight - curves) / size).max(axis=0)
-        if apart.max() <= _STRAIGHT:
+        if apart.max() <= (_STRAIGHT_IN_SLICES if basis.over else _STRAIGHT):
             return np.append(position[kept & (position < 1.0)], 1.0)
         kept[apart.argmax()] = True
 
@@ -441,10 +588,20 @@ def _in_windows(
     model: SampleModel, errors: np.ndarray, size: tuple[float, float], exact: bool, enlargements: int = 0
 ) -> dict[str, np.ndarray]:
     """Numbers of samples in windows of a size; of those that these do not hold in larger ones, exactly."""
+    if exact and model.solved.over:
+        return joined([_walked(model, sample) for sample in errors])
     level, (share, nearest) = model.level(*size), size
     together = max(1, _EXACT_TOGETHER // len(model.position)) if exact else _TOGETHER
+    together = together if level.over is None else _SLICED_TOGETHER
     blocks = np.split(errors, range(together, len(errors), together))
-    parts, unsolved, missed = zip(*(_solved(model, level, block, exact) for block in blocks))
+    parts, unsolved, missed = zip(
+        *(
+            _solved(model, level, block, exact)
+            if level.over is None
+            else _of_slices(model, level, block, _in_slices(model, level, block))
+            for block in blocks
+        )
+    )
     numbers, unsolved, missed = joined(parts), np.concatenate(unsolved), np.concatenate(missed)
     if (unsolved | missed).any() and enlargements == MOST_ENLARGEMENTS:
         raise not_contained()
@@ -476,8 +633,7 @@ def _solved(
     """
     found, N = level.found, model.solved.gears.n_planets
     (n, P), back, by_error = (len(errors), len(model.position)), np.argsort(model.order), errors.T.copy()
-    separations = (level.shifts @ by_error).reshape(P, -1, n)
-    tilts = None if level.tilts is None else (level.tilts @ by_error).reshape(P, -1, 3, n)
+    separations, tilts = _separations(model, level, by_error)
     force, motions, stiffness, ended = solve_laws(level.springs, model.load, separations, tilts)
     unsolved = ~ended.all(axis=0)
     if exact:
@@ -486,11 +642,90 @@ def _solved(
     approach = found.approach @ motions - found.supports.T @ of_mesh
     others = level.other_gap[:, None] + level.other_shifts @ by_error
     missed = (others < approach[level.other_place]).any(axis=0)
-    share = of_mesh[:, back] / model.load[N]
-    stiffness = np.einsum("p,pkn->kn", mean_weights(model.position, 1), stiffness.reshape(P, 2, N, n).mean(2))
-    numbers = np.ptp(motions[:, N], axis=0), share.max(axis=(0, 1)), *stiffness
-    planets = share.max(axis=0).T, (share <= 0.0).any(axis=0).T
-    return dict(zip(NUMBERS, (*numbers, *planets), strict=True)), np.asarray(unsolved), missed
+    share = of_mesh[:, :N][:, back] / model.load[N]
+    numbers = _numbers(model.position, motions[:, N], share, stiffness)
+    return numbers, np.asarray(unsolved), missed
+
+
+def _numbers(
+    position: np.ndarray, arc: np.ndarray, share: np.ndarray, stiffness: np.ndarray
+) -> dict[str, np.ndarray]:
+    """`NUMBERS` of n samples at P positions.
+
+    By arcs of the sun (P, n) [m], shares of planets (P, N, n) and stiffnesses of meshes (P, 2N, n) [N/m].
+    """
+    (P, N, n), weights = share.shape, mean_weights(position, 1)
+    of_kinds = np.einsum("p,pkn->kn", weights, stiffness.reshape(P, 2, N, n).mean(axis=2))
+    found = np.ptp(arc, axis=0), share.max(axis=(0, 1)), *of_kinds
+    planets = share.max(axis=0).T, np.any(share <= 0.0, axis=0).T
+    return {name: np.array(values) for name, values in zip(NUMBERS, (*found, *planets), strict=True)}
+
+
+def _in_slices(model: SampleModel, level: _Level, errors: np.ndarray) -> SliceSolutions:
+    """Solve samples in slices as springs."""
+    over, N = level.over, model.solved.gears.n_planets
+    assert over is not None
+    by_error, mesh = errors.T.copy(), level.found.mesh
+    separations, tilts = _separations(model, level, by_error)
+    leads = (over.shifts @ by_error).reshape(2 * N, over.springs.slices, -1)
+    of_windows = over.apart.swapaxes(1, 2)[..., None] + leads[mesh]
+    return solve_slice_springs(over.springs, model.load, separations, of_windows, tilts)
+
+
+def _overflows(level: _Level, force: np.ndarray) -> np.ndarray:
+    """Tell (n,) whether slices with such largest forces (P, W, n) press the end of a window amid a flank."""
+    reached = level.touching[:, :, [0, -1], None] <= force[:, :, None]
+    amid = ~np.moveaxis(level.found.at_edge, 0, -1)[..., None]
+    return np.asarray((reached & amid).any(axis=(0, 1, 2)))
+
+
+def _of_slices(
+    model: SampleModel, level: _Level, errors: np.ndarray, state: SliceSolutions, margin: float = 1.0
+) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
+    """Numbers of samples in slices, as `_solved` gives them.
+
+    Not solved are those whose iteration does not end, that windows do not hold, and whose contacts are
+    points. Pairs overlap under so many times the approach of the flanks.
+    """
+    over, found, N = level.over, level.found, model.solved.gears.n_planets
+    assert over is not None
+    width, slices, shared = found.bodies.widths[0], over.springs.slices, len(model.load)
+    contact = (level.touching[..., None] <= state.largest[:, :, None]).sum(axis=2)
+    contact = contact * found.setup.cell[found.mesh][:, None]
+    lines = contacts_are_lines(state.force, width * state.length, state.at_end, contact, width / slices)
+    holds = (lines & (contact <= width / slices)).all(axis=(0, 1)) & ~_overflows(level, state.largest)
+    of_mesh = state.force.reshape(*state.force.shape[:1], 2 * N, -1, len(errors)).sum(axis=2)
+    # of the slice that comes nearest
+    closer = -over.lead[..., None] - (over.shifts @ errors.T).reshape(2 * N, slices, -1)
+    if over.tilting is not None:
+        tilts = state.motions[:, shared:]
+        closer = closer + np.einsum("jsk,pkn->pjsn", over.tilting.approach, tilts)
+    approach = found.approach @ state.motions[:, :shared] - found.supports.T @ of_mesh
+    approach = margin * (approach + closer.max(axis=-2))
+    others = level.other_gap[:, None] + level.other_shifts @ errors.T
+    missed = (others < approach[level.other_place]).any(axis=0)
+    share = of_mesh[:, :N][:, np.argsort(model.order)] / model.load[N]
+    numbers = _numbers(model.position, state.motions[:, N], share, state.stiffness)
+    return numbers, ~(state.solved.all(axis=0) & holds), missed
+
+
+def _walked(model: SampleModel, errors: np.ndarray) -> dict[str, np.ndarray]:
+    """Numbers of a sample (K,) in slices as ``femgear run`` solves it, at the positions of the samples."""
+    basis, mirrored = model.basis, model.solved.gears is not model.basis.gears
+    position = -model.position[::-1] if mirrored else model.position
+    sample = replace(basis, deviations=model.deviations(errors), positions=position)
+    cycle = sample.walk(model.sun_torque, options=CycleOptions())
+    arc, share, stiffness = (
+        np.moveaxis(values, -1, 0)[..., None] for values in (cycle.sun_arc, cycle.load_share, cycle.stiffness)
+    )
+    return _numbers(position, arc, share, stiffness)
+
+
+def _separations(model: SampleModel, level: _Level, by_error: np.ndarray) -> tuple[np.ndarray, Any]:
+    """Separations of windows (P, W, n) by errors (K, n), and those at their nodes (P, W, 3, n) or None."""
+    P, n = len(model.position), by_error.shape[1]
+    tilts = None if level.tilts is None else (level.tilts @ by_error).reshape(P, -1, 3, n)
+    return (level.shifts @ by_error).reshape(P, -1, n), tilts
 
 
 def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts, force):
@@ -559,15 +794,25 @@ def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
         {"planet": n, "radial": length(radial), "tangential": length(tangential)}
         for n, (radial, tangential) in enumerate(d.pin_errors, 1)
     ]
+    kinds = {kind: name for name, kind in _FORMS.values()}
     for gear, flanks in _FLANKS.items():
-        slopes = [
-            {"kind": "profile slope", "amount": length(slope.amount)}
+        drawn = [
+            {"kind": kinds[type(form)], "amount": length(form.amount)}
             | ({"flank": flank[len("planet_") :].replace("_", " ")} if gear == "planet" else {})
             for flank in flanks
-            for slope in getattr(d, flank).modifications[len(getattr(base, flank).modifications) :]
+            for form in getattr(d, flank).modifications[len(getattr(base, flank).modifications) :]
         ]
-        if slopes:
-            values[f"{gear}.modifications"] = [*written[gear].get("modifications", []), *slopes]
+        if drawn:
+            values[f"{gear}.modifications"] = [*written[gear].get("modifications", []), *drawn]
+    if d.misaligned:
+        values |= {
+            f"{name}.misalignment": {along: f"{slope:.12g} rad" for along, slope in zip("xy", slopes)}
+            for name, slopes in (("sun", d.sun_misalignment), ("carrier", d.carrier_misalignment))
+        }
+        values["planet.misalignment"] = [
+            {"planet": n, "radial": f"{radial:.12g} rad", "tangential": f"{tangential:.12g} rad"}
+            for n, (radial, tangential) in enumerate(d.planet_misalignment, 1)
+        ]
     values |= {"static.positions": model.equidistant, "static.longest_record": 1}
     values["title"] = f"{case.title[:150]}: sample {index} of seed {seed}"
     return with_values(case, values)
@@ -594,7 +839,14 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
     if level.tilts is not None:
         of_nodes = (level.tilts @ errors).reshape(P, -1, 3, 1)
         tilts = np.repeat(of_nodes, len(periods), axis=-1)
-    force, motions, _, _ = solve_laws(level.springs, model.load, separations, tilts)
+    if level.over is None:
+        force, motions, _, _ = solve_laws(level.springs, model.load, separations, tilts)
+    else:
+        over = level.over
+        leads = over.apart.swapaxes(1, 2) + (over.shifts @ errors).reshape(2 * N, -1)[found.mesh]
+        leads = np.repeat(leads[..., None], len(periods), axis=-1)
+        state = solve_slice_springs(over.springs, model.load, separations, leads, tilts)
+        force, motions = state.force, state.motions
     share = force.reshape(P, 2, N, -1, len(periods)).sum(axis=3)[:, 0].max() / model.load[N]
     return float(np.ptp(motions[:, N])), float(share)
 
@@ -605,10 +857,8 @@ def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, fl
     As ``femgear run`` does of the case that `sample_case` makes of it: exactly, at the peaks of the sample.
     ``errors`` (K,) are those of the sample [m].
     """
-    basis, driver = model.basis, model.basis.gears.n_planets
-    torque = model.load[driver] * basis.gears.sun.base_radius
-    sample = replace(basis, deviations=model.deviations(errors), positions=model.equidistant)
-    cycle = sample.walk(torque if model.solved.gears is basis.gears else -torque)
+    sample = replace(model.basis, deviations=model.deviations(errors), positions=model.equidistant)
+    cycle = sample.walk(model.sun_torque)
     return float(cycle.peak_to_peak("sun_arc")), float(cycle.extremes("load_share")[1].max())
 
 
@@ -629,7 +879,7 @@ def prepared(
             value=True, limit="false", remedy="set it to false, or solve single samples by femgear run",
             file=case.location("static.back_flanks"),
         )  # fmt: skip
-    basis = design_basis(case, cache=cache, steps=steps)
+    basis = design_basis(case, cache=cache, steps=steps, slices=True)
     torque = sun_torque(case, basis.gears)
     places = sample_positions(basis, torque, positions)
     model = sample_model(basis, found, sun_torque=torque, positions=places)

@@ -133,8 +133,8 @@ def linearise(
 ) -> LinearContact:
     """Solve the contact of all drive flanks, and what it answers to small separations [m] of any cell.
 
-    CaseError: E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance.
-    ContactError: as `contact.cycle.walk_mesh_cycle`.
+    CaseError: E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance; E-SLICES:
+    slices over the width. ContactError: as `contact.cycle.walk_mesh_cycle`.
 
     Parameters
     ----------
@@ -145,6 +145,11 @@ def linearise(
     between : sequence of float, optional
         Further positions of the record, which are counted in [mesh periods].
     """
+    if basis.over:
+        raise CaseError(
+            "derivatives are those of the plane contact", code="E-SLICES", key="static.slices",
+            value=basis.over["slices"], remedy="leave static.slices and modifications of leads out",
+        )  # fmt: skip
     solved, order = basis.loaded(sun_torque)
     record = np.sort(np.append(cycle_positions(basis.positions, periods=periods), between))
     chosen = np.arange(len(record)) if only is None else np.atleast_1d(np.asarray(only, int))

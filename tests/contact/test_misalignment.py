@@ -68,11 +68,31 @@ def test_tilts_follow_in_the_tangent():
     options = dict(stiffness=mesh, load=2e3, slices=SLICES, tilting=one_tilt(k))
     newton = spring_newton(3e-3 * PLACE, **options)
     force = newton.solve()[0][0, :, 0]
-    together, alone = newton.tangents([(newton.smooth[None], newton.across[None] * newton.unit)])
+    bodies = newton.smooth[None], newton.across[None] * newton.unit
+    together, alone, _ = newton.tangents([bodies, bodies])
     S = [(PLACE[force > 0] ** i).sum() for i in range(3)]
     expected = mesh / SLICES * (S[0] - mesh * S[1] ** 2 / (mesh * S[2] + SLICES * k))
     assert 0 < S[0] < SLICES
     assert [together.item(), alone.item()] == pytest.approx([expected, expected], rel=1e-9)
+
+
+def test_wind_up_is_in_series_with_the_teeth_in_the_tangent(steel):
+    """A mesh with the compliance 1/k and a wall that turns by 1/k_w under the force: k k_w/(k + k_w).
+
+    Planets that tilt freely hold the loads even, so that half of a force winds the carrier up; the pin of the
+    planet passes on the projections of both of its meshes.
+    """
+    radius = steel[0].centre_distance
+    stiff, soft = (walk(steel, WidthSupports(planet=0.0, wind_up=k, wind_up_end=1)) for k in (1e12, 2e5))
+    along = np.array([member_approach(steel[0])["carrier"][mesh] for mesh in (0, 3)])
+    # the tangential part of the approach by half of what the wall moves
+    angle = steel[0].planet_angles[0]
+    moved = 0.5 * along @ [-np.sin(angle), np.cos(angle)]
+    added = moved**2 * radius**2 / 2e5
+    expected = 1.0 / (1.0 / stiff.stiffness[[0, 3]] + added[:, None])
+    assert soft.stiffness[[0, 3]] == pytest.approx(expected, rel=0.02)
+    plane = walk(steel)
+    assert stiff.stiffness == pytest.approx(plane.stiffness, rel=1e-4)
 
 
 @pytest.mark.parametrize("stiffness", [0.0, 3e3, 1e6])

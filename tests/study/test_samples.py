@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from script_runs import wait_for_lines
 from soak import programs
 
@@ -23,12 +24,13 @@ from femgear.errors import CaseError, StorageError
 from femgear.gears.deviations import no_deviations
 from femgear.run import grid_cache, solve
 from femgear.storage.files import read_dataset
-from femgear.study.relief import design_basis
+from femgear.study.relief import design_basis, sun_torque
 from femgear.study.runner import Runner, open_runner
 from femgear.study.sample_results import FILES, samples_into
 from femgear.study.samples import (
     Law,
     Tolerances,
+    between_positions,
     exact_numbers,
     over_a_turn,
     prepared,
@@ -466,10 +468,11 @@ def test_two_processes_and_an_interrupted_command_give_the_same_bits(case, tmp_p
     # a damaged block is computed again
     text = journal.read_bytes()
     journal.write_bytes(re.sub(rb'"8-16"', b'"0-16"', text))
-    last = Interrupted(9)
+    last = Interrupted(99)
     with pytest.warns(UserWarning, match="W-JOURNAL"):
         samples_into(case, tmp_path, basis, count=20, runner=last)
-    assert last.tasks == 7 and not journal.exists()
+    # two blocks, and the samples that are solved again in every way
+    assert last.tasks == 97 - len(expected.check) and not journal.exists()
     assert expected.identical(read_dataset(tmp_path / "samples.nc"))
 
 
@@ -560,3 +563,91 @@ def test_samples_have_the_errors_of_runs_with_many_positions(basis, torque):
         cycle = walk(positions=16, options=CycleOptions(peaks=True))
         assert cycle.peak_to_peak("sun_arc") == pytest.approx(exact, rel=0.01)
         assert cycle.between is not None and cycle.between.position[-1] == 1.0
+
+
+# --- slices of the face width ------------------------------------------------------------------------
+
+AXES = tolerances(
+    sun={
+        "cumulative_pitch": law(),
+        "lead_slope": law(),
+        "lead_crowning": law("1 um", mean="2 um"),
+        "misalignment": {"x": law("0.1 mrad"), "y": law("0.1 mrad")},
+    },
+    planet={
+        "lead_slope": law("2 um"),
+        "profile_slope": law("2 um"),
+        "misalignment": {"radial": law("0.1 mrad"), "tangential": law("0.1 mrad")},
+    },
+    carrier={"misalignment": {"x": law("0.05 mrad")}},
+    pin_errors={"tangential": law()},
+)
+
+
+@pytest.fixture(scope="module")
+def sliced(case):
+    return with_value(case, "static.slices", 9)
+
+
+@pytest.mark.parametrize(
+    "values",
+    [
+        {},
+        {"operation.torque": "-100 N m", "static.members": "elastic"},
+        {
+            "sun.modifications": [{"kind": "lead crowning", "amount": "3 um"}],
+            "planet.tilt_stiffness": "2e4 N m/rad",
+            "sun.torque_end": "front",
+        },
+    ],
+    ids=["plain", "other flanks, elastic", "crowned, tilting, twisted"],
+)
+def test_springs_in_slices_are_within_a_permille_of_the_whole_contact(sliced, values):
+    case = with_values(sliced, values)
+    basis = design_basis(case, cache=grid_cache(), slices=True)
+    torque = sun_torque(case, basis.gears)
+    model = sample_model(basis, AXES, sun_torque=torque, positions=6)
+    errors = model.draw(4, 0, 3)
+    springs, exact = spring_numbers(model, errors), exact_numbers(model, errors)
+    assert springs["transmission_error"] == pytest.approx(exact["transmission_error"], rel=2e-3)
+    assert springs["planet_share"] == pytest.approx(exact["planet_share"], abs=1e-3)
+    for kind in ("stiffness_sun_planet", "stiffness_planet_ring"):
+        assert springs[kind] == pytest.approx(exact[kind], rel=1e-2)
+    # exactly means as femgear run solves it
+    sample = replace(basis, deviations=model.deviations(errors[0]), positions=model.position)
+    if torque > 0:
+        arc = sample.walk(torque, options=CycleOptions()).sun_arc
+        assert exact["transmission_error"][0] == pytest.approx(np.ptp(arc), rel=1e-12)
+
+
+def test_a_sample_in_slices_is_a_case_that_a_run_solves(sliced, tmp_path):
+    path = tmp_path / "axes.toml"
+    path.write_text(
+        "[sun]\nlead_slope = { distribution = 'normal', sigma = '3 um' }\n"
+        "[planet.misalignment]\nradial = { distribution = 'uniform', limit = '0.2 mrad' }\n"
+    )
+    model, _ = prepared(sliced, path, positions=8, cache=grid_cache())
+    made = sample_case(sliced, model, 1, 5)
+    deviations, expected = set_deviations(made), model.deviations(model.draw(1, 5, 1)[0])
+    assert deviations.planet_misalignment == pytest.approx(expected.planet_misalignment, abs=1e-12)
+    assert deviations.sun.lead[0].amount == pytest.approx(expected.sun.lead[0].amount, abs=1e-15)
+    of_run = solve(made, "static")["static"].cycle.peak_to_peak("sun_arc")
+    assert between_positions(model, model.draw(1, 5, 1)[0])[0] == pytest.approx(of_run, rel=1e-6)
+
+
+def test_leads_and_axes_askew_need_slices_of_spur_teeth(basis, case):
+    with pytest.raises(CaseError, match=r"E-SLICES.*lead_slope"):
+        sample_model(basis, tolerances(sun={"lead_slope": law()}), sun_torque=TORQUE)
+    with pytest.raises(CaseError, match=r"E-SLICES.*planet\.misalignment\.radial"):
+        sample_model(
+            basis, tolerances(planet={"misalignment": {"radial": law("0.1 mrad")}}), sun_torque=TORQUE
+        )
+    with pytest.raises(CaseError, match=r"E-SLICES.*set\.helix_angle"):
+        design_basis(with_values(case, {"set.helix_angle": "10 deg", "static.slices": 25}), slices=True)
+
+
+def test_slopes_of_axes_have_a_plausible_size():
+    with pytest.raises(ValidationError, match="20 mrad"):
+        Tolerances.model_validate(
+            {"sun": {"misalignment": {"x": law("10 mrad")}}}, context={"module": 1.5e-3}
+        )
