@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -135,10 +135,12 @@ class FemgearError(Exception):
         The value found there.
     limit : str, optional
         What is allowed.
-    remedy : str, optional
-        What to do about it.
+    remedy : str or sequence of str, optional
+        What to do about it; of several remedies each does alone.
     file : str, optional
         The file that holds the entry.
+    gear : str, optional
+        The gear that is refused ("sun"), where the key is one of several gears.
     """
 
     exit_code = 3
@@ -152,8 +154,9 @@ class FemgearError(Exception):
         key: str | None = None,
         value: object = None,
         limit: str | None = None,
-        remedy: str | None = None,
+        remedy: str | Sequence[str] | None = None,
         file: str | None = None,
+        gear: str | None = None,
     ):
         super().__init__(message)
         self.message = message
@@ -161,12 +164,22 @@ class FemgearError(Exception):
         self.key = key
         self.value = value
         self.limit = limit
-        self.remedy = remedy
+        self.remedies = () if remedy is None else (remedy,) if isinstance(remedy, str) else tuple(remedy)
         self.file = file
+        self.gear = gear
         if self.code in SURROUNDINGS:
             self.exit_code = SURROUNDINGS_EXIT
         # the mistakes of a case file one by one, where there are several
         self.problems: tuple[FemgearError, ...] = (self,)
+
+    @property
+    def remedy(self) -> str | None:
+        """What to do about it."""
+        return ", or ".join(self.remedies) or None
+
+    @remedy.setter
+    def remedy(self, text: str | None) -> None:
+        self.remedies = () if text is None else (text,)
 
     def __str__(self) -> str:
         lines = [f"[{self.code}] {': '.join(part for part in (self.file, self.key, self.message) if part)}"]

@@ -210,19 +210,18 @@ def _name_root_radius(error: GeometryError, case: Case) -> None:
     The limit of one gear is not that of the others, and that of a gear whose profile shift is found only
     shows with that shift.
     """
-    key, remedy = error.key or "", error.remedy or ""
+    key = error.key or ""
     most = _largest_root_radius(case, key, ("E-ROOT-RADIUS", "E-FILLET"))
     if error.code == "E-FILLET":
         if most is not None:
-            error.remedy = remedy.replace("root_radius", f"root_radius to {most:.4f} or less", 1)
+            error.remedies = (f"reduce root_radius to {most:.4f} or less", *error.remedies[1:])
         return
     if most is None:
         most = _largest_root_radius(case, key, ("E-ROOT-RADIUS",))
     if most is None:
         error.limit, error.remedy = None, "reduce the dedendum: no root_radius fits"
     else:
-        # none fits with the one cutter that the gear has then; a smaller rounding may have another
-        error.message = error.message.removesuffix(", nor does any other")
+        # also where none fits with the one cutter that the gear has then: a smaller rounding may have another
         error.limit = f"<= {most:.4f} modules for the gears of this rack"
         error.remedy = "reduce root_radius"
 

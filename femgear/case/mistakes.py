@@ -191,10 +191,8 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
     if error.code == "E-ASSEMBLY":
         _assembly(error, case)
     if error.key == "rack.root_radius":
-        cut = re.match(r"(\w+):|the \w+'s tip runs into the (\w+)'s root fillet", error.message)
-        gear = (cut[1] or cut[2]) if cut else ""
-        if getattr(getattr(case, gear, None), "rack", None) is not None:
-            error.key = f"{gear}.rack.root_radius"
+        if getattr(getattr(case, error.gear or "", None), "rack", None) is not None:
+            error.key = f"{error.gear}.rack.root_radius"
         error.value = rack_at(case, error.key).root_radius
     _shift_left_out(error, case)
     _in_transverse_section(error, case)

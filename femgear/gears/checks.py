@@ -365,7 +365,8 @@ def _fillet_contact(gear: Gear, partner: Gear, reach: float, pair: GearPair):
             value=round(gear.tool.rounding / gear.module, 9),
             limit=f"overlap <= {allowed * 1e6:.3f} um, or active profile {'up' if gear.internal else 'down'} "
             f"to {gear.form_radius * 1e3:.4f} mm",
-            remedy=f"reduce root_radius, or give the {partner.name} a tip_diameter {limit} mm",
+            remedy=("reduce root_radius", f"give the {partner.name} a tip_diameter {limit} mm"),
+            gear=gear.name,
         )  # fmt: skip
     else:
         yield GeometryWarning(

@@ -417,10 +417,11 @@ def combined_fault(faults: Sequence[GeometryError]) -> GeometryError:
     if not others:
         return first
     also = "; ".join(f"[{fault.code}] {fault.message}" for fault in others)
-    remedies = dict.fromkeys(fault.remedy for fault in faults if fault.remedy)
+    *ways, last = first.remedies or ("",)
+    beside = dict.fromkeys(fault.remedy for fault in others if fault.remedy not in (None, first.remedy))
     return GeometryError(
         f"{first.message}; also {also}", code=first.code, key=first.key, value=first.value, limit=first.limit,
-        remedy="; ".join(remedies),
+        remedy=(*ways, "; ".join(filter(None, (last, *beside)))), gear=first.gear,
     )  # fmt: skip
 
 
@@ -434,10 +435,10 @@ def _tool_faults(gear: Gear) -> Iterator[GeometryError]:
         largest, rounding = _largest_rounding(gear), round(gear.tool.rounding / gear.module, 9)
         yield _fault(
             gear, "rack.root_radius",
-            f"a tool tip rounding of {rounding:.4f} modules does not fit between the flanks of the tool"
-            + ("" if largest > 0.0 else ", nor does any other"), code="E-ROOT-RADIUS", value=rounding,
+            f"a tool tip rounding of {rounding:.4f} modules does not fit between the flanks of the tool",
+            code="E-ROOT-RADIUS", value=rounding,
             limit=f"<= {largest:.4f} modules" if largest > 0.0 else None,
-            remedy="reduce root_radius" if largest > 0.0 else "reduce the dedendum",
+            remedy="reduce root_radius" if largest > 0.0 else "reduce the dedendum: no root_radius fits",
         )  # fmt: skip
 
 
@@ -557,5 +558,5 @@ def _fault(
         value = values.get(entry, gear.rim_radius)
     key = entry if entry.startswith("rack.") else f"{gear.name}.{entry}"
     return GeometryError(
-        f"{gear.name}: {message}", code=code, key=key, value=value, limit=limit, remedy=remedy
+        f"{gear.name}: {message}", code=code, key=key, value=value, limit=limit, remedy=remedy, gear=gear.name
     )

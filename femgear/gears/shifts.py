@@ -111,7 +111,7 @@ def share_shifts(
                 said = [one.code for one in check_meshes(gears) if one.code not in ("W-TIP", "W-RIM")]
             except GeometryError as error:
                 fault = fault or error
-                if error.code == "E-ROOT-RADIUS" and error.message.startswith("ring"):
+                if error.code == "E-ROOT-RADIUS" and error.gear == "ring":
                     no_room = float(shifts[2])
                 continue
             if fewest is None or len(said) < len(fewest):

@@ -56,6 +56,8 @@ class Curve:
         The last point is the first one again.
     complete : bool
         The curve reached an end of the range or closed.
+    lost : bool
+        No smaller step found a further point.
     message : str
         How it ended.
     tangent : (p, n + 1) array
@@ -75,6 +77,7 @@ class Curve:
     branch_points: np.ndarray
     closed: bool
     complete: bool
+    lost: bool
     message: str
     tangent: np.ndarray
     iterations: np.ndarray
@@ -164,7 +167,7 @@ def _scaled_curve(
 
 def _collect(curve: ScaledCurve, first: CurvePoint) -> Curve:
     """The whole curve from a corrected point along its tangent."""
-    points, closed, complete, message = _walk(curve, first)
+    points, end = _walk(curve, first)
     z = np.array([p.z for p in points])
     parameter = z[:, -1] * curve.unit
     if points[-1].kind == "end":
@@ -175,9 +178,10 @@ def _collect(curve: ScaledCurve, first: CurvePoint) -> Curve:
         parameter=parameter,
         folds=np.flatnonzero(kinds == "fold"),
         branch_points=np.flatnonzero(kinds == "branch point"),
-        closed=closed,
-        complete=complete,
-        message=message,
+        closed=end.closed,
+        complete=end.complete,
+        lost=end.lost,
+        message=end.message,
         tangent=np.array([p.tangent for p in points]),
         iterations=np.array([p.iterations for p in points]),
         error=np.array([p.error for p in points]),
@@ -186,8 +190,18 @@ def _collect(curve: ScaledCurve, first: CurvePoint) -> Curve:
     )
 
 
-def _walk(curve: ScaledCurve, first: CurvePoint) -> tuple[list[CurvePoint], bool, bool, str]:
-    """Points, limit points and branch points among them; whether closed, whether complete, how it ended."""
+@dataclass(frozen=True)
+class _End:
+    """How a curve ended, as in `Curve`."""
+
+    message: str
+    closed: bool = False
+    complete: bool = False
+    lost: bool = False
+
+
+def _walk(curve: ScaledCurve, first: CurvePoint) -> tuple[list[CurvePoint], _End]:
+    """Points, limit points and branch points among them, and how the curve ended."""
     points, point, options = [first], first, curve.options
     h = options.first
     while len(points) < options.max_points:
@@ -195,18 +209,18 @@ def _walk(curve: ScaledCurve, first: CurvePoint) -> tuple[list[CurvePoint], bool
             h = max(min(h, _longest(point, options)), options.smallest)
             segment, special, h = _step(curve, point, h)
         except LostError as lost:
-            return points, False, False, f"lost after {_where(curve, point)}: {lost}"
+            return points, _End(f"lost after {_where(curve, point)}: {lost}", lost=True)
         events = [*special, (segment.length, segment.last)]
         events, closed = _closing(segment, first, events, len(points))
         for _, end in _until_end(segment, events):
             points.append(end)
             if end.kind == "end":
-                return points, False, True, f"end of the range at {_where(curve, end)}"
+                return points, _End(f"end of the range at {_where(curve, end)}", complete=True)
         if closed:
-            return points, True, True, "closed loop"
+            return points, _End("closed loop", closed=True, complete=True)
         point = segment.last
     stopped = f"stopped at {_where(curve, point)} after {len(points)} points"
-    return points, False, False, f"{stopped}: raise max_points, largest or the scale"
+    return points, _End(f"{stopped}: raise max_points, largest or the scale")
 
 
 def _longest(point: CurvePoint, options: StepOptions) -> float:

@@ -108,8 +108,8 @@ class Branch:
     @property
     def message(self) -> str:
         """How the branch ended; where it was lost, what to change."""
-        lost = self.curve.message.startswith("lost")
-        return self.curve.message + (f"; {_advice(self.solutions[-1], self.equations)}" if lost else "")
+        advice = f"; {_advice(self.solutions[-1], self.equations)}" if self.curve.lost else ""
+        return self.curve.message + advice
 
 
 @dataclass(frozen=True)
