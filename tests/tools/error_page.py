@@ -144,6 +144,8 @@ def _text(node: ast.expr | None) -> str:
         return "".join("…" if isinstance(part, ast.FormattedValue) else part.value for part in node.values)
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
         return _text(node.left) + _text(node.right)
+    if isinstance(node, ast.Tuple):
+        return ", or ".join(map(_text, node.elts))
     if isinstance(node, ast.IfExp):
         return " / ".join(text for text in (_text(node.body), _text(node.orelse)) if text)
     return "…"

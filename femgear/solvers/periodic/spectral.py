@@ -16,8 +16,9 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.system.fourier import Product, pad, sample
 from femgear.system.system import MeshExcitation, Modes, Response, mesh_harmonics
 
-# Two signals or receptances closer than this (relative) are equal: identical planets.
-_EQUAL = 1e-9
+# Two signals or receptances closer than this (relative) are equal: identical planets. And what natural
+# frequencies of theirs differ by from rounding, which damping shows as a 1/(2 zeta)th at resonances.
+_EQUAL, _ROUNDED = 1e-9, 1e-10
 # Share of the energy in the upper half of the harmonics above which the message warns. Halving or doubling
 # the harmonics of planetary sets shows a truncation error of the size of this share: 0.1 % of the amplitude.
 _TAIL_ENERGY = 1e-3
@@ -227,15 +228,15 @@ def _moving(deflection: np.ndarray) -> np.ndarray:
 def solve_direct(problem: HarmonicProblem, accuracy: float = _ROUNDING) -> np.ndarray:
     """Solve ``(I + T G) E = S`` for the harmonics (n, n_speeds, H + 1) of the mesh deflections [m].
 
-    Least residual in the space of the fixed point's iterates, to an accuracy relative to S: adaptive simpler
-    GMRES (P. Jiranek and M. Rozloznik, Numer. Algorithms 53, 2010, pp. 93-112), all speeds together; but for
-    rounding none depends on the others.
+    Least residual in the space of the fixed point's iterates, to an accuracy relative to what fluctuates in S
+    and in E: adaptive simpler GMRES (P. Jiranek and M. Rozloznik, Numer. Algorithms 53, 2010, pp. 93-112),
+    all speeds together; but for rounding none depends on the others.
     """
     found = problem.source.copy()
-    limit, single = accuracy * _moving(problem.source), accuracy >= _SINGLE
+    moving, single = _moving(problem.source), accuracy >= _SINGLE
     for cycle in range(_CYCLES):
         rest = problem.source - found - _apply(problem, found)
-        size = _norm(rest)
+        size, limit = _norm(rest), accuracy * np.minimum(moving, _moving(found))
         todo = np.flatnonzero(size > limit)
         if not len(todo):
             break
@@ -365,7 +366,9 @@ def _alike(modes: Modes, twins: Twins, omega: float) -> bool:
     full = np.einsum("ik,hk,jk->hij", rows, modal, rows, optimize=True) + modes.residual
     folded = np.einsum("hij,gjh->ihg", full, member[:, :, None] * twins.shift)
     error = folded - twins.shift[:, :, None] * folded[twins.leaders][twins.group]
-    return bool(np.all(np.abs(error).max(axis=(0, 2)) <= _EQUAL * np.abs(full).max(axis=(1, 2))))
+    least = np.where(modes.frequency > 0.0, modes.damping_ratio, 1.0).min(initial=1.0)
+    equal = min(max(_EQUAL, _ROUNDED / max(2.0 * least, _UNDAMPED)), _LEAST)
+    return bool(np.all(np.abs(error).max(axis=(0, 2)) <= equal * np.abs(full).max(axis=(1, 2))))
 
 
 @dataclass(frozen=True)

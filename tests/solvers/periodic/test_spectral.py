@@ -295,6 +295,21 @@ def test_nearly_identical_planets_meet_the_full_equations(planet_set, planet_exc
         assert np.all(response.converged) and response.residual.max() < 1e-12
 
 
+@pytest.mark.parametrize(("ratio", "apart", "count"), [(0.001, 1e-10, 2), (0.001, 1e-6, 6), (0.05, 1e-6, 6)])
+def test_rounding_of_natural_frequencies_keeps_planets_equal(
+    planet_set, planet_excitation, ratio, apart, count
+):
+    """At resonances with little damping it shows five hundred times as much; other planets stay others."""
+    system = planet_set()
+    mass = system.M.copy()
+    mass[6, 6] *= 1.0 + apart
+    excitation = planet_excitation(np.zeros(6))
+    modes = solve_modes(replace(system, M=mass), excitation.stiffness.mean(axis=1), damping_ratio=ratio)
+    for frequency in modes.frequency[modes.frequency > 1e-3]:
+        data = spectral._Data.build(modes, excitation, 4, 8, float(frequency))
+        assert len(data.twins.leaders) == count
+
+
 def test_arnoldi_finds_the_spectral_radius(planet_set, planet_excitation):
     excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
     modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
