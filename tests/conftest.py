@@ -123,12 +123,12 @@ def gmsh_is_loaded_once(folder_of_both_workers):
 
 
 @pytest.fixture(scope="session", autouse=True)
-def figures_are_drawn_here():
-    """Workers of pytest take all cores, and what a copy of the process draws is not seen to have run."""
-    from femgear.report import page
+def everything_is_done_here():
+    """Workers of pytest take all cores, and what a copy of the process does is not seen to have run."""
+    from femgear import second_process
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(page, "second_core", lambda: False)
+        patch.setattr(second_process, "second_core", lambda: False)
         yield
 
 

@@ -12,7 +12,7 @@ import pytest
 PACKAGE = Path(__file__).parents[1] / "femgear"
 LAYERS = (
     ("curves", "errors", "remembered"),
-    ("findings",),
+    ("findings", "second_process"),
     ("gears", "fe"),
     ("contact", "system"),
     ("solvers",),

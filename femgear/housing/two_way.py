@@ -128,6 +128,7 @@ def solve_two_way(  # noqa: PLR0913
     damping=None,
     tolerance: float = 1e-10,
     cycles: int = CYCLES,
+    workers: int | None = None,
 ) -> TwoWayResponse:
     """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
 
@@ -158,6 +159,8 @@ def solve_two_way(  # noqa: PLR0913
         Residual of GMRES, and change of the forces by damping in their last pass, both over what fluctuates.
     cycles : int
         Of GMRES, each of twice the steps of the one before; equations that take more are nearly singular.
+    workers : int, optional
+        Threads that speeds are solved by, fewer where memory is short; default one for every core.
     """
     n_max = structure.max_diameter
     coupled = n_max if coupled_diameters is None else min(coupled_diameters, n_max)
@@ -179,7 +182,7 @@ def solve_two_way(  # noqa: PLR0913
         problem = _Problem(turning, orders_of(i), int(excited[i]), *known)
         found.keep(i, problem, problem.solve(abs(float(speeds[i])), tolerance))
 
-    workers = max(min(os.cpu_count() or 1, int(_MOST / 4 / found.size)), 1)
+    workers = max(min(workers or os.cpu_count() or 1, int(_MOST / 4 / found.size)), 1)
     with ThreadPoolExecutor(workers) as pool:  # BLAS and LAPACK do not hold up one another
         list(pool.map(solve, range(len(speeds))))
     _check_residual(found.figures[0], speeds, max(_RESIDUAL, 10.0 * tolerance))

@@ -6,19 +6,13 @@ Figures are PNG, grids VTU, the turning carrier is a GIF; the page is one HTML f
 from __future__ import annotations
 
 import base64
-import ctypes
 import hashlib
 import io
 import json
-import multiprocessing
 import os
 import re
-import signal
-import sys
-import warnings
 import zlib
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from html import escape
@@ -26,13 +20,14 @@ from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from femgear.errors import FemgearError, printable
+from femgear.errors import printable
 from femgear.findings import SEVERITIES, Finding, by_severity, remark
 from femgear.report.charts import chart
 from femgear.report.explorer import DRAWN, EXPLORER
 from femgear.report.solid import SOLID
 from femgear.report.style import png_bytes
 from femgear.report.tables import Block
+from femgear.second_process import shared
 from femgear.storage.files import checksum, storage_errors, write_bytes, write_text
 
 if TYPE_CHECKING:
@@ -75,7 +70,7 @@ def write_figures(
         return found
 
     tasks = [partial(pictures, stage) for stage in _drawn(train, drawn)]
-    found = {name: both for part in _shared(tasks, beside) for name, both in part.items()}
+    found = {name: both for part in shared(tasks, beside) for name, both in part.items()}
     if not found:
         return []
     for name, (data, _) in found.items():
@@ -89,83 +84,6 @@ def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
     """List the figures of the stages whose data are there, in their order, and of the case."""
     figures, names = train.figures, [*(s.name for s in train.stages if s.name in drawn.data), ""]
     return [figures[name] for name in names if name in figures]
-
-
-def _shared(tasks: Sequence[Callable[[], Any]], beside: Callable[[], object]) -> list[Any]:
-    """Values of up to 256 tasks; a second process begins with the last one, this one after ``beside()``."""
-    waiting, numbers = os.pipe()
-    os.write(numbers, bytes(reversed(range(len(tasks)))))
-    os.close(numbers)
-    with open(waiting, "rb", buffering=0) as queue:
-
-        def take() -> dict[int, Any]:
-            return {number[0]: tasks[number[0]]() for number in iter(partial(queue.read, 1), b"")}
-
-        with _second_process(take) as others:
-            beside()
-            found = take() | others()
-    return [found[number] for number in range(len(tasks))]
-
-
-@contextmanager
-def _second_process(work: Callable[[], dict]) -> Iterator[Callable[[], dict]]:
-    """Do some work in a copy of this process during a block of code, which is given what waits for the value.
-
-    The copy ends with the block, or with this process. Without a second core the value is empty.
-    """
-    if not second_core():
-        yield dict
-        return
-    context: Any = multiprocessing.get_context("fork")
-    mine, theirs = context.Pipe(duplex=False)
-    process = context.Process(target=_send, args=(work, theirs, os.getpid()), daemon=True)
-    # an interrupt is meant for this process, and waits until the other one can be ended
-    before, value = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGTERM]), dict
-    try:
-        with suppress(OSError), warnings.catch_warnings(action="ignore", category=DeprecationWarning):
-            process.start()
-            value = partial(_received, mine)
-        theirs.close()
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        yield value
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
-        if process.pid is not None:
-            process.kill()
-            process.join()
-        mine.close()
-
-
-def second_core() -> bool:
-    """Tell whether a copy of this process would have a core of its own."""
-    return sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
-
-
-def _send(work: Callable[[], Any], connection: Any, parent: int) -> None:
-    """Send the value of some work, or its error, and warnings; end with the parent, whose locks it has."""
-    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
-    if os.getppid() != parent:
-        return
-    with warnings.catch_warnings(record=True) as said:
-        try:
-            found = work()
-        except Exception as error:
-            found = error
-    connection.send((found, [(str(one.message), one.category, one.filename, one.lineno) for one in said]))
-
-
-def _received(connection: Any) -> dict:
-    """Receive what `_send` sends: value or error, and warnings."""
-    try:
-        found, said = connection.recv()
-    except EOFError:
-        remedy = "give it more memory, or run with --no-pictures"
-        raise FemgearError("the process that draws was ended", code="E-WORKER", remedy=remedy) from None
-    for one in said:
-        warnings.warn_explicit(*one)
-    if isinstance(found, BaseException):
-        raise found
-    return found
 
 
 def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progress) -> list[str]:

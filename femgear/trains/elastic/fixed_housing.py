@@ -302,10 +302,15 @@ def _radial_sensor(structure: FixedStructure, named, angle: float, top: int) -> 
     return weights
 
 
-def heard_in_housing(model: HousingModel, carrier: np.ndarray, limit: FrequencyLimit) -> HeardSpeeds:
-    """What is kept of the run-up at speeds of the carrier [rad/s] in a housing that stands still."""
+def heard_in_housing(
+    model: HousingModel, carrier: np.ndarray, limit: FrequencyLimit, workers: int | None = None
+) -> HeardSpeeds:
+    """What is kept of the run-up at speeds of the carrier [rad/s] in a housing that stands still.
+
+    By so many threads, default one for every core.
+    """
     case, housing = model.case, model.housing
-    two_way = housing.solve(carrier, limit, _ACCURACY * case.dynamics.tolerance)
+    two_way = housing.solve(carrier, limit, _ACCURACY * case.dynamics.tolerance, workers=workers)
     lines = _first_lines(case, model.modes, model, housing.structure, two_way)
     orders, some = two_way.order, two_way.force
     force = np.zeros((*some.shape[:2], orders[-1] + 1), complex)

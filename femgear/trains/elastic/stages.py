@@ -8,6 +8,7 @@ each.
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import replace
@@ -15,6 +16,7 @@ from functools import partial
 
 import numpy as np
 
+from femgear import second_process
 from femgear.case.dependencies import (
     Entries,
     Steps,
@@ -161,6 +163,8 @@ from femgear.trains.static.stages import (
     ring_foundation,
 )
 
+_FEW_SPEEDS = 8
+"""Speeds of a run-up that one process solves for."""
 _PART, _HARMONIC = 100e6, 4e3
 """Size of the speeds that are in memory at a time, and that of a mesh harmonic of one of them [bytes]."""
 _LINES_TOGETHER = 8000
@@ -547,11 +551,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
             level += mode_levels(response, field, alike, met.harmonic, turning, inside)
         progress("runup", float(own[-1] + 1), float(len(speeds)))
     if case.housing.stands_still:
-        model = HousingModel(case, modes, carrier[0])
-        room = np.cumsum(housing_memory(case, modes, limit)) // _PART
-        for own in np.split(np.arange(len(speeds)), np.flatnonzero(np.diff(room)) + 1):
-            parts.append(heard_in_housing(model, carrier[own], limit.at(own)))
-            progress("runup", float(own[-1] + 1), float(len(speeds)))
+        parts = _heard_in_housing(case, modes, carrier, limit, progress)
     levels = joined(parts)
     change, compared_to = _run_up_change(case, modes, speeds, limit, levels.level)
     return RunupResult(
@@ -569,6 +569,31 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         unresolved=unresolved(speeds, resonance, heard, damping),
         method=fixed_method(case),
     )
+
+
+def _heard_in_housing(
+    case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit, progress: Progress
+) -> list[HeardSpeeds]:
+    """What is kept of a run-up in a housing that stands still, part by part, in two processes if it is long.
+
+    Threads wait for one another between the many small steps of a speed; processes do not.
+    """
+    model, count = HousingModel(case, modes, carrier[0]), len(carrier)
+    processes = 2 if second_process.second_core() and count > _FEW_SPEEDS else 1
+    room = np.cumsum(housing_memory(case, modes, limit)) // _PART
+    blocks = np.split(np.arange(count), np.flatnonzero(np.diff(room)) + 1)
+    workers = max((os.cpu_count() or 1) // processes, 1)
+    _ = model.housing  # made before the process is copied
+
+    def heard(block: np.ndarray) -> HeardSpeeds:
+        found = heard_in_housing(model, carrier[block], limit.at(block), workers)
+        progress("runup", float(block[-1] + 1), float(count))  # to nobody from a second process
+        return found
+
+    # the slowest speeds, which take longest, come first
+    tasks = [partial(heard, block) for block in reversed(blocks)]
+    found = second_process.shared(tasks) if processes > 1 else [task() for task in reversed(tasks)][::-1]
+    return found[::-1]
 
 
 def _run_up_change(

@@ -1,5 +1,6 @@
 """A case whose ring stands on supports or in a casing: both ways and one way, lines and sound on disk."""
 
+import sys
 from pathlib import Path
 from shutil import copy
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from casing import Casing, write_casing
 
+from femgear import second_process
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError
 from femgear.housing.orders import order_level
@@ -132,6 +134,20 @@ def test_run_up_is_that_of_the_housing(before):
     lines, pressure = run_up_lines(data, result.dataset().attrs)
     assert (lines.method, pressure) == ("supports", None)
     assert not [one for one in case_warnings(case) if one.code == "W-SUPPORT"]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="one process elsewhere")
+def test_run_up_in_two_processes_is_the_same(before, monkeypatch):
+    ends = {"runup.from": "3000 rpm", "runup.to": "3100 rpm", "runup.count": 4}
+    case = reference(**{"housing.support": FEET} | ends)
+    monkeypatch.setattr(stages, "_PART", 1.0)  # every speed is a part
+    alone, told = solve_runup(case, before[1]).heard, []
+    monkeypatch.setattr(stages, "_FEW_SPEEDS", 1)
+    monkeypatch.setattr(second_process, "second_core", lambda: True)
+    found = solve_runup(case, before[1], progress=lambda *one: told.append(one)).heard
+    for name in ("level", "force_peak", "lowest_force", "order", "lines"):
+        assert np.array_equal(getattr(found, name), getattr(alone, name)), name
+    assert [one[1] for one in told] == sorted(one[1] for one in told)
 
 
 SENSORS = [

@@ -1,0 +1,101 @@
+"""Tasks shared with a copy of this process, where there is a core for it."""
+
+from __future__ import annotations
+
+import ctypes
+import multiprocessing
+import os
+import signal
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from functools import partial
+from typing import Any
+
+from femgear.errors import FemgearError
+
+_BYTES = 4
+"""Of the number of a task in the queue, which a pipe holds as a whole."""
+
+
+def shared(tasks: Sequence[Callable[[], Any]], beside: Callable[[], object] = lambda: None) -> list[Any]:
+    """Values of up to 10,000 tasks; a second process begins with the last one, this one after ``beside()``.
+
+    Values, errors and warnings of the other process come here through pickle.
+    """
+    waiting, numbers = os.pipe()
+    os.write(numbers, b"".join(number.to_bytes(_BYTES) for number in reversed(range(len(tasks)))))
+    os.close(numbers)
+    with open(waiting, "rb", buffering=0) as queue:
+
+        def take() -> dict[int, Any]:
+            numbers = map(int.from_bytes, iter(partial(queue.read, _BYTES), b""))
+            return {number: tasks[number]() for number in numbers}
+
+        with _second_process(take) as others:
+            beside()
+            found = take() | others()
+    return [found[number] for number in range(len(tasks))]
+
+
+@contextmanager
+def _second_process(work: Callable[[], dict]) -> Iterator[Callable[[], dict]]:
+    """Do some work in a copy of this process during a block of code, which is given what waits for the value.
+
+    The copy ends with the block, or with this process. Without a second core the value is empty.
+    """
+    if not second_core():
+        yield dict
+        return
+    context: Any = multiprocessing.get_context("fork")
+    mine, theirs = context.Pipe(duplex=False)
+    process = context.Process(target=_send, args=(work, theirs, os.getpid()), daemon=True)
+    # an interrupt is meant for this process, and waits until the other one can be ended
+    before, value = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT, signal.SIGTERM]), dict
+    try:
+        with suppress(OSError), warnings.catch_warnings(action="ignore", category=DeprecationWarning):
+            process.start()
+            value = partial(_received, mine)
+        theirs.close()
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        yield value
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        if process.pid is not None:
+            process.kill()
+            process.join()
+        mine.close()
+
+
+def second_core() -> bool:
+    """Tell whether a copy of this process would have a core of its own; workers have none, and no copies."""
+    alone = not multiprocessing.current_process().daemon
+    return alone and sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
+
+
+def _send(work: Callable[[], Any], connection: Any, parent: int) -> None:
+    """Send the value of some work, or its error, and warnings; end with the parent, whose locks it has."""
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+    if os.getppid() != parent:
+        return
+    with warnings.catch_warnings(record=True) as said:
+        try:
+            found = work()
+        except Exception as error:
+            found = error
+    connection.send((found, [(str(one.message), one.category, one.filename, one.lineno) for one in said]))
+
+
+def _received(connection: Any) -> dict:
+    """Receive what `_send` sends: value or error, and warnings."""
+    try:
+        found, said = connection.recv()
+    except EOFError:
+        message, remedy = "the second process, which draws or solves, was ended", "give it more memory"
+        raise FemgearError(message, code="E-WORKER", remedy=remedy) from None
+    for one in said:
+        warnings.warn_explicit(*one)
+    if isinstance(found, BaseException):
+        raise found
+    return found
