@@ -147,7 +147,8 @@ def test_run_up_in_two_processes_is_the_same(before, monkeypatch):
     found = solve_runup(case, before[1], progress=lambda *one: told.append(one)).heard
     for name in ("level", "force_peak", "lowest_force", "order", "lines"):
         assert np.array_equal(getattr(found, name), getattr(alone, name)), name
-    assert [one[1] for one in told] == sorted(one[1] for one in told)
+    in_housing = [done for _, done, _ in told[1:]]  # the first one is the foundation's
+    assert in_housing == sorted(in_housing)
 
 
 SENSORS = [
