@@ -132,35 +132,34 @@ def solve_two_way(  # noqa: PLR0913
 ) -> TwoWayResponse:
     """Solve for the mesh forces of a set in a housing that stands still, at all speeds.
 
-    CaseError: data that do not belong together, planets that do not repeat one another (E-SYMMETRY),
-    E-MEMORY. ConvergenceError: equations that are nearly singular (E-RESONANCE).
+    CaseError: data that do not fit, planets that do not repeat one another (E-SYMMETRY), E-MEMORY.
+    ConvergenceError: equations that are nearly singular (E-RESONANCE).
 
     Parameters
     ----------
     gears : Modes
-        Of gears and carrier with mean mesh stiffnesses against a rigid ring: N sun-planet, then N planet-ring
-        meshes. Without `damping` what damps them acts against the ring at rest.
+        Of gears and carrier with mean stiffnesses against a rigid ring: N sun-planet, N planet-ring meshes.
+        Without `damping` what damps them acts against the ring at rest.
     excitation : MeshExcitation
         Of the 2N meshes; their stiffness without what the structure is elastic. Over several mesh periods
         with errors that turn: then the symmetry is that of the places of the planets and of the modes.
     carrier_speed : (n_speeds,) array
         [rad/s], counter-clockwise positive, all of one direction.
-    harmonics : (int, int) or two (n_speeds,) int arrays
+    harmonics : two ints or (n_speeds,) int arrays
         Mesh harmonics kept in the data, and in the response.
     coupled_diameters : int, optional
-        Nodal diameters up to which waves of the structure act on one another and make side bands; waves
-        beyond act on themselves alone. Default: all.
+        Up to which waves act on one another and make side bands, those beyond on themselves. Default: all.
     side_bands : int, optional
-        Of every harmonic of the forces; default twice those. An axisymmetric structure makes none.
+        Of every harmonic; default twice those. An axisymmetric structure makes none.
     damping : (n, n) array, optional
         Of gears and ring as a whole, see `femgear.housing.set_damping.set_damping` [N s/m, ...]; without it
         gears and structure have each the modal damping of its own.
     tolerance : float
-        Residual of GMRES, and change of the forces by damping in their last pass, both over what fluctuates.
+        Residual, and change of the forces by damping in their last pass, both over what fluctuates.
     cycles : int
-        Of GMRES, each of twice the steps of the one before; equations that take more are nearly singular.
+        Of GMRES, each of twice the steps of the one before; beyond equations are nearly singular.
     workers : int, optional
-        Threads that speeds are solved by, fewer where memory is short; default one for every core.
+        Threads; default one for every core, fewer where memory is short.
     """
     n_max = structure.max_diameter
     coupled = n_max if coupled_diameters is None else min(coupled_diameters, n_max)
@@ -173,17 +172,16 @@ def solve_two_way(  # noqa: PLR0913
         size = int(kept[i]) * periods, n_max, bands, sense, periods, 1 if periods == 1 else paths.symmetry
         return CarrierOrders(paths, *size, structure.sectors)
 
-    widest = int(kept.argmax())
+    widest, known = int(kept.argmax()), (coupled, cycles)
     turning = _TurningSet(gears, excitation, structure, orders_of(widest), int(excited.max()), damping)
-    known = coupled, cycles
     found = _Lines(_Problem(turning, orders_of(widest), int(excited[widest]), *known), len(speeds))
 
     def solve(i: int) -> None:
         problem = _Problem(turning, orders_of(i), int(excited[i]), *known)
         found.keep(i, problem, problem.solve(abs(float(speeds[i])), tolerance))
 
-    workers = max(min(workers or os.cpu_count() or 1, int(_MOST / 4 / found.size)), 1)
-    with ThreadPoolExecutor(workers) as pool:  # BLAS and LAPACK do not hold up one another
+    room = max(int(_MOST / 4 / found.size), 1)
+    with ThreadPoolExecutor(min(workers or os.cpu_count() or 1, room)) as pool:  # BLAS lets others run
         list(pool.map(solve, range(len(speeds))))
     _check_residual(found.figures[0], speeds, max(_RESIDUAL, 10.0 * tolerance))
     return found.response(speeds, kept, paths if periods == 1 else replace(paths, symmetry=1))
