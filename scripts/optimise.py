@@ -157,7 +157,8 @@ def _searched(data, problem, extent: Extent, folder: Path, runner):
     options = {"options": counts, "cache": grid_cache(), "runner": runner}
     coarsely = options | {"journal": folder / JOURNALS[0]}
     with Progress() as progress:
-        rough = minimise(problem, method=extent.method, sensitivity=False, progress=progress, **coarsely)
+        quiet = coarsely | {"options": replace(counts, telling=False)}
+        rough = minimise(problem, method=extent.method, sensitivity=False, progress=progress, **quiet)
         progress("refinement", 0, 1)
         found = _refined(rough, with_values(data, QUIET), folder, options, extent.method)
         progress("refinement", 1, 1)
@@ -261,8 +262,10 @@ def _front(problem, second, folder: Path, options) -> None:
     )  # fmt: skip
     save_figure(figure, folder / "front.png")
     header = [f"{v.name} [{v.unit or 1}]" for v in problem.variables]
-    header += [f"{q.name} [{q.dimension.si}]" for q in both]
-    write_csv(folder / "front.csv", header, np.hstack([found.x, found.values]).tolist())
+    header += [*(f"{q.name} [{q.dimension.si}]" for q in both), "findings"]
+    codes = [", ".join(dict.fromkeys(one.code for one in findings)) for findings in found.findings]
+    rows = np.hstack([found.x, found.values]).tolist()
+    write_csv(folder / "front.csv", header, [[*row, code] for row, code in zip(rows, codes)])
     low, high = (found.values[i] for i in (0, -1))
     print(f"front: {len(found.values)} designs of {found.designs}, from")
     for end in (low, found.values[found.compromise], high):

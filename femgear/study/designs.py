@@ -30,7 +30,7 @@ from femgear import __version__
 from femgear.case.dependencies import Steps
 from femgear.case.sections import Case
 from femgear.errors import ContactError, FemgearError, StorageError
-from femgear.findings import Finding, tell
+from femgear.findings import NOTE, Finding, once, tell
 from femgear.storage.files import exclusive_lock, storage_errors
 from femgear.study.objectives import STAGES, Quantity
 from femgear.study.problem import Limit, Point, Problem, Variable, Vector
@@ -306,6 +306,19 @@ class Designs:
         """Codes of the doubts and faults that concern quantities at a point that was computed, by name."""
         known = self.journal.get(json.dumps(point), {}).get("doubts", {})
         return {quantity.name: known.get(quantity.name, []) for quantity in quantities}
+
+    def findings(self, quantities: Sequence[Quantity], point: Point) -> tuple[Finding, ...]:
+        """List the doubts and faults of a design that can be computed, each once.
+
+        Those that concern the quantities, and those of the contact and of the stresses that they come from.
+        """
+        answer, stages = self.answer(point), {quantity.stage for quantity in quantities}
+        found = [one for quantity in quantities for one in quantity.findings(answer)]
+        if stages - {"gears"}:
+            found += answer.static.findings
+        if "stress" in stages:
+            found += answer.stress.findings
+        return once(one for one in found if one.severity != NOTE)
 
     def ahead(
         self, points: Iterable[Point], quantities: Sequence[Quantity], limits: Sequence[Limit] = ()

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, FemgearError
+from femgear.findings import Finding, tell
 from femgear.study.designs import Enough, Evaluations, Failure, evaluations
 from femgear.study.objectives import Quantity
 from femgear.study.problem import Problem, Vector
@@ -46,6 +48,8 @@ class ParetoFront:
         Of the case as it is [SI].
     dominated : (k, 2) array
         Objectives of the other designs within the limits.
+    findings : tuple of tuple of Finding
+        Doubts and faults of every design, see `Designs.findings`.
     complete : bool
         Whether the search was not cut short by ``max_designs``.
     """
@@ -56,6 +60,7 @@ class ParetoFront:
     values: np.ndarray
     before: np.ndarray
     dominated: np.ndarray
+    findings: tuple[tuple[Finding, ...], ...]
     designs: int
     failures: int
     complete: bool
@@ -132,11 +137,27 @@ def pareto_front(
             raise infeasible(run)
         best = non_dominated(values)
         order = best[np.argsort(values[best, 0], kind="stable")]
-        rest = np.setdiff1d(np.arange(len(values)), best)
-        return ParetoFront(
+        rest, designs = np.setdiff1d(np.arange(len(values)), best), run.designs
+        asked = map(problem.point, x[order] if options.telling else ())
+        doubts = dict(designs.runner.map(partial(designs.findings, both), asked))
+        for outcome in doubts.values():
+            if isinstance(outcome, FemgearError):
+                raise outcome
+        found = ParetoFront(
             problem=problem, second=second, x=x[order], values=values[order], before=before,
-            dominated=values[rest], designs=run.asked, failures=len(run.designs.failures), complete=complete,
+            dominated=values[rest], findings=tuple(doubts.get(i, ()) for i in range(len(order))),
+            designs=run.asked, failures=len(designs.failures), complete=complete,
         )  # fmt: skip
+    _tell_of(found)
+    return found
+
+
+def _tell_of(front: ParetoFront) -> None:
+    """Tell each code of the findings of a front once, with how many of its designs have it."""
+    codes = [{one.code: one for one in findings} for findings in front.findings]
+    for code, finding in {code: one for design in codes for code, one in design.items()}.items():
+        count = sum(code in design for design in codes)
+        tell(replace(finding, text=f"{count} of {len(codes)} designs of the front, such as: {finding.text}"))
 
 
 def non_dominated(values: np.ndarray) -> np.ndarray:

@@ -28,6 +28,7 @@ from femgear.case.dependencies import FLANK_ENTRIES
 from femgear.case.gear_set import set_deviations
 from femgear.case.sections import Case
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
+from femgear.findings import Finding, tell
 from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Tolerance, evaluations, tolerances
 from femgear.study.objectives import under_torque
 from femgear.study.problem import Point, Problem, Variable, Vector, start_point
@@ -63,6 +64,8 @@ class SearchOptions:
         Different designs after which the search ends with the best so far.
     seed : int
         Of the samples.
+    telling : bool
+        Look for the findings of what is returned and tell them, see `femgear.findings.tell`.
 
     Raises
     ------
@@ -75,6 +78,7 @@ class SearchOptions:
     generations: int = 30
     max_designs: int | None = None
     seed: int = 0
+    telling: bool = True
 
     def __post_init__(self):
         for name, least in (("samples", 0), ("starts", 1), ("generations", 1), ("max_designs", 2)):
@@ -107,6 +111,8 @@ class Optimum:
         What each variable costs that is off by its tolerance; empty where that was not asked for.
     all_off : dict
         Quantities with all variables off at once, each to its worse side.
+    findings : tuple of Finding
+        Doubts and faults of the optimum, see `Designs.findings`.
     designs, computed, failures : int
         Designs asked for (the case and those of the tolerances among them), those of them computed now (the
         journal held the others), and those in the journal that cannot be computed.
@@ -127,6 +133,7 @@ class Optimum:
     after: dict[str, float]
     tolerances: tuple[Tolerance, ...]
     all_off: dict[str, float]
+    findings: tuple[Finding, ...]
     designs: int
     computed: int
     failures: int
@@ -224,7 +231,10 @@ def minimise(
                 converged, message = polish(run, run.cost, x0, method=method)
         except Enough:
             converged, message = False, f"ended after {most} designs"
-        return _optimum(run, before, sensitivity, (method, message, converged))
+        found = _optimum(run, before, sensitivity, options.telling, (method, message, converged))
+    for finding in found.findings:
+        tell(finding)
+    return found
 
 
 def _method(problem: Problem, method: Method) -> Method:
@@ -295,7 +305,7 @@ def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tupl
     return polish(run, run.cost, run.best[0], size=0.05)
 
 
-def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimum:
+def _optimum(run: Evaluations, before: dict, sensitivity: bool, telling: bool, ended) -> Optimum:
     """The best point with all that is reported of it."""
     problem = run.problem
     x, cost = run.best
@@ -312,10 +322,11 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, ended) -> Optimu
     quantities = (problem.objective, *problem.also)
     off, all_off = tolerances(run, x, quantities) if sensitivity else ((), {})
     designs, (method, message, converged) = run.designs, ended
+    findings = designs.findings(problem.reported, problem.point(x)) if telling else ()
     return Optimum(
         problem=problem, x=x, case=designs.at(problem.point(x)), before=before, after=after, tolerances=off,
-        all_off=all_off, course=tuple(run.course), designs=run.asked, computed=designs.computed,
-        failures=len(designs.failures), seconds=designs.seconds / max(designs.computed, 1),
+        all_off=all_off, findings=findings, course=tuple(run.course), designs=run.asked,
+        computed=designs.computed, failures=len(designs.failures), seconds=designs.seconds / max(designs.computed, 1),
         method=method, message=message, converged=converged,
     )  # fmt: skip
 

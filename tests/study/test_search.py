@@ -16,7 +16,7 @@ import pytest
 from femgear import cli
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, ConvergenceError, StorageError
-from femgear.findings import Finding
+from femgear.findings import Finding, FindingWarning
 from femgear.study.designs import Designs, Failure, Journal, evaluations, open_designs
 from femgear.study.front import check_second, non_dominated, pareto_front
 from femgear.study.objectives import (
@@ -321,6 +321,46 @@ def test_sweep_of_all_combinations(case, tmp_path):
     assert wider.computed == 2 and len(list(wider.records())) == 8
     bad = sweep(case, {"sun.profile_shift": [0.52681, 0.9]}, [contact_ratio("sun-planet")])
     assert bad.errors[0] == "" and bad.errors[1].startswith("[E-") and np.isnan(bad.values[1, 0])
+
+
+def early(answer):
+    """A finding of designs with little damping."""
+    yield Finding("W-LOAD", "", "a note is no doubt")
+    if answer.case.dynamics.damping_ratio < 0.55:
+        yield Finding("W-EXCITATION", "dynamics", "ends early")
+
+
+def test_an_optimum_tells_its_findings_and_a_front_those_of_its_designs(case, tmp_path):
+    """Once each, of the design that is returned, from memory as from the journal."""
+    first = replace(function("one", lambda x, y: (x - 0.3) ** 2), findings=early)
+    second = function("two", lambda x, y: (x - 0.9) ** 2)
+    options = {"method": "simplex", "start": [0.4, 1.0], "journal": tmp_path / "j", "sensitivity": False}
+    for _ in range(2):
+        with pytest.warns(FindingWarning) as told:
+            found = minimise(Problem(case, [X, Y], first), **options)
+        assert found.findings == (Finding("W-EXCITATION", "dynamics", "ends early"),)
+        assert [one.message.args[0] for one in told] == [*found.findings]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        silent = SearchOptions(telling=False)
+        assert minimise(Problem(case, [X, Y], first), options=silent, **options).findings == ()
+        assert minimise(Problem(case, [X, Y], second), **options | {"journal": None}).findings == ()
+    with pytest.warns(FindingWarning, match="designs of the front") as told:
+        front = pareto_front(Problem(case, [X], first), second, options=SearchOptions(samples=6))
+    doubtful = [len(findings) for findings in front.findings]
+    assert len(told) == 1 and doubtful == [int(x < 0.55) for x in front.x[:, 0]]
+    assert str(told[0].message).find(f"{sum(doubtful)} of {len(doubtful)} designs") > 0
+
+
+def test_an_optimum_of_the_teeth_has_the_findings_of_its_contact(case):
+    """Ten times the torque presses more than any steel carries, whatever the objective is."""
+    pressed = with_values(
+        case, {"operation.torque": "8000 N m", "static.positions": 8, "static.flank_elements": 6}
+    )
+    problem = Problem(pressed, [X], transmission_error("overall"))
+    with pytest.warns(FindingWarning):
+        found = minimise(problem, method="simplex", options=SearchOptions(max_designs=3), sensitivity=False)
+    assert "W-PRESSURE" in {one.code for one in found.findings}
 
 
 def test_doubtful_numbers_of_a_sweep_have_the_codes_of_their_findings(case, tmp_path, capsys):
