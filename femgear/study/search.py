@@ -327,7 +327,8 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, telling: bool, e
         problem=problem, x=x, case=designs.at(problem.point(x)), before=before, after=after, tolerances=off,
         all_off=all_off, findings=findings, course=tuple(run.course), designs=run.asked,
         computed=designs.computed, failures=len(designs.failures),
-        seconds=designs.seconds / max(designs.computed, 1), method=method, message=message, converged=converged,
+        seconds=designs.seconds / max(designs.computed, 1),
+        method=method, message=message, converged=converged,
     )  # fmt: skip
 
 
