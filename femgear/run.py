@@ -30,7 +30,6 @@ from femgear.exchange.formats import (
 )
 from femgear.findings import Finding, as_text, once, remark, tell
 from femgear.housing.sound import sound_quality
-from femgear.report.page import page, write_pictures
 from femgear.storage.contents import Contents, Datasets, as_dataset
 from femgear.storage.files import (
     append_dataset,
@@ -248,6 +247,8 @@ def _results_so_far(run: _Run, *names: str) -> Results:
 
 def _draw(run: _Run, case: Case, results: dict[str, Any], progress: Progress) -> None:
     """Write the page with its charts, then the pictures, and the page with these."""
+    from femgear.report.page import page, write_pictures
+
     start, train = time.perf_counter(), train_of(case)
     data = {name: as_dataset(contents) for name, contents in run.data.items()}
     run.data |= data
@@ -367,6 +368,8 @@ def report_again(folder: Path, *, static: bool = False) -> None:
 
     ``static`` is that of `femgear.report.page.page`.
     """
+    from femgear.report.page import page, write_pictures
+
     with folder_lock(folder):
         results = open_results(folder, partial=False)
         train = train_of(results.case)

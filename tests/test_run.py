@@ -11,9 +11,9 @@ import pytest
 import xarray as xr
 from edited_manifests import edit_manifest
 
-from femgear import run as run_module
 from femgear.errors import StorageError
 from femgear.findings import as_data
+from femgear.report import page as report_page
 from femgear.run import run_case
 from femgear.storage import files
 from femgear.storage.files import append_dataset, checksum, read_dataset, read_result, write_result
@@ -76,7 +76,7 @@ def test_numbers_are_told_before_anything_is_drawn(tmp_path, monkeypatch):
         seen.append([*results])
         assert not {*tmp_path.glob("*.png"), *tmp_path.glob("report.html")}
 
-    monkeypatch.setattr(run_module, "write_pictures", drawn)
+    monkeypatch.setattr(report_page, "write_pictures", drawn)
     with run_folder(tmp_path, case=case.source) as place:
         run_case(case, place, computed=computed)
     assert seen == [["modes", "response"], ["report.html"]]

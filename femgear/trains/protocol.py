@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -151,6 +152,26 @@ class Figures:
     captions: Mapping[str, str]
     draw: Callable[[Drawn], Mapping[str, Figure]] = lambda drawn: {}
     write: tuple[Callable[[Drawn, Path], list[str]], ...] = ()
+
+
+class FiguresOf(Mapping[str, Figures]):
+    """Figures by stage of a module that is imported when they are asked for: not to compute."""
+
+    def __init__(self, place: str):
+        self._place = place
+
+    @cached_property
+    def _figures(self) -> Mapping[str, Figures]:
+        return resolve_name(self._place)
+
+    def __getitem__(self, name: str) -> Figures:
+        return self._figures[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._figures)
+
+    def __len__(self) -> int:
+        return len(self._figures)
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,6 @@ from femgear.trains.drivetrain.checks import (
     record_every,
     record_rate,
 )
-from femgear.trains.drivetrain.figures import FIGURES
 from femgear.trains.drivetrain.model import BENDING, TORSIONAL, DrivetrainModel, case_model
 from femgear.trains.drivetrain.results import (
     WINDOW,
@@ -42,7 +41,7 @@ from femgear.trains.drivetrain.results import (
     describe_transient,
 )
 from femgear.trains.drivetrain.simulation import PASS_BAND, DrivetrainRun, Records, march_drivetrain
-from femgear.trains.protocol import Progress, Stage, Train, modes_verdict, one_blas_thread, silent
+from femgear.trains.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -333,6 +332,6 @@ DRIVETRAIN = Train(
     ),
     describe=describe_drivetrain,
     warnings=drivetrain_warnings,
-    figures=FIGURES,
+    figures=FiguresOf("femgear.trains.drivetrain.figures:FIGURES"),
     remarks=remarks,
 )  # fmt: skip

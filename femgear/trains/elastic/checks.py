@@ -24,7 +24,6 @@ from femgear.findings import Finding
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.gears.planetary import mesh_names
-from femgear.housing.casing_files import named_outputs, read_casing
 from femgear.housing.structure import FixedStructure, Support
 from femgear.report.style import NOTICEABLE
 from femgear.report.tables import first_speeds, pulling_meshes, pulls_of, response_warnings
@@ -196,6 +195,8 @@ def imported_casing(
                 value=section.file, limit=f"SHA-256 {section.sha256}",
                 remedy="put them beside the case file, or leave out sha256 for those that are there",
             )  # fmt: skip
+        from femgear.housing.casing_files import named_outputs, read_casing
+
         structure = read_casing(
             file, direction=turned @ on_ring, max_diameter=fixed_diameters(case), units=section.units,
             pitch_radius=gears.ring.base_radius / math.cos(gears.working_pressure_angle_planet_ring),

@@ -40,6 +40,7 @@ from femgear.trains.elastic.excitation_limit import (
     limited,
 )
 from femgear.trains.elastic.model import gears_alone, mesh_springs, ring_mesh_compliance
+from femgear.trains.elastic.outputs import lines_method
 from femgear.trains.elastic.results import DynamicsResult, FixedHousing, HousingResult, ModesResult
 from femgear.trains.elastic.runup import HeardSpeeds, heard_speeds
 from femgear.trains.rigid import member_speeds
@@ -202,7 +203,7 @@ def _first_lines(case: Case, modes: ModesResult, model, structure, two_way: TwoW
     order, moved = structure_lines(structure.combined(first), two_way)
     place = case.housing.sensor_angle, case.ring.teeth
     return SensorLines(
-        order, moved[:, 0], two_way.carrier_speed, *place, fixed_method(case), turns=two_way.turns
+        order, moved[:, 0], two_way.carrier_speed, *place, lines_method(case), turns=two_way.turns
     )
 
 
@@ -258,7 +259,7 @@ def lines_in_housing(
     weights = np.column_stack([first, np.eye(count)[:, points:]])  # then all that have names
     named, sound = structure.combined(weights), None
     order, moved = structure_lines(named, fixed.two_way)
-    lines = replace(exact, order=order, displacement=moved[:, 0], method=fixed_method(case))
+    lines = replace(exact, order=order, displacement=moved[:, 0], method=lines_method(case))
     by_kind = moved[:, 1:][:, : len(fixed.sensors)], moved[:, 1 + len(fixed.sensors) :]
     outputs = dict(zip(("sensor", "force"), zip((fixed.sensors, fixed.forces), by_kind)))
     order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
@@ -316,11 +317,6 @@ def heard_in_housing(
     force = np.zeros((*some.shape[:2], orders[-1] + 1), complex)
     force[..., orders] = some
     return heard_speeds(force, lines)
-
-
-def fixed_method(case: Case) -> str:
-    """Name how the lines of a sensor are found, see `SensorLines`."""
-    return "casing" if case.housing.structure else "supports" if case.housing.support else "exact"
 
 
 def _sound_around(

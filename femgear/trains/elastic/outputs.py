@@ -67,3 +67,8 @@ def named_sensors(case: Case, dynamics: DynamicsResult) -> tuple[tuple[str, ...]
         known = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
         lines.append(component_lines(field, *place, **known).displacement)
     return tuple(one.name for one in case.housing.sensor), np.stack(lines, axis=1)
+
+
+def lines_method(case: Case) -> str:
+    """Name how the lines of a sensor are found, see `SensorLines`."""
+    return "casing" if case.housing.structure else "supports" if case.housing.support else "exact"

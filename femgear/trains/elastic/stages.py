@@ -85,17 +85,6 @@ from femgear.trains.elastic.excitation_limit import (
     lines_on_foundation,
     lost_level,
 )
-from femgear.trains.elastic.figures import FIGURES
-from femgear.trains.elastic.fixed_housing import (
-    HousingModel,
-    fixed_housing,
-    fixed_method,
-    heard_in_housing,
-    housing_memory,
-    lines_at_sensor,
-    lines_in_housing,
-    turning_errors_time,
-)
 from femgear.trains.elastic.model import (
     RADIAL,
     RECORD,
@@ -108,6 +97,7 @@ from femgear.trains.elastic.model import (
     ring_model,
 )
 from femgear.trains.elastic.outputs import (
+    lines_method,
     lines_of_field,
     mesh_and_ring_outputs,
     named_sensors,
@@ -141,6 +131,7 @@ from femgear.trains.elastic.runup import (
     resonances,
 )
 from femgear.trains.protocol import (
+    FiguresOf,
     Progress,
     Recorded,
     Stage,
@@ -376,6 +367,8 @@ def dynamics_parts(
     decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     room = _HARMONIC * limit.response * excitation.periods
     if case.housing.stands_still:
+        from femgear.trains.elastic.fixed_housing import housing_memory
+
         room = room + housing_memory(case, modes, limit)
     for own, part in parts_of_speeds(case, room, memory):
         if early is None:
@@ -436,6 +429,8 @@ def _estimate_slow(change, heard_lines: Heard, case: Case, frequency, carrier, l
 def _fixed_part(case: Case, modes: ModesResult, carrier, limit: FrequencyLimit, own) -> FixedHousing:
     """Housing that stands still at some speeds of all (n_speeds,) of the carrier [rad/s]."""
     judged = np.flatnonzero(np.isin(own, checked_speeds(len(carrier))))
+    from femgear.trains.elastic.fixed_housing import fixed_housing
+
     return fixed_housing(case, modes, carrier[own], limit.at(own), judged_at=judged)
 
 
@@ -473,7 +468,9 @@ def _known_ends(case: Case, modes: ModesResult) -> list[tuple[float, float, np.n
 
 def _heard_lines(case: Case, modes: ModesResult) -> Heard:
     """Choose what computes the lines of the sensor that has the level."""
-    lines = lines_at_sensor if case.housing.stands_still else lines_on_foundation
+    lines = lines_on_foundation
+    if case.housing.stands_still:
+        from femgear.trains.elastic.fixed_housing import lines_at_sensor as lines
     return partial(lines, case, modes)
 
 
@@ -504,7 +501,11 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     if (periods := dynamics.response.periods) > 1:
         radiating = *place[:2], found.cylinder, found.microphone
         found = replace(found, sound=component_sound(dynamics.ring_radial, *radiating, periods=periods))
-    return found if dynamics.fixed is None else lines_in_housing(case, dynamics, found, dynamics.fixed)
+    if dynamics.fixed is None:
+        return found
+    from femgear.trains.elastic.fixed_housing import lines_in_housing
+
+    return lines_in_housing(case, dynamics, found, dynamics.fixed)
 
 
 @one_blas_thread()
@@ -567,7 +568,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         sensor_angle=case.housing.sensor_angle,
         operating_speeds=operating,
         unresolved=unresolved(speeds, resonance, heard, damping),
-        method=fixed_method(case),
+        method=lines_method(case),
     )
 
 
@@ -578,6 +579,8 @@ def _heard_in_housing(
 
     Threads wait for one another between the many small steps of a speed; processes do not.
     """
+    from femgear.trains.elastic.fixed_housing import HousingModel, heard_in_housing, housing_memory
+
     model, count = HousingModel(case, modes, carrier[0]), len(carrier)
     processes = 2 if second_process.second_core() and count > _FEW_SPEEDS else 1
     room = np.cumsum(housing_memory(case, modes, limit)) // _PART
@@ -654,7 +657,10 @@ def _warnings(case: Case) -> Iterator[Finding]:
             f"take about {max(kept.sum() * _SECONDS / 60.0, 1.0):.0f} min of one core",
             remedy="fewer speeds, or a lower dynamics.up_to, if that is too much",
         )  # fmt: skip
-    yield from turning_errors_time(case)
+    if case.housing.stands_still:
+        from femgear.trains.elastic.fixed_housing import turning_errors_time
+
+        yield from turning_errors_time(case)
 
 
 def _basis_entries(case: Case) -> Entries:
@@ -708,7 +714,8 @@ ELASTIC = Train(
             concerned_by={"": ("W-DAMPING", "W-POINTS"), "dynamics": ("W-EXCITATION", *RESPONSE_DOUBTS)},
         ),
     ),
-    describe=describe_set, warnings=_warnings, figures=FIGURES, verdict=verdict,
+    describe=describe_set, warnings=_warnings, verdict=verdict,
+    figures=FiguresOf("femgear.trains.elastic.figures:FIGURES"),
     recorded=Recorded(
         sensor_signals, signal_extent, _FORMATS, 2, sensor_spectra, ring_shapes, order_cuts
     ),

@@ -22,7 +22,6 @@ from femgear.solvers.time.stroboscopic import SweepResponse, sweep_up_and_down
 from femgear.storage.contents import Contents
 from femgear.storage.results import FOURIER, complex_entries
 from femgear.trains.gear_pair.case_file import GearPairCase, pair_of, scales_of
-from femgear.trains.gear_pair.figures import FIGURES
 from femgear.trains.gear_pair.model import (
     BACK,
     DRIVE,
@@ -34,6 +33,7 @@ from femgear.trains.gear_pair.model import (
     state_regions,
 )
 from femgear.trains.protocol import (
+    FiguresOf,
     Progress,
     Stage,
     StageResult,
@@ -418,5 +418,5 @@ GEAR_PAIR = Train(
     ),
     describe=_describe_case,
     warnings=_case_warnings,
-    figures=FIGURES,
+    figures=FiguresOf("femgear.trains.gear_pair.figures:FIGURES"),
 )

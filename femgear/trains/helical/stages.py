@@ -24,7 +24,6 @@ from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_d
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation, Response
-from femgear.trains.helical.figures import FIGURES
 from femgear.trains.helical.model import (
     SectionStiffness,
     check_helical_case,
@@ -43,6 +42,7 @@ from femgear.trains.helical.results import (
 )
 from femgear.trains.helical.section import HelicalCase
 from femgear.trains.protocol import (
+    FiguresOf,
     Progress,
     Stage,
     Train,
@@ -282,6 +282,6 @@ HELICAL = Train(
     ),
     describe=lambda case: (*describe_set(case), *describe_helical(case, planetary_set(case))),
     warnings=set_warnings,
-    figures=FIGURES,
+    figures=FiguresOf("femgear.trains.helical.figures:FIGURES"),
     remarks=_remarks,
 )  # fmt: skip

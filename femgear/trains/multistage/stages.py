@@ -27,7 +27,6 @@ from femgear.trains.multistage.case_file import (
     multistage_of,
     stage_gears,
 )
-from femgear.trains.multistage.figures import FIGURES
 from femgear.trains.multistage.model import (
     MultistageSet,
     joined_motions,
@@ -48,7 +47,7 @@ from femgear.trains.multistage.results import (
     describe_stage_modes,
     multistage_warnings,
 )
-from femgear.trains.protocol import Progress, Stage, Train, one_blas_thread, silent
+from femgear.trains.protocol import FiguresOf, Progress, Stage, Train, one_blas_thread, silent
 from femgear.trains.rigid import mixed_modes
 
 
@@ -380,5 +379,5 @@ MULTISTAGE = Train(
     ),
     describe=describe_multistage,
     warnings=multistage_warnings,
-    figures=FIGURES,
+    figures=FiguresOf("femgear.trains.multistage.figures:FIGURES"),
 )

@@ -20,7 +20,6 @@ from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.system.fourier import side_bands
-from femgear.trains.planar.figures import FIGURES
 from femgear.trains.planar.model import (
     carrier_sense,
     judged_branch,
@@ -43,6 +42,7 @@ from femgear.trains.planar.results import (
 )
 from femgear.trains.planar.section import PlanarCase
 from femgear.trains.protocol import (
+    FiguresOf,
     Progress,
     Stage,
     Train,
@@ -417,6 +417,6 @@ PLANAR = Train(
     ),
     describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),
     warnings=planar_warnings,
-    figures=FIGURES,
+    figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
 )  # fmt: skip
