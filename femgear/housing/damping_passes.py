@@ -22,9 +22,9 @@ _EXPECTED, _WAITING, _UNSETTLED, _SLOW = 0.2, 0.03, 0.06, 0.5
 """Part of its change that a sweep leaves to a block before it is known; part of all changes that may wait for
 the next pass, and that a pass may leave; change over that of the pass before from which on passes are
 extrapolated together, those of all blocks as one."""
-_SINGLE, _LEAST, _TINY = 1e-7, 1e-2, np.finfo(float).tiny
-"""Accuracy of the forces of the damping in single precision; what a sweep leaves at least; what no norm is
-below."""
+_SINGLE, _LEAST, _STILL, _TINY = 1e-7, 1e-2, 1e-12, np.finfo(float).tiny
+"""Accuracy of the forces of the damping in single precision; what a sweep leaves at least; part of its change
+up to which the forces of a block stood still; what no norm is below."""
 _AXES = (0, 0, 1, 1)
 """Axes of the blocks in the parts of the forces."""
 
@@ -77,7 +77,10 @@ class DampingPasses:
             self._count[:] = 0
         self._seen[:, some] = force[:, some]
         expected[some] = changes = self._sweep(motion, some)
-        self._ratio[some] = np.maximum(self._ratio[some], changes / np.maximum(moved[some], _TINY))
+        # blocks whose forces stood still tell nothing of what a change of them makes
+        known = moved[some] > _STILL * changes
+        ratio = np.divide(changes, moved[some], out=np.zeros(len(some)), where=known)
+        self._ratio[some] = np.maximum(self._ratio[some], ratio)
         change = float(np.linalg.norm(expected))
         if first and enough > _SINGLE * change:
             self._be_single()
