@@ -16,8 +16,8 @@ import numpy as np
 from femgear.housing.harmonic_blocks import HarmonicBlocks
 from femgear.housing.set_damping import DampingForces, SetDamping
 
-_MIXED, _SWEEPS = 3, 12
-"""Sweeps that are extrapolated together; sweeps of one pass at most."""
+_MIXED, _SWEEPS = 3, 2
+"""Sweeps that are extrapolated together; sweeps of one pass after its first one, at most."""
 _EXPECTED, _WAITING, _UNSETTLED, _SLOW = 0.2, 0.03, 0.06, 0.5
 """Part of its change that a sweep leaves to a block before it is known; part of all changes that may wait for
 the next pass, and that a pass may leave; change over that of the pass before from which on passes are

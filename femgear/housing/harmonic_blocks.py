@@ -203,7 +203,7 @@ def _add_coupled(add, structure: FixedStructure, orders: CarrierOrders, known, m
 
 def _times(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Products (i, B, R) of matrices (i, j, B, R) and values (j, B, R)."""
-    return np.stack([sum(part * other for part, other in zip(row, values)) for row in matrix])
+    return np.einsum("ijbr,jbr->ibr", matrix, values)
 
 
 def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:

@@ -386,11 +386,11 @@ class _Lines:
 def _add_at(total: np.ndarray, place: np.ndarray, values: np.ndarray) -> None:
     """Add values (n, ...) to places (n,) of a total, most of which get one of them."""
     number = place.ravel()
-    values = values.reshape(len(number), *total.shape[1:])
-    places, first, count = np.unique(number, return_index=True, return_counts=True)
-    total[places] += values[first]
-    again = np.setdiff1d(np.flatnonzero((count > 1)[np.searchsorted(places, number)]), first)
-    np.add.at(total, number[again], values[again])
+    values, left = values.reshape(len(number), *total.shape[1:]), np.arange(len(number))
+    while len(left):  # a place gets one value at a time
+        places, first = np.unique(number[left], return_index=True)
+        total[places] += values[left[first]]
+        left = np.delete(left, first)
 
 
 @dataclass(frozen=True)
