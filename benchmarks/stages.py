@@ -198,20 +198,32 @@ def housing(reference: Reference):
     return solve_housing(reference.case, reference.dynamics)
 
 
-def on_feet(case, speeds, *, harmonics: int | None = None, diameters: int = 14, runup: int = 0):
-    """The case on the four feet of docs/bolts.md, with a run-up of so many speeds from 300 to 3100 rpm.
+def on_supports(case, speeds, supports, *, harmonics: int | None = None, diameters: int = 14, runup: int = 0):
+    """The case on supports, with a run-up of so many speeds from 300 to 3100 rpm.
 
     The excitation ends at so many mesh harmonics, by default where that of a run does.
     """
     from femgear.trains.reading import with_values
 
     stiffness = dict.fromkeys(("radial_stiffness", "tangential_stiffness"), "4e8 N/m")
-    feet = [{"angle": f"{a} deg", "width": "20 mm", "mass": "50 g", **stiffness} for a in (35, 145, 215, 325)]
     entries = {
-        "housing.support": feet, "housing.nodal_diameters": diameters, "housing.published": [],
-        "operation.speeds": speeds, "runup.from": "300 rpm", "runup.to": "3100 rpm", "runup.count": runup,
+        "housing.support": [one | stiffness for one in supports], "housing.nodal_diameters": diameters,
+        "housing.published": [], "operation.speeds": speeds, "runup.from": "300 rpm", "runup.to": "3100 rpm",
+        "runup.count": runup,
     } | ({} if harmonics is None else {"dynamics.mesh_harmonics": harmonics})  # fmt: skip
     return with_values(case, entries)
+
+
+def on_feet(case, speeds, **known):
+    """The case on the four feet of docs/bolts.md."""
+    feet = [{"angle": f"{a} deg", "width": "20 mm", "mass": "50 g"} for a in (35, 145, 215, 325)]
+    return on_supports(case, speeds, feet, **known)
+
+
+def on_bolts(case, speeds, **known):
+    """The case on the six bolts of docs/bolts.md."""
+    bolts = [{"angle": f"{a} deg", "width": "12 mm", "mass": "20 g"} for a in range(15, 375, 60)]
+    return on_supports(case, speeds, bolts, **known)
 
 
 def turning_speeds(count: int) -> dict:
@@ -219,24 +231,26 @@ def turning_speeds(count: int) -> dict:
     return {"from": "300 rpm", "to": "3100 rpm", "count": count}
 
 
-def two_way(reference: Reference, modes=None, *, speeds=("250 rpm",), harmonics=None, diameters: int = 14):
-    """Mesh forces of the set on four feet both ways, and of the ring without them."""
+def two_way(
+    reference: Reference, modes=None, *, speeds=("250 rpm",), harmonics=None, diameters=14, supported=on_feet
+):
+    """Mesh forces of the set on supports both ways, and of the ring without them."""
     from femgear.trains.elastic.excitation_limit import limited
     from femgear.trains.elastic.fixed_housing import fixed_housing
     from femgear.trains.rigid import member_speeds
 
     modes = modes or reference.modes
-    case = on_feet(reference.case, speeds, harmonics=harmonics, diameters=diameters)
+    case = supported(reference.case, speeds, harmonics=harmonics, diameters=diameters)
     first, speeds = member_speeds(case, reference.gears), np.array(case.operation.speeds)
     limit = limited(case, first.mesh_frequency * speeds, modes.reach, given=case.dynamics.mesh_harmonics)
     return fixed_housing(case, modes, first.carrier * speeds, limit)
 
 
-def runup_on_feet(reference: Reference, count: int = 400):
-    """The run-up of the set on four feet, with speeds beside its resonances."""
+def runup_on_bolts(reference: Reference, count: int):
+    """The run-up of the set on six bolts, with speeds beside its resonances."""
     from femgear.trains.elastic.stages import solve_runup
 
-    return solve_runup(on_feet(reference.case, ["3100 rpm"], runup=count), reference.modes)
+    return solve_runup(on_bolts(reference.case, ["3100 rpm"], runup=count), reference.modes)
 
 
 def whole(reference: Reference):
