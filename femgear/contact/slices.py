@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
+from scipy.linalg.lapack import dposv, zposv
 
 from femgear.contact.assembly import Candidates
 from femgear.contact.batch import PairLaws, cyclic_harmonics
@@ -214,7 +214,7 @@ class _SliceNewton:
             np.repeat(one, self.each, axis=1) for one in (there, self.apart, self.plane)
         )
         self.widest = float(np.abs(np.where(there, self.apart + separations, 0.0)).max())
-        self.closed = self.force > 0.0
+        self.closed, self.carrying = self.force > 0.0, None
         # at the given state the curves miss their own points by their interpolation
         self.refresh()
         missed = self.by_laws(self.force)[0] + self.force @ laws.supports / self.unit
@@ -276,7 +276,8 @@ class _SliceNewton:
         for step in range(_MOST):
             if step < _REFRESHED:
                 self.refresh()
-            moved = self.step(single=step >= _BOLD)
+            # moments follow forces at first
+            moved = self.step(todo | (step < _REFRESHED), single=step >= _BOLD)
             steps += todo
             todo = moved > limit
             if not todo.any() and step >= _REFRESHED:
@@ -299,16 +300,19 @@ class _SliceNewton:
         the last of several bodies; ``own`` (P, meshes) of each follow [N/m].
         """
         (P, N, _), meshes = self.shape, np.arange(int(self.laws.mesh[-1]) + 1)
-        on, at = _first((self.force > 0.0).reshape(P, self.size))
+        carrying = _Carrying.of((self.force > 0.0).reshape(P, self.size), self.shape[2])
+        on, at = carrying.on, carrying.at
         c, k, rows = at.shape[1], self.tilts.shape[-1], np.arange(P)[:, None]
         ones = (np.tile(self.laws.mesh, N)[at][..., None] == meshes) * on[..., None].astype(float)
         ones = np.concatenate([ones, np.zeros((P, k, len(meshes)))], axis=1)
         found, A, slope = [], np.zeros((1, P, c + k, c + k)), self.gaps(self.force)[1]
+        # a border of tilts is not symmetric
+        solve = np.linalg.solve if k else _symmetric_solution
         moments = self._moments(self.force)
         for number, (smooth, across) in enumerate(bodies, 1):
             # the images are those of the last bodies alone
             images = len(across) if number == len(bodies) else 1
-            A, alone = self._bordered(smooth[:images], across[:images], moments, slope, on, at), []
+            A, alone = self._bordered(smooth[:images], across[:images], moments, slope, carrying), []
             for j in meshes:
                 own, some = _first(ones[:, :c, j] > 0.0)
                 own = np.hstack([own, np.ones((P, k), bool)])
@@ -319,15 +323,15 @@ class _SliceNewton:
                     np.eye(own.shape[1]),
                 )
                 own = np.where(some < c, own, False)
-                alone.append((own * np.linalg.solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
+                alone.append((own * solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
             found.append(np.stack(alone, axis=1) / (N * self.unit))
         if len(bodies) == 1:
             return [np.zeros((1, P, 0, 0)), *found]
         harmonics = cyclic_harmonics(A)
-        answers = [np.linalg.solve(harmonics[0].real, ones), *np.linalg.solve(harmonics[1:], ones)]
+        answers = [solve(harmonics[0].real, ones), *(solve(one, ones) for one in harmonics[1:])]
         return [ones.swapaxes(1, 2) @ np.array(answers) / (N * self.unit), *found]
 
-    def _bordered(self, smooth, across, moments, slope, on, at) -> np.ndarray:
+    def _bordered(self, smooth, across, moments, slope, carrying: _Carrying) -> np.ndarray:
         """Compliance between the loaded slices and to their images, (I, P, c + k, c + k), over the unit."""
         (P, N, W), n, L = self.shape, self.size, self.rows.shape[1]
         mu = moments.reshape(P, L, self.each, W, 3).swapaxes(2, 3)
@@ -339,38 +343,32 @@ class _SliceNewton:
         between[0][..., range(W), range(W)] -= np.einsum("plwsa,plwab,plwsb->plsw", mu, own, mu)
         between = between.reshape(-1, P, N, W, W) / self.unit
         between[0][..., range(W), range(W)] += slope
-        across = across.reshape(-1, P, n, n)
+        across, on, at = across.reshape(-1, P, n, n), carrying.on, carrying.at
         c, k, tilts = at.shape[1], self.tilts.shape[-1], self.tilts.reshape(n, -1)[at] * on[..., None]
         found = np.zeros((len(across), P, c + k, c + k))
         for one, part, beside in zip(found, across, between, strict=True):
-            self._gather(one, part, beside, on, at, 1.0 / self.unit)
+            self._gather(one, part, beside, carrying, 1.0 / self.unit)
         found[0][:, range(c), range(c)] += ~on
         # tilts follow the increments: the border of the rows that carry
         found[..., :c, c:], found[..., c:, :c] = -tilts, tilts.swapaxes(1, 2) / N
         found[..., range(c, c + k), range(c, c + k)] = self.springs[len(self.load) - k :]
         return found
 
-    def _gather(self, system, across, between, on, at, factor=1.0) -> None:
-        """Put compliances of the slices that are ``on`` into the first rows and columns of systems (P, ., .).
+    def _gather(self, system, across, between, carrying: _Carrying, factor=1.0) -> None:
+        """Put compliances of the slices that carry into the first rows and columns of systems (P, ., .).
 
         Those ``across`` (P, n, n) times a factor, and those ``between`` the windows of a slice (P, N, W, W).
         """
-        (_, _, W), (P, c) = self.shape, at.shape
-        p, i = np.arange(P)[:, None], np.arange(c)
+        P, c = carrying.at.shape
         block = system[:, :c, :c]
-        np.multiply(across[p[..., None], at[:, :, None], at[:, None]], factor, out=block)
-        if not on.all():
-            block *= on[:, :, None] & on[:, None]
-        # where the windows of the own slice stand
-        place = np.full((P, self.size), -1)
-        place[p, at] = np.where(on, i, -1)
-        beside = place.reshape(P, -1, W)[p, at // W]
-        p, i, w = np.nonzero((beside >= 0) & on[..., None])
-        own, window = np.divmod(at[p, i], W)
-        block[p, i, beside[p, i, w]] += between[p, own, window, w]
+        np.multiply(across.ravel()[carrying.entries].reshape(P, c, c), factor, out=block)
+        if not carrying.on.all():
+            block *= carrying.on[:, :, None] & carrying.on[:, None]
+        p, i, j, own, window, w = carrying.beside
+        block[p, i, j] += between[p, own, window, w]
 
-    def step(self, *, single: bool) -> np.ndarray:
-        """Take a step at all positions; by how much forces change at most [N], endless while sides change."""
+    def step(self, todo: np.ndarray, *, single: bool) -> np.ndarray:
+        """Take a step where one is to do; how much forces change at most [N], endless while sides change."""
         (P, N, W), n, m = self.shape, self.size, len(self.load)
         gap, slope = self.gaps(self.force)
         wrong = np.where(self.closed, self.force < 0.0, gap < 0.0).reshape(P, n)
@@ -383,27 +381,25 @@ class _SliceNewton:
         if (self.force != before).any():
             gap, slope = self.gaps(self.force)
         # what is closed alone, and as many of the others as the position with the most of it asks for
-        on, at = _first(self.closed.reshape(P, n))
-        system, c = np.zeros((P, at.shape[1] + m, at.shape[1] + m)), at.shape[1]
-        rows, between = np.arange(P)[:, None], self.between.copy()
+        if self.carrying is None or changed.any():
+            self.carrying = _Carrying.of(self.closed.reshape(P, n), W)
+        on, at = self.carrying.on, self.carrying.at
+        block = np.empty((P, at.shape[1], at.shape[1]))
+        between = self.between.copy()
         between[..., range(W), range(W)] += slope
-        self._gather(system, self.joined, between, on, at)
-        system[:, range(c), range(c)] += ~on
-        G = np.hstack([np.tile(self.laws.approach, (N, 1)), self.tilts.reshape(n, -1)])[at] * on[..., None]
-        system[:, :c, c:], system[:, c:, :c] = -G, G.swapaxes(1, 2) / N
-        system[:, range(c, c + m), range(c, c + m)] = self.springs
+        self._gather(block, self.joined, between, self.carrying)
+        G = np.hstack([np.tile(self.laws.approach, (N, 1)), self.tilts.reshape(n, -1)])[at]
         tilted = np.einsum("nwk,pnw->pk", self.tilts, self.force)
         carried = np.hstack([self.force.sum(axis=1) @ self.laws.approach, tilted]) / N
         balance = self.load - carried - self.springs * self.motions
-        right = np.concatenate([np.where(on, -gap.reshape(P, n)[rows, at], 0.0), balance], axis=1)
-        change = np.zeros((P, n + m))
-        for place, count in enumerate(on.sum(axis=1)):
+        gap, change = np.take_along_axis(gap.reshape(P, n), at, axis=1), np.zeros((P, n + m))
+        for place in np.flatnonzero(todo | changed):
             # what is closed comes first
-            closed = np.append(np.arange(count), np.arange(c, c + m))
-            some = np.append(at[place, :count], np.arange(n, n + m))
-            change[place, some] = _bordered_solution(
-                system[place][np.ix_(closed, closed)], right[place, closed], m
+            some = slice(int(on[place].sum()))
+            found = _bordered_solution(
+                block[place, some, some], G[place, some], self.springs, -gap[place, some], balance[place], N
             )
+            change[place, at[place, some]], change[place, n:] = found
         # pulls stay until the next step: motions belong to them
         self.force = np.where(self.closed, self.force + change[:, :n].reshape(P, N, W), 0.0)
         self.motions = self.motions + change[:, n:]
@@ -411,17 +407,63 @@ class _SliceNewton:
         return np.where(changed, np.inf, moved)
 
 
-def _bordered_solution(system: np.ndarray, right: np.ndarray, motions: int) -> np.ndarray:
-    """Solve a system (c + m, c + m) whose first block, a compliance, is symmetric and mostly definite."""
-    count = len(right) - motions
-    sides = np.column_stack([system[:count, count:], right[:count]])
-    try:
-        solved = cho_solve(cho_factor(system[:count, :count], check_finite=False), sides, check_finite=False)
-    except LinAlgError:
-        return np.linalg.solve(system, right)
-    below, by_motions, alone = system[count:, :count], solved[:, :motions], solved[:, motions]
-    moved = np.linalg.solve(system[count:, count:] - below @ by_motions, right[count:] - below @ alone)
-    return np.append(alone - by_motions @ moved, moved)
+def _bordered_solution(
+    compliance: np.ndarray,
+    G: np.ndarray,
+    springs: np.ndarray,
+    right: np.ndarray,
+    balance: np.ndarray,
+    slices: int,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Solve ``A f - G q = right, G^T f / N + S q = balance`` for forces (c,) and motions (m,).
+
+    The compliance A (c, c) is symmetric and mostly definite; S are springs (m,), N slices.
+    """
+    _, solved, failed = dposv(compliance.T, np.column_stack([G, right]))
+    if failed:
+        solved = np.linalg.solve(compliance, np.column_stack([G, right]))
+    by_motions, alone = solved[:, :-1], solved[:, -1]
+    below = G.T / slices
+    moved = np.linalg.solve(np.diag(springs) + below @ by_motions, balance - below @ alone)
+    return alone + by_motions @ moved, moved
+
+
+def _symmetric_solution(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """Solve systems (..., n, n) that are Hermitian and mostly definite for right sides (..., n, k)."""
+    found = np.empty(right.shape, matrices.dtype)
+    solver = zposv if np.iscomplexobj(matrices) else dposv
+    for place in np.ndindex(matrices.shape[:-2]):
+        _, found[place], failed = solver(matrices[place], right[place])
+        if failed:
+            found[place] = np.linalg.solve(matrices[place], right[place])
+    return found
+
+
+@dataclass(frozen=True)
+class _Carrying:
+    """Slices of windows that carry, (P, c): whether they do, which of all n they are, and where.
+
+    ``entries`` (P c c,) are the places of their pairs in a matrix (P, n, n), ``beside`` position, row and
+    column of pairs in the same slice, with slice and both windows.
+    """
+
+    on: np.ndarray
+    at: np.ndarray
+    entries: np.ndarray
+    beside: tuple[np.ndarray, ...]
+
+    @classmethod
+    def of(cls, carries: np.ndarray, windows: int) -> _Carrying:
+        """Find them, (P, n), of so many windows a slice."""
+        on, at = _first(carries)
+        (P, n), c = carries.shape, at.shape[1]
+        p, i = np.arange(P)[:, None], np.arange(c)
+        entries = (((p * n + at) * n)[:, :, None] + at[:, None]).ravel()
+        place = np.full((P, n), -1)
+        place[p, at] = np.where(on, i, -1)
+        beside = place.reshape(P, -1, windows)[p, at // windows]
+        p, i, w = np.nonzero((beside >= 0) & on[..., None])
+        return cls(on, at, entries, (p, i, beside[p, i, w], *np.divmod(at[p, i], windows), w))
 
 
 def _first(on: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
