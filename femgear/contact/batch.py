@@ -34,6 +34,8 @@ FAINT = 1e-9
 """Share of the largest load below which a touching cell may be no contact at all."""
 _TOGETHER = 400
 """Windows by themselves that are solved at once."""
+_ROUNDED = 1e-14
+"""Violation that is rounding alone."""
 _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
 
@@ -61,8 +63,9 @@ class BatchState:
 
 
 def solve_batch(
-    found: Candidates, load, springs: BearingSprings | None = None, *, start: np.ndarray | None = None
-) -> BatchState:
+    found: Candidates, load, springs: BearingSprings | None = None, *, start: np.ndarray | None = None,
+    refined: bool = True
+) -> BatchState:  # fmt: skip
     """Solve the contact of all meshes and bearings at all positions.
 
     ContactError: as `femgear.contact.solve.solve_contact`.
@@ -75,9 +78,11 @@ def solve_batch(
         Of planet bearings with clearance.
     start : (P, W, C) bool array, optional
         Cells thought to touch; guessed for equal mesh forces when left out.
+    refined : bool
+        Solve once more for what rounding left out; without it only where that is more than `_ROUNDED`.
     """
     batch = _ActiveSets(found, np.asarray(load, float), springs, start)
-    batch.solve()
+    batch.solve(refined)
     state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
     return BatchState(*state)
 
@@ -233,13 +238,16 @@ class _ActiveSets:
     ):  # fmt: skip
         P, W, C = found.gap.shape
         self.found, self.bearings, self.given = found, springs, load
+        # problems at one position, which differ in their separations alone
+        self.alike = P > 1 and found.local.strides[0] == 0
         G, arms = found.approach[found.mesh], np.zeros((0, len(load)))
         if springs is not None:
             arms = np.pad(springs.arms, ((0, 0), (len(load) - springs.arms.shape[1], 0)))
         self.arm = np.abs(np.vstack([G, arms])).max(axis=0)
         self.G, self.arms, self.load = G / self.arm, arms / self.arm, load / self.arm
         self.clearance, self.softness = (springs.clearance, springs.compliance) if springs else (0.0, 1.0)
-        self.S = found.smooth + found.supports[np.ix_(found.mesh, found.mesh)][:, None, :, None]
+        smooth = found.smooth[:1] if self.alike else found.smooth
+        self.S = smooth + found.supports[np.ix_(found.mesh, found.mesh)][:, None, :, None]
         # L^-1 of the separations and of the polynomials
         self.offset, self.columns = np.zeros((P, W, C)), np.zeros((P, W, C, 3))
         self.loads, self.gaps = np.zeros((2, P, W, C))
@@ -271,14 +279,15 @@ class _ActiveSets:
         edge = np.where(reached, smallest + 2 * force / (np.pi * modulus * width), -np.inf if share else 0.0)
         return gap <= edge.reshape(*gap.shape[:2], 1), springs
 
-    def solve(self) -> None:
+    def solve(self, refined: bool) -> None:
         """Solve all positions: together, and those that are left one by one."""
         first, solved = (self.active.copy(), self.springs.copy()), np.zeros(len(self.active), bool)
         self._pivot(np.arange(len(solved)), _MOST_STEPS, solved)
         # what is left may have lost all contact on its way
         self.active[~solved], self.springs[~solved] = (start[~solved] for start in first)
-        if solved.any():
-            done = np.flatnonzero(solved)
+        ready = np.zeros(0, int) if refined else self._ready(np.flatnonzero(solved))
+        done = np.setdiff1d(np.flatnonzero(solved), ready)
+        if len(done):
             solved[done] = self._refined(done)
             # cells of planets that carry nothing may touch all the same: they are released
             idle = done[~solved[done]]
@@ -290,6 +299,16 @@ class _ActiveSets:
                 solved[idle] = self._refined(idle)
         for at in np.flatnonzero(~solved):
             self._alone(at)
+
+    def _ready(self, done: np.ndarray) -> np.ndarray:
+        """Solved positions whose rounding is small and whose cells all carry for certain."""
+        loads, active = self.loads[done], self.active[done]
+        faint = active & (loads <= FAINT * loads.max(axis=(1, 2), keepdims=True))
+        ready = done[(self.residual[done] < _ROUNDED) & ~faint.any(axis=(1, 2))]
+        self.motions[ready] = self.motions[ready] / self.arm
+        self.gaps[ready] = np.where(self.active[ready], 0.0, np.maximum(self.gaps[ready], 0.0))
+        self.loads[ready] = np.where(self.active[ready], self.loads[ready], 0.0)
+        return ready
 
     def _pivot(self, todo, steps: int, solved) -> None:
         """Change the sides of all violating cells and springs of some positions; mark the `solved` ones."""
@@ -320,9 +339,10 @@ class _ActiveSets:
         From ``L^-1 gap`` (t, W, C), the load (t, m) or (m,) and the clearance of the bearings. Motions that
         nothing restrains are zero; they are the columns (m, k) of the arrays, by position.
         """
-        S, columns = self.S[todo], self.columns[todo]
+        S, columns = self._rows(self.S, todo), self.columns[todo]
         T, n = len(todo), 3 * S.shape[1]
-        onto, G = self.found.polynomials[todo].swapaxes(-1, -2), np.repeat(self.G, 3, axis=0)
+        onto = self._rows(self.found.polynomials, todo).swapaxes(-1, -2)
+        G = np.repeat(self.G, 3, axis=0)
         Q, moments = onto @ columns, onto @ offset[..., None]
         right = np.concatenate([Q.sum(axis=-1)[..., None] * self.G[:, None], moments], axis=-1)
         # windows in which nothing touches have no moments
@@ -332,7 +352,8 @@ class _ActiveSets:
             some = np.flatnonzero(count == most)
             windows = np.reshape(np.nonzero(touching[some])[1], (-1, most))
             some = some[:, None]
-            between = S[some[..., None], windows[..., None], :, windows[:, None]]
+            row = (some % len(S))[..., None]
+            between = S[row, windows[..., None], :, windows[:, None]]
             matrix = Q[some, windows, None] @ between
             matrix = matrix.swapaxes(2, 3).reshape(len(some), 3 * most, -1) + np.eye(3 * most)
             moments = right[some, windows].reshape(len(some), 3 * most, -1)
@@ -345,22 +366,37 @@ class _ActiveSets:
         free = held <= NULL * held[:, -1:]
         along = vectors.swapaxes(-1, -2) @ balance[..., None]
         motions = vectors @ np.where(free[..., None], 0.0, along / np.where(free, 1.0, held)[..., None])
-        moved = S.reshape(T, n, n) @ (solved[..., :-1] @ motions - solved[..., -1:]) - G @ motions
+        moved = S.reshape(-1, n, n) @ (solved[..., :-1] @ motions - solved[..., -1:]) - G @ motions
         loads = -offset - (columns @ moved.reshape(T, -1, 3, 1))[..., 0]
         null = {at: vectors[at][:, free[at]] for at in np.flatnonzero(free.any(axis=1))}
         return loads, motions[..., 0], null
 
-    def _conditions(self, todo, loads, motions, null):
-        """Keep a linear solution; find the cells and springs that violate the other conditions."""
-        found, active, springs = self.found, self.active[todo], self.springs[todo]
-        candidate, values, gap = found.candidate[todo], found.polynomials[todo], found.gap[todo]
-        T, n = len(todo), 3 * values.shape[1]
+    def _rows(self, values: np.ndarray, todo: np.ndarray) -> np.ndarray:
+        """Values of some problems, (1, ...) where they are alike."""
+        return values[:1] if self.alike else values[todo]
+
+    def _yielding(self, todo: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """What the bodies yield in all cells under loads (t, W, C) of some problems [m]."""
+        found, values = self.found, self._rows(self.found.polynomials, todo)
+        T, n = len(todo), 3 * loads.shape[1]
+        if self.alike:
+            by_window, values = loads.swapaxes(0, 1), values[0]
+            moments = (by_window @ values).swapaxes(0, 1).reshape(T, n)
+            bodies = (moments @ self.S.reshape(n, n)).reshape(T, -1, 3).swapaxes(0, 1)
+            elastic = bodies @ values.swapaxes(1, 2) + by_window @ found.local[0]
+            return np.ascontiguousarray(elastic.swapaxes(0, 1))
         moments = (values.swapaxes(-1, -2) @ loads[..., None]).reshape(T, n, 1)
         bodies = (self.S[todo].reshape(T, n, n) @ moments).reshape(T, -1, 3, 1)
         elastic = (values @ bodies)[..., 0]
         rows = np.nonzero(loads.any(axis=-1))
         elastic[rows] += (found.local[todo[rows[0]], rows[1]] @ loads[rows][..., None])[..., 0]
-        elastic = np.where(candidate, elastic, 0.0)
+        return elastic
+
+    def _conditions(self, todo, loads, motions, null):
+        """Keep a linear solution; find the cells and springs that violate the other conditions."""
+        found, active, springs = self.found, self.active[todo], self.springs[todo]
+        candidate, gap = found.candidate[todo], found.gap[todo]
+        elastic = np.where(candidate, self._yielding(todo, loads), 0.0)
         separation = np.where(candidate, gap + elastic, np.inf)
         motions, turned, blocked, forced = self._settled(todo, separation, motions, null)
         approach = (motions @ self.G.T)[..., None]

@@ -75,15 +75,16 @@ from femgear.trains.static.results import SLICES
 
 POSITIONS = 16
 """Of a mesh period."""
-_FORCES, _LEAST = 48, 1e-3
-"""Of the curves of tooth pairs: their number, and the share of the torque at which they begin."""
+_FORCES, _LEAST, _FINER = 48, 1e-3, 6
+"""Of the curves of tooth pairs: their number, and the share of the torque at which they begin; steps in one of
+theirs in which cells begin to touch."""
 _STRAIGHT, _STRAIGHT_IN_SLICES = 0.005, 0.05
 """Share of a peak to peak that straight lines between positions may miss, of the set without drawn errors.
 
 In slices, which come into contact one after the other where leads are drawn, kinks of all slices at once are
 none of the samples'.
 """
-_TOGETHER, _SLICED_TOGETHER, _EXACT_TOGETHER, _TRIED = 128, 256, 128, 32
+_TOGETHER, _SLICED_TOGETHER, _EXACT_TOGETHER, _TRIED = 128, 256, 64, 32
 """Samples as springs and positions of the whole problem solved at once; those
 of seed 0 that windows are tried with."""
 MOST_SAMPLES = 10_000_000
@@ -441,6 +442,9 @@ class SampleModel:
         if s.over:
             curves = curve_forces(self.load[N], N, self.load[N])
         laws = pair_laws(found, state, curves)
+        # where contacts end decides how soon their cells are found
+        finer = np.geomspace(curves[0], curves[-1], _FINER * (len(curves) - 1) + 1)
+        touching = laws.touching if s.over else pair_laws(found, state, finer).touching
         rolls = setup.roll[:, found.mesh, found.position[:, None], found.pair]
         tilted = any(key.endswith("profile_slope") for key, *_ in self.errors)
         shifts, tilts, leads, unit, ideal = [], [], [], 1e-6, no_deviations(self.basis.gears)
@@ -461,7 +465,7 @@ class SampleModel:
         at_nodes = _sparse(np.moveaxis(np.array(tilts), 0, -1)) if tilted else None
         over = _over_width(s, found, laws, np.moveaxis(np.array(leads), 0, -1)) if s.over else None
         made = _Level(
-            found, PairSprings(laws), laws.touching, _sparse(by_pairs[of_windows]), at_nodes, overflows,
+            found, PairSprings(laws), touching, _sparse(by_pairs[of_windows]), at_nodes, overflows,
             listed.gap[mesh, at, pair], _sparse(by_pairs[mesh, at, pair]), (at, mesh), over,
         )  # fmt: skip
         self._levels[share, nearest] = made
@@ -591,7 +595,7 @@ def _in_windows(
     if exact and model.solved.over:
         return joined([_walked(model, sample) for sample in errors])
     level, (share, nearest) = model.level(*size), size
-    together = max(1, _EXACT_TOGETHER // len(model.position)) if exact else _TOGETHER
+    together = _EXACT_TOGETHER if exact else _TOGETHER
     together = together if level.over is None else _SLICED_TOGETHER
     blocks = np.split(errors, range(together, len(errors), together))
     parts, unsolved, missed = zip(
@@ -731,35 +735,38 @@ def _separations(model: SampleModel, level: _Level, by_error: np.ndarray) -> tup
 def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts, force):
     """Forces, motions and stiffness of samples from those of springs; whether (n,) windows are too small.
 
-    Samples are the last axis, as of `femgear.contact.pair_springs.solve_laws`.
+    Samples are the last axis, as of `femgear.contact.pair_springs.solve_laws`. Those at one position, which
+    differ in their separations alone, are solved together.
     """
-    P, W, n = separations.shape
-    found, gap = _repeated(level, n), _by_samples(separations).reshape(n * P, W, 1)
-    if tilts is not None:
-        gap = gap + (found.polynomials @ _by_samples(tilts).reshape(-1, W, 3, 1))[..., 0]
-    found = replace(found, gap=np.where(found.candidate, found.gap + gap, 0.0))
-    force = _by_samples(force)
-    start = (force > 0.0)[..., None] & (force[..., None] >= level.touching)
-    state = solve_batch(found, model.load, start=start.reshape(found.gap.shape))
-    check_residual(found, state)
-    stiffness = ContactTangents(found, state).of_meshes(found.smooth)
-    overflows = state.active[..., [0, -1]] & ~np.moveaxis(found.at_edge, 0, -1)
-    values = state.loads.sum(axis=-1), state.motions, stiffness
-    by_positions = (np.moveaxis(a.reshape(n, P, -1), 0, -1) for a in values)
-    return *by_positions, overflows.reshape(n, -1).any(axis=1)
+    (P, W, n), N = separations.shape, model.solved.gears.n_planets
+    forces, motions = np.zeros((P, W, n)), np.zeros((P, len(model.load), n))
+    stiffness, overflows = np.zeros((P, 2 * N, n)), np.zeros(n, bool)
+    for at in range(P):
+        found, gap = _at_position(level, at, n), separations[at].T[..., None]
+        if tilts is not None:
+            gap = gap + (found.polynomials[0] @ tilts[at].transpose(2, 0, 1)[..., None])[..., 0]
+        found = replace(found, gap=np.where(found.candidate, found.gap + gap, 0.0))
+        pressed = force[at].T[..., None]
+        start = (pressed > 0.0) & (pressed >= level.touching[at])
+        state = solve_batch(found, model.load, start=start, refined=False)
+        check_residual(found, state)
+        forces[at], motions[at] = state.loads.sum(axis=-1).T, state.motions.T
+        stiffness[at] = ContactTangents(found, state).of_meshes(found.smooth).T
+        ends = state.active[..., [0, -1]] & ~np.moveaxis(found.at_edge, 0, -1)
+        overflows |= ends.any(axis=(1, 2))
+    return forces, motions, stiffness, overflows
 
 
-def _by_samples(values: np.ndarray) -> np.ndarray:
-    """Values (..., n) as (n, ...)."""
-    return np.ascontiguousarray(np.moveaxis(values, -1, 0))
+@lru_cache(maxsize=64)
+def _at_position(level: _Level, at: int, times: int) -> Candidates:
+    """Candidates at one position of so many samples without their errors; the last samples are often fewer."""
 
+    def repeated(values: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(values, (times, *values.shape))
 
-@lru_cache(maxsize=2)
-def _repeated(level: _Level, times: int) -> Candidates:
-    """Candidates of so many samples without their errors; the last samples are often fewer."""
     names = "position", "pair", "gap", "candidate", "polynomials", "local"
-    arrays = {name: np.concatenate([getattr(level.found, name)] * times) for name in names}
-    return replace(level.found, **arrays, images=np.concatenate([level.found.images] * times, axis=1))
+    arrays = {name: repeated(getattr(level.found, name)[at]) for name in names}
+    return replace(level.found, **arrays, images=np.moveaxis(repeated(level.found.images[:, at]), 0, 1))
 
 
 def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
