@@ -76,8 +76,8 @@ from femgear.trains.static.results import SLICES
 POSITIONS = 16
 """Of a mesh period."""
 _FORCES, _LEAST, _FINER = 48, 1e-3, 6
-"""Of the curves of tooth pairs: their number, and the share of the torque at which they begin; steps in one of
-theirs in which cells begin to touch."""
+"""Of the curves of tooth pairs: their number, the share of the torque at which they begin, and the steps in
+one of theirs in which cells begin to touch."""
 _STRAIGHT, _STRAIGHT_IN_SLICES = 0.005, 0.05
 """Share of a peak to peak that straight lines between positions may miss, of the set without drawn errors.
 
@@ -89,7 +89,7 @@ _TOGETHER, _SLICED_TOGETHER, _EXACT_TOGETHER, _TRIED = 128, 256, 64, 32
 of seed 0 that windows are tried with."""
 MOST_SAMPLES = 10_000_000
 _MARGIN = 1.5
-"""Forces and approaches in slices that windows hold, over the largest of the samples that are tried."""
+"""Approaches, and forces of slices, that windows hold, over the largest of the samples that are tried."""
 _REACH = 5.0
 """Standard deviations within which all values of a normal law count as lying."""
 _FLANKS = {"sun": ("sun",), "planet": ("planet_sun_side", "planet_ring_side"), "ring": ("ring",)}
@@ -521,7 +521,7 @@ def sample_model(
             return None, 4.0 * share, nearest
         tried = model.draw(0, 0, _TRIED)
         if level.over is None:
-            _, unsolved, missed = _solved(model, level, tried, False)
+            _, unsolved, missed = _solved(model, level, tried, False, _MARGIN)
         else:
             state = _in_slices(model, level, tried)
             if _overflows(level, _MARGIN * state.largest).any():
@@ -629,11 +629,12 @@ def joined(parts: Sequence[dict[str, np.ndarray]]) -> dict[str, np.ndarray]:
 
 
 def _solved(
-    model: SampleModel, level: _Level, errors: np.ndarray, exact: bool
+    model: SampleModel, level: _Level, errors: np.ndarray, exact: bool, margin: float = 1.0
 ) -> tuple[dict[str, np.ndarray], np.ndarray, np.ndarray]:
     """Numbers of samples, which (n,) are not solved, and in which pairs overlap that are no candidates.
 
     Springs do not solve those whose iteration does not end, windows those whose contact they do not contain.
+    Pairs overlap under so many times the approach of the flanks.
     """
     found, N = level.found, model.solved.gears.n_planets
     (n, P), back, by_error = (len(errors), len(model.position)), np.argsort(model.order), errors.T.copy()
@@ -645,7 +646,7 @@ def _solved(
     of_mesh = force.reshape(P, 2 * N, -1, n).sum(axis=2)
     approach = found.approach @ motions - found.supports.T @ of_mesh
     others = level.other_gap[:, None] + level.other_shifts @ by_error
-    missed = (others < approach[level.other_place]).any(axis=0)
+    missed = (others < margin * approach[level.other_place]).any(axis=0)
     share = of_mesh[:, :N][:, back] / model.load[N]
     numbers = _numbers(model.position, motions[:, N], share, stiffness)
     return numbers, np.asarray(unsolved), missed
@@ -759,7 +760,7 @@ def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts,
 
 @lru_cache(maxsize=64)
 def _at_position(level: _Level, at: int, times: int) -> Candidates:
-    """Candidates at one position of so many samples without their errors; the last samples are often fewer."""
+    """Candidates at one position of so many samples without errors; the last samples are often fewer."""
 
     def repeated(values: np.ndarray) -> np.ndarray:
         return np.broadcast_to(values, (times, *values.shape))
