@@ -7,9 +7,10 @@ compliance between them is that of `femgear.contact.width_waves`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dposv, zposv
+from scipy.linalg import get_lapack_funcs
 
 from femgear.contact.assembly import Candidates
 from femgear.contact.batch import PairLaws, cyclic_harmonics
@@ -27,6 +28,8 @@ _SOFTEST = 1e-13
 """Spring on every motion, over that of a tooth pair: it holds what no loaded pair holds."""
 _TOGETHER = 8
 """Positions that are solved at once."""
+_POSV: Any = {kind: get_lapack_funcs(("posv",), dtype=kind)[0] for kind in (float, complex)}
+"""Solution of Hermitian systems by Cholesky's factor, with a word whether they are definite."""
 PARTS = 25
 """Of the width, over which loads are told."""
 
@@ -419,7 +422,7 @@ def _bordered_solution(
 
     The compliance A (c, c) is symmetric and mostly definite; S are springs (m,), N slices.
     """
-    _, solved, failed = dposv(compliance.T, np.column_stack([G, right]))
+    _, solved, failed = _POSV[float](compliance.T, np.column_stack([G, right]))
     if failed:
         solved = np.linalg.solve(compliance, np.column_stack([G, right]))
     by_motions, alone = solved[:, :-1], solved[:, -1]
@@ -431,7 +434,7 @@ def _bordered_solution(
 def _symmetric_solution(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve systems (..., n, n) that are Hermitian and mostly definite for right sides (..., n, k)."""
     found = np.empty(right.shape, matrices.dtype)
-    solver = zposv if np.iscomplexobj(matrices) else dposv
+    solver = _POSV[complex if np.iscomplexobj(matrices) else float]
     for place in np.ndindex(matrices.shape[:-2]):
         _, found[place], failed = solver(matrices[place], right[place])
         if failed:
