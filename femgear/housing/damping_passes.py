@@ -141,7 +141,8 @@ class DampingPasses:
         """Go on in single precision."""
         self.damping = self.damping.single()
         self._answers = tuple(one.astype(np.complex64) for one in self._answers)
-        self.forces, *self._made = (one.single() for one in (self.forces, *self._made))
+        self.forces, first = self.forces.single(), self._made[0].single()
+        self._made = [first, *(_nothing_like(first) for _ in self._made[1:])]
 
 
 def _largest(values: np.ndarray, limit: float) -> np.ndarray:
@@ -149,6 +150,11 @@ def _largest(values: np.ndarray, limit: float) -> np.ndarray:
     order = np.argsort(values)
     beyond = np.sqrt(np.cumsum(values[order] ** 2)) > limit
     return np.sort(order[beyond])
+
+
+def _nothing_like(forces: DampingForces) -> DampingForces:
+    """Zeros of the same shapes and precision."""
+    return DampingForces(*(np.zeros_like(part) for part in forces.parts))
 
 
 def _put(to: DampingForces, what: DampingForces, at) -> None:
