@@ -397,3 +397,33 @@ def test_contacts_that_let_go_are_solved_by_active_sets():
     gap = beyond + loads[0] @ local[0] - approach[0][:, None]
     assert np.abs(gap[loads[0] > 0.0]).max() < 1e-12 and gap.min() > -1e-12
     assert (batch._growing_contacts(local, beyond, cells, force)[1] < 0.0).any()
+
+
+@pytest.mark.parametrize("supports", [Supports(), SPRUNG], ids=["fixed", "sprung"])
+def test_problems_that_differ_in_their_separations_alone_share_what_bodies_yield(supports):
+    """As views of one position, and with what rounding leaves: the loads of a batch of copies."""
+    gears, bodies, torque = random_bodies(3)
+    members = moving_members(gears, supports)
+    setup = mesh_windows(gears, bodies, share=4e3, nearest=20e-6, positions=4)
+    single, count = contact_candidates(setup, bodies, [1], members), 7
+    names = "position", "pair", "candidate", "polynomials", "local"
+    pins = np.random.default_rng(2).normal(scale=1e-6, size=(count, len(single.mesh)))[..., None]
+    gap = np.where(single.candidate, single.gap + pins, 0.0)
+    load = np.zeros(single.approach.shape[1])
+    load[setup.driver] = torque / gears.sun.base_radius
+
+    def of(repeated):
+        arrays = {name: repeated(getattr(single, name), 0) for name in names}
+        return replace(single, **arrays, gap=gap, images=repeated(single.images, 1))
+
+    def view(values, axis):
+        shape = [*values.shape]
+        shape[axis] = count
+        return np.broadcast_to(values, shape)
+
+    copies = solve_batch(of(lambda values, axis: np.repeat(values, count, axis=axis)), load)
+    for refined in (True, False):
+        views = solve_batch(of(view), load, refined=refined)
+        assert (views.active == copies.active).all() and views.residual.max() < 1e-13
+        assert views.loads == pytest.approx(copies.loads, abs=1e-11 * copies.loads.max())
+        assert views.motions == pytest.approx(copies.motions, rel=1e-11, abs=1e-17)
