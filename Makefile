@@ -56,18 +56,18 @@ docs: environment
 	@echo "Documentation: out/docs/html/index.html"
 
 validate: environment
-	$(PY) tests/validation -o docs/validation.md
+	$(PY) validation -o docs/validation.md
 	$(PY) -m pytest -m slow --benchmark-disable $(ARGS)
-	$(PY) tests/soak/supply.py
+	$(PY) validation/soak/supply.py
 
 soak: environment
-	$(PY) tests/soak --minutes $(MINUTES) --page docs/reliability.md
+	$(PY) validation/soak --minutes $(MINUTES) --page docs/reliability.md
 
 bench: environment
 	$(PY) -m pytest benchmarks -o python_files="test_*.py bench_*.py" $(ARGS)
 
 mutants: environment
-	$(PY) tests/tools/mutation.py $(ARGS)
+	$(PY) validation/tools/mutation.py $(ARGS)
 
 clean:
 	rm -rf out dist docs/_generated .pytest_cache .ruff_cache .hypothesis .benchmarks

@@ -94,9 +94,7 @@ def test_derivatives(benchmark, reference):
         return pin_sensitivities(linear)
 
     found = benchmark.pedantic(derive, rounds=3, warmup_rounds=1)
-    record(
-        benchmark, "derivatives of all shares by all pin errors", f"{found.size} derivatives, 64 positions"
-    )
+    record(benchmark, "derivatives of all shares by all pin errors", f"{found.size} derivatives, 64 positions")
 
 
 class Planets:
@@ -150,9 +148,7 @@ def walk(benchmark, gears, bodies, positions, rounds=3):
     from femgear.contact.cycle import walk_mesh_cycle
 
     options = {"sun_torque": 100.0, "positions": positions}
-    return benchmark.pedantic(
-        walk_mesh_cycle, args=(gears, bodies), kwargs=options, rounds=rounds, warmup_rounds=1
-    )
+    return benchmark.pedantic(walk_mesh_cycle, args=(gears, bodies), kwargs=options, rounds=rounds, warmup_rounds=1)
 
 
 @pytest.mark.benchmark(group=PLANETS, timer=process_time)
@@ -179,9 +175,7 @@ def test_growth_over_flank_elements(benchmark, reference, medians, elements):
     from femgear.contact.cycle import walk_mesh_cycle
 
     options = {"sun_torque": reference.sun_torque, "positions": 64}
-    sectors = make_sectors(
-        reference.gears, reference.material, flank_elements=elements, cache=reference.cache
-    )
+    sectors = make_sectors(reference.gears, reference.material, flank_elements=elements, cache=reference.cache)
 
     def still():
         return walk_mesh_cycle(reference.gears, make_bodies(sectors, reference.material), **options)
@@ -199,12 +193,10 @@ def test_growth_over_flank_elements(benchmark, reference, medians, elements):
 def test_growth_over_slices(benchmark, reference, medians, slices):
     from stages import misaligned
 
-    from femgear.trains.static.stages import solve_static
+    from femgear.stages.static import solve_static
 
     case = misaligned(reference.case, slices=slices)
-    found = benchmark.pedantic(
-        solve_static, args=(case,), kwargs={"cache": reference.cache}, rounds=3, warmup_rounds=1
-    )
+    found = benchmark.pedantic(solve_static, args=(case,), kwargs={"cache": reference.cache}, rounds=3, warmup_rounds=1)
     factor = found.cycle.face_load_factor.max()
     note = f"K_Hbeta {factor:.3f} by a lead slope of 10 um" + growth(benchmark, medians, SLICES, slices)
     record(benchmark, f"{slices} slices", note)
@@ -222,8 +214,11 @@ def test_growth_of_slices_over_planets(benchmark, planets, medians, n_planets):
     waves = width_waves(sectors, planets.material, 25)
     options = {"positions": 16, "options": CycleOptions(waves=waves, slices=25)}
     cycle = benchmark.pedantic(
-        walk_mesh_cycle, args=(gears, planets.bodies), kwargs={"sun_torque": 100.0} | options, rounds=3,
-    )  # fmt: skip
+        walk_mesh_cycle,
+        args=(gears, planets.bodies),
+        kwargs={"sun_torque": 100.0} | options,
+        rounds=3,
+    )
     note = f"{cycle.slice_load.shape[1]} tooth pairs a mesh"
     note += growth(benchmark, medians, SLICED_PLANETS, n_planets)
     record(benchmark, f"{2 * n_planets} meshes", note)

@@ -14,9 +14,7 @@ def test_one_sector(benchmark, reference):
     sector = reference.sectors.planet
     arguments = (sector.grid, sector.gear, reference.material, sector.stiffness)
     benchmark.pedantic(flank_compliance, args=arguments, rounds=5, warmup_rounds=1)
-    benchmark.extra_info.update(
-        title="cyclic symmetry, one sector (femgear)", note="all flanks of all 40 teeth"
-    )
+    benchmark.extra_info.update(title="cyclic symmetry, one sector (femgear)", note="all flanks of all 40 teeth")
 
 
 @pytest.mark.benchmark(group="Compliance of the planet's flanks")
@@ -48,9 +46,7 @@ def test_daqp(benchmark, problems):
     from femgear.contact.solve import solve_contact
 
     loads = benchmark.pedantic(lambda: [conventional.contact_by_daqp(*p) for p in problems], rounds=3)
-    difference = max(
-        np.abs(solve_contact(*p).loads - other).max() / other.max() for p, other in zip(problems, loads)
-    )
+    difference = max(np.abs(solve_contact(*p).loads - other).max() / other.max() for p, other in zip(problems, loads))
     note = f"loads differ by {difference:.0e} of the largest"
     benchmark.extra_info.update(title="general quadratic program (daqp)", note=note)
 

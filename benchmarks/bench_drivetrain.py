@@ -30,9 +30,7 @@ def run(duration, step, **options):
     from femgear.trains.drivetrain.simulation import march_drivetrain
 
     torques = constant_torques(paper_torques(balanced=True))
-    return march_drivetrain(
-        model(), torques, duration=duration, step=step, speed=PRINTED.speed, outputs=(), **options
-    )
+    return march_drivetrain(model(), torques, duration=duration, step=step, speed=PRINTED.speed, outputs=(), **options)
 
 
 def test_a_minute_at_20_khz(benchmark):

@@ -89,9 +89,11 @@ def step_through(benchmark, medians, case, steps, method):
     benchmark.group = SETTLED.format(ratio)
     options = {"steps": steps, "most": 600, "method": method}
     error, periods = benchmark.pedantic(
-        train.settle_by_steps, args=(problem(ratio), target(ratio), tolerance), kwargs=options,
+        train.settle_by_steps,
+        args=(problem(ratio), target(ratio), tolerance),
+        kwargs=options,
         rounds=3 if tolerance > 1e-4 else 1,
-    )  # fmt: skip
+    )
     assert error <= tolerance, f"error {error:.2e} after {periods} periods"
     note = f"error {error:.0e}; {periods} periods of {steps} steps"
     beside_balance(benchmark, medians, case, f"{method}, lines to {tolerance:g}", note)
@@ -113,9 +115,11 @@ def test_adaptive_integration(benchmark, medians, ratio, tolerance):
     local, periods = ADAPTIVE[ratio, tolerance]
     options = {"method": "LSODA", "tolerance": local, "periods": periods}
     error, change = benchmark.pedantic(
-        train.settle_adaptively, args=(problem(ratio), target(ratio)), kwargs=options,
+        train.settle_adaptively,
+        args=(problem(ratio), target(ratio)),
+        kwargs=options,
         rounds=3 if tolerance > 1e-4 else 1,
-    )  # fmt: skip
+    )
     assert max(error, change) <= tolerance, f"error {error:.2e}, change {change:.2e}"
     note = f"error {error:.0e}; {periods} periods, local tolerance {local:g}"
     beside_balance(benchmark, medians, (ratio, tolerance), f"SciPy's LSODA, lines to {tolerance:g}", note)
@@ -209,10 +213,13 @@ def test_branch(benchmark):
         return frequency_response_curve(problem(0.05), limits, harmonics=8, options=options)
 
     found = ask(
-        benchmark, "branch, 6.2 to 7.8 kHz, 8 harmonics, with stability and radius", follow,
+        benchmark,
+        "branch, 6.2 to 7.8 kHz, 8 harmonics, with stability and radius",
+        follow,
         lambda b: f"{len(b.parameter)} points, {len(b.folds)} folds, {np.mean(b.stable):.0%} stable",
-        rounds=1, limit=20.0,
-    )  # fmt: skip
+        rounds=1,
+        limit=20.0,
+    )
     assert len(found.parameter) >= 500 and found.complete and found.converged.all() and all(found.verdicts)
 
 
@@ -221,11 +228,12 @@ def test_solution_with_verdict(benchmark):
     from femgear.solvers.periodic.harmonic_balance import periodic_response
 
     found = ask(
-        benchmark, "one periodic solution, 8 harmonics, with fixed-point radius and stability",
+        benchmark,
+        "one periodic solution, 8 harmonics, with fixed-point radius and stability",
         lambda: periodic_response(problem(0.05), train.OMEGA, harmonics=8),
         lambda r: f"radius {r.spectral_radius:.3f}, largest multiplier {abs(r.verdict.multipliers[0]):.4f}",
         rounds=5,
-    )  # fmt: skip
+    )
     assert found.stable
 
 
@@ -237,10 +245,11 @@ def test_two_base_frequencies(benchmark):
     set_, orders = train.two_base_train(0.05), side_bands(2, 8, 2)
     omega = [train.OMEGA / 108.0, train.OMEGA]
     found = ask(
-        benchmark, "two base frequencies: weight on the turning carrier",
+        benchmark,
+        "two base frequencies: weight on the turning carrier",
         lambda: solve_harmonic_balance(set_, omega, orders=orders, stability=False),
         lambda s: f"{len(s.orders)} lines, {s.iterations} iterations",
-    )  # fmt: skip
+    )
     assert found.converged
 
 
@@ -249,14 +258,13 @@ def test_shooting(benchmark):
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
     from femgear.solvers.periodic.shooting import solve_shooting
 
-    start = train.state_at_zero(
-        problem(0.05), solve_harmonic_balance(problem(0.05), train.OMEGA, harmonics=8)
-    )
+    start = train.state_at_zero(problem(0.05), solve_harmonic_balance(problem(0.05), train.OMEGA, harmonics=8))
     found = ask(
-        benchmark, "shooting from the solution of harmonic balance",
+        benchmark,
+        "shooting from the solution of harmonic balance",
         lambda: solve_shooting(problem(0.05), train.OMEGA, start=start),
         lambda s: f"start and end differ by {s.solution.residual:.0e}; multipliers included",
-    )  # fmt: skip
+    )
     assert found.solution.converged and found.stable
 
 
@@ -266,12 +274,11 @@ def test_transient(benchmark):
 
     times, start = np.linspace(0.0, 100 / train.MESH_FREQUENCY, 2001), train.static_start(problem(0.05))
     found = ask(
-        benchmark, "transient of 100 mesh periods, average acceleration",
-        lambda: solve_transient(
-            problem(0.05), train.OMEGA, times, start=start, step=1 / train.MESH_FREQUENCY / 200
-        ),
+        benchmark,
+        "transient of 100 mesh periods, average acceleration",
+        lambda: solve_transient(problem(0.05), train.OMEGA, times, start=start, step=1 / train.MESH_FREQUENCY / 200),
         lambda r: f"{r.steps} steps",
-    )  # fmt: skip
+    )
     assert found.converged
 
 
@@ -282,11 +289,15 @@ def test_sweep_with_jumps(benchmark):
     speeds = 2.0 * np.pi * np.linspace(6200.0, 7000.0, 9)
     options = {"steps": 100, "tolerance": 1e-4, "most": 300}
     up, down = ask(
-        benchmark, "sweep up and down, 9 frequencies each way, 100 steps a period",
+        benchmark,
+        "sweep up and down, 9 frequencies each way, 100 steps a period",
         lambda: sweep_up_and_down(problem(0.05), speeds, **options),
-        lambda r: f"{r[0].periods.sum() + r[1].periods.sum()} periods, {np.sum(~r[0].settled)} and "
-        f"{np.sum(~r[1].settled)} frequencies where nothing settles", rounds=1,
-    )  # fmt: skip
+        lambda r: (
+            f"{r[0].periods.sum() + r[1].periods.sum()} periods, {np.sum(~r[0].settled)} and "
+            f"{np.sum(~r[1].settled)} frequencies where nothing settles"
+        ),
+        rounds=1,
+    )
     # downwards the motion stays on the upper part of the branch, which then becomes quasi-periodic
     assert up.settled.all() and 0 < np.sum(~down.settled) < 4 and len(up.jumps()) == 1
 
@@ -296,22 +307,20 @@ def test_poincare_section(benchmark):
     from validation.reference.sections import stroboscopic_section
 
     found = ask(
-        benchmark, "stroboscopic section: 100 points after 100 periods of 100 steps",
-        lambda: stroboscopic_section(
-            problem(0.05), train.OMEGA, steps=100, start=train.static_start(problem(0.05))
-        ),
+        benchmark,
+        "stroboscopic section: 100 points after 100 periods of 100 steps",
+        lambda: stroboscopic_section(problem(0.05), train.OMEGA, steps=100, start=train.static_start(problem(0.05))),
         lambda s: f"repeats after {s.repeats_after()} period",
-    )  # fmt: skip
+    )
     assert found.repeats_after() == 1
 
 
 @question_group
 @pytest.mark.parametrize("route", ["direct", "modal"])
 def test_frequency_response(benchmark, route):
-    from validation.reference.frequency_response import direct_response
-
     from femgear.solvers.linear.modal import solve_modes
     from femgear.solvers.linear.receptance import modal_response
+    from validation.reference.frequency_response import direct_response
 
     system, k = problem(0.05).system, problem(0.05).reference
     frequency, W = np.linspace(50.0, 12000.0, 2000), system.W
@@ -321,9 +330,7 @@ def test_frequency_response(benchmark, route):
         "modal": lambda: modal_response(system, modes, frequency, W, W.T),
     }
     note = "6 inputs, 6 outputs"
-    found = ask(
-        benchmark, f"linear frequency response at 2000 frequencies, {route}", routes[route], lambda _: note
-    )
+    found = ask(benchmark, f"linear frequency response at 2000 frequencies, {route}", routes[route], lambda _: note)
     np.testing.assert_allclose(found, routes["direct"](), atol=1e-9 * np.abs(found).max())
 
 
@@ -336,13 +343,16 @@ def test_campbell_diagram(benchmark):
 
     data = lin_parker_set(3)
     found = ask(
-        benchmark, "Campbell diagram of 31 carrier speeds",
+        benchmark,
+        "Campbell diagram of 31 carrier speeds",
         lambda: campbell_data(
-            lambda speed: gear_set_system(data, carrier_speed=speed), np.linspace(0.0, 1000.0, 31),
-            data.mesh_stiffness, orders=(108.0, 216.0),
+            lambda speed: gear_set_system(data, carrier_speed=speed),
+            np.linspace(0.0, 1000.0, 31),
+            data.mesh_stiffness,
+            orders=(108.0, 216.0),
         ),
         lambda c: f"{c.frequency.shape[1]} branches, {len(c.critical)} critical speeds",
-    )  # fmt: skip
+    )
     assert found.frequency.shape == (31, 17)
 
 
@@ -352,12 +362,14 @@ def test_stability_chart(benchmark):
 
     frequency = 2.0 * np.pi * np.linspace(6000.0, 16000.0, 100)
     found = ask(
-        benchmark, "stability chart of 100 x 100 cells over frequency and depth of k(t)",
+        benchmark,
+        "stability chart of 100 x 100 cells over frequency and depth of k(t)",
         lambda: stability_chart(
             problem(0.05), train.mesh_stiffness(), frequency, np.linspace(0.0, 4.0, 100), tolerance=1e-4
         ),
-        lambda c: f"{np.mean(~c.stable):.0%} unstable; monodromy to {c.error.max():.0e}", rounds=1,
-    )  # fmt: skip
+        lambda c: f"{np.mean(~c.stable):.0%} unstable; monodromy to {c.error.max():.0e}",
+        rounds=1,
+    )
     assert 0.0 < np.mean(found.stable) < 1.0
 
 
@@ -374,10 +386,11 @@ def test_spectral_speeds(benchmark):
     none = np.zeros_like(stiffness)
     excitation = MeshExcitation(stiffness, none, none, np.full(6, 20e-6))
     found = ask(
-        benchmark, "1000 speeds without contact loss, spectral",
+        benchmark,
+        "1000 speeds without contact loss, spectral",
         lambda: solve_spectral(
             modes, excitation, np.linspace(500.0, 6000.0, 1000), excitation_harmonics=3, response_harmonics=8
         ),
         lambda r: f"largest fixed-point radius {r.spectral_radius.max():.2f}",
-    )  # fmt: skip
+    )
     assert found.converged.all()

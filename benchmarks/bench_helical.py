@@ -21,13 +21,11 @@ def inputs():
     from published.planetary_sets import kahraman_set
 
     from femgear.gears.phasing import MeshPhasing, phase_factors
+    from femgear.stages.lumped_set import gear_set_modes
     from femgear.system.mesh_directions import gear_set_system
-    from femgear.trains.rigid import gear_set_modes
 
     data = kahraman_set()
-    cases = [
-        MeshPhasing(z, 100 - z, (0, 25, 50, 75), lag=lag) for z in (28, 29, 30, 31) for lag in (0.0, 0.5)
-    ]
+    cases = [MeshPhasing(z, 100 - z, (0, 25, 50, 75), lag=lag) for z in (28, 29, 30, 31) for lag in (0.0, 0.5)]
     error = 1e-6 * np.array([phase_factors(case, range(1, 5)).T for case in cases])
     return gear_set_system(data), gear_set_modes(data, damping_ratio=0.05), error
 
@@ -54,9 +52,8 @@ def test_sum_of_modes(benchmark, medians):
 @pytest.mark.benchmark(group=GROUP, timer=process_time)
 def test_direct(benchmark, medians):
     """One receptance from all meshes serves the eight cases."""
-    from validation.reference.frequency_response import direct_response
-
     from femgear.solvers.linear.receptance import modal_error_response
+    from validation.reference.frequency_response import direct_response
 
     system, modes, error = inputs()
     k = modes.mesh_stiffness
@@ -84,7 +81,7 @@ def test_direct(benchmark, medians):
 def test_modes(benchmark):
     from published.planetary_sets import kahraman_set
 
-    from femgear.trains.rigid import gear_set_modes
+    from femgear.stages.lumped_set import gear_set_modes
 
     data = kahraman_set()
     found = benchmark.pedantic(gear_set_modes, args=(data,), rounds=9, warmup_rounds=1)

@@ -8,9 +8,7 @@ import pytest
 # time of one process on one core: what else the machine does must not count
 pytestmark = pytest.mark.benchmark(timer=process_time)
 
-GROUP = (
-    "Answers after a change: static solution, dynamics and lines of the housing at 50 speeds (reference set)"
-)
+GROUP = "Answers after a change: static solution, dynamics and lines of the housing at 50 speeds (reference set)"
 SPEEDS = {"to": "3000 rpm", "count": 50}
 RELIEF = {"kind": "tip relief", "start_diameter": "43 mm"}
 BOLT = {"radial_stiffness": "2e8 N/m", "tangential_stiffness": "2e8 N/m"}
@@ -76,9 +74,7 @@ def test_fresh(benchmark, case):
 @pytest.mark.parametrize("name", CHANGES)
 def test_change(benchmark, handle, name):
     numbers = count(1)
-    found = benchmark.pedantic(
-        lambda: lines(handle.change(CHANGES[name](next(numbers)))), rounds=5, warmup_rounds=1
-    )
+    found = benchmark.pedantic(lambda: lines(handle.change(CHANGES[name](next(numbers)))), rounds=5, warmup_rounds=1)
     assert len(found) == 50
     new = ", ".join(stage for stage in STAGES if handle.changed[stage])
     if name in BACK:

@@ -63,16 +63,13 @@ def span(k):
 
 def duffing():
     """``x'' + 0.1 x' + (1 + 0.2 cos w t) x + 0.3 x^3 = 0.2 cos w t``, solved by femgear: its lines."""
-    from validation.nonlinear import oscillator
-
     from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
     from femgear.system.force_laws import GearMeshes, PolynomialSprings
     from femgear.system.fourier import FourierSeries
+    from validation.nonlinear import oscillator
 
     mesh = GearMeshes([0], FourierSeries([[1.0, 0.2]]), separates=False)
-    problem = oscillator(
-        mesh, PolynomialSprings([0], [[0.0, 0.0, 0.3]]), damping=0.1, forces=[(0.2, (1,))]
-    )  # fmt: skip
+    problem = oscillator(mesh, PolynomialSprings([0], [[0.0, 0.0, 0.3]]), damping=0.1, forces=[(0.2, (1,))])
     start = np.zeros((1, COUNT + 1), complex)
     start[0, 1] = 1.0
     options = {"harmonics": COUNT, "start": start, "stability": False}
@@ -128,9 +125,7 @@ def balanced(rotor):
     # a force of 1 N on the disc in the middle, x behind y by a quarter of a turn
     turning[3 * rotor.number_dof : 3 * rotor.number_dof + 2] = 1.0, -1j
     names = tuple(f"{i}" for i in range(n))
-    system = MechanicalSystem(
-        rotor.M(SPEED), rotor.C(SPEED), K, W, np.zeros(n), names, gyroscopic=rotor.G()
-    )  # fmt: skip
+    system = MechanicalSystem(rotor.M(SPEED), rotor.C(SPEED), K, W, np.zeros(n), names, gyroscopic=rotor.G())
     forces = tuple(HarmonicForce(size * turning, (order,)) for order, size in FORCES.items())
     problem = NonlinearSystem(system, (PolynomialSprings([0], [[TORSION]]),), forces, speed=SPEED)
     found = solve_harmonic_balance(problem, SPEED, harmonics=4, stability=False)
@@ -147,9 +142,7 @@ def test_rotor(benchmark, rotor):
 def test_rotor_of_ross(benchmark, rotor):
     force = {"node": 3, "harmonics": [*FORCES], "magnitudes": [*FORCES.values()], "phases": [0.0] * 3}
     options = {"speed": SPEED, "t": np.linspace(0.0, 0.02, 65), "harmonic_forces": [force], "n_harmonics": 4}
-    found = benchmark.pedantic(
-        rotor.run_harmonic_balance_response, kwargs=options, rounds=5, warmup_rounds=1
-    )  # fmt: skip
+    found = benchmark.pedantic(rotor.run_harmonic_balance_response, kwargs=options, rounds=5, warmup_rounds=1)
     lines = balanced(rotor)
     error = np.abs(found.dQ - lines).max() / np.abs(lines).max()
     assert error < 1e-10

@@ -23,6 +23,4 @@ def test_stage(benchmark, reference, name):
     memory = {} if name in others else peak_memory(name) or {}
     if memory:
         benchmark.extra_info.update(peak=memory["peak"], added=memory["peak"] - memory["before"])
-    benchmark.extra_info.update(
-        title=stage.title, unknowns=stage.unknowns(reference, result), limit=stage.limit
-    )
+    benchmark.extra_info.update(title=stage.title, unknowns=stage.unknowns(reference, result), limit=stage.limit)

@@ -58,9 +58,7 @@ def test_tasks_of_a_second(benchmark, medians, runner):
 
 
 @pytest.mark.benchmark(group=SAMPLES)
-@pytest.mark.parametrize(
-    ("method", "count"), [(name, count) for name, counts in SIZES.items() for count in counts]
-)
+@pytest.mark.parametrize(("method", "count"), [(name, count) for name, counts in SIZES.items() for count in counts])
 def test_samples(benchmark, medians, runner, model, method, count):
     from femgear.study.sample_results import _BLOCKS, _block
 

@@ -32,8 +32,9 @@ def solved(benchmark, reference, group, *, rounds=1, planets=1, **given) -> str:
     """Measure forces of both routes at some speeds; note how large they are and what they took."""
     benchmark.group, symmetry = group, reference.modes.symmetry if planets == 1 else 1
     modes = replace(reference.modes, symmetry=symmetry)
-    found = benchmark.pedantic(two_way, args=(reference, modes), kwargs=given, rounds=rounds,
-                               warmup_rounds=1 if rounds > 1 else 0)  # fmt: skip
+    found = benchmark.pedantic(
+        two_way, args=(reference, modes), kwargs=given, rounds=rounds, warmup_rounds=1 if rounds > 1 else 0
+    )
     assert found.two_way.residual.max() < 1e-6
     unknowns = len(found.two_way.order) * found.two_way.force.shape[1]
     return f"{unknowns} real unknowns a speed, {found.two_way.products.max()} products at most"
@@ -110,9 +111,9 @@ def test_unequal_planets(benchmark, reference, rows, planets):
 
 def erroneous(reference, errors):
     """The reference case with errors of the sun that turn, and its modes."""
+    from femgear.stages.static import solve_static
     from femgear.trains.elastic.stages import solve_modes
     from femgear.trains.reading import with_values
-    from femgear.trains.static.stages import solve_static
 
     other = type(reference)()
     other.case = with_values(reference.case, {"sun.errors": errors})
@@ -142,7 +143,7 @@ def folder(tmp_path_factory) -> Path:
 
 @pytest.mark.parametrize("name", ["casing.npz", "surface.npz", "casing.pch", "casing.op4", "casing.uff"])
 def test_reading_a_casing(benchmark, folder, name):
-    from femgear.housing.casing_files import read_casing
+    from femgear.exchange.casing_files import read_casing
 
     benchmark.group = CASINGS
     table = None if name.endswith("npz") else folder / ("nodes_held.csv" if "uff" in name else "nodes.csv")

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-sys.path.extend(str(Path(__file__).parents[1] / name) for name in ("benchmarks", "scripts", "tests"))
+sys.path.extend(str(Path(__file__).parents[1] / name) for name in ("benchmarks", "scripts", "tests", "."))
 
 import pytest
 from table import page, rows_of
@@ -17,7 +17,7 @@ def pytest_addoption(parser):
 
 @pytest.fixture(scope="session", autouse=True)
 def one_thread():
-    from femgear.trains.protocol import one_blas_thread
+    from femgear.stages.protocol import one_blas_thread
 
     with one_blas_thread():
         yield

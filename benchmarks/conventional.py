@@ -49,9 +49,7 @@ def without_residual(modes):
     elastic = modes.frequency > 1e-3
     share = np.zeros(len(modes.frequency))
     share[elastic] = modes.modal_load[elastic] / (2 * np.pi * modes.frequency[elastic]) ** 2
-    return replace(
-        modes, residual=np.zeros_like(modes.residual), load_deflection=modes.mesh_deflection @ share
-    )
+    return replace(modes, residual=np.zeros_like(modes.residual), load_deflection=modes.mesh_deflection @ share)
 
 
 def modal_harmonic_balance(modes, excitation, frequency, *, excitation_harmonics: int, harmonics: int):

@@ -17,9 +17,7 @@ def peak_memory(name: str) -> dict[str, float] | None:
     """
     if not Path("/proc/self/clear_refs").exists():
         return None
-    done = subprocess.run(
-        [sys.executable, __file__, name], capture_output=True, text=True, timeout=300, check=True
-    )
+    done = subprocess.run([sys.executable, __file__, name], capture_output=True, text=True, timeout=300, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -33,7 +31,7 @@ def _status(key: str) -> float:
 def _measure(name: str) -> None:
     from stages import STAGES, Reference
 
-    from femgear.trains.protocol import one_blas_thread
+    from femgear.stages.protocol import one_blas_thread
 
     stage, reference = STAGES[name], Reference()
     with one_blas_thread():

@@ -23,7 +23,7 @@ def mesh_stiffness():
     """k(t) of the six meshes in sequential phase."""
     from published.planetary_sets import lin_parker_set
 
-    from femgear.trains.rigid import phased_series
+    from femgear.stages.lumped_set import phased_series
 
     return phased_series(FLUCTUATION, FLUCTUATION, PHASES, mean=lin_parker_set(3).mesh_stiffness)
 
@@ -32,9 +32,9 @@ def planet_train(damping: float) -> NonlinearSystem:
     """Example set of Lin and Parker (1999) with three planets, 300 N m and 20 um of backlash."""
     from published.planetary_sets import lin_parker_set
 
+    from femgear.stages.lumped_set import gear_set_problem
     from femgear.system.mesh_directions import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
-    from femgear.trains.rigid import gear_set_problem
 
     data = lin_parker_set(3)
     meshes = mesh_elements(data, stiffness=mesh_stiffness(), backlash=20e-6)
@@ -45,9 +45,9 @@ def two_base_train(damping: float) -> NonlinearSystem:
     """The same set with its weight, which turns with the carrier: carrier first, mesh second frequency."""
     from published.planetary_sets import lin_parker_set
 
+    from femgear.stages.lumped_set import Gravity, gear_set_problem
     from femgear.system.mesh_directions import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
-    from femgear.trains.rigid import Gravity, gear_set_problem
 
     data, stiffness = lin_parker_set(3), replace(mesh_stiffness(), orders=(0, 1))
     meshes = mesh_elements(data, stiffness=stiffness, backlash=20e-6)
@@ -56,9 +56,7 @@ def two_base_train(damping: float) -> NonlinearSystem:
     )
 
 
-def with_chains(
-    problem: NonlinearSystem, links: int, *, damping: float, share=0.1, lowest=15e3
-) -> NonlinearSystem:
+def with_chains(problem: NonlinearSystem, links: int, *, damping: float, share=0.1, lowest=15e3) -> NonlinearSystem:
     """The set with a chain of equal links on every coordinate: ``1 + links`` times the coordinates.
 
     Parameters
@@ -85,9 +83,13 @@ def with_chains(
         K[left, right] = K[right, left] = -k
     more = size - n
     system = MechanicalSystem(
-        M=M, C=np.zeros((size, size)), K=K, W=np.vstack([s.W, np.zeros((more, s.W.shape[1]))]),
-        load=np.append(s.load, np.zeros(more)), dofs=(),
-    )  # fmt: skip
+        M=M,
+        C=np.zeros((size, size)),
+        K=K,
+        W=np.vstack([s.W, np.zeros((more, s.W.shape[1]))]),
+        load=np.append(s.load, np.zeros(more)),
+        dofs=(),
+    )
     system = replace(system, C=modal_damping(system, problem.reference, damping))
     return NonlinearSystem(system, problem.elements)
 

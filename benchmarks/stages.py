@@ -134,14 +134,12 @@ def contact(reference: Reference):
     from femgear.contact.cycle import walk_mesh_cycle
 
     positions = reference.case.static.positions
-    return walk_mesh_cycle(
-        reference.gears, reference.bodies, sun_torque=reference.sun_torque, positions=positions
-    )
+    return walk_mesh_cycle(reference.gears, reference.bodies, sun_torque=reference.sun_torque, positions=positions)
 
 
 def static(reference: Reference):
     """The static stage, grids cached."""
-    from femgear.trains.static.stages import solve_static
+    from femgear.stages.static import solve_static
 
     return solve_static(reference.case, cache=reference.cache)
 
@@ -207,10 +205,14 @@ def on_supports(case, speeds, supports, *, harmonics: int | None = None, diamete
 
     stiffness = dict.fromkeys(("radial_stiffness", "tangential_stiffness"), "4e8 N/m")
     entries = {
-        "housing.support": [one | stiffness for one in supports], "housing.nodal_diameters": diameters,
-        "housing.published": [], "operation.speeds": speeds, "runup.from": "300 rpm", "runup.to": "3100 rpm",
+        "housing.support": [one | stiffness for one in supports],
+        "housing.nodal_diameters": diameters,
+        "housing.published": [],
+        "operation.speeds": speeds,
+        "runup.from": "300 rpm",
+        "runup.to": "3100 rpm",
         "runup.count": runup,
-    } | ({} if harmonics is None else {"dynamics.mesh_harmonics": harmonics})  # fmt: skip
+    } | ({} if harmonics is None else {"dynamics.mesh_harmonics": harmonics})
     return with_values(case, entries)
 
 
@@ -231,13 +233,11 @@ def turning_speeds(count: int) -> dict:
     return {"from": "300 rpm", "to": "3100 rpm", "count": count}
 
 
-def two_way(
-    reference: Reference, modes=None, *, speeds=("250 rpm",), harmonics=None, diameters=14, supported=on_feet
-):
+def two_way(reference: Reference, modes=None, *, speeds=("250 rpm",), harmonics=None, diameters=14, supported=on_feet):
     """Mesh forces of the set on supports both ways, and of the ring without them."""
+    from femgear.stages.lumped_set import member_speeds
     from femgear.trains.elastic.excitation_limit import limited
     from femgear.trains.elastic.fixed_housing import fixed_housing
-    from femgear.trains.rigid import member_speeds
 
     modes = modes or reference.modes
     case = supported(reference.case, speeds, harmonics=harmonics, diameters=diameters)
@@ -255,8 +255,8 @@ def runup_on_bolts(reference: Reference, count: int):
 
 def whole(reference: Reference):
     """Static, modes, dynamics and housing, grids cached; no pictures."""
+    from femgear.stages.static import solve_static
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
-    from femgear.trains.static.stages import solve_static
 
     case = reference.case
     still = solve_static(case, cache=reference.cache)
@@ -266,8 +266,8 @@ def whole(reference: Reference):
 
 def whole_cold(reference: Reference):
     """The same with new grids."""
+    from femgear.stages.static import solve_static
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
-    from femgear.trains.static.stages import solve_static
 
     case = reference.case
     still = solve_static(case)
@@ -287,14 +287,14 @@ def misaligned(case, *, slices: int = 25, positions: int = 32):
 
 def slices(reference: Reference):
     """The static stage in 25 slices over the width, 32 positions, grids cached."""
-    from femgear.trains.static.stages import solve_static
+    from femgear.stages.static import solve_static
 
     return solve_static(misaligned(reference.case), cache=reference.cache)
 
 
 def slices_cold(reference: Reference):
     """The same with new grids."""
-    from femgear.trains.static.stages import solve_static
+    from femgear.stages.static import solve_static
 
     return solve_static(misaligned(reference.case))
 
@@ -322,8 +322,8 @@ def helical(planets: int):
 
 def helical_modes(planets: int, reference: Reference):
     """Static and modal stage of a helical set out of phase in slices."""
+    from femgear.stages.static import solve_static
     from femgear.trains.elastic.stages import solve_modes
-    from femgear.trains.static.stages import solve_static
 
     case = helical(planets)
     return solve_modes(case, solve_static(case, cache=reference.cache))
@@ -413,9 +413,7 @@ def _sector_unknowns(reference, _):
 
 
 def _lines(reference, response):
-    return (
-        response.deflection.shape[1] * (2 * response.deflection.shape[2] - 1) * len(response.mesh_frequency)
-    )
+    return response.deflection.shape[1] * (2 * response.deflection.shape[2] - 1) * len(response.mesh_frequency)
 
 
 def _none(*_):
@@ -459,9 +457,7 @@ STAGES = {
         "dynamics, 2 speeds, with Floquet verdict", dynamics, ("modes",), lambda r, d: _lines(r, d.response)
     ),
     "sweep": Stage("sweep of 1000 speeds", sweep, ("modes",), _lines, 3, 1.0),
-    "sweep_verdicts": Stage(
-        "sweep of 1000 speeds with Floquet verdicts", sweep_verdicts, ("modes",), _lines, 3
-    ),
+    "sweep_verdicts": Stage("sweep of 1000 speeds with Floquet verdicts", sweep_verdicts, ("modes",), _lines, 3),
     "two_way": Stage(
         "both ways, four feet, 250 rpm, excited as in a run, n to 14",
         two_way,

@@ -63,9 +63,7 @@ def page(rows: list[Row]) -> str:
         chosen = [row for row in rows if row.group == group]
         if group == BASELINE:
             continue
-        text += f"## {group}\n\n" + (
-            _stages(chosen, base) if "unknowns" in chosen[0].info else _plain(chosen, base)
-        )
+        text += f"## {group}\n\n" + (_stages(chosen, base) if "unknowns" in chosen[0].info else _plain(chosen, base))
         text += "\n"
     return text.rstrip() + "\n"
 

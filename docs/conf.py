@@ -160,9 +160,7 @@ def read_docstring(app, what: str, name: str, obj, options, lines: list[str]) ->
     """Link names of femgear, and let bars be those of absolute values."""
     for number, line in enumerate(lines):
         parts = re.split(r"(``.*?``)", line)
-        parts[::2] = (
-            re.sub(r"`(femgear[\w.]+)`", r":py:obj:`\1`", part).replace("|", r"\|") for part in parts[::2]
-        )
+        parts[::2] = (re.sub(r"`(femgear[\w.]+)`", r":py:obj:`\1`", part).replace("|", r"\|") for part in parts[::2])
         lines[number] = "".join(parts)
 
 

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
 from typing import TYPE_CHECKING
+
+from femgear.moved import FormerNames
 
 if TYPE_CHECKING:
     __version__: str
@@ -10,9 +13,9 @@ if TYPE_CHECKING:
     from femgear.case.sections import Case
     from femgear.errors import FemgearError
     from femgear.run import live, solve
+    from femgear.stages.static import solve_static, solve_stress
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
     from femgear.trains.reading import open_results, read_case, with_value, with_values
-    from femgear.trains.static.stages import solve_static, solve_stress
 
 __all__ = [
     "Case",
@@ -32,6 +35,8 @@ __all__ = [
     "with_values",
 ]
 
+sys.meta_path.insert(0, FormerNames)  # type: ignore[arg-type]
+
 _HOME = {
     "Case": "case.sections",
     "FemgearError": "errors",
@@ -43,8 +48,8 @@ _HOME = {
     "solve_dynamics": "trains.elastic.stages",
     "solve_housing": "trains.elastic.stages",
     "solve_modes": "trains.elastic.stages",
-    "solve_static": "trains.static.stages",
-    "solve_stress": "trains.static.stages",
+    "solve_static": "stages.static",
+    "solve_stress": "stages.static",
     "with_value": "trains.reading",
     "with_values": "trains.reading",
 }

@@ -55,9 +55,7 @@ except KeyboardInterrupt:  # loading takes long enough to be interrupted, before
     sys.stderr.write("interrupted\n")
     raise SystemExit(_INTERRUPTED) from None
 except (ImportError, MemoryError) as error:
-    sys.stderr.write(
-        f"[E-LIBRARY] {type(error).__name__}: {' '.join(str(error).split())}\n  remedy:  {_LOADING}\n"
-    )
+    sys.stderr.write(f"[E-LIBRARY] {type(error).__name__}: {' '.join(str(error).split())}\n  remedy:  {_LOADING}\n")
     raise SystemExit(5) from None  # femgear.errors, where the number stands, may be what cannot be loaded
 
 app = App(
@@ -76,9 +74,7 @@ def whole_number(text: str, key: str) -> int:
     """Read a whole number; 27.5 is none, and is not rounded (CaseError, E-TYPE)."""
     if re.fullmatch(r"\s*[+-]?\d+(\.0*)?\s*", text):
         return int(text.partition(".")[0])
-    raise CaseError(
-        f"{text!r} is no whole number", code="E-TYPE", key=key, value=text, limit="whole numbers"
-    )  # fmt: skip
+    raise CaseError(f"{text!r} is no whole number", code="E-TYPE", key=key, value=text, limit="whole numbers")
 
 
 def _convert_whole(_: Any, tokens: Sequence[Any]) -> int:
@@ -198,9 +194,7 @@ def _print(blocks) -> None:
             console.print(f"  {printable(note)}")
 
 
-def _fitting(
-    header: Sequence[str], rows: Sequence[Sequence[str]], width: int
-) -> list[list[tuple[int, str, int]]]:
+def _fitting(header: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[list[tuple[int, str, int]]]:
     """Split columns so that no number breaks in a width, the first one repeated; places, names, least widths.
 
     Names break between words where that makes the table narrower.
@@ -350,9 +344,13 @@ def run(
 
     if only is not None and only not in (known := stage_names()):
         raise CaseError(
-            "no train has this stage", code="E-ARGUMENTS", key="--only", value=only, limit=", ".join(known),
+            "no train has this stage",
+            code="E-ARGUMENTS",
+            key="--only",
+            value=only,
+            limit=", ".join(known),
             remedy="femgear run --help",
-        )  # fmt: skip
+        )
     case = case or _only_case()
     data = read_case(case)
     check_case(data, only)  # refuse before the folder is touched
@@ -391,10 +389,12 @@ def _only_case() -> Path:
         return found[0]
     here = ", ".join(map(str, found or sorted(Path().iterdir())))
     raise CaseError(
-        f"no case is named, and the current folder holds {len(found) or 'none'}", code="E-ARGUMENTS",
-        value=textwrap.shorten(here, 200, placeholder=" ...") or "an empty folder", limit="one *.toml",
+        f"no case is named, and the current folder holds {len(found) or 'none'}",
+        code="E-ARGUMENTS",
+        value=textwrap.shorten(here, 200, placeholder=" ...") or "an empty folder",
+        limit="one *.toml",
         remedy="name one" if found else "femgear new planetary writes one; femgear run --help",
-    )  # fmt: skip
+    )
 
 
 @app.command
@@ -446,9 +446,7 @@ class Formats:
 
 
 @app.command
-def compare(
-    first: Path, second: Path, /, *, output: Annotated[Path, Parameter(name=("--output", "-o"))]
-) -> int:
+def compare(first: Path, second: Path, /, *, output: Annotated[Path, Parameter(name=("--output", "-o"))]) -> int:
     """Compare two runs: entries of the cases and numbers that differ, curves over each other, both sounds.
 
     Parameters
@@ -539,14 +537,21 @@ def _need_new(paths: Sequence[Path], *, force: bool) -> None:
             except StorageError as error:
                 # a name that was typed is no matter of the disk
                 raise CaseError(
-                    error.message, code="E-CHOICE", key="--output", value=name, limit=error.limit,
+                    error.message,
+                    code="E-CHOICE",
+                    key="--output",
+                    value=name,
+                    limit=error.limit,
                     remedy=error.remedy,
-                ) from None  # fmt: skip
+                ) from None
         if path.exists() and not force:
             raise CaseError(
-                "the file is there already", code="E-OUTPUT", file=str(path), limit="a new file",
+                "the file is there already",
+                code="E-OUTPUT",
+                file=str(path),
+                limit="a new file",
                 remedy="name another one with -o, or add --force",
-            )  # fmt: skip
+            )
 
 
 @Parameter(name="*")
@@ -943,10 +948,13 @@ def _called(program_app: App, tokens: list[str], program: str) -> int:
     except (MemoryError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and "new thread" not in str(error):
             raise
-        return _fail(FemgearError(
-            f"the memory of this machine does not suffice: {error}".removesuffix(": "), code="E-MEMORY",
-            remedy="ask for fewer speeds, positions, harmonics or elements",
-        ))  # fmt: skip
+        return _fail(
+            FemgearError(
+                f"the memory of this machine does not suffice: {error}".removesuffix(": "),
+                code="E-MEMORY",
+                remedy="ask for fewer speeds, positions, harmonics or elements",
+            )
+        )
     except np.linalg.LinAlgError as error:
         remedy = "look for masses, stiffnesses or dimensions of very different size"
         return _fail(FemgearError(f"equations cannot be solved: {error}", code="E-SOLVE", remedy=remedy))

@@ -195,9 +195,7 @@ class FemgearError(Exception):
 
 def printable(text: str) -> str:
     """Write every control character of ``text`` as an escape: it then fits one line of a message."""
-    return "".join(
-        c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text
-    )
+    return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)
 
 
 def _one_line(value: object, limit: int = 120) -> str:
@@ -215,9 +213,10 @@ def nvh_library(words: str) -> Iterator[None]:
         python = (sys.executable or "python").removeprefix(os.path.join(os.getcwd(), ""))
         python = f'"{python}"' if " " in python else python
         raise FemgearError(
-            f"{words} need a library that is not installed: {error}", code="E-LIBRARY",
+            f"{words} need a library that is not installed: {error}",
+            code="E-LIBRARY",
             remedy=f'{python} -m pip install "femgear[nvh]"',
-        ) from error  # fmt: skip
+        ) from error
 
 
 class CaseError(FemgearError, ValueError):
@@ -259,9 +258,7 @@ class StorageError(FemgearError):
     default_code = "E-STORAGE"
 
 
-def checked_numbers(
-    value, key: str, *, code: str, unit: str, kind: type[float] | type[complex] = float
-) -> np.ndarray:
+def checked_numbers(value, key: str, *, code: str, unit: str, kind: type[float] | type[complex] = float) -> np.ndarray:
     """Convert a value to an array of numbers of its shape.
 
     Parameters
@@ -292,10 +289,13 @@ def checked_numbers(
         pass
     measured = f" in {unit}" if unit else ""
     raise CaseError(
-        f"{key} is not made of {'real ' if kind is float else ''}numbers", code=code, key=key,
-        value=repr(value), limit=f"numbers{measured}, rows of one length",
+        f"{key} is not made of {'real ' if kind is float else ''}numbers",
+        code=code,
+        key=key,
+        value=repr(value),
+        limit=f"numbers{measured}, rows of one length",
         remedy=f"give plain numbers{measured}, without text" + (" or units" if unit else ""),
-    )  # fmt: skip
+    )
 
 
 def checked_tolerance(value, key: str = "tolerance") -> float:
@@ -309,9 +309,12 @@ def checked_tolerance(value, key: str = "tolerance") -> float:
     number = checked_numbers(value, key, code="E-RANGE", unit="")
     if number.ndim or not 0.0 < number < 1.0:
         raise CaseError(
-            f"a {key} of {number.tolist()}", code="E-RANGE", key=key, limit="between 0 and 1",
+            f"a {key} of {number.tolist()}",
+            code="E-RANGE",
+            key=key,
+            limit="between 0 and 1",
             remedy="1e-6 to 1e-12 is usual",
-        )  # fmt: skip
+        )
     return float(number)
 
 
@@ -326,7 +329,11 @@ def checked_count(value, key: str, *, code: str, least: int = 1) -> int:
     number = checked_numbers(value, key, code=code, unit="")
     if number.ndim or not np.isfinite(number) or number != np.floor(number) or number < least:
         raise CaseError(
-            f"{number.tolist()} is not a possible number of {key}", code=code, key=key, value=number.tolist(),
-            limit=f"a whole number, {least} or more", remedy="give a whole number",
-        )  # fmt: skip
+            f"{number.tolist()} is not a possible number of {key}",
+            code=code,
+            key=key,
+            value=number.tolist(),
+            limit=f"a whole number, {least} or more",
+            remedy="give a whole number",
+        )
     return int(number)

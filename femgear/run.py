@@ -30,6 +30,15 @@ from femgear.exchange.formats import (
 )
 from femgear.findings import Finding, as_text, once, remark, tell
 from femgear.housing.sound import sound_quality
+from femgear.stages.protocol import (
+    Drawn,
+    Progress,
+    Stage,
+    StageResult,
+    joint_verdict,
+    one_blas_thread,
+    silent,
+)
 from femgear.storage.contents import Contents, Datasets, as_dataset
 from femgear.storage.files import (
     append_dataset,
@@ -60,15 +69,6 @@ from femgear.storage.results import (
     write_csv_tables,
 )
 from femgear.trains.live import Live
-from femgear.trains.protocol import (
-    Drawn,
-    Progress,
-    Stage,
-    StageResult,
-    joint_verdict,
-    one_blas_thread,
-    silent,
-)
 from femgear.trains.reading import open_results, read_case
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -184,9 +184,7 @@ class _Run:
         findings = once(one for stage in self.findings.values() for one in stage)
         told = {"timings": self.timings, "convergence": self.convergence, "known": known}
         told["findings"] = findings
-        manifest = record(
-            self.folder, list({**self.files, **dict.fromkeys(names)}), **told, complete=complete
-        )
+        manifest = record(self.folder, list({**self.files, **dict.fromkeys(names)}), **told, complete=complete)
         self.files = dict(manifest.files)
         return manifest
 
@@ -398,11 +396,12 @@ def export_results(
     if without:
         known = "; ".join(f"--{one} with the stages {', '.join(stages)}" for one, stages in needs.items())
         raise CaseError(
-            "the run has nothing that these formats hold", code="E-STAGE",
+            "the run has nothing that these formats hold",
+            code="E-STAGE",
             value=", ".join(f"--{one}" for one in without),
             limit=known or "runs with an elastic ring, and --wav of pairs",
             remedy="export tables, or run such a case without --only",
-        )  # fmt: skip
+        )
     _need_libraries(formats)
     if "csv" in formats:
         found += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
@@ -466,9 +465,7 @@ def _scaled(sampling: Sampling, extent: Mapping[str, tuple[float, float, float]]
     return sampling
 
 
-def _export_sound(
-    signals: Iterable[Signal], folder: Path, formats: Collection[str], sampling: Sampling
-) -> list[str]:
+def _export_sound(signals: Iterable[Signal], folder: Path, formats: Collection[str], sampling: Sampling) -> list[str]:
     """Write signals as WAV files, what is heard of those of microphones as a table; returns their names."""
     found, rows, peaks = list[str](), list[list](), dict[str, float]()
     scales = {unit: getattr(sampling, name) or 1.0 for unit, name in SCALES.items()}
@@ -482,9 +479,7 @@ def _export_sound(
             tones = " ".join(f"{one:g}" for one in heard.tones)
             rows.append([signal.name, heard.loudness, heard.tone_to_noise, heard.prominence, tones])
     for unit in [unit for unit, peak in peaks.items() if peak > scales[unit]]:
-        text = (
-            f"samples reach {peaks[unit]:.4g} {unit}, the full scale is {scales[unit]:g}: most players clip"
-        )
+        text = f"samples reach {peaks[unit]:.4g} {unit}, the full scale is {scales[unit]:g}: most players clip"
         remedy = f"raise --{SCALES[unit].replace('_', '-')} to hear it"
         tell(Finding("W-CLIPPING", "", text, remedy=remedy), stacklevel=4)
     if rows:

@@ -53,9 +53,10 @@ def main(
     plays, play = [to_si(text, LENGTH) for text in clearance], to_si(backlash, LENGTH)
     if min(plays, default=0.0) < 0.0 or play <= 0.0 or harmonics < 1 or min(frequencies, points) < 2:
         raise CaseError(
-            f"clearances {plays} m, play {play} m, {harmonics} harmonics", code="E-RANGE",
+            f"clearances {plays} m, play {play} m, {harmonics} harmonics",
+            code="E-RANGE",
             limit="clearances of 0 or more, play above 0, two frequencies and points or more",
-        )  # fmt: skip
+        )
     folder = ready_folder(output, FILES)
     with Progress() as progress:
         curves = []
@@ -64,15 +65,11 @@ def main(
             curves.append(_resonance(text, one, harmonics))
             progress(f"resonance, {text}", 1)
         progress("contact maps")
-        found = wedging_map(
-            np.linspace(0.5, 15.0, frequencies), np.linspace(0.6, 1.8, points) * play, backlash=play
-        )
+        found = wedging_map(np.linspace(0.5, 15.0, frequencies), np.linspace(0.6, 1.8, points) * play, backlash=play)
         progress("contact maps", 1)
     save_figure(_map_figure(found, play), folder / "tooth_contact.png")
     # stability is not asked for here
-    drawn = [
-        (text.replace(" um", " µm"), hertz, rms, np.ones(len(rms), int)) for text, hertz, rms, _ in curves
-    ]
+    drawn = [(text.replace(" um", " µm"), hertz, rms, np.ones(len(rms), int)) for text, hertz, rms, _ in curves]
     save_figure(response_branches(drawn, quantity="ring x, r.m.s."), folder / "ring_resonance.png")
     rows = [(text, float(f), float(r)) for text, hertz, rms, _ in curves for f, r in zip(hertz, rms)]
     write_csv(folder / "ring_resonance.csv", ("clearance", "frequency [Hz]", "ring x r.m.s. [m]"), rows)
@@ -91,9 +88,15 @@ def _resonance(text, clearance, harmonics):
     problem = bearing_problem_a(clearance)
     branch = weight_branch(problem, (10.0, 180.0), harmonics=harmonics, largest=0.03)
     rms = member_rms(problem, branch.solutions, "ring")[:, 0]
-    return f"clearance {text}" if clearance is not None else text, branch.parameter / (2.0 * np.pi), rms, (
-        *resonance(branch, rms), branch.message,
-    )  # fmt: skip
+    return (
+        f"clearance {text}" if clearance is not None else text,
+        branch.parameter / (2.0 * np.pi),
+        rms,
+        (
+            *resonance(branch, rms),
+            branch.message,
+        ),
+    )
 
 
 def _map_records(found):
@@ -119,15 +122,14 @@ def _print(curves, found, play):
     print_table("Resonance of the ring", header, rows)
     missing = np.isnan(found.back[..., 0])
     if missing.any():
-        print(
-            f"{np.count_nonzero(missing)} of {missing.size} cells of the maps not converged: grey, left out"
-        )
+        print(f"{np.count_nonzero(missing)} of {missing.size} cells of the maps not converged: grey, left out")
     known = wedging_onset(found)
     # an onset is one where the clearance below it is known not to touch
     sure = [
-        i for i, value in enumerate(known)
+        i
+        for i, value in enumerate(known)
         if np.isfinite(value) and not missing[i, : np.searchsorted(found.clearance, value)].any()
-    ]  # fmt: skip
+    ]
     for i in np.setdiff1d(np.flatnonzero(np.isfinite(known)), sure):
         print(f"at {found.frequency[i]:.3g} Hz where back flanks begin to touch is not known")
     ratio, step = np.unique(np.round(known[sure] / play, 6)), np.diff(found.clearance)[0] / play

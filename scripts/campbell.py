@@ -54,9 +54,10 @@ def main(
 
     if not (np.isfinite(highest) and highest > 0.0) or speeds < 5 or modes < 1 or harmonics < 0:
         raise CaseError(
-            f"{speeds} speeds up to {highest} rpm, {modes} modes, {harmonics} harmonics", code="E-RANGE",
+            f"{speeds} speeds up to {highest} rpm, {modes} modes, {harmonics} harmonics",
+            code="E-RANGE",
             limit="5 speeds or more, above 0 rpm, one mode or more",
-        )  # fmt: skip
+        )
     folder = ready_folder(output, FILES)
     data = wind_turbine_a() if train == "A" else wind_turbine_b()
     orders = [1.0, *(RING_TEETH[train] * h for h in range(1, harmonics + 1))]
@@ -75,10 +76,7 @@ def main(
     )
     write_csv(folder / "campbell.csv", header, records)
     save_figure(_figure(found, train), folder / "campbell.png")
-    rows = [
-        (f"{c.order:g}", str(c.branch + 1), f"{c.speed / RPM:.2f}", f"{c.frequency:.2f}")
-        for c in found.critical
-    ]
+    rows = [(f"{c.order:g}", str(c.branch + 1), f"{c.speed / RPM:.2f}", f"{c.frequency:.2f}") for c in found.critical]
     print_table(f"Critical speeds of set {train}", ("order", "mode", "carrier [rpm]", "frequency [Hz]"), rows)
     say_files(folder, FILES)
 
@@ -93,17 +91,25 @@ def _figure(found, train):
         change = f"{values[0]:.3g} Hz"
         change += f" to {values[-1]:.3g} Hz" if abs(values[-1] / values[0] - 1.0) > 5e-3 else ""
         ax.annotate(
-            change, (speed[-1], values[-1]), xytext=(5, 0), textcoords="offset points", va="center",
+            change,
+            (speed[-1], values[-1]),
+            xytext=(5, 0),
+            textcoords="offset points",
+            va="center",
             fontsize=SIZE - 1,
-        )  # fmt: skip
+        )
     top = 1.1 * found.frequency.max()
     for number, order in enumerate(found.orders):
         teeth = RING_TEETH[train]
         text = "weight, carrier speed" if order == 1.0 else f"mesh frequency × {order / teeth:g}"
         ax.plot(
-            speed, order * found.speed / (2.0 * np.pi), color=GREY, linewidth=1.0, label=text,
+            speed,
+            order * found.speed / (2.0 * np.pi),
+            color=GREY,
+            linewidth=1.0,
+            label=text,
             linestyle=(0, (6, 2) + (1, 2) * number),
-        )  # fmt: skip
+        )
     named = []
     for one in found.critical:
         style = {"color": BLACK, "markerfacecolor": "none", "label": "critical speed [rpm]"}
@@ -113,9 +119,12 @@ def _figure(found, train):
             continue
         named.append(place)
         ax.annotate(
-            f"{one.speed / RPM:.0f}", (one.speed / RPM, one.frequency), xytext=(6, 4),
-            textcoords="offset points", fontsize=SIZE - 1,
-        )  # fmt: skip
+            f"{one.speed / RPM:.0f}",
+            (one.speed / RPM, one.frequency),
+            xytext=(6, 4),
+            textcoords="offset points",
+            fontsize=SIZE - 1,
+        )
     ax.set_xlim(0.0, speed[-1])
     ax.set_ylim(0.0, top)
     label(ax, "carrier speed [rpm]", "frequency [Hz]", f"wind turbine set {train}")

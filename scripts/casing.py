@@ -21,8 +21,14 @@ from femgear.exchange.formats import Shapes, write_modes
 from femgear.storage.files import replaced_file, write_csv, write_text
 
 FILES = (
-    "casing.npz", "casing.pch", "casing.op4", "casing.uff", "nodes.csv", "nodes_held.csv", "surface.npz",
-)  # fmt: skip
+    "casing.npz",
+    "casing.pch",
+    "casing.op4",
+    "casing.uff",
+    "nodes.csv",
+    "nodes_held.csv",
+    "surface.npz",
+)
 E, NU, RHO, DAMPING = 206e9, 0.3, 7850.0, 0.02
 PART = 0.03  # of the surface that moves as one, edge of the grid [m]
 GEOMETRY = """SetFactory("OpenCASCADE");
@@ -252,10 +258,13 @@ def write_casing(casing: Casing, folder: Path) -> None:
     polar = np.stack([x * np.cos(angle) + y * np.sin(angle), y * np.cos(angle) - x * np.sin(angle)], axis=-1)
     sensors = shape[2 * p : 2 * p + 6].T.reshape(-1, 2, 3)
     arrays = {
-        "natural_frequency": omega, "damping_ratio": DAMPING, "ring_angle": angle, "ring_shape": polar,
+        "natural_frequency": omega,
+        "damping_ratio": DAMPING,
+        "ring_angle": angle,
+        "ring_shape": polar,
         # the top in z, the flange in x
         "sensor_shape": sensors[:, [0, 1], [2, 0]],
-    }  # fmt: skip
+    }
     with replaced_file(folder / FILES[0]) as path, open(path, "wb") as stream:
         np.savez(stream, **arrays, sizes=astuple(casing))
     moved = shape @ np.delete(across, np.arange(2 * p + 6, 2 * p + 12), axis=1).T  # the feet are held
@@ -278,9 +287,12 @@ def write_casing(casing: Casing, folder: Path) -> None:
 
 
 def main(
-    *, output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/casing"),
-    size: float = Casing.size, points: int = Casing.points, modes: int = Casing.modes,
-) -> None:  # fmt: skip
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/casing"),
+    size: float = Casing.size,
+    points: int = Casing.points,
+    modes: int = Casing.modes,
+) -> None:
     """Mesh a ring gear body with flange and two feet, reduce it and write it as arrays, DMIG, OP4 and modes.
 
     Parameters

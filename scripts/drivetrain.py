@@ -106,13 +106,13 @@ def _names() -> list[str]:
 def _computed(data, folder: Path, *, gears: bool):
     """Datasets of all stages, and the names of the pictures of a run."""
     from femgear.report.page import write_pictures
+    from femgear.stages.protocol import Drawn
     from femgear.trains.drivetrain.stages import (
         DRIVETRAIN,
         solve_drivetrain_modes,
         solve_spectrum,
         solve_transient_run,
     )
-    from femgear.trains.protocol import Drawn
 
     with Progress() as progress:
         transient = solve_transient_run(data, progress=progress)
@@ -170,8 +170,10 @@ def _write_forces(folder: Path, transient) -> None:
     meshes = [f"{mesh} [N]" for mesh in transient["mesh"].values]
     header = ("time [s]", f"{transient['body'].values[0]} speed [rad/s]", *meshes)
     columns = (
-        transient["time"].values, transient["speed"].values[0, :, 0], *transient["mesh_force"].values[0].T,
-    )  # fmt: skip
+        transient["time"].values,
+        transient["speed"].values[0, :, 0],
+        *transient["mesh_force"].values[0].T,
+    )
     write_csv(folder / "forces.csv", header, (tuple(map(float, row)) for row in zip(*columns)))
 
 

@@ -69,9 +69,12 @@ def separating_start(case, model, *, steps: int):
     s, torques = case.simulation, torque_histories(case, model.ratio)
     duration = min(max(settle_time(case), 10.0 / s.rate), s.duration, steps / s.rate)
     options = {
-        "duration": duration, "step": 1.0 / s.rate, "speed": case.operation.speed, "start": s.start,
+        "duration": duration,
+        "step": 1.0 / s.rate,
+        "speed": case.operation.speed,
+        "start": s.start,
         "outputs": (),
-    }  # fmt: skip
+    }
     parted = march_drivetrain(model, torques, contact_loss=True, **options)
     try:
         return parted, march_drivetrain(model, torques, contact_loss=False, **options)
@@ -100,9 +103,7 @@ def sensitivity_figure(progress):
     """Lines of the mesh forces with every assumed number lower and higher."""
     from published.wind_turbine_drivetrain import ASSUMED, assumption_names, varied
 
-    names = [
-        n for n in assumption_names() if "teeth" not in n and np.all(np.asarray(getattr(ASSUMED, n)) != 0.0)
-    ]
+    names = [n for n in assumption_names() if "teeth" not in n and np.all(np.asarray(getattr(ASSUMED, n)) != 0.0)]
     names = [n for n in names if n != "backlash" and not n.startswith("direction")]
     base, ratios = line_amplitudes(ASSUMED), []
     for number, name in enumerate(names):
@@ -139,9 +140,7 @@ def input_ratios(names, quantities, *, title: str = ""):
     for ax, (text, ratio) in zip(axes, quantities):
         ratio = np.asarray(ratio, float)
         for side, (colour, note) in enumerate(((COLOURS[0], "lower input"), (COLOURS[1], "higher input"))):
-            ax.barh(
-                at + 0.18 - 0.36 * side, ratio[:, side] - 1.0, height=0.34, left=1.0, color=colour, label=note
-            )
+            ax.barh(at + 0.18 - 0.36 * side, ratio[:, side] - 1.0, height=0.34, left=1.0, color=colour, label=note)
         ax.axvline(1.0, color=BLACK, linewidth=0.8)
         ax.set_yticks(at, names)
         label(ax, "ratio [1]", title=text)

@@ -65,8 +65,9 @@ def main(
     if not 0.0 < lowest < highest < np.inf or harmonics < 1 or sweep < 0 or min(plays, default=0.0) <= 0.0:
         raise CaseError(
             f"{harmonics} harmonics from {lowest} to {highest} Hz, play {min(plays, default=0.0)} m",
-            code="E-RANGE", limit="one harmonic or more, 0 < lowest < highest, play above 0",
-        )  # fmt: skip
+            code="E-RANGE",
+            limit="one harmonic or more, 0 < lowest < highest, play above 0",
+        )
     names = ["branches.csv", *PICTURES, *(["sweeps.csv"] if sweep else [])]
     folder, results = ready_folder(output, names), []
     with Progress() as progress:

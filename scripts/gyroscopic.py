@@ -49,17 +49,18 @@ def main(
     from femgear.case.gear_set import need_set, planetary_set
     from femgear.case.quantities import FREQUENCY, SPEED, to_si
     from femgear.report.style import save_figure
+    from femgear.stages.static import solve_static
     from femgear.trains.elastic.checks import check_rim_speed
     from femgear.trains.elastic.stages import solve_modes
     from femgear.trains.reading import read_case
-    from femgear.trains.static.stages import solve_static
 
     top, limit = to_si(highest, SPEED), to_si(below, FREQUENCY)
     if not top > 0.0 or speeds < 3 or not limit > 0.0:
         raise CaseError(
-            f"{speeds} speeds up to {highest}, modes below {below}", code="E-RANGE",
+            f"{speeds} speeds up to {highest}, modes below {below}",
+            code="E-RANGE",
             limit="3 speeds or more, above 0, modes above 0 Hz",
-        )  # fmt: skip
+        )
     data = read_case(case)
     need_set(data)
     planetary_set(data)  # refuse before the folder is touched
@@ -246,25 +247,41 @@ def _print(branches: Branches, ring, top: float, highest: str) -> None:
             apart = abs(branches.wave[i]) * top / (2.0 * np.pi)
             on_ring = (f"{branches.frequency[-1, i]:.2f} ± {apart:.2f}", f"± {100.0 * apart / still:.3f}")
         rows.append(
-            (f"{still:.2f}", kind, f"{branches.frequency[-1, i]:.2f}", f"{100.0 * change[i]:+.3f}",
-             f"{branches.share[i]:.2f}", _wave(branches, i), *on_ring)
-        )  # fmt: skip
+            (
+                f"{still:.2f}",
+                kind,
+                f"{branches.frequency[-1, i]:.2f}",
+                f"{100.0 * change[i]:+.3f}",
+                f"{branches.share[i]:.2f}",
+                _wave(branches, i),
+                *on_ring,
+            )
+        )
     header = (
-        "at rest [Hz]", "kind", "carrier frame [Hz]", "change [%]", "ring's share", "wave",
-        "on the ring [Hz]", "change [%]",
-    )  # fmt: skip
+        "at rest [Hz]",
+        "kind",
+        "carrier frame [Hz]",
+        "change [%]",
+        "ring's share",
+        "wave",
+        "on the ring [Hz]",
+        "change [%]",
+    )
     print_table(f"Natural frequencies at {highest} of the carrier", header, rows)
     inside = int(np.sum(np.abs(change) < CLAIM))
     print(f"{inside} of {len(change)} modes change by less than 1 % in the carrier frame")
     lines = [
-        (str(n), f"{f:.2f}", f"{f - n * top / (2 * np.pi):.2f}", f"{f + n * top / (2 * np.pi):.2f}",
-         f"± {100.0 * n * top / (2 * np.pi * f):.3f}")
+        (
+            str(n),
+            f"{f:.2f}",
+            f"{f - n * top / (2 * np.pi):.2f}",
+            f"{f + n * top / (2 * np.pi):.2f}",
+            f"± {100.0 * n * top / (2 * np.pi * f):.3f}",
+        )
         for n, f in ring
-    ]  # fmt: skip
+    ]
     title = "Ring alone on its foundation: f on the ring, f -+ n Omega / 2 pi in the carrier frame"
-    print_table(
-        title, ("nodal diameters", "on the ring [Hz]", "backward [Hz]", "forward [Hz]", "change [%]"), lines
-    )
+    print_table(title, ("nodal diameters", "on the ring [Hz]", "backward [Hz]", "forward [Hz]", "change [%]"), lines)
 
 
 def _write(folder: Path, branches: Branches) -> None:
@@ -314,9 +331,13 @@ def _figure(branches: Branches, ring, top: float):
     heard = [(branches.heard, much), (branches.frequency[-1] + apart, much & branches.standing)]
     for line, shown in heard:
         right.plot(
-            still[shown], 100.0 * (line / still - 1.0)[shown], "s", color=VERMILION, markersize=4,
+            still[shown],
+            100.0 * (line / still - 1.0)[shown],
+            "s",
+            color=VERMILION,
+            markersize=4,
             label="set, as heard on the ring (ring holds over a quarter of the energy)",
-        )  # fmt: skip
+        )
     label(right, "frequency at rest [Hz]", "change of frequency [%]", f"at {top:g} rad/s")
     legend_below(figure, columns=3)
     return figure

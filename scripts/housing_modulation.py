@@ -104,9 +104,9 @@ def _solve(case, progress):
     """Static, dynamic and housing results of the case."""
     from femgear.case.gear_set import planetary_set
     from femgear.run import grid_cache
+    from femgear.stages.lumped_set import check_one_period
+    from femgear.stages.static import solve_static
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
-    from femgear.trains.rigid import check_one_period
-    from femgear.trains.static.stages import solve_static
 
     check_one_period(case, planetary_set(case), "this script takes")
     static = solve_static(case, cache=grid_cache(), progress=progress)
@@ -171,9 +171,7 @@ def _print_lines(heard: Heard, dynamics, speed: str):
         for k in sorted(strongest)
         if heard.exact[k] > 1e-6 * heard.exact.max()
     ]
-    title = (
-        f"{speed}, mesh harmonic {heard.harmonic} (mesh frequency {dynamics.response.mesh_frequency[0]:g} Hz)"
-    )
+    title = f"{speed}, mesh harmonic {heard.harmonic} (mesh frequency {dynamics.response.mesh_frequency[0]:g} Hz)"
     header = ("carrier order", "exact [m/s^2]", "Hanning, scaled [m/s^2]")
     header += () if heard.linear is None else (LINEAR,)
     print_table(f"Strongest lines at {title}", header, rows)
@@ -214,8 +212,16 @@ def _spectrum_figure(speed: str, heard: Heard, teeth: int):
         for k in np.argsort(-values, kind="stable")[:5]:
             if values[k] > floor:
                 text = f"{heard.order[k]}"
-                ax.annotate(text, (heard.order[k], values[k]), xytext=(0, 8), textcoords="offset points",
-                            ha="center", va="bottom", rotation=90, fontsize=9.5)  # fmt: skip
+                ax.annotate(
+                    text,
+                    (heard.order[k], values[k]),
+                    xytext=(0, 8),
+                    textcoords="offset points",
+                    ha="center",
+                    va="bottom",
+                    rotation=90,
+                    fontsize=9.5,
+                )
     label(axes[0], y="acceleration [m/s²]")
     label(axes[1], y="acceleration, scaled [m/s²]")
     shown = heard.exact > floor
@@ -249,13 +255,9 @@ def _envelope_figure(speed: str, heard: Heard):
         for sign in (1, -1):
             ax.plot(at, sign * scale * band.envelope, color=VERMILION, linewidth=1.5, label="envelope")
         lobes = band.lobes
-        ax.plot(
-            lobes.position, scale * lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False
-        )
+        ax.plot(lobes.position, scale * lobes.height, "v", color=BLACK, markersize=7, label="lobe", clip_on=False)
         title = f"{text}: {len(lobes.position)} lobes (largest value {band.envelope.max():.3g}"
-        label(
-            ax, y="relative to the largest [1]", title=title + (" m/s²)" if name == "exact" else ", no unit)")
-        )
+        label(ax, y="relative to the largest [1]", title=title + (" m/s²)" if name == "exact" else ", no unit)"))
     axes[0].set_xlim(0, 1)
     figure.suptitle(f"{speed}, orders {heard.order[0]} to {heard.order[-1]}", fontsize=12)
     label(axes[1], "carrier revolutions [1]")
@@ -287,9 +289,7 @@ def ring_surface(planetary_set, radial, tangential, *, columns: int = 360):
     wave = np.exp(1j * np.outer(np.arange(-(radial.shape[1] // 2), radial.shape[1] // 2 + 1), phi))
     width, radius = planetary_set.ring.face_width, planetary_set.ring.rim_radius
     angle, z = np.meshgrid(phi, np.array([0.0, width]), indexing="ij")
-    grid = pv.StructuredGrid(
-        radius * np.cos(angle)[..., None], radius * np.sin(angle)[..., None], z[..., None]
-    )
+    grid = pv.StructuredGrid(radius * np.cos(angle)[..., None], radius * np.sin(angle)[..., None], z[..., None])
     grid = grid.cast_to_unstructured_grid()
     at = np.arctan2(grid.points[:, 1], grid.points[:, 0])
     column = np.rint(np.mod(at, 2 * np.pi) / (2 * np.pi) * columns).astype(int) % columns
@@ -351,8 +351,9 @@ def _polar_picture(path: Path, planetary_set, heard: Heard, curve) -> None:
     plotter.add_mesh(body, color="#D8D8D8", lighting=False)
     for psi in planetary_set.planet_angles:
         centre = planetary_set.centre_distance * np.array([np.cos(psi), np.sin(psi), 0.0])
-        disc = pv.Disc(center=centre, inner=planetary_set.planet.rim_radius, c_res=90,
-                       outer=planetary_set.planet.reference_radius)  # fmt: skip
+        disc = pv.Disc(
+            center=centre, inner=planetary_set.planet.rim_radius, c_res=90, outer=planetary_set.planet.reference_radius
+        )
         plotter.add_mesh(disc, color="#F0E0B0", lighting=False)
     windows = heard.bands["Hanning"].envelope
     other = polar_curve(windows, radius=1.02 * ring.rim_radius, height=0.4 * ring.rim_radius)

@@ -62,9 +62,10 @@ def main(
     if unknown or harmonics < 1 or ratios < 3 or points < 8 or frequencies < 2:
         raise CaseError(
             f"studies {', '.join(study)}; {harmonics} harmonics, {ratios} ratios, {points} points, "
-            f"{frequencies} frequencies", code="E-RANGE",
+            f"{frequencies} frequencies",
+            code="E-RANGE",
             limit=f"{', '.join(STUDIES)}; 1 harmonic, 3 ratios, 8 points, 2 frequencies or more",
-        )  # fmt: skip
+        )
     names = [file for name in dict.fromkeys(study) for file in FILES[name]]
     folder = ready_folder(output, names)
     with Progress() as progress:
@@ -93,7 +94,7 @@ def read(name: str, values: dict):
 
 def damping_study(folder: Path, harmonics: int) -> None:
     """Amplitude and mean for two damping ratios."""
-    from femgear.trains.gear_pair.stages import solve_response
+    from femgear.trains.impacts.stages import solve_response
 
     curves, rows = [], []
     for zeta in DAMPING:
@@ -111,7 +112,7 @@ def damping_study(folder: Path, harmonics: int) -> None:
 
 def error_study(folder: Path, harmonics: int) -> None:
     """Amplitude and mean for several tooth-frequency errors."""
-    from femgear.trains.gear_pair.stages import solve_response
+    from femgear.trains.impacts.stages import solve_response
 
     curves = []
     for error in ERRORS:
@@ -128,12 +129,10 @@ def curve_of(text: str, data) -> tuple:
 def draw_curves(folder: Path, name: str, curves, title: str) -> None:
     """Picture and table of curves over the frequency ratio."""
     from femgear.report.style import save_figure
-    from femgear.trains.gear_pair.figures import amplitude_and_mean
+    from femgear.trains.impacts.figures import amplitude_and_mean
 
     records = [
-        (text, float(r), float(a), float(m), int(s))
-        for text, *columns in curves
-        for r, a, m, s in zip(*columns)
+        (text, float(r), float(a), float(m), int(s)) for text, *columns in curves for r, a, m, s in zip(*columns)
     ]
     header = ("curve", "frequency ratio [1]", "amplitude [b]", "mean [b]", "stable")
     write_csv(folder / f"{name}.csv", header, records)
@@ -143,9 +142,9 @@ def draw_curves(folder: Path, name: str, curves, title: str) -> None:
 def state_study(folder: Path, harmonics: int, ratios: int) -> None:
     """Contact states by harmonic balance and by sweeps up and down."""
     from femgear.report.style import save_figure
-    from femgear.trains.gear_pair.figures import contact_rows, state_bands
-    from femgear.trains.gear_pair.model import STATE_NAMES, state_regions
-    from femgear.trains.gear_pair.stages import solve_response, solve_sweep
+    from femgear.trains.impacts.figures import contact_rows, state_bands
+    from femgear.trains.impacts.model import STATE_NAMES, state_regions
+    from femgear.trains.impacts.stages import solve_response, solve_sweep
 
     count = max(3, ratios // 2)
     ranges = [{"from": 0.6, "to": 1.0, "count": count}, {"from": 1.05, "to": 3.5, "count": count}]
@@ -164,14 +163,21 @@ def state_study(folder: Path, harmonics: int, ratios: int) -> None:
 def chaos_study(folder: Path, ratios: int, points: int) -> None:
     """Bifurcation diagram, exponents and sections of the lightly loaded pair."""
     from femgear.report.style import save_figure
-    from femgear.trains.gear_pair.figures import bifurcation_and_exponent, phase_sections
-    from femgear.trains.gear_pair.stages import solve_chaos
+    from femgear.trains.impacts.figures import bifurcation_and_exponent, phase_sections
+    from femgear.trains.impacts.stages import solve_chaos
 
     data = solve_chaos(read("gear_pair_light", {"chaos.count": ratios, "chaos.points": points})).dataset()
     names = ("ratio", "exponent", "error", "lowest", "highest", "repeats", "chaotic")
     columns = [data[name].values.tolist() for name in names]
-    header = ("frequency ratio [1]", "largest exponent [omega_n]", "error [omega_n]", "smallest x [b]",
-              "largest x [b]", "repeats after periods", "chaotic")  # fmt: skip
+    header = (
+        "frequency ratio [1]",
+        "largest exponent [omega_n]",
+        "error [omega_n]",
+        "smallest x [b]",
+        "largest x [b]",
+        "repeats after periods",
+        "chaotic",
+    )
     write_csv(folder / "chaos.csv", header, zip(*columns))
     save_figure(bifurcation_and_exponent(data), folder / "chaos.png")
     save_figure(phase_sections(data), folder / "sections.png")
@@ -179,10 +185,10 @@ def chaos_study(folder: Path, ratios: int, points: int) -> None:
     chaotic = [ratio for ratio, word in zip(columns[0], words) if word == "yes"]
     ends = [f"{chaotic[0]:.2f}", f"{chaotic[-1]:.2f}"] if chaotic else ["none", "none"]
     print_table(
-        "Lightly loaded pair", ("ratios", "chaotic: exponent clearly positive, no repetition", "from", "to",
-                                "not told", "smallest x"),
+        "Lightly loaded pair",
+        ("ratios", "chaotic: exponent clearly positive, no repetition", "from", "to", "not told", "smallest x"),
         [(str(ratios), str(len(chaotic)), *ends, str(words.count("not told")), f"{min(columns[3]):.3f}")],
-    )  # fmt: skip
+    )
 
 
 def eccentric_set(eccentricity: float, floating: bool):
@@ -198,18 +204,20 @@ def eccentric_set(eccentricity: float, floating: bool):
         with_errors,
     )
 
+    from femgear.stages.lumped_set import gear_set_problem, phased_series
     from femgear.system.fourier import tooth_lines
     from femgear.system.mesh_directions import mesh_elements
     from femgear.system.rigid_bodies import PlanarTorque
-    from femgear.trains.rigid import gear_set_problem, phased_series
 
     data = lin_parker_set(3)
     data = replace(data, sun=replace(data.sun, support=1e6 if floating else 1e9))
     phases = np.array([0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
     errors = TransmissionErrors(
-        data=data, teeth={"sun": 28, "planet": 36, "ring": 101}, sun=Eccentricity(eccentricity),
+        data=data,
+        teeth={"sun": 28, "planet": 36, "ring": 101},
+        sun=Eccentricity(eccentricity),
         tooth=tooth_lines([0.2e-6], [0.2e-6], phases),
-    )  # fmt: skip
+    )
     C = equivalent_damping(data, mesh_ratio=0.05, support_ratio=0.03)
     stiffness = phased_series([0.1], [0.1], phases, mean=data.mesh_stiffness)
     meshes = mesh_elements(data, stiffness=stiffness, backlash=60e-6)
@@ -276,9 +284,13 @@ def eccentric_response(eccentricity: float, floating: bool, hertz):
         omega = 2.0 * np.pi * value
         problem = build(omega)
         found = solve_harmonic_balance(
-            problem, errors.frequency(omega), orders=orders, start=start, stability=False,
+            problem,
+            errors.frequency(omega),
+            orders=orders,
+            start=start,
+            stability=False,
             reduction=reduce_problem(problem),
-        )  # fmt: skip
+        )
         force = element_forces(problem, (wave @ found.deflection.T).real, theta)[0][:, 0]
         rows.append((0.5 * np.ptp(force), force.mean(), float(found.converged)))
         if start is None:

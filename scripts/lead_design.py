@@ -85,10 +85,14 @@ def main(
         largest = [max(state(torque, s, *lead)[0] for s in slopes) for lead in designs.values()]
     write(folder, maps, torques, slopes, both, data.set.face_width / 8)
     rows = [
-        (name, *(f"{one:.2f}" for one in lead), f"{factor:.3f}",
-         f"{1e6 * maps[name][..., 1].min():.3f} to {1e6 * maps[name][..., 1].max():.3f}")
+        (
+            name,
+            *(f"{one:.2f}" for one in lead),
+            f"{factor:.3f}",
+            f"{1e6 * maps[name][..., 1].min():.3f} to {1e6 * maps[name][..., 1].max():.3f}",
+        )
         for (name, lead), factor in zip(designs.items(), largest)
-    ]  # fmt: skip
+    ]
     header = "design", "crowning [um]", "end relief [um]", "largest K_Hbeta", "STE p-p over the map [um]"
     print_table(f"Largest K_Hbeta over the misalignments at {torque:g} N m", header, rows)
     print(f"ISO 6336-1, annex B: C_beta = 0.5 F_beta = {0.5 * most:.2f} um; found {alone[0]:.2f} um")
@@ -104,8 +108,8 @@ def in_slices(case, positions: int):
     from femgear.contact.cycle import CycleOptions
     from femgear.gears.modifications import EndRelief, FlankForm, LeadCrowning, LeadSlope
     from femgear.run import grid_cache
+    from femgear.stages.static import flank_compliances, over_width, static_supports
     from femgear.study.relief import DesignBasis, sun_torque
-    from femgear.trains.static.stages import flank_compliances, over_width, static_supports
 
     gears, deviations, cache = planetary_set(case), set_deviations(case), grid_cache()
     bodies = flank_compliances(case, gears, cache=cache)[1]
@@ -156,8 +160,11 @@ def write(folder: Path, maps, torques, slopes, both, length: float) -> None:
     from femgear.report.style import label, new_figure, save_figure
     from femgear.storage.files import write_text
 
-    rows = ((name, torques[t], 1e-6 * slopes[s], *found[t, s])
-            for name, found in maps.items() for t, s in np.ndindex(found.shape[:2]))  # fmt: skip
+    rows = (
+        (name, torques[t], 1e-6 * slopes[s], *found[t, s])
+        for name, found in maps.items()
+        for t, s in np.ndindex(found.shape[:2])
+    )
     write_csv(folder / FILES[0], HEADER, ((name, *map(float, row)) for name, *row in rows))
     shown = {name: found for name, found in maps.items() if name != "crowning"}
     figure, axes = new_figure(rows=2, columns=len(shown), width=10.5, height=6.4, sharex=True, sharey=True)

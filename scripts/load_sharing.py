@@ -76,9 +76,7 @@ TOOTH_HEADER = ("gap [m]", "mesh", "position [periods]", "path from the pitch po
 
 def _checked(gap: float, text: str) -> float:
     if gap < 0:
-        raise CaseError(
-            "a gap cannot be negative", code="E-RANGE", key="--gap", value=text, limit="0 m or more"
-        )
+        raise CaseError("a gap cannot be negative", code="E-RANGE", key="--gap", value=text, limit="0 m or more")
     return gap
 
 
@@ -197,9 +195,7 @@ def _share_figure(gaps, cycles, planet):
         if cycle.periods == 1:
             position, share = periodic(position, share)
         for n, values in enumerate(share):
-            ax.plot(
-                position, values, label=f"planet {n + 1}", linewidth=max(4.6 - 1.5 * n, 1.2), **line_style(n)
-            )
+            ax.plot(position, values, label=f"planet {n + 1}", linewidth=max(4.6 - 1.5 * n, 1.2), **line_style(n))
         ax.set_xlim(0, cycle.periods)
         factor = 0.01 * len(share) * share.max()
         title = f"gap {gap * 1e6:g} µm at planet {planet}: $K_\\gamma$ {factor:.3f}"

@@ -49,8 +49,8 @@ def main(
     from femgear.case.gear_set import planetary_set
     from femgear.report.style import save_figure
     from femgear.run import grid_cache
+    from femgear.stages.static import solve_static
     from femgear.trains.reading import read_case, with_value
-    from femgear.trains.static.stages import solve_static
 
     data = read_case(case)
     if contact is not None:
@@ -91,8 +91,7 @@ def _print_summary(torques, results):
         for name, j in distinct_lines(static["mesh"].values, static["mesh_stiffness"]):
             k_peak, ste_peak = (static[f"{one}_peak_to_peak"].values[j] for one in ("mesh_stiffness", "ste"))
             k, ste = (
-                factor * float(static[f"{one}_mean"][j])
-                for one, factor in (("mesh_stiffness", 1e-6), ("ste", 1e6))
+                factor * float(static[f"{one}_mean"][j]) for one, factor in (("mesh_stiffness", 1e-6), ("ste", 1e6))
             )
             values = (k, k_peak / 1e6, ste, ste_peak * 1e6)
             per_width = k / (1e3 * static.attrs["face_width"])
@@ -134,9 +133,7 @@ def _figure(torques, results):
             peak = 1e6 * float(stored["ste_peak_to_peak"])
             title += f", {torques[0]:g} N m: {peak:.3g} µm peak to peak"
             peak = 1e-6 * float(stored["mesh_stiffness_peak_to_peak"])
-            mean = (
-                f"mean {1e-6 * float(stored['mesh_stiffness_mean']):.4g} N/µm, {peak:.4g} N/µm peak to peak"
-            )
+            mean = f"mean {1e-6 * float(stored['mesh_stiffness_mean']):.4g} N/µm, {peak:.4g} N/µm peak to peak"
         label(axes[column], y="transmission error [µm]", title=title)
         label(axes[len(kinds) + column], "position in the mesh period [1]", "tangent stiffness [N/µm]", mean)
     axes[0].set_xlim(0, 1)

@@ -55,9 +55,13 @@ def main(
     from femgear.trains.reading import with_values
 
     given = {
-        "lowest": f"{lowest} rpm", "highest": f"{highest} rpm", "points": points, "harmonics": harmonics,
-        "damping_ratio": damping, "balance_points": balance,
-    }  # fmt: skip
+        "lowest": f"{lowest} rpm",
+        "highest": f"{highest} rpm",
+        "points": points,
+        "harmonics": harmonics,
+        "damping_ratio": damping,
+        "balance_points": balance,
+    }
     values = {f"response.{key}": value for key, value in given.items()}
     case = with_values(four_stage_case(lateral=lateral), values)
     names = ["modes.csv", "forces.csv", "stage_energy.png", "mesh_orders.png", "stage_forces.png"]
@@ -99,9 +103,15 @@ def published_readings(folder: Path) -> None:
                 end = "last carrier held" if held else "last carrier free"
                 inside = int(np.sum((elastic > low) & (elastic < high)))
                 rows.append(
-                    (reading, end, str(len(found) - len(elastic)), f"{elastic[0]:.1f}", f"{elastic[-1]:.1f}",
-                     f"{inside} of {len(elastic)}")
-                )  # fmt: skip
+                    (
+                        reading,
+                        end,
+                        str(len(found) - len(elastic)),
+                        f"{elastic[0]:.1f}",
+                        f"{elastic[-1]:.1f}",
+                        f"{inside} of {len(elastic)}",
+                    )
+                )
                 records += [(unit, planets, end, number + 1, float(f)) for number, f in enumerate(found)]
                 ladders.append((f"{reading}\n{end}", elastic))
     write_csv(folder / "published.csv", ("unit", "planets", "end", "mode", "frequency [Hz]"), records)

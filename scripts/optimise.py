@@ -191,18 +191,23 @@ def _check_request(case, extent: Extent) -> None:
             raise CaseError("not usable", code="E-RANGE", key=key, value=value, limit=f"{least} to 1000000")
     if case.operation.torque == 0.0:
         raise CaseError(
-            "without torque no tooth carries load", code="E-NO-LOAD", key="operation.torque",
-            limit="not zero", remedy='give a torque, --torque "100 N m"',
-        )  # fmt: skip
+            "without torque no tooth carries load",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero",
+            remedy='give a torque, --torque "100 N m"',
+        )
     for name in ("planar", "helical"):
         section = getattr(case, name, None)
         if getattr(section, "mesh_stiffness", None) is not None:
             raise CaseError(
                 f"the case gives its mesh stiffness, so that deviations of the flanks change nothing in its "
-                f"{name} model", code="E-STAGE", key=f"{name}.mesh_stiffness",
+                f"{name} model",
+                code="E-STAGE",
+                key=f"{name}.mesh_stiffness",
                 limit="cases whose mesh stiffness is femgear's own",
                 remedy="leave the table out",
-            )  # fmt: skip
+            )
 
 
 def _refined(rough, case, folder: Path, options, method: str):
@@ -257,9 +262,12 @@ def _front(problem, second, folder: Path, options) -> None:
     scale = np.array([q.dimension.scale for q in both])
     titles = [f"{q.name} [{q.dimension.shown}]".replace("um]", "µm]") for q in both]
     figure = front_figure(
-        found.values / scale, found.dominated / scale, found.before / scale, names=titles,
+        found.values / scale,
+        found.dominated / scale,
+        found.before / scale,
+        names=titles,
         compromise=found.compromise,
-    )  # fmt: skip
+    )
     save_figure(figure, folder / "front.png")
     header = [f"{v.name} [{v.unit or 1}]" for v in problem.variables]
     header += [*(f"{q.name} [{q.dimension.si}]" for q in both), "findings"]
@@ -282,8 +290,7 @@ def _check(found, data, folder: Path, speeds, rough) -> None:
         fine["operation.speeds"] = {"from": speeds[0], "to": speeds[1], "count": 126}
     only = "static" if speeds is None else "housing"
     runs = [
-        _run(with_values(data, values | fine), folder / name, only)
-        for name, values in zip(RUNS, ({}, found.values))
+        _run(with_values(data, values | fine), folder / name, only) for name, values in zip(RUNS, ({}, found.values))
     ]
     numbers = [_numbers(results, only) for results in runs]
     rows = [(name, before, numbers[1][name][0], unit) for name, (before, unit) in numbers[0].items()]
@@ -471,9 +478,7 @@ def front_figure(values, dominated, before, *, names: Sequence[str], compromise:
     ax.plot(*values.T, "o", color=BLUE, markersize=5, label="front")
     ax.plot(*before, "s", color=BLACK, markersize=7, label="before")
     if compromise is not None:
-        ax.plot(
-            *values[compromise], "o", color=VERMILION, markersize=10, fillstyle="none", label="compromise"
-        )
+        ax.plot(*values[compromise], "o", color=VERMILION, markersize=10, fillstyle="none", label="compromise")
     # designs far beyond both are of no interest
     right, top = 1.1 * np.maximum(values.max(axis=0), before)
     ax.set_xlim(0, right)

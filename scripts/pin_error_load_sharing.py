@@ -152,9 +152,9 @@ class Sharing:
 def _solve(data, basis, kind, torque, place, sigma, samples, seed):
     """Pins (S, N, 2) [m] and load sharing of all samples, how some differ exactly, sensitivities."""
     from femgear.contact.supports import RIGID, Supports
+    from femgear.stages.static import case_supports
     from femgear.study.samples import Tolerances, exact_numbers, sample_model, spring_numbers
     from femgear.study.sensitivity import linearise, pin_sensitivities
-    from femgear.trains.static.stages import case_supports
 
     supports = {"fixed": RIGID, "floating": Supports(sun=0.0), "case": case_supports(data)}[kind]
     basis = replace(basis, supports=supports)
@@ -241,9 +241,7 @@ def _print_sensitivities(results, names, sigma):
         "spread, linear [%]",
         "of the samples [%]",
     )
-    print_table(
-        "Linear sensitivity of a planet's share, in % of the torque per um, mean of all planets", header, rows
-    )
+    print_table("Linear sensitivity of a planet's share, in % of the torque per um, mean of all planets", header, rows)
 
 
 def sharing_histogram(factors, names, n_planets: int):
@@ -264,9 +262,7 @@ def sharing_histogram(factors, names, n_planets: int):
     edges = np.linspace(0.99, max(top, 1.05), 80)
     for i, (factor, name) in enumerate(zip(factors, names)):
         share, name = 100.0 / len(factor), f"{name}: 95 % below {np.quantile(factor, 0.95):.3f}"
-        left.hist(
-            factor, edges, weights=np.full(len(factor), share), histtype="step", label=name, **line_style(i)
-        )
+        left.hist(factor, edges, weights=np.full(len(factor), share), histtype="step", label=name, **line_style(i))
         ordered = np.sort(factor)
         beyond = 100.0 * (1.0 - np.arange(1, len(ordered) + 1) / len(ordered))
         right.step(ordered, beyond, where="post", **line_style(i))

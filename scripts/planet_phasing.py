@@ -81,9 +81,10 @@ def main(
 
     if points < 2 or not 1 <= harmonics <= MOST_HARMONICS:
         raise CaseError(
-            f"{points} frequencies, {harmonics} harmonics", code="E-RANGE",
+            f"{points} frequencies, {harmonics} harmonics",
+            code="E-RANGE",
             limit=f"2 frequencies or more, 1 to {MOST_HARMONICS} harmonics",
-        )  # fmt: skip
+        )
     planets = len(angle) or planets
     psi = tuple(np.radians(angle)) or feasible_angles(sun + ring, equal_planet_angles(planets))
     phasing = mesh_phasing(sun, ring, psi, convention=convention, lag=standard_lag(planet))
@@ -93,14 +94,10 @@ def main(
     table = phasing_table(phasing, range(1, harmonics + 1))
     folder = ready_folder(output, FILES)
     header, rows = _phasing_rows(table)
-    print_table(
-        f"{sun}/{planet}/{ring}, {len(psi)} planets at {_degrees(psi)} deg, {convention}", header, rows
-    )
+    print_table(f"{sun}/{planet}/{ring}, {len(psi)} planets at {_degrees(psi)} deg, {convention}", header, rows)
     write_csv(folder / "phasing.csv", header, rows)
     header, rows = _choice_rows(choices)
-    title = (
-        f"Tooth numbers near {sun}/{planet}/{ring} for {planets} planets; what is left in harmonics 1 to 4"
-    )
+    title = f"Tooth numbers near {sun}/{planet}/{ring} for {planets} planets; what is left in harmonics 1 to 4"
     print_table(title, header[:8], [row[:8] for row in rows[:15]])
     write_csv(folder / "neighbours.csv", header, rows)
     save_figure(phase_diagram(phasing, harmonics=range(1, min(harmonics, 4) + 1)), folder / "phases.png")
@@ -130,34 +127,42 @@ def _phasing_rows(table):
             f"{size[:, 1].max():.4f}",
             " + ".join(modes),
         )
-        for h, kind, k, size, modes in zip(
-            table.harmonics, table.kind, table.cyclic, table.members, table.excited
-        )
+        for h, kind, k, size, modes in zip(table.harmonics, table.kind, table.cyclic, table.members, table.excited)
     ]
     return header, [tuple(str(value) for value in row) for row in rows]
 
 
 def _choice_rows(choices):
     header = (
-        "teeth", "ratio", "change [%]", "spacing", "torque left [%]", "lateral left [%]", "hunting",
-        "room [modules]", "z_r - z_s - 2 z_p", "phasing",
-    )  # fmt: skip
+        "teeth",
+        "ratio",
+        "change [%]",
+        "spacing",
+        "torque left [%]",
+        "lateral left [%]",
+        "hunting",
+        "room [modules]",
+        "z_r - z_s - 2 z_p",
+        "phasing",
+    )
     short, rows = np.array(["in", "counter", "sequential", "unequal"]), []
     for i, teeth in enumerate(choices.teeth.tolist()):
         off = f"{np.degrees(choices.spacing_error[i]):.2f} deg off"
         kinds = dict.fromkeys(short[choices.kind[i]])
         left = [", ".join(f"{100 * value:.0f}" for value in values) for values in choices.sums[i].T]
-        rows.append((
-            "/".join(map(str, teeth)),
-            f"{choices.ratio[i]:.4f}",
-            f"{100 * choices.ratio_change[i]:.2f}",
-            "equal" if choices.equally_spaced[i] else off,
-            *left,
-            "yes" if choices.hunting[i] else "no",
-            f"{choices.room[i]:.2f}",
-            str(choices.closure[i]),
-            ", ".join(kinds if len(kinds) == 1 else short[choices.kind[i]]),
-        ))  # fmt: skip
+        rows.append(
+            (
+                "/".join(map(str, teeth)),
+                f"{choices.ratio[i]:.4f}",
+                f"{100 * choices.ratio_change[i]:.2f}",
+                "equal" if choices.equally_spaced[i] else off,
+                *left,
+                "yes" if choices.hunting[i] else "no",
+                f"{choices.room[i]:.2f}",
+                str(choices.closure[i]),
+                ", ".join(kinds if len(kinds) == 1 else short[choices.kind[i]]),
+            )
+        )
     return header, rows
 
 
@@ -187,7 +192,7 @@ def _spectra(points):
 
     from femgear.gears.phasing import phase_factors
     from femgear.solvers.linear.receptance import modal_error_response
-    from femgear.trains.rigid import gear_set_modes
+    from femgear.stages.lumped_set import gear_set_modes
 
     modes, frequency = gear_set_modes(kahraman_set(), damping_ratio=0.05), np.linspace(100.0, 15e3, points)
     last, turning = TYPES["sequentially phased"], cases()
@@ -238,23 +243,17 @@ def resultant_chart(tables: Mapping[str, PhasingTable]):
     columns = min(4, count)
     rows = -(-count // columns)
     tall = max(len(table.harmonics) for table in tables.values())
-    figure, axes = new_figure(
-        rows=rows, columns=columns, width=3.0 * columns, height=(0.42 * tall + 1.9) * rows + 0.4
-    )
+    figure, axes = new_figure(rows=rows, columns=columns, width=3.0 * columns, height=(0.42 * tall + 1.9) * rows + 0.4)
     names = ("torque, thrust", "lateral force, tilting", *(f"{name} modes" for name in MODES))
     for ax in axes[count:]:
         ax.set_visible(False)
     for ax, (title, table) in zip(axes, tables.items()):
-        shares = np.column_stack(
-            [table.members[..., 0].max(axis=1), table.members[..., 1].max(axis=1), table.modes]
-        )
+        shares = np.column_stack([table.members[..., 0].max(axis=1), table.members[..., 1].max(axis=1), table.modes])
         for column, values in enumerate(shares.T):
             marker, colour = ("D", GREY) if column < 2 else _kind_marks()[MODES[column - 2]]
             there = np.flatnonzero(values > 1e-9)
             place = np.full(len(there), column)
-            ax.scatter(
-                place, table.harmonics[there], s=130 * values[there], color=colour, marker=marker, zorder=3
-            )
+            ax.scatter(place, table.harmonics[there], s=130 * values[there], color=colour, marker=marker, zorder=3)
             text = "resultant" if column < 2 else names[column]
             ax.plot([], [], marker, color=colour, label=text)
         ax.axvline(1.5, color="0.6", linewidth=1.0)
@@ -307,12 +306,26 @@ def mesh_force_spectra(
                     continue
                 # wide below narrow: lines that coincide are all seen
                 text = f"harmonic {h + 1}, {name}"
-                ax.plot(hertz, size[h, :, j], DASHES[j % 4], color=COLOURS[h % 7], label=text,
-                        linewidth=4.5 - 1.2 * min(h, 3), zorder=2 + h)  # fmt: skip
+                ax.plot(
+                    hertz,
+                    size[h, :, j],
+                    DASHES[j % 4],
+                    color=COLOURS[h % 7],
+                    label=text,
+                    linewidth=4.5 - 1.2 * min(h, 3),
+                    zorder=2 + h,
+                )
         for kind, values in (modes or {}).items():
             marker, colour = _kind_marks().get(kind, ("x", GREY))
-            ax.plot(np.asarray(values) * 1e-3, np.full(len(values), -0.05 * top), marker, color=colour,
-                    markersize=5, label=f"{kind} modes", clip_on=False)  # fmt: skip
+            ax.plot(
+                np.asarray(values) * 1e-3,
+                np.full(len(values), -0.05 * top),
+                marker,
+                color=colour,
+                markersize=5,
+                label=f"{kind} modes",
+                clip_on=False,
+            )
         ax.set_ylim(-0.09 * top, 1.05 * top)
         label(ax, title=title)
     for ax in axes[-columns:]:

@@ -50,7 +50,8 @@ def _script(command: str, title: str, **says: str) -> Run:
 RUNS = {
     "planetary_27_40_108": _case("planetary_27_40_108", "Reference set 27/40/108, elastic ring"),
     "misaligned": Run(
-        "femgear run cases/planetary_27_40_108.toml --only stress", "Misaligned and crowned sun, 25 slices",
+        "femgear run cases/planetary_27_40_108.toml --only stress",
+        "Misaligned and crowned sun, 25 slices",
         entry=(
             "[static]\n",
             '[[sun.modifications]]\nkind = "lead slope"\namount = "10 um"\n\n'
@@ -63,7 +64,8 @@ RUNS = {
     "modulation_paper": _case("modulation_paper", "Set of the modulation paper"),
     "helical_30_20_70": _case("helical_30_20_70", "Helical set 30/20/70"),
     "helical_slices": Run(
-        "femgear run cases/helical_30_20_70.toml", "Helical set in eight slices",
+        "femgear run cases/helical_30_20_70.toml",
+        "Helical set in eight slices",
         entry=("slices = 1 ", "slices = 8 "),
     ),
     "nrel_pgb": _case("nrel_pgb", "Wind turbine set B, rigid bodies"),
@@ -83,74 +85,89 @@ RUNS = {
         says={"samples": "STE over the largest share of a planet, and the distribution of both."},
     ),
     "mesh_stiffness": _script(
-        "mesh_stiffness.py", "Mesh stiffness",
+        "mesh_stiffness.py",
+        "Mesh stiffness",
         mesh_stiffness="Transmission error and tangent stiffness of all meshes over the mesh period.",
     ),
     "load_sharing": _script(
-        "load_sharing.py", "Load sharing",
+        "load_sharing.py",
+        "Load sharing",
         load_sharing="Shares of the planets where one of them has a gap, and the load sharing factor.",
         tooth_loads="Load of the tooth pairs of that planet and of its neighbour along the path of contact.",
     ),
     "harris_map": _script(
-        "harris_map.py", "Harris map",
+        "harris_map.py",
+        "Harris map",
         harris_map="Transmission error over torque: every tip relief has a torque at which it is best.",
     ),
     "tip_relief_design": _script(
-        "tip_relief_design.py", "Design of the tip relief",
+        "tip_relief_design.py",
+        "Design of the tip relief",
         tip_relief="Transmission error over amount and length of the relief, the best one marked.",
     ),
     "lead_design": _script(
-        "lead_design.py", "Design of the crowning",
+        "lead_design.py",
+        "Design of the crowning",
         lead_design="Face load factor and transmission error over misalignment and torque for three leads.",
     ),
     "pin_error_load_sharing": _script(
-        "pin_error_load_sharing.py", "Pin errors",
+        "pin_error_load_sharing.py",
+        "Pin errors",
         load_sharing="Distribution of the load sharing factor: a floating sun takes most errors up.",
     ),
     "optimise": _script(
-        "optimise.py", "Optimised tip relief",
+        "optimise.py",
+        "Optimised tip relief",
         optimum="Transmission error and mesh force before and after, and the course of the search.",
         tolerances="What the tolerances of the entries found do to the objective.",
     ),
     "housing_modulation": _script(
-        "housing_modulation.py", "Modulation of the housing",
+        "housing_modulation.py",
+        "Modulation of the housing",
         order_spectrum="Orders around the mesh harmonic: the ring's field splits them, windows do not.",
         envelope="Acceleration of a fixed point and its envelope: six lobes, three by the Hanning model.",
         modulation="The same envelopes around the ring over the angle of the carrier.",
     ),
     "side_bands": _script(
         "side_bands.py --ring 70 --sun 30 --planet 20 --angle 0 --angle 86.4 --angle 180 --angle 266.4 "
-        "--spectrum cases/spectra/lines_30_70.csv", "Which side bands are normal",
+        "--spectrum cases/spectra/lines_30_70.csv",
+        "Which side bands are normal",
         side_bands="Array factor around mesh harmonics, and what is measured there.",
     ),
     "gyroscopic": _script(
-        "gyroscopic.py", "Gyroscopic and convective terms",
+        "gyroscopic.py",
+        "Gyroscopic and convective terms",
         gyroscopic="Change of the natural frequencies with the carrier speed, and what is heard on the ring.",
     ),
     "planet_phasing": _script(
-        "planet_phasing.py", "Planet phasing",
+        "planet_phasing.py",
+        "Planet phasing",
         phases="Phases of sun and ring meshes at every planet, and what is left of their forces.",
         resultants="Resultants and kinds of modes that every harmonic excites, for four sets.",
         mesh_forces="Mesh forces of Kahraman's train over the frequency of every harmonic.",
     ),
     "campbell": _script(
-        "campbell.py", "Campbell diagram of a wind turbine set",
+        "campbell.py",
+        "Campbell diagram of a wind turbine set",
         campbell="Natural frequencies of set B over the carrier speed, and critical speeds.",
     ),
     "gravity_wedging": _script(
-        "gravity_wedging.py", "Tooth wedging by weight",
+        "gravity_wedging.py",
+        "Tooth wedging by weight",
         gravity_wedging="Carrier over the frequency of its weight for three plays; dashed: not stable.",
         carrier_orbit="Path of the carrier's centre at the peak.",
         planet_bearings="Planet bearing forces at the peak over one turn of the weight.",
         tooth_contact="Share of the cycle in which both flanks touch: where back flanks do, teeth wedge.",
     ),
     "bearing_clearance": _script(
-        "bearing_clearance.py", "Clearance of the carrier bearing",
+        "bearing_clearance.py",
+        "Clearance of the carrier bearing",
         ring_resonance="Resonance of the ring: its peak moves down with the clearance.",
         tooth_contact="Contact of both flanks over frequency and clearance: above the line teeth wedge.",
     ),
     "impacts": _script(
-        "impacts.py", "Impacts and chaos",
+        "impacts.py",
+        "Impacts and chaos",
         damping="Amplitude and mean for two damping ratios; dashed: not stable.",
         tooth_error="Amplitude and mean for three tooth errors; dashed: not stable.",
         contact_states="Contact states by harmonic balance and by sweeps in time.",
@@ -160,22 +177,22 @@ RUNS = {
         sun_path="Path of the sun's centre, held and floating.",
         spectrum="Lines of the mesh force: side bands of the sun's turn about every mesh harmonic.",
     ),
-    "multistage": Run(
-        "scripts/multistage.py", "Four stages over the speed", case="cases/four_stage_reducer.toml"
-    ),
+    "multistage": Run("scripts/multistage.py", "Four stages over the speed", case="cases/four_stage_reducer.toml"),
     "multistage_published": _script(
-        "multistage.py --published", "Readings of a published table",
+        "multistage.py --published",
+        "Readings of a published table",
         published="Natural frequencies of eight readings of the table beside the printed range.",
     ),
     "drivetrain": Run(
-        "scripts/drivetrain.py --balanced", "Wind turbine drivetrain at constant speed",
+        "scripts/drivetrain.py --balanced",
+        "Wind turbine drivetrain at constant speed",
         says={
             "backlash": "A mesh that parts, around its first separation; made linear, it pulls.",
             "sensitivity": "Lines at half and twice each assumed input.",
         },
         case="cases/wind_turbine_drivetrain.toml",
     ),
-}  # fmt: skip
+}
 
 
 def main(
@@ -203,9 +220,7 @@ def main(
     from femgear.storage.files import write_bytes, write_text
 
     if unknown := set(only) - set(RUNS):
-        raise CaseError(
-            f"no run {', '.join(sorted(unknown))}", code="E-CHOICE", key="--only", limit=", ".join(RUNS)
-        )
+        raise CaseError(f"no run {', '.join(sorted(unknown))}", code="E-CHOICE", key="--only", limit=", ".join(RUNS))
     page, images = docs / "gallery.md", docs / "images"
     sections = _sections(page)
     with Progress() as progress:

@@ -32,7 +32,7 @@ def run_script(command: Callable[..., None], *, arguments: Sequence[str] | None 
     """
     from cyclopts import App
 
-    from femgear.trains.protocol import one_blas_thread
+    from femgear.stages.protocol import one_blas_thread
 
     program = Path(sys.argv[0]).name
     app = App(

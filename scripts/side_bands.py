@@ -115,9 +115,11 @@ def main(
     known, ratio = _gear_set(case, ring, sun, planet, angle)
     if not (1 <= harmonics <= 12 and 1 <= half_width <= 60 and -200 <= threshold < 0):
         raise CaseError(
-            "no such picture", code="E-RANGE", value=(harmonics, half_width, threshold),
+            "no such picture",
+            code="E-RANGE",
+            value=(harmonics, half_width, threshold),
             limit="1 to 12 harmonics, 1 to 60 orders on either side, a threshold of -200 dB up to below 0",
-        )  # fmt: skip
+        )
     rows, order, level, found = [], np.zeros(0), np.zeros(0), []
     if spectrum is not None:
         measured = _read(spectrum, channel)
@@ -152,8 +154,8 @@ def main(
 def _gear_set(case, ring, sun, planet, angle) -> tuple[GearSet, float]:
     """The set of a case or of teeth and angles, and the speed of its carrier over that of ``--speed``."""
     from femgear.case.gear_set import need_set, planetary_set
+    from femgear.stages.lumped_set import member_speeds
     from femgear.trains.reading import read_case
-    from femgear.trains.rigid import member_speeds
 
     if ring is None and (sun or planet or angle):
         message, remedy = "teeth and angles belong to a set without case file", "give --ring as well"
@@ -166,9 +168,11 @@ def _gear_set(case, ring, sun, planet, angle) -> tuple[GearSet, float]:
         apart = np.diff(np.sort(np.mod(angle, 360.0))) if np.isfinite(angle).all() else [0.0]
         if not all(5 <= one <= 2000 for one in teeth) or min(apart, default=1.0) < 0.1:
             raise CaseError(
-                "teeth or angles of a set", code="E-RANGE", value=(*teeth, *angle),
+                "teeth or angles of a set",
+                code="E-RANGE",
+                value=(*teeth, *angle),
                 limit="5 to 2000 teeth, planets at different finite angles",
-            )  # fmt: skip
+            )
         return GearSet(ring, sun, planet, np.radians(angle)), 1.0
     data = read_case(case or REFERENCE_CASE)
     need_set(data)
@@ -202,9 +206,7 @@ def _read_csv(path: Path, channel: str | None) -> Measured:
         return CaseError(message, code="E-FILE", **where)
 
     if len(lines) < 3:
-        raise problem(
-            f"{max(len(lines) - 1, 0)} lines of a spectrum", 1, limit="a heading and two lines or more"
-        )
+        raise problem(f"{max(len(lines) - 1, 0)} lines of a spectrum", 1, limit="a heading and two lines or more")
     divider = next((mark for mark in ";\t" if mark in lines[0][1]), ",")
     (first, heading), *table = [(i, next(csv.reader([one], delimiter=divider))) for i, one in lines]
     names = [[*re.split(r"[\[(]", cell.strip(), maxsplit=1), ""] for cell in heading]
@@ -240,9 +242,7 @@ def _read_csv(path: Path, channel: str | None) -> Measured:
         values.append((pair[0], pair[1]))
     x, y = np.array(values).T
     amplitude = 10 ** (y / 20) if level else y
-    return Measured(
-        x * (HERTZ[unit] if hertz else 1.0), hertz, amplitude, f"{path.name}: {heading[chosen[0]]}"
-    )
+    return Measured(x * (HERTZ[unit] if hertz else 1.0), hertz, amplitude, f"{path.name}: {heading[chosen[0]]}")
 
 
 def _read_universal(path: Path, channel: str | None) -> Measured:
@@ -265,21 +265,22 @@ def _read_universal(path: Path, channel: str | None) -> Measured:
     if len(every) > 1:  # a signal may have the name of its spectrum
         found = [item for item in every if item[2]["func_type"] in KNOWN]
     if len(found) != 1:
-        listed = "; ".join(
-            f"{name} (dataset {i}, type {one['func_type']})" for i, name, one in found or every
-        )
+        listed = "; ".join(f"{name} (dataset {i}, type {one['func_type']})" for i, name, one in found or every)
         raise problem(
-            f"{len(found)} spectra in the file", value=listed[:600] or None,
-            limit="one dataset 58 of a spectrum", remedy="choose one by --channel and its ID line 1",
-        )  # fmt: skip
+            f"{len(found)} spectra in the file",
+            value=listed[:600] or None,
+            limit="one dataset 58 of a spectrum",
+            remedy="choose one by --channel and its ID line 1",
+        )
     ((number, name, one),) = found
     where, y = f"dataset {number}: {name}", np.asarray(one["data"])
     if one["func_type"] not in KNOWN:
         raise problem(
-            "a function that is no spectrum of amplitudes", value=f"{where}, type {one['func_type']}",
+            "a function that is no spectrum of amplitudes",
+            value=f"{where}, type {one['func_type']}",
             limit=", ".join(f"{number} ({word})" for number, word in KNOWN.items()),
             remedy="export the amplitude spectrum of one sensor",
-        )  # fmt: skip
+        )
     if one["func_type"] == 2 and np.iscomplexobj(y):
         raise problem("an auto spectrum with complex values", value=where, limit="real numbers")
     kind = one.get("abscissa_spec_data_type")
@@ -310,9 +311,7 @@ def _orders(measured: Measured, speed: str | None, ratio: float, path: Path) -> 
         return measured.abscissa
     carrier = abs(to_si(speed, SPEED)) * ratio / (2 * np.pi)
     if carrier == 0:
-        raise CaseError(
-            "at rest nothing is heard", code="E-SPEED", key="--speed", value=speed, limit="not zero"
-        )
+        raise CaseError("at rest nothing is heard", code="E-SPEED", key="--speed", value=speed, limit="not zero")
     print(f"carrier: {60 * carrier:.6g} rpm, one order is {carrier:.6g} Hz")
     return measured.abscissa / carrier
 
@@ -320,10 +319,13 @@ def _orders(measured: Measured, speed: str | None, ratio: float, path: Path) -> 
 def _checked_tolerance(tolerance: float, step: float) -> float:
     if not (0 < tolerance < 0.25 and (step >= 0.5 or tolerance >= 0.499 * step)):
         raise CaseError(
-            "the tolerance of orders does not fit the spectrum", code="E-RANGE", key="--tolerance",
-            value=f"{tolerance:g}, step {step:.3g} orders", limit="half the step or more, below 0.25",
+            "the tolerance of orders does not fit the spectrum",
+            code="E-RANGE",
+            key="--tolerance",
+            value=f"{tolerance:g}, step {step:.3g} orders",
+            limit="half the step or more, below 0.25",
             remedy="measure over more turns of the carrier: as many as one over the step",
-        )  # fmt: skip
+        )
     return tolerance
 
 
@@ -352,9 +354,7 @@ def _print_lines(name: str, rows, threshold: float, tolerance: float, known: Gea
     parts = sum(one is not None for one in known.teeth[1:])
     if parts:
         chance = 1 - (1 - 2 * tolerance) ** (4 * parts)
-        print(
-            f"an order without meaning fits turns of sun or planet by chance in {chance:.0%} of cases at most"
-        )
+        print(f"an order without meaning fits turns of sun or planet by chance in {chance:.0%} of cases at most")
 
 
 def _figure(known: GearSet, order, level, verdicts, threshold: float, harmonics: int, half_width: int):
@@ -369,9 +369,7 @@ def _figure(known: GearSet, order, level, verdicts, threshold: float, harmonics:
     for h, ax in enumerate(axes, 1):
         centre = h * known.ring
         whole = np.arange(max(centre - half_width, 1), centre + half_width + 1)
-        ax.bar(
-            whole, array_factor(known.angles, whole), width=0.8, color=SKY, alpha=0.5, label="array factor"
-        )
+        ax.bar(whole, array_factor(known.angles, whole), width=0.8, color=SKY, alpha=0.5, label="array factor")
         no = whole[whole % g != 0]
         ax.plot(no, np.full(len(no), 0.03), "x", color=GREY, label="forbidden by the symmetry", clip_on=False)
         ax.set_ylim(0, 1.12)
@@ -390,9 +388,7 @@ def _figure(known: GearSet, order, level, verdicts, threshold: float, harmonics:
             own &= np.abs(order - centre) <= half_width + 0.5
             if own.any():
                 over.vlines(order[own], bottom, level[own], color=colour, linewidth=1.5)
-                over.plot(
-                    order[own], level[own], mark, color=colour, markersize=6, label=f"measured: {verdict}"
-                )
+                over.plot(order[own], level[own], mark, color=colour, markersize=6, label=f"measured: {verdict}")
     legend_below(figure, columns=3)
     return figure
 

@@ -191,9 +191,7 @@ def _print_verdict(best, grid) -> None:
         ("length", best.length_slopes, LENGTH_STEP, ("shorter", "longer"), 1e3, "um per mm"),
     ):
         parts = [
-            f"end of the range searched to {word}"
-            if np.isnan(slope)
-            else f"{number * slope:+.3f} {unit} {word}"
+            f"end of the range searched to {word}" if np.isnan(slope) else f"{number * slope:+.3f} {unit} {word}"
             for slope, word in zip(slopes, words)
         ]
         print(f"slopes of the STE peak to peak over the {name}, within {step * 1e6:g} um: {', '.join(parts)}")

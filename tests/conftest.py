@@ -28,9 +28,7 @@ gc.set_threshold(100_000, 20, 100)
 # the default of 1e-12 is as large as many a compliance in m/N: an expected zero states its own tolerance
 type(pytest.approx(1.0)).DEFAULT_ABSOLUTE_TOLERANCE = 0.0
 if pytest.approx(1e-20) == 2e-20:
-    raise pytest.UsageError(
-        "this pytest keeps the absolute tolerance of approx elsewhere: see tests/conftest.py"
-    )
+    raise pytest.UsageError("this pytest keeps the absolute tolerance of approx elsewhere: see tests/conftest.py")
 
 TESTS = Path(__file__).parent
 
@@ -40,7 +38,8 @@ def pytest_collection_finish():
     gc.freeze()
 
 
-sys.path[:0] = [str(TESTS), str(TESTS.parent / "scripts")]
+ROOT = TESTS.parent
+sys.path[:0] = [str(TESTS), str(ROOT / "scripts"), str(ROOT), str(ROOT / "validation")]
 
 from computed_once import kept  # noqa: E402
 from small_systems import chain_excitation, geared_chain, planet_excitation, planet_set  # noqa: E402, F401
@@ -50,7 +49,7 @@ from small_systems import chain_excitation, geared_chain, planet_excitation, pla
 def folder_of_both_workers(tmp_path_factory):
     """Folder of what the workers of one session compute once for both, or None in a session of one process.
 
-    Nothing is shared there, so that tests/tools/mutation.py sees which test runs which line.
+    Nothing is shared there, so that validation/tools/mutation.py sees which test runs which line.
     """
     if "PYTEST_XDIST_WORKER" not in os.environ:
         return None
@@ -72,7 +71,7 @@ def pytest_sessionfinish(session):
 def bodies_are_computed_once(folder_of_both_workers):
     """A third of these are computed for several tests. What a test itself imports is as it is."""
     from femgear.contact import bodies, width_waves
-    from femgear.trains.static import stages
+    from femgear.stages import static as stages
 
     with pytest.MonkeyPatch.context() as patch:
         for module, name in (

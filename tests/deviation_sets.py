@@ -14,11 +14,18 @@ def make_set(teeth=(27, 40, 108), planets=3, *, backlash=0.0) -> PlanetarySet:
     sizes = {"sun": 9e-3, "planet": 15e-3, "ring": 0.1}
     gears = [
         Gear(
-            z, 1.5e-3, ALPHA, 0.0, 0.025, size, internal=name == "ring", thickness_allowance=backlash / 2,
+            z,
+            1.5e-3,
+            ALPHA,
+            0.0,
+            0.025,
+            size,
+            internal=name == "ring",
+            thickness_allowance=backlash / 2,
             name=name,
         )
         for z, (name, size) in zip(teeth, sizes.items())
-    ]  # fmt: skip
+    ]
     distance = 51e-3 if teeth == (27, 40, 108) else None
     return close_set(
         *gears,

@@ -20,17 +20,13 @@ PAIR_RADII, PAIR_INERTIAS = (0.05, 0.1), (0.2, 0.9)
 
 def held_pair(*, stiffness=2e8, damping=0.0, backlash=math.inf, harmonics=0, teeth=20) -> DrivetrainModel:
     """Two wheels on held axes: one mesh of mean stiffness [N/m], one elastic coordinate."""
-    mesh = MeshSection.in_si(
-        stiffness=stiffness, contact_ratio=1.5, low_share=0.8, phase=0.0, backlash=backlash
-    )
+    mesh = MeshSection.in_si(stiffness=stiffness, contact_ratio=1.5, low_share=0.8, phase=0.0, backlash=backlash)
     train = Drivetrain(
         tuple(
             BodySection.in_si(name=name, mass=10.0, inertia=inertia, tilts=False)
             for name, inertia in zip("ab", PAIR_INERTIAS)
         ),
-        parallel=(
-            ParallelSection.in_si(between=("a", "b"), teeth=(teeth, teeth), radii=PAIR_RADII, mesh=mesh),
-        ),
+        parallel=(ParallelSection.in_si(between=("a", "b"), teeth=(teeth, teeth), radii=PAIR_RADII, mesh=mesh),),
         bearings=tuple(BearingSection.in_si(body=name, radial=math.inf) for name in "ab"),
         gravity=0.0,
         damping_ratio=damping,
@@ -46,9 +42,7 @@ def planetary_stage(**changes) -> Drivetrain:
         BearingSection.in_si(body="carrier", radial=2e8),
         BearingSection.in_si(body="sun", radial=3e7),
     )
-    return Drivetrain(
-        bodies, planetary=(train.planetary[0].changed(**changes),), bearings=bearings, gravity=0.0
-    )
+    return Drivetrain(bodies, planetary=(train.planetary[0].changed(**changes),), bearings=bearings, gravity=0.0)
 
 
 def torsional_matrices(train: Drivetrain) -> tuple[np.ndarray, np.ndarray, np.ndarray, tuple[str, ...]]:

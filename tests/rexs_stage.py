@@ -22,8 +22,13 @@ class Gearbox:
         self.add(9, "planetary_stage")
         self.add(3, "planet_carrier")
         self.add(91, "lubricant", density_at_15_degree_celsius=(0.88, "kg / dm^3"))
-        self.add(86, "material", density=(7.85, "kg / dm^3"), elastic_modulus=(210000.0, "N / mm^2"),
-                 poisson_ratio=(0.3, NONE))  # fmt: skip
+        self.add(
+            86,
+            "material",
+            density=(7.85, "kg / dm^3"),
+            elastic_modulus=(210000.0, "N / mm^2"),
+            poisson_ratio=(0.3, NONE),
+        )
         tool = {"addendum_coefficient_reference_profile": (1.25, NONE)}
         self.add(83, "rack_shaped_tool", tip_radius_factor=(0.25, NONE), **tool)
         self.add(85, "cutter_wheel_tool", number_of_teeth=(23, NONE), tip_radius_factor=(0.0, NONE), **tool)
@@ -36,9 +41,7 @@ class Gearbox:
                 self.components[flank]["attributes"]["addendum_coefficient_basic_profile"] = (addendum, NONE)
         self.add(4, "shaft")
         self.relate("planet_carrier_shaft", planetary_stage=9, shaft=4)
-        self.components[34]["attributes"] |= {
-            "rotational_speed": (1500.0, "1 / min"), "defines_speed": ("true", NONE)
-        }  # fmt: skip
+        self.components[34]["attributes"] |= {"rotational_speed": (1500.0, "1 / min"), "defines_speed": ("true", NONE)}
         self.add(
             38,
             "external_load",
@@ -59,8 +62,12 @@ class Gearbox:
                 self.relate("side", assembly=bearing, outer_part=230 + n, inner_part=270 + n)
             for mesh, first, second, angle in ((210, 53, 240 + n, 0.0), (220, 240 + n, 58, 180.0)):
                 turned = (360.0 - n * 360.0 / planets + angle) % 360.0
-                self.add(mesh + n, "cylindrical_stage", center_distance=(78.0, MM),
-                         rotating_angle_around_neg_u_axis=(turned, DEG))  # fmt: skip
+                self.add(
+                    mesh + n,
+                    "cylindrical_stage",
+                    center_distance=(78.0, MM),
+                    rotating_angle_around_neg_u_axis=(turned, DEG),
+                )
                 self.relate("assembly", assembly=9, part=mesh + n)
                 self.relate("stage", gear_1=first, stage=mesh + n, gear_2=second)
 
@@ -71,11 +78,24 @@ class Gearbox:
         self.relations.append((type, roles))
 
     def gear(self, id, teeth, type, shaft, diameter, tool, shift=None):
-        self.add(id, type, number_of_teeth=(teeth, NONE), normal_module=(4.0, MM), face_width=(50.0, MM),
-                 helix_angle_reference_diameter=(0.0, DEG), u_coordinate_on_shaft=(25.0, MM))  # fmt: skip
+        self.add(
+            id,
+            type,
+            number_of_teeth=(teeth, NONE),
+            normal_module=(4.0, MM),
+            face_width=(50.0, MM),
+            helix_angle_reference_diameter=(0.0, DEG),
+            u_coordinate_on_shaft=(25.0, MM),
+        )
         self.add(shaft, "shaft")
-        self.add(1000 + shaft, "shaft_section", u_coordinate_on_shaft=(0.0, MM), length=(100.0, MM),
-                 outer_diameter_begin=(diameter, MM), outer_diameter_end=(diameter, MM))  # fmt: skip
+        self.add(
+            1000 + shaft,
+            "shaft_section",
+            u_coordinate_on_shaft=(0.0, MM),
+            length=(100.0, MM),
+            outer_diameter_begin=(diameter, MM),
+            outer_diameter_end=(diameter, MM),
+        )
         self.relate("assembly", assembly=shaft, part=1000 + shaft)
         self.relate("assembly", assembly=shaft, part=id)
         self.relate("reference", origin=id, referenced=86)
@@ -121,10 +141,14 @@ class Gearbox:
             return {"id": name, "unit": unit, "floating_point": value}
 
         components = [
-            {"id": id, "type": one["type"], "name": one["name"],
-             "attributes": [attribute(name, *pair) for name, pair in one["attributes"].items()]}
+            {
+                "id": id,
+                "type": one["type"],
+                "name": one["name"],
+                "attributes": [attribute(name, *pair) for name, pair in one["attributes"].items()],
+            }
             for id, one in self.components.items()
-        ]  # fmt: skip
+        ]
         relations = [
             {"id": n, "type": type, "refs": [{"id": id, "role": role} for role, id in roles.items()]}
             for n, (type, roles) in enumerate(self.relations)
@@ -151,18 +175,33 @@ class ParallelUnit(Gearbox):
         self.components[1]["name"] = "two stages"
         self.add(2, "gear_casing")
         self.relate("assembly", assembly=1, part=2)
-        self.add(3, "material", density=(7.85, "kg / dm^3"), elastic_modulus=(206000.0, "N / mm^2"),
-                 poisson_ratio=(0.3, NONE))  # fmt: skip
+        self.add(
+            3,
+            "material",
+            density=(7.85, "kg / dm^3"),
+            elastic_modulus=(206000.0, "N / mm^2"),
+            poisson_ratio=(0.3, NONE),
+        )
         for number, (length, diameter) in enumerate(((160.0, 30.0), (120.0, 40.0), (200.0, 55.0)), start=1):
             shaft = 10 * number
             self.add(shaft, "shaft")
-            self.add(shaft + 1, "shaft_section", u_coordinate_on_shaft=(0.0, MM), length=(length, MM),
-                     outer_diameter_begin=(diameter, MM), outer_diameter_end=(diameter, MM))  # fmt: skip
+            self.add(
+                shaft + 1,
+                "shaft_section",
+                u_coordinate_on_shaft=(0.0, MM),
+                length=(length, MM),
+                outer_diameter_begin=(diameter, MM),
+                outer_diameter_end=(diameter, MM),
+            )
             self.relate("assembly", assembly=shaft, part=shaft + 1)
             self.relate("reference", origin=shaft, referenced=3)
             for bearing, place in ((shaft + 2, 10.0), (shaft + 3, length - 10.0)):
-                self.add(bearing, "concept_bearing", radial_stiffness=(2e8, "N / m"),
-                         u_coordinate_on_shaft_inner_side=(place, MM))  # fmt: skip
+                self.add(
+                    bearing,
+                    "concept_bearing",
+                    radial_stiffness=(2e8, "N / m"),
+                    u_coordinate_on_shaft_inner_side=(place, MM),
+                )
                 self.relate("side", assembly=bearing, inner_part=shaft, outer_part=2)
         self.components[10]["attributes"] |= {"rotational_speed": (1500.0, "1 / min")}
         self.add(5, "external_load", torque_around_u_axis=(100.0, "N m"), u_coordinate_on_shaft=(0.0, MM))
@@ -175,17 +214,26 @@ class ParallelUnit(Gearbox):
         self.mesh(52, 43, 44, 120.0, 90.0)
 
     def wheel(self, id, shaft, teeth, module, width, place, type="cylindrical_gear"):
-        self.add(id, type, number_of_teeth=(teeth, NONE), normal_module=(module, MM), face_width=(width, MM),
-                 u_coordinate_on_shaft=(place, MM))  # fmt: skip
+        self.add(
+            id,
+            type,
+            number_of_teeth=(teeth, NONE),
+            normal_module=(module, MM),
+            face_width=(width, MM),
+            u_coordinate_on_shaft=(place, MM),
+        )
         self.relate("assembly", assembly=shaft, part=id)
         for side in (1000, 2000):
-            self.add(side + id, "cylindrical_gear_flank", normal_pressure_angle=(20.0, DEG),
-                     addendum_modification_coefficient=(0.0, NONE))  # fmt: skip
+            self.add(
+                side + id,
+                "cylindrical_gear_flank",
+                normal_pressure_angle=(20.0, DEG),
+                addendum_modification_coefficient=(0.0, NONE),
+            )
         self.relate("flank", gear=id, left=1000 + id, right=2000 + id)
 
     def mesh(self, id, first, second, distance, angle):
-        self.add(id, "cylindrical_stage", center_distance=(distance, MM),
-                 rotating_angle_around_neg_u_axis=(angle, DEG))  # fmt: skip
+        self.add(id, "cylindrical_stage", center_distance=(distance, MM), rotating_angle_around_neg_u_axis=(angle, DEG))
         self.relate("assembly", assembly=1, part=id)
         self.relate("stage", stage=id, gear_1=first, gear_2=second)
 
@@ -194,7 +242,5 @@ def both_units():
     """The planetary stage of `Gearbox`, and the two spur stages beside it with ids from 50000."""
     box, unit = Gearbox("1.4"), ParallelUnit()
     box.components |= {50000 + id: one for id, one in unit.components.items()}
-    box.relations += [
-        (type, {role: 50000 + id for role, id in roles.items()}) for type, roles in unit.relations
-    ]
+    box.relations += [(type, {role: 50000 + id for role, id in roles.items()}) for type, roles in unit.relations]
     return box

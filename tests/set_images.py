@@ -15,10 +15,22 @@ from femgear.trains.reading import parse_case, with_values
 
 # powers of length, and of mass at equal times, in the units of a case
 POWERS = {
-    "m": (1, 0), "mm": (1, 0), "um": (1, 0), "Pa": (0, 1), "kg/m^3": (0, 1), "kg": (3, 1), "kg m^2": (5, 1),
-    "N/m": (1, 1), "N/m^3": (-1, 1), "N m": (3, 1), "N m/rad": (3, 1), "rpm": (-1, 0), "Hz": (-1, 0),
-    "deg": (0, 0), "rad": (0, 0),
-}  # fmt: skip
+    "m": (1, 0),
+    "mm": (1, 0),
+    "um": (1, 0),
+    "Pa": (0, 1),
+    "kg/m^3": (0, 1),
+    "kg": (3, 1),
+    "kg m^2": (5, 1),
+    "N/m": (1, 1),
+    "N/m^3": (-1, 1),
+    "N m": (3, 1),
+    "N m/rad": (3, 1),
+    "rpm": (-1, 0),
+    "Hz": (-1, 0),
+    "deg": (0, 0),
+    "rad": (0, 0),
+}
 
 
 def larger(case: Case, factor: float) -> Case:

@@ -9,7 +9,7 @@ from published.multistage_example import CASES
 
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.system.system import MechanicalSystem
-from femgear.trains.gear_pair.model import ImpactPair
+from femgear.trains.impacts.model import ImpactPair
 from femgear.trains.multistage.model import PlanetaryStage, in_series
 
 EVEN = 2.0 * np.pi * np.arange(3) / 3
@@ -30,10 +30,15 @@ def closed_set(teeth, module=4e-3, *, angles=EVEN, **changes):
         "planet_bearing": 2e8,
     }
     return PlanarSet(
-        sun_radius=sun, ring_radius=ring, planet_radius=planet,
-        centre_distance=distance, planet_angles=angles,
-        pressure_angle_sun_planet=alpha, pressure_angle_planet_ring=alpha, **values | changes,
-    )  # fmt: skip
+        sun_radius=sun,
+        ring_radius=ring,
+        planet_radius=planet,
+        centre_distance=distance,
+        planet_angles=angles,
+        pressure_angle_sun_planet=alpha,
+        pressure_angle_planet_ring=alpha,
+        **values | changes,
+    )
 
 
 def stage(teeth, module=4e-3, *, fixed="ring", phases=None, angle=0.0, **changes):
@@ -58,11 +63,12 @@ def published_table():
     """Rows of the published four-stage table by stage, in its units: kg, mm, kg mm^2, N/mm."""
     rows = []
     for one in tomllib.loads((CASES / "published_four_stages.toml").read_text(encoding="utf-8"))["stage"]:
-        texts = {f"{name} {entry}": one[name][entry] for name in ("sun", "planet", "carrier")
-                 for entry in ("mass", "inertia")}  # fmt: skip
-        texts |= dict(
-            zip(("sun base radius", "planet base radius"), (one["radii"]["sun"], one["radii"]["planet"]))
-        )
+        texts = {
+            f"{name} {entry}": one[name][entry]
+            for name in ("sun", "planet", "carrier")
+            for entry in ("mass", "inertia")
+        }
+        texts |= dict(zip(("sun base radius", "planet base radius"), (one["radii"]["sun"], one["radii"]["planet"])))
         stiffness = one["radii"]["mesh_stiffness"]
         texts["external mesh stiffness"] = stiffness["sun_planet"]
         texts["internal mesh stiffness"] = stiffness["planet_ring"]
@@ -80,9 +86,13 @@ def gear_pair(inertia, base_radius, *, torque=0.0, mesh_damping=0.0):
     """Two gears on rigid shafts (Kahraman and Singh 1990); the rotation in their ratio is free."""
     column = np.array([[base_radius[0]], [-base_radius[1]]])
     return MechanicalSystem(
-        M=np.diag(inertia), C=mesh_damping * (column @ column.T), K=np.zeros((2, 2)), W=column,
-        load=torque / base_radius[0] * column[:, 0], dofs=("theta_1", "theta_2"),
-    )  # fmt: skip
+        M=np.diag(inertia),
+        C=mesh_damping * (column @ column.T),
+        K=np.zeros((2, 2)),
+        W=column,
+        load=torque / base_radius[0] * column[:, 0],
+        dofs=("theta_1", "theta_2"),
+    )
 
 
 def example_pair(damping_ratio):

@@ -211,9 +211,7 @@ def modes() -> xr.Dataset:
             row[DIAMETERS + m] = value
         components.append(row)
 
-    ring = {"sun: rotation": 20.0, "carrier: rotation": 4.0} | {
-        f"planet {n + 1}: rotation": -9.0 for n in range(N)
-    }
+    ring = {"sun: rotation": 20.0, "carrier: rotation": 4.0} | {f"planet {n + 1}: rotation": -9.0 for n in range(N)}
     add(ring, 0.0, "rigid", 0)
     add(
         {f"planet {n + 1}: rotation": 50.0 for n in range(N)} | {"sun: rotation": 60.0},
@@ -222,9 +220,7 @@ def modes() -> xr.Dataset:
         0,
     )
     for axis, hertz in (("x", 840.0), ("y", 840.0)):
-        add(
-            {f"sun: {axis}": 1.5, f"carrier: {axis}": 0.4}, hertz, "translational", 1, ((1, 0.05), (-1, 0.05))
-        )
+        add({f"sun: {axis}": 1.5, f"carrier: {axis}": 0.4}, hertz, "translational", 1, ((1, 0.05), (-1, 0.05)))
     for n, hertz in ((0, 5200.0), (1, 2100.0), (2, 2600.0), (3, 3150.0), (4, 4100.0)):
         for phase in (1.0, -1j)[: 1 if n == 0 else 2]:
             add({}, hertz, "ring", n, ((n, phase), (-n, np.conj(phase))))
@@ -326,9 +322,7 @@ def housing() -> xr.Dataset:
             "lines_imag": _variable(so, lines.imag, "m", words),
             "carrier_speed": _variable("speed", speed, "rad/s", "speed of the carrier"),
             "excitation_limit": _variable("speed", np.full(len(SPEEDS), 5e3), "Hz", "limit"),
-            "level": _variable(
-                "speed", np.sqrt((np.abs(acceleration) ** 2).sum(axis=1) / 2), "m/s^2", "level"
-            ),
+            "level": _variable("speed", np.sqrt((np.abs(acceleration) ** 2).sum(axis=1) / 2), "m/s^2", "level"),
             "pressure_level": _variable("speed", np.array([50.9, 87.7]), "dB", "level at the microphone"),
         },
         coords={

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validation.reference.plane_elasticity import edge_load
 
 from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
@@ -21,10 +20,11 @@ from femgear.fe.meshing import mesh_outline
 from femgear.gears.checks import check_set
 from femgear.gears.deviations import check_deviations
 from femgear.gears.tooth import half_sector
+from femgear.stages.static import solve_static
+from femgear.stages.static_results import describe_static
 from femgear.storage.results import coordinates
 from femgear.trains.reading import read_case, with_value, with_values
-from femgear.trains.static.results import describe_static
-from femgear.trains.static.stages import solve_static
+from validation.reference.plane_elasticity import edge_load
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -169,9 +169,7 @@ def test_refused_before_anything_is_computed(defect, tmp_path, capsys):
 # --- what deserves a warning and has a defined result ------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "angles", ["planets = 1", 'planets = 2\nplanet_angles = ["0 deg", "181.333333333 deg"]']
-)
+@pytest.mark.parametrize("angles", ["planets = 1", 'planets = 2\nplanet_angles = ["0 deg", "181.333333333 deg"]'])
 def test_one_or_two_planets_are_a_warning(angles, tmp_path):
     gears = planetary_set(read_case(case_of(tmp_path, edited(("planets = 3", angles)))))
     assert [warning.code for warning in check_set(gears)] == ["W-PLANETS"]
@@ -303,14 +301,29 @@ def test_an_active_set_that_is_cut_short_falls_back_to_the_general_solver():
 # --- what a message names ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("change", "key", "line_with", "words"), [
-    (("[material]\n", '[material]\nroot_stress_limit = "1 Pa"\n'), "material.root_stress_limit",
-     "root_stress_limit", "a stress of 1e-06 MPa"),
-    (("[housing]\n", '[housing]\nmicrophone = {distance = "-1 m"}\n'), "housing.microphone.distance",
-     "microphone", "a length"),
-    (('speeds = ["250 rpm", "3100 rpm"]', 'speeds = {from = "250 rpm", to = "3100 rpm", count = 1}'),
-     "operation.speeds.count", "count = 1}", "out of range"),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("change", "key", "line_with", "words"),
+    [
+        (
+            ("[material]\n", '[material]\nroot_stress_limit = "1 Pa"\n'),
+            "material.root_stress_limit",
+            "root_stress_limit",
+            "a stress of 1e-06 MPa",
+        ),
+        (
+            ("[housing]\n", '[housing]\nmicrophone = {distance = "-1 m"}\n'),
+            "housing.microphone.distance",
+            "microphone",
+            "a length",
+        ),
+        (
+            ('speeds = ["250 rpm", "3100 rpm"]', 'speeds = {from = "250 rpm", to = "3100 rpm", count = 1}'),
+            "operation.speeds.count",
+            "count = 1}",
+            "out of range",
+        ),
+    ],
+)
 def test_a_refusal_names_quantity_and_line(change, key, line_with, words, tmp_path):
     text = edited(change)
     (tmp_path / "case.toml").write_text(text, encoding="utf-8")

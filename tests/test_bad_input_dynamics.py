@@ -21,9 +21,7 @@ from femgear.trains.reading import read_case, with_value
 
 def oscillator(*elements, damping=0.0, load=0.0, forces=()):
     """Unit mass on its elements."""
-    system = MechanicalSystem(
-        np.eye(1), np.array([[damping]]), np.zeros((1, 1)), np.eye(1), np.array([load]), ("x",)
-    )
+    system = MechanicalSystem(np.eye(1), np.array([[damping]]), np.zeros((1, 1)), np.eye(1), np.array([load]), ("x",))
     return NonlinearSystem(system, elements, tuple(HarmonicForce([f], o) for f, o in forces))
 
 
@@ -39,9 +37,7 @@ def rectangular(harmonics=40, ratio=0.03):
     n = np.arange(1, harmonics + 1)
     low = 1.0 - 0.35 * 0.365
     wave = 0.35 / low * 2.0 * np.sin(np.pi * n * 0.635) / (np.pi * n)
-    return oscillator(
-        GearMeshes([0], FourierSeries([[1.0, *wave]]), separates=False), damping=2.0 * ratio, load=1.0
-    )
+    return oscillator(GearMeshes([0], FourierSeries([[1.0, *wave]]), separates=False), damping=2.0 * ratio, load=1.0)
 
 
 def test_a_converged_fixed_point_does_not_hide_parametric_instability():
@@ -97,9 +93,7 @@ def test_speeds_through_zero_are_refused():
 
 def test_planets_faster_than_the_waves_of_the_ring_are_refused():
     """f_n / n of a free ring rises with n; on a foundation it has a minimum: here 900/3 Hz = 18000 rpm."""
-    modes = SimpleNamespace(
-        nodal_diameter=np.array([0, 1, 2, 3]), frequency=np.array([10.0, 400.0, 700.0, 900.0])
-    )
+    modes = SimpleNamespace(nodal_diameter=np.array([0, 1, 2, 3]), frequency=np.array([10.0, 400.0, 700.0, 900.0]))
     check_rim_speed(modes, [2.0 * np.pi * 299.9])
     with pytest.raises(CaseError, match="E-SPEED") as error:
         check_rim_speed(modes, [10.0, 2.0 * np.pi * 300.1])

@@ -34,9 +34,7 @@ STAGES = ("static", "stress", "modes", "runup", "dynamics", "housing")
 
 
 def synthetic():
-    spec = importlib.util.spec_from_file_location(
-        "synthetic", Path(__file__).with_name("synthetic_results.py")
-    )
+    spec = importlib.util.spec_from_file_location("synthetic", Path(__file__).with_name("synthetic_results.py"))
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -234,9 +232,7 @@ def test_the_installed_program(tmp_path):
     assert run.returncode == 0
     for command in ("check", "run", "report", "sweep", "schema"):
         assert command in run.stdout
-    run = subprocess.run(
-        [program, "check", "absent.toml"], capture_output=True, text=True, timeout=60, check=False
-    )
+    run = subprocess.run([program, "check", "absent.toml"], capture_output=True, text=True, timeout=60, check=False)
     assert run.returncode == 2 and "E-FILE" in run.stderr and run.stdout == ""
 
 
@@ -467,9 +463,7 @@ def test_an_interrupt_while_the_last_words_are_shown_changes_nothing(monkeypatch
     monkeypatch.setattr(cli._Stream, "flush", lambda self: os.kill(os.getpid(), signal.SIGINT) or flush(self))
     monkeypatch.setattr(cli, "_called", lambda *_: print("said") or 0)
     assert cli.main(["--version"]) == 0
-    assert (
-        capsys.readouterr().out == "said\n" and signal.getsignal(signal.SIGINT) == signal.default_int_handler
-    )
+    assert capsys.readouterr().out == "said\n" and signal.getsignal(signal.SIGINT) == signal.default_int_handler
 
 
 def test_an_interrupt_of_which_compiled_code_makes_an_error_is_one(tmp_path, capsys, pipeline):
@@ -596,9 +590,7 @@ def test_export_writes_every_number_with_its_unit(tmp_path, capsys, pipeline):
 
 
 def test_python_runs_the_package_as_the_program():
-    done = subprocess.run(
-        [sys.executable, "-m", "femgear", "--version"], capture_output=True, text=True, timeout=60
-    )
+    done = subprocess.run([sys.executable, "-m", "femgear", "--version"], capture_output=True, text=True, timeout=60)
     assert (done.returncode, done.stdout.strip()) == (0, femgear.__version__)
     refused = [sys.executable, "-m", "femgear", "check", "absent.toml"]
     assert subprocess.run(refused, capture_output=True, timeout=60).returncode == 2

@@ -20,9 +20,9 @@ from femgear import cli
 from femgear.findings import CATALOGUE, SEVERITIES, Finding, FindingWarning, as_data, from_data, once, remark
 from femgear.report.tables import Marks, in_decibels, lower_bound, significant, tabulate, unmarked
 from femgear.run import solve
+from femgear.stages.static_results import describe_stress
 from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import train_of, trains
-from femgear.trains.static.results import describe_stress
 
 PACKAGE = Path(__file__).parents[1] / "femgear"
 CASES = Path(__file__).parents[1] / "cases"
@@ -261,13 +261,17 @@ def transient_base() -> xr.Dataset:
     vm, one = ("variant", "mesh"), np.ones((1, 1))
     return xr.Dataset(
         {
-            "least_force": (vm, -200.0 * one), "pulling": (vm, 0.0 * one), "lost": (vm, 0.0 * one),
-            "growth": (("variant",), [-3.0]), "gain": (("variant",), [1.0]),
-            "energy_error": (("variant",), [1e-12]), "momentum_error": (("variant",), [1e-14]),
+            "least_force": (vm, -200.0 * one),
+            "pulling": (vm, 0.0 * one),
+            "lost": (vm, 0.0 * one),
+            "growth": (("variant",), [-3.0]),
+            "gain": (("variant",), [1.0]),
+            "energy_error": (("variant",), [1e-12]),
+            "momentum_error": (("variant",), [1e-14]),
         },
         {"variant": ["with bending"], "mesh": ["a-b"]},
         {"steps": 40_000, "step": 5e-5, "contact": "linear"},
-    )  # fmt: skip
+    )
 
 
 def transient(contact: str = "linear", **values) -> xr.Dataset:
@@ -280,17 +284,21 @@ PROFILE = {"kind": "measured profile", "diameters": ["41 mm", "41.5 mm"], "devia
 ASKED = {"lowest": "1 rpm", "highest": "2 rpm"}
 CLOSE = ["0 deg", f"{29 * 360 / 135} deg", "200 deg"]
 SHARP = {
-    "sun.teeth": 14, "sun.tip_diameter": None, "sun.profile_shift": 0.0, "sun.bore_radius": "3 mm",
-    "planet.teeth": 40, "ring.teeth": 94,
-    "planet.bore_radius": "3 mm", "set.centre_distance": "40.5 mm", "ring.tip_diameter": "138.6 mm",
+    "sun.teeth": 14,
+    "sun.tip_diameter": None,
+    "sun.profile_shift": 0.0,
+    "sun.bore_radius": "3 mm",
+    "planet.teeth": 40,
+    "ring.teeth": 94,
+    "planet.bore_radius": "3 mm",
+    "set.centre_distance": "40.5 mm",
+    "ring.tip_diameter": "138.6 mm",
     "ring.cutter_teeth": None,
-}  # fmt: skip
+}
 RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-BACK": lambda: of_stage("elastic", "static", static(mesh_force=0.0, back_force=10.0)),
     "W-BALANCE": lambda: of_stage("drivetrain", "transient", transient(energy_error=1e-3)),
-    "W-BRANCH": lambda: of_stage(
-        "gear_pair", "response", xr.Dataset(attrs={"complete": 0, "message": "lost at 0.7"})
-    ),
+    "W-BRANCH": lambda: of_stage("gear_pair", "response", xr.Dataset(attrs={"complete": 0, "message": "lost at 0.7"})),
     "W-CHAOS": lambda: of_stage("drivetrain", "transient", transient("separating", growth=5.0)),
     "W-CONVERGENCE": lambda: of_stage("elastic", "dynamics", dynamics(converged=False)),
     "W-DEFLECTION": lambda: of_stage("elastic", "static", static(ste=1e-4)),
@@ -309,9 +317,11 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-PULL": lambda: of_stage("elastic", "runup", runup(lowest=-100.0)),
     "W-RESIDUAL": lambda: of_stage("elastic", "housing", housing(missing_compliance="a tenth")),
     "W-SEPARATION": lambda: of_stage(
-        "pair", "dynamics", dynamics().assign(
+        "pair",
+        "dynamics",
+        dynamics().assign(
             drive_contact=("speed", [1.0, 0.9]), back_contact=("speed", [0.0, 0.0]), backlash=("x", [1e-5])
-        )
+        ),
     ),
     "W-SETTLED": lambda: of_stage("gear_pair", "sweep", xr.Dataset({"settled": ("ratio", [1, 0])})),
     "W-STEPS": lambda: of_stage("elastic", "runup", runup(missed=3)),
@@ -319,17 +329,13 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-THRUST": lambda: of_stage("helical", "static", over_width(couple=20.0)),
     "W-UNSTABLE": lambda: of_stage("elastic", "dynamics", dynamics(stable=False)),
     "W-WEDGED": lambda: of_stage("planar", "static", static(back_force=10.0)),
-}  # fmt: skip
+}
 OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
-    "W-BACKLASH": lambda: of_case(
-        CHAIN, {"simulation.contact_loss": True, "parallel[0].mesh.backlash": None}
-    ),
+    "W-BACKLASH": lambda: of_case(CHAIN, {"simulation.contact_loss": True, "parallel[0].mesh.backlash": None}),
     "W-BEARING": lambda: of_case(PLANETARY, {"planet.bearing_clearance": "10 um"}),
     "W-CLEARANCE": lambda: of_case(PLANETARY, {"sun.tip_diameter": "45.6 mm"}),
     "W-CONTACT-POINTS": lambda: of_case(HELICAL, {"helical.contact_points": "base_circles"}),
-    "W-CONTACT-RATIO": lambda: of_case(
-        PLANETARY, {"sun.tip_diameter": "44 mm", "planet.tip_diameter": "62.4 mm"}
-    ),
+    "W-CONTACT-RATIO": lambda: of_case(PLANETARY, {"sun.tip_diameter": "44 mm", "planet.tip_diameter": "62.4 mm"}),
     "W-COUPLING": lambda: of_case(PLANETARY, {"motor.coupling_stiffness": "1 N m/rad"}),
     "W-DAMPING": lambda: of_case(PLANETARY, {"dynamics.damping_ratio": 0.0}),
     "W-ESTIMATED": lambda: of_case(PLANETARY, {"sun.mass": None}),
@@ -475,7 +481,7 @@ def test_the_level_of_an_excitation_that_ends_early_is_a_bound(tmp_path):
 
 def test_pressures_that_no_steel_carries_are_marked_in_the_table_of_a_run():
     from femgear.findings import as_text
-    from femgear.trains.static.results import describe_static
+    from femgear.stages.static_results import describe_static
 
     data = static(max_pressure=5e9)
     data.attrs["findings"] = as_text(of_stage("elastic", "static", data))

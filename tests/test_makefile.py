@@ -88,10 +88,10 @@ def test_this_system_has_what_is_needed():
         ("test", "-m pytest"),
         ("lint", "-m ruff check"),
         ("docs", "-m sphinx -b html -j 2 -W --keep-going docs out/docs/html"),
-        ("validate", "python tests/validation -o docs/validation.md"),
-        ("soak", "python tests/soak --minutes 60 --page docs/reliability.md"),
+        ("validate", "python validation -o docs/validation.md"),
+        ("soak", "python validation/soak --minutes 60 --page docs/reliability.md"),
         ("bench", "-m pytest benchmarks"),
-        ("mutants", "python tests/tools/mutation.py"),
+        ("mutants", "python validation/tools/mutation.py"),
         ("clean", "rm -rf out"),
     ],
 )
@@ -134,9 +134,7 @@ def test_clean_keeps_the_grids_of_the_repository(tmp_path, checkout):
 def test_ci_runs_the_tests_and_stops_at_the_first_failure():
     lines = (ROOT / ".ci" / "run").read_text().splitlines()
     assert "set -euo pipefail" in lines
-    assert {"make lint", "make test"} <= set(lines) and any(
-        line.startswith("if command -v chromium") for line in lines
-    )
+    assert {"make lint", "make test"} <= set(lines) and any(line.startswith("if command -v chromium") for line in lines)
     # once more in a folder with the name of the package, a blank and a letter beyond ASCII
     assert lines[-2:] == [
         'git clone --quiet . "$elsewhere/fem gear/femgear ü"',

@@ -54,11 +54,14 @@ def _nothing(*_, progress, **__):
     return found, ["±.csv"]
 
 
-@pytest.mark.parametrize(("encoding", "title"), [
-    ("ascii", r"Pr\xfcfstand 3: \u03a9 \u2248 2 \xb5m \xbd"),
-    ("latin-1", r"Prüfstand 3: \u03a9 \u2248 2 µm ½"),
-    ("utf-8", TITLE),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("encoding", "title"),
+    [
+        ("ascii", r"Pr\xfcfstand 3: \u03a9 \u2248 2 \xb5m \xbd"),
+        ("latin-1", r"Prüfstand 3: \u03a9 \u2248 2 µm ½"),
+        ("utf-8", TITLE),
+    ],
+)
 def test_what_an_encoding_lacks_is_escaped(titled, tmp_path, monkeypatch, encoding, title):
     monkeypatch.setattr(importlib.import_module("femgear.study.sweep"), "sweep_into", _nothing)
     monkeypatch.setattr(run_module, "report_again", lambda folder, **_: None)
@@ -87,21 +90,27 @@ def started(*arguments, shell: str = "") -> subprocess.CompletedProcess:
     line = f'("$@"; echo "code $?" >&3) 3>&2 {shell}'
     return subprocess.run(
         ["bash", "-c", line, "bash", sys.executable, "-m", "femgear.cli", *arguments],
-        capture_output=True, text=True, timeout=60, check=False,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+    )
 
 
-@pytest.mark.parametrize(("redirected", "arguments", "code", "words"), [
-    (">&-", ["schema"], 0, ""),
-    (">&- 2>&-", ["check", "absent.toml"], 2, ""),
-    (">/dev/full", ["schema"], 4, "[E-DISK-FULL] standard output: "),
-    (">/dev/full", ["schema"], 4, "remedy:  free some space where it goes, or send it elsewhere\n"),
-    (">/dev/full", ["check", "absent.toml"], 2, "E-FILE"),
-    ("2>/dev/full", ["check", "absent.toml"], 2, ""),
-    ("| true", ["schema"], 0, ""),
-    ("| true", ["--help"], 0, ""),
-    ("2>&1 | true", ["check", "absent.toml"], 2, ""),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("redirected", "arguments", "code", "words"),
+    [
+        (">&-", ["schema"], 0, ""),
+        (">&- 2>&-", ["check", "absent.toml"], 2, ""),
+        (">/dev/full", ["schema"], 4, "[E-DISK-FULL] standard output: "),
+        (">/dev/full", ["schema"], 4, "remedy:  free some space where it goes, or send it elsewhere\n"),
+        (">/dev/full", ["check", "absent.toml"], 2, "E-FILE"),
+        ("2>/dev/full", ["check", "absent.toml"], 2, ""),
+        ("| true", ["schema"], 0, ""),
+        ("| true", ["--help"], 0, ""),
+        ("2>&1 | true", ["check", "absent.toml"], 2, ""),
+    ],
+)
 def test_streams_that_cannot_be_written(redirected, arguments, code, words):
     """A reader that has gone is no failure; a full disk is, unless the program has one of its own."""
     run = started(*arguments, shell=redirected)
@@ -132,9 +141,7 @@ def test_names_with_control_characters_are_escaped(tmp_path, capsys):
     folder = tmp_path / HOSTILE
     folder.mkdir()
     path = folder / "case.toml"
-    path.write_text(
-        TEXT.replace("teeth = 27", 'teeth = 27\n"k\\u001b\\u202e" = "v\\u001b"'), encoding="utf-8"
-    )
+    path.write_text(TEXT.replace("teeth = 27", 'teeth = 27\n"k\\u001b\\u202e" = "v\\u001b"'), encoding="utf-8")
     assert cli.main(["check", str(path)]) == 2
     err = capsys.readouterr().err
     assert len(err.splitlines()) == 2 and "\x1b" not in err and "\u202e" not in err
@@ -147,9 +154,7 @@ def test_names_with_control_characters_are_escaped(tmp_path, capsys):
 
 
 def test_every_part_of_a_message_is_one_line_without_control_characters():
-    error = CaseError(
-        HOSTILE, code="E-CASE", key=HOSTILE, value=[HOSTILE], limit=HOSTILE, remedy=HOSTILE, file=HOSTILE
-    )
+    error = CaseError(HOSTILE, code="E-CASE", key=HOSTILE, value=[HOSTILE], limit=HOSTILE, remedy=HOSTILE, file=HOSTILE)
     assert len(str(error).splitlines()) == 4 and str(error).count(ESCAPED) == 6
     assert str(Finding("W-TIP", HOSTILE, HOSTILE, remedy=HOSTILE)).count(ESCAPED) == 3
 
@@ -173,10 +178,35 @@ def test_a_case_in_a_folder_with_an_unusual_blank_finds_its_profile(tmp_path):
 
 NAMES = ("Prüfstand 3", "歯車 1", "दाँत", "run_3-b (new)", "a.b", "ä" * 100, "condor", "com10x")
 WRONG_NAMES = (
-    "", "a\x1b", "a\nb", "a/b", "a\\b", "a:b", "a*", "a?", 'a"b', "<a", "a>", "a|b", ".a", "a.", " a", "a ",
-    "..", "con", "NUL.txt", "Com1", "lpt²", "nul .txt", "a" * 101, "歯" * 81, "u\u0308", "a\u202eb",
-    "\udcff", "a\u00a0b",
-)  # fmt: skip
+    "",
+    "a\x1b",
+    "a\nb",
+    "a/b",
+    "a\\b",
+    "a:b",
+    "a*",
+    "a?",
+    'a"b',
+    "<a",
+    "a>",
+    "a|b",
+    ".a",
+    "a.",
+    " a",
+    "a ",
+    "..",
+    "con",
+    "NUL.txt",
+    "Com1",
+    "lpt²",
+    "nul .txt",
+    "a" * 101,
+    "歯" * 81,
+    "u\u0308",
+    "a\u202eb",
+    "\udcff",
+    "a\u00a0b",
+)
 
 
 def test_folders_have_names_that_every_file_system_takes(tmp_path):
@@ -215,7 +245,7 @@ def test_an_interrupt_while_a_script_loads_its_libraries_is_told_as_such(monkeyp
     def script(*, wide: bool = False) -> None:
         """Compute nothing."""
 
-    monkeypatch.setattr("femgear.trains.protocol.one_blas_thread", interrupted)
+    monkeypatch.setattr("femgear.stages.protocol.one_blas_thread", interrupted)
     assert script_tools.run_script(script, arguments=["--wide"]) == 130
     assert capsys.readouterr().err == "interrupted\n"
 
@@ -253,8 +283,16 @@ def test_equal_rows_that_follow_one_another_are_one(capsys):
         *(("12", "1"), ("14", "1"), ("250.5", "1"), ("x", "1"), ("x", "1"), ("", "1")),
     )
     assert [row[0] for row in merged(rows)] == [
-        "sun-planet 1..3", "planet 1..2-ring", "planet 3-ring", "12", "14", "250.5", "x", "x", "",
-    ]  # fmt: skip
+        "sun-planet 1..3",
+        "planet 1..2-ring",
+        "planet 3-ring",
+        "12",
+        "14",
+        "250.5",
+        "x",
+        "x",
+        "",
+    ]
     assert len({row[1] for row in merged(rows)}) == 4
     cli._print([Block("Static", ("mesh", "STE [um]"), rows[:3])])
     out = capsys.readouterr().out

@@ -62,9 +62,7 @@ def test_pictures_cost_no_package_that_pyvista_does_not_bring():
 
 
 def test_versions_of_the_files_of_a_release_are_the_last_one():
-    assert "## [Unreleased]\n" in CHANGES and RELEASED[0] == max(
-        RELEASED, key=lambda v: [*map(int, v.split("."))]
-    )
+    assert "## [Unreleased]\n" in CHANGES and RELEASED[0] == max(RELEASED, key=lambda v: [*map(int, v.split("."))])
     assert yaml.safe_load(read("CITATION.cff"))["version"] == RELEASED[0]
     assert yaml.safe_load(read("recipe/recipe.yaml"))["context"]["version"] == RELEASED[0]
 
@@ -93,9 +91,7 @@ def test_hooks_are_what_make_lint_runs():
     assert len(hooks) == len(lint.splitlines())
 
 
-@pytest.mark.parametrize(
-    "path", sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("[!c]*.yml")), ids=lambda p: p.stem
-)
+@pytest.mark.parametrize("path", sorted((ROOT / ".github" / "ISSUE_TEMPLATE").glob("[!c]*.yml")), ids=lambda p: p.stem)
 def test_issue_forms_ask_for_something(path):
     form = yaml.safe_load(path.read_text(encoding="utf-8"))
     assert form["name"] and form["description"] and form["body"]

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent / "tools"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "validation" / "tools"))
 
 import public_api
 
 REMEDY = """the public interface is not that of tests/public_api.txt.
-Where this is meant, run `python tests/tools/public_api.py` and add a line under "Unreleased" in CHANGELOG.md;
+Where this is meant, run `python validation/tools/public_api.py` and add a line under "Unreleased" in CHANGELOG.md;
 a name that goes or is renamed stays for one minor release with a DeprecationWarning (CONTRIBUTING.md).
 """
 

@@ -13,19 +13,19 @@ import numpy as np
 import pytest
 import set_images as images
 from random_sets import KINDS, PLANETS, RandomSet, equal_planets, random_set, symmetry, turn_of
-from validation.reference.sensor_in_time import symmetry_leakage
 
 from femgear.case.dependencies import Steps, static_entries
 from femgear.gears.kinematics import torques
 from femgear.housing.orders import OrderSpectrum, order_level
 from femgear.housing.sensor import fixed_sensor_lines
+from femgear.stages.static import solve_static
+from femgear.stages.static_results import StaticResult
 from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import with_value, with_values
-from femgear.trains.static.results import StaticResult
-from femgear.trains.static.stages import solve_static
+from validation.reference.sensor_in_time import symmetry_leakage
 
 # every kind and every number of planets; `make soak` goes on beyond the others
 QUICK = (1, 4, 7, 8, 10, 13, 15, 18)
@@ -452,9 +452,7 @@ def converged_in_excitation(solved):
     limit = float(solved.dynamics.excitation_limit[-1])
     speeds = [f"{solved.case.operation.speeds[-1]!r} rad/s"]
     ended, further = (
-        solved.solved_as(
-            with_values(solved.case, {"dynamics.up_to": f"{end!r} Hz", "operation.speeds": speeds})
-        )
+        solved.solved_as(with_values(solved.case, {"dynamics.up_to": f"{end!r} Hz", "operation.speeds": speeds}))
         for end in (min(limit, 100e3), min(2.0 * limit, 200e3))
     )
     change = 20.0 * np.log10(heard_level(further) / heard_level(ended))[0]

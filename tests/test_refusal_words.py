@@ -82,7 +82,7 @@ WORDS = {
         ("E-TOML", None, "line 13", 'stand in quotation marks, as in "2 mm"'),
     ),
     "a table of a list with single brackets": (
-        TEXT + '\n[bearing]\na = 1\n[bearing]\na = 2\n',
+        TEXT + "\n[bearing]\na = 1\n[bearing]\na = 2\n",
         ("E-TOML", "bearing", "[[bearing]]"),
     ),
     "a model of another kind": ("model = 3\n", ("E-TYPE", "model", "gear_pair, pair, drivetrain")),
@@ -91,7 +91,7 @@ WORDS = {
         ("E-TYPE", "stage[0]", "write the section [[stage]]"),
     ),
     "an empty file": ("", ("E-KEY-MISSING", None, "add it: a text")),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("defect", WORDS)
@@ -105,11 +105,7 @@ def test_words_of_refusals(defect):
 
 def test_a_date_beside_a_series_of_a_file_is_named():
     """The points of files are written into the text of the case once its entries are known to be right."""
-    text = (
-        (CASES / "own_chain.toml")
-        .read_text(encoding="utf-8")
-        .replace('name = "motor"', "name = 1979-05-27", 1)
-    )
+    text = (CASES / "own_chain.toml").read_text(encoding="utf-8").replace('name = "motor"', "name = 1979-05-27", 1)
     with pytest.raises(CaseError) as caught:
         parse_case(text, name=str(CASES / "own_chain.toml"))
     assert ("E-TYPE", "body[0].name") in [(one.code, one.key) for one in caught.value.problems]
@@ -155,7 +151,7 @@ def test_meshes_that_never_carry_are_refused_before_the_modes():
 
 def test_a_branch_without_a_start_names_its_entry(monkeypatch):
     from femgear.errors import ConvergenceError
-    from femgear.trains.protocol import blaming_start
+    from femgear.stages.protocol import blaming_start
 
     case = read_case(CASES / "gear_pair.toml")
     for code, key in (("E-START", "response.from"), ("E-SOLVE", None)):

@@ -14,6 +14,7 @@ from edited_manifests import finish
 from femgear import cli
 from femgear.errors import StorageError
 from femgear.report import style
+from femgear.stages import static_figures as figures
 from femgear.storage.files import checksum, write_dataset, write_text
 from femgear.storage.results import (
     prepare_output,
@@ -23,7 +24,6 @@ from femgear.storage.results import (
     write_csv_tables,
 )
 from femgear.trains.reading import read_case
-from femgear.trains.static import figures
 
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 
@@ -228,10 +228,14 @@ def test_tables_without_a_line_are_left_out_and_attributes_have_units(tmp_path):
     data = xr.Dataset(
         {"gap": (("member", "position"), np.zeros((0, 4)), named), "x": ("position", np.zeros(4), named)},
         attrs={
-            "title": "words", "sun_torque": 30.0, "planet_angles": np.array([0.0, 2.0]),
-            "teeth": np.array([27]), "complete": 1, "step": np.float64(1e-5),
+            "title": "words",
+            "sun_torque": 30.0,
+            "planet_angles": np.array([0.0, 2.0]),
+            "teeth": np.array([27]),
+            "complete": 1,
+            "step": np.float64(1e-5),
         },
-    )  # fmt: skip
+    )
     names = write_csv_tables(data, tmp_path, "static")
     assert names == ["static.csv", "static_position.csv"] == sorted(os.listdir(tmp_path))
     units = pd.read_csv(tmp_path / "static.csv", keep_default_na=False).set_index("name").unit

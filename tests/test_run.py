@@ -27,23 +27,33 @@ CASES = Path(__file__).parents[1] / "cases"
 pytestmark = pytest.mark.usefixtures("coarse_states")
 QUICK = {
     "planetary_27_40_108": {
-        "static.positions": 14, "static.flank_elements": 6, "static.stresses": False,
-        "operation.speeds": ["2000 rpm", "3100 rpm"], "housing.published": None,
+        "static.positions": 14,
+        "static.flank_elements": 6,
+        "static.stresses": False,
+        "operation.speeds": ["2000 rpm", "3100 rpm"],
+        "housing.published": None,
     },
     "own_chain": {
-        "simulation.settle": "0.05 s", "simulation.duration": "0.2 s", "simulation.rate": "20 kHz",
+        "simulation.settle": "0.05 s",
+        "simulation.duration": "0.2 s",
+        "simulation.rate": "20 kHz",
         "simulation.modes": 1,
     },
     "four_stage_reducer": {},
     "helical_30_20_70": {
-        "static.positions": 12, "static.flank_elements": 6, "operation.speeds": ["900 rpm", "9000 rpm"],
+        "static.positions": 12,
+        "static.flank_elements": 6,
+        "operation.speeds": ["900 rpm", "9000 rpm"],
     },
     "nrel_pgb": {"planar.branch": {"from": "36 Hz", "to": "36.5 Hz", "harmonics": 3}},
     "gear_pair": {
-        "response.from": 1.1, "response.to": 1.0, "response.harmonics": 4, "chaos": None,
+        "response.from": 1.1,
+        "response.to": 1.0,
+        "response.harmonics": 4,
+        "chaos": None,
         "sweep": {"ranges": [{"from": 0.6, "to": 1.0, "count": 3}], "steps": 60, "most_periods": 60},
     },
-}  # fmt: skip
+}
 
 
 def quick(name):
@@ -204,9 +214,16 @@ def test_results_keep_types_identity_and_what_may_be_written(tmp_path):
     shared = np.arange(4.0)
     shared.setflags(write=False)
     value = {
-        "twice": (shared, [shared]), "set": {1, 2}, "frozen": frozenset({"a"}), "slice": slice(1, None, 2),
-        "nan": float("nan"), "number": np.float32(0.1), "complex": 1 + 2j, 3: None, "big": 10**30,
-    }  # fmt: skip
+        "twice": (shared, [shared]),
+        "set": {1, 2},
+        "frozen": frozenset({"a"}),
+        "slice": slice(1, None, 2),
+        "nan": float("nan"),
+        "number": np.float32(0.1),
+        "complex": 1 + 2j,
+        3: None,
+        "big": 10**30,
+    }
     write_result(value, tmp_path / "a.npz", fingerprint="f")
     found = read_result(tmp_path / "a.npz", fingerprint="f")
     array = found["twice"][0]
@@ -245,9 +262,7 @@ def gone_on(case, begun, folder):
         pytest.param("helical_30_20_70", helical.helical_dynamics_parts, "most", 5, marks=pytest.mark.slow),
     ],
 )
-def test_speeds_in_parts_are_those_solved_together(
-    name, parts, option, limit, many_speeds, tmp_path, monkeypatch
-):
+def test_speeds_in_parts_are_those_solved_together(name, parts, option, limit, many_speeds, tmp_path, monkeypatch):
     case, begun, whole = many_speeds(name)
     monkeypatch.setitem(parts.__kwdefaults__, option, limit)
     ways = whole, gone_on(case, begun, tmp_path / "parts")

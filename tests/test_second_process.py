@@ -58,9 +58,7 @@ def test_values_come_in_order_from_both(taken):
 def test_without_a_second_core_everything_is_done_here(monkeypatch, taken):
     monkeypatch.setattr(second_process, "second_core", lambda: False)
     beside = []
-    found = second_process.shared(
-        [told(taken, value) for value in range(3)], lambda: beside.append(taken.is_set())
-    )
+    found = second_process.shared([told(taken, value) for value in range(3)], lambda: beside.append(taken.is_set()))
     assert found == [(value, os.getpid()) for value in range(3)] and beside == [False]
 
 

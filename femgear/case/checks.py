@@ -38,9 +38,7 @@ def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
     """List the refusals of entries that do not go together; `more` are those of the train."""
     if missing := list(check_face_widths(case)):
         return missing
-    checks = (
-        _check_operation, _check_set, _check_supports, _check_ends, _check_numbers, _check_deviations
-    )  # fmt: skip
+    checks = (_check_operation, _check_set, _check_supports, _check_ends, _check_numbers, _check_deviations)
     problems = [problem for check in checks for problem in check(case)] + list(more)
     return problems or list(check_published(case))
 
@@ -69,28 +67,35 @@ def check_face_widths(case: Any) -> Iterator[CaseError]:
             shown = [LENGTH.show(one) for one in common]
             yield CaseError(
                 f"sun and planets have {shown[0]} of their faces in common, planets and ring {shown[1]}",
-                code="E-CHOICE", key=key, limit="meshes of one common face width",
+                code="E-CHOICE",
+                key=key,
+                limit="meshes of one common face width",
                 remedy=f'give planet.face_width = "{LENGTH.show(least)}", or leave {key} out',
-            )  # fmt: skip
+            )
 
 
 def _check_operation(case: Case):
     operation, ring = case.operation, case.ring
     if operation.input == operation.fixed:
         yield CaseError(
-            f"the {operation.input} cannot be both driven and held", code="E-MECHANISM",
-            key="operation.fixed", value=operation.fixed,
+            f"the {operation.input} cannot be both driven and held",
+            code="E-MECHANISM",
+            key="operation.fixed",
+            value=operation.fixed,
             limit="one member driven, another held, the third is the output",
             remedy="drive the sun and hold the ring, or name two other members",
-        )  # fmt: skip
+        )
     yield from check_speeds(case)
     yield from check_torque(operation.torque)
     if not case.rigid and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
         yield CaseError(
-            "the ring is the fixed member but nothing keeps it from turning", code="E-MECHANISM",
-            key="ring.foundation_tangential", value="0 N/m^3", limit="above 0 N/m^3",
+            "the ring is the fixed member but nothing keeps it from turning",
+            code="E-MECHANISM",
+            key="ring.foundation_tangential",
+            value="0 N/m^3",
+            limit="above 0 N/m^3",
             remedy="give a tangential foundation, or hold another member",
-        )  # fmt: skip
+        )
 
 
 def steep_helix(key: str, helix_angle: float) -> Iterator[Finding]:
@@ -107,28 +112,30 @@ def check_speeds(case: Any) -> Iterator[CaseError]:
     """Refuse operating speeds given twice, and a run-up that ends where it begins or before."""
     speeds = case.operation.speeds
     if len(set(speeds)) < len(speeds):
-        yield CaseError(
-            "a speed is given twice", code="E-DUPLICATE", key="operation.speeds", remedy="keep one of them"
-        )
+        yield CaseError("a speed is given twice", code="E-DUPLICATE", key="operation.speeds", remedy="keep one of them")
     start, to = runup_range(case)
     if case.runup.count and not start < to:
         name, value = ("from", start) if case.runup.to is None else ("to", to)
         yield CaseError(
-            "the run-up ends where it begins, or before", code="E-RANGE", key=f"runup.{name}",
+            "the run-up ends where it begins, or before",
+            code="E-RANGE",
+            key=f"runup.{name}",
             value=SPEED.show(value),
             limit=f"below {SPEED.show(to)}" if name == "from" else f"above {SPEED.show(start)}",
             remedy="give runup.from below runup.to; defaults are around operation.speeds",
-        )  # fmt: skip
+        )
 
 
 def check_torque(torque: float) -> Iterator[CaseError]:
     """Refuse a torque [N m] that is neither none nor enough to be told from none."""
     if 0.0 < abs(torque) < LEAST_TORQUE:
         yield CaseError(
-            "the torque is too small to be told from none", code="E-RANGE", key="operation.torque",
+            "the torque is too small to be told from none",
+            code="E-RANGE",
+            key="operation.torque",
             value=f"{torque:g} N m",
             limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
-        )  # fmt: skip
+        )
 
 
 def runup_range(case: Any) -> tuple[float, float]:
@@ -141,16 +148,20 @@ def _check_set(case: Case):
     angles, count = case.set.planet_angles, case.set.planets
     if angles is not None and len(angles) != count:
         yield CaseError(
-            f"{len(angles)} angles for {count} planets", code="E-COUNT", key="set.planet_angles",
-            value=len(angles), limit=f"{count} angles",
+            f"{len(angles)} angles for {count} planets",
+            code="E-COUNT",
+            key="set.planet_angles",
+            value=len(angles),
+            limit=f"{count} angles",
             remedy="give one angle a planet, or leave planet_angles out for equal spacing",
-        )  # fmt: skip
+        )
     if case.set.centre_distance is case.sun.profile_shift is case.ring.profile_shift is None:
         yield CaseError(
-            "neither the centre distance nor a profile shift of sun or ring is given", code="E-KEY-MISSING",
+            "neither the centre distance nor a profile shift of sun or ring is given",
+            code="E-KEY-MISSING",
             key="set.centre_distance",
             remedy="give set.centre_distance, sun.profile_shift or ring.profile_shift; the rest is found",
-        )  # fmt: skip
+        )
 
 
 def _check_supports(case: Case):
@@ -158,10 +169,12 @@ def _check_supports(case: Case):
         section = getattr(case, name)
         if section.support_stiffness is not None and section.support_shaft:
             yield CaseError(
-                f"the support of the {name} is given twice", code="E-DUPLICATE",
-                key=f"{name}.support_stiffness", limit="one of support_stiffness and support_shaft",
+                f"the support of the {name} is given twice",
+                code="E-DUPLICATE",
+                key=f"{name}.support_stiffness",
+                limit="one of support_stiffness and support_shaft",
                 remedy='write support_stiffness = "5e7 N/m" or the like, "0 N/m" for a member that floats',
-            )  # fmt: skip
+            )
 
 
 def _check_ends(case: Case):
@@ -173,9 +186,12 @@ def _check_ends(case: Case):
         if alone != (getattr(section, other) is None) and (alone or name == "carrier"):
             key = f"{name}.{'torque_end' if alone else other}"
             yield CaseError(
-                f"{name}.torque_end and {name}.{other} belong together", code="E-KEY-MISSING", key=key,
-                limit='torque_end = "front" (z < 0) or "back" (z > 0)', remedy="give both, or none of them",
-            )  # fmt: skip
+                f"{name}.torque_end and {name}.{other} belong together",
+                code="E-KEY-MISSING",
+                key=key,
+                limit='torque_end = "front" (z < 0) or "back" (z > 0)',
+                remedy="give both, or none of them",
+            )
 
 
 def _check_numbers(case: Case):
@@ -184,39 +200,51 @@ def _check_numbers(case: Case):
     # the record of rigid bodies is that of the static positions
     if rigid and harmonics is not None and case.static.positions <= 2 * harmonics:
         yield CaseError(
-            f"{case.static.positions} positions cannot carry {harmonics} mesh harmonics", code="E-RANGE",
-            key="static.positions", value=case.static.positions, limit=f"more than 2 x {harmonics}",
-        )  # fmt: skip
+            f"{case.static.positions} positions cannot carry {harmonics} mesh harmonics",
+            code="E-RANGE",
+            key="static.positions",
+            value=case.static.positions,
+            limit=f"more than 2 x {harmonics}",
+        )
     if harmonics is not None and response is not None and response < 2 * harmonics:
         yield CaseError(
             "the response needs twice the harmonics of the mesh: the product of both reaches that far",
-            code="E-RANGE", key="dynamics.response_harmonics", value=response,
+            code="E-RANGE",
+            key="dynamics.response_harmonics",
+            value=response,
             limit=f"{2 * harmonics} or more",
-        )  # fmt: skip
+        )
     if dynamics.up_to is not None and (rigid or dynamics.mesh_harmonics is not None):
         yield CaseError(
             "the reach of the excitation is given twice"
             if dynamics.mesh_harmonics is not None
             else "rigid bodies are excited by mesh harmonics, not up to a frequency",
-            code="E-RANGE", key="dynamics.up_to", value=f"{dynamics.up_to:g} Hz",
+            code="E-RANGE",
+            key="dynamics.up_to",
+            value=f"{dynamics.up_to:g} Hz",
             limit="one of up_to and mesh_harmonics; rigid bodies have mesh_harmonics alone",
             remedy="leave dynamics.up_to out" if rigid else "leave out one of the two",
-        )  # fmt: skip
+        )
     if harmonics is None and dynamics.response_harmonics is not None:
         yield CaseError(
-            "the harmonics of the response follow from the reach of the excitation", code="E-RANGE",
-            key="dynamics.response_harmonics", value=dynamics.response_harmonics,
+            "the harmonics of the response follow from the reach of the excitation",
+            code="E-RANGE",
+            key="dynamics.response_harmonics",
+            value=dynamics.response_harmonics,
             limit="together with dynamics.mesh_harmonics",
             remedy="give dynamics.mesh_harmonics too, or leave dynamics.response_harmonics out",
-        )  # fmt: skip
+        )
     planets, points = case.set.planets, case.housing.points
     if case.housing.form == "linear" and case.set.planet_angles is None and case.housing.points % planets:
         yield CaseError(
             f"{case.housing.points} points break the symmetry of {planets} equally spaced planets: the "
-            "interpolation between them makes carrier orders that cannot exist", code="E-SYMMETRY",
-            key="housing.points", value=case.housing.points, limit=f"a multiple of {planets}",
+            "interpolation between them makes carrier orders that cannot exist",
+            code="E-SYMMETRY",
+            key="housing.points",
+            value=case.housing.points,
+            limit=f"a multiple of {planets}",
             remedy=f"write {planets * -(-max(points, 54) // planets)}, or leave housing.form out",
-        )  # fmt: skip
+        )
 
 
 def _check_deviations(case: Case):
@@ -238,10 +266,13 @@ def check_gear_deviations(case: Any, more: Iterable[tuple[str, float]] = ()) -> 
     for key, value in (*_gear_amounts(case), *more):
         if abs(value) > most:
             yield CaseError(
-                f"a deviation of {value * 1e6:.6g} um is not plausible", code="E-RANGE", key=key,
+                f"a deviation of {value * 1e6:.6g} um is not plausible",
+                code="E-RANGE",
+                key=key,
                 value=f"{value * 1e6:.6g} um",
-                limit=f"{LARGEST_DEVIATION} modules, {most * 1e6:.6g} um", remedy="check the unit",
-            )  # fmt: skip
+                limit=f"{LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
+                remedy="check the unit",
+            )
 
 
 def _check_planets(case: Case):
@@ -254,14 +285,19 @@ def _check_planets(case: Case):
         for i, table in enumerate(tables):
             if table.planet > case.set.planets:
                 yield CaseError(
-                    f"there is no planet {table.planet}", code="E-RANGE", key=f"{key}[{i}].planet",
-                    value=table.planet, limit=f"1 to {case.set.planets}",
-                )  # fmt: skip
+                    f"there is no planet {table.planet}",
+                    code="E-RANGE",
+                    key=f"{key}[{i}].planet",
+                    value=table.planet,
+                    limit=f"1 to {case.set.planets}",
+                )
             if table.planet in seen:
                 yield CaseError(
-                    f"planet {table.planet} is given twice", code="E-DUPLICATE", key=f"{key}[{i}].planet",
+                    f"planet {table.planet} is given twice",
+                    code="E-DUPLICATE",
+                    key=f"{key}[{i}].planet",
                     remedy="keep one of the tables",
-                )  # fmt: skip
+                )
             seen.add(table.planet)
 
 
@@ -270,16 +306,20 @@ def _check_pitch(key: str, table: GearErrors, teeth: int, most: float):
         values = getattr(table, name)
         if values is not None and len(values) != teeth:
             yield CaseError(
-                f"{len(values)} pitch deviations for {teeth} teeth", code="E-COUNT", key=f"{key}.{name}",
+                f"{len(values)} pitch deviations for {teeth} teeth",
+                code="E-COUNT",
+                key=f"{key}.{name}",
                 limit=f"{teeth} deviations",
-            )  # fmt: skip
+            )
     total = math.fsum(table.pitch or ())
     if abs(total) > ROUNDING * teeth:
         yield CaseError(
             f"the pitch deviations add up to {total * 1e6:.6g} um; around the gear they must add up to zero",
-            code="E-RANGE", key=f"{key}.pitch", limit=f"{ROUNDING * teeth * 1e6:.6g} um from rounding",
+            code="E-RANGE",
+            key=f"{key}.pitch",
+            limit=f"{ROUNDING * teeth * 1e6:.6g} um from rounding",
             remedy="subtract their mean, or give cumulative_pitch",
-        )  # fmt: skip
+        )
     elif table.pitch:
         yield from _check_cumulative(f"{key}.pitch", table.pitch, most)
 
@@ -291,11 +331,12 @@ def _check_cumulative(key: str, pitch: tuple[float, ...], most: float):
     largest = _largest(tuple(cumulative))
     if abs(largest) > most:
         yield CaseError(
-            f"the single pitch deviations add up to {largest * 1e6:.6g} um at tooth "
-            f"{cumulative.index(largest) + 1}", code="E-RANGE", key=key,
+            f"the single pitch deviations add up to {largest * 1e6:.6g} um at tooth {cumulative.index(largest) + 1}",
+            code="E-RANGE",
+            key=key,
             limit=f"cumulative deviations of at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um",
             remedy="check signs, order and unit of the list; it holds deviations from tooth to tooth",
-        )  # fmt: skip
+        )
 
 
 def _gear_amounts(case: Case):
@@ -347,10 +388,12 @@ def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False
         return
     if case.ring.foundation_tangential == 0.0:
         _mechanism(
-            case, "ring.foundation_tangential",
-            "nothing keeps the ring from turning under the load of the planets", value="0 N/m^3",
+            case,
+            "ring.foundation_tangential",
+            "nothing keeps the ring from turning under the load of the planets",
+            value="0 N/m^3",
             remedy='give it a tangential foundation, or write static.members = "fixed"',
-        )  # fmt: skip
+        )
     names = [name for name in ("sun", "carrier") if getattr(case, name).support_stiffness == 0.0]
     # the dynamic model has no back flanks
     both_flanks = case.static.back_flanks and not dynamic
@@ -364,14 +407,22 @@ def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False
         where = f"{N} planet{'s' * (N > 1)} at {angles} deg"
         message = f"{where} cannot hold a floating {loose[0]}: their forces leave it free to move aside"
     _mechanism(
-        case, f"{loose[-1]}.support_stiffness", message, value="0 N/m",
+        case,
+        f"{loose[-1]}.support_stiffness",
+        message,
+        value="0 N/m",
         remedy=f'write support_stiffness = "5e7 N/m" or the like in [{loose[-1]}], or '
         'run with static.members = "fixed" and --only static; three equally spaced planets hold it',
-    )  # fmt: skip
+    )
 
 
 def _mechanism(case: Case, key: str, message: str, *, value: str, remedy: str):
     raise GeometryError(
-        message, code="E-MECHANISM", key=key, value=value, limit=f"above {value}", remedy=remedy,
+        message,
+        code="E-MECHANISM",
+        key=key,
+        value=value,
+        limit=f"above {value}",
+        remedy=remedy,
         file=case.location(key),
-    )  # fmt: skip
+    )

@@ -29,15 +29,16 @@ _LONGEST_TITLE = 200
 _COMMAS = "decimal commas need semicolons or tabs between the columns, or write decimal points"
 
 _PROFILE_ENTRIES = {
-    "roll angle": "roll_angles", "diameter": "diameters", "place": "places", "deviation": "deviations",
-}  # fmt: skip
+    "roll angle": "roll_angles",
+    "diameter": "diameters",
+    "place": "places",
+    "deviation": "deviations",
+}
 _PROFILE_DIMENSIONS = {"roll angle": ANGLE, "diameter": LENGTH, "deviation": LENGTH}
 _PROFILE_UNITS = {"roll_angles": "rad", "diameters": "m", "places": "m", "deviations": "m"}
 _PROFILE_HEADING = "the first line names two columns: roll angle [deg] or diameter [mm], and deviation [um]"
 _LEAD_DIMENSIONS = {"place": LENGTH, "deviation": LENGTH}
-_LEAD_HEADING = (
-    "the first line names two columns: place [mm], from the middle of the width, and deviation [um]"
-)
+_LEAD_HEADING = "the first line names two columns: place [mm], from the middle of the width, and deviation [um]"
 
 
 @dataclass(frozen=True)
@@ -331,7 +332,9 @@ def _read_deviations(path, dimensions: Mapping[str, Dimension], heading: str) ->
     for (before, after), line in zip(pairwise(places), found.lines[1:], strict=True):
         if before == after or (after > before) is not rising:
             raise found.problem(
-                "the points are neither ascending nor descending", line, value=after,
+                "the points are neither ascending nor descending",
+                line,
+                value=after,
                 remedy="sort the lines, and keep one line of every point",
-            )  # fmt: skip
+            )
     return {_PROFILE_ENTRIES[title]: values for title, values in found.values.items()}

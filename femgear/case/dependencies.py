@@ -31,9 +31,7 @@ FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"
 
 _GEARS = ("sun", "planet", "ring", "gear_1", "gear_2")
 _LIMITS = {
-    f"{of}material.{name}_stress_limit"
-    for of in ("", *(f"{gear}." for gear in _GEARS))
-    for name in ("root", "contact")
+    f"{of}material.{name}_stress_limit" for of in ("", *(f"{gear}." for gear in _GEARS)) for name in ("root", "contact")
 }
 _WORDS = {"format", "title", "housing", "runup", *_LIMITS}
 """No stage before housing and run-up depends on them."""
@@ -45,9 +43,7 @@ _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 _MACHINES = {"dynamics", "motor", "brake", "planar", "operation"}
 _DYNAMIC = _WORDS | {"static.stresses", "static.members"}
 """What decides neither modes nor response."""
-_SOLUTION = {
-    f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")
-}
+_SOLUTION = {f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")}
 """How the contact is solved, whatever the grids."""
 _HELIX = {"helical.helix_angle"}
 """All that the transverse section of helical gears depends on."""
@@ -122,9 +118,7 @@ def ring_entries(case: Case) -> Entries:
     return _entries(case, left_out, FLANK_ENTRIES | _SUPPORTS | _WIDTH | {"mass", "inertia"}, kept=_HELIX)
 
 
-def _entries(
-    case: Case, left_out: Set[str], parts: Set[str] = frozenset(), *, kept: Set[str] = frozenset()
-) -> Entries:
+def _entries(case: Case, left_out: Set[str], parts: Set[str] = frozenset(), *, kept: Set[str] = frozenset()) -> Entries:
     """Entries without tables and keys that are left out, but for those kept, and without parts of keys."""
     return {
         key: value
@@ -151,9 +145,11 @@ def check_entries(result: Any, kind: type, case_entries: Entries, words: str) ->
     """
     if not isinstance(result, kind):
         raise CaseError(
-            f"a {words} is needed, not a {type(result).__name__}", code="E-TYPE", limit=f"a {kind.__name__}",
+            f"a {words} is needed, not a {type(result).__name__}",
+            code="E-TYPE",
+            limit=f"a {kind.__name__}",
             remedy="compute the stage: files of results hold numbers alone, from which no stage goes on",
-        )  # fmt: skip
+        )
     entries: Entries = result.entries
     keys = sorted(entries.keys() | case_entries.keys())
     differ = [key for key in keys if entries.get(key) != case_entries.get(key)]
@@ -162,11 +158,13 @@ def check_entries(result: Any, kind: type, case_entries: Entries, words: str) ->
     shown = ", ".join(f"{key} ({_show(entries.get(key))})" for key in differ[:4])
     more = f" and {len(differ) - 4} more" if len(differ) > 4 else ""
     raise CaseError(
-        f"the {words} is that of another case, which differs in {shown}{more}", code="E-OTHER-CASE",
-        key=differ[0], value=_show(case_entries.get(differ[0])),
+        f"the {words} is that of another case, which differs in {shown}{more}",
+        code="E-OTHER-CASE",
+        key=differ[0],
+        value=_show(case_entries.get(differ[0])),
         limit=f"{_show(entries.get(differ[0]))}, with which the {words} was computed",
         remedy=f"compute the {words} of this case, or take the case that it belongs to",
-    )  # fmt: skip
+    )
 
 
 class Steps:

@@ -106,9 +106,7 @@ def estimates(case: Any) -> dict[str, Estimate]:
     """
     gears = planetary_set(case)
     materials = {name: gear_material(case, name) for name in case.gear_names}
-    bodies = {
-        gear.name: (gear_cylinder(gear, materials[gear.name].density), _words(gear)) for gear in gears.gears
-    }
+    bodies = {gear.name: (gear_cylinder(gear, materials[gear.name].density), _words(gear)) for gear in gears.gears}
     if "ring" in bodies:
         radius = gears.centre_distance + gears.planet.rim_radius
         how = "two discs of half the planets' face width, out to the far side of their bores"
@@ -191,9 +189,7 @@ def with_estimates(case: Any) -> tuple[Any, tuple[Finding, ...]]:
         case = _with(case, key.split("."), known[key].value)
     shown = ", ".join(f"{key} = {known[key]}" for key in missing)
     text = f"left out and estimated from the gears: {shown}"
-    remedy = (
-        "give what is known: modes and vibration depend on it, a static solution of fixed members does not"
-    )
+    remedy = "give what is known: modes and vibration depend on it, a static solution of fixed members does not"
     return case, (Finding("W-ESTIMATED", missing[0], text, remedy=remedy),)
 
 

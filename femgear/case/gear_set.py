@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.checks import check_floating
-from femgear.case.mistakes import in_terms_of_the_case, rack_at
+from femgear.case.messages import in_terms_of_the_case, rack_at
 from femgear.case.quantities import FREE, LENGTH
 from femgear.case.sections import (
     CarrierErrors,
@@ -76,9 +76,13 @@ def need_set(case: Any) -> None:
     """Refuse a case without a planetary set of its own (E-MODEL)."""
     if not isinstance(case, Case):
         raise CaseError(
-            f"a {case.model} has no planetary set of its own", code="E-MODEL", key="model", value=case.model,
-            remedy="use femgear check and femgear run, or a case without model", file=case.location("model"),
-        )  # fmt: skip
+            f"a {case.model} has no planetary set of its own",
+            code="E-MODEL",
+            key="model",
+            value=case.model,
+            remedy="use femgear check and femgear run, or a case without model",
+            file=case.location("model"),
+        )
 
 
 @remembered(latest=16)
@@ -198,9 +202,7 @@ def _name_backlash(error: GeometryError, case: Case) -> None:
         steps = range(math.ceil(1e6 * case.set.backlash))
         first = bisect_left(steps, True, key=lambda one: code(one) != without)
         error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
-        error.limit = (
-            f"up to {LENGTH.show(1e-6 * (first - 1))} for these gears, each of which takes half of it"
-        )
+        error.limit = f"up to {LENGTH.show(1e-6 * (first - 1))} for these gears, each of which takes half of it"
         error.remedy, error.file = "reduce the backlash, or check its unit", case.location("set.backlash")
 
 
@@ -398,11 +400,13 @@ def _check_reach(profile: MeasuredProfile, gear: Gear, key: str) -> None:
     if profile.roll[-1] >= low and profile.roll[0] <= high:
         return
     raise GeometryError(
-        f"{gear.name}: no part of the measured profile lies on the flank", code="E-MODIFICATION", key=key,
+        f"{gear.name}: no part of the measured profile lies on the flank",
+        code="E-MODIFICATION",
+        key=key,
         value=_range(gear, *profile.roll[:: len(profile.roll) - 1]),
         limit=f"points within {_range(gear, low, high)}",
         remedy="check the unit of its first column and that it belongs to this gear",
-    )  # fmt: skip
+    )
 
 
 def _range(gear: Gear, low: float, high: float) -> str:

@@ -157,10 +157,12 @@ def to_si(
         raise _too_small(value)
     if not low <= number <= high:
         raise CaseError(
-            f"{dimension.name} of {dimension.show(number)} is not plausible", code="E-RANGE", value=value,
+            f"{dimension.name} of {dimension.show(number)} is not plausible",
+            code="E-RANGE",
+            value=value,
             limit=dimension.window(low, high),
             remedy=_factor_hint(number, low, high, dimension, value) or remedy,
-        )  # fmt: skip
+        )
     return number
 
 
@@ -180,10 +182,12 @@ def _check_number(text: str, name: str) -> None:
 def _too_small(value: object) -> CaseError:
     """Make the refusal of a number that is next to none."""
     return CaseError(
-        "the number is next to none", code="E-RANGE", value=value,
+        "the number is next to none",
+        code="E-RANGE",
+        value=value,
         limit=f"0, or {SMALLEST:g} or more of either sign in SI units",
         remedy="write 0 where it has no effect",
-    )  # fmt: skip
+    )
 
 
 def _no_text(value: object, dimension: Dimension, low: float, high: float) -> CaseError:
@@ -230,10 +234,12 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
     """SI value of one ``unit``, refused unless it has the dimension."""
     if len(unit) > 60 or not _UNIT.fullmatch(unit):
         raise CaseError(
-            f"{unit[:60]!a} is not a product of units", code="E-UNIT", value=text,
+            f"{unit[:60]!a} is not a product of units",
+            code="E-UNIT",
+            value=text,
             limit="unit names with * / ^ or blanks, without brackets",
             remedy=_near(unit[:60], dimension, example),
-        )  # fmt: skip
+        )
     usual = re.sub(r" ?/ ?", "/", " ".join(unit.replace("**", "^").translate(_SPELLING).split()))
     known, words = _FACTORS.get(dimension.si, {}), _WORDS.get(dimension.si, {})
     usual = words.get(usual, usual)
@@ -243,10 +249,12 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
     if found is None or expected is None or found[1] != expected[1]:
         what = f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}"
         raise CaseError(
-            what if found else f"unknown unit {unit!a}", code="E-UNIT", value=text,
+            what if found else f"unknown unit {unit!a}",
+            code="E-UNIT",
+            value=text,
             limit=f"units convertible to {dimension.si}",
             remedy=_near(usual, dimension, example),
-        )  # fmt: skip
+        )
     return found[0] / expected[0]
 
 
@@ -315,9 +323,7 @@ def Quantity(dimension: Dimension, low: float, high: float, *, remedy: str | Non
     return _Reader(read, schema)
 
 
-def Number(
-    low: float, high: float, *, open_low: bool = False, open_high: bool = False, note: str = ""
-) -> _Reader:
+def Number(low: float, high: float, *, open_low: bool = False, open_high: bool = False, note: str = "") -> _Reader:
     """Make the reader of a plain number (integer or float, no text, no boolean) within a window.
 
     Its ends themselves are refused where they are open; the note says why, for the message of a refusal.
@@ -337,9 +343,11 @@ def Number(
             raise _too_small(value)
         if not (above and below):
             raise CaseError(
-                f"the number is out of range{': ' + note if note else ''}", code="E-RANGE",
-                value=found(value) if isinstance(value, int) else value, limit=limit,
-            )  # fmt: skip
+                f"the number is out of range{': ' + note if note else ''}",
+                code="E-RANGE",
+                value=found(value) if isinstance(value, int) else value,
+                limit=limit,
+            )
         return float(value)
 
     schema = {"type": "number", "description": f"{limit}{'; ' + note if note else ''}"}
@@ -364,9 +372,7 @@ def at_most(count: int) -> BeforeValidator:
 def wrong_length(length: int, limit: str, *, many: bool) -> CaseError:
     """Make the refusal of a list with too many entries, or too few."""
     message = f"{length} entries are too {'many' if many else 'few'}"
-    return CaseError(
-        message, code="E-RANGE", limit=limit, remedy="leave some out" if many else "add what is missing"
-    )
+    return CaseError(message, code="E-RANGE", limit=limit, remedy="leave some out" if many else "add what is missing")
 
 
 PAIR, TRIPLE = (Values(min_length=count, max_length=count) for count in (2, 3))
@@ -392,9 +398,7 @@ def _read_or_word(quantity: _Reader, value: object, word: str) -> object:
     try:
         return quantity.read(value)
     except CaseError as error:
-        error.limit = (
-            f'{error.limit}, or "{word}"' if error.limit else f'a quantity with its unit, or "{word}"'
-        )
+        error.limit = f'{error.limit}, or "{word}"' if error.limit else f'a quantity with its unit, or "{word}"'
         raise
 
 
@@ -405,9 +409,7 @@ def LengthOrFree(low: float, high: float) -> _Reader:
     def free_too(value: object) -> object:
         return FREE if value == FREE else _read_or_word(length, value, FREE)
 
-    return _Reader(
-        free_too, {"type": "string", "description": f'{length.schema["description"]}, or "{FREE}"'}
-    )
+    return _Reader(free_too, {"type": "string", "description": f'{length.schema["description"]}, or "{FREE}"'})
 
 
 def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: str | None = None) -> _Reader:
@@ -435,9 +437,12 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: 
                 f"did you mean {-value}?" if low <= -value <= high else None,
             )
             raise CaseError(
-                f"{shown(value)} is out of range{': ' + why if why else ''}", code="E-RANGE",
-                value=found(value), limit=f"{low} to {high}", remedy=sign or remedy,
-            )  # fmt: skip
+                f"{shown(value)} is out of range{': ' + why if why else ''}",
+                code="E-RANGE",
+                value=found(value),
+                limit=f"{low} to {high}",
+                remedy=sign or remedy,
+            )
         return number
 
     schema = {"type": "integer", "minimum": -high if signed else low, "maximum": high}

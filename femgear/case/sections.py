@@ -111,9 +111,17 @@ class ModificationSection(Section):
     """
 
     kind: Literal[
-        "tip relief", "root relief", "profile slope", "profile crowning", "measured profile",
-        "lead slope", "lead crowning", "end relief", "flank twist", "measured lead",
-    ]  # fmt: skip
+        "tip relief",
+        "root relief",
+        "profile slope",
+        "profile crowning",
+        "measured profile",
+        "lead slope",
+        "lead crowning",
+        "end relief",
+        "flank twist",
+        "measured lead",
+    ]
     amount: Deviation | None = None
     length: Annotated[float, Quantity(LENGTH, 1e-5, 2.5)] | None = None
     start_diameter: Diameter | None = None
@@ -145,9 +153,7 @@ class ModificationSection(Section):
         if measured:
             _check_points(self)
         elif self.amount is None:
-            raise CaseError(
-                f"a {self.kind} needs its amount", code="E-KEY-MISSING", remedy='amount = "10 um"'
-            )
+            raise CaseError(f"a {self.kind} needs its amount", code="E-KEY-MISSING", remedy='amount = "10 um"')
         elif self.kind == "end relief" and self.length is None:
             raise CaseError("an end relief needs its length", code="E-KEY-MISSING", remedy='length = "3 mm"')
         elif relief and not self.given(*starts):
@@ -177,9 +183,10 @@ def _check_points(section: ModificationSection) -> None:
     wrong = len(columns) != 1 or section.deviations is None or section.file is not None
     if lead and (wrong or columns != ["places"]):
         raise CaseError(
-            "a measured lead is a file, or deviations over places", code="E-MODIFICATION",
+            "a measured lead is a file, or deviations over places",
+            code="E-MODIFICATION",
             remedy='places = ["-9 mm", "9 mm"] from the middle of the width, deviations = ["0 um", "3 um"]',
-        )  # fmt: skip
+        )
     if wrong or (columns == ["places"]) != lead:
         raise CaseError(
             "a measured profile is a file, or deviations over either roll_angles or diameters",
@@ -440,9 +447,11 @@ def speed_range(value: object) -> object:
         return value
     if value.keys() != {"from", "to", "count"}:
         raise CaseError(
-            f"a range of speeds with {', '.join(map(repr, value)) or 'nothing'}", code="E-KEY-MISSING",
-            limit="from, to and count", remedy='write {from = "250 rpm", to = "3100 rpm", count = 12}',
-        )  # fmt: skip
+            f"a range of speeds with {', '.join(map(repr, value)) or 'nothing'}",
+            code="E-KEY-MISSING",
+            limit="from, to and count",
+            remedy='write {from = "250 rpm", to = "3100 rpm", count = 12}',
+        )
     ends = _SpeedRange.model_validate(value)
     step = (ends.to - ends.start) / (ends.count - 1)
     return [f"{ends.start + i * step!r} rad/s" for i in range(ends.count)]
@@ -705,9 +714,11 @@ def face_width(case: Any, gear: str) -> float:
     width = getattr(case, gear).face_width or case.set.face_width
     if width is None:
         raise CaseError(
-            f"the face width of the {gear.replace('_', ' ')} is missing", code="E-KEY-MISSING",
-            key="set.face_width", remedy=f"give set.face_width, or {gear}.face_width and that of all others",
-        )  # fmt: skip
+            f"the face width of the {gear.replace('_', ' ')} is missing",
+            code="E-KEY-MISSING",
+            key="set.face_width",
+            remedy=f"give set.face_width, or {gear}.face_width and that of all others",
+        )
     return width
 
 
@@ -731,16 +742,23 @@ def check_published(case: Case) -> Iterator[CaseError]:
         key = f"housing.published[{i}]"
         if not np.isclose(speeds, entry.speed, rtol=1e-9, atol=0.0).any():
             yield CaseError(
-                "this speed is not computed", code=_CODE, key=f"{key}.speed", value=SPEED.show(entry.speed),
-                limit=_speeds(case), remedy="add it to operation.speeds, or leave the published lines out",
-            )  # fmt: skip
+                "this speed is not computed",
+                code=_CODE,
+                key=f"{key}.speed",
+                value=SPEED.show(entry.speed),
+                limit=_speeds(case),
+                remedy="add it to operation.speeds, or leave the published lines out",
+            )
         computed = case.response_harmonics
         if computed is not None and entry.harmonic > computed:
             yield CaseError(
-                "this mesh harmonic is not computed", code=_CODE, key=f"{key}.harmonic", value=entry.harmonic,
+                "this mesh harmonic is not computed",
+                code=_CODE,
+                key=f"{key}.harmonic",
+                value=entry.harmonic,
                 limit=f"1 to {computed}, the harmonics of the response",
                 remedy="raise dynamics.response_harmonics, or leave the published lines out",
-            )  # fmt: skip
+            )
 
 
 def _speeds(case: Case) -> str:

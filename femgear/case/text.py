@@ -37,9 +37,7 @@ _ENTRY = re.compile(r"\s*+([A-Za-z0-9_.\"' -]++)\s*+=")
 _KEY = re.compile(r"=+|^[ \t]*\[", re.MULTILINE)
 _TEXT = re.compile(r""""[^"]*"|'[^']*'|#.*""")
 # tomllib needs a time that grows with the square of the parts of a dotted key.
-_LONG_KEY = re.compile(
-    r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){7}"
-)
+_LONG_KEY = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*|\"[^\"\n]*\"[ \t]*\.[ \t]*|'[^'\n]*'[ \t]*\.[ \t]*){7}")
 
 
 def read_text(path: str | os.PathLike) -> str:
@@ -60,18 +58,18 @@ def read_bytes(path: str | os.PathLike, most: int, remedy: str) -> bytes:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise CaseError(
-            f"cannot open the file: {reason}", code="E-FILE", file=name,
+            f"cannot open the file: {reason}",
+            code="E-FILE",
+            file=name,
             remedy="check its name and permissions",
-        ) from error  # fmt: skip
+        ) from error
     try:
         if not stat.S_ISREG(os.fstat(descriptor).st_mode):
             raise CaseError("not a regular file", code="E-FILE", file=name, remedy=remedy)
         with open(descriptor, "rb", closefd=False) as stream:
             data = stream.read(most + 1)
     except OSError as error:
-        raise CaseError(
-            f"cannot read the file: {error.strerror}", code="E-FILE", file=name, remedy=remedy
-        ) from error
+        raise CaseError(f"cannot read the file: {error.strerror}", code="E-FILE", file=name, remedy=remedy) from error
     finally:
         os.close(descriptor)
     if len(data) > most:
@@ -88,9 +86,11 @@ def decoded(data: bytes, name: str) -> str:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise CaseError(
-            f"not UTF-8: byte 0x{data[error.start]:02x} at offset {error.start}", code="E-FILE-ENC",
-            file=name, remedy="save the file as UTF-8",
-        ) from error  # fmt: skip
+            f"not UTF-8: byte 0x{data[error.start]:02x} at offset {error.start}",
+            code="E-FILE-ENC",
+            file=name,
+            remedy="save the file as UTF-8",
+        ) from error
 
 
 def parse(text: str, name: str) -> dict:
@@ -110,9 +110,12 @@ def parse(text: str, name: str) -> dict:
         raise _syntax_error(text, str(error), name) from error
     except ValueError as error:
         raise CaseError(
-            "an integer has thousands of digits", code="E-TOML", file=name, limit="4300 digits",
+            "an integer has thousands of digits",
+            code="E-TOML",
+            file=name,
+            limit="4300 digits",
             remedy="write it as a decimal number such as 1e9",
-        ) from error  # fmt: skip
+        ) from error
     except RecursionError:
         raise _too_deep(name) from None
     infinite = check_tree(data, name)
@@ -122,10 +125,13 @@ def parse(text: str, name: str) -> dict:
         also = "".join(f", nor is {other} (line {line_of(text, other)})" for other, _ in others)
         also += f", nor are {len(infinite) - MOST_SHOWN} others" if len(infinite) > MOST_SHOWN else ""
         raise CaseError(
-            f"not a finite number{also}", code="E-FINITE", key=key, value=value,
+            f"not a finite number{also}",
+            code="E-FINITE",
+            key=key,
+            value=value,
             file=f"{name}:{line}" if name and line else name,
             limit="finite numbers (no nan, no inf, nothing beyond 1.8e308)",
-        )  # fmt: skip
+        )
     return data
 
 
@@ -143,9 +149,12 @@ def check_tree(data: dict, name: str) -> list[tuple[tuple[str | int, ...], float
         tables = isinstance(value, dict) or any(isinstance(one, dict) for one in value)
         if count > _MOST_ENTRIES or (tables and len(value) > _MOST_TABLES):
             raise CaseError(
-                f"{len(value)} entries are too many", code="E-RANGE", key=dotted(path), file=name,
+                f"{len(value)} entries are too many",
+                code="E-RANGE",
+                key=dotted(path),
+                file=name,
                 limit=f"at most {_MOST_TABLES} of a table or list of tables, {_MOST_ENTRIES} of all together",
-            )  # fmt: skip
+            )
         items = list(value.items() if isinstance(value, dict) else enumerate(value))
         pending += [
             ((*path, k), v)
@@ -167,9 +176,7 @@ def dotted(location: tuple, prefix: str = "") -> str:
 
 
 def _too_deep(name: str) -> CaseError:
-    return CaseError(
-        "tables or lists are nested too deeply", code="E-TOML", file=name, limit=f"{_MAX_DEPTH} levels"
-    )
+    return CaseError("tables or lists are nested too deeply", code="E-TOML", file=name, limit=f"{_MAX_DEPTH} levels")
 
 
 def _syntax_error(text: str, message: str, name: str) -> CaseError:
@@ -182,10 +189,14 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
         if len(lines) > 1:
             places = " and ".join(str(number) for number in lines[:MOST_SHOWN])
             return CaseError(
-                f"given twice, in lines {places}", code="E-TOML", key=key, file=name,
-                remedy="keep one of them" if "Cannot overwrite" in message
+                f"given twice, in lines {places}",
+                code="E-TOML",
+                key=key,
+                file=name,
+                remedy="keep one of them"
+                if "Cannot overwrite" in message
                 else f"keep one of them; tables of a list have double brackets, [[{key}]]",
-            )  # fmt: skip
+            )
     remedy = 'lines are [section] or key = value; texts and quantities stand in quotation marks, as in "2 mm"'
     bare = _TEXT.sub("", lines_of_text[min(line, len(lines_of_text)) - 1])
     if re.search(r"=\s*[+-]?\d+,\d", bare):
@@ -296,16 +307,17 @@ def text_with_points(data: dict, name: str) -> str:
     text = write(data)
     if len(text.encode()) > _MAX_BYTES:
         raise CaseError(
-            "the case is too long with the points of the files that it names", code="E-FILE",
-            value=f"{len(text.encode())} bytes", limit=f"{_MAX_BYTES} bytes",
-            remedy="give them at fewer points", file=name or None,
-        )  # fmt: skip
+            "the case is too long with the points of the files that it names",
+            code="E-FILE",
+            value=f"{len(text.encode())} bytes",
+            limit=f"{_MAX_BYTES} bytes",
+            remedy="give them at fewer points",
+            file=name or None,
+        )
     return text
 
 
-def _write_table(
-    table: dict, header: str, lines: list[str], remarks: Mapping[str, str] | None, path: str = ""
-) -> None:
+def _write_table(table: dict, header: str, lines: list[str], remarks: Mapping[str, str] | None, path: str = "") -> None:
     listed = {} if remarks is None else {k: v for k, v in table.items() if v and _is_tables(v)}
     values = {k: v for k, v in table.items() if not isinstance(v, dict) and k not in listed}
     if header and (values or not table or header.startswith("[[")):
@@ -351,9 +363,11 @@ def _value(value: object) -> str:
     if isinstance(value, np.ndarray | np.generic) and not isinstance(plain := value.tolist(), np.generic):
         return _value(plain)
     raise CaseError(
-        f"no TOML form for a {type(value).__name__}", code="E-TYPE", value=value,
+        f"no TOML form for a {type(value).__name__}",
+        code="E-TYPE",
+        value=value,
         limit="texts, numbers, true or false, lists and tables",
-    )  # fmt: skip
+    )
 
 
 class ReadCase(BaseModel):

@@ -63,9 +63,13 @@ class BatchState:
 
 
 def solve_batch(
-    found: Candidates, load, springs: BearingSprings | None = None, *, start: np.ndarray | None = None,
-    refined: bool = True
-) -> BatchState:  # fmt: skip
+    found: Candidates,
+    load,
+    springs: BearingSprings | None = None,
+    *,
+    start: np.ndarray | None = None,
+    refined: bool = True,
+) -> BatchState:
     """Solve the contact of all meshes and bearings at all positions.
 
     ContactError: as `femgear.contact.solve.solve_contact`.
@@ -112,9 +116,7 @@ def check_definite(found: Candidates) -> None:
     for matrix, cells in zip(local, some, strict=True):
         factor(matrix[np.ix_(cells, cells)])
     values = found.polynomials[0, filled] * some[..., None]
-    size, axes = np.linalg.eigh(
-        values.swapaxes(1, 2) @ _local_solution(local, (np.arange(len(local)),), some, values)
-    )
+    size, axes = np.linalg.eigh(values.swapaxes(1, 2) @ _local_solution(local, (np.arange(len(local)),), some, values))
     root = axes * np.sqrt(np.maximum(size, 0.0))[:, None] @ axes.swapaxes(1, 2)
     W, size = len(filled), 3 * len(filled)
     for smooth in cyclic_harmonics(found.images[:, 0, filled][:, :, :, filled]):
@@ -233,9 +235,12 @@ class _ActiveSets:
     """Active sets of all positions on their way to the solution; motions over their largest arms."""
 
     def __init__(
-        self, found: Candidates, load: np.ndarray, springs: BearingSprings | None,
+        self,
+        found: Candidates,
+        load: np.ndarray,
+        springs: BearingSprings | None,
         start: np.ndarray | None = None,
-    ):  # fmt: skip
+    ):
         P, W, C = found.gap.shape
         self.found, self.bearings, self.given = found, springs, load
         # problems at one position, which differ in their separations alone

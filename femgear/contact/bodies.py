@@ -312,9 +312,7 @@ def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:
     ring = bodies.ring
     assert ring.free is not None
     compliance, surface = _seen(ring.free.supported(ring_foundation), len(ring.roll))
-    return replace(
-        bodies, ring=replace(ring, regular=regular_compliance(compliance, ring.local), surface=surface)
-    )
+    return replace(bodies, ring=replace(ring, regular=regular_compliance(compliance, ring.local), surface=surface))
 
 
 def flank_compliance(
@@ -351,9 +349,7 @@ def flank_compliance(
     stations, depths, loads, observations = observed_flanks(grid, gear, depth)
     along = None if root_state is None else root_functionals(grid, gear, material, state=root_state)
     observations = np.hstack([observations, loads if along is None else along.columns])
-    free = condense_sector(
-        grid, stiffness, count=gear.teeth, rim="rim", loads=loads, observations=observations
-    )
+    free = condense_sector(grid, stiffness, count=gear.teeth, rim="rim", loads=loads, observations=observations)
     compliance, further = _seen(free.supported(foundation), len(stations.roll))
     found = _without_half_plane(
         gear, material, stations, depths, compliance, len(grid.points), widths or (gear.face_width,) * 2
@@ -455,9 +451,7 @@ def observed_flanks(grid, gear, depth=None):
     stations = flank_stations(grid, gear)
     depths = joining_depth(gear, np.hypot(*stations.points.T), depth)[:, None]
     _check_depth(depth, stations)
-    once, twice = (
-        interpolation(grid, stations.points + factor * depths * stations.normals) for factor in (1.0, 2.0)
-    )
+    once, twice = (interpolation(grid, stations.points + factor * depths * stations.normals) for factor in (1.0, 2.0))
     seen = directional(2.0 * once - twice, stations.normals)
     return stations, depths, flank_load_columns(grid, stations), seen
 

@@ -482,9 +482,15 @@ def walk_mesh_cycle(
 
 
 def _under_load(
-    gears: GearSet, bodies: Bodies, torque: float, deviations: SetDeviations | None, supports: Supports,
-    empty: MeshCycle, options: CycleOptions, equidistant: bool,
-) -> MeshCycle:  # fmt: skip
+    gears: GearSet,
+    bodies: Bodies,
+    torque: float,
+    deviations: SetDeviations | None,
+    supports: Supports,
+    empty: MeshCycle,
+    options: CycleOptions,
+    equidistant: bool,
+) -> MeshCycle:
     """Solve the positions of a record without load under a torque on the sun that is not negative [N m]."""
     members = moving_members(gears, supports, both_flanks=options.both_flanks)
     springs, width = bearing_springs(gears, supports, members), _face_width(gears, options)
@@ -498,9 +504,20 @@ def _under_load(
         repeats = 1
     sector, deviations = _first_planets(gears, gears.n_planets // images, deviations)
     walk = _Walk(
-        gears, sector, bodies, torque, deviations, members, springs, empty, options, width,
-        alike=turns if one_period and not tilting else 1, repeats=repeats, turns=turns,
-    )  # fmt: skip
+        gears,
+        sector,
+        bodies,
+        torque,
+        deviations,
+        members,
+        springs,
+        empty,
+        options,
+        width,
+        alike=turns if one_period and not tilting else 1,
+        repeats=repeats,
+        turns=turns,
+    )
     peaks = options.peaks and options.ahead is None and equidistant
     attempt = walk.attempt_with_peaks if peaks else walk.attempt
     return in_windows(attempt, *first_windows(gears, bodies, torque))
@@ -754,9 +771,7 @@ class _Walk:
         options, empty = replace(self.options, progress=None, pressures=False), self.empty
         record = {"periods": empty.periods, "contact": empty.contact, "options": options}
         parts = np.arange(self.repeats)[:, None] / self.repeats + places
-        return replace(
-            self, options=options, empty=cycle_without_load(self.planetary_set, parts.ravel(), **record)
-        )
+        return replace(self, options=options, empty=cycle_without_load(self.planetary_set, parts.ravel(), **record))
 
     def _curves(self, record: MeshCycle) -> dict[str, np.ndarray]:
         """What has peaks over the positions, and the tooth pairs that carry as `tooth_pair_codes`."""
@@ -931,9 +946,12 @@ class _Walk:
         if self.options.pressures:
             wide["pressure_centre"] = _over_positions(setup.listed.centre, tau[0].size), slots[1]
         wide |= {
-            name: (values[name], slots[0]) for axes, names in _AXES.items() if axes[:2] == "ms"
-            for name in names if name in values
-        }  # fmt: skip
+            name: (values[name], slots[0])
+            for axes, names in _AXES.items()
+            if axes[:2] == "ms"
+            for name in names
+            if name in values
+        }
         for name, (some, places) in wide.items():
             values[name] = np.zeros((M, T, *some.shape[2:]), some.dtype)
             inside = (places >= 0) & (places < T)
@@ -970,9 +988,7 @@ class _Walk:
             planet = (np.arange(N) + turns * step) % N
             mesh = np.concatenate([planet + kind * N for kind in range(kinds)])
             known = {"m": mesh, "n": planet}
-            slots = {
-                back: _same_pairs(values[f"{back}path"], mesh, number * part, pitch) for back in ("", "back_")
-            }
+            slots = {back: _same_pairs(values[f"{back}path"], mesh, number * part, pitch) for back in ("", "back_")}
             for axes, names in _AXES.items():
                 names = (*names, "near") if axes == "mst" else names
                 over_positions = (name for name in names if axes[-1] == "t" and name in values)
@@ -1101,9 +1117,7 @@ def _seen_from_front(cycle: MeshCycle, planetary_set: GearSet, order) -> MeshCyc
     )
 
 
-def _in_mirror(
-    names: Sequence[str], values: np.ndarray, planet: np.ndarray, angle: float
-) -> np.ndarray:  # fmt: skip
+def _in_mirror(names: Sequence[str], values: np.ndarray, planet: np.ndarray, angle: float) -> np.ndarray:
     """Vectors of members (m, P), and what turns them last, of the mirror image in the original's order."""
     vectors, turned = _mapped(names, values, planet, _reflection(angle))
     return np.concatenate([vectors, -turned])[:, ::-1]

@@ -268,10 +268,12 @@ def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, sl
     if width / slices < thinnest:
         raise ContactError(
             f"contacts of {thinnest * 1e3:.3g} mm along the profile are wider than slices",
-            code="E-SLICES", key="static.slices", value=slices,
+            code="E-SLICES",
+            key="static.slices",
+            value=slices,
             limit=f"at most {int(width / thinnest)}",
             remedy="use fewer slices or reduce operation.torque",
-        )  # fmt: skip
+        )
     if force is None:
         return
     load, carries = force.mean(axis=1), force > 0.0
@@ -281,7 +283,9 @@ def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, sl
         raise ContactError(
             f"a tooth pair touches over no more than {length[point].min() * 1e3:.3g} mm of the width and "
             f"{contact[point].max() * 1e3:.3g} mm along the profile: slices hold for lines, not for points",
-            code="E-SLICES", key="static.slices", value=slices,
+            code="E-SLICES",
+            key="static.slices",
+            value=slices,
             limit="contacts over three slices, and longer than five half widths",
             remedy="reduce lead crowning and end relief, or take more slices",
-        )  # fmt: skip
+        )

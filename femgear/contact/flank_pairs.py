@@ -241,18 +241,14 @@ def _mesh_order(planetary_set: GearSet, order: np.ndarray) -> np.ndarray:
     return np.concatenate([order + kind * len(order) for kind in range(len(planetary_set.kinds))])
 
 
-def profile_form(
-    planetary_set: GearSet, deviations: SetDeviations | None, kind: int, back: bool
-) -> Callable | None:
+def profile_form(planetary_set: GearSet, deviations: SetDeviations | None, kind: int, back: bool) -> Callable | None:
     """Separation [m] by deviations of the profiles as a function of both roll lengths [m], or None.
 
     `kind` is that of the mesh, 0 for sun-planet and 1 for planet-ring.
     """
     if deviations is None or not any(form.profile for form in deviations.mesh_forms(kind, back)):
         return None
-    return lambda roll_1, roll_2: profile_separation(
-        deviations, planetary_set, kind, roll_1, roll_2, back=back
-    )
+    return lambda roll_1, roll_2: profile_separation(deviations, planetary_set, kind, roll_1, roll_2, back=back)
 
 
 def pair_separations(
@@ -275,9 +271,7 @@ def pair_separations(
         return shift
     shift += body_separation(deviations, planetary_set, tau, back=back)[:, :, None]
     for mesh in range(meshes):
-        first, second = (
-            tooth[gear, mesh] + tooth_steps(planetary_set, mesh, gear) * turns[:, None] for gear in (0, 1)
-        )
+        first, second = (tooth[gear, mesh] + tooth_steps(planetary_set, mesh, gear) * turns[:, None] for gear in (0, 1))
         shift[mesh] += tooth_separation(deviations, mesh, first, second, back=back)
     return shift
 

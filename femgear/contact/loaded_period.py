@@ -242,9 +242,7 @@ def _unresolved(record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return np.flatnonzero((missed > MISSED) & (gap > SMOOTHEST) & ~jumping), np.flatnonzero(jumping)
 
 
-def _whole_period(
-    planetary_set: GearSet, record: dict, symmetry: int, shift: Fraction, periods: int
-) -> LoadedPeriod:
+def _whole_period(planetary_set: GearSet, record: dict, symmetry: int, shift: Fraction, periods: int) -> LoadedPeriod:
     """The period from one of its parts: later parts are the first one with the planets moved on.
 
     Those of ``symmetry`` repeat one another after ``shift`` mesh periods, see `_repetition`.

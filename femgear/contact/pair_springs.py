@@ -58,9 +58,7 @@ def solve_laws(
     P, W, n = separations.shape
     force = np.zeros((P, W, n))
     force[np.arange(P)[:, None], springs.window] = newton.force.reshape(-1, P, n).swapaxes(0, 1)
-    motions, stiffness = (
-        values.reshape(-1, P, n).swapaxes(0, 1) for values in (newton.motions, newton.stiffness)
-    )
+    motions, stiffness = (values.reshape(-1, P, n).swapaxes(0, 1) for values in (newton.motions, newton.stiffness))
     return force, motions * springs.unit, stiffness / springs.unit, newton.solved.reshape(P, n)
 
 
@@ -95,8 +93,7 @@ class PairSprings:
         rises = np.diff(moments, axis=-1) / self.step
         # tables of (slots, positions, intervals)
         self.cubics, self.moments, self.rises = (
-            [np.ascontiguousarray(part).ravel() for part in parts]
-            for parts in (cubics, moments[..., :-1], rises)
+            [np.ascontiguousarray(part).ravel() for part in parts] for parts in (cubics, moments[..., :-1], rises)
         )
         self.meshes, self.mesh = int(laws.mesh[-1]) + 1, laws.mesh
         # the slot of every window; those of windows that are not there never carry
@@ -156,9 +153,7 @@ class _SpringNewton:
     ``stiffness`` (meshes, N) and ``solved`` (N,).
     """
 
-    def __init__(
-        self, springs: PairSprings, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None
-    ):
+    def __init__(self, springs: PairSprings, load: np.ndarray, separations: np.ndarray, tilts: np.ndarray | None):
         (P, _, n), at = separations.shape, np.arange(len(separations))[:, None]
         self.springs, self.load, self.limit = springs, load, _SETTLED * np.abs(load).max()
         self.place = np.repeat(np.arange(P), n)
@@ -194,9 +189,7 @@ class _SpringNewton:
         self.motions[:, todo] = self.springs.motions[self.place[todo]].T
         self.closed[:, todo] = self.force[:, todo] > 0.0
 
-    def _iterate(
-        self, todo: np.ndarray, steps: int, *, refreshed: int = 1, careful: bool = False
-    ) -> np.ndarray:
+    def _iterate(self, todo: np.ndarray, steps: int, *, refreshed: int = 1, careful: bool = False) -> np.ndarray:
         """Take steps until some problems have ended; give those that have not.
 
         For so many steps the moments of the pressures are refreshed from the forces as they are.

@@ -34,9 +34,7 @@ def mean_weights(position: np.ndarray, periods: int) -> np.ndarray:
     return weights
 
 
-def tooth_pair_codes(
-    path: np.ndarray, load: np.ndarray, position: np.ndarray, base_pitch: float
-) -> np.ndarray:
+def tooth_pair_codes(path: np.ndarray, load: np.ndarray, position: np.ndarray, base_pitch: float) -> np.ndarray:
     """Find numbers (M, P) that are equal at positions where the same tooth pairs of a mesh carry.
 
     From path coordinates (M, T, P) [m] and loads, (M, T, P), or (M, T, S, P) in slices: then the same slices
@@ -142,9 +140,7 @@ def _beyond(
         most = np.where(other, np.maximum(most, by_slope), most)
         # each side goes on as a line up to a jump, which may lie anywhere; a mean slope beyond that of both
         # neighbours hides a steeper one as a jump does
-        to_jump = np.maximum(
-            begin + np.maximum(rising, 0.0) * length, end + np.maximum(falling, 0.0) * length
-        )
+        to_jump = np.maximum(begin + np.maximum(rising, 0.0) * length, end + np.maximum(falling, 0.0) * length)
         most = np.where(jump | (other & (own >= steepest)), np.maximum(most, to_jump), most)
         # stiffnesses and shares that are zero go on no lower
         bounded = (sign < 0.0) & (low == 0.0)

@@ -297,9 +297,7 @@ def observed_root_stress(gear: Gear, root: ObservedRoot) -> _RootStress:
     )
 
 
-def root_waves(
-    grid: Grid, gear: Gear, material: Material, wave_number: np.ndarray, *, foundation=None
-) -> np.ndarray:
+def root_waves(grid: Grid, gear: Gear, material: Material, wave_number: np.ndarray, *, foundation=None) -> np.ndarray:
     """Compute the root stress influences (K, teeth, 2 m, 2 n) of loads ``cos(kz)`` across the width [Pa/N].
 
     Loads are those over the face width of the gear; see the head of the module. Wave numbers (K,) [1/m];

@@ -58,9 +58,13 @@ class SliceSprings:
     """
 
     def __init__(
-        self, found: Candidates, laws: PairLaws, waves: WidthWaves, slices: int,
+        self,
+        found: Candidates,
+        laws: PairLaws,
+        waves: WidthWaves,
+        slices: int,
         tilting: TiltingMembers | None = None,
-    ):  # fmt: skip
+    ):
         self.pairs = pairs = PairSprings(laws)
         self.slices, self.T = slices, cosines(slices)[:WAVES]
         P, place, mesh = len(pairs.window), np.arange(len(pairs.window))[:, None], pairs.mesh[pairs.window]
@@ -165,9 +169,12 @@ class SliceSolutions:
 
 
 def solve_slice_springs(
-    springs: SliceSprings, load: np.ndarray, separations: np.ndarray, leads: np.ndarray,
+    springs: SliceSprings,
+    load: np.ndarray,
+    separations: np.ndarray,
+    leads: np.ndarray,
     tilts: np.ndarray | None = None,
-) -> SliceSolutions:  # fmt: skip
+) -> SliceSolutions:
     """Solve the contact in slices of n sets at P positions, each from the position before.
 
     Parameters
@@ -320,9 +327,7 @@ class _SliceSpringNewton:
                 if not len(on):
                     return
                 sets, motions, between, bent = sets[on], motions[on], between[..., on], bent[:, on]
-                force, slope, apart, waves, beyond = (
-                    values[:, on] for values in (force, slope, apart, waves, beyond)
-                )
+                force, slope, apart, waves, beyond = (values[:, on] for values in (force, slope, apart, waves, beyond))
             lag = beyond
             beyond = by_all(force, R) + _parted(bent, between, force.mean(axis=2))
             expected = force - slope * (beyond - lag)
@@ -415,9 +420,7 @@ class _SliceSpringNewton:
             right = np.zeros((n, system.shape[1], 1))
             right[:, :size, 0] = np.sqrt(S) * B[..., 0].swapaxes(0, 1).reshape(n, size)
             if springs.tilts is not None:
-                right[:, size:, 0] -= (
-                    np.einsum("uns,usk->nk", slopes[slots], springs.tilts[self.at][slots]) / S
-                )
+                right[:, size:, 0] -= np.einsum("uns,usk->nk", slopes[slots], springs.tilts[self.at][slots]) / S
             answer = np.linalg.solve(system, right)[:, :size, 0].reshape(n, len(slots), M)
             found[:, mesh] = answer[..., 0].sum(axis=1) / np.sqrt(S)
         return found

@@ -169,9 +169,7 @@ def solve_slices(
         after = [b - a for a, b in zip(before, after, strict=True)] if before else after
         # positions come first
         parts.append((*solved, after[0].swapaxes(0, 1), *after[1:]))
-    force, motions, iterations, residual, joint, *own = (
-        np.concatenate(part) for part in zip(*parts, strict=True)
-    )
+    force, motions, iterations, residual, joint, *own = (np.concatenate(part) for part in zip(*parts, strict=True))
     return SliceState(force, motions, laws.mesh, iterations, residual, tuple(own), joint.swapaxes(0, 1))
 
 
@@ -213,9 +211,7 @@ class _SliceNewton:
             self.springs[len(load) :] += tilting.stiffness * self.unit
         there = np.isfinite(laws.separation[rows])
         self.apart = np.where(there, laws.separation[rows], 1.0)
-        there, self.apart, self.force = (
-            np.repeat(one, self.each, axis=1) for one in (there, self.apart, self.plane)
-        )
+        there, self.apart, self.force = (np.repeat(one, self.each, axis=1) for one in (there, self.apart, self.plane))
         self.widest = float(np.abs(np.where(there, self.apart + separations, 0.0)).max())
         self.closed, self.carrying = self.force > 0.0, None
         # at the given state the curves miss their own points by their interpolation

@@ -191,10 +191,13 @@ def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) ->
     if np.linalg.matrix_rank(free, tol=1e-9) < free.shape[1]:
         loose = [name.split(":")[0].split()[0] for name in np.array(tilts.names)[tilts.free]]
         raise ContactError(
-            f"nothing holds a common tilt of {' and '.join(dict.fromkeys(loose))}", code="E-MECHANISM",
-            key=f"{loose[0]}.tilt_stiffness", value="0 N m/rad", limit="above 0 N m/rad",
+            f"nothing holds a common tilt of {' and '.join(dict.fromkeys(loose))}",
+            code="E-MECHANISM",
+            key=f"{loose[0]}.tilt_stiffness",
+            value="0 N m/rad",
+            limit="above 0 N m/rad",
             remedy="give it a tilt stiffness, or leave the entry out for a rigid one",
-        )  # fmt: skip
+        )
     names, stiffness = list(tilts.names), tilts.stiffness / (0.5 * width) ** 2
     approach, angle = tilts.approach[:, None] * along[:, None], np.full(len(names), 2.0 / width)
     if supports.wind_up is not None:
@@ -239,9 +242,7 @@ def moving_members(planetary_set: GearSet, supports: Supports, *, both_flanks: b
     return replace(sides[0], approach=np.vstack([side.approach for side in sides]))
 
 
-def bearing_springs(
-    planetary_set: GearSet, supports: Supports, members: MovingMembers
-) -> BearingSprings | None:
+def bearing_springs(planetary_set: GearSet, supports: Supports, members: MovingMembers) -> BearingSprings | None:
     """Springs of all planet bearings, or None for bearings without clearance.
 
     The first spring of a planet points away from the centre of the set, so that turned and mirrored sets

@@ -145,9 +145,7 @@ class CondensedWaves:
         """
         gear, grid, material = self.sector.gear, self.sector.grid, self.material
         stations, depths, *_ = observed_flanks(grid, gear)
-        uniform = tooth_compliance(
-            self.uniform.supported(None if foundation is None else foundation / self.width)
-        )
+        uniform = tooth_compliance(self.uniform.supported(None if foundation is None else foundation / self.width))
         support = None
         if foundation is not None:
             entries = coo_array(foundation / gear.face_width)
@@ -165,9 +163,7 @@ class CondensedWaves:
             )
             local = np.tile((2 * once - twice) / self.width, (2, 1, 1))
             regular = regular_compliance(change / self.width, local)
-            found.append(
-                FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0)
-            )
+            found.append(FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0))
         return found
 
 
@@ -181,9 +177,7 @@ def condensed_waves(sector: Sector, material: Material, slices: int, width: floa
     thickness: Any = {"tooth": 1.0, "body": gear.face_width / width} if gear.face_width > width else 1.0
     plane = stiffness(grid, material, state=state, thickness=thickness)
     uniform = condense_sector(grid, plane, loads=loads, observations=observations, **options)
-    loads, observations = (
-        np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, observations)
-    )
+    loads, observations = (np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, observations))
     k = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
     parts, powers = wave_stiffness(grid, material), k[:, None] ** np.arange(3)
     waves = condense_sums(grid, parts, powers, loads=loads, observations=observations, **options)
@@ -244,9 +238,7 @@ def cosines(slices: int) -> np.ndarray:
     return np.sqrt(np.where(m == 0, 1.0, 2.0) / slices) * np.cos(np.pi * m * z)
 
 
-def slice_compliance(
-    found: Candidates, rows: np.ndarray, waves: Sequence[WidthWaves], slices: int
-) -> list[np.ndarray]:
+def slice_compliance(found: Candidates, rows: np.ndarray, waves: Sequence[WidthWaves], slices: int) -> list[np.ndarray]:
     """Compute the compliance between the slices of all windows beyond the plane one [m/N].
 
     For each of several ``waves`` of the same material, whose gears may be the same ones. (I, P, N, W, N, W),
@@ -284,9 +276,7 @@ def slice_compliance(
     return result
 
 
-def _over_bodies(
-    found: Candidates, windows, waves: Sequence[WidthWaves], add, further=()
-) -> list[np.ndarray]:
+def _over_bodies(found: Candidates, windows, waves: Sequence[WidthWaves], add, further=()) -> list[np.ndarray]:
     """Sum up what all bodies yield between windows and their images under each waves, (I, P, W, W, *further).
 
     ``add(across, bodies, members, gear, side)`` adds one gear by its compliances under all waves. Gears that
@@ -309,19 +299,19 @@ def _over_bodies(
     return [shared + one for one in own]
 
 
-def _along_helix(
-    found: Candidates, rows, waves: Sequence[WidthWaves], wave_number, between
-) -> list[np.ndarray]:
+def _along_helix(found: Candidates, rows, waves: Sequence[WidthWaves], wave_number, between) -> list[np.ndarray]:
     """`slice_compliance` of helical teeth, whose slices are at positions of their own.
 
     ``between`` (N - 1, K) are the weights of the waves that were computed in those of ``wave_number``.
     """
     setup, W, (P, N) = found.setup, len(found.mesh), rows.shape
     windows = (
-        np.tile(found.mesh, N), found.pair[rows].reshape(P, N * W),
+        np.tile(found.mesh, N),
+        found.pair[rows].reshape(P, N * W),
         np.asarray(found.candidate.any(axis=-1))[rows].reshape(P, N * W),
-        np.repeat(found.position[rows], W, axis=1), np.repeat(np.arange(N), W),
-    )  # fmt: skip
+        np.repeat(found.position[rows], W, axis=1),
+        np.repeat(np.arange(N), W),
+    )
     # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
     over = np.cos(np.pi / N * np.arange(1, N)[:, None] * np.arange(2 * N)) / N
     number = np.arange(N)

@@ -47,16 +47,13 @@ def pair_tables(
     if "profile_shift" not in read["sun"] and "centre_distance" not in read["set"]:
         read["sun"]["profile_shift"], remarks["sun.profile_shift"] = 0.0, "assumed"
     elif "profile_shift" not in read["sun"]:
-        remarks["set.centre_distance"] = (
-            "assumed: no play at this distance, hence the profile shift of gear 1"
-        )
+        remarks["set.centre_distance"] = "assumed: no play at this distance, hence the profile shift of gear 1"
     operation = _operation(model, mesh, read, remarks, load_case, flows)
     forwards = to_si(operation["torque"], TORQUE) > 0.0
     add_modifications(stage, read, remarks, dict.fromkeys(stage.gears, forwards))
     if before < len(model.findings):
         model.findings[:] = [
-            one if one in known else replace(one, key=_renamed(f"{mesh.id}: {one.key}"))
-            for one in model.findings
+            one if one in known else replace(one, key=_renamed(f"{mesh.id}: {one.key}")) for one in model.findings
         ]
     title = f"{mesh.name or 'stage'}, {' and '.join(one.name or str(one) for (one,) in stage.gears.values())}"
     tables: dict[str, Any] = {"format": 1, "model": "pair"}
@@ -77,9 +74,13 @@ def _renamed(key: str) -> str:
 
 
 def _operation(
-    model: Model, mesh: Component, read: dict[str, Any], remarks: dict[str, str], wanted: int | None,
+    model: Model,
+    mesh: Component,
+    read: dict[str, Any],
+    remarks: dict[str, str],
+    wanted: int | None,
     flows: Sequence[PowerFlow],
-) -> dict[str, Any]:  # fmt: skip
+) -> dict[str, Any]:
     """Torque on gear 1, positive where it drives in its sense of rotation, and its speeds."""
     number, _ = model.chosen_case(wanted)
     gear = pair_stage(model, mesh).gears["sun"][0]
@@ -96,9 +97,7 @@ def _operation(
         teeth = [read[name]["teeth"] for name in read if name in _NAMES]
         torque = float(f"{usual_torque(teeth[0], teeth[1], module, width):.3g}")
         remarks["operation.torque"] = "assumed: K factor of 1 N/mm^2"
-        model.remark(
-            "operation.torque", "the file does not determine the torque: that of a K factor is taken"
-        )
+        model.remark("operation.torque", "the file does not determine the torque: that of a K factor is taken")
     taken = speeds_of_cases(model, number, torques, speeds, alone=wanted is not None)
     remarks |= {} if taken else {"operation.speeds": "assumed"}
     texts = dict.fromkeys(shown(one, SPEED) for one in taken or [1000.0 * SPEED.scale])

@@ -30,9 +30,15 @@ from femgear.gears.modifications import (
 
 RELIEFS = {"tip_relief": "tip relief", "root_relief": "root relief"}
 READ = (
-    *RELIEFS, "profile_slope", "profile_crowning", "profile_twist", "helix_slope", "helix_crowning",
-    "end_relief_datum_face", "end_relief_non_datum_face",
-)  # fmt: skip
+    *RELIEFS,
+    "profile_slope",
+    "profile_crowning",
+    "profile_twist",
+    "helix_slope",
+    "helix_crowning",
+    "end_relief_datum_face",
+    "end_relief_non_datum_face",
+)
 """Types of modifications that a case can have."""
 NOT_READ = ("triangular_tip_relief", "triangular_root_relief", "topographical_modification")
 """Types that it cannot have."""
@@ -64,9 +70,15 @@ def mm(length: float) -> str:
 
 
 def flank_modifications(
-    model: Model, flank: Component, *, width: float, base_radius: float, tip_diameter: float | None,
-    internal: bool, up: bool,
-) -> Flank:  # fmt: skip
+    model: Model,
+    flank: Component,
+    *,
+    width: float,
+    base_radius: float,
+    tip_diameter: float | None,
+    internal: bool,
+    up: bool,
+) -> Flank:
     """Read the modifications of one flank.
 
     Parameters
@@ -165,10 +177,7 @@ class _Reader:
     def profile_crowning(self, part: Component) -> None:
         """Crowning, and where its ends differ a slope of the difference."""
         tip, root = (self.length(part, f"profile_crowning_at_{end}") or 0.0 for end in ("tip", "root"))
-        at = [
-            self.length(part, f"diameter_where_profile_crowning_{end}_is_specified")
-            for end in ("root", "tip")
-        ]
+        at = [self.length(part, f"diameter_where_profile_crowning_{end}_is_specified") for end in ("root", "tip")]
         if self.length(part, "profile_highest_point") is not None:
             self.left_out.append(f"{part}: its highest point, which is taken half-way")
         self._profile(part, "profile crowning", 0.5 * (tip + root), at[0], at[1])
@@ -250,8 +259,9 @@ def written_modifications(
     """
     found, left_out = [], []
     for one in flank_form(case, gear, side).modifications:
-        parts = [(kind, {k: (f"{1e3 * v:.12g}", "mm") for k, v in values.items()}) for kind, values in
-                 _parts(one, gear)]  # fmt: skip
+        parts = [
+            (kind, {k: (f"{1e3 * v:.12g}", "mm") for k, v in values.items()}) for kind, values in _parts(one, gear)
+        ]
         if parts and isinstance(one, TipRelief | RootRelief):
             parts[0][1]["shape_of_relief"] = ("linear" if one.power == 1.0 else "parabolic", "none")
         if isinstance(one, EndRelief):
@@ -279,21 +289,33 @@ def _parts(one: Any, gear: Gear) -> Iterator[tuple[str, dict[str, float]]]:
     match one:
         case TipRelief() | RootRelief() if one.power in (1.0, 2.0):
             name, end = ("tip_relief", tip) if isinstance(one, TipRelief) else ("root_relief", root)
-            yield name, {
-                f"{name}_depth": one.amount, f"{name}_datum_diameter": diameter(one.start, root),
-                f"{name}_evaluation_reference": diameter(one.end, end),
-            }  # fmt: skip
+            yield (
+                name,
+                {
+                    f"{name}_depth": one.amount,
+                    f"{name}_datum_diameter": diameter(one.start, root),
+                    f"{name}_evaluation_reference": diameter(one.end, end),
+                },
+            )
         case ProfileSlope():
-            yield "profile_slope", {
-                "profile_slope": one.amount, "profile_evaluation_start": diameter(one.start, root),
-                "profile_evaluation_end": diameter(one.end, tip),
-            }  # fmt: skip
+            yield (
+                "profile_slope",
+                {
+                    "profile_slope": one.amount,
+                    "profile_evaluation_start": diameter(one.start, root),
+                    "profile_evaluation_end": diameter(one.end, tip),
+                },
+            )
         case ProfileCrowning():
-            yield "profile_crowning", {
-                "profile_crowning_at_tip": one.amount, "profile_crowning_at_root": one.amount,
-                "diameter_where_profile_crowning_root_is_specified": diameter(one.start, root),
-                "diameter_where_profile_crowning_tip_is_specified": diameter(one.end, tip),
-            }  # fmt: skip
+            yield (
+                "profile_crowning",
+                {
+                    "profile_crowning_at_tip": one.amount,
+                    "profile_crowning_at_root": one.amount,
+                    "diameter_where_profile_crowning_root_is_specified": diameter(one.start, root),
+                    "diameter_where_profile_crowning_tip_is_specified": diameter(one.end, tip),
+                },
+            )
         case LeadSlope():
             yield "helix_slope", {"helix_slope": one.amount}
         case LeadCrowning():

@@ -64,23 +64,33 @@ class Sampling:
     def __post_init__(self):
         if self.level not in LEVELS:
             raise CaseError(
-                "no such level", code="E-CHOICE", key="--level", value=self.level, limit=", ".join(LEVELS),
+                "no such level",
+                code="E-CHOICE",
+                key="--level",
+                value=self.level,
+                limit=", ".join(LEVELS),
                 remedy="leave it out for the default",
-            )  # fmt: skip
+            )
         for name, value in vars(self).items():
             least = _SLOWEST if name == "rate" else 0.0
             if name != "level" and value is not None and not (least <= value < np.inf and value > 0.0):
                 raise CaseError(
-                    "no such sampling", code="E-RANGE", key=f"--{name.replace('_', '-')}", value=value,
+                    "no such sampling",
+                    code="E-RANGE",
+                    key=f"--{name.replace('_', '-')}",
+                    value=value,
                     limit=f"{least:g} Hz or more" if least else "a number above zero",
                     remedy="leave it out for the default",
-                )  # fmt: skip
+                )
         samples = self.rate * max(self.duration, self.run_up)
         if samples > _SAMPLES:
             raise CaseError(
-                "signals of so many samples take too much memory", code="E-MEMORY", value=f"{samples:.4g}",
-                limit=f"{_SAMPLES:.4g}", remedy="lower --rate, --duration or --run-up",
-            )  # fmt: skip
+                "signals of so many samples take too much memory",
+                code="E-MEMORY",
+                value=f"{samples:.4g}",
+                limit=f"{_SAMPLES:.4g}",
+                remedy="lower --rate, --duration or --run-up",
+            )
 
 
 SCALES = {"Pa": "pressure_scale", "m/s^2": "acceleration_scale", "N": "force_scale"}
@@ -266,9 +276,12 @@ def write_matlab(stages: Mapping[str, xr.Dataset], path: Path) -> None:
     largest = max((one.nbytes for one in stages.values()), default=0)
     if largest >= 2**31:
         raise StorageError(
-            f"a stage of {largest / 1e9:.1f} GB", code="E-RANGE", file=str(path),
-            limit="less than 2.1 GB", remedy="export it with --csv, or read its .nc file by ncread",
-        )  # fmt: skip
+            f"a stage of {largest / 1e9:.1f} GB",
+            code="E-RANGE",
+            file=str(path),
+            limit="less than 2.1 GB",
+            remedy="export it with --csv, or read its .nc file by ncread",
+        )
     found = {stage: _struct(data) for stage, data in stages.items()}
     with replaced_file(path, size=sum(data.nbytes for data in stages.values())) as temporary:
         savemat(temporary, found, appendmat=False, long_field_names=True, oned_as="column")

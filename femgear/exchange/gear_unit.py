@@ -134,8 +134,14 @@ def power_flow(model: Model, given: Mapping[str, Mapping]) -> PowerFlow:
         for id, weight in stage.arms.items():
             row[place[group[id]]] += weight
     shafts = [one for one in model.components.values() if one.type == "shaft" and group[one.id] in place]
-    speeds = _speeds(model, shafts, table, {id: place[group[id]] for id in group if group[id] in place},
-                     [place[one] for one in held if one in place], given)  # fmt: skip
+    speeds = _speeds(
+        model,
+        shafts,
+        table,
+        {id: place[group[id]] for id in group if group[id] in place},
+        [place[one] for one in held if one in place],
+        given,
+    )
     loads: dict[int, list[float | None]] = {}
     for shaft in shafts:
         loads.setdefault(place[group[shaft.id]], []).extend(loads_on(model, shaft, given))
@@ -145,9 +151,7 @@ def power_flow(model: Model, given: Mapping[str, Mapping]) -> PowerFlow:
         torques = _torques(table[rows], loads, standing)
         of_stage |= {stages[i].component.id: t for i, t in zip(rows, torques, strict=True) if t is not None}
     by_shaft = {one.id: speeds[place[group[one.id]]] for one in shafts}
-    return PowerFlow(
-        {id: one for id, one in by_shaft.items() if one is not None}, of_stage, frozenset(joined)
-    )
+    return PowerFlow({id: one for id, one in by_shaft.items() if one is not None}, of_stage, frozenset(joined))
 
 
 def case_flows(model: Model, load_case: int | None) -> list[PowerFlow]:
@@ -185,9 +189,7 @@ def _groups(model: Model) -> tuple[dict[str, str], set[str]]:
     return group, held
 
 
-def _speeds(
-    model: Model, shafts, table, place: Mapping[str, int], held: list[int], given
-) -> list[float | None]:
+def _speeds(model: Model, shafts, table, place: Mapping[str, int], held: list[int], given) -> list[float | None]:
     """Speeds of groups of shafts [rad/s], None of those that nothing determines."""
     rows, values = [*table], [0.0] * len(table)
     for at in held:

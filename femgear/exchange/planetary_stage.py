@@ -62,7 +62,7 @@ class _Stage:
 
     def common(
         self, of: Iterable[Component], attribute: str, kind: Dimension | None = None, *, sign: bool = True
-    ) -> float | None:  # fmt: skip
+    ) -> float | None:
         """Value in SI units of all that give it, None where none does; without ``sign`` of rings positive."""
         found: dict[float, Component] = {}
         for one in of:
@@ -71,9 +71,11 @@ class _Stage:
         if found and max(found) - min(found) > 1e-9 * max(map(abs, found)):
             least, most = found[min(found)], found[max(found)]
             self.model.refuse(
-                f"{min(found):.9g} here, {max(found):.9g} of {most} (SI units)", f"{least}, {attribute}",
-                limit="one value for all", remedy="femgear needs equal planets, and gears that match",
-            )  # fmt: skip
+                f"{min(found):.9g} here, {max(found):.9g} of {most} (SI units)",
+                f"{least}, {attribute}",
+                limit="one value for all",
+                remedy="femgear needs equal planets, and gears that match",
+            )
         return next(iter(found), None)
 
     def needed(self, of: list[Component], attribute: str, kind: Dimension | None = None) -> float:
@@ -125,10 +127,14 @@ def gear_tables(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
 
 
 _ATTRIBUTES = {
-    "teeth": "number_of_teeth", "module": "normal_module", "pressure_angle": "normal_pressure_angle",
-    "profile_shift": "addendum_modification_coefficient", "centre_distance": "center_distance",
-    "youngs_modulus": "elastic_modulus", "torque": "torque_around_u_axis",
-}  # fmt: skip
+    "teeth": "number_of_teeth",
+    "module": "normal_module",
+    "pressure_angle": "normal_pressure_angle",
+    "profile_shift": "addendum_modification_coefficient",
+    "centre_distance": "center_distance",
+    "youngs_modulus": "elastic_modulus",
+    "torque": "torque_around_u_axis",
+}
 """Names in REXS of entries of a case that have another one there."""
 
 
@@ -161,17 +167,22 @@ def _chosen(model: Model, wanted: str | None) -> Component:
     if not stages:
         kinds = sorted({one.type for one in model.components.values() if one.type.endswith("_stage")})
         model.refuse(
-            "the file has no planetary stage", "components", limit=f"planetary_stage, not {', '.join(kinds)}",
+            "the file has no planetary stage",
+            "components",
+            limit=f"planetary_stage, not {', '.join(kinds)}",
             remedy="femgear imports planetary and cylindrical stages",
-        )  # fmt: skip
+        )
     chosen = [one for one in stages if one.id == wanted or (wanted is None and len(stages) == 1)]
     if not chosen:
         raise CaseError(
             f"the file has {len(stages)} planetary stages" if wanted is None else "no such planetary stage",
-            code="E-CHOICE", key="--stage", value=wanted, file=model.name,
+            code="E-CHOICE",
+            key="--stage",
+            value=wanted,
+            file=model.name,
             limit=", ".join(f"{one.id} ({one.name})" for one in stages[:20]),
             remedy=f"choose one by its id: --stage {stages[0].id}",
-        )  # fmt: skip
+        )
     return chosen[0]
 
 
@@ -192,9 +203,10 @@ def _stage(model: Model, stage: Component) -> _Stage:
     if len(rings) != 1 or len(suns) != 1 or planets.keys() & suns or len(meshes) != 2 * len(planets):
         model.refuse(
             f"{len(meshes)} meshes join {len(rings)} ring gears, {len(planets)} planets, {len(suns)} suns",
-            str(stage), limit="one sun, one ring gear, and planets that mesh with both and with nothing else",
+            str(stage),
+            limit="one sun, one ring gear, and planets that mesh with both and with nothing else",
             remedy="femgear computes simple sets: no pairs of planets, no stepped ones, no second sun",
-        )  # fmt: skip
+        )
     gears = {"sun": [*suns.values()], "planet": [*planets.values()], "ring": rings}
 
     def of_all(kind: str, to: tuple[str, ...], role: str) -> dict[str, list[Component]]:
@@ -218,9 +230,7 @@ def pair_stage(model: Model, mesh: Component) -> _Stage:
     pair = gears_of(model, mesh)
     if len(pair) != 2 or pair[0].type == "ring_gear":
         kinds = ", ".join(map(str, pair)) or "none"
-        model.refuse(
-            "a stage of two gears is needed", str(mesh), limit=f"an external gear and its mate, not {kinds}"
-        )
+        model.refuse("a stage of two gears is needed", str(mesh), limit=f"an external gear and its mate, not {kinds}")
     wheel = "ring" if pair[1].type == "ring_gear" else "planet"
     gears = {"sun": [pair[0]], wheel: [pair[1]]}
     flanks = {
@@ -300,9 +310,7 @@ def _materials(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> No
         ("poisson_ratio", "poisson_ratio", None, 0.3),
         ("density", "density", DENSITY, 7850.0),
     ):
-        values = {
-            name: s.model.number(one, attribute, dimension) for name, ones in made.items() for one in ones[:1]
-        }
+        values = {name: s.model.number(one, attribute, dimension) for name, ones in made.items() for one in ones[:1]}
         known = {name: value for name, value in values.items() if value is not None}
         value = next(iter(known.values()), usual)
         tables["material"][key] = shown(value, dimension) if dimension else value
@@ -392,9 +400,13 @@ def _rim(s: _Stage, name: str, tables: dict[str, Any], remarks: dict[str, str]) 
     gear, section, internal = s.gears[name][0], tables[name], name == "ring"
     module, helix = to_si(tables["sun"]["module"], LENGTH), tables["set"].get("helix_angle", "0 deg")
     usual, root = usual_rim(
-        section["teeth"], module, section.get("rack", tables["rack"])["dedendum"],
-        section.get("profile_shift", 0.0), internal=internal, helix=to_si(helix, ANGLE),
-    )  # fmt: skip
+        section["teeth"],
+        module,
+        section.get("rack", tables["rack"])["dedendum"],
+        section.get("profile_shift", 0.0),
+        internal=internal,
+        helix=to_si(helix, ANGLE),
+    )
     given = None if internal else s.model.number(gear, "inner_diameter", LENGTH)
     place = s.model.number(gear, "u_coordinate_on_shaft", LENGTH) or 0.0
     for shaft in s.shafts[name][:1] if given is None else ():
@@ -449,8 +461,9 @@ def add_bearings(
             f"{name}.{key}",
             f"{what}: rigid, taken as {rigid:.3g} N/m, {RIGID:,} mesh stiffnesses, which changes natural "
             "frequencies by less than 0.1 %; real bearings are softer, and move them by more",
-            remedy="give the stiffness of the bearings", severity=NOTE,
-        )  # fmt: skip
+            remedy="give the stiffness of the bearings",
+            severity=NOTE,
+        )
     elif values:
         tables[name][key] = shown(sum(values), STIFFNESS)
     elif springs:
@@ -467,14 +480,10 @@ def bearings_between(model: Model, shafts: list[Component], role: str, mate: str
     """Bearings and couplings that join shafts, in a role, with a component of a type."""
     other = "inner_part" if role == "outer_part" else "outer_part"
     joints = (one for shaft in shafts for one in model.related("side", "assembly", **{role: shaft.id}))
-    return [
-        one for one in joints if any(m.type == mate for m in model.related("side", other, assembly=one.id))
-    ]
+    return [one for one in joints if any(m.type == mate for m in model.related("side", other, assembly=one.id))]
 
 
-def add_modifications(
-    s: _Stage, tables: dict[str, Any], remarks: dict[str, str], forwards: Mapping[str, bool]
-) -> None:
+def add_modifications(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], forwards: Mapping[str, bool]) -> None:
     """Add the modifications of the flanks of all gears, and findings on those that no case has.
 
     Looked at from the end z > 0, tooth upwards, the left flank leads a sun that turns counter-clockwise. Left
@@ -488,9 +497,7 @@ def add_modifications(
         sides = flanks[0]
         if any(one != sides for one in flanks):
             first = s.gears[name][0]
-            model.remark(
-                f"{name}.modifications", f"planets have different modifications: all get those of {first}"
-            )
+            model.remark(f"{name}.modifications", f"planets have different modifications: all get those of {first}")
         for problem in dict.fromkeys(p for one in flanks for flank in one.values() for p in flank.left_out):
             model.remark(f"{name}.modifications", f"not taken: {problem}")
         left, right = (sides[side].tables if side in sides else [] for side in ("left", "right"))
@@ -504,15 +511,16 @@ def add_modifications(
                 f"{name}.modifications",
                 f"the flanks of {s.gears[name][0]} differ: taken are those that carry under the torque of "
                 "the case; its back flanks, and flanks under the other sense of torque, get the same",
-            )  # fmt: skip
+            )
         if found:
             tables[name]["modifications"] = found
         if any(flank.signs for flank in sides.values()):
             model.remark(
                 f"{name}.modifications",
                 "slopes and twist are taken with the sign of ISO 1328-1, more material at the tip or at the "
-                "non-datum face; REXS does not define it", remedy="compare with the drawing",
-            )  # fmt: skip
+                "non-datum face; REXS does not define it",
+                remedy="compare with the drawing",
+            )
 
     sections = (tables[name] for name in s.gears)
     leads = (one["kind"] in OVER_WIDTH for section in sections for one in section.get("modifications", ()))
@@ -542,8 +550,10 @@ def _flanks_of(s: _Stage, tables: dict[str, Any], name: str, gear: Component) ->
     given = {
         "width": _width(s, tables, name),
         "base_radius": 0.5 * teeth * module / math.cos(helix) * math.cos(angle),
-        "tip_diameter": None if tip is None else to_si(tip, LENGTH), "internal": name == "ring", "up": up,
-    }  # fmt: skip
+        "tip_diameter": None if tip is None else to_si(tip, LENGTH),
+        "internal": name == "ring",
+        "up": up,
+    }
     # ISO 1328-1 looks at the datum face, from z < 0 where it lies there
     seen = {"left": "right", "right": "left"} if up else {"left": "left", "right": "right"}
     return {
@@ -558,13 +568,9 @@ def _width(s: _Stage, tables: dict[str, Any], name: str) -> float:
     return to_si(tables[name].get("face_width", tables["set"]["face_width"]), LENGTH)
 
 
-def _operation(
-    s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wanted: int | None
-) -> dict[str, Any]:
+def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wanted: int | None) -> dict[str, Any]:
     """Input, fixed member, torque and speeds of the input."""
-    coupled = {
-        name: bearings_between(s.model, s.shafts[name], "inner_part", "gear_casing") for name in MEMBERS
-    }
+    coupled = {name: bearings_between(s.model, s.shafts[name], "inner_part", "gear_casing") for name in MEMBERS}
     held = [name for name in MEMBERS if any(one.type.endswith("coupling") for one in coupled[name])]
     fixed = held[0] if len(held) == 1 else "ring"
     remarks |= {} if len(held) == 1 else {"operation.fixed": "assumed"}
@@ -612,7 +618,7 @@ def speeds_of_cases(
             f"load case {number} of {count} is taken; others have torques and speeds of their own: "
             f"{'; '.join(others[:10])}{' ...' * (len(others) > 10)}",
             remedy=f"--load-case 1 to {count} takes another",
-        )  # fmt: skip
+        )
     return list(dict.fromkeys(one for one in taken if one))
 
 
@@ -669,9 +675,15 @@ class _Writer:
 
 
 _UNITS = {
-    "mm": 1e-3, "deg": math.pi / 180, "1 / min": SPEED.scale, "N / mm^2": 1e6, "kg / dm^3": 1e3,
-    "N m": 1.0, "N / m": 1.0, "none": 1.0,
-}  # fmt: skip
+    "mm": 1e-3,
+    "deg": math.pi / 180,
+    "1 / min": SPEED.scale,
+    "N / mm^2": 1e6,
+    "kg / dm^3": 1e3,
+    "N m": 1.0,
+    "N / m": 1.0,
+    "none": 1.0,
+}
 """SI values of units as REXS spells them."""
 
 
@@ -692,9 +704,7 @@ def stage_model(case: Case, name: str) -> Model:
     for whole, part in ((unit, casing), (unit, stage), (stage, carrier)):
         w.relate("assembly", assembly=whole, part=part)
     model = Model(name, "1.4", w.components, (), ())
-    (sun, sun_shaft), (ring, ring_shaft) = (
-        _add_gear(w, case, one.name, one, model) for one in (gears.sun, gears.ring)
-    )
+    (sun, sun_shaft), (ring, ring_shaft) = (_add_gear(w, case, one.name, one, model) for one in (gears.sun, gears.ring))
     shafts = {"sun": sun_shaft, "ring": ring_shaft, "carrier": w.add("shaft", "carrier shaft")}
     w.relate("planet_carrier_shaft", planetary_stage=stage, shaft=shafts["carrier"])
     for shaft in (sun_shaft, ring_shaft):
@@ -708,9 +718,10 @@ def stage_model(case: Case, name: str) -> Model:
         w.relate("side", assembly=bearing, outer_part=shaft, inner_part=pin)
         for pair, turned in (((sun, planet), angle), ((planet, ring), angle + math.pi)):
             mesh = w.add(
-                "cylindrical_stage", center_distance=a(gears.centre_distance, "mm"),
+                "cylindrical_stage",
+                center_distance=a(gears.centre_distance, "mm"),
                 rotating_angle_around_neg_u_axis=a(turned % math.tau, "deg"),
-            )  # fmt: skip
+            )
             w.relate("assembly", assembly=stage, part=mesh)
             w.relate("stage", stage=mesh, gear_1=pair[0], gear_2=pair[1])
     load_cases = _add_operation(w, case, shafts, casing)
@@ -724,43 +735,58 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tup
     rack, helix, material = section.rack or case.rack, case.helix_angle or 0.0, gear_material(case, gear.name)
     shaft, rim = w.add("shaft", f"{name} shaft"), a(2.0 * gear.rim_radius, "mm")
     id = w.add(
-        "ring_gear" if internal else "cylindrical_gear", name, number_of_teeth=a(gear.teeth),
-        normal_module=a(case.module, "mm"), face_width=a(gear.face_width, "mm"),
+        "ring_gear" if internal else "cylindrical_gear",
+        name,
+        number_of_teeth=a(gear.teeth),
+        normal_module=a(case.module, "mm"),
+        face_width=a(gear.face_width, "mm"),
         helix_angle_reference_diameter=a(helix if gear.name == "sun" else -helix, "deg"),
-        tip_diameter=a(tip, "mm"), root_diameter=a(section.root_diameter, "mm"),
-        u_coordinate_on_shaft=a(0.0, "mm"), inner_diameter=None if internal else rim,
-    )  # fmt: skip
+        tip_diameter=a(tip, "mm"),
+        root_diameter=a(section.root_diameter, "mm"),
+        u_coordinate_on_shaft=a(0.0, "mm"),
+        inner_diameter=None if internal else rim,
+    )
     parts = [id]
     if internal:
-        parts += [w.add(
-            "shaft_section", u_coordinate_on_shaft=a(0.0, "mm"), length=a(gear.face_width, "mm"),
-            outer_diameter_begin=rim, outer_diameter_end=rim,
-        )]  # fmt: skip
+        parts += [
+            w.add(
+                "shaft_section",
+                u_coordinate_on_shaft=a(0.0, "mm"),
+                length=a(gear.face_width, "mm"),
+                outer_diameter_begin=rim,
+                outer_diameter_end=rim,
+            )
+        ]
     for part in parts:
         w.relate("assembly", assembly=shaft, part=part)
     made = w.add(
-        "material", elastic_modulus=a(material.youngs_modulus, "N / mm^2"),
-        density=a(material.density, "kg / dm^3"), poisson_ratio=a(material.poisson_ratio),
+        "material",
+        elastic_modulus=a(material.youngs_modulus, "N / mm^2"),
+        density=a(material.density, "kg / dm^3"),
+        poisson_ratio=a(material.poisson_ratio),
         endurance_limit_root=a(material.root_stress_limit, "N / mm^2"),
         endurance_limit_flank=a(material.contact_stress_limit, "N / mm^2"),
-    )  # fmt: skip
+    )
     w.relate("reference", origin=id, referenced=made)
     cutter = getattr(section, "cutter_teeth", None)
     tool = w.add(
-        "rack_shaped_tool" if cutter is None else "cutter_wheel_tool", tip_radius_factor=a(rack.root_radius),
-        addendum_coefficient_reference_profile=a(rack.dedendum), number_of_teeth=a(cutter),
+        "rack_shaped_tool" if cutter is None else "cutter_wheel_tool",
+        tip_radius_factor=a(rack.root_radius),
+        addendum_coefficient_reference_profile=a(rack.dedendum),
+        number_of_teeth=a(cutter),
         addendum_modification_coefficient=None if cutter is None else a(section.cutter_profile_shift),
-    )  # fmt: skip
+    )
     settings = w.add("cylindrical_gear_manufacturing_settings")
     shift = gear.profile_shift / math.cos(helix) * (-1.0 if internal else 1.0)
     flanks = {
         side: w.add(
-            "cylindrical_gear_flank", addendum_modification_coefficient=a(shift),
+            "cylindrical_gear_flank",
+            addendum_modification_coefficient=a(shift),
             normal_pressure_angle=a(case.pressure_angle, "deg"),
             addendum_coefficient_basic_profile=a(rack.addendum),
         )
         for side in ("left", "right")
-    }  # fmt: skip
+    }
     w.relate("flank", gear=id, **flanks)
     for flank in flanks.values():
         w.relate("manufacturing_step", workpiece=flank, tool=tool, manufacturing_settings=settings)

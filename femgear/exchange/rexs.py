@@ -37,9 +37,15 @@ MOST_CASES = 1000
 MOST_ELEMENTS = 500_000
 """Tags of an XML text, tables of a JSON text; those of whole gear units have some ten thousand."""
 _ENCODINGS = {
-    "utf-8": "utf-8-sig", "us-ascii": "ascii", "iso-8859-1": "latin-1", "iso-8859-15": "iso8859-15",
-    "windows-1252": "cp1252", "utf-16": "utf-16", "utf-16le": "utf-16-le", "utf-16be": "utf-16-be",
-}  # fmt: skip
+    "utf-8": "utf-8-sig",
+    "us-ascii": "ascii",
+    "iso-8859-1": "latin-1",
+    "iso-8859-15": "iso8859-15",
+    "windows-1252": "cp1252",
+    "utf-16": "utf-16",
+    "utf-16le": "utf-16-le",
+    "utf-16be": "utf-16-be",
+}
 """Codecs of the encodings that are read, by their names in XML."""
 _DECLARED = re.compile(rb"<\?xml\s[^>]{0,200}?\bencoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"']")
 _VERSIONS = re.compile(r"(1\.[0-7]|2\.0)(\.\d+)?")
@@ -102,18 +108,14 @@ class Model:
     used: set[tuple[str, str]] = field(default_factory=set)
     findings: list[Finding] = field(default_factory=list)
 
-    def remark(
-        self, key: str, text: str, *, remedy: str = "", severity: str = DOUBT, first: bool = False
-    ) -> None:
+    def remark(self, key: str, text: str, *, remedy: str = "", severity: str = DOUBT, first: bool = False) -> None:
         """Keep a finding on what a case does not have, or has otherwise; the same one once."""
         finding = Finding("W-REXS", key, text, remedy=remedy, severity=severity)
         if finding not in self.findings:
             self.findings.insert(0 if first else len(self.findings), finding)
             self.findings.sort(key=lambda one: -SEVERITIES.index(one.severity))
 
-    def chosen_case(
-        self, wanted: int | None
-    ) -> tuple[int, Mapping[str, Mapping[str, tuple[str, str | None]]]]:
+    def chosen_case(self, wanted: int | None) -> tuple[int, Mapping[str, Mapping[str, tuple[str, str | None]]]]:
         """Find number, from 1, and attributes of a load case, by default of the first, if there are any.
 
         CaseError: no such load case (E-CHOICE).
@@ -121,10 +123,14 @@ class Model:
         number, count = 1 if wanted is None else wanted, len(self.load_cases)
         if wanted is not None and not 1 <= number <= count:
             raise CaseError(
-                "there is no such load case", code="E-CHOICE", key="--load-case", value=wanted,
-                file=self.name, limit=f"1 to {count}" if count else "a file with load cases",
+                "there is no such load case",
+                code="E-CHOICE",
+                key="--load-case",
+                value=wanted,
+                file=self.name,
+                limit=f"1 to {count}" if count else "a file with load cases",
                 remedy="leave it out, or name one of the file",
-            )  # fmt: skip
+            )
         return number, self.load_cases[number - 1] if count else {}
 
     def case_in_words(self, number: int, speed: float, torque: float | None) -> str:
@@ -174,9 +180,14 @@ class Model:
             number = math.nan
         if not math.isfinite(number) or (unit or "") not in _PLAIN:
             raise CaseError(
-                "a plain number is needed", code="E-UNIT", key=key, value=f"{text} {unit or ''}",
-                limit='a finite number with the unit "none"', remedy=_EXPORT, file=self.name,
-            )  # fmt: skip
+                "a plain number is needed",
+                code="E-UNIT",
+                key=key,
+                value=f"{text} {unit or ''}",
+                limit='a finite number with the unit "none"',
+                remedy=_EXPORT,
+                file=self.name,
+            )
         return number
 
     def refuse(self, message: str, key: str, remedy: str = _EXPORT, limit: str | None = None) -> NoReturn:
@@ -230,9 +241,12 @@ def _text(data: bytes, name: str) -> str:
     if text is None:
         what = "does not fit the bytes of the file" if encoding in _ENCODINGS else "is not read"
         raise CaseError(
-            f"the encoding {encoding} {what}", code="E-FILE-ENC", file=name, limit=", ".join(_ENCODINGS),
+            f"the encoding {encoding} {what}",
+            code="E-FILE-ENC",
+            file=name,
+            limit=", ".join(_ENCODINGS),
             remedy="save the file as UTF-8, with the declaration",
-        )  # fmt: skip
+        )
     return text.removeprefix("\ufeff")
 
 
@@ -299,8 +313,7 @@ def _from_xml(text: str, name: str) -> dict:
         **root.attrib,
         "components": [_xml_component(one) for one in _below(root, "components", "component")],
         "relations": [
-            {**one.attrib, "refs": [dict(ref.attrib) for ref in one]}
-            for one in _below(root, "relations", "relation")
+            {**one.attrib, "refs": [dict(ref.attrib) for ref in one]} for one in _below(root, "relations", "relation")
         ],
         "load_spectrum": [{"load_cases": _xml_cases(one)} for one in root if _tag(one) == "load_spectrum"],
     }
@@ -335,9 +348,14 @@ def _model(data: dict, name: str) -> Model:
     version = str(data.get("version"))
     if not _VERSIONS.fullmatch(version):
         raise CaseError(
-            "this version of REXS is not read", code="E-FORMAT", key="version", value=version, file=name,
-            limit="1.0 to 1.7 and 2.0", remedy="export the gear unit in one of these versions",
-        )  # fmt: skip
+            "this version of REXS is not read",
+            code="E-FORMAT",
+            key="version",
+            value=version,
+            file=name,
+            limit="1.0 to 1.7 and 2.0",
+            remedy="export the gear unit in one of these versions",
+        )
     components: dict[str, Component] = {}
     model = Model(name, version, components, tuple(_relations(data)), _load_cases(data, name))
     for one in _dicts(data, "components"):
@@ -404,9 +422,12 @@ def _refuse_loops(model: Model) -> None:
 def model_text(model: Model, program: str, version: str) -> str:
     """Write a model as REXS in XML; `program` and its `version` are those of the writer."""
     root = ElementTree.Element(
-        "model", applicationId=program, applicationVersion=version, version=model.version,
+        "model",
+        applicationId=program,
+        applicationVersion=version,
+        version=model.version,
         date=datetime.now().astimezone().isoformat(timespec="seconds"),
-    )  # fmt: skip
+    )
     relations = ElementTree.SubElement(root, "relations")
     for number, relation in enumerate(model.relations, start=1):
         parent = ElementTree.SubElement(relations, "relation", id=str(number), type=relation.type, order="1")

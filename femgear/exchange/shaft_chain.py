@@ -101,9 +101,10 @@ def chain_tables(
     tables["simulation"] = {"duration": "1 s", "damping_ratio": 0.03}
     remarks["simulation.damping_ratio"] = "assumed"
     model.remark(
-        "body", "REXS has no inertia of motor and load: the ends of the drivetrain are bare shafts",
+        "body",
+        "REXS has no inertia of motor and load: the ends of the drivetrain are bare shafts",
         remedy="add the inertias of motor and load to the bodies at the ends",
-    )  # fmt: skip
+    )
     return tables, remarks
 
 
@@ -174,12 +175,12 @@ def _shaft(model: Model, shaft: Component, gears, pairs, names, tables, remarks)
         if diameter is None:
             raise NoChain(f"{shaft} has no sections")
         table = {"between": [one, two], "length": shown(end - start, LENGTH), "elements": 1}
-        table |= {"outer_diameter": shown(diameter, LENGTH)} | (
-            {"inner_diameter": shown(bore, LENGTH)} if bore else {}
-        )
+        table |= {"outer_diameter": shown(diameter, LENGTH)} | ({"inner_diameter": shown(bore, LENGTH)} if bore else {})
         for made in model.related("reference", "referenced", origin=shaft.id)[:1]:
-            for key, attribute, dimension in (("youngs_modulus", "elastic_modulus", MODULUS),
-                                              ("density", "density", DENSITY)):  # fmt: skip
+            for key, attribute, dimension in (
+                ("youngs_modulus", "elastic_modulus", MODULUS),
+                ("density", "density", DENSITY),
+            ):
                 value = model.number(made, attribute, dimension)
                 table |= {} if value is None else {key: shown(value, dimension)}
         tables["shaft"].append(table)
@@ -234,8 +235,14 @@ def _section(model: Model, shaft: Component, start: float, end: float) -> tuple[
     for part in model.related(("assembly", "ordered_assembly"), "part", assembly=shaft.id):
         if part.type != "shaft_section":
             continue
-        keys = ("u_coordinate_on_shaft", "length", "outer_diameter_begin", "outer_diameter_end",
-                "inner_diameter_begin", "inner_diameter_end")  # fmt: skip
+        keys = (
+            "u_coordinate_on_shaft",
+            "length",
+            "outer_diameter_begin",
+            "outer_diameter_end",
+            "inner_diameter_begin",
+            "inner_diameter_end",
+        )
         at, length, begin, finish, inner, inside = (model.number(part, key, LENGTH) or 0.0 for key in keys)
         share = min(end, at + length) - max(start, at)
         outer, bore = 0.5 * (begin + finish), 0.5 * (inner + inside)
@@ -249,9 +256,7 @@ def _section(model: Model, shaft: Component, start: float, end: float) -> tuple[
     return (covered / compliance + bore**4) ** 0.25, bore
 
 
-def _stage(
-    model: Model, stage: Component, pair, file: str, names, tables, speed: Mapping[str, float]
-) -> None:
+def _stage(model: Model, stage: Component, pair, file: str, names, tables, speed: Mapping[str, float]) -> None:
     """Add a parallel stage; its helix is positive where it pushes the second gear along z (see the docs)."""
     gears = gears_of(model, stage)
     helix = to_si(pair["set"].get("helix_angle", "0 deg"), ANGLE)

@@ -219,9 +219,10 @@ def _curved_coordinates(element_nodes, points, b1, b2):
             break
     if np.minimum(np.minimum(b1, b2), 1.0 - b1 - b2).min() < -0.05:
         raise GridError(
-            "an observation point falls between curved elements", code="E-GRID",
+            "an observation point falls between curved elements",
+            code="E-GRID",
             remedy="try another static.flank_elements or static.depth",
-        )  # fmt: skip
+        )
     return b1, b2
 
 
@@ -279,9 +280,7 @@ def condense_sums(
     edges, on_rim, schurs = [], [], []
     for fields, inner in _half_sector_fields(grid, None, rim, components):
         back = csr_array(fields.T)
-        schurs.append(
-            _schur_complements([back @ part @ fields for part in parts], factors, back @ columns, inner)
-        )
+        schurs.append(_schur_complements([back @ part @ fields for part in parts], factors, back @ columns, inner))
         edges.append(fields[:, inner:])
         on_rim.append(abs(csr_array(edges[-1])[nodes]).sum(axis=0) > 0)
     nb, sizes = components * len(boundary_nodes(grid, "cut_left")), (loads.shape[1], observations.shape[1])
@@ -294,9 +293,7 @@ def condense_sums(
 def check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
     """Refuse loads (2n, m) [N] that act on degrees of freedom (k,) of the cuts (`GridError`, E-GRID)."""
     if np.any(loads[cut]):
-        raise GridError(
-            "a load acts on a cut of the sector", code="E-GRID", remedy="load nodes of the flanks alone"
-        )
+        raise GridError("a load acts on a cut of the sector", code="E-GRID", remedy="load nodes of the flanks alone")
 
 
 def _check_residual(residual: float) -> None:
@@ -541,8 +538,7 @@ def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
                 remedy="hold its bore or its rim, or put it on a foundation",
             )
         loads, observations = (
-            (tie * cut).swapaxes(1, 2).reshape(*A.shape[:2], -1)
-            for cut in (schur.load_cut, schur.observation_cut)
+            (tie * cut).swapaxes(1, 2).reshape(*A.shape[:2], -1) for cut in (schur.load_cut, schur.observation_cut)
         )
         tied = observations.swapaxes(1, 2) @ np.linalg.solve(A, loads)
         tied = tied.reshape(-1, 2, observed, 1, 2, loaded)
@@ -626,9 +622,7 @@ def rim_compliance(grid: Grid, stiffness, *, count: int, orders) -> np.ndarray:
     kept = np.concatenate([node_dofs(cuts[0]), node_dofs(cuts[1]), node_dofs(inside)])
     turn, size = np.pi / count, 2 * len(cuts[0])
     right = np.kron(np.eye(len(cuts[0])), [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
-    polar = block_array(
-        [[right, None, None], [None, right.T, None], [None, None, eye_array(2 * len(inside))]]
-    )
+    polar = block_array([[right, None, None], [None, right.T, None], [None, None, eye_array(2 * len(inside))]])
     polar = polar.toarray()
     schur, found = polar.T @ _condensed(stiffness, kept) @ polar, np.empty((len(orders), 2, 2), complex)
     rest = np.r_[:size, 2 * size : len(kept)]
@@ -652,9 +646,7 @@ def _condensed(stiffness, kept: np.ndarray) -> np.ndarray:
     matrix: Any = csc_array(stiffness)
     inner = np.setdiff1d(np.arange(matrix.shape[0]), kept)
     across = matrix[inner][:, kept].toarray()
-    return matrix[kept][:, kept].toarray() - across.T @ symmetric_factor(matrix[inner][:, inner]).solve(
-        across
-    )
+    return matrix[kept][:, kept].toarray() - across.T @ symmetric_factor(matrix[inner][:, inner]).solve(across)
 
 
 def _wave(grid: Grid, order: int) -> np.ndarray:

@@ -69,9 +69,12 @@ def boundary_edges(grid: Grid, name: str) -> np.ndarray:
     if name not in grid.boundaries:
         limit = "one of " + ", ".join(sorted(grid.boundaries))
         raise GridError(
-            f"the grid has no boundary {name!r}", code="E-GRID", key=name, limit=limit,
+            f"the grid has no boundary {name!r}",
+            code="E-GRID",
+            key=name,
+            limit=limit,
             remedy="name one of these, or give the outline a curve of this name",
-        )  # fmt: skip
+        )
     return grid.boundaries[name]
 
 
@@ -162,9 +165,7 @@ def shape_functions(b1, b2):
     """Quadratic shape functions (6, m) at reference coordinates (m,), and their derivatives along both."""
     b0 = 1.0 - b1 - b2
     one, zero = np.ones_like(b0), np.zeros_like(b0)
-    value = np.stack(
-        [b0 * (2 * b0 - 1), b1 * (2 * b1 - 1), b2 * (2 * b2 - 1), 4 * b0 * b1, 4 * b1 * b2, 4 * b2 * b0]
-    )
+    value = np.stack([b0 * (2 * b0 - 1), b1 * (2 * b1 - 1), b2 * (2 * b2 - 1), 4 * b0 * b1, 4 * b1 * b2, 4 * b2 * b0])
     first = np.stack([one - 4 * b0, 4 * b1 - 1, zero, 4 * (b0 - b1), 4 * b2, -4 * b2])
     second = np.stack([one - 4 * b0, zero, 4 * b2 - 1, -4 * b1, 4 * b1, 4 * (b0 - b2)])
     return value, first, second
@@ -243,9 +244,10 @@ def write_grid(path: Path, grid: Grid) -> None:
         if isinstance(error, FileNotFoundError) and path.is_file():
             return
         raise StorageError(
-            f"cannot write the grid {path}: {error}", code="E-GRID-FILE",
+            f"cannot write the grid {path}: {error}",
+            code="E-GRID-FILE",
             remedy="free some space, or name another folder of grids: FEMGEAR_MESHES",
-        ) from error  # fmt: skip
+        ) from error
 
 
 def read_grid(path: Path) -> Grid:

@@ -95,16 +95,16 @@ def check_outline(outline) -> Plan:
     every = np.vstack([points for _, points in curves])
     size = np.ptp(every, axis=0).max()
     if not size > 0:
-        raise GridError(
-            "all points of the outline coincide", code="E-GRID", remedy="give points that enclose an area"
-        )
+        raise GridError("all points of the outline coincide", code="E-GRID", remedy="give points that enclose an area")
     points, segments, mids, names = _join(curves, inner, size)
     n_boundary = sum(len(p) // 2 for _, p in curves)
     if len(segments) > MAX_SEGMENTS:
         raise GridError(
-            f"the outline has {len(segments)} segments", code="E-GRID", limit=f"at most {MAX_SEGMENTS}",
+            f"the outline has {len(segments)} segments",
+            code="E-GRID",
+            limit=f"at most {MAX_SEGMENTS}",
             remedy="use fewer points along the outline",
-        )  # fmt: skip
+        )
     _check_distinct(points, size)
     _check_crossing(points, segments, names, size)
     _check_area(points[segments[:n_boundary, 0]], size)
@@ -188,8 +188,7 @@ def _check_crossing(points, segments, names, size):
             p, q = i[hit[0]], j[hit[0]]
             x, y = 0.25 * (a[p] + b[p] + a[q] + b[q])
             raise GridError(
-                f"the outline crosses or touches itself: {names[p]!r} and {names[q]!r} near "
-                f"({x:.9g}, {y:.9g}) m",
+                f"the outline crosses or touches itself: {names[p]!r} and {names[q]!r} near ({x:.9g}, {y:.9g}) m",
                 code="E-GRID",
                 remedy="give the points in their order along the outline; curves meet at their ends alone",
             )
@@ -211,9 +210,11 @@ def _check_area(polygon, size):
         raise GridError(message, code="E-GRID", remedy="give an outline with a body inside")
     if area < 0:
         raise GridError(
-            "the outline runs clockwise", code="E-GRID", limit="counter-clockwise, the body on the left",
+            "the outline runs clockwise",
+            code="E-GRID",
+            limit="counter-clockwise, the body on the left",
             remedy="reverse the order of curves and points",
-        )  # fmt: skip
+        )
 
 
 def _faces(segments, n_boundary, inner):
@@ -373,9 +374,10 @@ def _grid_of_plan(plan: Plan, found: Grid, path: Path) -> Grid:
         return grid
     except (GridError, KeyError, IndexError, ValueError) as error:
         raise StorageError(
-            f"{path} is not a grid of this outline: {error!r}", code="E-GRID-FILE",
+            f"{path} is not a grid of this outline: {error!r}",
+            code="E-GRID-FILE",
             remedy="delete the file; it is made again when needed",
-        ) from error  # fmt: skip
+        ) from error
 
 
 def mesh_outlines(outlines, *, cache: Path | None = None) -> tuple[Grid, ...]:
@@ -459,9 +461,10 @@ def _worker_error(done):
     if done.returncode == 3:
         return _library_error(text)
     return GridError(
-        f"Gmsh failed (exit code {done.returncode}): {text}", code="E-GRID-GMSH",
+        f"Gmsh failed (exit code {done.returncode}): {text}",
+        code="E-GRID-GMSH",
         remedy="try another static.flank_elements; if no grid can be made, install Gmsh anew",
-    )  # fmt: skip
+    )
 
 
 def _library_error(text):

@@ -207,9 +207,7 @@ def cyclic_modes(
         Append the part of the static response to the loads that the kept modes miss.
     """
     on_basis = [vectors.T @ loads for vectors in basis.vectors]
-    found = [
-        _one_diameter(basis, int(n), on_basis, max_frequency, static_correction) for n in nodal_diameters
-    ]
+    found = [_one_diameter(basis, int(n), on_basis, max_frequency, static_correction) for n in nodal_diameters]
     reduced, recovery = np.hstack([vectors for _, vectors in found]), np.hstack(basis.vectors)
     return CyclicModes(
         count=basis.count,
@@ -230,9 +228,7 @@ def _one_diameter(basis: _SectorBasis, n, loads, max_frequency, static_correctio
     # antisymmetric fields lag by a quarter of a turn; where no turn is seen both are real
     lags = (1.0, 1.0 if n == 0 or 2 * n == basis.count else 1j)
     force = np.zeros((size, loads[0].shape[1]), complex)
-    for (own, tie), stiffness, mass, load, lag in zip(
-        places, basis.stiffness, basis.mass, loads, lags, strict=True
-    ):
+    for (own, tie), stiffness, mass, load, lag in zip(places, basis.stiffness, basis.mass, loads, lags, strict=True):
         at = np.r_[:nb, own]
         K[np.ix_(at, at)] += tie[:, None] * stiffness * tie
         M[np.ix_(at, at)] += tie[:, None] * mass * tie

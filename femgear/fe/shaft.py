@@ -238,9 +238,9 @@ def shaft_flexibility(steps: Sequence[ShaftStep], material, *, refine: float = 1
     # a tilt that goes with a positive deflection lowers the side towards which the shaft bends
     prescribed[3 * face + 2, 1] = -grid.points[face, 0]
     matrix = (shapes.T @ K @ shapes).tocsc()
-    solved = scipy.sparse.linalg.splu(
-        matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
-    ).solve(shapes.T @ (K @ prescribed))
+    solved = scipy.sparse.linalg.splu(matrix, permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
+        shapes.T @ (K @ prescribed)
+    )
     u = prescribed - shapes @ solved
     return np.linalg.inv(u.T @ (K @ u))
 
@@ -257,9 +257,10 @@ def _half_section(steps, refine):
     for one, other in pairwise(steps):
         if not max(one.inner_diameter, other.inner_diameter) < min(one.outer_diameter, other.outer_diameter):
             raise GeometryError(
-                "two neighbouring parts of a shaft do not touch", code="E-SHAFT",
+                "two neighbouring parts of a shaft do not touch",
+                code="E-SHAFT",
                 limit="the bore of each below the outer diameter of the other",
-            )  # fmt: skip
+            )
     wall = min(0.5 * (step.outer_diameter - step.inner_diameter) for step in steps)
     size = wall / (ACROSS * refine)
     z = np.concatenate([[0.0], np.cumsum([step.length for step in steps])])

@@ -127,10 +127,12 @@ def _planets(s: PlanetarySet):
     """Warn of sets with one or two planets."""
     if s.n_planets < 3:
         yield GeometryWarning(
-            "W-PLANETS", "set.planets",
+            "W-PLANETS",
+            "set.planets",
             f"{s.n_planets} planet{'s' * (s.n_planets > 1)} leave{'s' * (s.n_planets == 1)} the radial mesh "
-            "forces on sun and ring to their bearings; a floating member cannot balance the load", ">= 3",
-        )  # fmt: skip
+            "forces on sun and ring to their bearings; a floating member cannot balance the load",
+            ">= 3",
+        )
 
 
 def _neighbours(s: PlanetarySet):
@@ -145,17 +147,21 @@ def _neighbours(s: PlanetarySet):
         raise GeometryError(
             f"neighbouring planets overlap by {-room * 1e3:.4f} mm: {pair} "
             f"(tip radius {s.planet.tip_radius * 1e3:.4f} mm at {s.centre_distance * 1e3:.4f} mm)",
-            code="E-NEIGHBOURS", key="set.planet_angles" if uneven else "set.planets",
+            code="E-NEIGHBOURS",
+            key="set.planet_angles" if uneven else "set.planets",
             value=f"{math.degrees(gap):.4f} deg" if uneven else s.n_planets,
-            limit=f"more than {math.degrees(2.0 * least):.4f} deg between neighbours" if uneven
+            limit=f"more than {math.degrees(2.0 * least):.4f} deg between neighbours"
+            if uneven
             else f"at most {most} equally spaced planets",
             remedy="use fewer planets, or fewer teeth on the planets",
-        )  # fmt: skip
+        )
     if room < s.planet.module:
         yield GeometryWarning(
-            "W-NEIGHBOURS", "set.planets",
-            f"only {room * 1e3:.4f} mm are left between neighbouring tips: {pair}", ">= one module",
-        )  # fmt: skip
+            "W-NEIGHBOURS",
+            "set.planets",
+            f"only {room * 1e3:.4f} mm are left between neighbouring tips: {pair}",
+            ">= one module",
+        )
 
 
 def planet_room(s: PlanetarySet, angles: tuple[float, ...]) -> tuple[float, float, str]:
@@ -193,21 +199,25 @@ def _backlash(s: GearSet):
                 f"{mesh}: the flanks overlap by {-value * 1e6:.3f} um along the line of action at the centre "
                 f"distance of {s.centre_distance * 1e3:.5f} mm (negative backlash){other_sign(s)}",
                 code="E-BACKLASH",
-                key=f"{gear.name}.profile_shift", value=gear.profile_shift,
+                key=f"{gear.name}.profile_shift",
+                value=gear.profile_shift,
                 limit=f"normal backlash >= -{BACKLASH_TOLERANCE * module * 1e6:.3g} um",
                 remedy=f"let the {gear.name}'s profile shift be found, or give a thickness allowance",
-            )  # fmt: skip
+            )
         elif value - _asked_play(pair) > least + _UNEVEN * module:
             yield GeometryWarning(
-                "W-BACKLASH", "set.centre_distance",
+                "W-BACKLASH",
+                "set.centre_distance",
                 f"{mesh}: normal backlash of {value * 1e3:.4f} mm; {_closing(pair)}{other_sign(s)}",
                 f"that of the other meshes within {_UNEVEN:g} modules",
-            )  # fmt: skip
+            )
         elif value > 0.3 * module:
             yield GeometryWarning(
-                "W-BACKLASH", f"{gear.name}.profile_shift",
-                f"{mesh}: normal backlash of {value * 1e3:.4f} mm", "< 0.3 modules",
-            )  # fmt: skip
+                "W-BACKLASH",
+                f"{gear.name}.profile_shift",
+                f"{mesh}: normal backlash of {value * 1e3:.4f} mm",
+                "< 0.3 modules",
+            )
 
 
 def _asked_play(pair: GearPair) -> float:
@@ -233,15 +243,20 @@ def _clearances(s: GearSet):
         gear = next(gear for gear in s.gears if gear.name == name.split()[0])
         if value < 0.0:
             yield GeometryError(
-                f"negative tip clearance, {name}: {value * 1e3:.4f} mm", code="E-CLEARANCE",
-                key=f"{gear.name}.tip_diameter", value=2.0 * gear.tip_radius, limit="clearance >= 0",
+                f"negative tip clearance, {name}: {value * 1e3:.4f} mm",
+                code="E-CLEARANCE",
+                key=f"{gear.name}.tip_diameter",
+                value=2.0 * gear.tip_radius,
+                limit="clearance >= 0",
                 remedy=f"shorten the tips of the {gear.name} (tip_diameter) or deepen the rack's dedendum",
-            )  # fmt: skip
+            )
         elif value < 0.1 * gear.module:
             yield GeometryWarning(
-                "W-CLEARANCE", f"{gear.name}.tip_diameter", f"tip clearance, {name}, of {value * 1e3:.4f} mm",
+                "W-CLEARANCE",
+                f"{gear.name}.tip_diameter",
+                f"tip clearance, {name}, of {value * 1e3:.4f} mm",
                 ">= 0.1 modules",
-            )  # fmt: skip
+            )
 
 
 def _longer_contact(pair: GearPair) -> str:
@@ -254,9 +269,7 @@ def _longer_contact(pair: GearPair) -> str:
     ]
     found = [f"leave {' and '.join(given)} out: tips are then as long as can be"] if given else []
     if few:
-        found.append(
-            f"take more teeth, or a larger profile shift where undercut cuts the flank: {', '.join(few)}"
-        )
+        found.append(f"take more teeth, or a larger profile shift where undercut cuts the flank: {', '.join(few)}")
     return "; ".join([*found, "lengthen the tips or reduce the working pressure angle"])
 
 
@@ -266,21 +279,29 @@ def _contact_ratios(s: GearSet, overlap: float):
         mesh, value = f"{pair.gear_1.name}-{pair.gear_2.name}", pair.contact_ratio
         if value < 1.0 < value + overlap:
             yield GeometryWarning(
-                "W-CONTACT-RATIO", "set.centre_distance",
+                "W-CONTACT-RATIO",
+                "set.centre_distance",
                 f"{mesh}: transverse contact ratio {value:.4f}; the overlap ratio of {overlap:.4f} alone "
                 "keeps teeth in contact",
-                ">= 1", severity=DOUBT,
-            )  # fmt: skip
+                ">= 1",
+                severity=DOUBT,
+            )
         elif value < 1.0:
             yield GeometryError(
                 f"{mesh}: contact ratio {value:.4f}, so contact is lost between teeth",
-                code="E-CONTACT-RATIO", key="set.centre_distance", value=f"contact ratio {value:.4f}",
-                limit="contact ratio >= 1", remedy=_longer_contact(pair),
-            )  # fmt: skip
+                code="E-CONTACT-RATIO",
+                key="set.centre_distance",
+                value=f"contact ratio {value:.4f}",
+                limit="contact ratio >= 1",
+                remedy=_longer_contact(pair),
+            )
         elif value < 1.2:
             yield GeometryWarning(
-                "W-CONTACT-RATIO", "set.centre_distance", f"{mesh}: contact ratio {value:.4f}", ">= 1.2",
-            )  # fmt: skip
+                "W-CONTACT-RATIO",
+                "set.centre_distance",
+                f"{mesh}: contact ratio {value:.4f}",
+                ">= 1.2",
+            )
 
 
 def _single_gears(s: GearSet):
@@ -288,27 +309,31 @@ def _single_gears(s: GearSet):
     for gear in s.gears:
         if gear.undercut:
             yield GeometryWarning(
-                "W-UNDERCUT", f"{gear.name}.profile_shift",
+                "W-UNDERCUT",
+                f"{gear.name}.profile_shift",
                 f"{gear.teeth} teeth are undercut: the involute ends at {gear.form_radius * 1e3:.4f} mm; "
                 f"this tool needs x >= {gear.undercut_shift:.4f} (a tool flank one module deep: "
-                f"{undercut_shift(gear.teeth, gear.pressure_angle):.4f})", f">= {gear.undercut_shift:.4f}",
-            )  # fmt: skip
+                f"{undercut_shift(gear.teeth, gear.pressure_angle):.4f})",
+                f">= {gear.undercut_shift:.4f}",
+            )
         land = float(tooth_thickness(gear, gear.tip_radius))
         if land < USUAL_LAND * gear.module:
             yield GeometryWarning(
-                "W-TIP-THIN", f"{gear.name}.profile_shift",
+                "W-TIP-THIN",
+                f"{gear.name}.profile_shift",
                 f"the teeth of the {gear.name} are {land * 1e3:.4f} mm thick at the tip",
                 f">= {USUAL_LAND:g} modules",
-            )  # fmt: skip
+            )
         rim = abs(gear.root_radius - gear.rim_radius)
         height = abs(gear.tip_radius - gear.root_radius)
         if rim < 1.2 * height:
             yield GeometryWarning(
-                "W-RIM", f"{gear.name}.{'outer_radius' if gear.internal else 'bore_radius'}",
+                "W-RIM",
+                f"{gear.name}.{'outer_radius' if gear.internal else 'bore_radius'}",
                 f"the {gear.name}'s rim is {rim * 1e3:.4f} mm thick under teeth of {height * 1e3:.4f} mm; "
                 + _rim_held(gear),
                 ">= 1.2 tooth heights (below, ISO 6336-3 raises the root stress by a rim factor)",
-            )  # fmt: skip
+            )
 
 
 def _rim_held(gear: Gear) -> str:
@@ -332,10 +357,13 @@ def _interference(s: GearSet):
             yield GeometryError(
                 f"involute interference: the {partner.name}'s tip meets the {gear.name} "
                 f"{-reach * 1e3:.4f} mm beyond the end of the line of action, inside the {gear.name}'s base "
-                "circle", code="E-INTERFERENCE", key=f"{partner.name}.tip_diameter",
-                value=2.0 * partner.tip_radius, limit=f"tip diameter {_tip_limit(partner, allowed)} mm",
+                "circle",
+                code="E-INTERFERENCE",
+                key=f"{partner.name}.tip_diameter",
+                value=2.0 * partner.tip_radius,
+                limit=f"tip diameter {_tip_limit(partner, allowed)} mm",
                 remedy=f"give that tip_diameter, more teeth to the {gear.name}, or profile shifts",
-            )  # fmt: skip
+            )
             continue
         excess = reach - gear.form_roll if gear.internal else gear.form_roll - reach
         # undercut has removed the flank that a partner's tip would reach: the path of contact is shorter
@@ -361,19 +389,23 @@ def _fillet_contact(gear: Gear, partner: Gear, reach: float, pair: GearPair):
     limit = _tip_limit(partner, largest_tip(gear, partner, reach))
     if overlap > allowed:
         yield GeometryError(
-            message, code="E-FILLET", key="rack.root_radius",
+            message,
+            code="E-FILLET",
+            key="rack.root_radius",
             value=round(gear.tool.rounding / gear.module, 9),
             limit=f"overlap <= {allowed * 1e6:.3f} um, or active profile {'up' if gear.internal else 'down'} "
             f"to {gear.form_radius * 1e3:.4f} mm",
             remedy=("reduce root_radius", f"give the {partner.name} a tip_diameter {limit} mm"),
             gear=gear.name,
-        )  # fmt: skip
+        )
     else:
         yield GeometryWarning(
-            "W-FILLET", f"{partner.name}.tip_diameter",
+            "W-FILLET",
+            f"{partner.name}.tip_diameter",
             f"{message}; contact is computed on the involutes alone, which this corner would part by as much",
-            f"{limit} mm", severity=DOUBT if overlap > DOUBTFUL_OVERLAP * gear.module else "",
-        )  # fmt: skip
+            f"{limit} mm",
+            severity=DOUBT if overlap > DOUBTFUL_OVERLAP * gear.module else "",
+        )
 
 
 def _tip_limit(partner: Gear, radius: float) -> str:
@@ -393,11 +425,12 @@ def _shortened_tips(s: GearSet):
         if further > SEEN:
             why += [f"{further * 1e3:.4f} mm let them run free of their mates"]
         yield Finding(
-            "W-TIP", f"{gear.name}.tip_diameter",
+            "W-TIP",
+            f"{gear.name}.tip_diameter",
             f"the tips of the {gear.name} are {gear.tip_shortening * 1e3:.4f} mm shorter than those of the "
             f"rack, at a diameter of {2e3 * gear.tip_radius:.4f} mm: {' and '.join(why)}",
             remedy="give tip_diameter where the drawing has another one",
-        )  # fmt: skip
+        )
 
 
 def other_sign(s: GearSet) -> str:
@@ -426,7 +459,9 @@ def _passing_faults(planet: Gear, ring: Gear, centre_distance: float) -> Iterato
             f"the tips of {planet.name} ({planet.teeth} teeth) and {ring.name} ({ring.teeth}) strike each "
             "other outside the path of contact: "
             f"the corners overlap by {-margin * ring.tip_radius * 1e3:.4f} mm",
-            code="E-INTERFERENCE", key=f"{ring.name}.teeth", value=ring.teeth,
+            code="E-INTERFERENCE",
+            key=f"{ring.name}.teeth",
+            value=ring.teeth,
             limit="corners of the tips pass each other",
             remedy="increase the difference of the tooth numbers, or shorten the tips (tip_diameter)",
-        )  # fmt: skip
+        )

@@ -283,9 +283,7 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
     return one[np.asarray(tooth_1) % len(one)] + two[np.asarray(tooth_2) % len(two)]
 
 
-def body_separation(
-    deviations: SetDeviations, planetary_set: GearSet, position, *, back: bool = False
-) -> np.ndarray:
+def body_separation(deviations: SetDeviations, planetary_set: GearSet, position, *, back: bool = False) -> np.ndarray:
     """Compute the separation (2N, P) [m] of every mesh by runouts, pin errors, ovality and planet thickness.
 
     ``n . (u_2 - u_1)`` at positions tau (P,), in mesh periods and beyond 1 too, with the normals of
@@ -335,9 +333,7 @@ def _oval(ovality: Ovality, psi: np.ndarray, ring_angle: np.ndarray) -> np.ndarr
     return ovality.amplitude * (np.cos(wave) + 1j * along) * np.exp(1j * psi[:, None])
 
 
-def common_period(
-    deviations: SetDeviations, planetary_set: GearSet, *, limit: int = LONGEST_RECORD
-) -> tuple[int, str]:
+def common_period(deviations: SetDeviations, planetary_set: GearSet, *, limit: int = LONGEST_RECORD) -> tuple[int, str]:
     """Find the number of mesh periods after which a set with deviations repeats.
 
     A member whose teeth or whose axis deviate repeats after the mesh periods of its own turn against the
@@ -392,9 +388,7 @@ def _repeat(values: np.ndarray) -> int:
     """Smallest divisor of the number of teeth by which the values may be shifted without a change."""
     count = len(values)
     return next(
-        step
-        for step in range(1, count + 1)
-        if count % step == 0 and np.array_equal(values, np.roll(values, step))
+        step for step in range(1, count + 1) if count % step == 0 and np.array_equal(values, np.roll(values, step))
     )
 
 
@@ -426,9 +420,7 @@ def planet_shift(d: SetDeviations, s: GearSet, symmetry: int, periods: int) -> F
             continue
         turned = step * np.rint(float(shift) + phases - phases[behind]).astype(int)
         pitches = d.planet_pitch, d.planet_ring_side_pitch
-        alike = (
-            np.array_equal(np.roll(one[n], -turned[n]), one[behind[n]]) for one in pitches for n in range(N)
-        )
+        alike = (np.array_equal(np.roll(one[n], -turned[n]), one[behind[n]]) for one in pitches for n in range(N))
         if all(alike):
             here = body_separation(d, s, position + float(shift))
             if np.abs(here - there[meshes]).max() <= close:
@@ -436,9 +428,7 @@ def planet_shift(d: SetDeviations, s: GearSet, symmetry: int, periods: int) -> F
     return None
 
 
-def mirrored_deviations(
-    deviations: SetDeviations, planetary_set: GearSet, mirrored: GearSet, order
-) -> SetDeviations:
+def mirrored_deviations(deviations: SetDeviations, planetary_set: GearSet, mirrored: GearSet, order) -> SetDeviations:
     """Find the deviations that the mirror image of the set has, for a torque that loads the other flanks.
 
     The image is taken at the line through the first planet, with the sun where it was and the play of all

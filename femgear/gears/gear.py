@@ -388,27 +388,33 @@ def _check_circles(gear: Gear) -> None:
     sign = -1.0 if gear.internal else 1.0
     if not (sign * (tip - root) > 0.0 and tip > 0.0):
         raise _fault(
-            gear, "tip_diameter",
-            f"tip radius {tip * 1e3:.4f} mm and root radius {root * 1e3:.4f} mm leave no tooth", code="E-TIP",
+            gear,
+            "tip_diameter",
+            f"tip radius {tip * 1e3:.4f} mm and root radius {root * 1e3:.4f} mm leave no tooth",
+            code="E-TIP",
             limit=f"tip diameter {'<' if gear.internal else '>'} {2e3 * root:.4f} mm",
             remedy="correct the tip or root diameter",
-        )  # fmt: skip
+        )
     if not sign * (root - rim) > 0.0:
         raise _fault(
-            gear, "outer_radius" if gear.internal else "bore_radius",
+            gear,
+            "outer_radius" if gear.internal else "bore_radius",
             f"the rim is {sign * (root - rim) * 1e3:.4f} mm thick: root radius {root * 1e3:.4f} mm, "
-            f"{'outer' if gear.internal else 'bore'} radius {rim * 1e3:.4f} mm", code="E-RIM",
+            f"{'outer' if gear.internal else 'bore'} radius {rim * 1e3:.4f} mm",
+            code="E-RIM",
             limit=f"{'>' if gear.internal else '<'} {root * 1e3:.4f} mm",
             remedy="enlarge the outer radius" if gear.internal else "reduce the bore radius",
-        )  # fmt: skip
+        )
     if not tip > gear.base_radius:
         raise _fault(
-            gear, "tip_diameter",
+            gear,
+            "tip_diameter",
             f"the tip circle (radius {tip * 1e3:.4f} mm) lies inside the base circle "
-            f"({gear.base_radius * 1e3:.4f} mm), where there is no involute", code="E-TIP",
+            f"({gear.base_radius * 1e3:.4f} mm), where there is no involute",
+            code="E-TIP",
             limit=f"tip diameter > {2e3 * gear.base_radius:.4f} mm",
             remedy="give a larger tip_diameter, more teeth or a larger profile shift",
-        )  # fmt: skip
+        )
 
 
 def combined_fault(faults: Sequence[GeometryError]) -> GeometryError:
@@ -420,9 +426,14 @@ def combined_fault(faults: Sequence[GeometryError]) -> GeometryError:
     *ways, last = first.remedies or ("",)
     beside = dict.fromkeys(fault.remedy for fault in others if fault.remedy not in (None, first.remedy))
     return GeometryError(
-        f"{first.message}; also {also}", code=first.code, key=first.key, value=first.value, limit=first.limit,
-        remedy=(*ways, "; ".join(filter(None, (last, *beside)))), gear=first.gear,
-    )  # fmt: skip
+        f"{first.message}; also {also}",
+        code=first.code,
+        key=first.key,
+        value=first.value,
+        limit=first.limit,
+        remedy=(*ways, "; ".join(filter(None, (last, *beside)))),
+        gear=first.gear,
+    )
 
 
 def _tool_faults(gear: Gear) -> Iterator[GeometryError]:
@@ -434,53 +445,66 @@ def _tool_faults(gear: Gear) -> Iterator[GeometryError]:
     if gear.tool.room / (1.0 if gear.internal else gear.module) < -ROOM_TOLERANCE:
         largest, rounding = _largest_rounding(gear), round(gear.tool.rounding / gear.module, 9)
         yield _fault(
-            gear, "rack.root_radius",
+            gear,
+            "rack.root_radius",
             f"a tool tip rounding of {rounding:.4f} modules does not fit between the flanks of the tool",
-            code="E-ROOT-RADIUS", value=rounding,
+            code="E-ROOT-RADIUS",
+            value=rounding,
             limit=f"<= {largest:.4f} modules" if largest > 0.0 else None,
             remedy="reduce root_radius" if largest > 0.0 else "reduce the dedendum: no root_radius fits",
-        )  # fmt: skip
+        )
 
 
 def _cutter_faults(gear: Gear, cutter: PinionCutter) -> Iterator[GeometryError]:
     """Faults of a pinion cutter."""
     if not (is_whole(cutter.teeth) and 5 <= cutter.teeth <= gear.teeth - 5):
         yield _fault(
-            gear, "cutter_teeth",
+            gear,
+            "cutter_teeth",
             f"a cutter of {cutter.teeth!r} teeth cannot generate an internal gear of {gear.teeth} teeth",
-            code="E-CUTTER", value=cutter.teeth, limit=f"whole number 5 .. {gear.teeth - 5}",
+            code="E-CUTTER",
+            value=cutter.teeth,
+            limit=f"whole number 5 .. {gear.teeth - 5}",
             remedy="choose a smaller cutter; 30 teeth, or 12 fewer than the gear, is the default",
-        )  # fmt: skip
+        )
         return
     try:
         tool = _cutter_tip(gear, cutter)
     except GeometryError:
         yield _fault(
-            gear, "profile_shift",
+            gear,
+            "profile_shift",
             f"a cutter of {cutter.teeth} teeth with shift {cutter.profile_shift:.4f} finds no working "
-            f"pressure angle for a flank shifted by {gear.profile_shift:.4f}", code="E-CUTTER",
+            f"pressure angle for a flank shifted by {gear.profile_shift:.4f}",
+            code="E-CUTTER",
             limit="inv(alpha_w0) >= 0 between cutter and gear",
             remedy="increase the profile shift, or take a cutter with fewer teeth or a smaller shift",
-        )  # fmt: skip
+        )
         return
     if not tool.centre_radius > tool.cutter_base_radius:
         yield _fault(
-            gear, "cutter_teeth",
+            gear,
+            "cutter_teeth",
             f"the rounding of the cutter's tip is centred at {tool.centre_radius * 1e3:.4f} mm, inside the "
-            f"cutter's base circle of {tool.cutter_base_radius * 1e3:.4f} mm", code="E-CUTTER",
-            value=cutter.teeth, limit="tip radius - rounding > base radius of the cutter",
+            f"cutter's base circle of {tool.cutter_base_radius * 1e3:.4f} mm",
+            code="E-CUTTER",
+            value=cutter.teeth,
+            limit="tip radius - rounding > base radius of the cutter",
             remedy=f"{_better_cutter(gear)}, or give a smaller root_radius",
-        )  # fmt: skip
+        )
     start = tool.centre_distance * math.cos(tool.end_angle)  # gear roll at the cutter's base tangent point
     if gear.tip_roll < start:
         least = math.hypot(gear.base_radius, start)
         yield _fault(
-            gear, "cutter_teeth",
+            gear,
+            "cutter_teeth",
             f"a cutter of {cutter.teeth} teeth has no involute for the flank below {least * 1e3:.4f} mm; the "
-            f"tip circle is at {gear.tip_radius * 1e3:.4f} mm", code="E-CUTTER", value=cutter.teeth,
+            f"tip circle is at {gear.tip_radius * 1e3:.4f} mm",
+            code="E-CUTTER",
+            value=cutter.teeth,
             limit=f"tip radius >= {least * 1e3:.4f} mm",
             remedy=f"{_better_cutter(gear)}, or give a tip_diameter of {_up(2e3 * least)} mm or more",
-        )  # fmt: skip
+        )
 
 
 def _better_cutter(gear: Gear) -> str:
@@ -530,23 +554,28 @@ def _flank_faults(gear: Gear) -> Iterator[GeometryError]:
         free = tip_radius_at_land(gear, USUAL_LAND * gear.module)
         word = "least" if gear.internal else "most"
         yield _fault(
-            gear, "profile_shift",
+            gear,
+            "profile_shift",
             f"the tooth is pointed below its tip circle: thickness {2e3 * half * gear.tip_radius:.4f} mm at "
-            f"the tip radius {gear.tip_radius * 1e3:.4f} mm", code="E-POINTED", limit="tip thickness > 0",
+            f"the tip radius {gear.tip_radius * 1e3:.4f} mm",
+            code="E-POINTED",
+            limit="tip thickness > 0",
             remedy=f"change the profile shift or give a tip_diameter of at {word} {2e3 * free:.4f} mm, which "
             f"leaves {USUAL_LAND:g} modules at the tip",
-        )  # fmt: skip
+        )
     if gear.internal and any(_cutter_faults(gear, cutter_of(gear))):
         return  # no tool, no fillet
     sign = -1.0 if gear.internal else 1.0
     if not sign * (gear.tip_roll - gear.form_roll) > 0.0:
         yield _fault(
-            gear, "tip_diameter",
+            gear,
+            "tip_diameter",
             f"no involute is left between the fillet (radius {gear.form_radius * 1e3:.4f} mm) and the tip "
-            f"(radius {gear.tip_radius * 1e3:.4f} mm)", code="E-TIP",
+            f"(radius {gear.tip_radius * 1e3:.4f} mm)",
+            code="E-TIP",
             limit=f"tip radius {'<' if gear.internal else '>'} {gear.form_radius * 1e3:.4f} mm",
             remedy="correct the tip or root diameter, the dedendum or the profile shift",
-        )  # fmt: skip
+        )
 
 
 def _fault(

@@ -103,9 +103,7 @@ def zone_factor(pressure_angle: float, working_angle: float, base_helix: float =
     return math.sqrt(2.0 * math.cos(base_helix) / math.tan(working_angle)) / math.cos(pressure_angle)
 
 
-def elasticity_factor(
-    youngs_modulus: float, poisson_ratio: float, mate: tuple[float, float] | None = None
-) -> float:
+def elasticity_factor(youngs_modulus: float, poisson_ratio: float, mate: tuple[float, float] | None = None) -> float:
     """Compute Z_E = ``1/sqrt(pi ((1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2))`` [Pa^0.5] (ISO 6336-2, section 7).
 
     Young's modulus [Pa] and Poisson's ratio of one gear, and of its mate where that has others.
@@ -235,10 +233,11 @@ def nominal_root_stress(
     arm, angle, radius = _load(tooth, contact_ratio, direction, offset)
     if not (chord > 0.0 and arm > 0.0 and fillet > 0.0):
         raise GeometryError(
-            "the tooth has no critical section: "
-            f"chord {chord:.4g}, arm {arm:.4g}, fillet radius {fillet:.4g} modules", code="E-ISO6336",
-            limit="all > 0", remedy="the root of this tooth is outside the range of method B",
-        )  # fmt: skip
+            f"the tooth has no critical section: chord {chord:.4g}, arm {arm:.4g}, fillet radius {fillet:.4g} modules",
+            code="E-ISO6336",
+            limit="all > 0",
+            remedy="the root of this tooth is outside the range of method B",
+        )
     form = 6.0 * arm * math.cos(angle) / (chord**2 * math.cos(tooth.pressure_angle))
     form *= load_distribution_factor(contact_ratio) if helix == 0.0 else 1.0
     correction = stress_correction(chord / arm, 0.5 * chord / fillet)
@@ -299,9 +298,7 @@ def contact_safety(limit: float, nominal: float, load_factor: float) -> float:
     return limit / (nominal * math.sqrt(load_factor))
 
 
-def single_pair_factor(
-    gear_1: Gear, gear_2: Gear, *, working_angle: float, path: tuple[float, float]
-) -> float:
+def single_pair_factor(gear_1: Gear, gear_2: Gear, *, working_angle: float, path: tuple[float, float]) -> float:
     """Compute the larger of Z_B, Z_D and 1, from the pitch point to a single pair in contact (ISO 6336-2, 6).
 
     The root of the relative curvature at the inner point of single contact of either gear over that at the
@@ -431,9 +428,11 @@ def _check_contact_ratio(contact_ratio: float) -> None:
     """Refuse a transverse contact ratio outside the range of the method (E-ISO6336)."""
     if not 1.0 <= contact_ratio < 2.5:
         raise GeometryError(
-            f"nominal stresses for a contact ratio of {contact_ratio:.4g}", code="E-ISO6336",
-            limit="1 .. 2.5", remedy="change tip diameters or profile shifts",
-        )  # fmt: skip
+            f"nominal stresses for a contact ratio of {contact_ratio:.4g}",
+            code="E-ISO6336",
+            limit="1 .. 2.5",
+            remedy="change tip diameters or profile shifts",
+        )
 
 
 def theoretical_single_stiffness(
@@ -470,14 +469,24 @@ def theoretical_single_stiffness(
     virtual = math.cos(base_helix_angle(pressure_angle, helix_angle)) ** 2 * math.cos(helix_angle)
     pinion, wheel = virtual / teeth_1, (0.0 if math.isinf(teeth_2) else virtual / teeth_2)
     terms = (
-        1.0, pinion, wheel, shift_1, shift_1 * pinion, shift_2, shift_2 * wheel, shift_1**2, shift_2**2,
-    )  # fmt: skip
+        1.0,
+        pinion,
+        wheel,
+        shift_1,
+        shift_1 * pinion,
+        shift_2,
+        shift_2 * wheel,
+        shift_1**2,
+        shift_2**2,
+    )
     flexibility = sum(c * t for c, t in zip(_C, terms, strict=True))
     if not flexibility > 0.0:
         raise GeometryError(
-            f"ISO 6336-1 method B gives the flexibility {flexibility:.4g} mm um/N", code="E-ISO6336",
-            limit="> 0", remedy="the profile shifts are outside the range of method B (-0.5 <= x1 + x2 <= 2)",
-        )  # fmt: skip
+            f"ISO 6336-1 method B gives the flexibility {flexibility:.4g} mm um/N",
+            code="E-ISO6336",
+            limit="> 0",
+            remedy="the profile shifts are outside the range of method B (-0.5 <= x1 + x2 <= 2)",
+        )
     return 1e9 / flexibility
 
 
@@ -546,7 +555,12 @@ def pair_mesh_stiffness(pair: GearPair, helix_angle: float = 0.0) -> tuple[float
     pinion, wheel = sorted(pair.gears, key=lambda gear: (gear.internal, gear.teeth, -gear.profile_shift))
     teeth, shift = (math.inf, -wheel.profile_shift) if wheel.internal else (wheel.teeth, wheel.profile_shift)
     return mesh_stiffness_method_b(
-        pinion.teeth, teeth, pinion.profile_shift / normal, shift / normal, pair.contact_ratio,
+        pinion.teeth,
+        teeth,
+        pinion.profile_shift / normal,
+        shift / normal,
+        pair.contact_ratio,
         dedendum=0.5 * (pinion.rack.dedendum + wheel.rack.dedendum) / normal,
-        pressure_angle=math.atan(math.tan(pinion.pressure_angle) * normal), helix_angle=helix_angle,
-    )  # fmt: skip
+        pressure_angle=math.atan(math.tan(pinion.pressure_angle) * normal),
+        helix_angle=helix_angle,
+    )

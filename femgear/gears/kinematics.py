@@ -93,11 +93,13 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
     """
     if input == fixed:
         raise GeometryError(
-            f"the {input} is both driven and held, which leaves two members free", code="E-MECHANISM",
-            key="operation.fixed", value=input,
+            f"the {input} is both driven and held, which leaves two members free",
+            code="E-MECHANISM",
+            key="operation.fixed",
+            value=input,
             limit="one driven, one held and one output member out of sun, carrier and ring",
             remedy='for example input = "sun", fixed = "ring"',
-        )  # fmt: skip
+        )
     zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
     known = {input: speed, fixed: 0.0}
     # z_s w_s + z_r w_r - (z_s + z_r) w_c = 0
@@ -143,10 +145,7 @@ def mesh_normals(planetary_set: GearSet, *, back: bool = False) -> np.ndarray:
     s, psi = planetary_set, np.asarray(planetary_set.planet_angles)
     sides = [-s.senses[one] if back else s.senses[one] for one, _ in s.mates]
     angle = np.concatenate(
-        [
-            psi + side * (0.5 * np.pi - kind.working_pressure_angle)
-            for side, kind in zip(sides, s.kinds, strict=True)
-        ]
+        [psi + side * (0.5 * np.pi - kind.working_pressure_angle) for side, kind in zip(sides, s.kinds, strict=True)]
     )
     return np.stack([np.cos(angle), np.sin(angle)], axis=1)
 

@@ -270,28 +270,35 @@ def check_form(form: FlankForm, gear: Gear) -> None:
         problem = _problem(modification, gear) if isinstance(modification, laws) else None
         if isinstance(modification, EndRelief) and 2 * modification.length > gear.face_width:
             raise GeometryError(
-                f"{gear.name}: both end reliefs overlap", code="E-MODIFICATION",
-                key=f"{gear.name}.modifications[{number}]", value=f"{modification.length * 1e3:.4g} mm",
+                f"{gear.name}: both end reliefs overlap",
+                code="E-MODIFICATION",
+                key=f"{gear.name}.modifications[{number}]",
+                value=f"{modification.length * 1e3:.4g} mm",
                 limit=f"at most half the face width, {gear.face_width * 500:.4g} mm",
                 remedy="a crowning takes off more than that over the whole width",
-            )  # fmt: skip
+            )
         half = 0.5 * gear.face_width
         places = modification.place if isinstance(modification, MeasuredLead) else (0.0,)
         furthest = max(places, key=abs)
         if abs(furthest) > OVER_ENDS * half:
             raise GeometryError(
-                f"{gear.name}: places of a measured lead lie beside the face width", code="E-MODIFICATION",
-                key=f"{gear.name}.modifications[{number}]", value=f"{furthest * 1e3:.6g} mm",
+                f"{gear.name}: places of a measured lead lie beside the face width",
+                code="E-MODIFICATION",
+                key=f"{gear.name}.modifications[{number}]",
+                value=f"{furthest * 1e3:.6g} mm",
                 limit=f"-{half * 1e3:.6g} to {half * 1e3:.6g} mm, half the face width to either side",
                 remedy="count places from the middle of the width, not from an end of it",
-            )  # fmt: skip
+            )
         if problem is not None:
             message, value, limit = problem
             raise GeometryError(
-                f"{gear.name}: {message}", code="E-MODIFICATION", key=f"{gear.name}.modifications[{number}]",
-                value=value, limit=limit,
+                f"{gear.name}: {message}",
+                code="E-MODIFICATION",
+                key=f"{gear.name}.modifications[{number}]",
+                value=value,
+                limit=limit,
                 remedy="diameters, roll angles and roll lengths are those of the involute of this gear",
-            )  # fmt: skip
+            )
 
 
 def _problem(modification: ProfileModification, gear: Gear):
@@ -301,9 +308,7 @@ def _problem(modification: ProfileModification, gear: Gear):
     tolerance = 1e-6 * gear.module
     for name, value in (("start", start), ("end", end)):
         if not low - tolerance <= value <= high + tolerance:
-            flank = (
-                f"{_place(gear, gear.form_roll)} (form circle) to {_place(gear, gear.tip_roll)} (tip circle)"
-            )
+            flank = f"{_place(gear, gear.form_roll)} (form circle) to {_place(gear, gear.tip_roll)} (tip circle)"
             return f"the modification {name}s outside the involute flank", _place(gear, value), flank
     outwards = (end > start) == (gear.tip_roll > gear.form_roll)
     if abs(end - start) < 1e-3 * (high - low) or outwards == isinstance(modification, RootRelief):
@@ -356,9 +361,7 @@ def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
     most = LARGEST_DEVIATION * gear.module
     rolls = [np.linspace(gear.form_roll, gear.tip_roll, 1001)]
     # laws are monotonic or parabolas between their ends, profiles straight between their points
-    rolls += [
-        m.roll if isinstance(m, MeasuredProfile) else _modification_range(m, gear) for m in form.profile
-    ]
+    rolls += [m.roll if isinstance(m, MeasuredProfile) else _modification_range(m, gear) for m in form.profile]
     roll = np.concatenate(rolls)
     removed = form_deviation(form, gear, roll)
     i = int(np.abs(removed).argmax())
@@ -374,8 +377,10 @@ def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
         message = f"the modification goes on beyond its end and reaches {found}"
         remedy = "let it end nearer to the end of the flank"
     raise GeometryError(
-        f"{flank}: {message}", code="E-MODIFICATION", key=f"{gear.name}.modifications",
+        f"{flank}: {message}",
+        code="E-MODIFICATION",
+        key=f"{gear.name}.modifications",
         value=f"{removed[i] * 1e6:.6g} um",
         limit=f"at most {LARGEST_DEVIATION} modules, {most * 1e6:.6g} um, at every place of the flank",
         remedy=remedy,
-    )  # fmt: skip
+    )

@@ -191,10 +191,13 @@ def _tooth_sum(one: Gear, two: Gear) -> int:
     """Sum of the teeth of an external pair, difference of an internal one (gear 2)."""
     if two.internal and two.teeth <= one.teeth:
         raise GeometryError(
-            f"{one.teeth} teeth do not turn in an internal gear of {two.teeth}", code="E-RANGE",
-            key=f"{two.name}.teeth", value=two.teeth, limit=f"more than {one.teeth} teeth",
+            f"{one.teeth} teeth do not turn in an internal gear of {two.teeth}",
+            code="E-RANGE",
+            key=f"{two.name}.teeth",
+            value=two.teeth,
+            limit=f"more than {one.teeth} teeth",
             remedy="give the internal gear more teeth than its pinion",
-        )  # fmt: skip
+        )
     return two.teeth - one.teeth if two.internal else one.teeth + two.teeth
 
 
@@ -213,10 +216,12 @@ def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> floa
         raise GeometryError(
             f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {one.teeth} and "
             f"{two.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
-            code="E-CENTRE-DISTANCE", key="set.centre_distance", value=centre_distance,
+            code="E-CENTRE-DISTANCE",
+            key="set.centre_distance",
+            value=centre_distance,
             limit=f">= {math.ceil(base * 1e7) / 1e4:.4f} mm",
             remedy="increase the centre distance or reduce the tooth numbers or the module",
-        )  # fmt: skip
+        )
     return pressure_angle_at(centre_distance, base)
 
 
@@ -239,9 +244,13 @@ def zero_backlash_distance(one: Gear, two: Gear) -> float:
     except GeometryError as error:
         raise GeometryError(
             f"no centre distance suits profile shifts {x_1:.4f} ({one.name}) and {x_2:.4f} "
-            f"({two.name}): {error.message}", code=error.code, key=f"{two.name}.profile_shift", value=x_2,
-            limit=error.limit, remedy=error.remedy,
-        ) from None  # fmt: skip
+            f"({two.name}): {error.message}",
+            code=error.code,
+            key=f"{two.name}.profile_shift",
+            value=x_2,
+            limit=error.limit,
+            remedy=error.remedy,
+        ) from None
     return 0.5 * one.module * total * math.cos(alpha) / math.cos(angle)
 
 

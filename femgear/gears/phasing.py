@@ -335,9 +335,7 @@ def _check_phasing(phasing: MeshPhasing) -> None:
     if not all(is_whole(value) for value in whole):
         problem = "teeth, positions, rotation and flank must be whole numbers"
     elif not all(TEETH_RANGE[0] <= z <= TEETH_RANGE[1] for z in (p.sun_teeth, p.ring_teeth)):
-        problem = (
-            f"{p.sun_teeth} sun and {p.ring_teeth} ring teeth, allowed {TEETH_RANGE[0]} to {TEETH_RANGE[1]}"
-        )
+        problem = f"{p.sun_teeth} sun and {p.ring_teeth} ring teeth, allowed {TEETH_RANGE[0]} to {TEETH_RANGE[1]}"
     elif p.ring_teeth <= p.sun_teeth:
         problem = f"a ring of {p.ring_teeth} teeth around a sun of {p.sun_teeth}, allowed: more than the sun"
     elif not p.positions or p.positions[0] != 0 or np.any(np.diff([*p.positions, p.teeth_sum]) <= 0):
@@ -489,9 +487,7 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
         limit, remedy = f"{_CLOSURE:.0%} of z_s + z_p", f"{(ring - sun) // 2} teeth close this set"
         raise GeometryError(message, code="E-CHOICE", key="planet teeth", limit=limit, remedy=remedy)
     if abs(misfit) > 1:
-        found.append(
-            f"z_r - z_s - 2 z_p = {misfit}: profile shifts of about {abs(misfit) / 2:g} times the module"
-        )
+        found.append(f"z_r - z_s - 2 z_p = {misfit}: profile shifts of about {abs(misfit) / 2:g} times the module")
     places = np.array([phasing.positions])
     room = float(_room(np.array([[sun, planet_teeth, ring]]), places, np.array([sun + ring]))[0])
     if room < -_OVERLAP:

@@ -333,9 +333,13 @@ def check_planets(planets: int) -> None:
     """Refuse what is no whole number of at least one planet (E-RANGE)."""
     if not is_whole(planets) or not 1 <= planets <= 1000:
         raise GeometryError(
-            f"a planetary set with {planets!r} planets", code="E-RANGE", key="set.planets", value=planets,
-            limit="a whole number, 1 to 1000", remedy="three planets share the load of a set best",
-        )  # fmt: skip
+            f"a planetary set with {planets!r} planets",
+            code="E-RANGE",
+            key="set.planets",
+            value=planets,
+            limit="a whole number, 1 to 1000",
+            remedy="three planets share the load of a set best",
+        )
 
 
 def check_angles(angles: tuple[float, ...]) -> None:
@@ -351,10 +355,13 @@ def check_angles(angles: tuple[float, ...]) -> None:
     if problem:
         listing = ", ".join(f"{a:.6g}" for a in angles[:12])
         raise GeometryError(
-            f"the planet angles [{listing}] rad {problem}", code="E-RANGE", key="set.planet_angles",
-            value=listing, limit="ascending, different, within one turn",
+            f"the planet angles [{listing}] rad {problem}",
+            code="E-RANGE",
+            key="set.planet_angles",
+            value=listing,
+            limit="ascending, different, within one turn",
             remedy="sort the angles; the case file takes them with a unit, such as '120 deg'",
-        )  # fmt: skip
+        )
 
 
 def feasible_angles(teeth_sum: int, angles: tuple[float, ...]) -> tuple[float, ...]:
@@ -384,11 +391,13 @@ def assembly_positions(sun_teeth: int, ring_teeth: int, angles: tuple[float, ...
         raise GeometryError(
             f"{len(angles)} planets do not assemble at these angles: {sun_teeth} + {ring_teeth} teeth times "
             f"the angle over one turn must be whole, one planet misses by {worst:.3g} teeth "
-            f"((z_s + z_r)/N = {each})", code="E-ASSEMBLY", key="set.planet_angles",
+            f"((z_s + z_r)/N = {each})",
+            code="E-ASSEMBLY",
+            key="set.planet_angles",
             value=f"{each} teeth a planet",
             limit=f"multiples of {360.0 / total:.6f} deg from the first planet",
             remedy=f"nearest planet_angles that assemble: {listing} deg",
-        )  # fmt: skip
+        )
     return tuple(round(t) for t in turns)
 
 
@@ -420,9 +429,10 @@ def _free_distance(sun: Gear, planet: Gear, ring: Gear, find: tuple[str, ...]) -
             f"{second * 1e3:.5f} mm (tooth numbers {sun.teeth} + 2 x {planet.teeth} = "
             f"{sun.teeth + 2 * planet.teeth}, ring {ring.teeth}){_other_sign(first, planet, ring)}",
             code="E-COAXIAL",
-            key="set.centre_distance", limit="one centre distance for both meshes",
+            key="set.centre_distance",
+            limit="one centre distance for both meshes",
             remedy="give centre_distance and let the profile shifts of sun or ring be found",
-        )  # fmt: skip
+        )
     return first
 
 

@@ -62,9 +62,11 @@ def arcinv(value) -> Any:
     v = np.asarray(value, dtype=float)
     if not np.all(np.isfinite(v)) or np.any(v < 0.0):
         raise GeometryError(
-            f"no pressure angle has the involute {float(np.min(v)):.6g} rad", code="E-GEOMETRY",
-            limit="inv(angle) >= 0", remedy="increase the sum of the profile shifts or the centre distance",
-        )  # fmt: skip
+            f"no pressure angle has the involute {float(np.min(v)):.6g} rad",
+            code="E-GEOMETRY",
+            limit="inv(angle) >= 0",
+            remedy="increase the sum of the profile shifts or the centre distance",
+        )
     # start: small-angle root below one, tan(a) = v + a with a near pi/2 above
     a = np.where(v < 1.0, np.cbrt(3.0 * v) / (1.0 + 0.26 * np.cbrt(v) ** 2), np.arctan(v + math.pi / 2))
     for _ in range(30):
@@ -284,9 +286,7 @@ class CutterTip:
     @property
     def junction_roll(self) -> float:
         """Roll length [m] of the gear's involute where the tool's flank ends and its rounding begins."""
-        _, cutter_roll, _ = cutter_rounding(
-            self.cutter_base_radius, self.centre_radius, self.rounding, self.stretch
-        )
+        _, cutter_roll, _ = cutter_rounding(self.cutter_base_radius, self.centre_radius, self.rounding, self.stretch)
         return float(cutter_roll) + self.centre_distance * math.cos(self.end_angle)
 
 

@@ -124,11 +124,12 @@ def share_shifts(
         raise fault
     raise GeometryError(
         "no profile shifts close these teeth" + ("" if centre_distance is None else " at this distance"),
-        code="E-GEOMETRY", key="--teeth" if centre_distance is None else "--centre-distance",
+        code="E-GEOMETRY",
+        key="--teeth" if centre_distance is None else "--centre-distance",
         value=" ".join(map(str, teeth)),
         limit=f"a centre distance of about {0.5 * (teeth[0] + teeth[1]):g} transverse modules",
         remedy="give another centre distance, module or teeth, or leave the centre distance out",
-    )  # fmt: skip
+    )
 
 
 def _shared(gears: PlanetarySet | GearPair, lacks: tuple[str, ...] = ()) -> SharedShifts:
@@ -142,11 +143,20 @@ def _closed(teeth, pressure_angle, racks, a: float, shift: float, backlash: floa
     names = ("sun", "planet", "ring") if len(teeth) == 3 else ("gear_1", "gear_2")
     gears = [
         Gear(
-            z, _UNIT, pressure_angle, float(x), 10 * _UNIT, _rim(z, float(x), name), internal=name == "ring",
-            rack=rack, thickness_allowance=0.5 * backlash * _UNIT, name=name, tip_open=True,
+            z,
+            _UNIT,
+            pressure_angle,
+            float(x),
+            10 * _UNIT,
+            _rim(z, float(x), name),
+            internal=name == "ring",
+            rack=rack,
+            thickness_allowance=0.5 * backlash * _UNIT,
+            name=name,
+            tip_open=True,
         )
         for z, x, rack, name in zip(teeth, shifts, racks, names)
-    ]  # fmt: skip
+    ]
     if len(gears) == 2:
         return settled_tips(GearPair(gears[0], gears[1], a * _UNIT), free=names)
     sun, planet, ring = gears

@@ -229,9 +229,7 @@ def _fillet(gear: Gear, flank: np.ndarray, end_roll: float, sizes: _Sizes) -> tu
     return points, len(upper) - 1
 
 
-def _sharp_sizes(
-    points: np.ndarray, length: np.ndarray, gear: Gear, sizes: _Sizes, corner: np.ndarray
-) -> np.ndarray:
+def _sharp_sizes(points: np.ndarray, length: np.ndarray, gear: Gear, sizes: _Sizes, corner: np.ndarray) -> np.ndarray:
     """Largest element sizes (n,) [m] along a finely sampled fillet, small where it turns sharply.
 
     ``corner`` (n,) are the rows of a fillet so short that it is a corner.
@@ -365,10 +363,12 @@ def _check_cost(gear: Gear, cut_nodes: int, sizes: _Sizes) -> None:
     word, size = ("outer", "smaller") if gear.internal else ("bore", "larger")
     raise GeometryError(
         f"the body of the {gear.name} reaches from {1e3 * gear.root_radius:.6g} mm to "
-        f"{1e3 * gear.rim_radius:.6g} mm: its sector would have {cut_nodes} nodes on each cut", code="E-GRID",
-        key=f"{gear.name}.{word}_radius", limit=f"at most {limit} nodes",
+        f"{1e3 * gear.rim_radius:.6g} mm: its sector would have {cut_nodes} nodes on each cut",
+        code="E-GRID",
+        key=f"{gear.name}.{word}_radius",
+        limit=f"at most {limit} nodes",
         remedy=f"give a {size} {word} radius: material this far from the teeth hardly moves",
-    )  # fmt: skip
+    )
 
 
 def _rim(gear: Gear, sizes: _Sizes) -> np.ndarray:

@@ -256,9 +256,11 @@ def band_pass(spectrum: OrderSpectrum, low: float, high: float) -> OrderSpectrum
     if low <= 0 or not inside.any():
         raise CaseError(
             f"no carrier orders from {low} to {high} in a spectrum that ends at {spectrum.order[-1]}",
-            code="E-RANGE", value=(low, high), limit=f"0 < low <= high, low <= {spectrum.order[-1]}",
+            code="E-RANGE",
+            value=(low, high),
+            limit=f"0 < low <= high, low <= {spectrum.order[-1]}",
             remedy="choose a mesh harmonic that the response contains",
-        )  # fmt: skip
+        )
     return OrderSpectrum(spectrum.order, np.where(inside, spectrum.value, 0), spectrum.turns)
 
 
@@ -287,9 +289,10 @@ def count_lobes(periodic_envelope, *, threshold: float = 0.1) -> Lobes:
     if not usable or not 0 < threshold < 1:
         raise CaseError(
             f"no lobes can be counted on values of shape {values.shape} with the threshold {threshold}",
-            code="E-SHAPE", limit="one envelope, finite and not negative, 0 < threshold < 1",
+            code="E-SHAPE",
+            limit="one envelope, finite and not negative, 0 < threshold < 1",
             remedy="pass the envelope of one speed",
-        )  # fmt: skip
+        )
     largest = values.max()
     if largest == 0:
         return Lobes(np.empty(0), np.empty(0), threshold)
@@ -326,9 +329,11 @@ def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: i
     amplitude = band_pass(spectrum, low, high).amplitude
     if amplitude.ndim != 1:
         raise CaseError(
-            f"lines are listed for one signal, not for values of shape {amplitude.shape}", code="E-SHAPE",
-            limit="a spectrum of shape (n_orders,)", remedy="pick one speed first",
-        )  # fmt: skip
+            f"lines are listed for one signal, not for values of shape {amplitude.shape}",
+            code="E-SHAPE",
+            limit="a spectrum of shape (n_orders,)",
+            remedy="pick one speed first",
+        )
     strongest = amplitude.max()
     # stable, so that equal lines come in ascending order
     ranking = np.argsort(-amplitude, kind="stable")[:count]

@@ -244,9 +244,13 @@ def stored_lines(housing: Any, *, form: str | None = None) -> SensorLines:
     end = np.flatnonzero(exact.any(axis=tuple(range(exact.ndim - 1)))).max(initial=1) + 1
     place = float(known["sensor_angle"]), int(known["ring_teeth"])
     lines = SensorLines(
-        order[:end], exact[..., :end], housing["carrier_speed"].values, *place,
-        known.get("method", "exact"), int(known.get("turns", 1)),
-    )  # fmt: skip
+        order[:end],
+        exact[..., :end],
+        housing["carrier_speed"].values,
+        *place,
+        known.get("method", "exact"),
+        int(known.get("turns", 1)),
+    )
     return lines_in_form(lines, form or known["form"], int(known["points"]), round(order[-1] / place[1]))
 
 
@@ -313,9 +317,10 @@ def fixed_sensor_signal(lines: SensorLines) -> HousingSignal:
     revolution = np.arange(count) / count * lines.turns
     motion = (lines.displacement, lines.velocity, lines.acceleration)
     return HousingSignal(
-        revolution, 2 * np.pi * revolution / lines.base_speed[..., None],
+        revolution,
+        2 * np.pi * revolution / lines.base_speed[..., None],
         *(_synthesised(values, lines.number, count) for values in motion),
-    )  # fmt: skip
+    )
 
 
 def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max: int = 24) -> np.ndarray:
@@ -339,17 +344,21 @@ def hanning_model(harmonics, planet_angles, *, width: float | None = None, n_max
     harmonics, psi = np.asarray(harmonics, dtype=complex), np.asarray(planet_angles, dtype=float)
     if harmonics.ndim < 2 or psi.shape != harmonics.shape[-2:-1] or not np.all(np.isfinite(harmonics)):
         raise CaseError(
-            f"mesh harmonics of shape {harmonics.shape} do not fit {psi.size} planets", code="E-SHAPE",
+            f"mesh harmonics of shape {harmonics.shape} do not fit {psi.size} planets",
+            code="E-SHAPE",
             limit="finite values of shape (..., planets, H + 1)",
             remedy="give the harmonics of the planet-ring meshes alone",
-        )  # fmt: skip
+        )
     width = 2 * np.pi / psi.size if width is None else width
     # a width rounded from degrees may exceed the circle by one bit
     if not 0 < width <= 2 * np.pi * (1 + 1e-12):
         raise CaseError(
-            f"a window of {width} rad does not fit on the ring", code="E-RANGE", value=width,
-            limit="0 < width <= 2 pi", remedy="leave it out for 2 pi divided by the number of planets",
-        )  # fmt: skip
+            f"a window of {width} rad does not fit on the ring",
+            code="E-RANGE",
+            value=width,
+            limit="0 < width <= 2 pi",
+            remedy="leave it out for 2 pi divided by the number of planets",
+        )
     n = np.arange(-n_max, n_max + 1)
     riding = _window_components(n, width)[:, None] * np.exp(-1j * np.outer(n, psi))
     return np.swapaxes(riding @ harmonics, -1, -2)
@@ -364,10 +373,11 @@ def _motion(field: np.ndarray, z_ring: int, carrier_speed) -> tuple[int, np.ndar
     if not usable or direction.size != 1 or direction[0] == 0:
         raise CaseError(
             f"carrier speeds of shape {speed.shape}, directions {direction.tolist()}, do not fit the field",
-            code="E-SPEED", value=carrier_speed,
+            code="E-SPEED",
+            value=carrier_speed,
             limit=f"finite speeds of shape {field.shape[:-2]}, all of one direction, none zero",
             remedy="one speed for every field; split a sweep where the carrier changes direction",
-        )  # fmt: skip
+        )
     return int(direction[0]), speed
 
 
@@ -384,10 +394,11 @@ def _checked_field(field) -> tuple[np.ndarray, np.ndarray]:
     field = np.asarray(field, dtype=complex)
     if field.ndim < 2 or field.size == 0 or field.shape[-1] % 2 == 0 or not np.all(np.isfinite(field)):
         raise CaseError(
-            f"the carrier-frame field of shape {field.shape} is not usable", code="E-SHAPE",
+            f"the carrier-frame field of shape {field.shape} is not usable",
+            code="E-SHAPE",
             limit="finite values of shape (..., H + 1, 2 n_max + 1)",
             remedy="give one column for every n = -n_max..n_max",
-        )  # fmt: skip
+        )
     n_max = field.shape[-1] // 2
     return field, np.arange(-n_max, n_max + 1)
 
@@ -396,9 +407,12 @@ def _checked_angle(angle: float) -> float:
     """Refuse an angle [rad] that is not finite."""
     if not np.isfinite(angle):
         raise CaseError(
-            f"the angle {angle} is not a number of radians", code="E-RANGE", value=angle,
-            limit="a finite angle", remedy="give an angle such as 0.5",
-        )  # fmt: skip
+            f"the angle {angle} is not a number of radians",
+            code="E-RANGE",
+            value=angle,
+            limit="a finite angle",
+            remedy="give an angle such as 0.5",
+        )
     return float(angle)
 
 
@@ -417,9 +431,7 @@ def _folded(two_sided: np.ndarray) -> np.ndarray:
     return lines
 
 
-def _interpolated_orders(
-    sampled: np.ndarray, z_ring: int, direction: int, top: int, away: float
-) -> np.ndarray:
+def _interpolated_orders(sampled: np.ndarray, z_ring: int, direction: int, top: int, away: float) -> np.ndarray:
     """Collect two-sided lines -top..top of the linear interpolation: components and all their images.
 
     With m = direction (h z_ring - order), sin^2(pi m/P) depends on residues of h z_ring and order alone.

@@ -73,9 +73,11 @@ def nodal_diameters(lines: SensorLines) -> np.ndarray:
     """
     if lines.method != "exact":
         raise CaseError(
-            f"lines in the form {lines.method!r} do not tell nodal diameters apart", code="E-SHAPE",
-            limit="lines in the exact form", remedy='read them by stored_lines(housing, form="exact")',
-        )  # fmt: skip
+            f"lines in the form {lines.method!r} do not tell nodal diameters apart",
+            code="E-SHAPE",
+            limit="lines in the exact form",
+            remedy='read them by stored_lines(housing, form="exact")',
+        )
     harmonic = np.rint(lines.order / lines.z_ring).astype(int)
     return int(np.sign(lines.carrier_speed.flat[0])) * (harmonic * lines.z_ring - lines.order)
 
@@ -93,9 +95,7 @@ def pressure_transfer(n, frequency, cylinder: Cylinder, distance: float = 0.0) -
         impedance, spread = -1j * cylinder.density * cylinder.sound_speed, 1 + distance / cylinder.radius
         ratios = _over_frequency(n, wave * cylinder.radius, _ratios, spread)
         return impedance * ratios * np.exp(phase)
-    pressure = _over_frequency(
-        n, wave * cylinder.radius, _ring_transfer, cylinder, distance, most=_FREQUENCIES
-    )
+    pressure = _over_frequency(n, wave * cylinder.radius, _ring_transfer, cylinder, distance, most=_FREQUENCIES)
     return pressure * np.exp(phase)
 
 
@@ -380,9 +380,7 @@ def sampled_signal(order, values, speed: float, *, samples: int, rate: float = R
     return _between(_turn(order, _heard(order, values, nodes, rate)), turns)[0]
 
 
-def run_up_signal(
-    order, values, speeds, *, duration: float, start=None, stop=None, rate: float = RATE
-) -> np.ndarray:
+def run_up_signal(order, values, speeds, *, duration: float, start=None, stop=None, rate: float = RATE) -> np.ndarray:
     """Sample the signal of a carrier whose speed rises or falls linearly with time, (n_samples,).
 
     The angle of the carrier is the integral of its speed, start t + (stop - start) t^2/(2 duration), exactly,
@@ -413,10 +411,11 @@ def run_up_signal(
     inside = len(nodes) > 1 and nodes[0] <= ends.min() and ends.max() <= nodes[-1]
     if not (inside and 0 < duration < np.inf):
         raise CaseError(
-            f"no run from {ends[0]} to {ends[1]} rad/s in {duration} s", code="E-RANGE",
+            f"no run from {ends[0]} to {ends[1]} rad/s in {duration} s",
+            code="E-RANGE",
             limit=f"two speeds or more, {nodes[0]} to {nodes[-1]} rad/s, a duration above zero",
             remedy="compute the lines at the first and the last speed of the run, too",
-        )  # fmt: skip
+        )
     heard, count = _heard(order, values, nodes, rate), int(np.ceil(duration * rate * (1 - 1e-15)))
     slope, times, found = (ends[1] - ends[0]) / duration, np.arange(count) / rate, np.empty(count)
     speed, turns = ends[0] + slope * times, (ends[0] + 0.5 * slope * times) * times / (2 * np.pi)
@@ -438,16 +437,18 @@ def _checked_lines(order, values, speeds, rate: float) -> tuple[np.ndarray, np.n
     if not fits or not np.isfinite(values).all() or (whole != order).any() or (whole < 0).any():
         raise CaseError(
             f"lines of shape {values.shape} at {order.size} orders and {speeds.size} speeds make no signal",
-            code="E-SHAPE", remedy="give the lines of one sensor",
+            code="E-SHAPE",
+            remedy="give the lines of one sensor",
             limit="finite lines of shape (speeds, orders); orders that are whole and not negative",
-        )  # fmt: skip
+        )
     rising = speeds[0] > 0 and (np.diff(speeds) > 0).all() and speeds[-1] < np.inf
     if not (rising and 0 < rate < np.inf):
         raise CaseError(
             f"speeds of {speeds[:3].tolist()} rad/s .. and a rate of {rate} Hz make no signal",
-            code="E-RANGE", remedy="sort the speeds, take them positive",
+            code="E-RANGE",
+            remedy="sort the speeds, take them positive",
             limit="ascending speeds above zero, a rate above zero",
-        )  # fmt: skip
+        )
     return whole, values, speeds
 
 

@@ -95,9 +95,7 @@ def _panel(ax: Any, number: int, panels: list[Any]) -> dict[str, Any]:
     traces = [*_areas(ax), *_lines(ax), *_patches(ax)]
     return (
         {
-            "place": [spec.rowspan.start, spec.rowspan.stop, spec.colspan.start, spec.colspan.stop]
-            if spec
-            else [],
+            "place": [spec.rowspan.start, spec.rowspan.stop, spec.colspan.start, spec.colspan.stop] if spec else [],
             "title": next((text for text in titles if text), ""),
             "x": _axis(ax.xaxis, ax.get_xlim()),
             "y": _axis(ax.yaxis, ax.get_ylim()),
@@ -278,11 +276,7 @@ def _area(corners, one, ax: Any) -> dict[str, Any]:
         raise _PictureOnly
     corners = np.asarray(corners, float)[:: 1 + len(corners) // _MOST_CORNERS]
     faces = one.get_facecolors()
-    fill = (
-        {"fill": "toself", "fillcolor": _colour(faces), "fillopacity": float(faces[0][3])}
-        if len(faces)
-        else {}
-    )
+    fill = {"fill": "toself", "fillcolor": _colour(faces), "fillopacity": float(faces[0][3])} if len(faces) else {}
     return {
         "mode": "none" if fill else "lines",
         "hoverinfo": "skip",
@@ -360,9 +354,7 @@ def _words(ax: Any) -> list[dict[str, Any]]:
             continue
         x, y = getattr(text, "xy", None) or text.get_position()
         place = _place_of(text, x, y, ax)
-        shift = (
-            text.xyann if hasattr(text, "xyann") and getattr(text, "xycoords", "") == "data" else (0.0, 0.0)
-        )
+        shift = text.xyann if hasattr(text, "xyann") and getattr(text, "xycoords", "") == "data" else (0.0, 0.0)
         found.append(
             place
             | {

@@ -14,8 +14,8 @@ from femgear.report.page import chart_figure, document, part_of, shown_data, tab
 from femgear.report.tables import MARKS, WARNINGS, Block, is_bound, unmarked
 
 if TYPE_CHECKING:
+    from femgear.stages.protocol import Train
     from femgear.storage.results import Results
-    from femgear.trains.protocol import Train
 
 _MEETING = ("operating [rpm]", "mode", "kind", "mesh harmonic")
 """Columns that tell which resonance a row is."""
@@ -31,9 +31,7 @@ def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]
     """Tabulate what differs between two runs of one train: entries of the case, then numbers by stage."""
     cases = [(run.case.source, run.case.model_dump(by_alias=True)) for run in (first, second)]
     rows = tuple(_entries(*cases))
-    entries = Block(
-        "Cases", ("entry", "first", "second") if rows else (), rows, () if rows else ("the same",)
-    )
+    entries = Block("Cases", ("entry", "first", "second") if rows else (), rows, () if rows else ("the same",))
     others = {block.title: block for block in train.describe_results(second)}
     found = [entries]
     for block in train.describe_results(first):

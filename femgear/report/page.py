@@ -31,8 +31,8 @@ from femgear.second_process import shared
 from femgear.storage.files import checksum, storage_errors, write_bytes, write_text
 
 if TYPE_CHECKING:
+    from femgear.stages.protocol import Drawn, Figures, Progress, Train
     from femgear.storage.results import Results
-    from femgear.trains.protocol import Drawn, Figures, Progress, Train
 
 
 _Call = Callable[[], object]
@@ -148,9 +148,7 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     warnings = [*by_severity(results.findings), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
-    known = (
-        f'<p class="warn"><a href="#warnings">Warnings: {_counted(warnings)}</a></p>\n' if warnings else ""
-    )
+    known = f'<p class="warn"><a href="#warnings">Warnings: {_counted(warnings)}</a></p>\n' if warnings else ""
     head = "".join(
         (
             f"<h1>{escape(case.title)}</h1>\n",
@@ -162,9 +160,7 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     )
     charts = data.get("charts", {})
     parts = {stage.title: part_of(stage.name) for stage in train.stages if stage.name in {*data} & {*_PARTS}}
-    body = "".join(
-        _section(name, numbers, pictures, charts, train, results, parts.get(name, "")) for name in sections
-    )
+    body = "".join(_section(name, numbers, pictures, charts, train, results, parts.get(name, "")) for name in sections)
     main = f"{head}{body}{_trust(results, numbers, warnings, static)}"
     return document(case.title, main, {"charts": charts} | data if data else None)
 
@@ -196,9 +192,7 @@ def _scripts(data: dict[str, Any]) -> str:
     """Data and scripts of a page that can be read off and turned."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), sort_keys=True)
     packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")
-    parts = [
-        name for part, names in _PARTS.items() if any(key.startswith(part) for key in data) for name in names
-    ]
+    parts = [name for part, names in _PARTS.items() if any(key.startswith(part) for key in data) for name in names]
     files = ("plotly-cartesian.min.js", "charts.js", *parts)
     scripts = "".join(f"<script>{(_WEB / name).read_text('utf-8')}</script>\n" for name in files)
     return (
@@ -253,10 +247,7 @@ def _gears(gears: Sequence[Block], verdict: Sequence[Block], drawn: bool, static
 
 def _folded(key: str, title: str, content: str, shown: bool) -> str:
     """Fold a section away under its title; paper, and pages without scripts, show it."""
-    return (
-        f'<details id="{key}"{" open" * shown}>\n<summary><h2>{escape(title)}</h2></summary>\n{content}'
-        "</details>\n"
-    )
+    return f'<details id="{key}"{" open" * shown}>\n<summary><h2>{escape(title)}</h2></summary>\n{content}</details>\n'
 
 
 def part_of(name: str) -> str:

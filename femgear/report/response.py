@@ -165,9 +165,7 @@ def _draw_mode(ax, modes, planetary_set, mode, scale):
         ax.plot(*xy(centre + radius * circle[::4]), color="0.8", linewidth=1.0)
         ax.plot(*xy(np.array([centre, centre + spoke])), color="0.8", linewidth=1.0)
         ax.plot(*xy(moved + radius * circle[::4]), color=colour, linewidth=1.6, label=text)
-        ax.plot(
-            *xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6
-        )
+        ax.plot(*xy(np.array([moved, moved + spoke * np.exp(1j * factor * turn)])), color=colour, linewidth=1.6)
     span = 1.24 * outer
     ax.set_xlim(-span, span)
     ax.set_ylim(-span, span)
@@ -382,9 +380,7 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
         top.plot(speed, rms[:, row], label=text, **marker, **line_style(i))
     failed = ~dynamics["converged"].values[order].astype(bool)
     if failed.any():
-        top.plot(
-            speed[failed], rms[failed].max(axis=1), "x", color=BLACK, markersize=8, label="not converged"
-        )
+        top.plot(speed[failed], rms[failed].max(axis=1), "x", color=BLACK, markersize=8, label="not converged")
     top.set_ylim(bottom=0)
     label(top, y="RMS [µm]", title="fluctuation of the transmission error")
     for name, text, colour, dash in (
@@ -469,9 +465,7 @@ def _cut_series(records, h, highest: int, periods: int, count: int) -> np.ndarra
 def _panels(count: int, *, above: float = 0.8, height: float = 2.5, sharex: Any = True):
     """Make a figure with `count` axes [in] of one vertical scale, two in a row, and room above them [in]."""
     rows, columns = -(-count // 2), min(count, 2)
-    figure, axes = new_figure(
-        rows=rows, columns=columns, height=above + height * rows, sharex=sharex, sharey=True
-    )
+    figure, axes = new_figure(rows=rows, columns=columns, height=above + height * rows, sharex=sharex, sharey=True)
     for ax in axes[count:]:
         figure.delaxes(ax)
     return figure, axes[:count]

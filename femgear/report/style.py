@@ -262,9 +262,7 @@ def family(name: str) -> str:
     return "planet-ring" if "ring" in name else name if name.startswith("gear 1") else "sun-planet"
 
 
-def distinct_lines(
-    names, values, *, partly: bool = False, within: float = _IDENTICAL
-) -> list[tuple[str, int]]:
+def distinct_lines(names, values, *, partly: bool = False, within: float = _IDENTICAL) -> list[tuple[str, int]]:
     """Choose the rows of `values` to draw, with their legend texts: one for a family of meshes, else each.
 
     The family is drawn as one where its rows (n, ...) differ by less than a millionth of the largest value,

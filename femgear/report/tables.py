@@ -58,8 +58,7 @@ def merged(rows: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
         else:
             found.append((row, head, value, value, tail))
     return [
-        row if first == last else (f"{head}{first}..{last}{tail}", *row[1:])
-        for row, head, first, last, tail in found
+        row if first == last else (f"{head}{first}..{last}{tail}", *row[1:]) for row, head, first, last, tail in found
     ]
 
 
@@ -134,8 +133,7 @@ class Marks:
     def notes(self) -> tuple[str, ...]:
         """What the marks that were used mean."""
         return tuple(
-            f"{mark} {code}, {self._known[code][0].severity}: {CATALOGUE[code][1]}"
-            for code, mark in self._used.items()
+            f"{mark} {code}, {self._known[code][0].severity}: {CATALOGUE[code][1]}" for code, mark in self._used.items()
         )
 
 
@@ -292,9 +290,7 @@ def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         if bad.any():
             rest = np.count_nonzero(bad) - MANY
             more = f" and {rest} more speeds" if rest > 0 else ""
-            yield Finding(
-                code, "operation.speeds", f"the periodic solution {text} {first_speeds(speed[bad])}{more}"
-            )
+            yield Finding(code, "operation.speeds", f"the periodic solution {text} {first_speeds(speed[bad])}{more}")
 
 
 def pulls_of(forces: np.ndarray) -> np.ndarray:

@@ -58,9 +58,14 @@ _NAME, _CIRCLE = np.array([0.1, 0.035]), np.array([0.02, 0.03])
 """Width and height of the name of a mode, and of a crossing, with what is around it, parts of the axes."""
 _CUTS, _NAMED = 6, 8
 KIND_COLOURS = {
-    "rotational": BLUE, "translational": VERMILION, "planet": GREEN, "mixed": PURPLE,
-    "torsional": BLUE, "lateral": VERMILION, "coupled": GREEN,
-}  # fmt: skip
+    "rotational": BLUE,
+    "translational": VERMILION,
+    "planet": GREEN,
+    "mixed": PURPLE,
+    "torsional": BLUE,
+    "lateral": VERMILION,
+    "coupled": GREEN,
+}
 _MESHES = (BLUE, VERMILION)
 
 
@@ -117,9 +122,13 @@ def _name_modes(ax, crossings: xr.Dataset, speed: np.ndarray) -> None:
             if np.concatenate(apart).any(axis=1).all():
                 names = np.append(names, [middle], axis=0)
                 ax.annotate(
-                    f"mode {mode}", (left, up[first]), xycoords="axes fraction", va="center",
-                    fontsize=SMALL, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
-                )  # fmt: skip
+                    f"mode {mode}",
+                    (left, up[first]),
+                    xycoords="axes fraction",
+                    va="center",
+                    fontsize=SMALL,
+                    bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0},
+                )
                 break
 
 
@@ -134,9 +143,7 @@ def waterfall(runup: xr.Dataset) -> Figure:
     """Draw the level [dB re 1e-6 m/s^2] of runup.nc over speed and frequency, and over speed and order."""
     figure, axes = new_figure(columns=2, height=4.8, sharey=True)
     order, speed = runup["order"].values, runup["speed"].values
-    power = 0.5 * (
-        runup["lines_real"].values.astype(float) ** 2 + runup["lines_imag"].values.astype(float) ** 2
-    )
+    power = 0.5 * (runup["lines_real"].values.astype(float) ** 2 + runup["lines_imag"].values.astype(float) ** 2)
     teeth, reach = int(runup.attrs["ring_teeth"]), 1e-3 * float(runup["excitation_limit"].max())
     # a line crosses all that lies between the middles of the steps on either side of its speed
     ends = np.concatenate([speed[:1], 0.5 * (speed[1:] + speed[:-1]), speed[-1:]])
@@ -163,10 +170,15 @@ def waterfall(runup: xr.Dataset) -> Figure:
     highest = max(float(one.max()) for one in levels)
     for ax, one, (_, end, _, text) in zip(axes, levels, views):
         shown = ax.imshow(
-            np.maximum(one, highest - _DYNAMIC), origin="lower", aspect="auto", cmap="cividis",
-            extent=(0.0, end, speed[0], speed[-1]), vmin=highest - _DYNAMIC, vmax=highest,
+            np.maximum(one, highest - _DYNAMIC),
+            origin="lower",
+            aspect="auto",
+            cmap="cividis",
+            extent=(0.0, end, speed[0], speed[-1]),
+            vmin=highest - _DYNAMIC,
+            vmax=highest,
             interpolation="nearest",
-        )  # fmt: skip
+        )
         ax.grid(False)
         label(ax, text)
     label(axes[0], y="speed of the input [rpm]")
@@ -263,9 +275,7 @@ def _ends_short(runup: xr.Dataset) -> str:
     return f"the excitation ends short, at {ends.min():.3g} to {ends.max():.3g} kHz (W-EXCITATION)"
 
 
-def _curve(
-    ax, speed: np.ndarray, values: np.ndarray, short: np.ndarray, *, label: str = "_", **style
-) -> None:
+def _curve(ax, speed: np.ndarray, values: np.ndarray, short: np.ndarray, *, label: str = "_", **style) -> None:
     """Draw a curve over the speed, dotted where the excitation ends short (bool, of every speed)."""
     starts = [0, *(np.flatnonzero(np.diff(short)) + 1)]
     for first, end in zip(starts, [*starts[1:], len(speed)]):
@@ -291,9 +301,16 @@ def _name_resonances(ax, runup: xr.Dataset) -> None:
         at = float(runup["resonance_speed"].values[i]), float(runup["resonance_level"].values[i])
         style = {"arrowstyle": "-", "color": "0.5", "linewidth": 0.8}
         ax.annotate(
-            text, at, xytext=(0, 16), textcoords="offset points", rotation=90, ha="center", va="bottom",
-            fontsize=SMALL, arrowprops=style,
-        )  # fmt: skip
+            text,
+            at,
+            xytext=(0, 16),
+            textcoords="offset points",
+            rotation=90,
+            ha="center",
+            va="bottom",
+            fontsize=SMALL,
+            arrowprops=style,
+        )
 
 
 def runup_figures(runup: xr.Dataset, modes: xr.Dataset) -> dict[str, Figure]:

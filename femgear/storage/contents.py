@@ -26,9 +26,7 @@ class Labelled:
     ``parent`` gives the contents when their coordinates are asked for.
     """
 
-    def __init__(
-        self, values: Any, dims: tuple[str, ...], attrs: Mapping[str, Any], parent: Callable[[], Contents]
-    ):
+    def __init__(self, values: Any, dims: tuple[str, ...], attrs: Mapping[str, Any], parent: Callable[[], Contents]):
         self.values, self.dims, self.attrs, self._parent = np.asarray(values), dims, dict(attrs), parent
 
     def to_xarray(self) -> xr.DataArray:
@@ -329,9 +327,7 @@ class Contents:
             raise ValueError(f"both have {', '.join(sorted(both))}")
         found = self._chosen(lambda one: (one.values, one.dims))
         for made, more in zip(found._entered, other._entered, strict=True):
-            made.update(
-                {n: Labelled(one.values, one.dims, one.attrs, found._itself) for n, one in more.items()}
-            )
+            made.update({n: Labelled(one.values, one.dims, one.attrs, found._itself) for n, one in more.items()})
         found._check()
         return found
 

@@ -247,9 +247,13 @@ def read_dataset(path: str | os.PathLike) -> xr.Dataset:
     version = dataset.attrs.get("femgear_format")
     if not isinstance(version, int | np.integer) or version > _FORMAT:
         raise StorageError(
-            "not written by this version of femgear", code="E-FORMAT", file=name, value=version,
-            limit=f"femgear_format up to {_FORMAT}", remedy="run the case again",
-        )  # fmt: skip
+            "not written by this version of femgear",
+            code="E-FORMAT",
+            file=name,
+            value=version,
+            limit=f"femgear_format up to {_FORMAT}",
+            remedy="run the case again",
+        )
     return dataset
 
 
@@ -296,9 +300,7 @@ def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
             return _decoded(tree["result"], arrays[1:], {})
     except (ValueError, LookupError, TypeError, RecursionError, AttributeError, ImportError, BadZipFile):
         pass
-    raise StorageError(
-        "no result of this case", code="E-FORMAT", file=os.fspath(path), remedy="run the case again"
-    )
+    raise StorageError("no result of this case", code="E-FORMAT", file=os.fspath(path), remedy="run the case again")
 
 
 def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, Any]]) -> Any:
@@ -404,9 +406,11 @@ def replaced_file(path: str | os.PathLike, *, size: float = 0.0) -> Iterator[Pat
             raise StorageError(
                 f"{size / 1e6:.1f} MB to write, {free / 1e6:.1f} MB left on the disk, of which "
                 f"{_RESERVE / 1e6:.0f} MB are kept in reserve",
-                code="E-DISK-FULL", file=str(path), limit=f"{(size + _RESERVE) / 1e6:.1f} MB free",
+                code="E-DISK-FULL",
+                file=str(path),
+                limit=f"{(size + _RESERVE) / 1e6:.1f} MB free",
                 remedy="free some space or name another folder",
-            )  # fmt: skip
+            )
         try:
             with open(temporary, "xb") as held:
                 _lock(held, alone=False)
@@ -565,10 +569,12 @@ def _is_own(path: Path) -> bool:
 def foreign(path: Path) -> StorageError:
     """Make the refusal to replace or remove what femgear has not written, or somebody has changed."""
     return StorageError(
-        "femgear has not written this here, or it was changed since", code="E-OUTPUT", file=str(path),
+        "femgear has not written this here, or it was changed since",
+        code="E-OUTPUT",
+        file=str(path),
         limit=f"files whose SHA-256 {WRITTEN} or the manifest lists",
         remedy="move it away and repeat the command, or name another folder",
-    )  # fmt: skip
+    )
 
 
 def _entry(path: Path, digest: str) -> bytes:
@@ -586,10 +592,13 @@ def checked_name(name: str) -> str:
     plain = name.isprintable() and unicodedata.is_normalized("NFC", name) and not _RESERVED.fullmatch(name)
     if not plain or len(name) > 100 or len(name.encode()) > 240:
         raise StorageError(
-            "not a safe file name", code="E-CHOICE", value=name, remedy="name another one",
+            "not a safe file name",
+            code="E-CHOICE",
+            value=name,
+            remedy="name another one",
             limit='1 to 100 characters (240 bytes), composed (NFC), without / \\ : * ? " < > | and control '
             "characters, no dot or blank at the ends, none that Windows reserves (con, nul, com1, ...)",
-        )  # fmt: skip
+        )
     return name
 
 
@@ -611,9 +620,11 @@ def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
             lock.acquire()
         except Timeout:
             raise StorageError(
-                "another run is writing into this folder", code="E-LOCKED", file=str(path.parent),
+                "another run is writing into this folder",
+                code="E-LOCKED",
+                file=str(path.parent),
                 remedy="wait until it has ended, or name another folder",
-            ) from None  # fmt: skip
+            ) from None
     try:
         yield
     finally:
@@ -678,9 +689,11 @@ def storage_errors(path: str | os.PathLike) -> Iterator[None]:
         possible = False
     if not possible:
         raise StorageError(
-            "no file can have this name", value=os.fsdecode(path), limit="no NUL, no lone surrogate",
+            "no file can have this name",
+            value=os.fsdecode(path),
+            limit="no NUL, no lone surrogate",
             remedy="name another folder",
-        )  # fmt: skip
+        )
     try:
         yield
     except OSError as error:
@@ -706,22 +719,24 @@ def storage_error(error: OSError, path: str | os.PathLike | None) -> StorageErro
     )
 
 
-def _check_variable(
-    name: str, variable: Labelled | xr.Variable, *, coordinate: bool, path: str | os.PathLike
-) -> None:
+def _check_variable(name: str, variable: Labelled | xr.Variable, *, coordinate: bool, path: str | os.PathLike) -> None:
     """Refuse a variable of a type that no file holds, or without unit or text."""
     if variable.dtype.kind not in "fiubOU":
         raise StorageError(
-            f"{name} has the type {variable.dtype}", code="E-FORMAT", file=os.fspath(path),
+            f"{name} has the type {variable.dtype}",
+            code="E-FORMAT",
+            file=os.fspath(path),
             remedy="store complex numbers as real and imaginary part",
-        )  # fmt: skip
+        )
     labels = coordinate and variable.dtype.kind in "OU"
     missing = [key for key in ("units", "long_name") if key not in variable.attrs]
     if missing and not labels:
         raise StorageError(
-            f"{name} lacks {' and '.join(missing)}", code="E-FORMAT", file=os.fspath(path),
+            f"{name} lacks {' and '.join(missing)}",
+            code="E-FORMAT",
+            file=os.fspath(path),
             remedy="give every variable attributes units and long_name",
-        )  # fmt: skip
+        )
 
 
 def _hostility(path: str | os.PathLike) -> str:

@@ -118,11 +118,7 @@ def as_written(values) -> np.ndarray:
 
 def declared(texts: Mapping[str, tuple[str, str, str]], values: Mapping[str, Any]) -> dict[str, tuple]:
     """Join declarations ``(dims, units, long_name)`` with values by name; what has no value is left out."""
-    return {
-        name: (dims, values[name], units, words)
-        for name, (dims, units, words) in texts.items()
-        if name in values
-    }
+    return {name: (dims, values[name], units, words) for name, (dims, units, words) in texts.items() if name in values}
 
 
 def tables_of(data: xr.Dataset, stage: str) -> Iterator[tuple[str, Any]]:
@@ -327,20 +323,22 @@ class Results:
         if name not in self.manifest.files:
             _refuse_incomplete(self)
             raise StorageError(
-                "the run did not write this file", code="E-RESULTS-MISSING", file=str(path),
+                "the run did not write this file",
+                code="E-RESULTS-MISSING",
+                file=str(path),
                 limit=", ".join(self.manifest.files) or "nothing was written",
-            )  # fmt: skip
+            )
         if checksum(path) != self.manifest.files[name]:
             raise StorageError(
                 "the file is not the one that the run wrote (SHA-256 differs from the manifest)",
-                code="E-RESULTS-CHANGED", file=str(path), remedy="run the case again",
-            )  # fmt: skip
+                code="E-RESULTS-CHANGED",
+                file=str(path),
+                remedy="run the case again",
+            )
         return path
 
 
-def results_of(
-    folder: str | os.PathLike, read_case: Callable[[Path], Any], *, partial: bool = True
-) -> Results:
+def results_of(folder: str | os.PathLike, read_case: Callable[[Path], Any], *, partial: bool = True) -> Results:
     """Open the results of a run, whose case ``read_case(path)`` reads; see `femgear.open_results`."""
     folder = Path(folder)
     _refuse_missing(folder)
@@ -470,17 +468,21 @@ def prepare_output(folder: str | os.PathLike, *, case: str | None = None, force:
         manifest = read_manifest(folder)
         if manifest.complete:
             raise StorageError(
-                "the folder holds results already", code="E-OUTPUT", file=str(folder),
+                "the folder holds results already",
+                code="E-OUTPUT",
+                file=str(folder),
                 remedy="name a new folder, or replace them with --force",
-            )  # fmt: skip
+            )
         _refuse_changed(folder, manifest)
         if case is not None and manifest.files.get(_CASE) == hashlib.sha256(case.encode()).hexdigest():
             return folder
         if case is not None and _CASE in manifest.files and not force:
             raise StorageError(
-                "the folder holds an interrupted run of another case", code="E-OUTPUT", file=str(folder),
+                "the folder holds an interrupted run of another case",
+                code="E-OUTPUT",
+                file=str(folder),
                 remedy="name a new folder, or replace it with --force",
-            )  # fmt: skip
+            )
         discard(folder, manifest.files)
     _write_manifest(folder, Manifest(complete=False))
     return folder
@@ -547,27 +549,38 @@ def read_manifest(folder: str | os.PathLike) -> Manifest:
         written = data.pop("femgear_format")
         if type(written) is not int or written not in _READ:
             raise StorageError(
-                "written by another version of femgear", code="E-FORMAT", file=str(path), value=written,
-                limit=" and ".join(map(str, _READ)), remedy="run the case again",
-            )  # fmt: skip
+                "written by another version of femgear",
+                code="E-FORMAT",
+                file=str(path),
+                value=written,
+                limit=" and ".join(map(str, _READ)),
+                remedy="run the case again",
+            )
         if seal != right:
             raise StorageError(
-                "changed since femgear wrote it (its checksum does not fit)", code="E-FORMAT",
-                file=str(path), remedy="run the case again in a new folder",
-            )  # fmt: skip
+                "changed since femgear wrote it (its checksum does not fit)",
+                code="E-FORMAT",
+                file=str(path),
+                remedy="run the case again in a new folder",
+            )
         data["findings"] = (_UNKNOWN,) if written < _FORMAT else from_data(data["findings"])
         manifest = Manifest(**data)
     except (ValueError, RecursionError, KeyError, AttributeError, TypeError):
         raise StorageError(
-            "no femgear manifest of reasonable size", code="E-FORMAT", file=str(path),
+            "no femgear manifest of reasonable size",
+            code="E-FORMAT",
+            file=str(path),
             remedy="name a folder that femgear run wrote",
-        ) from None  # fmt: skip
+        ) from None
     for name in manifest.files:
         if not all(_NAME.fullmatch(part) for part in name.split("/")):
             raise StorageError(
-                "names a file outside the folder", code="E-FORMAT", file=str(path), value=name,
+                "names a file outside the folder",
+                code="E-FORMAT",
+                file=str(path),
+                value=name,
                 remedy="run the case again in a new folder",
-            )  # fmt: skip
+            )
     return manifest
 
 
@@ -598,9 +611,11 @@ def _refuse_missing(folder: Path) -> None:
     """Refuse a folder that is not there."""
     if not folder.is_dir():
         raise StorageError(
-            "no such results folder", code="E-RESULTS-MISSING", file=str(folder),
+            "no such results folder",
+            code="E-RESULTS-MISSING",
+            file=str(folder),
             remedy="name a folder that femgear run wrote",
-        )  # fmt: skip
+        )
 
 
 def _refuse_incomplete(results: Results) -> None:
@@ -610,9 +625,11 @@ def _refuse_incomplete(results: Results) -> None:
     folder = results.folder
     case = folder / _CASE if _CASE in results.manifest.files else "CASE"
     raise StorageError(
-        _interrupted(results), code="E-RESULTS-INCOMPLETE", file=str(folder),
+        _interrupted(results),
+        code="E-RESULTS-INCOMPLETE",
+        file=str(folder),
         remedy=f"run it again: femgear run {shlex.quote(str(case))} -o {shlex.quote(str(folder))}",
-    )  # fmt: skip
+    )
 
 
 def _refuse_changed(folder: Path, manifest: Manifest) -> None:
@@ -622,8 +639,10 @@ def _refuse_changed(folder: Path, manifest: Manifest) -> None:
     if changed:
         raise StorageError(
             f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
-            code="E-OUTPUT", file=str(folder), remedy="move the changed files away, or name a new folder",
-        )  # fmt: skip
+            code="E-OUTPUT",
+            file=str(folder),
+            remedy="move the changed files away, or name a new folder",
+        )
 
 
 def _interrupted(results: Results) -> str:
@@ -644,9 +663,11 @@ def _make(folder: Path) -> None:
         others = [path for path in folder.iterdir() if path.name != _LOCK and not is_temporary(path)]
     if others and not (folder / MANIFEST).is_file():
         raise StorageError(
-            "the folder holds files but no femgear results", code="E-OUTPUT", file=str(folder),
+            "the folder holds files but no femgear results",
+            code="E-OUTPUT",
+            file=str(folder),
             remedy="name a new folder",
-        )  # fmt: skip
+        )
 
 
 def _publish(folder: Path) -> None:

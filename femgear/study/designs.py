@@ -31,12 +31,12 @@ from femgear.case.dependencies import Steps
 from femgear.case.sections import Case
 from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.findings import NOTE, Finding, once, tell
+from femgear.stages.protocol import Progress
 from femgear.storage.files import exclusive_lock, storage_errors
 from femgear.study.objectives import STAGES, Quantity
 from femgear.study.problem import Limit, Point, Problem, Variable, Vector
 from femgear.study.runner import Runner, check_complete
 from femgear.trains.live import Answer
-from femgear.trains.protocol import Progress
 from femgear.trains.reading import to_toml, with_values
 
 _FORMAT = 2
@@ -97,9 +97,11 @@ class Journal(dict[str, dict]):
             shown = f"line{'s' * (len(bad) > 1)} {', '.join(bad[:9])}" if bad else f"{missing} missing"
             shown += f" and {len(bad) - 9} more" if len(bad) > 9 else ""
             finding = Finding(
-                "W-JOURNAL", "", f"{path}: changed or damaged since it was written: {shown}",
+                "W-JOURNAL",
+                "",
+                f"{path}: changed or damaged since it was written: {shown}",
                 remedy="what stood there is left out, and computed again where no later line holds it",
-            )  # fmt: skip
+            )
             tell(finding)
         if whole < len(text):
             with storage_errors(path):
@@ -181,18 +183,24 @@ def _check_header(path: Path, line: bytes, header: dict) -> None:
     for name, expected in header.items():
         if found and found.get(name) != expected:
             raise StorageError(
-                f"the journal was written {_WRITTEN[name]}", code="E-JOURNAL", file=str(path),
-                value=found.get(name), limit=str(expected), remedy="name a new place, or move this file away",
-            )  # fmt: skip
+                f"the journal was written {_WRITTEN[name]}",
+                code="E-JOURNAL",
+                file=str(path),
+                value=found.get(name),
+                limit=str(expected),
+                remedy="name a new place, or move this file away",
+            )
     raise _broken(path, "its first line is not what this version of femgear writes there")
 
 
 def _broken(path: Path, why: str) -> StorageError:
     """Make the refusal of a file that is no journal."""
     return StorageError(
-        f"not usable as a journal: {why}", code="E-JOURNAL", file=str(path),
+        f"not usable as a journal: {why}",
+        code="E-JOURNAL",
+        file=str(path),
         remedy="name a new place, or move this file away; it is not changed",
-    )  # fmt: skip
+    )
 
 
 def _is_entry(line: dict, fits: _Fits) -> bool:
@@ -243,9 +251,16 @@ class Designs:
     """
 
     def __init__(
-        self, case: Case, keys, journal: Journal, *, cache: Path | None = None,
-        progress: Progress | None = None, runner: Runner | None = None, telling: bool = False
-    ):  # fmt: skip
+        self,
+        case: Case,
+        keys,
+        journal: Journal,
+        *,
+        cache: Path | None = None,
+        progress: Progress | None = None,
+        runner: Runner | None = None,
+        telling: bool = False,
+    ):
         self.telling = telling
         self.case, self.journal, self.runner = case, journal, runner or Runner()
         self.seconds = 0.0
@@ -430,10 +445,15 @@ def _finite(quantity: Quantity, value: float) -> float:
 
 @contextmanager
 def open_designs(
-    case: Case, keys: Sequence[tuple[str, ...]], *, journal: str | Path | None = None,
-    cache: Path | None = None, progress: Progress | None = None, runner: Runner | None = None,
-    telling: bool = False
-) -> Iterator[Designs]:  # fmt: skip
+    case: Case,
+    keys: Sequence[tuple[str, ...]],
+    *,
+    journal: str | Path | None = None,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+    runner: Runner | None = None,
+    telling: bool = False,
+) -> Iterator[Designs]:
     """Open the designs of a case, with a journal on disk where one is named.
 
     Parameters
@@ -453,9 +473,7 @@ def open_designs(
     """
     more = {"keys": [" = ".join(entries) for entries in keys]}
     with open_journal(journal, case, more, partial(_is_design, len(keys))) as records:
-        yield Designs(
-            case, tuple(keys), records, cache=cache, progress=progress, runner=runner, telling=telling
-        )
+        yield Designs(case, tuple(keys), records, cache=cache, progress=progress, runner=runner, telling=telling)
 
 
 class Enough(Exception):

@@ -11,6 +11,7 @@ import numpy as np
 
 from femgear.errors import CaseError, FemgearError
 from femgear.findings import Finding, tell
+from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.study.designs import Enough, Evaluations, Failure, evaluations
 from femgear.study.objectives import Quantity
 from femgear.study.problem import Problem, Vector
@@ -26,7 +27,6 @@ from femgear.study.search import (
     samples_of,
     start_at,
 )
-from femgear.trains.protocol import Progress, one_blas_thread
 
 _SMALL = 0.01
 """Share of the sum in the scalar objective; without it points that are better in one alone would tie."""
@@ -76,10 +76,13 @@ def check_second(problem: Problem, second: Quantity) -> None:
     """Refuse (E-OBJECTIVE) the objective of a problem as the second one of its front."""
     if second.name == problem.objective.name:
         raise CaseError(
-            "a front has two objectives", code="E-OBJECTIVE", key="second", value=second.name,
+            "a front has two objectives",
+            code="E-OBJECTIVE",
+            key="second",
+            value=second.name,
             limit=f"another objective than {problem.objective.name}",
             remedy="name another second objective, or search without one",
-        )  # fmt: skip
+        )
 
 
 @one_blas_thread()
@@ -144,10 +147,17 @@ def pareto_front(
             if isinstance(outcome, FemgearError):
                 raise outcome
         found = ParetoFront(
-            problem=problem, second=second, x=x[order], values=values[order], before=before,
-            dominated=values[rest], findings=tuple(doubts.get(i, ()) for i in range(len(order))),
-            designs=run.asked, failures=len(designs.failures), complete=complete,
-        )  # fmt: skip
+            problem=problem,
+            second=second,
+            x=x[order],
+            values=values[order],
+            before=before,
+            dominated=values[rest],
+            findings=tuple(doubts.get(i, ()) for i in range(len(order))),
+            designs=run.asked,
+            failures=len(designs.failures),
+            complete=complete,
+        )
     _tell_of(found)
     return found
 
@@ -196,9 +206,7 @@ def _search(run: Evaluations, second: Quantity, points: int, places) -> None:
 
         def cost(x, weight=float(weight)) -> float:
             run.count(x)
-            return run.penalised(
-                x, lambda: float(distance(np.array([*run.values(x, both).values()]), weight))
-            )
+            return run.penalised(x, lambda: float(distance(np.array([*run.values(x, both).values()]), weight)))
 
         x, values = _known(run, both)
         polish(run, cost, x[distance(values, float(weight)).argmin()], size=0.1, rounds=1)

@@ -21,11 +21,11 @@ from femgear.case.sections import LARGEST_TORQUE, Case
 from femgear.errors import CaseError
 from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness
+from femgear.stages.static_results import LARGE
 from femgear.trains.elastic import stages as elastic_stages
 from femgear.trains.elastic.checks import case_warnings, response_findings
 from femgear.trains.live import Answer
 from femgear.trains.reading import with_values
-from femgear.trains.static.results import LARGE
 
 if TYPE_CHECKING:
     from femgear.system.system import Response
@@ -79,9 +79,11 @@ def need_elastic_ring(case: Case, subject: str) -> None:
     other = [name for name in ("planar", "helical") if getattr(case, name, None) is not None]
     if other:
         raise CaseError(
-            f"{subject} a case with an elastic ring", code="E-STAGE", key=other[0],
+            f"{subject} a case with an elastic ring",
+            code="E-STAGE",
+            key=other[0],
             limit="transmission error, contact ratio, tip thickness, contact pressure, root stress",
-        )  # fmt: skip
+        )
 
 
 def _no_findings(answer: Answer) -> Iterable[Finding]:
@@ -170,9 +172,12 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
     value = None if torque is None else to_si(torque, TORQUE, low=-LARGEST_TORQUE, high=LARGEST_TORQUE)
     if value is not None and abs(value) < LEAST_TORQUE:
         raise CaseError(
-            "without torque no tooth bends", code="E-TORQUE", key="torque", value=torque,
+            "without torque no tooth bends",
+            code="E-TORQUE",
+            key="torque",
+            value=torque,
             limit=f"{LEAST_TORQUE:g} N m or more of either sign",
-        )  # fmt: skip
+        )
     compute = partial(_peak_to_peak, signal, value)
     where = "" if value is None else f" at {TORQUE.show(value)}"
     findings = partial(_of_static, (*LARGE, "W-POSITIONS"), value)
@@ -194,9 +199,7 @@ def _peak_to_peak(signal: Callable, torque: float | None, answer: Answer) -> flo
     return float((high - low).max())
 
 
-def mesh_force(
-    first: str, last: str, *, speeds: int = 51, part: Literal["dynamic", "peak"] = "dynamic"
-) -> Quantity:
+def mesh_force(first: str, last: str, *, speeds: int = 51, part: Literal["dynamic", "peak"] = "dynamic") -> Quantity:
     """Define the largest mesh force over equidistant input speeds, of all times and meshes [N].
 
     Part "dynamic" is the largest deviation from the mean force of a mesh, which follows from the torque
@@ -320,9 +323,7 @@ def _chosen(value, table: dict, key: str):
     try:
         return table[value]
     except (KeyError, TypeError):
-        raise CaseError(
-            f"no such {key}", code="E-OBJECTIVE", key=key, value=value, limit=", ".join(table)
-        ) from None
+        raise CaseError(f"no such {key}", code="E-OBJECTIVE", key=key, value=value, limit=", ".join(table)) from None
 
 
 def _range(first: str, last: str, count: int) -> Range:
@@ -334,10 +335,13 @@ def _range(first: str, last: str, count: int) -> Range:
         raise
     if not (0 < low < high and 2 <= count <= 10000):
         raise CaseError(
-            "not a range of speeds", code="E-OBJECTIVE", key="speeds",
-            value=f"{count} from {first} to {last}", limit="2 to 10000 speeds, from over 0 upwards",
+            "not a range of speeds",
+            code="E-OBJECTIVE",
+            key="speeds",
+            value=f"{count} from {first} to {last}",
+            limit="2 to 10000 speeds, from over 0 upwards",
             remedy='give the lower speed first, as in "1000 rpm" and "3500 rpm"',
-        )  # fmt: skip
+        )
     return low, high, int(count)
 
 

@@ -73,16 +73,23 @@ class Variable:
         low, high = self.bounds
         if not low < high:
             raise CaseError(
-                "the bounds of a design variable are equal" if low == high else
-                "the bounds of a design variable are in the wrong order",
-                code="E-VARIABLE", key=self.name, value=f"{self.low}..{self.high}", limit="low < high",
+                "the bounds of a design variable are equal"
+                if low == high
+                else "the bounds of a design variable are in the wrong order",
+                code="E-VARIABLE",
+                key=self.name,
+                value=f"{self.low}..{self.high}",
+                limit="low < high",
                 remedy=f'write "{self.high}..{self.low}"' if low > high else "give two different bounds",
-            )  # fmt: skip
+            )
         if self.integer and (self.unit or low != round(low) or high != round(high)):
             raise CaseError(
-                "bounds of whole numbers are whole numbers", code="E-VARIABLE", key=self.name,
-                value=f"{self.low} to {self.high}", limit="two whole numbers without unit",
-            )  # fmt: skip
+                "bounds of whole numbers are whole numbers",
+                code="E-VARIABLE",
+                key=self.name,
+                value=f"{self.low} to {self.high}",
+                limit="two whole numbers without unit",
+            )
         if not self.tolerance_at(high) > 0:
             raise CaseError(
                 "a tolerance is over 0", code="E-VARIABLE", key=self.name, value=self.tolerance, limit="> 0"
@@ -93,14 +100,15 @@ class Variable:
         (_, first), (_, second) = (split(bound, self.name) for bound in (self.low, self.high))
         if bool(first) != bool(second):
             unit = first or second
-            low, high = (
-                bound if has else f"{bound} {unit}" for bound, has in ((self.low, first), (self.high, second))
-            )
+            low, high = (bound if has else f"{bound} {unit}" for bound, has in ((self.low, first), (self.high, second)))
             raise CaseError(
-                "one bound has a unit and the other has none", code="E-UNIT", key=self.name,
-                value=f"{self.low}..{self.high}", limit="the same kind of unit at both bounds",
+                "one bound has a unit and the other has none",
+                code="E-UNIT",
+                key=self.name,
+                value=f"{self.low}..{self.high}",
+                limit="the same kind of unit at both bounds",
                 remedy=f'write "{low}..{high}"',
-            )  # fmt: skip
+            )
 
     @property
     def keys(self) -> tuple[str, ...]:
@@ -129,9 +137,12 @@ class Variable:
             return number
         if not (unit and self.unit):
             raise CaseError(
-                "values of a design variable have one unit", code="E-UNIT", key=self.name, value=value,
+                "values of a design variable have one unit",
+                code="E-UNIT",
+                key=self.name,
+                value=value,
                 limit=f"a number with {self.unit}" if self.unit else "a number without unit",
-            )  # fmt: skip
+            )
         try:
             return to_si(str(value), Dimension("a value", self.unit, self.unit, 1.0))
         except CaseError as error:
@@ -168,9 +179,12 @@ def split(value: object, key: str) -> tuple[float, str]:
         number, unit = (float(match[1]), match[2]) if match else (np.nan, "")
     if not np.isfinite(number):
         raise CaseError(
-            "not a number with a unit", code="E-VARIABLE", key=key, value=value,
+            "not a number with a unit",
+            code="E-VARIABLE",
+            key=key,
+            value=value,
             limit='as in "40 um", or 0.5 for an entry without dimension',
-        )  # fmt: skip
+        )
     return number, unit
 
 
@@ -202,8 +216,10 @@ def _check_variables(case: Case, variables: Sequence[Variable]) -> None:
     if not keys or twice:
         raise CaseError(
             f"{', '.join(twice)} is given twice" if twice else "an optimisation needs a design variable",
-            code="E-VARIABLE", key=twice[0] if twice else None, limit="each entry of the case file once",
-        )  # fmt: skip
+            code="E-VARIABLE",
+            key=twice[0] if twice else None,
+            limit="each entry of the case file once",
+        )
     for variable in variables:
         for bound in variable.bounds:
             try:
@@ -228,10 +244,12 @@ class Limit:
         finite = math.isfinite(self.low) or math.isfinite(self.high)
         if not (finite and self.low <= self.high):
             raise CaseError(
-                "a limit needs a lower or an upper bound", code="E-OBJECTIVE", key=self.quantity.name,
+                "a limit needs a lower or an upper bound",
+                code="E-OBJECTIVE",
+                key=self.quantity.name,
                 value=f"{self.low} to {self.high}",
                 limit=f"numbers in {self.quantity.dimension.si}, low <= high",
-            )  # fmt: skip
+            )
 
     def violation(self, value: float) -> float:
         """Compute how far a value [SI] lies outside, over the size of the bound; 0 inside."""
@@ -317,10 +335,13 @@ def parse_variable(text: str) -> Variable:
     match = re.fullmatch(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*(?:\+-\s*(.+?)\s*)?", text, re.DOTALL)
     if not match:
         raise CaseError(
-            "not a design variable", code="E-VARIABLE", key="--vary", value=text,
+            "not a design variable",
+            code="E-VARIABLE",
+            key="--vary",
+            value=text,
             limit="KEY=LOW..HIGH or KEY=LOW..HIGH +- TOLERANCE",
             remedy='--vary "sun.modifications[0].amount=0 um..15 um +- 1 um"',
-        )  # fmt: skip
+        )
     key, low, high, tolerance = match.groups()
     low, high = (_number(value) for value in (low, high))
     return Variable(key, low, high, tolerance=_number(tolerance) if tolerance else None)

@@ -24,8 +24,8 @@ from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.modifications import FlankForm, TipRelief
-from femgear.trains.protocol import Progress, one_blas_thread
-from femgear.trains.static.stages import known_compliances, over_width, static_supports
+from femgear.stages.protocol import Progress, one_blas_thread
+from femgear.stages.static import known_compliances, over_width, static_supports
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -90,15 +90,16 @@ class DesignBasis:
         Refuses no torque (E-TORQUE) and bearings with clearance (E-SUPPORT).
         """
         if not (np.isfinite(sun_torque) and sun_torque):
-            raise CaseError(
-                "without torque nothing touches", code="E-TORQUE", value=sun_torque, limit="not zero"
-            )
+            raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque, limit="not zero")
         if clearance := self.supports.planet_clearance:
             raise CaseError(
                 "derivatives and the load sharing of samples know no clearance of the planet bearings",
-                code="E-SUPPORT", key="planet.bearing_clearance", value=f"{clearance * 1e6:.6g} um",
-                limit="0 um", remedy='set it to zero, or solve single cases with static.members = "elastic"',
-            )  # fmt: skip
+                code="E-SUPPORT",
+                key="planet.bearing_clearance",
+                value=f"{clearance * 1e6:.6g} um",
+                limit="0 um",
+                remedy='set it to zero, or solve single cases with static.members = "elastic"',
+            )
         gears, order, deviations = loaded_image(self.gears, sun_torque, self.deviations)
         return replace(self, gears=gears, deviations=deviations), order
 
@@ -110,27 +111,38 @@ def design_basis(
     """Collect gears, compliances, deviations, supports and positions of the static problem of a case.
 
     ``cache`` is the folder of generated grids; flank compliances of other cases are taken from ``steps``
-    where they are those of this one, as in `femgear.trains.static.stages.solve_static`.
+    where they are those of this one, as in `femgear.stages.static.solve_static`.
 
     CaseError: E-SLICES: slices over the width, which ``slices`` allows, but for those of helical teeth.
     """
     if case.static.slices > 1 and not slices:
         raise CaseError(
-            "this study solves the plane contact", code="E-SLICES", key="static.slices",
-            file=case.location("static.slices"), remedy="leave static.slices and modifications of leads out",
-        )  # fmt: skip
+            "this study solves the plane contact",
+            code="E-SLICES",
+            key="static.slices",
+            file=case.location("static.slices"),
+            remedy="leave static.slices and modifications of leads out",
+        )
     if case.set.helix_angle:
         raise CaseError(
-            "this study is one of spur teeth", code="E-SLICES", key="set.helix_angle",
-            file=case.location("set.helix_angle"), remedy="leave set.helix_angle out",
-        )  # fmt: skip
+            "this study is one of spur teeth",
+            code="E-SLICES",
+            key="set.helix_angle",
+            file=case.location("set.helix_angle"),
+            remedy="leave set.helix_angle out",
+        )
     gears, deviations = planetary_set(case), set_deviations(case)
     bodies = known_compliances(case, gears, steps or Steps(), cache=cache)[1]
     own = None if deviations.ideal else deviations
     return DesignBasis(
-        gears, bodies, static_supports(case), own, case.static.positions, case.static.contact,
+        gears,
+        bodies,
+        static_supports(case),
+        own,
+        case.static.positions,
+        case.static.contact,
         over_width(case, gears, cache=cache),
-    )  # fmt: skip
+    )
 
 
 def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
@@ -152,9 +164,11 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
     """
     if not 0.05 <= length <= _LARGEST_LENGTH:
         raise CaseError(
-            f"a relief of {length} lengths of two-pair contact is not plausible", code="E-RANGE",
-            value=length, limit=f"0.05 to {_LARGEST_LENGTH}",
-        )  # fmt: skip
+            f"a relief of {length} lengths of two-pair contact is not plausible",
+            code="E-RANGE",
+            value=length,
+            limit=f"0.05 to {_LARGEST_LENGTH}",
+        )
     pair = mesh_pairs(planetary_set)[0]
     begin, end = pair.path
     along = length * (end - begin - planetary_set.base_pitch)
@@ -323,9 +337,7 @@ def loads_back(torques: np.ndarray) -> bool:
     """Tell whether torques (T,) are negative; E-TORQUE (CaseError) where their signs differ."""
     if (torques > 0).any() and (torques < 0).any():
         message = "torques of both signs load different flanks"
-        raise CaseError(
-            message, code="E-TORQUE", value=torques, remedy="take those of each sign by themselves"
-        )
+        raise CaseError(message, code="E-TORQUE", value=torques, remedy="take those of each sign by themselves")
     return bool((torques < 0).any())
 
 

@@ -26,7 +26,7 @@ from uuid import uuid4
 
 from femgear import __version__
 from femgear.errors import CaseError, FemgearError, checked_count
-from femgear.trains.protocol import one_blas_thread
+from femgear.stages.protocol import one_blas_thread
 
 _TIMEOUT, _PERIOD = 20.0, 5.0
 """How long a scheduler may take to answer, and how often its workers are counted [s]."""
@@ -124,9 +124,11 @@ def _packed(value: Any) -> bytes:
         return pickle.dumps(value)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         raise CaseError(
-            f"a function cannot be sent to workers: {error}", code="E-WORKER",
-            limit="functions of importable modules", remedy="compute without workers",
-        ) from None  # fmt: skip
+            f"a function cannot be sent to workers: {error}",
+            code="E-WORKER",
+            limit="functions of importable modules",
+            remedy="compute without workers",
+        ) from None
 
 
 @lru_cache(maxsize=1)
@@ -309,10 +311,13 @@ class Dask(Runner):
 
     def _lost(self, error: object) -> FemgearError:
         return FemgearError(
-            f"no scheduler answers: {error}", code="E-CLUSTER", key="--cluster", value=self._address,
+            f"no scheduler answers: {error}",
+            code="E-CLUSTER",
+            key="--cluster",
+            value=self._address,
             limit="tcp://host:port, or tls://host:port with certificates in the configuration of Dask",
             remedy='dask scheduler; where Dask is missing, pip install "femgear[cluster]"',
-        )  # fmt: skip
+        )
 
     @property
     def workers(self) -> int:
@@ -363,9 +368,13 @@ def open_runner(workers: int = 1, cluster: str | None = None) -> Runner:
     scheme = cluster.partition("://")[0] if cluster and "://" in cluster else ""
     if scheme == "inproc":
         raise CaseError(
-            "a scheduler within another process cannot be reached", code="E-ARGUMENTS", key="--cluster",
-            value=cluster, limit="tcp://host:port or tls://host:port", remedy="dask scheduler starts one",
-        )  # fmt: skip
+            "a scheduler within another process cannot be reached",
+            code="E-ARGUMENTS",
+            key="--cluster",
+            value=cluster,
+            limit="tcp://host:port or tls://host:port",
+            remedy="dask scheduler starts one",
+        )
     if cluster is None:
         return Processes(number) if number > 1 else Runner()
     if number > 1:

@@ -22,6 +22,8 @@ from femgear.errors import FemgearError, StorageError
 from femgear.findings import Finding, as_text, findings_in, tell
 from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figure, save_figure
 from femgear.report.tables import Block, Marks
+from femgear.stages.protocol import Progress, one_blas_thread, silent
+from femgear.stages.static_results import HELD, LARGEST_PEAK_DOUBT, SERIES
 from femgear.storage.files import (
     append_dataset,
     own_files,
@@ -45,9 +47,7 @@ from femgear.study.samples import (
     sample_block,
     sample_case,
 )
-from femgear.trains.protocol import Progress, one_blas_thread, silent
 from femgear.trains.reading import to_toml
-from femgear.trains.static.results import HELD, LARGEST_PEAK_DOUBT, SERIES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -73,9 +73,17 @@ FILES, _JOURNAL, _COLUMNS = ("samples.nc", "samples.png", "worst.toml"), "sample
 
 @one_blas_thread()
 def samples_into(
-    case: Case, folder: Path, basis: tuple[SampleModel, str], *, count: int = 1000, seed: int = 1,
-    exact: bool = False, force: bool = False, progress: Progress = silent, runner: Runner | None = None
-) -> tuple[list[Block], list[str]]:  # fmt: skip
+    case: Case,
+    folder: Path,
+    basis: tuple[SampleModel, str],
+    *,
+    count: int = 1000,
+    seed: int = 1,
+    exact: bool = False,
+    force: bool = False,
+    progress: Progress = silent,
+    runner: Runner | None = None,
+) -> tuple[list[Block], list[str]]:
     """Compute samples 0 to ``count - 1``; write numbers, a figure and the worst of them as a case file.
 
     The worst has the largest transmission error. ``basis`` is what `prepared` gives. What there is to say
@@ -91,9 +99,11 @@ def samples_into(
     own_files(folder, FILES)
     if (folder / FILES[0]).exists() and not (force or (folder / _JOURNAL).exists()):
         raise StorageError(
-            "the folder holds results already", code="E-OUTPUT", file=str(folder),
+            "the folder holds results already",
+            code="E-OUTPUT",
+            file=str(folder),
             remedy="name a new folder, or replace them with --force",
-        )  # fmt: skip
+        )
     method = "exact" if exact else "spring"
     more = {"tolerances": fingerprint(text), "seed": seed, "method": method, "positions": len(model.position)}
     widths = {n: model.basis.gears.n_planets * ("planet" in dims) for n, (dims, *_) in NUMBERS.items()}
@@ -172,9 +182,7 @@ class _Tasks:
             return {"checksum": self.columns.write(blocks[key], numbers)}
 
         items = [tuple(map(int, key.split("-"))) for key in blocks]
-        self._map(
-            partial(_block, self.model, self.seed, method == "exact"), [*blocks], items, "samples", kept, keep
-        )
+        self._map(partial(_block, self.model, self.seed, method == "exact"), [*blocks], items, "samples", kept, keep)
 
     def exactly(self, chosen: np.ndarray) -> dict[str, np.ndarray]:
         """Numbers of some samples (n,), solved exactly."""
@@ -186,9 +194,7 @@ class _Tasks:
             return {name: part.tolist() for name, part in numbers.items()}
 
         kept = self._journal.__contains__
-        self._map(
-            partial(_exact_block, self.model, self.seed), keys, items, "samples again, exactly", kept, keep
-        )
+        self._map(partial(_exact_block, self.model, self.seed), keys, items, "samples again, exactly", kept, keep)
         return joined([{name: np.array(part) for name, part in self._journal[key].items()} for key in keys])
 
     def in_every_way(self, chosen: np.ndarray) -> tuple[dict[str, np.ndarray], list[dict[str, np.ndarray]]]:

@@ -30,7 +30,7 @@ from scipy.sparse import csr_array
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import need_set
-from femgear.case.mistakes import combine, translate
+from femgear.case.messages import combine, translate
 from femgear.case.quantities import ANGLE, Quantity, Section
 from femgear.case.sections import LARGEST_DEVIATION, LARGEST_SLOPE, Amplitude, Case, Deviation, Slope
 from femgear.contact.assembly import (
@@ -68,10 +68,10 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope, ProfileSlope
+from femgear.stages.protocol import one_blas_thread
+from femgear.stages.static_results import SLICES
 from femgear.study.relief import DesignBasis, design_basis, sun_torque
-from femgear.trains.protocol import one_blas_thread
 from femgear.trains.reading import with_values
-from femgear.trains.static.results import SLICES
 
 POSITIONS = 16
 """Of a mesh period."""
@@ -134,18 +134,21 @@ class Law(Section):
         needed = "sigma" if self.distribution == "normal" else "limit"
         if getattr(self, needed) is None:
             raise CaseError(
-                f"a {self.distribution} distribution needs its {needed}", code="E-KEY-MISSING",
+                f"a {self.distribution} distribution needs its {needed}",
+                code="E-KEY-MISSING",
                 remedy=f'add {needed} = "3 um"',
-            )  # fmt: skip
+            )
         if self.distribution == "uniform" and self.sigma is not None:
             message = "a uniform distribution has no sigma"
             raise CaseError(message, code="E-CHOICE", limit="mean and limit", remedy="leave sigma out")
         reach = abs(self.mean) + (_REACH * (self.sigma or 0.0) if self.limit is None else self.limit)
         if info.context and reach > (most := self._largest(info.context["module"]))[0]:
             raise CaseError(
-                f"errors of {reach * self._shown[0]:.6g} {self._shown[1]} are not plausible", code="E-RANGE",
-                limit=f"mean and limit, or {_REACH:g} sigma, within {most[1]}", remedy="check the unit",
-            )  # fmt: skip
+                f"errors of {reach * self._shown[0]:.6g} {self._shown[1]} are not plausible",
+                code="E-RANGE",
+                limit=f"mean and limit, or {_REACH:g} sigma, within {most[1]}",
+                remedy="check the unit",
+            )
         return self
 
     def at(self, share: np.ndarray) -> np.ndarray:
@@ -250,9 +253,10 @@ class Tolerances(Section):
     def _some(self):
         if not any(True for _ in self.laws()):
             raise CaseError(
-                "no error has a tolerance", code="E-KEY-MISSING",
+                "no error has a tolerance",
+                code="E-KEY-MISSING",
                 remedy="give some, such as sun.pitch, pin_errors.tangential",
-            )  # fmt: skip
+            )
         return self
 
     def laws(self) -> Iterator[tuple[str, Law]]:
@@ -380,9 +384,7 @@ class SampleModel:
     def deviations(self, errors: np.ndarray, base: SetDeviations | None = None) -> SetDeviations:
         """Add the errors (K,) of a sample to deviations, by default those of the case."""
         gears, d = self.basis.gears, base or self.basis.deviations or no_deviations(self.basis.gears)
-        found = {
-            key.replace(".pitch", ".cumulative_pitch"): part for key, part in self._by_key(errors).items()
-        }
+        found = {key.replace(".pitch", ".cumulative_pitch"): part for key, part in self._by_key(errors).items()}
 
         def of(key: str) -> np.ndarray:
             return found.get(key, np.zeros((1, 1)))
@@ -399,30 +401,40 @@ class SampleModel:
             flank: FlankForm((*getattr(d, flank).modifications, *drawn))
             for gear, flanks in _FLANKS.items()
             for i, flank in enumerate(flanks)
-            if (drawn := [
-                kind(float(amount))
-                for key, (_, kind) in _FORMS.items()
-                if (amount := np.append(of(f"{gear}.{key}")[0], 0.0)[i])
-            ])
-        }  # fmt: skip
+            if (
+                drawn := [
+                    kind(float(amount))
+                    for key, (_, kind) in _FORMS.items()
+                    if (amount := np.append(of(f"{gear}.{key}")[0], 0.0)[i])
+                ]
+            )
+        }
         askew = {
             name: getattr(d, f"{name}_misalignment")
             + np.concatenate([of(f"{name}.misalignment.{along}")[0] for along in "xy"])
             for name in ("sun", "carrier")
         }
         return replace(
-            d, **forms, sun_pitch=d.sun_pitch - sun[0], planet_pitch=d.planet_pitch - planet,
-            planet_ring_side_pitch=d.planet_ring_side_pitch + planet, ring_pitch=d.ring_pitch - ring[0],
-            sun_runout=moved("sun", d.sun_runout)[0], planet_runout=moved("planet", *d.planet_runout),
-            ring_runout=moved("ring", d.ring_runout)[0], carrier_runout=moved("carrier", d.carrier_runout)[0],
+            d,
+            **forms,
+            sun_pitch=d.sun_pitch - sun[0],
+            planet_pitch=d.planet_pitch - planet,
+            planet_ring_side_pitch=d.planet_ring_side_pitch + planet,
+            ring_pitch=d.ring_pitch - ring[0],
+            sun_runout=moved("sun", d.sun_runout)[0],
+            planet_runout=moved("planet", *d.planet_runout),
+            ring_runout=moved("ring", d.ring_runout)[0],
+            carrier_runout=moved("carrier", d.carrier_runout)[0],
             pin_errors=d.pin_errors + of("pin_errors.radial") * [1, 0] + of("pin_errors.tangential") * [0, 1],
-            planet_misalignment=d.planet_misalignment + of("planet.misalignment.radial") * [1, 0]
+            planet_misalignment=d.planet_misalignment
+            + of("planet.misalignment.radial") * [1, 0]
             + of("planet.misalignment.tangential") * [0, 1],
-            sun_misalignment=askew["sun"], carrier_misalignment=askew["carrier"],
+            sun_misalignment=askew["sun"],
+            carrier_misalignment=askew["carrier"],
             sun_thickness=d.sun_thickness + float(of("sun.thickness_reduction")[0, 0]),
             planet_thickness=d.planet_thickness + of("planet.thickness_reduction")[:, 0],
             ring_thickness=d.ring_thickness + float(of("ring.thickness_reduction")[0, 0]),
-        )  # fmt: skip
+        )
 
     def image(self, deviations: SetDeviations) -> SetDeviations:
         """Find deviations as the solved set has them."""
@@ -465,9 +477,17 @@ class SampleModel:
         at_nodes = _sparse(np.moveaxis(np.array(tilts), 0, -1)) if tilted else None
         over = _over_width(s, found, laws, np.moveaxis(np.array(leads), 0, -1)) if s.over else None
         made = _Level(
-            found, PairSprings(laws), touching, _sparse(by_pairs[of_windows]), at_nodes, overflows,
-            listed.gap[mesh, at, pair], _sparse(by_pairs[mesh, at, pair]), (at, mesh), over,
-        )  # fmt: skip
+            found,
+            PairSprings(laws),
+            touching,
+            _sparse(by_pairs[of_windows]),
+            at_nodes,
+            overflows,
+            listed.gap[mesh, at, pair],
+            _sparse(by_pairs[mesh, at, pair]),
+            (at, mesh),
+            over,
+        )
         self._levels[share, nearest] = made
         return made
 
@@ -538,9 +558,11 @@ def _check_over_width(basis: DesignBasis, tolerances: Tolerances) -> None:
     for key, _ in tolerances.laws():
         if ("lead" in key or "misalignment" in key) and not basis.over:
             raise CaseError(
-                "leads and axes askew need slices over the width", code="E-SLICES", key=key,
+                "leads and axes askew need slices over the width",
+                code="E-SLICES",
+                key=key,
                 remedy=f"give static.slices = {SLICES} in the case file, or leave the tolerance out",
-            )  # fmt: skip
+            )
 
 
 def sample_positions(basis: DesignBasis, sun_torque: float, positions: int) -> np.ndarray:
@@ -652,9 +674,7 @@ def _solved(
     return numbers, np.asarray(unsolved), missed
 
 
-def _numbers(
-    position: np.ndarray, arc: np.ndarray, share: np.ndarray, stiffness: np.ndarray
-) -> dict[str, np.ndarray]:
+def _numbers(position: np.ndarray, arc: np.ndarray, share: np.ndarray, stiffness: np.ndarray) -> dict[str, np.ndarray]:
     """`NUMBERS` of n samples at P positions.
 
     By arcs of the sun (P, n) [m], shares of planets (P, N, n) and stiffnesses of meshes (P, 2N, n) [N/m].
@@ -795,9 +815,7 @@ def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
         kept = {key: value for key, value in written[name].get("errors", {}).items() if key != "pitch"}
         values[f"{name}.errors"] = kept | table
     planets = zip(d.planet_runout, d.planet_ring_side_pitch, d.planet_thickness, strict=True)
-    values["planet.individual"] = [
-        {"planet": n, **of_gear(s.planet, *planet)} for n, planet in enumerate(planets, 1)
-    ]
+    values["planet.individual"] = [{"planet": n, **of_gear(s.planet, *planet)} for n, planet in enumerate(planets, 1)]
     values["set.pin_errors"] = [
         {"planet": n, "radial": length(radial), "tangential": length(tangential)}
         for n, (radial, tangential) in enumerate(d.pin_errors, 1)
@@ -871,9 +889,8 @@ def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, fl
 
 
 def prepared(
-    case: Case, tolerances: Path, *, positions: int = POSITIONS, cache: Path | None = None,
-    steps: Steps | None = None
-) -> tuple[SampleModel, str]:  # fmt: skip
+    case: Case, tolerances: Path, *, positions: int = POSITIONS, cache: Path | None = None, steps: Steps | None = None
+) -> tuple[SampleModel, str]:
     """Prepare the samples of a case for a file of tolerances, whose text comes with the model.
 
     Refused is (CaseError) what `read_tolerances` and `sample_model` refuse, and back flanks (E-SUPPORT).
@@ -883,10 +900,14 @@ def prepared(
     checked(positions, "--positions", 8, 4096)
     if case.static.back_flanks:
         raise CaseError(
-            "samples are solved on their drive flanks alone", code="E-SUPPORT", key="static.back_flanks",
-            value=True, limit="false", remedy="set it to false, or solve single samples by femgear run",
+            "samples are solved on their drive flanks alone",
+            code="E-SUPPORT",
+            key="static.back_flanks",
+            value=True,
+            limit="false",
+            remedy="set it to false, or solve single samples by femgear run",
             file=case.location("static.back_flanks"),
-        )  # fmt: skip
+        )
     basis = design_basis(case, cache=cache, steps=steps, slices=True)
     torque = sun_torque(case, basis.gears)
     places = sample_positions(basis, torque, positions)

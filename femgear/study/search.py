@@ -29,15 +29,15 @@ from femgear.case.gear_set import set_deviations
 from femgear.case.sections import Case
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
 from femgear.findings import Finding, tell
+from femgear.stages.protocol import Progress, one_blas_thread
+from femgear.stages.static import static_supports
 from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Tolerance, evaluations, tolerances
 from femgear.study.objectives import under_torque
 from femgear.study.problem import Point, Problem, Variable, Vector, start_point
 from femgear.study.relief import DesignBasis
 from femgear.study.runner import Runner
 from femgear.study.sensitivity import linearise, sensitivity
-from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_values
-from femgear.trains.static.stages import static_supports
 
 Method = Literal["auto", "minimax", "global", "simplex", "powell"]
 METHODS = get_args(Method)
@@ -164,9 +164,7 @@ class Optimum:
 
     def summary(self) -> str:
         """Write before and after, variables, what their tolerances cost, and how the optimum was found."""
-        lines = [
-            f"{name}: {before} -> {after} ({change})" for name, before, after, change in comparison_rows(self)
-        ]
+        lines = [f"{name}: {before} -> {after} ({change})" for name, before, after, change in comparison_rows(self)]
         lines += [f"{key} = {value}" for key, value in self.values.items()]
         lines += [f"at a bound: {name}" for name in self.at_bounds]
         for name, tolerance, less, more in tolerance_rows(self):
@@ -176,10 +174,17 @@ class Optimum:
 
 @one_blas_thread()
 def minimise(
-    problem: Problem, *, method: Method = "auto", journal: str | Path | None = None,
-    start: Vector | None = None, options: SearchOptions | None = None, sensitivity: bool = True,
-    cache: Path | None = None, progress: Progress | None = None, runner: Runner | None = None
-) -> Optimum:  # fmt: skip
+    problem: Problem,
+    *,
+    method: Method = "auto",
+    journal: str | Path | None = None,
+    start: Vector | None = None,
+    options: SearchOptions | None = None,
+    sensitivity: bool = True,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+    runner: Runner | None = None,
+) -> Optimum:
     """Find the best design within the bounds and limits of a problem.
 
     A search repeats itself exactly with the same arguments: with a journal one that was interrupted goes
@@ -245,11 +250,13 @@ def _method(problem: Problem, method: Method) -> Method:
     wrong = method not in METHODS
     if wrong or (method == "minimax" and not smooth):
         raise CaseError(
-            "no such method" if wrong else "this problem has no derivatives", code="E-CHOICE", key="method",
+            "no such method" if wrong else "this problem has no derivatives",
+            code="E-CHOICE",
+            key="method",
             value=method,
             limit=", ".join(METHODS) if wrong else "a transmission error over deviations of the drive flanks",
             remedy=None if wrong else 'take "global"',
-        )  # fmt: skip
+        )
     if method != "global" and any(variable.integer for variable in problem.variables):
         raise CaseError("whole numbers", code="E-CHOICE", key="method", value=method, limit='"global"')
     return method
@@ -317,19 +324,32 @@ def _optimum(run: Evaluations, before: dict, sensitivity: bool, telling: bool, e
     except Failure as failure:
         raise ConvergenceError(
             f"the optimum has the objective but not all other quantities: {failure}",
-            code=failure.error["code"], key=failure.error["key"], value=problem.point(x),
-        ) from None  # fmt: skip
+            code=failure.error["code"],
+            key=failure.error["key"],
+            value=problem.point(x),
+        ) from None
     quantities = (problem.objective, *problem.also)
     off, all_off = tolerances(run, x, quantities) if sensitivity else ((), {})
     designs, (method, message, converged) = run.designs, ended
     findings = designs.findings(problem.reported, problem.point(x)) if telling else ()
     return Optimum(
-        problem=problem, x=x, case=designs.at(problem.point(x)), before=before, after=after, tolerances=off,
-        all_off=all_off, findings=findings, course=tuple(run.course), designs=run.asked,
-        computed=designs.computed, failures=len(designs.failures),
+        problem=problem,
+        x=x,
+        case=designs.at(problem.point(x)),
+        before=before,
+        after=after,
+        tolerances=off,
+        all_off=all_off,
+        findings=findings,
+        course=tuple(run.course),
+        designs=run.asked,
+        computed=designs.computed,
+        failures=len(designs.failures),
         seconds=designs.seconds / max(designs.computed, 1),
-        method=method, message=message, converged=converged,
-    )  # fmt: skip
+        method=method,
+        message=message,
+        converged=converged,
+    )
 
 
 def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
@@ -339,9 +359,12 @@ def start_at(problem: Problem, start: Vector | None) -> np.ndarray:
     x, (low, high) = np.asarray(start, float), problem.bounds.T
     if x.shape != low.shape or not np.all((x >= low) & (x <= high)):
         raise CaseError(
-            "the start lies outside the bounds", code="E-START", key="start", value=start,
+            "the start lies outside the bounds",
+            code="E-START",
+            key="start",
+            value=start,
             limit=", ".join(f"{v.name} {v.low} to {v.high}" for v in problem.variables),
-        )  # fmt: skip
+        )
     return x
 
 
@@ -413,9 +436,11 @@ def numbers(problem: Problem, point: Point) -> np.ndarray:
 def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
     """Make the error that a search ends with that found no design."""
     return ConvergenceError(
-        f"none of {run.asked} designs can be computed and lies within the limits", code="E-INFEASIBLE",
-        limit=limit, remedy="widen limits or bounds, or ask for more samples",
-    )  # fmt: skip
+        f"none of {run.asked} designs can be computed and lies within the limits",
+        code="E-INFEASIBLE",
+        limit=limit,
+        remedy="widen limits or bounds, or ask for more samples",
+    )
 
 
 def has_derivatives(problem: Problem) -> bool:
@@ -510,9 +535,13 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     answer = under_torque(evaluations.designs.answer(problem.point(x)), objective.torque)
     case, static = answer.case, answer.static
     basis = DesignBasis(
-        static.planetary_set, static.bodies, static_supports(case), set_deviations(case),
-        case.static.positions, case.static.contact,
-    )  # fmt: skip
+        static.planetary_set,
+        static.bodies,
+        static_supports(case),
+        set_deviations(case),
+        case.static.positions,
+        case.static.contact,
+    )
     peaks = () if static.cycle.between is None else static.cycle.between.position
     linear = linearise(basis, sun_torque=static.sun_torque, periods=static.cycle.periods, between=peaks)
     n, signal = static.planetary_set.n_planets, objective.signal

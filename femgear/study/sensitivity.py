@@ -49,8 +49,8 @@ from femgear.gears.deviations import (
     tooth_separation,
 )
 from femgear.gears.planetary import rotation_approach
+from femgear.stages.protocol import one_blas_thread
 from femgear.study.relief import DesignBasis
-from femgear.trains.protocol import one_blas_thread
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -128,9 +128,7 @@ def _original_rows(order) -> np.ndarray:
 
 
 @one_blas_thread()
-def linearise(
-    basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=None, between=()
-) -> LinearContact:
+def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=None, between=()) -> LinearContact:
     """Solve the contact of all drive flanks, and what it answers to small separations [m] of any cell.
 
     CaseError: E-TORQUE: no torque; E-RANGE: no such position; E-SUPPORT: bearings with clearance; E-SLICES:
@@ -147,9 +145,12 @@ def linearise(
     """
     if basis.over:
         raise CaseError(
-            "derivatives are those of the plane contact", code="E-SLICES", key="static.slices",
-            value=basis.over["slices"], remedy="leave static.slices and modifications of leads out",
-        )  # fmt: skip
+            "derivatives are those of the plane contact",
+            code="E-SLICES",
+            key="static.slices",
+            value=basis.over["slices"],
+            remedy="leave static.slices and modifications of leads out",
+        )
     solved, order = basis.loaded(sun_torque)
     record = np.sort(np.append(cycle_positions(basis.positions, periods=periods), between))
     chosen = np.arange(len(record)) if only is None else np.atleast_1d(np.asarray(only, int))
@@ -251,9 +252,7 @@ def _touching(solved: PlanetarySet, setup, numbers, cells) -> _TouchingCells:
     mesh, pair, cell, weight = (np.concatenate([c[i] for c in cells]) for i in range(4))
     place = mesh, numbers[at], pair
     turns = setup.turns[numbers[at]]
-    tooth_1, tooth_2 = (
-        setup.tooth[gear][mesh, pair] + tooth_steps(solved, mesh, gear) * turns for gear in (0, 1)
-    )
+    tooth_1, tooth_2 = (setup.tooth[gear][mesh, pair] + tooth_steps(solved, mesh, gear) * turns for gear in (0, 1))
     roll_1, roll_2 = np.zeros((2, len(mesh)))
     for kind, contact in enumerate(mesh_pairs(solved)):
         rows = mesh // N == kind
@@ -312,8 +311,7 @@ def sensitivity(
     low, high = variant(value - step), variant(value + step)
     if linear.solved is not linear.original:
         low, high = (
-            mirrored_deviations(deviations, linear.original, linear.solved, linear.order)
-            for deviations in (low, high)
+            mirrored_deviations(deviations, linear.original, linear.solved, linear.order) for deviations in (low, high)
         )
     change = (_separations(linear, high) - _separations(linear, low)) / (2.0 * step)
     return _sensitivity(linear, change)

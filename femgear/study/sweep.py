@@ -20,12 +20,12 @@ from femgear.errors import CaseError
 from femgear.findings import CATALOGUE, Finding, tell
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure
 from femgear.report.tables import Block
+from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.storage.files import own_files, resumable, write_csv
 from femgear.study.designs import Failure, open_designs
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
 from femgear.study.runner import Runner
-from femgear.trains.protocol import Progress, one_blas_thread
 from femgear.trains.reading import with_value
 
 _LARGEST, _MANY, _TIMED = 100_000, 1000, 3
@@ -83,10 +83,15 @@ class Sweep:
 
 @one_blas_thread()
 def sweep(
-    case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity], *,
-    journal: str | Path | None = None, cache: Path | None = None, progress: Progress | None = None,
-    runner: Runner | None = None
-) -> Sweep:  # fmt: skip
+    case: Case,
+    over: Mapping[str, Sequence[object]],
+    quantities: Sequence[Quantity],
+    *,
+    journal: str | Path | None = None,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+    runner: Runner | None = None,
+) -> Sweep:
     """Compute quantities of a case over values of entries of its file.
 
     Parameters
@@ -158,16 +163,22 @@ def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: S
     for key, values in over.items():
         if key.split(".")[0] in _WITHOUT_EFFECT:
             raise CaseError(
-                f"{key} changes no quantity", code="E-VARIABLE", key="--over", value=key,
+                f"{key} changes no quantity",
+                code="E-VARIABLE",
+                key="--over",
+                value=key,
                 limit="entries that the computation uses",
-            )  # fmt: skip
+            )
         for value in values:
             with_value(case, key, value)
         if len(set(map(repr, values))) < len(values):  # some are lists
             raise CaseError(
-                "a value is given twice", code="E-DUPLICATE", key="--over",
-                value=f"{key}={', '.join(map(str, values))}", remedy="give every value once",
-            )  # fmt: skip
+                "a value is given twice",
+                code="E-DUPLICATE",
+                key="--over",
+                value=f"{key}={', '.join(map(str, values))}",
+                remedy="give every value once",
+            )
     _check_stages(case, quantities, over)
     return count
 
@@ -182,9 +193,12 @@ def _check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str
     loaded = any(key.startswith("operation") for key in keys) or any("N m" in q.name for q in quantities)
     if stages - {"gears"} and case.operation.torque == 0.0 and not loaded:
         raise CaseError(
-            "without torque no tooth carries load", code="E-NO-LOAD", key="operation.torque",
-            limit="not zero for transmission errors, forces and stresses", remedy="give a torque",
-        )  # fmt: skip
+            "without torque no tooth carries load",
+            code="E-NO-LOAD",
+            key="operation.torque",
+            limit="not zero for transmission errors, forces and stresses",
+            remedy="give a torque",
+        )
 
 
 def _warn_of_time(left: int, seconds: float, workers: int) -> None:
@@ -231,17 +245,26 @@ def _value(text: str) -> str | float | bool:
 
 def _not_over(text: str) -> CaseError:
     return CaseError(
-        "not a key with values", code="E-VARIABLE", key="--over", value=text,
+        "not a key with values",
+        code="E-VARIABLE",
+        key="--over",
+        value=text,
         limit=f"KEY=V1,V2,V3 or KEY=LOW..HIGH/COUNT with a count of 2 to {_LARGEST}",
         remedy='--over "operation.torque=50 N m, 100 N m" --over "sun.modifications[0].amount=0 um..12 um/7"',
-    )  # fmt: skip
+    )
 
 
 def sweep_into(
-    case: Case, folder: Path, *, over: Sequence[str], of: Sequence[str] = ("ste",),
-    speeds: tuple[str, str] | None = None, cache: Path | None = None, progress: Progress | None = None,
-    runner: Runner | None = None
-) -> tuple[Sweep, list[str]]:  # fmt: skip
+    case: Case,
+    folder: Path,
+    *,
+    over: Sequence[str],
+    of: Sequence[str] = ("ste",),
+    speeds: tuple[str, str] | None = None,
+    cache: Path | None = None,
+    progress: Progress | None = None,
+    runner: Runner | None = None,
+) -> tuple[Sweep, list[str]]:
     """Compute a sweep, or what is left of it, and write its table and figure.
 
     CaseError: E-VARIABLE, E-OBJECTIVE: what cannot be computed; nothing is written then. StorageError:
@@ -261,9 +284,12 @@ def sweep_into(
     values = dict(parse_over(text) for text in over)
     if len(values) < len(over):
         raise CaseError(
-            "a key is given twice", code="E-VARIABLE", key="--over", value=", ".join(over),
+            "a key is given twice",
+            code="E-VARIABLE",
+            key="--over",
+            value=", ".join(over),
             remedy="give all its values in one --over",
-        )  # fmt: skip
+        )
     quantities = [named_quantity(words, speeds=speeds) for words in of]
     _check_sweep(case, values, quantities)
     own_files(folder, (_TABLE, _FIGURE))

@@ -123,17 +123,17 @@ class GearMeshes:
             object.__setattr__(self, name, series)
         _positive("smoothing length", self.smoothing)
         if np.any(np.isnan(backlash)) or np.any(backlash < 0.0):
-            raise CaseError(
-                f"backlash of {backlash.min():.4g} m", code="E-BACKLASH", limit="0 m or more, or infinite"
-            )
+            raise CaseError(f"backlash of {backlash.min():.4g} m", code="E-BACKLASH", limit="0 m or more, or infinite")
         for name in ("stiffness", "deflection", "force"):
             series = getattr(self, name)
             if not hasattr(series, "mean") or len(np.atleast_1d(series.mean)) != len(columns):
                 count = len(np.atleast_1d(series.mean)) if hasattr(series, "mean") else "no"
                 raise CaseError(
-                    f"{count} series of the mesh {name} for {len(columns)} meshes", code="E-SHAPE", key=name,
+                    f"{count} series of the mesh {name} for {len(columns)} meshes",
+                    code="E-SHAPE",
+                    key=name,
                     remedy="give FourierSeries([[mean, ...], ...]) or StepSeries, one row a mesh",
-                )  # fmt: skip
+                )
         if self.separates:
             _check_pressing(self.stiffness)
 
@@ -275,9 +275,10 @@ class PolynomialSprings:
             )
         if len(table) != len(columns):
             raise CaseError(
-                f"{len(table)} rows of coefficients for {len(columns)} springs", code="E-SHAPE",
+                f"{len(table)} rows of coefficients for {len(columns)} springs",
+                code="E-SHAPE",
                 limit="one row a spring",
-            )  # fmt: skip
+            )
         object.__setattr__(self, "columns", columns)
         object.__setattr__(self, "coefficients", table)
 
@@ -333,13 +334,12 @@ class TurningSprings:
         columns, stiffness = _columns(self.columns, 4), np.atleast_1d(np.array(self.stiffness, float))
         if len(columns) != len(stiffness):
             raise CaseError(
-                f"columns {columns.tolist()} for {len(stiffness)} springs", code="E-SHAPE",
+                f"columns {columns.tolist()} for {len(stiffness)} springs",
+                code="E-SHAPE",
                 limit="four column numbers of W a spring",
-            )  # fmt: skip
-        if not np.all(np.isfinite(stiffness)) or np.any(stiffness < 0.0):
-            raise CaseError(
-                f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-RANGE", limit="finite, 0 or more"
             )
+        if not np.all(np.isfinite(stiffness)) or np.any(stiffness < 0.0):
+            raise CaseError(f"lateral stiffnesses {stiffness.tolist()} N/m", code="E-RANGE", limit="finite, 0 or more")
         stiffness.setflags(write=False)
         object.__setattr__(self, "columns", columns)
         object.__setattr__(self, "stiffness", stiffness)
@@ -378,9 +378,7 @@ def turning_wave(orders: tuple[int, ...], *, phase: float = 0.0) -> FourierSerie
 def coefficients_of(element: Element) -> dict[str, Series]:
     """Collect the coefficients of an element that repeat with the phases, by the names of its fields."""
     return {
-        name: series
-        for name, series in vars(element).items()
-        if hasattr(series, "at") and hasattr(series, "orders")
+        name: series for name, series in vars(element).items() if hasattr(series, "at") and hasattr(series, "orders")
     }
 
 
@@ -542,11 +540,14 @@ def _check_pressing(stiffness) -> None:
         instant = float(turn[np.argmin(values[mesh])])
         raise CaseError(
             f"the stiffness of mesh {mesh + 1} is {lowest[mesh]:.4g} N/m at {instant:.4g} of its period, and "
-            "its teeth part", code="E-STIFFNESS", key="stiffness", value=float(lowest[mesh]),
+            "its teeth part",
+            code="E-STIFFNESS",
+            key="stiffness",
+            value=float(lowest[mesh]),
             limit="0 N/m or more at every instant",
             remedy="lower the fluctuation or keep other harmonics of k(t), or take separates=False for a "
             "line that may pull",
-        )  # fmt: skip
+        )
 
 
 def _columns(columns, width: int) -> np.ndarray:
@@ -554,9 +555,7 @@ def _columns(columns, width: int) -> np.ndarray:
     array = np.array(columns)
     array = array.reshape(-1, width) if array.ndim < 2 else array
     if array.shape[1] != width or not np.issubdtype(array.dtype, np.integer) or np.any(array < 0):
-        raise CaseError(
-            f"columns {array.tolist()}", code="E-SHAPE", limit=f"groups of {width} column numbers of W"
-        )
+        raise CaseError(f"columns {array.tolist()}", code="E-SHAPE", limit=f"groups of {width} column numbers of W")
     array.setflags(write=False)
     return array
 

@@ -44,9 +44,11 @@ def harmonics_of(samples, count: int) -> np.ndarray:
     if positions < 2 * count + 1:
         raise CaseError(
             f"{positions} positions in a period cannot hold {count} harmonics",
-            code="E-HARMONICS", value=positions, limit=f"at least {2 * count + 1} positions",
+            code="E-HARMONICS",
+            value=positions,
+            limit=f"at least {2 * count + 1} positions",
             remedy="compute more positions of the mesh cycle or keep fewer harmonics",
-        )  # fmt: skip
+        )
     amplitudes = np.fft.rfft(samples, axis=-1)[..., : count + 1] * (2.0 / positions)
     amplitudes[..., 0] *= 0.5
     return amplitudes
@@ -59,9 +61,11 @@ def sample(amplitudes, positions: int) -> np.ndarray:
     if amplitudes.shape[-1] > (positions + 1) // 2:
         raise CaseError(
             f"{positions} instants cannot show {amplitudes.shape[-1] - 1} harmonics",
-            code="E-HARMONICS", value=positions, limit=f"at least {2 * amplitudes.shape[-1] - 1}",
+            code="E-HARMONICS",
+            value=positions,
+            limit=f"at least {2 * amplitudes.shape[-1] - 1}",
             remedy="ask for more instants",
-        )  # fmt: skip
+        )
     spectrum[..., : amplitudes.shape[-1]] = amplitudes * (0.5 * positions)
     spectrum[..., 0] *= 2.0
     return np.fft.irfft(spectrum, n=positions, axis=-1)
@@ -147,9 +151,11 @@ class FourierSeries:
         amplitudes = np.atleast_2d(given.copy())
         if amplitudes.ndim != 2 or not amplitudes.size:
             raise CaseError(
-                f"amplitudes of shape {amplitudes.shape}", code="E-SHAPE", key="amplitudes",
+                f"amplitudes of shape {amplitudes.shape}",
+                code="E-SHAPE",
+                key="amplitudes",
                 limit="one row of harmonics a coefficient",
-            )  # fmt: skip
+            )
         if not np.all(np.isfinite(amplitudes)):
             raise CaseError("a Fourier series holds numbers that are not finite", code="E-FINITE")
         amplitudes.setflags(write=False)
@@ -188,18 +194,19 @@ class StepSeries:
 
     def __post_init__(self):
         values, breaks = (
-            checked_numbers(getattr(self, name), name, code="E-SHAPE", unit="").copy()
-            for name in ("values", "breaks")
+            checked_numbers(getattr(self, name), name, code="E-SHAPE", unit="").copy() for name in ("values", "breaks")
         )
         values = np.atleast_2d(values)
         fits = values.ndim == 2 and breaks.ndim == 1 and len(breaks) == values.shape[1] > 0
         if not fits or breaks[0] != 0.0 or not np.all(np.diff(breaks) > 0.0) or not breaks[-1] < 1.0:
             raise CaseError(
-                f"values of shape {values.shape} with breaks {breaks.tolist()}", code="E-SHAPE", key="breaks",
+                f"values of shape {values.shape} with breaks {breaks.tolist()}",
+                code="E-SHAPE",
+                key="breaks",
                 limit="one value a break; breaks ascend from 0 to below 1",
                 remedy="values come first, one row a coefficient, then the fractions of the period at which "
                 "they start, such as StepSeries([[1.0, 2.0]], [0.0, 0.5])",
-            )  # fmt: skip
+            )
         if not np.all(np.isfinite(values)):
             raise CaseError("a step series holds numbers that are not finite", code="E-FINITE", key="values")
         for name, array in (("values", values), ("breaks", breaks)):
@@ -224,8 +231,9 @@ def phase_of(theta, orders) -> np.ndarray:
     if any(orders[known:]):
         raise CaseError(
             f"orders {tuple(orders)} name more base frequencies than the {known} that are given",
-            code="E-HARMONICS", limit="one order a base frequency",
-        )  # fmt: skip
+            code="E-HARMONICS",
+            limit="one order a base frequency",
+        )
     used = np.asarray(orders[:known], float)
     return theta[..., : len(used)] @ used
 
@@ -248,7 +256,7 @@ def series_of(samples, count: int, *, orders: tuple[int, ...] = (1,)) -> Fourier
 def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
     """Make the tooth errors (2N, H) [m] of one wave of each kind, shifted by the mesh phases (2N,) [periods].
 
-    The waves are harmonics 1 to H at phase zero [m]; phases as of `femgear.trains.rigid.phased_series`.
+    The waves are harmonics 1 to H at phase zero [m]; phases as of `femgear.stages.lumped_set.phased_series`.
 
     Raises
     ------
@@ -263,9 +271,11 @@ def tooth_lines(sun_planet, planet_ring, phases) -> np.ndarray:
     finite = all(np.all(np.isfinite(values)) for values in (*waves, phases))
     if phases.ndim != 1 or not len(phases) or len(phases) % 2 or max(w.ndim for w in waves) > 1 or not finite:
         raise CaseError(
-            f"mesh phases of shape {phases.shape}", code="E-SHAPE", key="phases",
+            f"mesh phases of shape {phases.shape}",
+            code="E-SHAPE",
+            key="phases",
             limit="two a planet, finite: sun-planet meshes, then planet-ring meshes",
-        )  # fmt: skip
+        )
     table = np.repeat([np.pad(wave, (0, count - len(wave))) for wave in waves], len(phases) // 2, axis=0)
     return table * np.exp(2j * np.pi * phases[:, None] * np.arange(1, count + 1))
 
@@ -284,9 +294,10 @@ class SummedSeries:
         sizes = {len(part.amplitudes) for part in parts if isinstance(part, FourierSeries)}
         if len(sizes) != 1 or not all(isinstance(part, FourierSeries) for part in parts):
             raise CaseError(
-                f"a sum of {len(parts)} series with {sorted(sizes)} coefficients", code="E-SHAPE",
+                f"a sum of {len(parts)} series with {sorted(sizes)} coefficients",
+                code="E-SHAPE",
                 limit="one Fourier series or more, all of one size",
-            )  # fmt: skip
+            )
         object.__setattr__(self, "parts", parts)
 
     @property
@@ -319,9 +330,10 @@ def harmonic_lines(harmonics: int, bases: int = 1) -> np.ndarray:
     """
     if int(harmonics) != harmonics or harmonics < 0 or bases < 1:
         raise CaseError(
-            f"{harmonics} harmonics of {bases} base frequencies", code="E-HARMONICS",
+            f"{harmonics} harmonics of {bases} base frequencies",
+            code="E-HARMONICS",
             limit="whole numbers, at least one base frequency",
-        )  # fmt: skip
+        )
     axes = np.meshgrid(*[np.arange(-harmonics, harmonics + 1)] * bases, indexing="ij")
     orders = np.stack([axis.ravel() for axis in axes], axis=1)
     return distinct_lines(orders[np.abs(orders).sum(axis=1) <= harmonics])
@@ -374,15 +386,18 @@ def checked_lines(orders) -> np.ndarray:
     array = array.astype(int)
     if np.any(array[0]):
         raise CaseError(
-            f"the first line has the orders {array[0].tolist()}", code="E-HARMONICS", limit="zeros: the mean",
+            f"the first line has the orders {array[0].tolist()}",
+            code="E-HARMONICS",
+            limit="zeros: the mean",
             remedy="build the lines with harmonic_lines, side_bands or distinct_lines",
-        )  # fmt: skip
+        )
     unique, count = np.unique(array * _mirror_sign(array)[:, None], axis=0, return_counts=True)
     if np.any(count > 1):
         raise CaseError(
             f"the line {unique[count > 1][0].tolist()} or its mirror image is there twice",
-            code="E-HARMONICS", remedy="pass the lines through distinct_lines",
-        )  # fmt: skip
+            code="E-HARMONICS",
+            remedy="pass the lines through distinct_lines",
+        )
     return array
 
 

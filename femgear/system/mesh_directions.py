@@ -132,9 +132,10 @@ def gear_set_system(
     T, flank, kept = free_motions(data), flank_sign(data, torque), _kept(data)
     if not T.shape[1]:
         raise CaseError(
-            "infinite stiffnesses hold every motion of the set", code="E-MECHANISM",
+            "infinite stiffnesses hold every motion of the set",
+            code="E-MECHANISM",
             remedy="give the support or the bearing of a body finite stiffnesses",
-        )  # fmt: skip
+        )
     masses = body_masses(data)
     columns = [mesh_directions(data, flank)]
     if back_flanks:
@@ -207,14 +208,20 @@ def mesh_elements(
         made = GearMeshes(columns, series, separates=separates, smoothing=smoothing)
     elif harmonics is None:
         raise CaseError(
-            "the mesh harmonics of the static record are not said", code="E-HARMONICS", key="harmonics",
+            "the mesh harmonics of the static record are not said",
+            code="E-HARMONICS",
+            key="harmonics",
             limit="a whole number of 1 or more",
-        )  # fmt: skip
+        )
     else:
         made = gear_meshes(
-            stiffness, harmonics=harmonics, columns=columns, separates=separates, smoothing=smoothing,
+            stiffness,
+            harmonics=harmonics,
+            columns=columns,
+            separates=separates,
+            smoothing=smoothing,
             orders=orders,
-        )  # fmt: skip
+        )
     return made if backlash is None else replace(made, backlash=backlash)
 
 
@@ -223,9 +230,12 @@ def check_mesh_columns(data: RigidSet, meshes: GearMeshes) -> None:
     count = len(data.column_stiffness)
     if not np.array_equal(meshes.columns[:, 0], np.arange(count)):
         raise CaseError(
-            f"meshes on columns {meshes.columns[:, 0].tolist()}", code="E-SHAPE", key="meshes",
-            limit=f"columns 0 to {count - 1} in order", remedy="make them with mesh_elements",
-        )  # fmt: skip
+            f"meshes on columns {meshes.columns[:, 0].tolist()}",
+            code="E-SHAPE",
+            key="meshes",
+            limit=f"columns 0 to {count - 1} in order",
+            remedy="make them with mesh_elements",
+        )
 
 
 def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:

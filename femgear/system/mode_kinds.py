@@ -116,10 +116,7 @@ def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
     planet_angles = np.asarray(planet_angles, float)
 
     def rows(bodies, *axes):
-        found = [
-            [next((place[k] for a in axis if (k := f"{b}: {a}") in place), -1) for axis in axes]
-            for b in bodies
-        ]
+        found = [[next((place[k] for a in axis if (k := f"{b}: {a}") in place), -1) for axis in axes] for b in bodies]
         found = np.array(found)
         there = found >= 0
         return np.where(there[..., None], shape[found], 0.0), np.where(there, np.asarray(mass)[found], 0.0)
@@ -305,9 +302,7 @@ def gear_set_motions(data: RigidSet, shape) -> SetMotions:
     """
     shape, T, axes = np.asarray(shape), free_motions(data), data.axes
     if shape.ndim != 2 or len(shape) != T.shape[1]:
-        raise CaseError(
-            f"mode shapes of shape {shape.shape}", code="E-SHAPE", limit=f"({T.shape[1]}, modes)"
-        )  # fmt: skip
+        raise CaseError(f"mode shapes of shape {shape.shape}", code="E-SHAPE", limit=f"({T.shape[1]}, modes)")
     full, mass = (T @ shape).reshape(data.n_planets + 3, len(axes), -1), body_masses(data)
     planes = [[axes.index(axis) for axis in plane] for plane in _PLANES if set(plane) <= set(axes)]
     central = np.concatenate([full[:3, plane] for plane in planes])

@@ -137,9 +137,7 @@ class RigidSet(ABC):
     @property
     def radii(self) -> np.ndarray:
         """Radius r (N + 3,) of ``u = r theta`` of carrier, ring, sun and planets [m]."""
-        return np.array(
-            [member_radius(self, name) for name in CENTRAL] + [self.planet_radius] * self.n_planets
-        )
+        return np.array([member_radius(self, name) for name in CENTRAL] + [self.planet_radius] * self.n_planets)
 
     @property
     def mesh_stiffness(self) -> np.ndarray:
@@ -239,9 +237,10 @@ class PlanarTorque:
     def __post_init__(self):
         if self.member not in CENTRAL or self.output not in (*CENTRAL, None) or self.member == self.output:
             raise CaseError(
-                f"a torque on {self.member!r} that reacts on {self.output!r}", code="E-MECHANISM",
+                f"a torque on {self.member!r} that reacts on {self.output!r}",
+                code="E-MECHANISM",
                 limit="two of sun, carrier and ring",
-            )  # fmt: skip
+            )
         if not math.isfinite(self.torque):
             raise CaseError(f"a torque of {self.torque} N m", code="E-RANGE", limit="finite")
 
@@ -351,9 +350,10 @@ def torque_load(data: RigidSet, torque: PlanarTorque | None, kept: np.ndarray) -
         return load
     if not kept[CENTRAL.index(torque.member), -1]:
         raise CaseError(
-            f"the torque acts on the {torque.member}, which is held", code="E-MECHANISM",
+            f"the torque acts on the {torque.member}, which is held",
+            code="E-MECHANISM",
             remedy="drive a member that can turn",
-        )  # fmt: skip
+        )
     shares = torque_shares(data)
     on_sun = torque.torque / member_radius(data, torque.member) / shares[torque.member]
     for member in (torque.member, torque.output):
@@ -450,8 +450,12 @@ def refuse(key: str, value, unit: str, limit: str, *, remedy: str | None = None)
     """Refuse an entry of a set, such as ``planet.mass``, with its value and what is allowed."""
     raise CaseError(
         f"{key.replace('_', ' ').replace('.', ': ')} of {value} {unit}".rstrip(),
-        code="E-RANGE", key=key, value=value, limit=limit, remedy=remedy,
-    )  # fmt: skip
+        code="E-RANGE",
+        key=key,
+        value=value,
+        limit=limit,
+        remedy=remedy,
+    )
 
 
 def _check_positive(key: str, value, unit: str) -> None:

@@ -262,8 +262,9 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
         if array.ndim != 2 or array.shape != excitation.stiffness.shape:
             raise CaseError(
                 f"mesh {name} has shape {array.shape}, mesh stiffness {excitation.stiffness.shape}",
-                code="E-SHAPE", limit="(n_meshes, n_positions), the same for all",
-            )  # fmt: skip
+                code="E-SHAPE",
+                limit="(n_meshes, n_positions), the same for all",
+            )
         if not np.all(np.isfinite(array)):
             raise CaseError(f"mesh {name} holds numbers that are not finite", code="E-FINITE")
     if excitation.periods < 1:
@@ -319,15 +320,17 @@ class NonlinearSystem:
         for element in self.elements:
             if element.columns.max(initial=-1) >= columns:
                 raise CaseError(
-                    f"an element acts on column {element.columns.max()} of {columns}", code="E-SHAPE",
+                    f"an element acts on column {element.columns.max()} of {columns}",
+                    code="E-SHAPE",
                     limit=f"0 to {columns - 1}",
-                )  # fmt: skip
+                )
         for force in self.forces:
             if force.force.shape != (n,) or not np.all(np.isfinite(force.force)):
                 raise CaseError(
                     f"a harmonic force of shape {force.force.shape} on {n} degrees of freedom",
-                    code="E-SHAPE", limit="one finite number a degree of freedom",
-                )  # fmt: skip
+                    code="E-SHAPE",
+                    limit="one finite number a degree of freedom",
+                )
 
     @property
     def damping(self) -> np.ndarray:
@@ -374,9 +377,12 @@ def checked_bases(problem: NonlinearSystem, frequency) -> np.ndarray:
     if len(frequency) > problem.bases:
         raise CaseError(
             f"{len(frequency)} base frequencies, elements and forces name {problem.bases}",
-            code="E-RANGE", key="frequency", value=frequency.tolist(), limit=f"{problem.bases} or fewer",
+            code="E-RANGE",
+            key="frequency",
+            value=frequency.tolist(),
+            limit=f"{problem.bases} or fewer",
             remedy="leave out those that drive nothing, or give elements and forces one order a frequency",
-        )  # fmt: skip
+        )
     return frequency
 
 

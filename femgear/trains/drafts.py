@@ -44,9 +44,7 @@ from femgear.trains.reading import parse_case
 from femgear.trains.registry import train_of
 
 
-def draft_text(
-    tables: Mapping[str, Any], remarks: Mapping[str, str], *, word: str, head: Iterable[str] = ()
-) -> str:
+def draft_text(tables: Mapping[str, Any], remarks: Mapping[str, str], *, word: str, head: Iterable[str] = ()) -> str:
     """Write the text of a case from tables, with estimates of what they leave out.
 
     Parameters
@@ -92,9 +90,12 @@ def _section(case: Any, key: str) -> Any:
 
 
 KINDS = {
-    "planetary": (27, 40, 108), "pair": (24, 36), "planar": (27, 40, 108), "helical": (30, 20, 70),
+    "planetary": (27, 40, 108),
+    "pair": (24, 36),
+    "planar": (27, 40, 108),
+    "helical": (30, 20, 70),
     "drivetrain": (23, 71),
-}  # fmt: skip
+}
 """Kinds of cases that `new_case` writes, with the teeth of their gears."""
 ADDENDA = (1.0, 1.1, 1.2, 0.9, 0.8)
 """Addenda [modules] that are tried until teeth leave nothing to warn of, where none is given."""
@@ -139,10 +140,16 @@ class ToothForm:
 
 
 def new_case(
-    kind: str, *, teeth: tuple[int, ...] = (), module: str | None = None, torque: str | None = None,
-    speed: str | None = None, planets: int | None = None, face_width: str | None = None,
+    kind: str,
+    *,
+    teeth: tuple[int, ...] = (),
+    module: str | None = None,
+    torque: str | None = None,
+    speed: str | None = None,
+    planets: int | None = None,
+    face_width: str | None = None,
     form: ToothForm | None = None,
-) -> str:  # fmt: skip
+) -> str:
     """Write a commented case from a few numbers.
 
     Shifts that are not given are those of `femgear.gears.shifts.share_shifts`; tips run free of their mates.
@@ -239,9 +246,7 @@ def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm) -
         addenda = f" with addenda of {min(ADDENDA):g} to {max(ADDENDA):g} modules"
         racks = addenda if form.addendum is None else ""
         missing = " and ".join(_USUAL.get(code, code) for code in lacks)
-        head.append(
-            f"No profile shifts{racks}{place} were found that give these teeth {missing}: femgear check warns"
-        )
+        head.append(f"No profile shifts{racks}{place} were found that give these teeth {missing}: femgear check warns")
     return head
 
 
@@ -282,17 +287,24 @@ def _teeth(kind: str, teeth: tuple[int, ...]) -> tuple[int, ...]:
     if len(usual) == 2 == len(teeth) and min(teeth) < 0:
         external = [abs(z) for z in teeth]
         raise CaseError(
-            f"a {kind} case is drafted with external gears", code="E-COUNT", key="--teeth", value=teeth,
+            f"a {kind} case is drafted with external gears",
+            code="E-COUNT",
+            key="--teeth",
+            value=teeth,
             limit="positive numbers",
             remedy=f"write --teeth {external[0]} {external[1]}, then make gear 2 internal in the case: "
             "gear_2.outer_radius in place of its bore_radius"
-            if kind == "pair" else "leave the sign out",
-        )  # fmt: skip
+            if kind == "pair"
+            else "leave the sign out",
+        )
     if len(teeth) != len(usual) or min(teeth) < 5 or max(teeth) > 5000:
         raise CaseError(
-            f"a {kind} case needs {len(usual)} numbers of teeth", code="E-COUNT", key="--teeth",
-            value=teeth, limit=f"5 to 5000 each, as in --teeth {' '.join(map(str, usual))}",
-        )  # fmt: skip
+            f"a {kind} case needs {len(usual)} numbers of teeth",
+            code="E-COUNT",
+            key="--teeth",
+            value=teeth,
+            limit=f"5 to 5000 each, as in --teeth {' '.join(map(str, usual))}",
+        )
     return teeth
 
 
@@ -317,9 +329,11 @@ def _gears(
     if form.shifts:
         if len(form.shifts) not in (len(teeth), 2):
             raise CaseError(
-                f"{len(form.shifts)} profile shifts of {len(teeth)} gears", code="E-COUNT", key="--shifts",
+                f"{len(form.shifts)} profile shifts of {len(teeth)} gears",
+                code="E-COUNT",
+                key="--shifts",
                 limit="those of sun and planet, or of all three gears" if len(teeth) == 3 else "two",
-            )  # fmt: skip
+            )
         for gear, shift in zip(gears, form.shifts, strict=False):
             gear["profile_shift"] = shift
         return gears, of_all | _rack_table(form.addendum, notes), ()
@@ -367,9 +381,13 @@ def _shared_shifts(
         rack = BasicRack(tried, _dedendum(tried), 0.25)
         try:
             shared = share_shifts(
-                teeth, alpha, transverse_rack(rack, beta), backlash=BACKLASH * math.cos(beta), step=step,
+                teeth,
+                alpha,
+                transverse_rack(rack, beta),
+                backlash=BACKLASH * math.cos(beta),
+                step=step,
                 centre_distance=distance,
-            )  # fmt: skip
+            )
         except GeometryError as error:
             fault = fault or error
             continue
@@ -401,9 +419,12 @@ def check_rack(rack: Mapping[str, float]) -> None:
     """Refuse an addendum that no rack has (E-RANGE), under the name of its option."""
     if not 0.5 <= rack["addendum"] <= 1.5:
         raise CaseError(
-            "no usual addendum", code="E-RANGE", key="--addendum", value=rack["addendum"],
+            "no usual addendum",
+            code="E-RANGE",
+            key="--addendum",
+            value=rack["addendum"],
             limit="0.5 to 1.5 modules",
-        )  # fmt: skip
+        )
 
 
 _MODULES = {3.0: "three", 4.0: "four"}
@@ -420,9 +441,7 @@ def _sections(
         rack = of_all.get("rack", {})
         dedendum, addendum = rack.get("dedendum", 1.25), rack.get("addendum", 1.0)
         shift = section.pop("rim_shift", section.get("profile_shift", 0.0))
-        radius, root = usual_rim(
-            gear["teeth"], size, dedendum, shift, internal=internal, helix=beta, addendum=addendum
-        )
+        radius, root = usual_rim(gear["teeth"], size, dedendum, shift, internal=internal, helix=beta, addendum=addendum)
         key = "outer_radius" if internal else "bore_radius"
         rim = round(abs(radius - root) / size, 9)
         notes[f"{name}.{key}"] = f"estimated: a rim of {_MODULES.get(rim, f'{rim:.4g}')} modules"
@@ -481,9 +500,12 @@ def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:
     remedies += [f"with {planets} planets --teeth {' or '.join(others)}"] if others else []
     return CaseError(
         f"{planets} planets cannot be equally spaced: (z_s + z_r)/N = {total / planets:.6g} is not whole",
-        code="E-ASSEMBLY", key="--planets", value=planets, limit=f"divisors of z_s + z_r = {total}",
+        code="E-ASSEMBLY",
+        key="--planets",
+        value=planets,
+        limit=f"divisors of z_s + z_r = {total}",
         remedy="; ".join(remedies) or "fewer planets, or other teeth",
-    )  # fmt: skip
+    )
 
 
 def _read(kind: Any, text: str, key: str) -> float:
@@ -511,9 +533,7 @@ def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     gears: Any = planetary_set(case)
     known, width = estimates(case), planetary_set(case).mesh_widths[0]
     bearing, ratio = known["gear_1.bearing_stiffness"], gears.gear_2.teeth / gears.gear_1.teeth
-    tilt = Estimate(
-        0.75 * bearing.value * width**2, TORSION, "the bearing's stiffness over three face widths"
-    )
+    tilt = Estimate(0.75 * bearing.value * width**2, TORSION, "the bearing's stiffness over three face widths")
     how = "cylinder of the wheel's radius and four face widths"
     rotor = cylinder(0.0, gears.gear_2.reference_radius, 4.0 * width, case.material.density)
     rotors = [Estimate(value, one, how) for value, one in zip(rotor, (MASS, INERTIA, INERTIA), strict=True)]

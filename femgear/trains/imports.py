@@ -33,9 +33,7 @@ class CaseDraft:
     words: str
 
 
-def case_drafts(
-    model: Model, name: str, *, stage: str | None = None, load_case: int | None = None
-) -> list[CaseDraft]:
+def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case: int | None = None) -> list[CaseDraft]:
     """Write the cases of the stages of a REXS file; `Model.findings` holds what they have not.
 
     Of one stage there is one case. Of several each has its own, called by its id; the one without is the
@@ -62,10 +60,14 @@ def case_drafts(
         chosen = [one for one in stages if one.id == stage]
         if not chosen:
             raise CaseError(
-                "no such stage", code="E-CHOICE", key="--stage", value=stage, file=model.name,
+                "no such stage",
+                code="E-CHOICE",
+                key="--stage",
+                value=stage,
+                file=model.name,
                 limit=", ".join(stage_in_words(model, one) for one in stages[:20]) or "none in the file",
                 remedy="choose one by its id",
-            )  # fmt: skip
+            )
         left = [stage_in_words(model, one) for one in stages if one.id != stage]
         if left:
             model.remark("--stage", f"stages that are not taken: {_listed(left)}", first=True)

@@ -14,7 +14,7 @@ from typing import Any
 from femgear.case.dependencies import Steps, compliance_entries
 from femgear.case.sections import Case
 from femgear.errors import CaseError
-from femgear.trains.protocol import Progress, Stage, one_blas_thread, silent
+from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import check_case, stages_of, train_of
 
@@ -36,9 +36,7 @@ class Answer(Mapping[str, Any]):
         Folder of generated grids.
     """
 
-    def __init__(
-        self, case: Any, steps: Steps, *, cache: Path | None = None, progress: Progress = silent
-    ) -> None:
+    def __init__(self, case: Any, steps: Steps, *, cache: Path | None = None, progress: Progress = silent) -> None:
         self.case, self.steps, self.cache, self._progress = case, steps, cache, progress
         # results of this case stay, whatever other answers leave behind
         self._results: dict[str, Any] = {}
@@ -153,10 +151,11 @@ class Live:
         """
         if not isinstance(values, Mapping):
             raise CaseError(
-                f"entries are changed by a mapping, not by {type(values).__name__}", code="E-TYPE",
+                f"entries are changed by a mapping, not by {type(values).__name__}",
+                code="E-TYPE",
                 limit="keys and values as of the case file",
                 remedy='as in change({"operation.torque": "90 N m"})',
-            )  # fmt: skip
+            )
         changed = with_values(self.case, values)
         check_case(changed)
         # of the first one, whose grids are kept on disk

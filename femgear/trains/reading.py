@@ -21,7 +21,7 @@ from femgear.case.checks import cross_check
 from femgear.case.csv_columns import embed_checksum, embed_profiles
 from femgear.case.estimates import with_estimates
 from femgear.case.gear_set import with_shafts
-from femgear.case.mistakes import added_material, combine, notices, translate
+from femgear.case.messages import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.text import described, text_with_points
 from femgear.errors import CaseError
@@ -222,9 +222,7 @@ def _change(data: dict, key: str, value: Any, name: str) -> None:
         table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
     if last.startswith("["):
         remedy = "give the whole list, or the key of an entry of one of its tables"
-        raise CaseError(
-            "a list is changed as a whole", code="E-TYPE", key=key, file=name or None, remedy=remedy
-        )
+        raise CaseError("a list is changed as a whole", code="E-TYPE", key=key, file=name or None, remedy=remedy)
     if value is None:
         table.pop(last, None)
     else:
@@ -241,9 +239,12 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
     if not isinstance(found, (dict, list)) or not isinstance(found, wanted):
         kind = "table" if wanted is dict else "list"
         raise CaseError(
-            f"{part} is not a {kind}", code="E-TYPE", key=key, file=name or None,
+            f"{part} is not a {kind}",
+            code="E-TYPE",
+            key=key,
+            file=name or None,
             limit='keys such as "operation.torque" or "sun.modifications[0].amount"',
-        )  # fmt: skip
+        )
     return found
 
 
@@ -269,9 +270,13 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
     own = _own_files()
     if model not in own:
         raise CaseError(
-            "there is no such model", code="E-MODEL", key="--model", value=model, limit=", ".join(own),
+            "there is no such model",
+            code="E-MODEL",
+            key="--model",
+            value=model,
+            limit=", ".join(own),
             remedy="planetary sets have no model: leave it out",
-        )  # fmt: skip
+        )
     return own[model].file.model.model_json_schema()
 
 
@@ -289,9 +294,13 @@ def _train_of_file(data: dict) -> registry.Known:
     version = data.get("format", FORMAT)
     if type(version) is int and version > FORMAT:
         raise CaseError(
-            "the file is written for a newer femgear", code="E-FORMAT", key="format",
-            value=case_text.found(version), limit=f"up to {FORMAT}", remedy="update femgear",
-        )  # fmt: skip
+            "the file is written for a newer femgear",
+            code="E-FORMAT",
+            key="format",
+            value=case_text.found(version),
+            limit=f"up to {FORMAT}",
+            remedy="update femgear",
+        )
     if "model" in data:
         own, model = _own_files(), data["model"]
         if not isinstance(model, str) or model not in own:
@@ -301,9 +310,11 @@ def _train_of_file(data: dict) -> registry.Known:
     for train in [one for one in registry.TRAINS if one.key == "model"] if foreign else ():
         if what := train.file.claims(data):
             raise CaseError(
-                f"a file with {what} needs its model", code="E-KEY-MISSING", key="model",
+                f"a file with {what} needs its model",
+                code="E-KEY-MISSING",
+                key="model",
                 remedy=f'write model = "{train.name}" before the first table',
-            )  # fmt: skip
+            )
     return _train_of_set(data)
 
 
@@ -324,10 +335,13 @@ def _unknown_model(value: object) -> CaseError:
         return CaseError(message, code="E-TYPE", key="model", value=value, limit=limit)
     near = difflib.get_close_matches(value.lower(), known, n=1, cutoff=0.6)
     return CaseError(
-        "there is no such model", code="E-CHOICE", key="model", value=value,
+        "there is no such model",
+        code="E-CHOICE",
+        key="model",
+        value=value,
         limit=f"{', '.join(known)}; planetary sets have no entry model",
         remedy=f"did you mean {near[0]}?" if near else "leave it out",
-    )  # fmt: skip
+    )
 
 
 def _train_of_set(data: dict) -> registry.Known:
@@ -336,7 +350,11 @@ def _train_of_set(data: dict) -> registry.Known:
     if len(given) > 1:
         sections = [one.key for one in given]
         raise CaseError(
-            f"a set is {' or '.join(sections)}", code="E-CHOICE", key=sections[-1],
-            value=" and ".join(sections), limit="one of the sections", remedy="leave one of them out",
-        )  # fmt: skip
+            f"a set is {' or '.join(sections)}",
+            code="E-CHOICE",
+            key=sections[-1],
+            value=" and ".join(sections),
+            limit="one of the sections",
+            remedy="leave one of them out",
+        )
     return given[0] if given else next(one for one in registry.TRAINS if not one.key)

@@ -14,7 +14,7 @@ from femgear.errors import CaseError, FemgearError
 from femgear.findings import Finding, tell
 
 if TYPE_CHECKING:
-    from femgear.trains.protocol import Stage, Train
+    from femgear.stages.protocol import Stage, Train
 
 
 @dataclass(frozen=True)
@@ -38,15 +38,15 @@ GROUP = "femgear.trains"
 """Entry points of other packages; the name is that of the train, the value a module with FILE and TRAIN."""
 
 TRAINS = tuple(
-    Known(name, key, f"femgear.{reads}:FILE", f"femgear.trains.{name}.stages:{name.upper()}")
-    for name, key, reads in (
-        ("multistage", "model", "trains.multistage.case_file"),
-        ("gear_pair", "model", "trains.gear_pair.case_file"),
-        ("pair", "model", "trains.pair.case_file"),
-        ("drivetrain", "model", "trains.drivetrain.case_file"),
-        ("helical", "helical", "trains.helical.section"),
-        ("planar", "planar", "trains.planar.section"),
-        ("elastic", "", "case.sections"),
+    Known(name, key, f"femgear.{reads}:FILE", f"femgear.trains.{folder}.stages:{name.upper()}")
+    for name, key, folder, reads in (
+        ("multistage", "model", "multistage", "trains.multistage.case_file"),
+        ("gear_pair", "model", "impacts", "trains.impacts.case_file"),
+        ("pair", "model", "pair", "trains.pair.case_file"),
+        ("drivetrain", "model", "drivetrain", "trains.drivetrain.case_file"),
+        ("helical", "helical", "helical", "trains.helical.section"),
+        ("planar", "planar", "planar", "trains.planar.section"),
+        ("elastic", "", "elastic", "case.sections"),
     )
 )
 
@@ -70,8 +70,9 @@ class Installed(Known):
             raise FemgearError(
                 f"the train {self.name} of the package {self.package} cannot be loaded: "
                 f"{type(error).__name__}: {' '.join(str(error).split())}",
-                code="E-LIBRARY", remedy=f"update {self.package} or remove it",
-            ) from error  # fmt: skip
+                code="E-LIBRARY",
+                remedy=f"update {self.package} or remove it",
+            ) from error
         return found
 
 
@@ -111,9 +112,7 @@ def _installed() -> tuple[Installed, ...]:
     from importlib.metadata import entry_points
 
     return tuple(
-        Installed(
-            one.name, "model", f"{one.module}:FILE", f"{one.module}:TRAIN", one.dist.name if one.dist else ""
-        )
+        Installed(one.name, "model", f"{one.module}:FILE", f"{one.module}:TRAIN", one.dist.name if one.dist else "")
         for one in sorted(entry_points(group=GROUP))
     )
 
@@ -123,9 +122,7 @@ def train_of(case) -> Train:
     for known in trains():
         if known.name == getattr(case, "train", None):
             return known.train
-    raise CaseError(
-        f"a case is needed, not {described(case)}", code="E-TYPE", remedy="femgear.read_case reads one"
-    )
+    raise CaseError(f"a case is needed, not {described(case)}", code="E-TYPE", remedy="femgear.read_case reads one")
 
 
 def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:
@@ -148,9 +145,7 @@ def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:
     why = f"it is no stage of {train.words}" if last is None else last.unavailable(case)
     if why:
         allowed = [stage.name for stage in train.stages if not stage.unavailable(case)]
-        raise CaseError(
-            f"no stage {only}: {why}", code="E-STAGE", key="only", value=only, limit=", ".join(allowed)
-        )
+        raise CaseError(f"no stage {only}: {why}", code="E-STAGE", key="only", value=only, limit=", ".join(allowed))
     needs, needed = {stage.name: stage.before(case) for stage in train.stages}, {only}
     while more := {one for name in needed for one in needs[name]} - needed:
         needed |= more

@@ -13,8 +13,8 @@ import numpy as np
 
 from femgear import read_case
 from femgear.solvers import periodic_response
-from femgear.trains.gear_pair.case_file import pair_of
-from femgear.trains.gear_pair.model import contact_shares
+from femgear.trains.impacts.case_file import pair_of
+from femgear.trains.impacts.model import contact_shares
 
 plt.style.use("tableau-colorblind10")
 pair = pair_of(read_case(Path(__file__).parents[2] / "cases" / "gear_pair.toml"))

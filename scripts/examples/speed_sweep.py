@@ -25,9 +25,7 @@ ax.plot(found.speed, 1e6 * found.dte_rms)
 strongest = found.sortby("resonance_dte", ascending=False).isel(resonance=slice(3))
 for harmonic, speed in zip(strongest.mesh_harmonic.values, strongest.resonance_speed.values):
     ax.axvline(speed, color="0.6", linestyle=":")
-    ax.annotate(
-        f"harmonic {harmonic}", (speed, 0.97), xycoords=("data", "axes fraction"), rotation=90, va="top"
-    )
+    ax.annotate(f"harmonic {harmonic}", (speed, 0.97), xycoords=("data", "axes fraction"), rotation=90, va="top")
     print(f"mesh harmonic {harmonic}: {speed:.0f} rpm")
 
 ax.set(xlabel="speed of gear 1 [rpm]", ylabel="dynamic transmission error, r.m.s. [µm]")

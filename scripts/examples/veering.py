@@ -15,8 +15,8 @@ from femgear import read_case
 from femgear.case.gear_set import planetary_set
 from femgear.solvers.linear.modal import complex_modes
 from femgear.solvers.linear.tracking import oscillating, track_modes
+from femgear.stages.lumped_set import gear_set_system
 from femgear.trains.planar.model import planar_data
-from femgear.trains.rigid import gear_set_system
 
 case = read_case(Path(__file__).parents[2] / "cases" / "nrel_pgb.toml")
 data = planar_data(case, planetary_set(case))

@@ -74,12 +74,8 @@ def kahraman_set(**changes) -> HelicalSet:
 
     given = {
         "sun": reduced_body(sun, mass=0.460, polar=0.272, diametral=0.136, support=support(sun, 1e-4)),
-        "ring": reduced_body(
-            ring, mass=0.588, polar=0.759, diametral=0.389, support=support(ring, 1e4, stiff)
-        ),
-        "carrier": reduced_body(
-            distance, mass=3.0, polar=1.5, diametral=0.75, support=support(distance, 100.0)
-        ),
+        "ring": reduced_body(ring, mass=0.588, polar=0.759, diametral=0.389, support=support(ring, 1e4, stiff)),
+        "carrier": reduced_body(distance, mass=3.0, polar=1.5, diametral=0.75, support=support(distance, 100.0)),
         "planet": reduced_body(planet, mass=0.177, polar=0.100, diametral=0.050),
         "sun_radius": sun,
         "ring_radius": ring,
@@ -106,11 +102,14 @@ def cases(*, convention: str = "rotation") -> dict[str, MeshPhasing]:
     """
     return {
         letter: MeshPhasing(
-            sun, ring, tuple((sun + ring) // 4 * n for n in range(4)), convention=convention,
+            sun,
+            ring,
+            tuple((sun + ring) // 4 * n for n in range(4)),
+            convention=convention,
             lag=standard_lag(planet),
         )
         for letter, (sun, ring, planet, _) in TABLE_2.items()
-    }  # fmt: skip
+    }
 
 
 def torsional_set(data: PlanarSet) -> PlanarSet:

@@ -103,9 +103,11 @@ class TransmissionErrors:
             lines = checked_numbers(self.tooth, "tooth", code="E-SHAPE", unit="m", kind=complex)
             if lines.ndim != 2 or len(lines) != 2 * self.data.n_planets or not np.all(np.isfinite(lines)):
                 raise CaseError(
-                    f"tooth errors of shape {lines.shape}", code="E-SHAPE", key="tooth",
+                    f"tooth errors of shape {lines.shape}",
+                    code="E-SHAPE",
+                    key="tooth",
                     limit=f"({2 * self.data.n_planets}, harmonics), finite",
-                )  # fmt: skip
+                )
             object.__setattr__(self, "tooth", lines)
 
     def frequency(self, mesh_frequency: float) -> np.ndarray:
@@ -162,9 +164,12 @@ class TransmissionErrors:
         given = getattr(self, name)
         if not isinstance(given, Eccentricity):
             raise CaseError(
-                f"an eccentricity given as {given!r}", code="E-RANGE", key=name, limit="an Eccentricity",
+                f"an eccentricity given as {given!r}",
+                code="E-RANGE",
+                key=name,
+                limit="an Eccentricity",
                 remedy=f"{name}=Eccentricity(5e-6)",
-            )  # fmt: skip
+            )
         amplitude = checked_numbers(given.amplitude, f"{name}.amplitude", code="E-RANGE", unit="m")
         phase = checked_numbers(given.phase, f"{name}.phase", code="E-RANGE", unit="rad")
         size = (self.data.n_planets,) if name == "planet" else ()
@@ -175,9 +180,11 @@ class TransmissionErrors:
             turned = np.array(np.nan)
         if not np.all(np.isfinite(turned)) or np.any(amplitude < 0.0):
             raise CaseError(
-                f"an eccentricity of {amplitude.tolist()} m at {phase.tolist()} rad", code="E-RANGE",
-                key=name, limit="0 m or more, finite, one value, for planets also one each",
-            )  # fmt: skip
+                f"an eccentricity of {amplitude.tolist()} m at {phase.tolist()} rad",
+                code="E-RANGE",
+                key=name,
+                limit="0 m or more, finite, one value, for planets also one each",
+            )
         return np.stack([turned, -1j * sense * turned], axis=-1)
 
 
@@ -200,9 +207,11 @@ def series_spectrum(series: FourierSeries | SummedSeries, frequency) -> tuple[np
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)):
         raise CaseError(
-            f"base frequencies of shape {frequency.shape}", code="E-RANGE", key="frequency",
+            f"base frequencies of shape {frequency.shape}",
+            code="E-RANGE",
+            key="frequency",
             limit="finite numbers, one a base",
-        )  # fmt: skip
+        )
     parts = series.parts if isinstance(series, SummedSeries) else (series,)
     rates, lines = [np.zeros(1)], [np.zeros((len(parts[0].amplitudes), 1), complex)]
     for part in parts:
@@ -251,9 +260,10 @@ def with_errors(
         or len(drive.columns) != 2 * errors.data.n_planets
     ):
         raise CaseError(
-            "errors need one element of all meshes with Fourier series", code="E-RANGE",
+            "errors need one element of all meshes with Fourier series",
+            code="E-RANGE",
             remedy="build the problem with gear_set_problem, without back flanks on their own lines",
-        )  # fmt: skip
+        )
     series = errors.series
     parts = known.parts if isinstance(known, SummedSeries) else (known,)
     elements = (replace(drive, deflection=SummedSeries((*parts, *series.parts))), *others)
@@ -265,9 +275,11 @@ def with_errors(
         rate = checked_numbers(mesh_frequency, "mesh_frequency", code="E-RANGE", unit="rad/s")
         if dampers.shape != (len(drive.columns),) or rate.ndim or not np.all(np.isfinite([*dampers, rate])):
             raise CaseError(
-                f"mesh dampers of shape {dampers.shape} at {rate.tolist()} rad/s", code="E-SHAPE",
-                key="dampers", limit=f"{len(drive.columns)} finite numbers and one mesh frequency",
-            )  # fmt: skip
+                f"mesh dampers of shape {dampers.shape} at {rate.tolist()} rad/s",
+                code="E-SHAPE",
+                key="dampers",
+                limit=f"{len(drive.columns)} finite numbers and one mesh frequency",
+            )
         pushes = problem.system.W[:, drive.columns[:, 0]] * dampers
         forces = (*forces, *_rates(pushes, series, errors.frequency(mesh_frequency)))
     return replace(problem, elements=elements, forces=forces)
@@ -318,9 +330,7 @@ def mesh_dampers(stiffness, mass_1, mass_2, ratio) -> np.ndarray:
         raise CaseError("a mesh between gears without mass", code="E-DAMPING", limit="masses above 0 kg")
     flexibility = 1.0 / m1 + 1.0 / m2
     if np.any(flexibility == 0.0):
-        raise CaseError(
-            "a mesh between two gears that are held", code="E-DAMPING", limit="one finite mass a mesh"
-        )
+        raise CaseError("a mesh between two gears that are held", code="E-DAMPING", limit="one finite mass a mesh")
     return 2.0 * xi * np.sqrt(k / flexibility)
 
 
@@ -349,9 +359,11 @@ def planar_mesh_dampers(data: PlanarSet, ratio) -> np.ndarray:
     """
     if _numbers("mesh_ratio", ratio).shape not in ((), (2 * data.n_planets,)):
         raise CaseError(
-            f"mesh damping ratios of shape {np.shape(ratio)}", code="E-DAMPING", key="mesh_ratio",
+            f"mesh damping ratios of shape {np.shape(ratio)}",
+            code="E-DAMPING",
+            key="mesh_ratio",
             limit=f"one, or {2 * data.n_planets}: one a mesh",
-        )  # fmt: skip
+        )
     turning = body_masses(data)[:, 2]
     held = {name: math.isinf(getattr(data, name).torsional_support) for name in CENTRAL}
     sun, ring = (math.inf if held[n] else turning[CENTRAL.index(n)] for n in ("sun", "ring"))
@@ -395,22 +407,25 @@ def _check_teeth(data: PlanarSet, teeth) -> None:
     """Refuse numbers that are no teeth, or not those of the base radii."""
     names = ("sun", "planet", "ring")
     values = [teeth.get(name) for name in names] if isinstance(teeth, dict) else [None]
-    numbers = [
-        z for z in values if isinstance(z, int | float | np.number) and float(z).is_integer() and z >= 1
-    ]
+    numbers = [z for z in values if isinstance(z, int | float | np.number) and float(z).is_integer() and z >= 1]
     if len(numbers) != 3:
         raise CaseError(
-            f"errors of gears with teeth {teeth}", code="E-RANGE", key="teeth",
+            f"errors of gears with teeth {teeth}",
+            code="E-RANGE",
+            key="teeth",
             limit="whole numbers of sun, planet and ring, 1 or more",
-        )  # fmt: skip
+        )
     for name, count, radius in zip(names[1:], numbers[1:], (data.planet_radius, data.ring_radius)):
         teeth_ratio, radii_ratio = count / numbers[0], radius / data.sun_radius
         if abs(radii_ratio / teeth_ratio - 1.0) > _RADII:
             raise CaseError(
-                f"{name} and sun have {teeth_ratio:.5g} as ratio of teeth and {radii_ratio:.5g} as ratio of "
-                "base radii", code="E-TEETH", key="teeth", value=tuple(numbers), limit="the same to 1 %",
+                f"{name} and sun have {teeth_ratio:.5g} as ratio of teeth and {radii_ratio:.5g} as ratio of base radii",
+                code="E-TEETH",
+                key="teeth",
+                value=tuple(numbers),
+                limit="the same to 1 %",
                 remedy="give the teeth of the set",
-            )  # fmt: skip
+            )
 
 
 def _rates(pushes, series: SummedSeries, frequency):

@@ -16,10 +16,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
-from femgear.system.mesh_directions import mesh_elements
-from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque
-from femgear.system.system import NonlinearSystem
-from femgear.trains.rigid import (
+from femgear.stages.lumped_set import (
     Bearings,
     Gravity,
     MemberBearing,
@@ -27,6 +24,9 @@ from femgear.trains.rigid import (
     phased_series,
     working_springs,
 )
+from femgear.system.mesh_directions import mesh_elements
+from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque
+from femgear.system.system import NonlinearSystem
 
 # printed data of the nonlinear examples: torques on the carrier [N m], speeds [rpm], play [m]
 TORQUE_A, SPEED_A, BEARING_A = 322_610.0, 22.2, 3.2e9
@@ -58,10 +58,16 @@ def wind_turbine_a(*, reduced_inertia: bool = True, pressure_angle: float = _ANG
         `bearing_problem_a`.
     """
     data = _set(
-        0.5 * np.array([0.2156, 0.4004, 1.0164]), 0.308, pressure_angle, (181.6, 2633.0, 759.9, 104.0),
-        (3.2, 144.2, 59.1, 3.2), supports=(100.0, 102e6, 5e9), torsional=(45.8e6, 57.4e6),
-        meshes=(16.9e9, 19.2e9), planet_bearing=6.8e9,
-    )  # fmt: skip
+        0.5 * np.array([0.2156, 0.4004, 1.0164]),
+        0.308,
+        pressure_angle,
+        (181.6, 2633.0, 759.9, 104.0),
+        (3.2, 144.2, 59.1, 3.2),
+        supports=(100.0, 102e6, 5e9),
+        torsional=(45.8e6, 57.4e6),
+        meshes=(16.9e9, 19.2e9),
+        planet_bearing=6.8e9,
+    )
     if reduced_inertia:
         return data
     inertias = {"sun": 3.2, "ring": 144.2, "carrier": 59.1, "planet": 3.2}
@@ -81,10 +87,16 @@ def wind_turbine_b(*, as_printed: bool = False) -> PlanarSet:
     supports = (100.0, 126e6, 4e9) if as_printed else (100.0, 4e9, 126e6)
     factor = 1.0 if as_printed else 4.0
     return _set(
-        0.5 * 14e-3 * np.array([16.0, 26.0, 68.0]), 0.294, _ANGLE, (51.0, 4000.0, 1330.0, 114.0),
-        (61.1, 2484.0, 314.7, 51.9), supports=supports, torsional=(factor * 3e6, factor * 24.4e6),
-        meshes=(3.95e9, 5.29e9), planet_bearing=5.3e9,
-    )  # fmt: skip
+        0.5 * 14e-3 * np.array([16.0, 26.0, 68.0]),
+        0.294,
+        _ANGLE,
+        (51.0, 4000.0, 1330.0, 114.0),
+        (61.1, 2484.0, 314.7, 51.9),
+        supports=supports,
+        torsional=(factor * 3e6, factor * 24.4e6),
+        meshes=(3.95e9, 5.29e9),
+        planet_bearing=5.3e9,
+    )
 
 
 def gravity_problem_b(
@@ -194,9 +206,7 @@ def drive_reduction(problem: NonlinearSystem) -> Reduction:
     return reduce_problem(problem, reference=working_springs(problem))
 
 
-def _set(
-    radii, distance, angle, masses, reduced, *, supports, torsional, meshes, planet_bearing
-) -> PlanarSet:
+def _set(radii, distance, angle, masses, reduced, *, supports, torsional, meshes, planet_bearing) -> PlanarSet:
     """Three equal planets; pitch radii [m] of sun, planet, ring; bodies sun, ring, carrier, planet."""
     if not 0.0 < angle < 0.5 * math.pi:
         raise CaseError(f"a pressure angle of {angle} rad", code="E-RANGE", limit="between 0 and pi/2")

@@ -253,13 +253,7 @@ def ratio_of_radii() -> float:
     """Generator over rotor speed by the printed radii, without sign."""
     p = PRINTED
     ring = p.sun_radius + 2.0 * p.planet_radius
-    return (
-        (1.0 + ring / p.sun_radius)
-        * p.gear_1_radius
-        / p.gear_2_radii[0]
-        * p.gear_2_radii[1]
-        / p.gear_3_radius
-    )
+    return (1.0 + ring / p.sun_radius) * p.gear_1_radius / p.gear_2_radii[0] * p.gear_2_radii[1] / p.gear_3_radius
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,12 @@ def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, 
         for wanted, (dash, note) in STABILITY.items():
             for number, part in enumerate(pieces(stable, wanted)):
                 ax.plot(
-                    hertz[part], 1e6 * size[part], color=colour, linestyle=dash,
+                    hertz[part],
+                    1e6 * size[part],
+                    color=colour,
+                    linestyle=dash,
                     label=None if number else text + (f", {note}" if wanted != 1 else ""),
-                )  # fmt: skip
+                )
     for marker, (text, hertz, size) in zip("^vso", sweeps):
         ax.plot(hertz, 1e6 * size, marker, color=BLACK, markersize=4.5, fillstyle="none", label=text)
     ax.set_ylim(bottom=0.0)
@@ -88,16 +91,27 @@ def contact_map(frequency, clearance, panels: Sequence[tuple], *, line: tuple | 
             title += f": {high:.3g} everywhere"
             low, high = 0.0, 1.0
         image = ax.pcolormesh(
-            frequency, 1e6 * np.asarray(clearance), np.ma.masked_invalid(share.T), vmin=low, vmax=high,
-            cmap=colours, shading="nearest",
-        )  # fmt: skip
+            frequency,
+            1e6 * np.asarray(clearance),
+            np.ma.masked_invalid(share.T),
+            vmin=low,
+            vmax=high,
+            cmap=colours,
+            shading="nearest",
+        )
         if line is not None:
             ax.axhline(1e6 * line[1], color="white", linestyle="--", label=line[0])
             ax.annotate(
-                line[0], (0.98, 1e6 * line[1]), xycoords=("axes fraction", "data"), xytext=(0, 3),
-                textcoords="offset points", ha="right", color="white", fontsize=9,
+                line[0],
+                (0.98, 1e6 * line[1]),
+                xycoords=("axes fraction", "data"),
+                xytext=(0, 3),
+                textcoords="offset points",
+                ha="right",
+                color="white",
+                fontsize=9,
                 bbox={"boxstyle": "round,pad=0.15", "facecolor": "0.25", "edgecolor": "none", "alpha": 0.7},
-            )  # fmt: skip
+            )
         label(ax, "frequency of the weight [Hz]", title=title)
         figure.colorbar(image, ax=ax).set_label("share of the cycle in contact [1]")
     label(axes[0], y="clearance of the carrier bearing [µm]")

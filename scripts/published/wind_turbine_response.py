@@ -62,9 +62,14 @@ def weight_branch(
     max_points : int
     """
     return weight_curve(
-        problem, limits, reduction=drive_reduction(problem), harmonics=harmonics, stability=stability,
-        largest=largest, max_points=max_points,
-    )  # fmt: skip
+        problem,
+        limits,
+        reduction=drive_reduction(problem),
+        harmonics=harmonics,
+        stability=stability,
+        largest=largest,
+        max_points=max_points,
+    )
 
 
 def member_lines(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], member: str) -> np.ndarray:
@@ -153,9 +158,14 @@ def wedging_map(
         for j, play in enumerate(clearance):
             problem = bearing_problem_a(play, backlash=backlash, smoothing=smoothing)
             found = solve_harmonic_balance(
-                problem, 2.0 * np.pi * hertz, harmonics=harmonics, samples=512, start=start,
-                reduction=drive_reduction(problem), stability=False,
-            )  # fmt: skip
+                problem,
+                2.0 * np.pi * hertz,
+                harmonics=harmonics,
+                samples=512,
+                start=start,
+                reduction=drive_reduction(problem),
+                stability=False,
+            )
             start = found if found.converged else None
             if found.converged:
                 states[i, j] = contact_shares(problem, found)[:12].reshape(2, 6)

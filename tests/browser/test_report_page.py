@@ -74,9 +74,7 @@ def opened(chromium, report):
     contexts, messages = [], []
 
     def show(name: str, width: int = 1400, scheme: str = "light"):
-        context = chromium.new_context(
-            viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True
-        )
+        context = chromium.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True)
         contexts.append(context)
         tab = context.new_page()
         tab.set_default_timeout(120_000)

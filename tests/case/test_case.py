@@ -101,9 +101,7 @@ def test_the_case_cannot_be_changed():
     ],
 )
 def test_spellings_of_a_torque(text, value):
-    assert with_value(read_case(CASE), "operation.torque", text).operation.torque == pytest.approx(
-        value, rel=1e-14
-    )
+    assert with_value(read_case(CASE), "operation.torque", text).operation.torque == pytest.approx(value, rel=1e-14)
 
 
 @pytest.mark.parametrize("text", ["1e-4 kg m^2", "1e-4 kg*m**2", "1e-4 kg m²", "100 kg mm^2", "1 kg cm^2"])
@@ -113,9 +111,7 @@ def test_spellings_of_an_inertia(text):
 
 def test_speeds_as_a_range_and_in_other_units():
     case = with_value(read_case(CASE), "operation.speeds", {"from": "100 rpm", "to": "300 rpm", "count": 5})
-    assert case.operation.speeds == pytest.approx(
-        [n * math.pi / 30 for n in (100, 150, 200, 250, 300)], rel=1e-14
-    )
+    assert case.operation.speeds == pytest.approx([n * math.pi / 30 for n in (100, 150, 200, 250, 300)], rel=1e-14)
     case = with_value(case, "operation.speeds", ["10 rad/s", "2 turn/s"])
     assert case.operation.speeds == pytest.approx([10, 4 * math.pi], rel=1e-14)
 
@@ -133,9 +129,7 @@ def test_byte_order_mark(tmp_path):  # bad input 2
 
 
 def test_a_changed_case_can_be_written_and_read_again():
-    case = with_value(
-        with_value(read_case(CASE), "operation.torque", "50 N m"), "sun.rack", {"addendum": 0.9}
-    )
+    case = with_value(with_value(read_case(CASE), "operation.torque", "50 N m"), "sun.rack", {"addendum": 0.9})
     assert case.operation.torque == 50 and case.sun.rack.addendum == 0.9
     assert read_case(CASE).operation.torque == 100
     assert parse_case(to_toml(case)) == case
@@ -254,9 +248,7 @@ def test_numbers_that_are_not_finite(literal, tmp_path):
     assert error.code == "E-FINITE" and error.key == "material.poisson_ratio"
 
 
-@pytest.mark.parametrize(
-    "literal", ["nan N m", "inf N m", "1e999 N m", "-1e400 kN m"]
-)  # bad input 10, 11, 23
+@pytest.mark.parametrize("literal", ["nan N m", "inf N m", "1e999 N m", "-1e400 kN m"])  # bad input 10, 11, 23
 def test_torques_that_are_not_finite(literal):  # bad input 10, 11, 23
     error = changed("operation.torque", literal)
     assert error.code in ("E-FINITE", "E-UNIT") and error.key == "operation.torque"
@@ -494,9 +486,7 @@ def test_a_date_is_named_as_such(tmp_path):  # bad input 9
 
 
 def test_several_problems_come_in_one_error(tmp_path):
-    text = replaced(
-        '"20 deg"', '"20 rad"', replaced('"100 N m"', "100", replaced("teeth = 40", "teeth = 4.5"))
-    )
+    text = replaced('"20 deg"', '"20 rad"', replaced('"100 N m"', "100", replaced("teeth = 40", "teeth = 4.5")))
     error = refused(text, tmp_path)
     assert [problem.key for problem in error.problems] == [
         "sun.pressure_angle",
@@ -521,14 +511,10 @@ def test_an_angle_beyond_a_turn_is_not_taken_for_radians():
 
 
 def test_numbers_that_are_not_finite_are_shown_with_their_lines(tmp_path):
-    text = replaced("damping_ratio = 0.05", "damping_ratio = 1e999").replace(
-        "tolerance = 1e-6", "tolerance = nan"
-    )
+    text = replaced("damping_ratio = 0.05", "damping_ratio = 1e999").replace("tolerance = 1e-6", "tolerance = nan")
     error = refused(text, tmp_path)
     lines = text.splitlines()
-    first, second = (
-        1 + next(i for i, t in enumerate(lines) if t.startswith(k)) for k in ("damping", "tolerance")
-    )
+    first, second = (1 + next(i for i, t in enumerate(lines) if t.startswith(k)) for k in ("damping", "tolerance"))
     assert error.code == "E-FINITE" and error.value == math.inf
     assert error.file.endswith(f":{first}") and f"dynamics.tolerance (line {second})" in str(error)
 

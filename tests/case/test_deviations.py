@@ -10,8 +10,8 @@ from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.gears.deviations import Ovality, Runout, body_separation, common_period
 from femgear.gears.modifications import ProfileCrowning, ProfileSlope, RootRelief, TipRelief, form_deviation
+from femgear.stages.static_results import set_warnings
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
-from femgear.trains.static.results import set_warnings
 
 CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -173,8 +173,7 @@ HEAD = '\n[[sun.modifications]]\nkind = "tip relief"\namount = "12 um"\n'
         ),
         (RELIEF.replace("tip relief", "measured profile"), "E-MODIFICATION", "sun.modifications[0]"),
         (
-            '\n[[sun.modifications]]\nkind = "measured profile"\ndiameters = ["4 cm", "5 cm"]\n'
-            'deviations = ["1 um"]\n',
+            '\n[[sun.modifications]]\nkind = "measured profile"\ndiameters = ["4 cm", "5 cm"]\ndeviations = ["1 um"]\n',
             "E-COUNT",
             "sun.modifications[0]",
         ),
@@ -218,7 +217,7 @@ HEAD = '\n[[sun.modifications]]\nkind = "tip relief"\namount = "12 um"\n'
             "ring.errors.ovality.inextensional",
         ),
     ],
-)  # fmt: skip
+)
 def test_refusals(extra, code, key):
     if not code:  # what rounding leaves is spread
         assert set_deviations(case_of(extra)).sun_pitch[0] == 0.0

@@ -172,9 +172,7 @@ def test_cases_are_read_from_paths_texts_and_tables(case):
     assert caught.value.key == "sun.teeth"
 
 
-@pytest.mark.parametrize(
-    ("source", "code"), [(3, "E-TYPE"), (None, "E-TYPE"), ({1: 2}, "E-TYPE"), ("x", "E-FILE")]
-)
+@pytest.mark.parametrize(("source", "code"), [(3, "E-TYPE"), (None, "E-TYPE"), ({1: 2}, "E-TYPE"), ("x", "E-FILE")])
 def test_other_things_are_no_cases(source, code):
     with pytest.raises(CaseError, match=code):
         read_case(source)

@@ -8,8 +8,8 @@ from femgear.case.checks import check_floating
 from femgear.case.gear_set import planetary_set
 from femgear.cli import main
 from femgear.errors import GeometryError
+from femgear.stages.static import solve_static
 from femgear.trains.reading import parse_case, with_value
-from femgear.trains.static.stages import solve_static
 
 TEXT = (Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
 ELASTIC = TEXT.replace("[static]", '[static]\nmembers = "elastic"')
@@ -36,7 +36,7 @@ def test_a_member_that_the_planets_cannot_hold(member, change, planets, monkeypa
     def no_mesh(*_, **__):
         raise AssertionError("meshed before it was refused")
 
-    monkeypatch.setattr("femgear.trains.static.stages.make_sectors", no_mesh)
+    monkeypatch.setattr("femgear.stages.static.make_sectors", no_mesh)
     text = edited(change, planets)
     case = parse_case(text, name="case.toml")
     for refuses in (planetary_set, solve_static):

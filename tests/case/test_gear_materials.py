@@ -18,10 +18,10 @@ from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.sections import face_width, gear_material
 from femgear.errors import CaseError
 from femgear.gears.deviations import lead_separation
+from femgear.stages.static import nominal_stresses
+from femgear.stages.static_results import describe_set, width_warnings
 from femgear.trains.elastic.results import _safeties
 from femgear.trains.reading import read_case, with_value, with_values
-from femgear.trains.static.results import describe_set, width_warnings
-from femgear.trains.static.stages import nominal_stresses
 
 CASES = Path(__file__).parents[2] / "cases"
 
@@ -37,9 +37,7 @@ def pair():
 
 
 def test_a_gear_has_what_it_gives_and_else_what_all_have(case):
-    other = with_values(
-        case, {"ring.material.youngs_modulus": "110 GPa", "material.root_stress_limit": "461 MPa"}
-    )
+    other = with_values(case, {"ring.material.youngs_modulus": "110 GPa", "material.root_stress_limit": "461 MPa"})
     assert [one.youngs_modulus for one in materials_of(other)] == [206e9, 206e9, 110e9]
     ring = gear_material(other, "ring")
     assert (ring.poisson_ratio, ring.root_stress_limit) == (0.3, 461e6)
@@ -90,9 +88,12 @@ def test_steps_notice_what_they_depend_on(case, key, value, changes):
 def test_estimates_follow_density_modulus_and_width(case):
     other = with_values(
         case,
-        {"planet.material.density": "3925 kg/m^3", "ring.material.youngs_modulus": "103 GPa",
-         "sun.face_width": "50 mm"},
-    )  # fmt: skip
+        {
+            "planet.material.density": "3925 kg/m^3",
+            "ring.material.youngs_modulus": "103 GPa",
+            "sun.face_width": "50 mm",
+        },
+    )
     one, two = estimates(case), estimates(other)
     ratio = {key: two[key].value / one[key].value for key in one}
     assert ratio["planet.mass"] == pytest.approx(0.5) and ratio["sun.inertia"] == pytest.approx(2.0)
@@ -136,8 +137,10 @@ def test_check_shows_materials_and_widths_where_they_differ(case):
     other = with_values(case, {"ring.material.youngs_modulus": "110 GPa", "planet.face_width": "27 mm"})
     (block,) = [block for block in describe_set(other) if block.title == "Materials"]
     assert [row[:3] for row in block.rows] == [
-        ("sun", "25", "206"), ("planet", "27", "206"), ("ring", "25", "110"),
-    ]  # fmt: skip
+        ("sun", "25", "206"),
+        ("planet", "27", "206"),
+        ("ring", "25", "110"),
+    ]
 
 
 def test_gears_wider_than_their_mates_are_said(case):

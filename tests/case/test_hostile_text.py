@@ -107,10 +107,7 @@ def test_the_first_of_many_mistakes_are_shown_with_their_number():
     assert f": 999 problems, the first {MOST_SHOWN} of them\n" in str(error) and len(error.problems) == 999
     error = refused(SET + many(500, "[[set.pin_errors]]\nplanet = 'x'\nradial = 1"))
     assert f": 1000 problems, the first {MOST_SHOWN} of them\n" in str(error)
-    assert (
-        "set.pin_errors[0].planet" in str(error)
-        and error.problems[0].file == f"case.toml:{SET.count(chr(10)) + 2}"
-    )
+    assert "set.pin_errors[0].planet" in str(error) and error.problems[0].file == f"case.toml:{SET.count(chr(10)) + 2}"
     error = refused("k = [" + "nan, " * 20 + "]")
     assert "nor is k[9] (line 1), nor are 10 others" in str(error)
 

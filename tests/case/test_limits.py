@@ -19,9 +19,7 @@ def refused(text, code):
     return caught.value.limit
 
 
-@pytest.mark.parametrize(
-    "line", ["[[a]]\n", "[k{i}]\n", "k{i} = 1\n"], ids=["list of tables", "tables", "numbers"]
-)
+@pytest.mark.parametrize("line", ["[[a]]\n", "[k{i}]\n", "k{i} = 1\n"], ids=["list of tables", "tables", "numbers"])
 def test_entries_of_a_table_or_list_of_tables(line):
     lines = [line.format(i=i) for i in range(1001)]
     read = parse("".join(lines[:1000]), "")

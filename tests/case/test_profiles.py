@@ -11,8 +11,8 @@ from femgear.case.csv_columns import read_profile
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.modifications import MeasuredLead, MeasuredProfile
+from femgear.stages.static_results import set_warnings
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
-from femgear.trains.static.results import set_warnings
 
 TEXT = (Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
 UM = 1e-6
@@ -104,7 +104,7 @@ def test_the_points_are_kept_with_the_case(folder, tmp_path):
         (b"roll angle [deg], deviation [\xb5m]\n15, 1\n20, 1\n", "not UTF-8", None),
         ("x" * 1_000_001, "too long", None),
     ],
-)  # fmt: skip
+)
 def test_bad_profiles_name_file_and_line(folder, csv, text, line):
     with pytest.raises(CaseError, match=text) as info:
         read_case(folder(csv))
@@ -266,7 +266,4 @@ def test_files_that_cannot_be_read_hide_no_other_mistake(folder):
         ("E-CHOICE", "operation.fixed"),
     ]
     text = str(caught.value)
-    assert (
-        "one.csv: sun.mod" in text
-        and f"{path}:{wrong[: wrong.index('../x.csv')].count(chr(10)) + 1}: " in text
-    )
+    assert "one.csv: sun.mod" in text and f"{path}:{wrong[: wrong.index('../x.csv')].count(chr(10)) + 1}: " in text

@@ -7,8 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 from random_sets import random_set
-from validation.planetary import reference_set
-from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
 from femgear.case.gear_set import material_of, planetary_set
 from femgear.contact import batch, cycle
@@ -23,6 +21,8 @@ from femgear.contact.width_waves import width_waves
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import FlankForm, Runout, no_deviations
 from femgear.gears.modifications import FlankTwist, LeadCrowning, LeadSlope, ProfileSlope
+from validation.planetary import reference_set
+from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
 STEEL = Material(206e9, 0.3, 7850.0)
 SPRUNG = Supports(sun=5e7, carrier=2e8, planet=3e8)
@@ -120,9 +120,7 @@ def test_light_torque_under_which_planets_open(seed):
     compare(results)
 
 
-@pytest.mark.parametrize(
-    "supports", [Supports(), Supports(sun=0.0), LOOSE], ids=["fixed", "floating", "loose"]
-)
+@pytest.mark.parametrize("supports", [Supports(), Supports(sun=0.0), LOOSE], ids=["fixed", "floating", "loose"])
 def test_supports(supports):
     gears = reference_set()
     bodies = make_bodies(make_sectors(gears, STEEL, flank_elements=8), STEEL)
@@ -134,9 +132,7 @@ def test_planet_with_clearance_that_loses_all_load(monkeypatch):
     # its motions are restrained by nothing: most positions need no other route all the same
     alone = []
     one = batch.solve_contact
-    monkeypatch.setattr(
-        batch, "solve_contact", lambda *arrays, **start: alone.append(1) or one(*arrays, **start)
-    )
+    monkeypatch.setattr(batch, "solve_contact", lambda *arrays, **start: alone.append(1) or one(*arrays, **start))
     gears = reference_set()
     bodies = make_bodies(make_sectors(gears, STEEL, flank_elements=8), STEEL)
     results = list(both_ways(gears, bodies, 1.0, supports=LOOSE, pins=60.0))
@@ -188,9 +184,7 @@ def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
 
     monkeypatch.setattr(batch, "_MOST_STEPS", 2)
     monkeypatch.setattr(batch, "solve_contact", counting)
-    monkeypatch.setitem(
-        globals(), "solve_batch", lambda *given: states.append(together(*given)) or states[-1]
-    )
+    monkeypatch.setitem(globals(), "solve_batch", lambda *given: states.append(together(*given)) or states[-1])
     compare(both_ways(gears, bodies, torque, supports=SPRUNG, pins=0.3))
     steps = states[0].iterations
     # the others: two steps and one that takes out the rounding
@@ -245,22 +239,21 @@ def test_planets_in_the_same_state_are_solved_as_one(seed, images, supports, mon
     )
     for sign, errors in ((1.0, None), (-1.0, same)):
         kept = CycleOptions(held_bodies=bodies, pressures=True)
-        given = dict(
-            sun_torque=sign * torque, positions=6, deviations=errors, supports=supports, options=kept
-        )
+        given = dict(sun_torque=sign * torque, positions=6, deviations=errors, supports=supports, options=kept)
         check_equal(*both_routes(gears, images, monkeypatch, bodies, **given), 1e-11)
 
 
 @pytest.mark.parametrize(
     "seed, images, supports, overlap",
     [
-        (3, 3, SPRUNG, None), (6, 4, Supports(sun=0.0), None), (7, 2, SPRUNG, None),
-        (3, 3, Supports(sun=0.0), 0.7), (7, 2, SPRUNG, 1.2),
+        (3, 3, SPRUNG, None),
+        (6, 4, Supports(sun=0.0), None),
+        (7, 2, SPRUNG, None),
+        (3, 3, Supports(sun=0.0), 0.7),
+        (7, 2, SPRUNG, 1.2),
     ],
-)  # fmt: skip
-def test_planets_in_the_same_state_are_solved_as_one_over_the_width(
-    seed, images, supports, overlap, monkeypatch
-):
+)
+def test_planets_in_the_same_state_are_solved_as_one_over_the_width(seed, images, supports, overlap, monkeypatch):
     """With leads, errors that all planets have alike, tangents of other bodies; spur and helical teeth."""
     (gears, bodies, torque), slices = random_bodies(seed), 7
     N, width, material = gears.n_planets, bodies.widths[0], material_of(random_set(seed).case, "sun")
@@ -286,9 +279,7 @@ def test_planets_in_the_same_state_are_solved_as_one_over_the_width(
             held_waves=softer_waves,
             pressures=True,
         )
-        given = dict(
-            sun_torque=sign * torque, positions=4, deviations=errors, supports=supports, options=kept
-        )
+        given = dict(sun_torque=sign * torque, positions=4, deviations=errors, supports=supports, options=kept)
         one, every = both_routes(gears, images, monkeypatch, bodies, **given)
         check_equal(one, every, 1e-9)
         assert one.held_compliance is not None and one.mesh_misalignment.any() and one.lead_offset.any()
@@ -330,9 +321,7 @@ def test_first_cells_and_springs_are_those_that_equal_forces_would_press():
     # equal forces on all drive flanks push along both motions alike, over their arms
     found.approach = np.array([[-4.0, 0.0], [1.0, 0.0], [1.0, -1.0], [0.0, 0.5], *np.full((4, 2), 5.0)])
     arms = np.array([[1.0, 0.0], [0.7, 0.7], [0.9, 0.4], [0.0, 1.0], [-1.0, 0.0]])
-    sets: Any = SimpleNamespace(
-        found=found, given=np.array([0.0, 4000.0]), arms=arms, arm=np.array([4.0, 1.0])
-    )
+    sets: Any = SimpleNamespace(found=found, given=np.array([0.0, 4000.0]), arms=arms, arm=np.array([4.0, 1.0]))
     active, springs = batch._ActiveSets._first(sets)
     assert springs.tolist() == [[False, True, True, False, False]]
     # where a pair is too far away the other one carries alone; back flanks carry nothing

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
@@ -13,6 +12,7 @@ from femgear.contact.supports import SPRINGS, Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
 from femgear.gears.kinematics import mesh_normals
+from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planetary import reference_set
 
 from femgear.contact.assembly import contact_candidates, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
@@ -15,6 +14,7 @@ from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import orientations
+from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
@@ -79,9 +79,7 @@ def test_teeth_stand_where_their_flanks_touch(gears, direction, angles):
         turn = direction if kind == 0 else -direction
         towards_1 = psi
         towards_2 = psi + np.pi if kind == 0 else psi
-        centre_1 = towards_1 + turn * (
-            place_1 - half_thickness_angle(first, np.hypot(pair.base_radius_1, roll_1))
-        )
+        centre_1 = towards_1 + turn * (place_1 - half_thickness_angle(first, np.hypot(pair.base_radius_1, roll_1)))
         flank_2 = half_thickness_angle(second, np.hypot(pair.base_radius_2, roll_2))
         # external gear 2 carries on the flank of the same hand; a ring's flank faces the planet
         centre_2 = towards_2 + turn * (place_2 - flank_2 if kind == 0 else place_2 + flank_2)
@@ -105,9 +103,7 @@ def test_every_mesh_carries_on_its_own_flank_of_each_gear(gears, bodies):
 
     def flanks_only(body, unit):
         n = len(body.roll)
-        return replace(
-            body, regular=unit * np.kron([[1.0, 2.0], [2.0, 4.0]], np.ones((len(body.regular), n, n)))
-        )
+        return replace(body, regular=unit * np.kron([[1.0, 2.0], [2.0, 4.0]], np.ones((len(body.regular), n, n))))
 
     names = ("sun", "planet", "ring")
     told = replace(bodies, **{n: flanks_only(getattr(bodies, n), 10.0**k) for k, n in enumerate(names)})
@@ -161,8 +157,6 @@ def test_a_planet_further_ahead_than_the_backlash_works_against_the_others(gears
 
 
 def test_floating_sun_rests_on_both_flanks_where_it_must(gears, bodies):
-    cycle = walk_mesh_cycle(
-        gears, bodies, sun_torque=TORQUE, positions=4, options=BOTH, supports=Supports(sun=0.0)
-    )
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=4, options=BOTH, supports=Supports(sun=0.0))
     assert cycle.load_share == pytest.approx(1 / 3, abs=1e-9)
     assert not cycle.wedged.any()

@@ -4,7 +4,6 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
 from femgear.contact import cycle as cycle_module
 from femgear.contact.assembly import assemble_contact, mesh_windows
@@ -16,6 +15,7 @@ from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
+from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
 STEEL = Material(206e9, 0.3, 7850.0)
 ALPHA = np.deg2rad(20)
@@ -141,9 +141,7 @@ def test_other_flanks_are_the_mirror_image(gears, bodies, cycle):
 
 def test_gap_stays_with_its_planet_on_the_other_flanks(gears, bodies):
     gaps = [0.0, 3e-6, 0.0]
-    back = walk_mesh_cycle(
-        gears, bodies, sun_torque=-TORQUE, positions=8, options=CycleOptions(planet_gaps=gaps)
-    )
+    back = walk_mesh_cycle(gears, bodies, sun_torque=-TORQUE, positions=8, options=CycleOptions(planet_gaps=gaps))
     assert (back.load_share[1] < 0.3).all() and (back.load_share[[0, 2]] > 0.35).all()
 
 
@@ -240,10 +238,12 @@ def five():
     """Five planets out of phase, and their bodies."""
     common = dict(module=2e-3, pressure_angle=ALPHA, face_width=0.024, profile_shift=0.0)
     gears = PlanetarySet(
-        Gear(teeth=36, rim_radius=0.018, **common), Gear(teeth=24, rim_radius=0.012, **common),
+        Gear(teeth=36, rim_radius=0.018, **common),
+        Gear(teeth=24, rim_radius=0.012, **common),
         Gear(teeth=84, rim_radius=0.1, internal=True, **common),
-        centre_distance=0.06, planet_angles=equal_planet_angles(5),
-    )  # fmt: skip
+        centre_distance=0.06,
+        planet_angles=equal_planet_angles(5),
+    )
     return gears, make_bodies(make_sectors(gears, STEEL, flank_elements=6), STEEL)
 
 
@@ -271,9 +271,7 @@ def test_planets_that_come_to_the_same_states_are_solved_once(five, torque, monk
 
 def test_peaks_between_positions_are_those_of_every_planet(five):
     gears, bodies = five
-    peaks = walk_mesh_cycle(
-        gears, bodies, sun_torque=TORQUE, positions=20, options=CycleOptions(peaks=True, cells=20)
-    )
+    peaks = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=20, options=CycleOptions(peaks=True, cells=20))
     fine = walk_mesh_cycle(
         gears, bodies, sun_torque=TORQUE, positions=np.arange(400) / 400, options=CycleOptions(cells=20)
     )

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
@@ -13,6 +12,7 @@ from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import Runout, common_period, no_deviations
 from femgear.gears.modifications import FlankForm, TipRelief
+from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
@@ -65,9 +65,7 @@ def test_rigid_gears_follow_their_relief(gears):
 def test_relief_made_for_a_torque_quietens_the_mesh_there(gears, bodies):
     """Harris map: peak-to-peak under 25 % of the unmodified mesh at the design torque, least there."""
     torques = (50.0, 100.0, 200.0)
-    plain = [
-        np.ptp(walk_mesh_cycle(gears, bodies, sun_torque=t, positions=32).deflection[0]) for t in torques
-    ]
+    plain = [np.ptp(walk_mesh_cycle(gears, bodies, sun_torque=t, positions=32).deflection[0]) for t in torques]
     made = relieved(gears, 3.9e-6, length=0.9)
     quiet = [
         np.ptp(walk_mesh_cycle(gears, bodies, sun_torque=t, positions=32, deviations=made).deflection[0])

@@ -5,11 +5,11 @@ import math
 import numpy as np
 import pytest
 from trains.pair.test_pair import pair_case
-from validation.reference.hertz import cell_influence
 
 from femgear.case.gear_set import planetary_set
 from femgear.contact import face_width
-from femgear.trains.static.stages import record_positions, solve_static
+from femgear.stages.static import record_positions, solve_static
+from validation.reference.hertz import cell_influence
 
 # the tip diameters of the case are those of spur teeth: helical ones are left to the rack
 OWN_TIPS = {"gear_1.tip_diameter": None, "gear_2.tip_diameter": None}
@@ -46,9 +46,7 @@ def kinked_peaks(load, radius, away, slope, modulus, cell):
         forces = np.array([-1.0])
         while forces.min() < 0.0:
             n = len(pressed)
-            system = np.block(
-                [[compliance[np.ix_(pressed, pressed)], -np.ones((n, 1))], [np.ones(n), np.zeros(1)]]
-            )
+            system = np.block([[compliance[np.ix_(pressed, pressed)], -np.ones((n, 1))], [np.ones(n), np.zeros(1)]])
             forces = np.linalg.solve(system, np.append(-gap[pressed], load))[:-1]
             found, pressed = pressed, pressed[forces >= 0.0]
         assert found[0] > 0 and found[-1] < len(x) - 1

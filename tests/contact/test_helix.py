@@ -37,9 +37,12 @@ def walk(gears, bodies, waves, overlap, *lead, **options):
     options = {"sun_torque": TORQUE, "positions": 24} | options
     ahead = None if overlap is None else overlap * HEIGHT
     return walk_mesh_cycle(
-        gears, bodies, deviations=replace(no_deviations(gears), sun=FlankForm(lead)),
-        options=CycleOptions(waves=waves, slices=SLICES, ahead=ahead), **options,
-    )  # fmt: skip
+        gears,
+        bodies,
+        deviations=replace(no_deviations(gears), sun=FlankForm(lead)),
+        options=CycleOptions(waves=waves, slices=SLICES, ahead=ahead),
+        **options,
+    )
 
 
 @pytest.fixture(scope="module")
@@ -67,13 +70,13 @@ def test_meshes_that_only_an_end_of_the_width_loads_are_coupled(gears, bodies, w
     options["deviations"] = replace(errors, sun=FlankForm((LeadSlope(8e-6), LeadCrowning(3e-6))))
     spur, found = (
         walk_mesh_cycle(
-            gears, bodies, **options,
-            options=CycleOptions(
-                waves=waves, slices=SLICES, ahead=ahead, held_bodies=bodies, held_waves=waves
-            ),
+            gears,
+            bodies,
+            **options,
+            options=CycleOptions(waves=waves, slices=SLICES, ahead=ahead, held_bodies=bodies, held_waves=waves),
         ).held_compliance
         for ahead in (None, np.zeros(SLICES))
-    )  # fmt: skip
+    )
     assert np.abs(spur).min() > 0.0
     assert np.abs(found - spur).max() < 5e-3 * np.abs(spur).max()
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from validation.planetary import reference_set
 
 from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
@@ -16,6 +15,7 @@ from femgear.contact.supports import Supports, bearing_springs, moving_members
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import mirrored_deviations, no_deviations
 from femgear.gears.planetary import mirrored_set
+from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
@@ -122,9 +122,7 @@ def test_modulus_and_torque_scale_together(gears, bodies, values, factor):
 @given(pins, supports, st.floats(1.05, 3.0))
 def test_more_torque_turns_the_sun_further_and_stiffens_the_path(gears, bodies, values, held, factor):
     """Contact only stiffens: the sun turns further, but by less for each further newton metre."""
-    turns = [
-        walk(gears, bodies, values, held, torque=t * TORQUE).sun_arc for t in (1.0, factor, 2 * factor - 1)
-    ]
+    turns = [walk(gears, bodies, values, held, torque=t * TORQUE).sun_arc for t in (1.0, factor, 2 * factor - 1)]
     assert np.all(turns[1] > turns[0])
     assert np.all(turns[2] - turns[1] <= (turns[1] - turns[0]) * (1 + 1e-6))
 

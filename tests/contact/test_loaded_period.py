@@ -68,9 +68,7 @@ def test_record_is_the_walk_at_its_positions(solved, bodies):
     """Positions all over the period, of which only the first part was solved."""
     gears, found = solved
     some = np.arange(len(found.position))[3::17]
-    walk = walk_mesh_cycle(
-        gears, bodies, sun_torque=TORQUE, positions=found.position[some], supports=SUPPORTS
-    )
+    walk = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=found.position[some], supports=SUPPORTS)
     for name in ("force", "deflection", "stiffness"):
         assert np.array_equal(found.held_stiffness, found.stiffness)
         expected = getattr(walk, name)
@@ -123,9 +121,7 @@ def test_coupling_through_the_sun_is_what_a_changed_load_shows(bodies):
     """Diagonal and rest of the compliance against central differences of the loaded state."""
     gears = small_set(equal_planet_angles(4))
     options = dict(positions=np.array([0.1]), options=CycleOptions(held_bodies=bodies))
-    found, less, more = (
-        walk_mesh_cycle(gears, bodies, sun_torque=TORQUE * f, **options) for f in (1.0, 0.98, 1.02)
-    )
+    found, less, more = (walk_mesh_cycle(gears, bodies, sun_torque=TORQUE * f, **options) for f in (1.0, 0.98, 1.02))
     change = (more.deflection - less.deflection)[:, 0]
     force = (more.force - less.force)[:, 0]
     predicted = found.held_compliance[..., 0] @ force
@@ -144,8 +140,7 @@ def test_positions_meet_equal_planets_alike():
         ((28, 41, 110), 3, 64, 66),
     ):
         sun, planet, ring = (
-            Gear(teeth=z, rim_radius=0.3 if i == 2 else 0.005, internal=i == 2, **common)
-            for i, z in enumerate(teeth)
+            Gear(teeth=z, rim_radius=0.3 if i == 2 else 0.005, internal=i == 2, **common) for i, z in enumerate(teeth)
         )
         gears = PlanetarySet(sun, planet, ring, 1e-3 * (teeth[0] + teeth[1]), equal_planet_angles(N))
         assert gears.equal_positions(wanted) == expected
@@ -217,9 +212,7 @@ MOUNTED = _mounted()
         (-TORQUE, 4, {"planet_ring_side_pitch": MOUNTED}, 19, 4),
     ],
 )
-def test_planets_repeat_one_another_where_errors_turn(
-    bodies, coarse, torque, angles, changes, periods, parts
-):
+def test_planets_repeat_one_another_where_errors_turn(bodies, coarse, torque, angles, changes, periods, parts):
     """Of the record one part is solved: all of it is what a walk finds at its positions."""
     gears = small_set(equal_planet_angles(4) if angles == 4 else angles)
     d = replace(no_deviations(gears), **changes)

@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 from scipy.linalg import toeplitz
+
+from femgear.contact.assembly import _window_compliance
+from femgear.contact.local_compliance import depth_displacement, surface_displacement
 from validation.reference.hertz import (
     cell_influence,
     contact_modulus,
@@ -13,9 +16,6 @@ from validation.reference.hertz import (
     surface_relative_to_depth,
     weber_banaschek,
 )
-
-from femgear.contact.assembly import _window_compliance
-from femgear.contact.local_compliance import depth_displacement, surface_displacement
 
 E, NU = 206e9, 0.3
 MU = E / (2 * (1 + NU))
@@ -113,10 +113,7 @@ def test_semi_elliptic_pressure_gives_weber_and_banaschek(nu):
 
 def test_the_sum_of_local_and_deep_part_does_not_depend_on_the_depth():
     x, h = np.linspace(-2e-4, 2e-4, 9), 1e-7
-    sums = [
-        surface_relative_to_depth(x, h, d, MU, NU) + depth_displacement(x, d, MU, NU)
-        for d in (1e-4, 4e-4, 2e-3)
-    ]
+    sums = [surface_relative_to_depth(x, h, d, MU, NU) + depth_displacement(x, d, MU, NU) for d in (1e-4, 4e-4, 2e-3)]
     np.testing.assert_allclose(sums[1], sums[0], rtol=1e-6)
     np.testing.assert_allclose(sums[2], sums[0], rtol=1e-6)
 

@@ -21,11 +21,16 @@ WIDTH, TORQUE = 0.02, 100.0
 def pair_of(*widths: float, teeth: tuple[int, int] = (24, 24)) -> GearPair:
     gears = (
         Gear(
-            teeth=z, module=3e-3, pressure_angle=math.radians(20.0), profile_shift=0.0,
-            face_width=width, rim_radius=r, name=f"gear_{i}",
+            teeth=z,
+            module=3e-3,
+            pressure_angle=math.radians(20.0),
+            profile_shift=0.0,
+            face_width=width,
+            rim_radius=r,
+            name=f"gear_{i}",
         )
         for i, (z, width, r) in enumerate(zip(teeth, widths, (0.018, 0.018)), start=1)
-    )  # fmt: skip
+    )
     return close_pair(*gears)
 
 
@@ -90,9 +95,7 @@ def test_teeth_have_the_common_width_and_bodies_their_own():
     """The stiffness of a sector is the sum of its parts, each in proportion to its own width."""
     sectors = make_sectors(pair_of(WIDTH, 1.5 * WIDTH), STEEL, flank_elements=6)
     grid = sectors.planet.grid
-    parts = [
-        stiffness(grid, STEEL, thickness={"tooth": t, "body": b}) for t, b in ((WIDTH, 1e-12), (1e-12, WIDTH))
-    ]
+    parts = [stiffness(grid, STEEL, thickness={"tooth": t, "body": b}) for t, b in ((WIDTH, 1e-12), (1e-12, WIDTH))]
     missed = sectors.planet.stiffness - (parts[0] + 1.5 * parts[1])
     assert abs(missed).max() < 1e-9 * abs(sectors.planet.stiffness).max()
     narrow = make_sectors(pair_of(WIDTH, WIDTH), STEEL, flank_elements=6)

@@ -57,9 +57,12 @@ def moments(cycle, mesh):
 
 def one_tilt(stiffness):
     return TiltingMembers(
-        ("gear: x",), (2 * PLACE / WIDTH)[None, :, None], np.array([stiffness / (WIDTH / 2) ** 2]),
-        np.array([2 / WIDTH]), np.zeros((1, SLICES, 1, SLICES)),
-    )  # fmt: skip
+        ("gear: x",),
+        (2 * PLACE / WIDTH)[None, :, None],
+        np.array([stiffness / (WIDTH / 2) ** 2]),
+        np.array([2 / WIDTH]),
+        np.zeros((1, SLICES, 1, SLICES)),
+    )
 
 
 def test_tilts_follow_in_the_tangent():
@@ -123,9 +126,11 @@ def test_rigid_sets_touch_where_leads_and_axes_let_them(rigid):
     """The planet whose flanks come nearest carries: the sun turns until its two smallest gaps are closed."""
     gears = rigid[0]
     errors = dict(
-        sun=FlankForm((LeadSlope(8e-6),)), ring=FlankForm((LeadSlope(-3e-6),)),
-        sun_misalignment=ASKEW, planet_misalignment=[[1e-4, 0], [0, -2e-4], [0, 0]],
-    )  # fmt: skip
+        sun=FlankForm((LeadSlope(8e-6),)),
+        ring=FlankForm((LeadSlope(-3e-6),)),
+        sun_misalignment=ASKEW,
+        planet_misalignment=[[1e-4, 0], [0, -2e-4], [0, 0]],
+    )
     found = walk(rigid, **errors)
     apart = lead_separation(replace(no_deviations(gears), **errors), gears, SLICES).min(axis=1)
     assert found.sun_arc == pytest.approx((apart[:3] + apart[3:]).min(), rel=1e-6)
@@ -205,9 +210,11 @@ FULL = WidthSupports(sun=1e4, carrier=5e4, planet=1e4, wind_up=2e5, sun_rigidity
 
 def errors_of(sun=ASKEW, carrier=(1e-4, 0.0), planets=((1e-4, 5e-5), (0, 0), (0, -1e-4)), slope=5e-6):
     return dict(
-        sun_misalignment=sun, carrier_misalignment=carrier, planet_misalignment=planets,
+        sun_misalignment=sun,
+        carrier_misalignment=carrier,
+        planet_misalignment=planets,
         sun=FlankForm((LeadSlope(slope), LeadCrowning(2e-6))),
-    )  # fmt: skip
+    )
 
 
 def test_the_mirrored_width(steel):
@@ -273,8 +280,7 @@ def test_leads_and_tilts_take_play(steel):
     """Both flanks of the sun stand out at one end: a slope of 10 um takes 10 um."""
     gears = steel[0]
     plain, leaning = (
-        least_play(replace(no_deviations(gears), sun=FlankForm(lead)), gears)[0]
-        for lead in ((), (LeadSlope(10e-6),))
+        least_play(replace(no_deviations(gears), sun=FlankForm(lead)), gears)[0] for lead in ((), (LeadSlope(10e-6),))
     )
     assert plain - leaning == pytest.approx(10e-6, rel=0.02)
 

@@ -11,8 +11,8 @@ from femgear.contact import cycle
 from femgear.contact.assembly import body_compliance, contact_candidates, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.omitted_pairs import needed_nearest, yielding
+from femgear.stages.static import solve_static
 from femgear.trains.reading import parse_case, with_values
-from femgear.trains.static.stages import solve_static
 
 TWISTED = """title = "twisted"
 [set]
@@ -124,9 +124,7 @@ def test_a_loaded_flank_lets_pairs_in_that_it_draws_nearer(gears, bodies):
     assert needed_nearest(found, deep, none)[at[1]] == pytest.approx(expected, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    "factors", [(1.05, 1.0), pytest.param((1.05, 0.5, 1.0, 1.0001, 2.0), marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize("factors", [(1.05, 1.0), pytest.param((1.05, 0.5, 1.0, 1.0001, 2.0), marks=pytest.mark.slow)])
 def test_candidates_decide_nothing_of_a_twisted_set(grids, factors):
     """Young's modulus, torque and tilt stiffnesses times one factor: the same shares and k over it."""
     case, found = parse_case(TWISTED), []

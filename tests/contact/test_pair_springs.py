@@ -64,6 +64,4 @@ def test_no_problem_depends_on_those_beside_it(supports, sigma):
     np.testing.assert_allclose(spoiled[0][..., :7], force[..., :7], rtol=0.0, atol=1e-9 * force.max())
     for i in (0, 17, 59):
         for values, alone in zip(together, solved(errors[i : i + 1]), strict=True):
-            np.testing.assert_allclose(
-                values[..., i], alone[..., 0], rtol=1e-9, atol=1e-9 * np.abs(alone).max()
-            )
+            np.testing.assert_allclose(values[..., i], alone[..., 0], rtol=1e-9, atol=1e-9 * np.abs(alone).max())

@@ -9,12 +9,12 @@ from femgear.case.dependencies import Steps
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.peaks import TOLERANCE, open_places, peak_doubt, tooth_pair_codes
+from femgear.stages.static import solve_static, solve_stress
 from femgear.study.objectives import transmission_error
 from femgear.study.relief import design_basis, harris_map, sun_torque, with_tip_relief
 from femgear.trains.drafts import new_case
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.stages import solve_static, solve_stress
 
 PEAKS = CycleOptions(peaks=True)
 

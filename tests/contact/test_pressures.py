@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
@@ -12,6 +11,7 @@ from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet
+from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 WIDTH = 0.02
@@ -90,9 +90,7 @@ def test_pressures_are_kept_only_when_asked_for(reference):
 def test_windows_at_the_ends_of_flanks_say_where_they_are(reference):
     """Every window lies on the flank of the sun: centre and offset give its arc length there."""
     gears, bodies = reference
-    cycle = walk_mesh_cycle(
-        gears, bodies, sun_torque=100.0, positions=16, options=CycleOptions(pressures=True)
-    )
+    cycle = walk_mesh_cycle(gears, bodies, sun_torque=100.0, positions=16, options=CycleOptions(pressures=True))
     sun, alpha = gears.sun, gears.working_pressure_angle_sun_planet
     roll = sun.base_radius * np.tan(alpha) + cycle.path[:3]
     arc = roll**2 / (2 * sun.base_radius) + cycle.pressure_centre[:3]

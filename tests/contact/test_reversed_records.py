@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
@@ -12,6 +11,7 @@ from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import Runout, common_period, mirrored_deviations, no_deviations
 from femgear.gears.planetary import mirrored_set
+from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
@@ -50,9 +50,7 @@ def mirrored(gears, errors):
 
 @pytest.fixture(scope="module")
 def closed(gears, bodies, errors):
-    return walk_mesh_cycle(
-        gears, bodies, sun_torque=TORQUE, positions=POSITIONS, deviations=errors, periods=27
-    )
+    return walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=POSITIONS, deviations=errors, periods=27)
 
 
 def reversed_walk(bodies, mirrored, periods, **options):

@@ -2,9 +2,6 @@
 
 import numpy as np
 import pytest
-from validation.planetary import reference_set
-from validation.reference.rim_support import rim_support_stiffness
-from validation.reference.support_stiffness import annulus_support_stiffness
 
 from femgear.contact.bodies import RING_STATE, Sector
 from femgear.errors import GridError
@@ -12,6 +9,9 @@ from femgear.fe.elasticity import Material, foundation, stiffness
 from femgear.fe.grid import mirror
 from femgear.fe.meshing import mesh_outline
 from femgear.gears.tooth import half_sector
+from validation.planetary import reference_set
+from validation.reference.rim_support import rim_support_stiffness
+from validation.reference.support_stiffness import annulus_support_stiffness
 
 STEEL = Material(206e9, 0.3, 7850.0)
 

@@ -6,10 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from validation.planetary import reference_set
-from validation.reference.plane_elasticity import stress
-from validation.reference.root_stress import set_root_stress
-from validation.stress import sharp_root_over_grids
 
 from femgear.contact.bodies import flank_compliance, flank_stations, make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
@@ -33,6 +29,10 @@ from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336 import nominal_root_stress
 from femgear.gears.tooth import half_sector
+from validation.planetary import reference_set
+from validation.reference.plane_elasticity import stress
+from validation.reference.root_stress import set_root_stress
+from validation.stress import sharp_root_over_grids
 
 STEEL = Material(206e9, 0.3, 7850.0)
 BOTH = CycleOptions(both_flanks=True)
@@ -385,9 +385,11 @@ def test_ranges_are_those_of_the_point_with_the_widest_one(loaded):
             (2 * (3 + n), ring_side, sun_side),
         ):
             both = np.concatenate(
-                [pulled.stress[:, :, LOADED].reshape(-1, len(pulled.arc)),
-                 other.stress[:, :, BACK].reshape(-1, len(pulled.arc))]
-            )  # fmt: skip
+                [
+                    pulled.stress[:, :, LOADED].reshape(-1, len(pulled.arc)),
+                    other.stress[:, :, BACK].reshape(-1, len(pulled.arc)),
+                ]
+            )
             found = ranges[number]
             assert found.point == np.ptp(both, axis=0).argmax()
             assert found.maximum - found.minimum == pytest.approx(np.ptp(both, axis=0).max(), rel=1e-9)
@@ -471,9 +473,7 @@ def test_no_torque_no_stress(loaded):
 def test_records_of_several_periods_repeat(loaded):
     gears, _, bodies, _, roots, _ = loaded
     one, three = (
-        root_stress_cycle(
-            gears, roots, walk_mesh_cycle(gears, bodies, sun_torque=100.0, positions=8, periods=periods)
-        )
+        root_stress_cycle(gears, roots, walk_mesh_cycle(gears, bodies, sun_torque=100.0, positions=8, periods=periods))
         for periods in (1, 3)
     )
     for a, b in zip(one, three, strict=True):

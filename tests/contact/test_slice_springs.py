@@ -36,11 +36,12 @@ def leads(seed, sets=SETS):
     gears, rng = reference_set(), np.random.default_rng(seed)
     drawn = [
         replace(
-            no_deviations(gears), sun_misalignment=2e-4 * rng.normal(size=2),
+            no_deviations(gears),
+            sun_misalignment=2e-4 * rng.normal(size=2),
             planet_misalignment=1e-4 * rng.normal(size=(3, 2)),
         )
         for _ in range(sets)
-    ]  # fmt: skip
+    ]
     pins = 2e-6 * rng.normal(size=(6, sets))
     pins[[1, 4], -1] = 40e-6
     return np.stack([lead_separation(d, gears, SLICES) for d in drawn], axis=-1), pins

@@ -95,9 +95,7 @@ def test_energy_of_a_wave_is_that_of_its_strains(sectors):
 def test_sector_answers_waves_as_the_whole_gear(sectors):
     sector, teeth = sectors.sun, sectors.sun.gear.teeth
     stations = flank_stations(sector.grid, sector.gear)
-    loads = np.insert(
-        flank_load_columns(sector.grid, stations), range(2, 2 * sector.grid.n_nodes + 1, 2), 0, 0
-    )
+    loads = np.insert(flank_load_columns(sector.grid, stations), range(2, 2 * sector.grid.n_nodes + 1, 2), 0, 0)
     whole = rotated_copies(sector.grid, teeth)
     nodes, at = KDTree(whole.points).query(sector.grid.points[stations.nodes])[1], 3
     free = np.setdiff1d(np.arange(3 * whole.n_nodes), node_dofs(boundary_nodes(whole, "rim"), 3))
@@ -145,12 +143,19 @@ def spring_newton(separation, *, stiffness, load, slices, tilting=None):
 
     force = np.geomspace(1.0, 1e5, 8)
     laws = PairLaws(
-        force=force, yields=np.full((1, 1, 8), 1 / stiffness), moments=np.full((1, 1, 8, 3), 1 / 3),
-        touching=np.zeros((1, 1, 1)), smooth=np.zeros((1, 1, 3, 1, 3)), supports=np.zeros((1, 1)),
-        separation=np.zeros((1, 1)), mesh=np.zeros(1, int), approach=np.ones((1, 1)),
-        loads=np.full((1, 1, 3), load / 3), motions=np.full((1, 1), load / stiffness),
+        force=force,
+        yields=np.full((1, 1, 8), 1 / stiffness),
+        moments=np.full((1, 1, 8, 3), 1 / 3),
+        touching=np.zeros((1, 1, 1)),
+        smooth=np.zeros((1, 1, 3, 1, 3)),
+        supports=np.zeros((1, 1)),
+        separation=np.zeros((1, 1)),
+        mesh=np.zeros(1, int),
+        approach=np.ones((1, 1)),
+        loads=np.full((1, 1, 3), load / 3),
+        motions=np.full((1, 1), load / stiffness),
         pressure=np.zeros((1, 1, 8)),
-    )  # fmt: skip
+    )
     across = np.zeros((1, slices, 1, slices, 1))
     apart = np.asarray(separation)[None, :, None]
     rows, smooth = np.zeros((1, 1), int), laws.smooth[None]
@@ -215,9 +220,7 @@ def test_slices_add_up_and_balance_the_torque(gears, bodies, waves):
 
 
 def test_the_mirror_image_over_the_width_is_that_of_the_mirrored_lead(gears, bodies, waves):
-    one, other = (
-        walk(gears, bodies, waves, LeadSlope(sign * 8e-6), EndRelief(5e-6, 4e-3)) for sign in (1, -1)
-    )
+    one, other = (walk(gears, bodies, waves, LeadSlope(sign * 8e-6), EndRelief(5e-6, 4e-3)) for sign in (1, -1))
     assert np.abs(one.slice_load - other.slice_load[:, :, ::-1]).max() < 1e-9 * one.slice_load.max()
     assert np.abs(one.stiffness - other.stiffness).max() < 1e-9 * one.stiffness.max()
 
@@ -303,9 +306,14 @@ def test_errors_on_soft_supports_settle(gears, bodies, waves, sun, error):
     deviations = replace(no_deviations(gears), sun=FlankForm((LeadSlope(10e-6),)), pin_errors=pins)
     supports = Supports(sun=sun, planet=3e8, carrier=2e8)
     cycle = walk_mesh_cycle(
-        gears, bodies, sun_torque=TORQUE, positions=4, deviations=deviations, supports=supports,
+        gears,
+        bodies,
+        sun_torque=TORQUE,
+        positions=4,
+        deviations=deviations,
+        supports=supports,
         options=CycleOptions(waves=waves, slices=SLICES),
-    )  # fmt: skip
+    )
     assert cycle.residual.max() < 1e-9 and cycle.slice_load.min() >= 0.0
     assert cycle.force[:3].sum(axis=0) * gears.sun.base_radius == pytest.approx(TORQUE, rel=1e-9)
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import daqp
 import numpy as np
 import pytest
-from validation.reference.closed_form import share_load
-from validation.reference.hertz import surface_relative_to_depth
-from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
 from femgear.contact.solve import solve_contact
 from femgear.errors import ContactError
+from validation.reference.closed_form import share_load
+from validation.reference.hertz import surface_relative_to_depth
+from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 
 
 def planetary_motions(mesh, n_planets):
@@ -112,9 +112,7 @@ def test_200_random_positions_agree_with_daqp(floating):
             assert not state.open_motions[n_planets]
         again = solve_contact(H, gap, G, load, start=rng.random(len(gap)) < 0.3)
         np.testing.assert_allclose(again.loads, state.loads, rtol=0, atol=1e-10 * state.loads.max())
-        np.testing.assert_allclose(
-            again.motions, state.motions, rtol=0, atol=1e-9 * np.abs(state.motions).max()
-        )
+        np.testing.assert_allclose(again.motions, state.motions, rtol=0, atol=1e-9 * np.abs(state.motions).max())
     assert unloaded > 20
 
 
@@ -334,9 +332,7 @@ def test_results_are_read_only():
 
 def test_share_load_refuses_and_loads_planets_in_the_order_of_their_gaps():
     a = np.full(3, 2e8)
-    forces = [
-        share_load(a, a, a * [0, 1e-6, 2e-6], 0 * a, total).force for total in (0.0, 90.0, 250.0, 900.0)
-    ]
+    forces = [share_load(a, a, a * [0, 1e-6, 2e-6], 0 * a, total).force for total in (0.0, 90.0, 250.0, 900.0)]
     assert [int((f > 0).sum()) for f in forces] == [0, 1, 2, 3]
     # path stiffness 1e8 N/m: second planet at 100 N, third at 300 N
     np.testing.assert_allclose(forces[2], [175, 75, 0], rtol=1e-12)

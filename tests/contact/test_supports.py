@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.planetary import reference_set
 
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
@@ -13,6 +12,7 @@ from femgear.errors import ContactError
 from femgear.fe.elasticity import Material
 from femgear.gears.kinematics import mesh_normals
 from femgear.gears.planetary import equal_planet_angles
+from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
@@ -69,9 +69,7 @@ def test_springs_carry_what_the_meshes_leave(gears, bodies):
         "carrier": on_planet.T @ sun_planet - on_ring.T @ planet_ring,
     }
     for n in range(3):
-        expected[f"planet {n + 1}"] = np.outer(on_planet[n], sun_planet[n]) - np.outer(
-            on_ring[n], planet_ring[n]
-        )
+        expected[f"planet {n + 1}"] = np.outer(on_planet[n], sun_planet[n]) - np.outer(on_ring[n], planet_ring[n])
     for i, name in enumerate(cycle.member_names):
         member, axis = name.split(": ")
         force = stiffness[member.split()[0]] * cycle.member_motion[i]

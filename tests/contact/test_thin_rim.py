@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from validation import rims
-from validation.cases import reference_case
-from validation.whole_gear import Held, by_sector, loads_of
 
 from femgear.contact.flank_pairs import LEFT
 from femgear.fe.grid import ordered_nodes
+from validation import rims
+from validation.cases import reference_case
+from validation.whole_gear import Held, by_sector, loads_of
 
 # of the whole gears in cubic elements; the rows of validation and the slow test take finer ones
 SIZES = {"flank_elements": 8, "refine": 0.35}

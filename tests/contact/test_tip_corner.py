@@ -4,6 +4,15 @@ import math
 
 import numpy as np
 import pytest
+
+from femgear.contact.assembly import cell_centres, cell_edges, equal_cells
+from femgear.contact.bodies import station_weights
+from femgear.contact.local_compliance import TipCorner, _excess, apex_excess, surface_displacement, tip_corner
+from femgear.fe.compliance import symmetric_factor
+from femgear.fe.elasticity import Material, stiffness
+from femgear.fe.grid import mirror, ordered_nodes
+from femgear.fe.meshing import mesh_outline
+from femgear.gears.tooth import half_sector
 from validation.planetary import reference_set
 from validation.reference.graded_teeth import graded_sector
 from validation.reference.held_sector import held_sector_compliance
@@ -15,15 +24,6 @@ from validation.torque_rotation import (
     corner_set,
     mesh_alone,
 )
-
-from femgear.contact.assembly import cell_centres, cell_edges, equal_cells
-from femgear.contact.bodies import station_weights
-from femgear.contact.local_compliance import TipCorner, _excess, apex_excess, surface_displacement, tip_corner
-from femgear.fe.compliance import symmetric_factor
-from femgear.fe.elasticity import Material, stiffness
-from femgear.fe.grid import mirror, ordered_nodes
-from femgear.fe.meshing import mesh_outline
-from femgear.gears.tooth import half_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)
 SET = reference_set()
@@ -72,9 +72,7 @@ def test_surface_of_the_wedge_in_closed_form(gear):
     exact = corner.depth(1e-4, 0.0, y)
     half_plane = (1 - corner.poisson_ratio) / (math.pi * corner.shear_modulus)
     assert np.abs(corner.surface(1e-4, y) - exact).max() < 6e-3 * half_plane
-    assert corner.surface(1e-4, 1e-4) == pytest.approx(
-        float(corner.depth(1e-4, 0.0, np.array(1e-4))), rel=1e-9
-    )
+    assert corner.surface(1e-4, 1e-4) == pytest.approx(float(corner.depth(1e-4, 0.0, np.array(1e-4))), rel=1e-9)
 
 
 def test_no_wedge_no_excess():

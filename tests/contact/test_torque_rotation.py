@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
+
+from femgear.errors import ContactError
+from femgear.fe.elasticity import Material
+from femgear.fe.meshing import check_outline
+from femgear.gears.tooth import half_sector
 from validation.planetary import reference_set
 from validation.reference.flank_mortar import PlacedFlank, flank_contact, opposite, smallest_separation
 from validation.reference.graded_teeth import flank_curve, graded_sector
 from validation.reference.torque_balance import balanced_loads
 from validation.reference.torque_rotation import GearPair, torque_rotation
 from validation.torque_rotation import SUN_PLANET, by_compliance, depth_compliance
-
-from femgear.errors import ContactError
-from femgear.fe.elasticity import Material
-from femgear.fe.meshing import check_outline
-from femgear.gears.tooth import half_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)
 SET = reference_set()

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from femgear.stages.static import solve_static
 from femgear.trains.reading import read_case, with_value
-from femgear.trains.static.stages import solve_static
 
 TANGENTIAL = [{"planet": 1, "tangential": "0.12 mm"}]
 
@@ -55,9 +55,7 @@ def test_pin_error_beyond_the_play_unloads_its_planet(solved):
     check_equilibrium(result, 100.0)
     assert cycle.open_planets[0].all() and not cycle.open_planets[1:].any()
     assert "lose all load" in cycle.message
-    assert any(
-        "W-OPEN" in str(one) and "planet 1 carries nothing at all" in str(one) for one in result.findings
-    )
+    assert any("W-OPEN" in str(one) and "planet 1 carries nothing at all" in str(one) for one in result.findings)
 
 
 def test_pin_error_beyond_the_play_presses_on_the_back_flanks(solved):
@@ -108,9 +106,7 @@ def test_pitch_error_that_separates_one_planet(solved):
     assert not cycle.force[[1, 4]][:, separated].any()
     assert cycle.load_share[[0, 2]][:, separated] == pytest.approx(0.5, abs=2e-3)
     assert cycle.load_share[1][~separated].max() == pytest.approx(1 / 3, abs=2e-3)
-    assert any(
-        "W-OPEN" in str(one) and "planet 2 carries nothing at some" in str(one) for one in result.findings
-    )
+    assert any("W-OPEN" in str(one) and "planet 2 carries nothing at some" in str(one) for one in result.findings)
 
 
 @pytest.mark.parametrize("back", [False, True])

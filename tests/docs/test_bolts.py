@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from femgear.housing.sensor import stored_lines
+from femgear.stages.static import solve_static
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "bolts.md").read_text(encoding="utf-8")
@@ -37,9 +37,7 @@ def before():
     return case, static, solve_modes(case, static)
 
 
-@pytest.mark.parametrize(
-    "name", ["foundation alone", pytest.param("six bolts", marks=pytest.mark.slow), "four feet"]
-)
+@pytest.mark.parametrize("name", ["foundation alone", pytest.param("six bolts", marks=pytest.mark.slow), "four feet"])
 def test_rows_of_the_table(before, name):
     case = with_values(before[0], ROWS[name])
     data = solve_housing(case, solve_dynamics(case, *before[1:])).dataset()

@@ -6,14 +6,12 @@ import pytest
 from page_examples import read_page, run_examples
 from script_runs import run_script
 
-from femgear.housing.casing_files import read_nodes
+from femgear.exchange.casing_files import read_nodes
 
 PAGE, EXAMPLES, PRINTED = read_page("casings.md")
 
 
-@pytest.mark.parametrize(
-    "coarse", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["coarse", "as it stands"]
-)
+@pytest.mark.parametrize("coarse", [True, pytest.param(False, marks=pytest.mark.slow)], ids=["coarse", "as it stands"])
 def test_the_page_runs(coarse, tmp_path, monkeypatch):
     words = re.search(r"^\.venv/bin/python scripts/(casing\.py) (.+)$", PAGE, re.MULTILINE)
     size = 0.02 if coarse else 0.009
@@ -25,9 +23,7 @@ def test_the_page_runs(coarse, tmp_path, monkeypatch):
     found = run_examples("casings.md", EXAMPLES)
     if coarse:
         # frequencies, stiffness and the modes in the range are those of larger elements
-        found, printed = (
-            re.sub(r"\[[\d ]+\]|\d+(?= N/um| of )", "", "".join(one)) for one in (found, printed)
-        )
+        found, printed = (re.sub(r"\[[\d ]+\]|\d+(?= N/um| of )", "", "".join(one)) for one in (found, printed))
     assert found == printed
     (tmp_path / "table.csv").write_text(table)
     written = {one.number: one for one in read_nodes(tmp_path / "out/casing/nodes.csv")}

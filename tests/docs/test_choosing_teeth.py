@@ -34,7 +34,7 @@ def test_table_of_the_eight_cases_is_computed():
 
     from femgear.gears.phasing import phase_factors, phasing_table
     from femgear.solvers.linear.receptance import modal_error_response
-    from femgear.trains.rigid import gear_set_modes
+    from femgear.stages.lumped_set import gear_set_modes
 
     data, hertz = kahraman_set(), np.arange(5000.0, 15000.0, 5.0)
     modes = gear_set_modes(data, damping_ratio=0.005)

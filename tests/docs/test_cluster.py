@@ -40,9 +40,14 @@ def test_a_sweep_by_workers_that_slurm_starts(tmp_path):
     programs = (str(tmp_path / "bin"), str(Path(sys.executable).parent), os.environ["PATH"])
     environment = os.environ | {"PATH": os.pathsep.join(programs), "PYTHONPATH": str(ROOT)}
     done = subprocess.run(
-        [sys.executable, "script.py"], cwd=tmp_path, env=environment, capture_output=True, text=True,
-        timeout=600, check=False,
-    )  # fmt: skip
+        [sys.executable, "script.py"],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=600,
+        check=False,
+    )
     job = (tmp_path / "job.sh").read_text(encoding="utf-8")
     assert done.returncode == 0, done.stderr + (tmp_path / "job.log").read_text(encoding="utf-8")
     assert "#SBATCH --cpus-per-task=2" in job and "--nworkers 2 " in job

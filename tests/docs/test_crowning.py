@@ -47,9 +47,7 @@ def test_the_script_on_a_small_case(tmp_path):
     with open(tmp_path / "out" / "lead_design.csv", encoding="utf-8") as stream:
         rows = list(csv.DictReader(stream))
     assert len(rows) == 4 * 3 * 3
-    table = re.findall(
-        r"(?m)^ +(unmodified|ISO 6336-1|crowning.*?) {2,}([\d.]+) +([\d.]+) +([\d.]+)", done.stdout
-    )
+    table = re.findall(r"(?m)^ +(unmodified|ISO 6336-1|crowning.*?) {2,}([\d.]+) +([\d.]+) +([\d.]+)", done.stdout)
     (plain, rule, alone, both) = (float(row[3]) for row in table)
     assert both <= alone <= rule < 0.8 * plain
     amount = re.search(r'amount = "([\d.]+) um"', (tmp_path / "out" / "lead.toml").read_text())

@@ -79,8 +79,9 @@ def commands() -> list[list[str]]:
         shlex.split(text.replace("\\\n", " "))
         for text in re.findall(r"^```sh\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
     ]
-    names = [[Path(words[1]).name, *words[2:]] if "python" in words[0] else ["femgear", *words[1:]]
-             for words in written]  # fmt: skip
+    names = [
+        [Path(words[1]).name, *words[2:]] if "python" in words[0] else ["femgear", *words[1:]] for words in written
+    ]
     check, run, harris, relief, pins = names
     return [check, run, run, harris, relief, run, run, pins, run]
 

@@ -8,7 +8,7 @@ import pytest
 
 from femgear import errors
 
-PATH = Path(__file__).parents[1] / "tools" / "error_page.py"
+PATH = Path(__file__).parents[2] / "validation" / "tools" / "error_page.py"
 DOCS = Path(__file__).parents[2] / "docs"
 
 
@@ -28,7 +28,7 @@ def test_every_code_has_a_meaning_and_every_meaning_a_code(error_page):
 
 def test_page_is_that_of_the_source(error_page):
     page = (DOCS / "errors.md").read_text(encoding="utf-8")
-    assert page == error_page.page(errors.CODES), "run python tests/tools/error_page.py -o docs/errors.md"
+    assert page == error_page.page(errors.CODES), "run python validation/tools/error_page.py -o docs/errors.md"
 
 
 def test_codes_on_the_other_pages_exist():

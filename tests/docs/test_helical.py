@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from femgear import read_case
+from femgear.stages.static import solve_static, solve_stress
 from femgear.trains.helical.stages import solve_helical_modes, solve_helical_static
-from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = (ROOT / "docs" / "helical.md").read_text(encoding="utf-8")

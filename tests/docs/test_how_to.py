@@ -21,9 +21,23 @@ from femgear.trains import registry
 PAGES = ("pin_errors", "faq", "api", "live", pytest.param("silent_without_load", marks=pytest.mark.slow))
 TUTORIAL = ("drawing_to_ste",)
 HOW_TO = (
-    "how_to", "silent_without_load", "choosing_teeth", "optimise", "side_bands", "pin_errors", "misaligned",
-    "crowning", "bolts", "casings", "run_up_sound", "samples", "live", "cluster", "plugin", "faq",
-)  # fmt: skip
+    "how_to",
+    "silent_without_load",
+    "choosing_teeth",
+    "optimise",
+    "side_bands",
+    "pin_errors",
+    "misaligned",
+    "crowning",
+    "bolts",
+    "casings",
+    "run_up_sound",
+    "samples",
+    "live",
+    "cluster",
+    "plugin",
+    "faq",
+)
 
 
 @pytest.fixture(autouse=True)
@@ -98,9 +112,7 @@ def test_programs_that_read_results(tmp_path):
     case = with_values(read_case(ROOT / "cases" / "planetary_27_40_108.toml"), entries)
     names = {"results": SimpleNamespace(housing=solve(case)["housing"].dataset())}
     exec(examples[0], names)
-    assert names["signal"].acceleration.std() == pytest.approx(
-        float(names["results"].housing["level"][0]), rel=1e-3
-    )
+    assert names["signal"].acceleration.std() == pytest.approx(float(names["results"].housing["level"][0]), rel=1e-3)
     pytest.importorskip("mosqito")
     exec(examples[1].replace("10.0", "0.5"), names)
     assert names["sound"].shape[0] / 48000 == pytest.approx(0.5, abs=2 * np.pi / names["speed"])

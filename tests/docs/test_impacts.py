@@ -11,12 +11,17 @@ from femgear.solvers.stability.lyapunov import LyapunovExponents
 
 PAGE, EXAMPLES, PRINTED = read_page("impacts.md")
 MODULES = (
-    "published.transmission_errors", "femgear.system.fourier", "femgear.trains.gear_pair.model",
-    "femgear.trains.gear_pair.model",
-    "femgear.trains.gear_pair.case_file",
-    "femgear.trains.gear_pair.figures", "femgear.solvers.linear.modal", "femgear.solvers.stability.lyapunov",
-    "femgear.solvers.continuation.branches", "femgear.solvers.time.stroboscopic",
-)  # fmt: skip
+    "published.transmission_errors",
+    "femgear.system.fourier",
+    "femgear.trains.impacts.model",
+    "femgear.trains.impacts.model",
+    "femgear.trains.impacts.case_file",
+    "femgear.trains.impacts.figures",
+    "femgear.solvers.linear.modal",
+    "femgear.solvers.stability.lyapunov",
+    "femgear.solvers.continuation.branches",
+    "femgear.solvers.time.stroboscopic",
+)
 
 
 @cache

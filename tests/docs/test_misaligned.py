@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femgear.stages.static import solve_static, solve_stress
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "misaligned.md").read_text(encoding="utf-8")
@@ -26,10 +26,13 @@ def test_rows_of_the_table(row):
     stress = solve_stress(case, static).dataset()
     assert cycle.face_load_factor is not None
     found = (
-        cycle.face_load_factor[0], np.ptp(cycle.sun_arc) * 1e6, cycle.stiffness[0].mean() / 1e6,
-        cycle.max_pressure[0].max() / 1e6, float(stress["root_worst"][0, 0]) / 1e6,
+        cycle.face_load_factor[0],
+        np.ptp(cycle.sun_arc) * 1e6,
+        cycle.stiffness[0].mean() / 1e6,
+        cycle.max_pressure[0].max() / 1e6,
+        float(stress["root_worst"][0, 0]) / 1e6,
         float(stress["root_face_factor"][0, 0]),
-    )  # fmt: skip
+    )
     assert found == pytest.approx(printed, rel=3e-3)
 
 

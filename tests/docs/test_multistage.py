@@ -44,9 +44,7 @@ def test_table_of_readings_is_what_the_published_data_give():
 
     from femgear.trains.multistage.stages import multistage_modes
 
-    rows = re.findall(
-        r"^\|[^|]*\| ([34]) \| (free|held) \| (\d) \| (\S+) \| (\S+) \|", PAGE, flags=re.MULTILINE
-    )
+    rows = re.findall(r"^\|[^|]*\| ([34]) \| (free|held) \| (\d) \| (\S+) \| (\S+) \|", PAGE, flags=re.MULTILINE)
     assert len(rows) == 8
     for number, (planets, end, rigid, low, high) in enumerate(rows):
         unit = 1e3 if number < 4 else 1.0

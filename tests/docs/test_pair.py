@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from page_examples import read_page, run_examples
 
+from femgear.stages.static import solve_static, solve_stress
 from femgear.study.relief import design_basis, harris_map, with_tip_relief
 from femgear.trains.pair.stages import iso_stiffness
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "pair.md").read_text(encoding="utf-8")
@@ -24,11 +24,14 @@ def test_table_and_relief():
     cycle, data = static.cycle, solve_stress(case, static).dataset()
     roots = zip(data.root_worst.values[0] / 1e6, data.iso_root_stress.values[0] / 1e6, strict=True)
     found = [
-        float(cycle.mean("deflection")[0]) * 1e6, float(cycle.peak_to_peak()[0]) * 1e6,
-        float(cycle.mean()[0]) / case.set.face_width / 1e9, iso_stiffness(case)[1] / 1e9,
-        float(data.largest_pressure[0]) / 1e6, float(data.iso_contact_stress[0]) / 1e6,
+        float(cycle.mean("deflection")[0]) * 1e6,
+        float(cycle.peak_to_peak()[0]) * 1e6,
+        float(cycle.mean()[0]) / case.set.face_width / 1e9,
+        iso_stiffness(case)[1] / 1e9,
+        float(data.largest_pressure[0]) / 1e6,
+        float(data.iso_contact_stress[0]) / 1e6,
         *(x for pair in roots for x in pair),
-    ]  # fmt: skip
+    ]
     rows = re.findall(r"(?m)^\| [a-z].*\] \|(.*)\|$", PAGE)
     printed = [float(number) for row in rows for number in re.findall(r"[\d.]+", row)]
     assert found == pytest.approx(printed, rel=2e-3)

@@ -49,13 +49,10 @@ def test_the_readme_is_a_front_page():
 def test_what_the_readme_says_of_its_checks():
     """Numbers of the section on verification: no more than the pages have."""
     pages = {
-        name: (ROOT / "docs" / f"{name}.md").read_text("utf-8")
-        for name in ("validation", "reliability", "benchmarks")
+        name: (ROOT / "docs" / f"{name}.md").read_text("utf-8") for name in ("validation", "reliability", "benchmarks")
     }
     claimed = README.split("## How it is verified")[1].split("\n## ")[0]
-    rows, changes, trials = (
-        int(one.replace(",", "")) for one in re.findall(r"[Mm]ore than ([\d,]+)", claimed)
-    )
+    rows, changes, trials = (int(one.replace(",", "")) for one in re.findall(r"[Mm]ore than ([\d,]+)", claimed))
     passes = re.findall(r"(\d+) rows: (\d+) passes", pages["validation"])[0][1]
     assert 0 <= int(passes) - rows < 300
     mutants = re.findall(r"\*\*all\*\* \| (\d+) \| (\d+) \| \d+ \| (\d+) \| (\d+)", pages["reliability"])[0]
@@ -127,7 +124,7 @@ def test_command_table_names_every_command_and_script():
     commands = {name for name in app if not name.startswith("-")}
     assert commands >= {"check", "run", "report", "sweep", "schema"}
     assert commands <= set(re.findall(r"`femgear (\w+)", COMMANDS))
-    assert "| `python tests/validation " in COMMANDS
+    assert "| `python validation " in COMMANDS
     helpers = {"script_tools.py", "drivetrain_figures.py"}
     scripts = {path.name for path in (ROOT / "scripts").glob("*.py")} - helpers
     assert scripts <= set(re.findall(r"scripts/(\w+\.py)", COMMANDS))

@@ -7,7 +7,7 @@ import pytest
 
 pytestmark = pytest.mark.usefixtures("coarse_states")
 
-PATH = Path(__file__).parents[1] / "tools" / "results_page.py"
+PATH = Path(__file__).parents[2] / "validation" / "tools" / "results_page.py"
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def results_page():
 
 def test_tables_are_those_of_the_files(results_page):
     page = results_page.PAGE.read_text(encoding="utf-8")
-    remedy = "run python tests/tools/results_page.py -o docs/results.md"
+    remedy = "run python validation/tools/results_page.py -o docs/results.md"
     assert page == results_page.page(page, results_page.variables()), remedy
 
 
@@ -31,9 +31,7 @@ def test_a_table_keeps_its_remarks_and_joins_real_and_imaginary_parts(results_pa
     }
     found["kind"] = ("mode", "", "kind of mode")
     text = results_page.table(found, {"kind": "rigid or not"})
-    rows = (
-        "| `x_real`, `x_imag` | speed | m | motion | |\n| `kind` | mode | | kind of mode | rigid or not |\n"
-    )
+    rows = "| `x_real`, `x_imag` | speed | m | motion | |\n| `kind` | mode | | kind of mode | rigid or not |\n"
     assert text == results_page.HEAD + rows
     page = f"<!-- table one modes -->\n{text}<!-- end -->\n"
     assert results_page.page(page, {("one", "modes"): found}) == page

@@ -43,9 +43,7 @@ def test_attributes_of_the_page_are_those_that_are_read():
 
 def test_the_new_case_of_the_page(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    (command,) = [
-        line for one in blocks("case_file.md", "sh") for line in one.splitlines() if "--teeth" in line
-    ]
+    (command,) = [line for one in blocks("case_file.md", "sh") for line in one.splitlines() if "--teeth" in line]
     words = re.findall(r'"([^"]*)"|(\S+)', command)
     assert cli.main([quoted or plain for quoted, plain in words][1:]) == 0
     written = Path("case.toml").read_text(encoding="utf-8")

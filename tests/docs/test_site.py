@@ -47,9 +47,7 @@ def test_every_page_is_in_the_index():
     pages = {page.stem for page in PAGES} - {"index"}
     assert [page for page in sorted(pages) if not any(fnmatch.fnmatch(page, one) for one in named)] == []
     patterns = {one for one in named if "*" in one}
-    assert set(named) - patterns == {page for page in pages if page in named} and len(named) == len(
-        set(named)
-    )
+    assert set(named) - patterns == {page for page in pages if page in named} and len(named) == len(set(named))
 
 
 @pytest.mark.slow
@@ -69,9 +67,7 @@ def test_the_site_builds_without_a_warning(tmp_path):
         str(tmp_path),
     ]
     options = ["-D", "plot_gallery=0"] if any((ROOT / "scripts/examples").glob("*.py")) else []
-    done = subprocess.run(
-        [*command, *options], cwd=ROOT, capture_output=True, text=True, timeout=900, check=False
-    )
+    done = subprocess.run([*command, *options], cwd=ROOT, capture_output=True, text=True, timeout=900, check=False)
     assert done.returncode == 0, done.stderr[-3000:]
     for page in tmp_path.rglob("*.html"):
         text = page.read_text(encoding="utf-8")

@@ -56,9 +56,7 @@ def public_names() -> set[str]:
     for path in paths:
         module = importlib.import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
         found |= {
-            name
-            for name, value in inspect.getmembers(module)
-            if getattr(value, "__module__", "") == module.__name__
+            name for name, value in inspect.getmembers(module) if getattr(value, "__module__", "") == module.__name__
         }
     return found
 

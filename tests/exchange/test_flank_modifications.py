@@ -54,9 +54,11 @@ def removed(case, roll=None, place=None, height=0.0, gear="sun", side="both"):
 def test_crowning_of_profile_and_lead(tmp_path):
     box = with_parts(
         ("profile_crowning", {"profile_crowning_at_tip": (5.0, UM), "profile_crowning_at_root": (5.0, UM)}),
-        ("helix_crowning", {"helix_crowning_amount_datum_face": (5.0, UM),
-                            "helix_crowning_amount_non_datum_face": (5.0, UM)}),
-    )  # fmt: skip
+        (
+            "helix_crowning",
+            {"helix_crowning_amount_datum_face": (5.0, UM), "helix_crowning_amount_non_datum_face": (5.0, UM)},
+        ),
+    )
     model, case = imported(box, tmp_path)
     assert [one.kind for one in case.sun.modifications] == ["profile crowning", "lead crowning"]
     assert [one.amount for one in case.sun.modifications] == [5e-6, 5e-6]
@@ -67,11 +69,16 @@ def test_crowning_of_profile_and_lead(tmp_path):
 def test_amounts_that_differ_at_both_ends_are_there_at_both_ends(tmp_path):
     box = with_parts(
         ("profile_crowning", {"profile_crowning_at_tip": (8.0, UM), "profile_crowning_at_root": (2.0, UM)}),
-        ("helix_crowning", {"helix_crowning_amount_datum_face": (6.0, UM),
-                            "helix_crowning_amount_non_datum_face": (2.0, UM),
-                            "coordinate_where_helix_crowning_is_specified_datum_face": (-25.0, MM),
-                            "coordinate_where_helix_crowning_is_specified_non_datum_face": (12.5, MM)}),
-    )  # fmt: skip
+        (
+            "helix_crowning",
+            {
+                "helix_crowning_amount_datum_face": (6.0, UM),
+                "helix_crowning_amount_non_datum_face": (2.0, UM),
+                "coordinate_where_helix_crowning_is_specified_datum_face": (-25.0, MM),
+                "coordinate_where_helix_crowning_is_specified_non_datum_face": (12.5, MM),
+            },
+        ),
+    )
     case = imported(box, tmp_path)[1]
     gear = planetary_set(case).sun
     rolls = [gear.form_roll, 0.5 * (gear.form_roll + gear.tip_roll), gear.tip_roll]
@@ -93,8 +100,11 @@ def test_reliefs_by_diameters_and_by_lengths(tmp_path, shape):
         power = 2.0 if shape in ("parabolic", "circular") else 1.0
         found.append(removed(case, [tip - 3e-3, tip - 2e-3, tip - 1e-3, tip]))
         assert found[-1] == pytest.approx([0.0, 0.0, 12e-6 * 0.5**power, 12e-6], abs=1e-12)
-    root = {"root_relief_depth": (7.0, UM), "root_relief_datum_diameter": (68.0, MM),
-            "root_relief_evaluation_reference": (66.0, MM)}  # fmt: skip
+    root = {
+        "root_relief_depth": (7.0, UM),
+        "root_relief_datum_diameter": (68.0, MM),
+        "root_relief_evaluation_reference": (66.0, MM),
+    }
     case = imported(with_parts(("root_relief", root)), tmp_path)[1]
     rolls = [math.sqrt(r**2 - SUN_BASE**2) for r in (0.034, 0.033)]
     assert removed(case, rolls) == pytest.approx([0.0, 7e-6], abs=1e-12)
@@ -103,9 +113,10 @@ def test_reliefs_by_diameters_and_by_lengths(tmp_path, shape):
 def test_end_reliefs_of_one_end_and_of_both(tmp_path):
     def end(face, depth, length, shape="parabolic"):
         return f"end_relief_{face}", {
-            f"end_relief_depth_{face}": (depth, UM), f"end_relief_length_{face}": (length, MM),
+            f"end_relief_depth_{face}": (depth, UM),
+            f"end_relief_length_{face}": (length, MM),
             "shape_of_relief": (shape, NONE),
-        }  # fmt: skip
+        }
 
     both = imported(with_parts(end("datum_face", 9, 4), end("non_datum_face", 9, 4)), tmp_path)[1]
     assert [one.kind for one in both.sun.modifications] == ["end relief"]
@@ -123,10 +134,12 @@ def test_end_reliefs_of_one_end_and_of_both(tmp_path):
 def test_slopes_and_twist(tmp_path):
     box = with_parts(
         ("profile_slope", {"profile_slope": (4.0, UM)}),
-        ("helix_slope", {"helix_slope": (6.0, UM), "helix_evaluation_start": (-20.0, MM),
-                         "helix_evaluation_end": (20.0, MM)}),
+        (
+            "helix_slope",
+            {"helix_slope": (6.0, UM), "helix_evaluation_start": (-20.0, MM), "helix_evaluation_end": (20.0, MM)},
+        ),
         ("profile_twist", {"profile_twist": (3.0, UM)}),
-    )  # fmt: skip
+    )
     model, case = imported(box, tmp_path)
     gear = planetary_set(case).sun
     # more material at the tip, at the non-datum face; evaluated over 40 of 50 mm
@@ -164,13 +177,19 @@ def test_flanks_that_differ(tmp_path):
     [
         ("triangular_tip_relief", {"triangular_tip_relief_depth": (5.0, UM)}, "triangular_tip_relief"),
         ("topographical_modification", {}, "topographical_modification"),
-        ("tip_relief", {"tip_relief_depth": (5.0, UM), "shape_of_relief": ("logarithmic", NONE)},
-         "logarithmic"),
+        ("tip_relief", {"tip_relief_depth": (5.0, UM), "shape_of_relief": ("logarithmic", NONE)}, "logarithmic"),
         ("tip_relief", {"tip_relief_depth": (5.0, UM)}, "neither its diameter"),
-        ("tip_relief", {"tip_relief_depth": (5.0, UM), "tip_relief_datum_diameter": (74.0, MM),
-                        "specify_tangential_transition": ("true", NONE)}, "tangential transition"),
+        (
+            "tip_relief",
+            {
+                "tip_relief_depth": (5.0, UM),
+                "tip_relief_datum_diameter": (74.0, MM),
+                "specify_tangential_transition": ("true", NONE),
+            },
+            "tangential transition",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_no_case_has_is_said(tmp_path, kind, attributes, words):
     _, findings = tables_of(with_parts((kind, attributes)), tmp_path)
     (told,) = [one for one in findings if one.key == "sun.modifications"]

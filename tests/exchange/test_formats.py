@@ -134,9 +134,7 @@ def test_progress_counts_the_signals(results, tmp_path):
     told = []
     own_files(tmp_path / "a", ())
     options = Sampling(duration=0.1, run_up=0.1)
-    names = run.export_results(
-        results, tmp_path / "a", ["wav"], options, progress=lambda *one: told.append(one)
-    )
+    names = run.export_results(results, tmp_path / "a", ["wav"], options, progress=lambda *one: told.append(one))
     assert told == [("sound", done, len(names)) for done in range(len(names) + 1)]
 
 
@@ -216,9 +214,7 @@ def test_functions_come_back_from_a_universal_file(tmp_path):
 
 def test_modes_come_back_from_a_universal_file(tmp_path):
     rng = np.random.default_rng(1)
-    shapes = Shapes(
-        rng.normal(size=(5, 3)), np.array([10.0, 2e3]), np.array([0.05, 0.01]), rng.normal(size=(2, 5, 3))
-    )
+    shapes = Shapes(rng.normal(size=(5, 3)), np.array([10.0, 2e3]), np.array([0.05, 0.01]), rng.normal(size=(2, 5, 3)))
     write_modes(shapes, tmp_path / "a.uff")
     units, nodes, *modes = uff(tmp_path / "a.uff")
     assert units["type"] == 164 and nodes["type"] == 15 and [one["type"] for one in modes] == [55, 55]
@@ -376,17 +372,13 @@ def test_levels_and_place_of_the_microphone(results):
 
 def test_exported_files_belong_to_the_results(out, results):
     exported = {path.name for path in (out / "exported").iterdir() if path.name != ".written"}
-    listed = {
-        name.removeprefix("exported/") for name in results.manifest.files if name.startswith("exported/")
-    }
+    listed = {name.removeprefix("exported/") for name in results.manifest.files if name.startswith("exported/")}
     assert exported == listed and {"results.xlsx", "results.mat", "signals.uff", "modes.uff"} < exported
 
 
 def test_runs_without_a_sensor_have_no_sound(tmp_path, out, capsys):
     folder = tmp_path / "out"
-    assert (
-        cli.main(["run", str(out / "case.toml"), "-o", str(folder), "--only", "modes", "--no-pictures"]) == 0
-    )
+    assert cli.main(["run", str(out / "case.toml"), "-o", str(folder), "--only", "modes", "--no-pictures"]) == 0
     capsys.readouterr()
     assert cli.main(["export", str(folder), "--wav"]) == 2
     said = capsys.readouterr().err
@@ -394,9 +386,7 @@ def test_runs_without_a_sensor_have_no_sound(tmp_path, out, capsys):
     assert cli.main(["export", str(folder), "--mat"]) == 0
 
 
-@pytest.mark.parametrize(
-    ("option", "library"), [("--uff", "pyuff"), ("--xlsx", "openpyxl"), ("--quality", "mosqito")]
-)
+@pytest.mark.parametrize(("option", "library"), [("--uff", "pyuff"), ("--xlsx", "openpyxl"), ("--quality", "mosqito")])
 def test_absent_libraries_are_named_with_their_remedy(out, tmp_path, capsys, monkeypatch, option, library):
     monkeypatch.setitem(sys.modules, library, None)
     assert cli.main(["export", str(out), option, "--duration", "0.1", "-o", str(tmp_path / "a")]) == 5

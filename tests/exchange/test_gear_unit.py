@@ -14,9 +14,7 @@ RPM = math.pi / 30.0
 def flow_of(box, tmp_path, given=None):
     model = read_model(box.write(tmp_path / "unit.rexs"))
     flow = power_flow(model, given or {})
-    return {int(id): one / RPM for id, one in flow.speed.items()}, {
-        int(id): one for id, one in flow.torque.items()
-    }
+    return {int(id): one / RPM for id, one in flow.speed.items()}, {int(id): one for id, one in flow.torque.items()}
 
 
 def test_two_parallel_stages(tmp_path):

@@ -23,10 +23,13 @@ from femgear.trains.reading import parse_case, read_case, with_values
 
 CASES = Path(__file__).parents[2] / "cases"
 IRON_RING = {
-    "ring.material.youngs_modulus": "110 GPa", "ring.material.density": "7100 kg/m^3",
-    "ring.material.root_stress_limit": "140 MPa", "planet.material.contact_stress_limit": "1400 MPa",
-    "planet.face_width": "27 mm", "ring.face_width": "24 mm",
-}  # fmt: skip
+    "ring.material.youngs_modulus": "110 GPa",
+    "ring.material.density": "7100 kg/m^3",
+    "ring.material.root_stress_limit": "140 MPa",
+    "planet.material.contact_stress_limit": "1400 MPa",
+    "planet.face_width": "27 mm",
+    "ring.face_width": "24 mm",
+}
 STRENGTH = {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1.4 GPa"}
 OWN = os.environ.get("FEMGEAR_REXS")  # a file of FVA's example, for whoever has it
 
@@ -243,14 +246,16 @@ OUTWARDS = {id: {"center_distance": (-78.0, MM)} for id in (*range(210, 213), *r
         (FURLONGS, "E-RANGE", ["cylindrical_gear 53, normal_module (sun.module)", "ring.outer_radius"]),
         (OUTWARDS, "E-RANGE", ["cylindrical_stage 210, center_distance (set.centre_distance)"]),
         ({210: OUTWARDS[210]}, "E-REXS", ["cylindrical_stage 210, center_distance"]),
-        ({53: {"number_of_teeth": (-17, NONE)}}, "E-RANGE",
-         ["cylindrical_gear 53, number_of_teeth (sun.teeth)"]),
+        ({53: {"number_of_teeth": (-17, NONE)}}, "E-RANGE", ["cylindrical_gear 53, number_of_teeth (sun.teeth)"]),
         ({53: {"number_of_teeth": (18, NONE)}}, "E-ASSEMBLY", ["set.planets"]),
         ({86: {"density": (7850.0, "kg / dm^3")}}, "E-RANGE", ["material 86, density (material.density)"]),
-        ({38: {"torque_around_u_axis": (1e20, "N m")}}, "E-RANGE",
-         ["external_load 38, torque_around_u_axis (operation.torque)"]),
+        (
+            {38: {"torque_around_u_axis": (1e20, "N m")}},
+            "E-RANGE",
+            ["external_load 38, torque_around_u_axis (operation.torque)"],
+        ),
     ],
-)  # fmt: skip
+)
 def test_refusals_of_the_case_name_file_component_and_attribute(tmp_path, changes, code, keys):
     box = Gearbox()
     for id, attributes in changes.items():
@@ -287,8 +292,10 @@ def test_torque_and_speed_of_other_members_and_powers(tmp_path):
     assert 'speeds = ["1000 rpm"]  # assumed; that of the file is 0' in imported(still)[0]
     bare = Gearbox().set(38, torque_around_u_axis=None).set(34, rotational_speed=None)
     text = imported(bare.write(tmp_path / "d.rexs"))[0]
-    assert all(any(f"{key} = " in line and "# assumed" in line for line in text.splitlines())
-               for key in ("input", "torque", "speeds"))  # fmt: skip
+    assert all(
+        any(f"{key} = " in line and "# assumed" in line for line in text.splitlines())
+        for key in ("input", "torque", "speeds")
+    )
 
 
 SPECTRUM = """<load_spectrum id="1">{}</load_spectrum></model>"""
@@ -373,8 +380,11 @@ def second_sun():
         (Gearbox().set(53, number_of_teeth=(17, MM)), "E-UNIT", "cylindrical_gear 53, number_of_teeth"),
         (Gearbox().set(53, number_of_teeth=("inf", NONE)), "E-UNIT", "cylindrical_gear 53, number_of_teeth"),
         (Gearbox().set(53, number_of_teeth=(17.5, NONE)), "E-REXS", "cylindrical_gear 53, number_of_teeth"),
-        (Gearbox().set(53, number_of_teeth=(0, NONE)).set(38, torque_around_u_axis=None), "E-REXS",
-         "cylindrical_gear 53, number_of_teeth"),
+        (
+            Gearbox().set(53, number_of_teeth=(0, NONE)).set(38, torque_around_u_axis=None),
+            "E-REXS",
+            "cylindrical_gear 53, number_of_teeth",
+        ),
         (Gearbox().set(53, number_of_teeth=None), "E-REXS", "cylindrical_gear 53, number_of_teeth"),
         (Gearbox().set(53, normal_module=(3.0, MM)), "E-REXS", "cylindrical_gear 53, normal_module"),
         (Gearbox().set(241, number_of_teeth=(23, NONE)), "E-REXS", "cylindrical_gear 240, number_of_teeth"),
@@ -388,7 +398,7 @@ def second_sun():
         (related_to_nothing(), "E-REXS", "relation assembly, part"),
         (second_sun(), "E-REXS", "planetary_stage 9"),
     ],
-)  # fmt: skip
+)
 @pytest.mark.parametrize("suffix", ["rexs", "rexsj"])
 def test_files_that_make_no_case(tmp_path, box, code, where, suffix):
     path = box.write(tmp_path / f"stage.{suffix}")
@@ -449,12 +459,16 @@ GOOD_JSON = Gearbox().json()
             "load case 1, component 34, rotational_speed",
         ),
         (GOOD_JSON.replace('{"version"', '{"version": "1.0", "version"'), "version"),
-        (GOOD_JSON.replace('"floating_point": 1591.', '"floating_point": 1, "floating_point": 1591.'),
-         "torque_around_u_axis, floating_point"),
-        (GOOD_JSON.replace(TORQUE_JSON, f'{TORQUE_JSON}, "integer": 15}}, {TORQUE_JSON}'),
-         "external_load 38, torque_around_u_axis"),
+        (
+            GOOD_JSON.replace('"floating_point": 1591.', '"floating_point": 1, "floating_point": 1591.'),
+            "torque_around_u_axis, floating_point",
+        ),
+        (
+            GOOD_JSON.replace(TORQUE_JSON, f'{TORQUE_JSON}, "integer": 15}}, {TORQUE_JSON}'),
+            "external_load 38, torque_around_u_axis",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_is_given_twice_is_refused(tmp_path, text, key):
     assert text not in (GOOD, GOOD_JSON)
     path = tmp_path / "stage.rexs"
@@ -483,11 +497,18 @@ NAMED = GOOD.replace('name="gear_unit [1]"', 'name="Pr\xfcfstand 2 \xb5m"')
 @pytest.mark.parametrize(
     ("declared", "codec"),
     [
-        ("UTF-8", "utf-8"), ("UTF-8", "utf-8-sig"), ("ISO-8859-1", "latin-1"), ("iso-8859-1", "latin-1"),
-        ("ISO-8859-15", "iso8859-15"), ("windows-1252", "cp1252"), ("UTF-16", "utf-16"),
-        ("UTF-16", "utf-16-le"), ("UTF-16", "utf-16-be"), ("UTF-16LE", "utf-16-le"),
+        ("UTF-8", "utf-8"),
+        ("UTF-8", "utf-8-sig"),
+        ("ISO-8859-1", "latin-1"),
+        ("iso-8859-1", "latin-1"),
+        ("ISO-8859-15", "iso8859-15"),
+        ("windows-1252", "cp1252"),
+        ("UTF-16", "utf-16"),
+        ("UTF-16", "utf-16-le"),
+        ("UTF-16", "utf-16-be"),
+        ("UTF-16LE", "utf-16-le"),
     ],
-)  # fmt: skip
+)
 def test_declared_encodings_are_read(tmp_path, declared, codec):
     path = tmp_path / "stage.rexs"
     path.write_bytes(NAMED.replace('"UTF-8"', f'"{declared}"').encode(codec))
@@ -499,11 +520,13 @@ def test_declared_encodings_are_read(tmp_path, declared, codec):
 @pytest.mark.parametrize(
     ("declared", "codec", "words"),
     [
-        ("EBCDIC-CP-FR", "latin-1", "is not read"), ("utf-7", "latin-1", "is not read"),
-        ("UTF-16", "latin-1", "does not fit"), ("us-ascii", "latin-1", "does not fit"),
+        ("EBCDIC-CP-FR", "latin-1", "is not read"),
+        ("utf-7", "latin-1", "is not read"),
+        ("UTF-16", "latin-1", "does not fit"),
+        ("us-ascii", "latin-1", "does not fit"),
         ("UTF-8", "latin-1", "not UTF-8"),
     ],
-)  # fmt: skip
+)
 def test_other_encodings_are_refused(tmp_path, declared, codec, words):
     path = tmp_path / "stage.rexs"
     path.write_bytes(NAMED.replace('"UTF-8"', f'"{declared}"').encode(codec))

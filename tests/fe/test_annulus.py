@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import jv, jvp, yv, yvp
-from validation.reference.annulus import annulus_frequencies
 
 from femgear.errors import GeometryError
 from femgear.fe.elasticity import Material
+from validation.reference.annulus import annulus_frequencies
 
 STEEL = Material(200e9, 0.3, 8000.0)
 
@@ -37,9 +37,7 @@ def bessel_determinant(frequency, inner, outer, material, n, state):
 def test_frequencies_are_zeros_of_the_bessel_determinant(n, state):
     inner, outer = 1.8, 6.0
     for f in annulus_frequencies(inner, outer, STEEL, nodal_diameters=[n], count=4, state=state)[0]:
-        exact = brentq(
-            bessel_determinant, f * 0.9999, f * 1.0001, args=(inner, outer, STEEL, n, state), xtol=1e-12 * f
-        )
+        exact = brentq(bessel_determinant, f * 0.9999, f * 1.0001, args=(inner, outer, STEEL, n, state), xtol=1e-12 * f)
         assert f == pytest.approx(exact, rel=1e-9)
 
 

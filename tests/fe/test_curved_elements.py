@@ -32,9 +32,7 @@ def test_points_are_found_in_a_curved_element():
     b1, b2 = np.random.default_rng(3).dirichlet([2.0, 2.0, 2.0], 40)[:, :2].T
     expected = shapes(b1, b2).T
     points = expected @ grid.points
-    inside = np.linalg.solve(np.vstack([CORNERS.T, np.ones(3)]), np.vstack([points.T, np.ones(40)])).min(
-        axis=0
-    )
+    inside = np.linalg.solve(np.vstack([CORNERS.T, np.ones(3)]), np.vstack([points.T, np.ones(40)])).min(axis=0)
     assert np.count_nonzero(inside > 0) > 25
     rows = interpolation(grid, points[inside > 0]).toarray()
     assert np.abs(rows - expected[inside > 0]).max() < 1e-11
@@ -64,9 +62,7 @@ def parabola(edges):
     points = np.vstack([below, peaks, 0.5 * (ends[1:] + peaks), 0.5 * (ends[:-1] + peaks)])
     k, first = np.arange(edges), 2 * edges + 1
     line = np.column_stack([2 * k, 2 * k + 2, 2 * k + 1])
-    elements = np.column_stack(
-        [2 * k, 2 * k + 2, first + k, 2 * k + 1, first + edges + k, first + 2 * edges + k]
-    )
+    elements = np.column_stack([2 * k, 2 * k + 2, first + k, 2 * k + 1, first + edges + k, first + 2 * edges + k])
     return Grid(points, elements, {"edge": line})
 
 

@@ -142,9 +142,7 @@ def test_a_body_held_against_the_other_motion_only_is_refused(gear, sector, axis
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)
     K = K + 1e9 * csc_array(spring) @ csc_array(spring).T
     loads = flank_load_columns(sector, flank_stations(sector, gear))
-    schur = condense_sector(
-        sector, K, count=gear.teeth, rim=None, loads=loads, observations=loads
-    ).supported()
+    schur = condense_sector(sector, K, count=gear.teeth, rim=None, loads=loads, observations=loads).supported()
     for harmonic in (0, 1, 2, 16, 17):
         if harmonic in free:
             with pytest.raises(GridError, match="E-GRID-FREE"):
@@ -171,9 +169,7 @@ def test_a_solution_that_misses_its_equations_is_refused(gear, sector):
     for size in (1.0, unit):
         loads[[2 * node, 2 * node + 1], 0] = size, 0.3 * size
         with pytest.raises(GridError, match="E-RESIDUAL"):
-            condense_sector(
-                sector, csc_array(K), count=18, rim="rim", loads=loads, observations=loads
-            ).supported()
+            condense_sector(sector, csc_array(K), count=18, rim="rim", loads=loads, observations=loads).supported()
         with pytest.raises(GridError, match="E-RESIDUAL"):
             for half in half_sectors(sector, csc_array(K), "rim"):
                 half.held((half.fields.T @ loads)[: half.inner])
@@ -200,9 +196,7 @@ def test_a_residual_counts_whatever_its_sign(wrong, monkeypatch):
     def factored(whole, **options):
         factor = symmetric_factor(whole, **options)
         scale = diags_array([1.0, *rows])
-        return SimpleNamespace(
-            L=csc_array(scale @ factor.L), U=factor.U, solve=lambda b: change(factor.solve(b))
-        )
+        return SimpleNamespace(L=csc_array(scale @ factor.L), U=factor.U, solve=lambda b: change(factor.solve(b)))
 
     (found,) = compliance._schur_complements([matrix], [[1.0]], columns, 1)
     np.testing.assert_allclose(found, [[1.5, 1.0], [1.0, 0.0]], rtol=0, atol=1e-15)
@@ -284,15 +278,11 @@ def test_reduced_ring_is_statically_complete(gear, sector, smooth):
     K = stiffness(sector, STEEL, state="plane stress", thickness=THICKNESS)
     K = K + foundation(sector, "rim", 1e11, 1e11, thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))[:, 3:4]
-    schur = condense_sector(
-        sector, K, count=gear.teeth, rim=None, loads=loads, observations=loads
-    ).supported()
+    schur = condense_sector(sector, K, count=gear.teeth, rim=None, loads=loads, observations=loads).supported()
     exact = cyclic_harmonics(schur, np.arange(10))[:, 0, 0].real
     shapes = smooth_cut_shapes(sector, static_cut_shapes(schur, np.arange(10)))
     whole, basis = (
-        sector_basis(
-            sector, K, mass(sector, STEEL, THICKNESS), count=gear.teeth, loads=loads, cut_shapes=chosen
-        )
+        sector_basis(sector, K, mass(sector, STEEL, THICKNESS), count=gear.teeth, loads=loads, cut_shapes=chosen)
         for chosen in (None, shapes if smooth else None)
     )
     frequency = [
@@ -320,9 +310,7 @@ def test_displacement_field_of_the_whole_gear(gear, sector, whole):
     loads[0], loads[1], loads[7] = columns[:, 2], 0.5 * columns[:, 6], -0.2 * columns[:, 4]
     field = cyclic_displacement(sector, K, loads, held="rim")
     nodes = copy_nodes(sector, gear.teeth)
-    force = sum(
-        _on_tooth(loads[t][:, None], nodes[t], t * gear.pitch_angle, 2 * len(whole.points)) for t in range(18)
-    )
+    force = sum(_on_tooth(loads[t][:, None], nodes[t], t * gear.pitch_angle, 2 * len(whole.points)) for t in range(18))
     K_whole = stiffness(whole, STEEL, state="plane strain", thickness=THICKNESS)
     free = np.setdiff1d(np.arange(K_whole.shape[0]), node_dofs(np.unique(whole.boundaries["rim"])))
     u = np.zeros(K_whole.shape[0])

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from validation.reference.plane_elasticity import quality
 
 from femgear.errors import GridError, StorageError
 from femgear.fe.grid import (
@@ -17,6 +16,7 @@ from femgear.fe.grid import (
     write_grid,
 )
 from femgear.fe.meshing import Outline, mesh_outline
+from validation.reference.plane_elasticity import quality
 
 COUNT = 9
 ANGLE = np.pi / COUNT
@@ -130,9 +130,7 @@ def test_jacobian_bounds_of_a_straight_and_a_bulged_triangle():
     # x = 2 xi, y = 3 eta + 4 b xi (1 - xi - eta): the determinant is 2 (3 - 4 b xi), between 6 - 8 b and 6
     bulged = straight.copy()
     bulged[3, 1] = 0.5
-    np.testing.assert_allclose(
-        jacobian_bounds(Grid(bulged, [[0, 1, 2, 3, 4, 5]])), [[6 - 8 * 0.5, 6.0]], rtol=1e-13
-    )
+    np.testing.assert_allclose(jacobian_bounds(Grid(bulged, [[0, 1, 2, 3, 4, 5]])), [[6 - 8 * 0.5, 6.0]], rtol=1e-13)
 
 
 def test_quality_of_the_equilateral_triangle_is_one():

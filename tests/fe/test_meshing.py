@@ -10,12 +10,12 @@ import warnings
 
 import numpy as np
 import pytest
-from validation.reference.plane_elasticity import quality
 
 from femgear.errors import GridError
 from femgear.fe import grid as fe_grid
 from femgear.fe import meshing
 from femgear.fe.meshing import Outline, check_outline, estimate_elements, mesh_outline, mesh_outlines
+from validation.reference.plane_elasticity import quality
 
 
 @pytest.fixture
@@ -182,19 +182,29 @@ def _no_region(path, grid, elsewhere):
 
 
 def _no_triangle(path, grid, elsewhere):
-    sealed(
-        path, fe_grid.Grid(grid.points, np.zeros((0, 6), int), grid.boundaries, {"body": np.zeros(0, int)})
-    )
+    sealed(path, fe_grid.Grid(grid.points, np.zeros((0, 6), int), grid.boundaries, {"body": np.zeros(0, int)}))
 
 
 @pytest.mark.usefixtures("in_this_process")
 @pytest.mark.parametrize(
     "damage",
     [
-        _truncated, _empty, _link, _pipe, _sparse, _of_another_outline, _moved_corner, _moved_middle,
-        _not_a_number, _wrong_node, _inverted, _exchanged_boundaries, _no_region, _no_triangle,
+        _truncated,
+        _empty,
+        _link,
+        _pipe,
+        _sparse,
+        _of_another_outline,
+        _moved_corner,
+        _moved_middle,
+        _not_a_number,
+        _wrong_node,
+        _inverted,
+        _exchanged_boundaries,
+        _no_region,
+        _no_triangle,
     ],
-)  # fmt: skip
+)
 def test_a_grid_in_the_cache_that_is_not_that_of_the_outline_is_said_and_made_again(tmp_path, damage):
     outline, cache = polygon(SQUARE, divide=4), tmp_path / "meshes"
     first = mesh_outline(outline, cache=cache)
@@ -296,9 +306,7 @@ def test_missing_system_library_names_its_package(tmp_path, monkeypatch):
 
 
 def test_generator_errors_are_passed_on(tmp_path, monkeypatch):
-    fake_gmsh(
-        tmp_path, monkeypatch, "def initialize(*a, **k): pass\ndef finalize(): pass\noption = model = None\n"
-    )
+    fake_gmsh(tmp_path, monkeypatch, "def initialize(*a, **k): pass\ndef finalize(): pass\noption = model = None\n")
     error = refusal(polygon(SQUARE))
     assert error.code == "E-GRID-GMSH"
 
@@ -365,9 +373,7 @@ def test_estimate_is_within_a_factor_two(divide):
 
 
 def split_square(points, regions=(("lower", (0.5, 0.1)), ("upper", (0.5, 0.9)))):
-    return Outline(
-        polygon(SQUARE, divide=4).curves, (("interface", np.asarray(points, dtype=float)),), regions
-    )
+    return Outline(polygon(SQUARE, divide=4).curves, (("interface", np.asarray(points, dtype=float)),), regions)
 
 
 def straight(p, q, k=4):

@@ -3,6 +3,11 @@
 import numpy as np
 import pytest
 from scipy.sparse import csc_array
+
+from femgear.errors import FemgearError, GridError
+from femgear.fe.elasticity import Material, foundation, mass, stiffness
+from femgear.fe.grid import Grid
+from femgear.fe.meshing import Outline, mesh_outline
 from validation.reference.plane_elasticity import (
     check_solution,
     checked_solve,
@@ -11,11 +16,6 @@ from validation.reference.plane_elasticity import (
     stress,
     to_skfem,
 )
-
-from femgear.errors import FemgearError, GridError
-from femgear.fe.elasticity import Material, foundation, mass, stiffness
-from femgear.fe.grid import Grid
-from femgear.fe.meshing import Outline, mesh_outline
 
 STEEL = Material(206e9, 0.3, 7850.0)
 
@@ -135,19 +135,13 @@ def test_states_and_thicknesses_by_region():
     for name, state, thickness in (("left", "plane strain", 0.1), ("right", "plane stress", 0.3)):
         part = Grid(grid.points, grid.triangles[grid.regions[name]])
         used, triangles = np.unique(part.triangles, return_inverse=True)
-        K = stiffness(
-            Grid(grid.points[used], triangles.reshape(-1, 6)), STEEL, state=state, thickness=thickness
-        )
+        K = stiffness(Grid(grid.points[used], triangles.reshape(-1, 6)), STEEL, state=state, thickness=thickness)
         dofs = np.ravel([2 * used, 2 * used + 1], order="F")
-        place = csc_array(
-            (np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(2 * grid.n_nodes, len(dofs))
-        )
+        place = csc_array((np.ones(len(dofs)), (dofs, np.arange(len(dofs)))), shape=(2 * grid.n_nodes, len(dofs)))
         parts.append(place @ K @ place.T)
     assert abs(mixed - parts[0] - parts[1]).max() < 1e-14 * abs(mixed).max()
     M = mass(grid, STEEL, {"left": 0.1, "right": 0.3})
-    assert np.ones(2 * grid.n_nodes) @ M @ np.ones(2 * grid.n_nodes) == pytest.approx(
-        2 * 7850 * 0.4, rel=1e-13
-    )
+    assert np.ones(2 * grid.n_nodes) @ M @ np.ones(2 * grid.n_nodes) == pytest.approx(2 * 7850 * 0.4, rel=1e-13)
 
 
 def test_mass_gives_weight_and_moments_of_inertia():
@@ -213,9 +207,7 @@ def test_foundation_pressure_is_modulus_times_displacement():
 def test_skfem_grid_keeps_names_and_order(plate):
     other = to_skfem(plate)
     assert other.nelements == len(plate.triangles)
-    np.testing.assert_allclose(
-        other.p[:, other.t[:3]].transpose(2, 1, 0), plate.points[plate.triangles[:, :3]]
-    )
+    np.testing.assert_allclose(other.p[:, other.t[:3]].transpose(2, 1, 0), plate.points[plate.triangles[:, :3]])
     for name, edges in plate.boundaries.items():
         ends = np.sort(other.p[:, other.facets[:, other.boundaries[name]]].transpose(2, 1, 0), axis=1)
         np.testing.assert_allclose(ends, np.sort(plate.points[edges[:, :2]], axis=1))
@@ -288,6 +280,4 @@ def test_prescribed_displacements_and_several_loads(plate):
     fixed = np.append(2 * left, 2 * left + 1)
     both = checked_solve(plate, K, loads, fixed=fixed)
     for column in range(2):
-        np.testing.assert_allclose(
-            both[:, column], checked_solve(plate, K, loads[:, column], fixed=fixed), rtol=1e-9
-        )
+        np.testing.assert_allclose(both[:, column], checked_solve(plate, K, loads[:, column], fixed=fixed), rtol=1e-9)

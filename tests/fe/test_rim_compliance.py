@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from femgear.fe.compliance import rim_compliance
-from femgear.housing.structure import Support, supported_ring
+from femgear.housing.two_way.structure import Support, supported_ring
+from femgear.stages.static import solve_static
 from femgear.trains.elastic.stages import solve_modes
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
 SMALL = {"static.positions": 8, "static.flank_elements": 6, "static.stresses": False, "runup.count": 0}

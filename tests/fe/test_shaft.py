@@ -5,10 +5,10 @@ import math
 import numpy as np
 import pytest
 from scipy.linalg import eigh, eigvals
-from validation.timoshenko import Disc, Support, free_bending, shaft_system, simply_supported
 
 from femgear.errors import CaseError
 from femgear.fe.shaft import RoundSection, beam_element, joint_deflections
+from validation.timoshenko import Disc, Support, free_bending, shaft_system, simply_supported
 
 SECTION = RoundSection(0.1, 0.02)
 LENGTH, COUNT = 1.0, 24
@@ -80,9 +80,16 @@ ROSS_FREE = (452.333793, 1189.288296, 1589.615652, 2195.991369, 3186.042934, 339
 ROSS_DISCS = (377.474134, 562.711177, 835.190445, 1324.163334, 2108.046811)
 ROSS_BEARINGS = (106.033701, 275.141073, 562.711176, 575.650784, 947.624003, 1380.710501)
 ROSS_TURNING = (
-    104.871976, 107.138874, 269.019913, 280.980129, 539.582438, 562.711177, 611.726325, 931.268824,
+    104.871976,
+    107.138874,
+    269.019913,
+    280.980129,
+    539.582438,
+    562.711177,
+    611.726325,
+    931.268824,
     963.704651,
-)  # fmt: skip
+)
 BEARINGS = (Support(0, 5e7), Support(COUNT, 8e7))
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from validation.mapped import mapped_grid
-from validation.reference.plane_elasticity import checked_solve, edge_load
 
 from femgear.fe.elasticity import Material, plane_modulus, stiffness, tangential_stress
 from femgear.fe.meshing import Outline, mesh_outline
+from validation.mapped import mapped_grid
+from validation.reference.plane_elasticity import checked_solve, edge_load
 
 STEEL = Material(206e9, 0.3, 7850.0)
 
@@ -23,9 +23,7 @@ def quarter(inner, outer, cells):
 
 def on_axes(grid, x_axis, y_axis):
     """Degrees of freedom held by symmetry."""
-    return np.concatenate(
-        [2 * np.unique(grid.boundaries[y_axis]), 2 * np.unique(grid.boundaries[x_axis]) + 1]
-    )
+    return np.concatenate([2 * np.unique(grid.boundaries[y_axis]), 2 * np.unique(grid.boundaries[x_axis]) + 1])
 
 
 def test_hoop_stress_of_a_cylinder_under_outer_pressure():

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from validation.reference.plane_elasticity import checked_solve, edge_load
-from validation.reference.substructure import chain, closed_compliance, condensed_sector
-from validation.support_stiffness import annulus_sector
 
 from femgear.errors import GridError
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import Grid, copy_nodes, rotated_copies
+from validation.reference.plane_elasticity import checked_solve, edge_load
+from validation.reference.substructure import chain, closed_compliance, condensed_sector
+from validation.support_stiffness import annulus_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)
 COUNT, WIDTH = 7, 0.02
@@ -91,9 +91,7 @@ def test_mean_rotation_of_a_twisted_annulus():
     grid = annulus_sector(inner, outer, count, across=6, along=4)
     boundaries = dict(grid.boundaries) | {"rim": grid.boundaries["bore"], "outside": grid.boundaries["rim"]}
     grid = Grid(grid.points, grid.triangles, boundaries, grid.regions)
-    load = edge_load(
-        grid, "outside", lambda x, n: np.stack([-x[..., 1], x[..., 0]], axis=-1), thickness=WIDTH
-    )
+    load = edge_load(grid, "outside", lambda x, n: np.stack([-x[..., 1], x[..., 0]], axis=-1), thickness=WIDTH)
     moment = count * (grid.points[:, 0] @ load[1::2] - grid.points[:, 1] @ load[::2])
     K = stiffness(grid, STEEL, thickness=WIDTH)
     part = condensed_sector(grid, K, load[:, None] / moment, count=count, thickness=WIDTH, rim="sliding")

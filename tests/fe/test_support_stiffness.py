@@ -2,13 +2,6 @@
 
 import numpy as np
 import pytest
-from validation.mapped import mapped_grid, ring_mapping
-from validation.reference.support_stiffness import (
-    annulus_support_stiffness,
-    centre_node_stiffness,
-    cyclic_support_stiffness,
-)
-from validation.support_stiffness import annulus_sector
 
 from femgear.errors import GeometryError, GridError
 from femgear.fe.elasticity import Material, foundation, stiffness
@@ -19,6 +12,13 @@ from femgear.fe.shaft import (
     shaft_support_stiffness,
     timoshenko_flexibility,
 )
+from validation.mapped import mapped_grid, ring_mapping
+from validation.reference.support_stiffness import (
+    annulus_support_stiffness,
+    centre_node_stiffness,
+    cyclic_support_stiffness,
+)
+from validation.support_stiffness import annulus_sector
 
 STEEL = Material(206e9, 0.3, 7850.0)
 STATES = ("plane stress", "plane strain")
@@ -109,9 +109,7 @@ def test_beam_of_two_parts_against_integration():
     np.testing.assert_allclose(found, total, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "numbers", [(0.0, 0.02, 0.0), (0.1, 0.02, 0.02), (0.1, 0.02, -1.0), (np.nan, 0.02, 0)]
-)
+@pytest.mark.parametrize("numbers", [(0.0, 0.02, 0.0), (0.1, 0.02, 0.02), (0.1, 0.02, -1.0), (np.nan, 0.02, 0)])
 def test_impossible_parts_are_refused(numbers):
     with pytest.raises(GeometryError) as error:
         ShaftStep(*numbers)

@@ -136,9 +136,7 @@ def test_tooth_numbers_are_taken_around_the_gear():
     d = replace(no_deviations(SET), sun_pitch=np.arange(27) * UM, ring_pitch=np.arange(108) * UM)
     got = tooth_separation(d, 1, np.array([[-1, 27], [28, 5]]), 0)
     np.testing.assert_allclose(got, np.array([[26, 0], [1, 5]]) * UM, rtol=1e-12)
-    np.testing.assert_allclose(
-        tooth_separation(d, 5, 0, np.array([109, -2])), np.array([1, 106]) * UM, rtol=1e-12
-    )
+    np.testing.assert_allclose(tooth_separation(d, 5, 0, np.array([109, -2])), np.array([1, 106]) * UM, rtol=1e-12)
     assert tooth_separation(d, 0, 2, 2, back=True) == pytest.approx(-2 * UM)
 
 
@@ -233,14 +231,10 @@ def test_everything_repeats_after_the_common_period(step, seed, tau):
     d = with_sun(
         sun_pitch=np.tile(rng.normal(size=step), 27 // step) * UM,
         ring_runout=Runout(UM * rng.integers(0, 2), rng.normal()),
-        ovality=Ovality(
-            int(rng.integers(1, 7)), UM * rng.integers(0, 2), rng.normal(), bool(rng.integers(0, 2))
-        ),
+        ovality=Ovality(int(rng.integers(1, 7)), UM * rng.integers(0, 2), rng.normal(), bool(rng.integers(0, 2))),
     )
     periods, _ = common_period(d, SET)
-    assert np.allclose(
-        body_separation(d, SET, tau), body_separation(d, SET, tau + periods), rtol=0, atol=1e-16
-    )
+    assert np.allclose(body_separation(d, SET, tau), body_separation(d, SET, tau + periods), rtol=0, atol=1e-16)
     k = np.arange(27)
     assert np.array_equal(tooth_separation(d, 0, k, 0), tooth_separation(d, 0, k + periods, 0))
 
@@ -274,9 +268,7 @@ def test_play_left_and_wedging():  # bad input 50
     assert single == pytest.approx(min(loose, PLAY.backlash_planet_ring), rel=1e-12)
     assert whole == pytest.approx(loose + PLAY.backlash_planet_ring, rel=1e-12)
     # the back flanks of planet 1 meet when its pin lags by the play of both meshes
-    cosines = math.cos(PLAY.working_pressure_angle_sun_planet) + math.cos(
-        PLAY.working_pressure_angle_planet_ring
-    )
+    cosines = math.cos(PLAY.working_pressure_angle_sun_planet) + math.cos(PLAY.working_pressure_angle_planet_ring)
     limit = (loose + PLAY.backlash_planet_ring) / cosines
     for sign in (1.0, -1.0):
         below, above = (

@@ -53,9 +53,7 @@ def drawn_separation(s, mesh, position, moved_1=0.0, moved_2=0.0, *, back=False,
     side_p = side if at_sun else -side
     first = round((psi - angle) / other.pitch_angle), round((facing - planet) / s.planet.pitch_angle)
     centre_p = s.centre_distance * np.exp(1j * psi) + centre_p
-    mates = [
-        curve(other, angle + turned_o + (first[0] + i) * other.pitch_angle, 0.0, side) for i in (-1, 0, 1)
-    ]
+    mates = [curve(other, angle + turned_o + (first[0] + i) * other.pitch_angle, 0.0, side) for i in (-1, 0, 1)]
 
     def gap(turn):
         teeth = [
@@ -119,8 +117,7 @@ def test_displaced_teeth_against_drawn_ones(mesh, back):
     along = 8 * UM, -5 * UM  # counter-clockwise on the reference circles
     one, two = (s.sun, s.planet) if mesh < 3 else (s.planet, s.ring)
     displaced = [
-        np.full(g.teeth, tooth_displacements(g, cumulative=np.full(g.teeth, a))[0])
-        for g, a in zip((one, two), along)
+        np.full(g.teeth, tooth_displacements(g, cumulative=np.full(g.teeth, a))[0]) for g, a in zip((one, two), along)
     ]
     d, planets = no_deviations(s), np.zeros((3, s.planet.teeth))
     if mesh < 3:

@@ -30,9 +30,7 @@ EXTERNAL = {
 INTERNAL = {
     "ring": Gear(108, 1.5e-3, ALPHA, 0.0, 25e-3, 0.1, internal=True, cutter=PinionCutter(30)),
     "shifted": Gear(81, 2e-3, ALPHA, 0.3, 25e-3, 0.1, internal=True, cutter=PinionCutter(20, 0.1)),
-    "small rounding": Gear(
-        93, 21e-3, ALPHA, -0.1171, 0.5, 1.2, internal=True, cutter=PinionCutter(25, tip_radius=0.1)
-    ),
+    "small rounding": Gear(93, 21e-3, ALPHA, -0.1171, 0.5, 1.2, internal=True, cutter=PinionCutter(25, tip_radius=0.1)),
     "allowance": Gear(60, 1e-3, ALPHA, 0.0, 1e-2, 0.04, internal=True, thickness_allowance=30e-6),
 }
 
@@ -76,9 +74,7 @@ def cutter_profile(gear):
     angle = arcinv(inv(alpha) + 2 * math.tan(alpha) * shift / (gear.teeth - cutter.teeth))
     distance = m * (gear.teeth - cutter.teeth) * math.cos(alpha) / math.cos(angle) / 2
     tip = gear.root_radius - distance
-    half = (
-        math.pi / (2 * cutter.teeth) + 2 * cutter.profile_shift * math.tan(alpha) / cutter.teeth + inv(alpha)
-    )
+    half = math.pi / (2 * cutter.teeth) + 2 * cutter.profile_shift * math.tan(alpha) / cutter.teeth + inv(alpha)
     rolls = np.linspace(0.0, math.sqrt(tip**2 - base**2), 40001)
     polar = half - rolls / base + np.arctan2(rolls, base)
     flank = np.column_stack([np.hypot(base, rolls) * np.cos(polar), np.hypot(base, rolls) * np.sin(polar)])

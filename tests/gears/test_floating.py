@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import linprog
-from validation.planetary import reference_set
 
 from femgear.gears.kinematics import mesh_normals, unheld_members
+from validation.planetary import reference_set
 
 MEMBERS = ("sun", "carrier", "ring")
 

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.reference.gear_limits import neighbour_limit
 
 from femgear.errors import GeometryError
 from femgear.gears.checks import _backlash, check_passing_tips, check_set, tip_clearances, tip_margin
@@ -18,6 +17,7 @@ from femgear.gears.planetary import (
     zero_backlash_shift,
 )
 from femgear.gears.profile import BasicRack
+from validation.reference.gear_limits import neighbour_limit
 
 ALPHA = math.radians(20.0)
 
@@ -36,9 +36,7 @@ def standard(teeth, planets=1, angles=(), **options):
     return close_set(*gears(teeth, **options), planet_angles=angles or equal_planet_angles(planets))
 
 
-REFERENCE = PlanetarySet(
-    *gears((27, 40, 108), shifts=(0.52681, 0.0, 0.0)), 51e-3, planet_angles=equal_planet_angles(3)
-)
+REFERENCE = PlanetarySet(*gears((27, 40, 108), shifts=(0.52681, 0.0, 0.0)), 51e-3, planet_angles=equal_planet_angles(3))
 
 
 def refusal(planetary):
@@ -145,15 +143,10 @@ def test_uneven_backlash_names_the_centre_distance_of_the_shifts():
 
 
 def test_negative_play_names_the_gear_whose_shift_is_wrong():
-    assert (
-        refusal(replace(REFERENCE, ring=replace(REFERENCE.ring, profile_shift=-0.1))).key
-        == "ring.profile_shift"
-    )
+    assert refusal(replace(REFERENCE, ring=replace(REFERENCE.ring, profile_shift=-0.1))).key == "ring.profile_shift"
 
 
-@pytest.mark.parametrize(
-    ("rho", "refused"), [(0.25, False), (0.26, False), (0.38, False), (0.30, True), (0.38, True)]
-)
+@pytest.mark.parametrize(("rho", "refused"), [(0.25, False), (0.26, False), (0.38, False), (0.30, True), (0.38, True)])
 def test_ring_tip_on_planet_fillet(rho, refused, mesh_gaps):
     """Against placed outlines: the largest overlap over one mesh period is the one that is told.
 
@@ -289,9 +282,7 @@ def test_thin_tips_and_thin_rims_are_warned_about():
     sun = Gear(27, 1.5e-3, ALPHA, 1.2, 25e-3, 9e-3)
     planet = replace(REFERENCE.planet, tip_diameter=62e-3)
     planet = replace(planet, profile_shift=zero_backlash_shift(sun, planet, 51.5e-3) - sun.profile_shift)
-    thin_tip = close_set(
-        sun, planet, REFERENCE.ring, planet_angles=(0.0,), centre_distance=51.5e-3, find=("ring",)
-    )
+    thin_tip = close_set(sun, planet, REFERENCE.ring, planet_angles=(0.0,), centre_distance=51.5e-3, find=("ring",))
     assert "W-TIP-THIN" in codes(thin_tip)
 
 

@@ -18,9 +18,16 @@ def helical(beta, *, shift=0.0):
 
     def gear(teeth, name, rim, x=0.0):
         return Gear(
-            teeth=teeth, module=module, pressure_angle=angle, profile_shift=x * math.cos(beta),
-            face_width=0.02, rim_radius=rim, internal=name == "ring", rack=rack, name=name,
-        )  # fmt: skip
+            teeth=teeth,
+            module=module,
+            pressure_angle=angle,
+            profile_shift=x * math.cos(beta),
+            face_width=0.02,
+            rim_radius=rim,
+            internal=name == "ring",
+            rack=rack,
+            name=name,
+        )
 
     gears = gear(30, "sun", 0.02, shift), gear(20, "planet", 0.01), gear(70, "ring", 0.11)
     return close_set(*gears, planet_angles=(0.0,), find=("ring",))
@@ -56,9 +63,7 @@ def test_virtual_gears_have_the_curvature_of_the_normal_section():
         # to half a tooth
         away = other.reference_radius - one.reference_radius / math.cos(beta) ** 2
         assert abs(away) <= 0.5 * 2e-3 * 0.5 + 1e-12
-        assert other.module == pytest.approx(2e-3) and other.pressure_angle == pytest.approx(
-            math.radians(20.0)
-        )
+        assert other.module == pytest.approx(2e-3) and other.pressure_angle == pytest.approx(math.radians(20.0))
 
 
 def test_contact_ratio_of_the_virtual_gears_is_that_over_cos_squared_of_the_base_helix():
@@ -90,9 +95,7 @@ def test_form_circles_take_the_height_of_the_rounding_in_the_normal_section():
         gear = Gear(teeth, module, angle, shift * math.cos(beta), 0.36, 0.3 * teeth * module, rack=rack)
         depth = 14e-3 * (1.25 - shift - 0.38 * (1.0 - math.sin(normal)))
         reference = teeth * module
-        form = math.hypot(
-            reference * math.sin(angle) - 2.0 * depth / math.sin(angle), reference * math.cos(angle)
-        )
+        form = math.hypot(reference * math.sin(angle) - 2.0 * depth / math.sin(angle), reference * math.cos(angle))
         assert 2.0 * gear.form_radius == pytest.approx(form, rel=1e-12)
         assert 2e3 * gear.form_radius == pytest.approx(expected, abs=5e-4)
 

@@ -6,12 +6,12 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from validation.reference import gear_limits as limits
 
 from femgear.errors import GeometryError
 from femgear.gears import profile as iv
 from femgear.gears.gear import Gear
 from femgear.gears.pair import working_pressure_angle, zero_backlash_distance, zero_backlash_shift
+from validation.reference import gear_limits as limits
 
 ALPHA = math.radians(20.0)
 
@@ -73,9 +73,7 @@ def test_centre_distance_below_the_base_circles_is_refused_with_the_limit():
 
 
 def test_largest_root_radius_of_the_iso_rack():
-    assert limits.largest_root_radius(ALPHA, 1.25) == pytest.approx(
-        0.472, abs=5e-4
-    )  # ISO 53, profiles C and D
+    assert limits.largest_root_radius(ALPHA, 1.25) == pytest.approx(0.472, abs=5e-4)  # ISO 53, profiles C and D
 
 
 def test_undercut_limits_agree_with_each_other():

@@ -44,11 +44,17 @@ def helical_pair(teeth, shifts, *, module, degrees, distance, rack, tips=(None, 
     transverse, angle = transverse_tool(module * 1e-3, math.radians(20.0), beta)
     gears = (
         Gear(
-            z, transverse, angle, x * math.cos(beta), 0.1, 0.3 * z * transverse,
-            rack=transverse_rack(rack, beta), tip_diameter=tip and tip * 1e-3,
+            z,
+            transverse,
+            angle,
+            x * math.cos(beta),
+            0.1,
+            0.3 * z * transverse,
+            rack=transverse_rack(rack, beta),
+            tip_diameter=tip and tip * 1e-3,
         )
         for z, x, tip in zip(teeth, shifts, tips, strict=True)
-    )  # fmt: skip
+    )
     return GearPair(*gears, distance * 1e-3)
 
 
@@ -56,9 +62,14 @@ ISO_EXAMPLE = helical_pair(
     (17, 103), (0.145, 0.0), module=8, degrees=15.8, distance=500, rack=BasicRack(1.0, 1.4, 0.39)
 )
 WIND = helical_pair(
-    (24, 95), (0.48, 0.6691), module=14, degrees=10, distance=861, rack=BasicRack(1.0, 1.25, 0.38),
+    (24, 95),
+    (0.48, 0.6691),
+    module=14,
+    degrees=10,
+    distance=861,
+    rack=BasicRack(1.0, 1.25, 0.38),
     tips=(380.747, 1395.376),
-)  # fmt: skip
+)
 
 
 def test_virtual_teeth_are_those_of_the_base_helix():

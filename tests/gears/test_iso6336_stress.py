@@ -10,7 +10,6 @@ import math
 
 import numpy as np
 import pytest
-from validation.planetary import nrel_set
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
@@ -30,6 +29,7 @@ from femgear.gears.iso6336 import (
 )
 from femgear.gears.pair import close_pair
 from femgear.gears.profile import BasicRack, transverse_rack, transverse_tool
+from validation.planetary import nrel_set
 
 FORCE = 285900.438
 STEEL = {"youngs_modulus": 206e9, "poisson_ratio": 0.3}
@@ -126,9 +126,7 @@ def test_root_stress_is_linear_in_the_force_and_similar(nrel):
     assert two.stress == pytest.approx(2 * one.stress)
     assert two.form == one.form
     small, large = (
-        nominal_root_stress(
-            Gear(20, m, math.radians(20), 0.1, 10 * m, 5 * m), contact_ratio=1.5, tangential_force=m**2
-        )
+        nominal_root_stress(Gear(20, m, math.radians(20), 0.1, 10 * m, 5 * m), contact_ratio=1.5, tangential_force=m**2)
         for m in (1e-3, 1e-2)
     )
     assert large.stress == pytest.approx(small.stress, rel=1e-12)
@@ -168,27 +166,45 @@ def helical_pair(teeth, shifts, tips, *, module, angle, width, centre, rack=(1.0
     section = transverse_tool(1e-3 * module, math.radians(20.0), helix)
     gears = [
         Gear(
-            z, *section, x * math.cos(helix), 1e-3 * width, 5e-3 * module,
-            rack=transverse_rack(BasicRack(*rack), helix), tip_diameter=1e-3 * tip, name=name,
+            z,
+            *section,
+            x * math.cos(helix),
+            1e-3 * width,
+            5e-3 * module,
+            rack=transverse_rack(BasicRack(*rack), helix),
+            tip_diameter=1e-3 * tip,
+            name=name,
         )
         for z, x, tip, name in zip(teeth, shifts, tips, ("pinion", "wheel"), strict=True)
-    ]  # fmt: skip
+    ]
     return close_pair(*gears, centre_distance=1e-3 * centre, find=("wheel",))
 
 
 def iso_tr_example():
     """Worked example 1 of ISO/TR 6336-30."""
     return helical_pair(
-        (17, 103), (0.145, 0.0), (159.66, 872.35), module=8.0, angle=15.8, width=100.0, centre=500.0,
+        (17, 103),
+        (0.145, 0.0),
+        (159.66, 872.35),
+        module=8.0,
+        angle=15.8,
+        width=100.0,
+        centre=500.0,
         rack=(1.0, 1.4, 0.39),
-    )  # fmt: skip
+    )
 
 
 def fzg_h501(rounding):
     return helical_pair(
-        (20, 30), (0.1809, 0.0891), (80.672, 116.264), module=3.5, angle=15.0, width=23.0, centre=91.5,
+        (20, 30),
+        (0.1809, 0.0891),
+        (80.672, 116.264),
+        module=3.5,
+        angle=15.0,
+        width=23.0,
+        centre=91.5,
         rack=(1.0, 1.25, rounding),
-    )  # fmt: skip
+    )
 
 
 def test_contact_stress_of_helical_teeth_is_that_of_the_technical_report():
@@ -203,9 +219,13 @@ def test_contact_stress_of_helical_teeth_is_that_of_the_technical_report():
     assert contact_ratio_factor(pair.contact_ratio, overlap) == pytest.approx(0.803, abs=5e-4)
     assert contact_helix_factor(helix) == pytest.approx(1.01944, abs=5e-6)
     stress = nominal_contact_stress(
-        small, large, working_angle=pair.working_pressure_angle, contact_ratio=pair.contact_ratio,
-        tangential_force=9000.0 / small.reference_radius, **STEEL,
-    )  # fmt: skip
+        small,
+        large,
+        working_angle=pair.working_pressure_angle,
+        contact_ratio=pair.contact_ratio,
+        tangential_force=9000.0 / small.reference_radius,
+        **STEEL,
+    )
     assert stress == pytest.approx(1206.58e6, rel=5e-6)
 
 
@@ -246,12 +266,9 @@ def test_factors_of_the_helix():
 def test_internal_teeth_of_a_small_helix_are_spur_teeth(nrel):
     """All factors go over into those of spur teeth, for the ring and its cutter too."""
     helix = 1e-4
-    ring = dataclasses.replace(
-        nrel.ring, rack=dataclasses.replace(nrel.ring.rack, stretch=1.0 / math.cos(helix))
-    )
+    ring = dataclasses.replace(nrel.ring, rack=dataclasses.replace(nrel.ring.rack, stretch=1.0 / math.cos(helix)))
     spur, helical = (
-        nominal_root_stress(gear, contact_ratio=1.6, tangential_force=FORCE).stress
-        for gear in (nrel.ring, ring)
+        nominal_root_stress(gear, contact_ratio=1.6, tangential_force=FORCE).stress for gear in (nrel.ring, ring)
     )
     assert helical == pytest.approx(spur, rel=1e-5) and helical != spur
 

@@ -60,9 +60,7 @@ def test_mirrored_bodies_and_teeth_are_those_at_the_back(s):
     back = body_separation(loose, s, start - tau, back=True)[mesh]
     half = 0.5 * (d.planet_thickness - d.planet_thickness.min())[order] * math.cos(ALPHA)
     # amplitudes of micrometres turned by play over radius
-    assert np.allclose(
-        seen - np.tile(half, 2)[:, None], back, atol=2e-8 if s.backlash_sun_planet > UM else 1e-16
-    )
+    assert np.allclose(seen - np.tile(half, 2)[:, None], back, atol=2e-8 if s.backlash_sun_planet > UM else 1e-16)
     # the teeth that meet in the image are the original ones whose back flanks stand there
     index = np.tile(np.arange(-2, 3), (2 * N, 1))
     one, two = tooth_numbers(mirrored, index)

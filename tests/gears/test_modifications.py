@@ -45,9 +45,7 @@ def test_values_at_points(gear):
     linear = TipRelief(12 * um, place(gear, 0.6))
     assert at(linear, gear, [0, 0.6, 0.8, 1]) == pytest.approx([0, 0, 6 * um, 12 * um], abs=1e-18)
     parabolic = TipRelief(12 * um, place(gear, 0.6), power=2.0)
-    assert at(parabolic, gear, [0.3, 0.7, 0.8, 1]) == pytest.approx(
-        [0, 0.75 * um, 3 * um, 12 * um], abs=1e-17
-    )
+    assert at(parabolic, gear, [0.3, 0.7, 0.8, 1]) == pytest.approx([0, 0.75 * um, 3 * um, 12 * um], abs=1e-17)
     to_end = TipRelief(12 * um, place(gear, 0.6), place(gear, 0.8))
     assert at(to_end, gear, [0.7, 0.8, 1]) == pytest.approx([6 * um, 12 * um, 24 * um], abs=1e-17)
     root = RootRelief(8 * um, place(gear, 0.4))

@@ -75,9 +75,7 @@ def test_turning_back_meets_the_same_contacts_in_opposite_order(any_set, arcs_to
         state = orientations(s, phase)
         gear, turn = (s.sun, state.sun) if j < s.n_planets else (s.ring, state.ring)
         angle = (s.working_pressure_angle_sun_planet, s.working_pressure_angle_planet_ring)[j >= s.n_planets]
-        pitch_point = (
-            gear.base_radius / math.cos(angle) * np.exp(1j * (s.planet_angles[j % s.n_planets] + 1e-12))
-        )
+        pitch_point = gear.base_radius / math.cos(angle) * np.exp(1j * (s.planet_angles[j % s.n_planets] + 1e-12))
         assert abs(arcs_to_tooth(gear, turn, np.array([pitch_point]), 1.0)[0]) < 2e-9
 
 
@@ -127,9 +125,7 @@ def test_four_equal_planets(sun, planet):
             assert np.all(gone == gone[0])
             assert (torque, thrust) == (kind != "in-phase",) * 2
             assert (lateral, tilt) == (kind != "sequentially phased",) * 2
-            assert modes == (
-                {"in-phase": "rotational", "counter-phased": "planet"}.get(kind, "translational"),
-            )
+            assert modes == ({"in-phase": "rotational", "counter-phased": "planet"}.get(kind, "translational"),)
 
 
 @pytest.mark.parametrize("planets", [3, 4, 5, 6, 7, 8])
@@ -140,9 +136,7 @@ def test_equal_spacing_follows_the_published_rule(planets):
         phasing = mesh_phasing(sun, ring, equal_planet_angles(planets))
         table = phasing_table(phasing, range(1, 2 * planets + 1))
         shares = cyclic_shares(phasing, range(1, 2 * planets + 1))
-        for h, k, size, modes, share in zip(
-            table.harmonics, table.cyclic, table.members, table.modes, shares
-        ):
+        for h, k, size, modes, share in zip(table.harmonics, table.cyclic, table.members, table.modes, shares):
             assert k == h * sun % planets
             torque, lateral = float(k == 0), float(k in (1, planets - 1))
             assert size == pytest.approx(np.tile([torque, lateral, torque, lateral], (3, 1)), abs=1e-12)
@@ -198,9 +192,7 @@ def test_far_harmonics_stay_exact():
 def test_whirl_goes_against_the_phase_that_the_planets_gain():
     """Four planets and z_s = 29, each a quarter period later: q = -1 (or 3) adds up, -2 in harmonic 2."""
     sums = planet_sums(29, np.array([0, 25, 50, 75]), 100, [1, 2, 3], [0, 1, -1, 2, 3])
-    assert sums == pytest.approx(
-        np.array([[0, 0, 1, 0, 1], [0, 0, 0, 1, 0], [0, 1, 0, 0, 0]], complex), abs=1e-12
-    )
+    assert sums == pytest.approx(np.array([[0, 0, 1, 0, 1], [0, 0, 0, 1, 0], [0, 1, 0, 0, 0]], complex), abs=1e-12)
     # the other way round, and unequal spacing, planet by planet
     positions = np.array([0, 17, 45, 60, 81])
     psi = 2 * np.pi * positions / 103

@@ -6,10 +6,10 @@ from phase_patterns import mesh_loads
 
 from femgear.gears.phasing import mesh_phasing, phasing_table
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
+from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mesh_directions import gear_set_system, mesh_directions, pin_directions
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport
 from femgear.trains.helical.model import HelicalSet
-from femgear.trains.rigid import gear_set_modes
 
 HARMONICS = np.arange(1, 7)
 KIND = {"rotational": "rotational-axial", "translational": "translational-tilting", "planet": "planet"}
@@ -30,9 +30,7 @@ IDS = [f"{s}-{r}, {n}{', unequal' if o else ''}" for s, r, n, o in SPACINGS]
 
 def helical(psi, *, alpha=(0.37, 0.35), contact_points="pitch_point"):
     support = HelicalSupport(radial=2e7, axial=5e7, tilt=2e4, torsional=3e4)
-    sun, ring, carrier = (
-        HelicalBody(m, j, 0.6 * j, support) for m, j in ((0.4, 2e-4), (2.3, 8e-3), (5.0, 9e-3))
-    )
+    sun, ring, carrier = (HelicalBody(m, j, 0.6 * j, support) for m, j in ((0.4, 2e-4), (2.3, 8e-3), (5.0, 9e-3)))
     return HelicalSet(
         sun=sun,
         ring=ring,
@@ -124,9 +122,7 @@ def test_harmonics_excite_one_kind_of_mode(sun, ring, planets, offsets):
     modes = gear_set_modes(data)
     kind = np.array(modes.kind)
     k = data.mesh_stiffness[:, None]
-    force = np.abs(mesh_loads(modes.shape.T @ (gear_set_system(data).W * k.T), phasing, HARMONICS)).max(
-        axis=1
-    )
+    force = np.abs(mesh_loads(modes.shape.T @ (gear_set_system(data).W * k.T), phasing, HARMONICS)).max(axis=1)
     table = phasing_table(phasing, HARMONICS)
     for row, excited in zip(force, table.excited):
         (name,) = excited

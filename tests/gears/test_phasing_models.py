@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 from phase_patterns import cyclic_shares, mesh_loads
-from validation.reference.frequency_response import mesh_error_response
 
 from femgear.gears.phasing import mesh_phasing, phase_factors, phasing_table
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
+from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mesh_directions import gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import gear_set_motions, phase_basis, phase_shares
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.trains.rigid import gear_set_modes
+from validation.reference.frequency_response import mesh_error_response
 
 ALPHA = np.radians(21.0), np.radians(20.0)
 HARMONICS = np.arange(1, 8)
@@ -160,9 +160,7 @@ def test_planet_modes_are_excited_by_cyclic_harmonic(planets):
     number = np.array([np.nanargmax(column) for column in share.T])
     directions = gear_set_system(data).W.reshape(-1, 2, planets)
     force = np.abs(
-        np.einsum(
-            "gm,gfn,hfn->hfm", shape, directions, phase_factors(phasing, HARMONICS).reshape(-1, 2, planets)
-        )
+        np.einsum("gm,gfn,hfn->hfm", shape, directions, phase_factors(phasing, HARMONICS).reshape(-1, 2, planets))
     ).max(axis=1)
     expected = cyclic_shares(phasing, HARMONICS)
     assert np.count_nonzero(expected, axis=1) == pytest.approx(1)

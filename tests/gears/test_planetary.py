@@ -107,11 +107,7 @@ def test_a_pair_touches_at_the_pitch_point_when_position_plus_phase_is_whole(arc
             state = orientations(s, -phase)
             n = j % s.n_planets
             mesh_gear, turn = (s.sun, state.sun) if j < s.n_planets else (s.ring, state.ring)
-            aw = (
-                s.working_pressure_angle_sun_planet
-                if j < s.n_planets
-                else s.working_pressure_angle_planet_ring
-            )
+            aw = s.working_pressure_angle_sun_planet if j < s.n_planets else s.working_pressure_angle_planet_ring
             radius = mesh_gear.base_radius / math.cos(aw)
             point = np.array([radius * np.exp(1j * s.planet_angles[n])])
             left = arcs_to_tooth(mesh_gear, turn, point * np.exp(1e-12j), 1.0)
@@ -212,9 +208,7 @@ def test_single_contact_is_a_base_pitch_from_the_ends_of_the_path(name):
         first = tip_1 - pitch, sense * (tip_2 - length) + pitch
         second = length + sense * first[1], length + sense * first[0]
         for gear, rolls, found in zip(pair.gears, (first, second), pair.single_contact, strict=True):
-            assert found == pytest.approx(
-                [2 * math.hypot(gear.base_radius, roll) for roll in rolls], rel=1e-12
-            )
+            assert found == pytest.approx([2 * math.hypot(gear.base_radius, roll) for roll in rolls], rel=1e-12)
             assert abs(found[1] - 2 * gear.tip_radius) < abs(found[0] - 2 * gear.tip_radius)
 
 

@@ -198,9 +198,7 @@ def test_a_ring_shift_with_the_sign_of_iso_21771_is_recognised(distance):
     # another shift that does not close the set is not explained so
     with pytest.raises(GeometryError) as caught:
         other = replace(ring, profile_shift=wrong.profile_shift - 0.05)
-        check_meshes(
-            settled_tips(close_set(sun, planet, other, planet_angles=(0.0,), centre_distance=distance))
-        )
+        check_meshes(settled_tips(close_set(sun, planet, other, planet_angles=(0.0,), centre_distance=distance)))
     assert "ISO 21771" not in caught.value.message
 
 

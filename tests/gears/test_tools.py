@@ -10,9 +10,16 @@ from femgear.gears.gear import Gear, PinionCutter, half_thickness_angle
 from femgear.gears.profile import CutterTip, inv, pressure_angle_at
 
 TIP = CutterTip(
-    pitch_radius=0.05, cutter_pitch_radius=0.02, cutter_base_radius=0.0188, centre_distance=0.03,
-    centre_radius=0.0221, centre_angle=0.01, rounding=3e-4, gap_angle=0.02, end_angle=0.4,
-)  # fmt: skip
+    pitch_radius=0.05,
+    cutter_pitch_radius=0.02,
+    cutter_base_radius=0.0188,
+    centre_distance=0.03,
+    centre_radius=0.0221,
+    centre_angle=0.01,
+    rounding=3e-4,
+    gap_angle=0.02,
+    end_angle=0.4,
+)
 
 
 def test_a_cutter_whose_rounding_lies_within_its_base_circle_has_no_room():

@@ -36,8 +36,9 @@ def crosses(vertices):
     a, b = vertices, np.roll(vertices, -1, axis=0)
 
     def side(p, q, r):
-        return np.sign((q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1])
-                       - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0]))  # fmt: skip
+        return np.sign(
+            (q[..., 0] - p[..., 0]) * (r[..., 1] - p[..., 1]) - (q[..., 1] - p[..., 1]) * (r[..., 0] - p[..., 0])
+        )
 
     i, j = np.triu_indices(len(a), 2)
     keep = ~((i == 0) & (j == len(a) - 1))
@@ -203,9 +204,16 @@ def test_a_body_too_deep_for_its_sector_is_refused():
 
 def test_elements_are_smaller_where_a_fillet_turns_sharply():
     gear = Gear(
-        61, 4e-3, ALPHA, 0.0, 0.05, 0.14, internal=True, rack=BasicRack(0.9, 1.25, 0.0),
+        61,
+        4e-3,
+        ALPHA,
+        0.0,
+        0.05,
+        0.14,
+        internal=True,
+        rack=BasicRack(0.9, 1.25, 0.0),
         cutter=PinionCutter(45),
-    )  # fmt: skip
+    )
     fillet = half_sector(gear).curve("fillet")[::2]
     step = np.diff(fillet @ np.array([1.0, 1j]))
     # by the chord of an arc, an element turns by its length over the radius
@@ -218,9 +226,16 @@ def test_elements_are_smaller_where_a_fillet_turns_sharply():
 def test_corners_of_roots_are_found():
     """Where a sharp cutter ends its flank at the pitch point the fillet has no length."""
     corner = Gear(
-        80, 2e-3, ALPHA, 0.5, 0.02, 0.16, internal=True, rack=BasicRack(root_radius=0.0),
+        80,
+        2e-3,
+        ALPHA,
+        0.5,
+        0.02,
+        0.16,
+        internal=True,
+        rack=BasicRack(root_radius=0.0),
         cutter=PinionCutter(60),
-    )  # fmt: skip
+    )
     notches, radius = root_notches(corner)
     assert radius < 0.003 * 2e-3
     assert np.abs(np.hypot(*notches.T) - corner.root_radius).max() < 0.003 * 2e-3
@@ -247,8 +262,6 @@ def test_a_similar_gear_has_the_similar_outline(name):
     larger = {key: factor * value for key in lengths if (value := getattr(gear, key)) is not None}
     shift = gear.profile_shift * (1.0 + 1e-15)
     one, two = half_sector(gear), half_sector(replace(gear, **larger, profile_shift=shift))
-    for (kind, points), (_, others) in zip(
-        one.curves + one.interfaces, two.curves + two.interfaces, strict=True
-    ):
+    for (kind, points), (_, others) in zip(one.curves + one.interfaces, two.curves + two.interfaces, strict=True):
         assert others == pytest.approx(factor * points, rel=1e-13, abs=1e-13 * gear.module), kind
     assert two.flank_roll == pytest.approx(factor * one.flank_roll, rel=1e-13)

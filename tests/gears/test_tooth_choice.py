@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 import pytest
-from validation.reference.gear_limits import neighbour_limit
 
 from femgear.errors import GeometryError
 from femgear.gears.phasing import (
@@ -16,6 +15,7 @@ from femgear.gears.phasing import (
     phasing_table,
 )
 from femgear.gears.planetary import equal_planet_angles, feasible_angles
+from validation.reference.gear_limits import neighbour_limit
 
 
 @pytest.mark.parametrize(("wanted", "planets"), [((30, 20, 70), 4), ((27, 40, 108), 3), ((29, 16, 61), 5)])

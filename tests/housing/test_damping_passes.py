@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 
-from femgear.housing import damping_passes
-from femgear.housing.damping_passes import _largest, _shares
-from femgear.housing.structure import supported_ring
-from femgear.housing.two_way import MeshPaths, solve_two_way
+from femgear.housing.two_way import damping_passes
+from femgear.housing.two_way.damping_passes import _largest, _shares
+from femgear.housing.two_way.response import MeshPaths, solve_two_way
+from femgear.housing.two_way.structure import supported_ring
 from femgear.solvers.linear.modal import modal_damping, solve_modes
+from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 
 
 def solved(symmetry):

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from validation.reference.sensor_in_time import mean_square, symmetry_leakage
 
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, order_spectrum
@@ -13,6 +12,7 @@ from femgear.housing.sensor import (
     heaviside_linear_lines,
     rounded_lines,
 )
+from validation.reference.sensor_in_time import mean_square, symmetry_leakage
 
 Z_RING, SENSOR, SPEED = 108, 0.7, 5.2
 
@@ -66,9 +66,7 @@ def test_each_line_is_weighted_with_its_own_order_squared():
     field = np.zeros((2, 7), dtype=complex)
     field[1, 0] = field[1, 6] = 1e-6
     lines = fixed_sensor_lines(field, Z_RING, SPEED, 0.0)
-    assert abs(lines.acceleration[111] / lines.acceleration[105]) == pytest.approx(
-        (111 / 105) ** 2, rel=1e-13
-    )
+    assert abs(lines.acceleration[111] / lines.acceleration[105]) == pytest.approx((111 / 105) ** 2, rel=1e-13)
     signal = fixed_sensor_signal(lines)
     # d2/dt2 of cos(a t) + cos(b t), by hand
     t = signal.seconds
@@ -170,9 +168,7 @@ def test_rounded_lines_err_by_less_than_their_share_of_the_acceleration(share):
     order = np.arange(0, 900, 3)
     size = 10.0 ** np.random.default_rng(2).uniform(-15, -4, (3, 300))
     waves = random_field(harmonics=2, n_max=149, seed=3)[:, 1:] / 10.0
-    lines = SensorLines(
-        order, size * np.pad(waves, ((0, 0), (0, 2))), np.array([1.0, 7.0, 40.0]), 0.0, 9, "exact"
-    )
+    lines = SensorLines(order, size * np.pad(waves, ((0, 0), (0, 2))), np.array([1.0, 7.0, 40.0]), 0.0, 9, "exact")
     rounded = rounded_lines(lines, share)
     assert rounded.dtype == np.complex64
     error = np.abs((rounded - lines.displacement) * (order * lines.base_speed[:, None]) ** 2)

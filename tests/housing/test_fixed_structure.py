@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from validation import fixed_housing
-from validation.fixed_housing import DIRECTION, EQUAL, FEET, PAIR, WIDTH, R, feet, gears, solved, thin_ring
 
 from femgear.errors import CaseError
-from femgear.housing.structure import FixedStructure, Support, from_arrays, supported_ring
-from femgear.housing.two_way import MeshPaths, planet_groups, solve_two_way
+from femgear.housing.two_way.response import MeshPaths, planet_groups, solve_two_way
+from femgear.housing.two_way.structure import FixedStructure, Support, from_arrays, supported_ring
 from femgear.solvers.linear.modal import solve_modes
+from validation import fixed_housing
+from validation.fixed_housing import DIRECTION, EQUAL, FEET, PAIR, WIDTH, R, feet, gears, solved, thin_ring
 
 KNOWN: Any = {"max_diameter": 4, "max_frequency": 6e3, "damping_ratio": 0.03}
 
@@ -60,11 +60,14 @@ def _sampled(structure: FixedStructure, angle):
     across = np.random.default_rng(0).normal(size=shape.shape)
     vector = shape[..., None] * DIRECTION + across[..., None] * (DIRECTION[1], -DIRECTION[0])
     return {
-        "natural_frequency": structure.natural_frequency, "damping_ratio": 0.03, "ring_angle": angle,
-        "ring_shape": vector, "sensor_shape": structure.sensor_shape,
+        "natural_frequency": structure.natural_frequency,
+        "damping_ratio": 0.03,
+        "ring_angle": angle,
+        "ring_shape": vector,
+        "sensor_shape": structure.sensor_shape,
         "ring_compliance": np.real(waves @ structure.residual @ waves.conj().T),
         "sensor_compliance": np.real(structure.sensor_residual @ waves.conj().T),
-    }  # fmt: skip
+    }
 
 
 @pytest.mark.parametrize("even", [True, False])
@@ -155,6 +158,4 @@ def test_speeds_do_not_depend_on_one_another():
     assert together.residual.max() < 1e-12
     for i, speed in enumerate(speeds):
         alone = solved(paths, feet(4), speeds[i : i + 1], tolerance=1e-13).force[0]
-        np.testing.assert_allclose(
-            together.force[i], alone, atol=1e-11 * abs(alone).max(), err_msg=str(speed)
-        )
+        np.testing.assert_allclose(together.force[i], alone, atol=1e-11 * abs(alone).max(), err_msg=str(speed))

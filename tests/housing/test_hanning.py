@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from validation.reference.sensor_in_time import phased_harmonics
 
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, analyse_band
 from femgear.housing.sensor import fixed_sensor_lines, fixed_sensor_signal, hanning_model
+from validation.reference.sensor_in_time import phased_harmonics
 
 
 def windowed_sum(theta, harmonics, planet_angles, width, sensor, z_ring, direction):

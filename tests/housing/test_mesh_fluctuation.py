@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.housing.mesh_fluctuation import gmres
+from femgear.housing.two_way.mesh_fluctuation import gmres
 
 
 @pytest.mark.parametrize("size", [1, 14, 15, 16, 64])

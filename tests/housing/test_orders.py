@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from validation.reference.sensor_in_time import mean_square, symmetry_leakage
 
 from femgear.errors import CaseError
 from femgear.housing.orders import (
@@ -21,6 +20,7 @@ from femgear.housing.orders import (
     spacing_symmetry,
 )
 from femgear.housing.sensor import fixed_sensor_lines
+from validation.reference.sensor_in_time import mean_square, symmetry_leakage
 
 THETA = 2 * np.pi * np.arange(2048) / 2048
 
@@ -217,11 +217,7 @@ def test_symmetry_of_the_spacing(name, symmetry):
 def test_verdicts_on_lines(name, order, verdict, reason):
     angles = 2 * np.pi * np.array(PLACES[name]) / 100
     found = classify_line(order, angles, (70, 30, 20), tolerance=0.05)
-    assert (
-        found.verdict == verdict
-        and found.reason.startswith(reason)
-        and (found.reason == "") == (reason == "")
-    )
+    assert found.verdict == verdict and found.reason.startswith(reason) and (found.reason == "") == (reason == "")
     assert found.nearest == round(order)
     without = classify_line(order, angles, (70, None, None), tolerance=0.05)
     assert without.verdict == (FOREIGN if "turn" in reason else verdict)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from validation.reference.sensor_in_time import heaviside_linear, passages, point_signals
 
 from femgear.errors import CaseError
 from femgear.housing.sensor import fixed_sensor_lines, heaviside_linear_lines
+from validation.reference.sensor_in_time import heaviside_linear, passages, point_signals
 
 
 def random_field(harmonics, n_max, seed=7):

@@ -5,19 +5,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.housing.structure import Support, circumferential, equal_sectors, ring_waves, supported_ring
-from femgear.housing.turn_stability import _extrapolated, turn_stability
-from femgear.housing.two_way import MeshPaths, solve_two_way, structure_lines
+from femgear.housing.two_way.response import MeshPaths, solve_two_way, structure_lines
+from femgear.housing.two_way.structure import Support, circumferential, equal_sectors, ring_waves, supported_ring
+from femgear.housing.two_way.turn_stability import _extrapolated, turn_stability
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.stability.parametric import stability
+from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 
 RING = thin_ring(4, foundation=2e10)
-STRUCTURE = supported_ring(
-    RING, FEET, max_diameter=4, max_frequency=1e6, damping_ratio=0.04, sensor_angles=(0.3, 2.0)
-)
+STRUCTURE = supported_ring(RING, FEET, max_diameter=4, max_frequency=1e6, damping_ratio=0.04, sensor_angles=(0.3, 2.0))
 
 
 def solved(symmetry, *, damped=True, structure=STRUCTURE, speeds=(8.0, 30.0), **changed):
@@ -102,9 +100,7 @@ def test_refused(changed):
     assert error.value.code == "E-SHAPE"
 
 
-@pytest.mark.parametrize(
-    ("speed", "depth", "ratio"), [(100.0, 0.15, 2e-4), (100.0, 0.15, 1e-2), (170.0, 0.4, 2e-4)]
-)
+@pytest.mark.parametrize(("speed", "depth", "ratio"), [(100.0, 0.15, 2e-4), (100.0, 0.15, 1e-2), (170.0, 0.4, 2e-4)])
 def test_a_ring_that_turns_alone_is_the_same_in_both_frames(speed, depth, ratio):
     paths, ring = MeshPaths(37, EQUAL, 0.1, 3), thin_ring(0, foundation=2e10)
     structure = supported_ring(ring, (), max_diameter=0, max_frequency=1e6, damping_ratio=ratio)

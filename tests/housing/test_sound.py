@@ -5,7 +5,6 @@ import sys
 
 import numpy as np
 import pytest
-from validation.sound import axial_waves, outgoing
 
 from femgear.errors import CaseError, FemgearError, nvh_library
 from femgear.housing.sensor import component_lines, lines_in_form
@@ -27,6 +26,7 @@ from femgear.housing.sound import (
     sound_quality,
     whole_turns,
 )
+from validation.sound import axial_waves, outgoing
 
 RING, ENDLESS = Cylinder(0.1, 0.025), Cylinder(0.1, np.inf)
 TURN = 2 * np.pi
@@ -45,9 +45,7 @@ def test_pressure_transfer_solves_the_wave_equation():
     for n, ka, kr in ((0, 0.3, 2.0), (3, 1.1, 1.1), (5, 4.0, 30.0)):
         frequency = ka * 343.0 / (TURN * 0.1)
         expected = -1j * 1.204 * 343.0 * outgoing(n, ka, kr)
-        assert pressure_transfer(n, frequency, ENDLESS, 0.1 * (kr / ka - 1)) == pytest.approx(
-            expected, rel=1e-8
-        )
+        assert pressure_transfer(n, frequency, ENDLESS, 0.1 * (kr / ka - 1)) == pytest.approx(expected, rel=1e-8)
 
 
 def test_air_is_a_resistance_to_short_waves_and_a_mass_to_long_ones():
@@ -58,9 +56,7 @@ def test_air_is_a_resistance_to_short_waves_and_a_mass_to_long_ones():
     assert slow == pytest.approx(1j * TURN * 1.204 * 0.1 / 4, rel=1e-4)
 
 
-@pytest.mark.parametrize(
-    ("n", "frequency", "distance"), [(0, 60.0, 0.9), (3, 1116.0, 0.4), (12, 9000.0, 0.1)]
-)
+@pytest.mark.parametrize(("n", "frequency", "distance"), [(0, 60.0, 0.9), (3, 1116.0, 0.4), (12, 9000.0, 0.1)])
 def test_a_ring_in_a_rigid_cylinder_is_the_sum_of_its_axial_waves(n, frequency, distance):
     expected = axial_waves(n, frequency, RING, distance)
     assert pressure_transfer(n, frequency, RING, distance) == pytest.approx(expected, rel=1e-6)
@@ -131,9 +127,7 @@ def test_power_is_the_equivalent_one_times_the_efficiency():
     assert equivalent == pytest.approx(0.5 * 1.204 * 343.0 * velocity**2 * TURN * 0.1 * 0.025)
     some = lines.order > 0
     ka = TURN * lines.frequency[some] * 0.1 / 343.0
-    assert power[some] / equivalent[some] == pytest.approx(
-        radiation_efficiency(nodal_diameters(lines)[some], ka, 0.25)
-    )
+    assert power[some] / equivalent[some] == pytest.approx(radiation_efficiency(nodal_diameters(lines)[some], ka, 0.25))
     assert not power[~some].any()
 
 
@@ -313,15 +307,18 @@ def test_loudness_needs_all_that_is_heard():
         assert caught.value.code == "E-RANGE" and "48 kHz" in caught.value.limit
 
 
-@pytest.mark.parametrize(("form", "expected"), [
-    ("m/s^2 rms", lambda a, w: a / math.sqrt(2)),
-    ("m/s^2 peak", lambda a, w: a),
-    ("g peak", lambda a, w: a / 9.80665),
-    ("mm/s rms", lambda a, w: 1e3 * a / (w * math.sqrt(2))),
-    ("mm/s peak", lambda a, w: 1e3 * a / w),
-    ("um peak", lambda a, w: 1e6 * a / w**2),
-    ("dB rms", lambda a, w: 20 * math.log10(a / math.sqrt(2) / 1e-6)),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("form", "expected"),
+    [
+        ("m/s^2 rms", lambda a, w: a / math.sqrt(2)),
+        ("m/s^2 peak", lambda a, w: a),
+        ("g peak", lambda a, w: a / 9.80665),
+        ("mm/s rms", lambda a, w: 1e3 * a / (w * math.sqrt(2))),
+        ("mm/s peak", lambda a, w: 1e3 * a / w),
+        ("um peak", lambda a, w: 1e6 * a / w**2),
+        ("dB rms", lambda a, w: 20 * math.log10(a / math.sqrt(2) / 1e-6)),
+    ],
+)
 def test_levels_of_sines(form, expected):
     """A sine of amplitude a at f has a/sqrt(2) r.m.s. and the velocity a/(2 pi f); two add their powers."""
     a, f = np.array([[3.0, 4.0j]]), np.array([50.0, 80.0])

@@ -1,16 +1,16 @@
-"""Errors that turn, in a housing that stands still; against time integration in tests/validation."""
+"""Errors that turn, in a housing that stands still; against time integration in validation."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.fixed_housing import EQUAL, excitation, feet, gears, rigid_modes, shaken
 
 from femgear.errors import CaseError
-from femgear.housing.carrier_orders import MeshPaths, mean_excitation
-from femgear.housing.two_way import solve_two_way, structure_lines
+from femgear.housing.two_way.carrier_orders import MeshPaths, mean_excitation
+from femgear.housing.two_way.response import solve_two_way, structure_lines
 from femgear.solvers.linear.modal import solve_modes
-from femgear.trains.protocol import one_blas_thread
+from femgear.stages.protocol import one_blas_thread
+from validation.fixed_housing import EQUAL, excitation, feet, gears, rigid_modes, shaken
 
 SPEEDS = np.array([-40.0, -70.0])
 STRUCTURE = feet(6)
@@ -23,9 +23,7 @@ def paths(symmetry: int) -> MeshPaths:
 
 def tiled(drive, periods: int):
     arrays = {name: getattr(drive, name) for name in ("stiffness", "deflection", "force")}
-    return replace(
-        drive, periods=periods, **{name: np.tile(one, (1, periods)) for name, one in arrays.items()}
-    )
+    return replace(drive, periods=periods, **{name: np.tile(one, (1, periods)) for name, one in arrays.items()})
 
 
 @one_blas_thread()
@@ -37,9 +35,7 @@ def lines(drive, symmetry: int):
 @pytest.mark.parametrize("symmetry", [3, 1])
 def test_a_record_over_more_periods_than_it_needs_changes_nothing(symmetry):
     drive = excitation(paths(1), -1)
-    (once, order, expected), (thrice, more, found) = (
-        lines(one, symmetry) for one in (drive, tiled(drive, 3))
-    )
+    (once, order, expected), (thrice, more, found) = (lines(one, symmetry) for one in (drive, tiled(drive, 3)))
     assert (once.turns, thrice.turns) == (1, 3)
     at = np.searchsorted(more, order)
     size = np.abs(expected).max()

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.report.tables import Block
+from femgear.stages.protocol import Figures, Stage, StageResult, Train
 from femgear.storage.results import dataset
-from femgear.trains.protocol import Figures, Stage, StageResult, Train
 
 
 @dataclass(frozen=True)
@@ -17,9 +17,7 @@ class ModesResult(StageResult):
 
     def dataset(self):
         """Contents of modes.nc."""
-        return dataset(
-            {"frequency": ((), self.frequency, "Hz", "natural frequency")}, {}, {"title": "oscillator"}
-        )
+        return dataset({"frequency": ((), self.frequency, "Hz", "natural frequency")}, {}, {"title": "oscillator"})
 
 
 @dataclass(frozen=True)

@@ -84,11 +84,7 @@ def test_resonances_are_paired_by_mode_kind_and_harmonic():
 def test_curves_lie_over_each_other_within_joint_limits():
     def chart(low, high, name):
         axis = {"title": "", "log": False, "range": [low, high]}
-        return {
-            "panels": [
-                {"x": axis, "y": axis, "traces": [{"name": name, "y": [1.0]}], "words": [{"text": "w"}]}
-            ]
-        }
+        return {"panels": [{"x": axis, "y": axis, "traces": [{"name": name, "y": [1.0]}], "words": [{"text": "w"}]}]}
 
     found = compare._overlaid(chart(0, 2, "k"), chart(-1, 1, "k"))
     panel = found["panels"][0]
@@ -109,17 +105,13 @@ def test_a_bound_has_no_change_and_marks_keep_their_meaning():
         ("speed [rpm]", "level [m/s²]", "K_v"),
         "W-EXCITATION, doubt: it ends early",
     )
-    short = Block(
-        "Levels", header, (("1000", "> 1", "1.001†"),), ("1 speed", f"† {meaning}", "‡ W-PULL, ...")
-    )
+    short = Block("Levels", header, (("1000", "> 1", "1.001†"),), ("1 speed", f"† {meaning}", "‡ W-PULL, ..."))
     whole = Block("Levels", header, (("1000", "20.14", "1.058"),), ("1 speed",))
     found = compare._differences(short, whole)
     assert [row[1:] for row in found.rows] == [
         ("level [m/s²]", "> 1", "20.14", "-"),
         ("K_v", "1.001†", "1.058", "+5.69 %"),
     ]
-    assert found.notes[0].startswith("-: one of both is a bound") and found.notes[1:] == (
-        f"first: † {meaning}",
-    )
+    assert found.notes[0].startswith("-: one of both is a bound") and found.notes[1:] == (f"first: † {meaning}",)
     back = compare._differences(whole, short)
     assert back.rows[0][-1] == "-" and back.notes[-1] == f"second: † {meaning}"

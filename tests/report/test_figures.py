@@ -20,10 +20,10 @@ from femgear.report import response, style, waterfall
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, WIDTH, _highest, distinct_lines
 from femgear.report.tables import describe_response
+from femgear.stages import static_figures as static_figures
+from femgear.stages.static_results import describe_static
 from femgear.trains.elastic import figures as elastic_figures
 from femgear.trains.elastic.results import describe_housing
-from femgear.trains.static import figures as static_figures
-from femgear.trains.static.results import describe_static
 
 _HERE = Path(__file__).parents[1]
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -33,9 +33,7 @@ TEETH = synthetic.RING
 
 
 def all_figures():
-    static, modes, dynamics, housing = (
-        getattr(synthetic, n)() for n in ("static", "modes", "dynamics", "housing")
-    )
+    static, modes, dynamics, housing = (getattr(synthetic, n)() for n in ("static", "modes", "dynamics", "housing"))
     gears = synthetic.planetary_set()
     unequal = synthetic.static(defect=0.2)
     return {
@@ -238,9 +236,7 @@ def test_mesh_forces_are_drawn_whole_with_their_dynamic_factor():
     dynamic, rest = figure.axes[0].get_lines()[:2]
     tau = dynamic.get_xdata()
     np.testing.assert_allclose(dynamic.get_ydata(), 1000 + 200 * np.cos(6 * np.pi * tau), rtol=1e-12)
-    assert (
-        np.mean(rest.get_ydata()[:-1]) == pytest.approx(925.0, rel=1e-3) and np.ptp(rest.get_ydata()) > 35.0
-    )
+    assert np.mean(rest.get_ydata()[:-1]) == pytest.approx(925.0, rel=1e-3) and np.ptp(rest.get_ydata()) > 35.0
 
 
 def test_ring_deflection_of_two_nodal_diameters():
@@ -275,9 +271,7 @@ def test_modes_along_the_rim_move_its_marks():
     modes["ring_tangential_shape_real"].values[mode, modes["circumferential"].values == 0] = 2.0
     figure = response.mode_shapes(modes, synthetic.planetary_set(), shown=[mode], scale=0.1)
     black = [line for line in figure.axes[0].get_lines() if line.get_color() == style.BLACK]
-    marks = [
-        complex(*(values[-1] for values in line.get_data())) for line in black if len(line.get_xdata()) == 2
-    ]
+    marks = [complex(*(values[-1] for values in line.get_data())) for line in black if len(line.get_xdata()) == 2]
     at_rest = np.arange(len(marks)) * 2 * np.pi / len(marks)
     assert len(marks) == 12
     np.testing.assert_allclose(np.array(marks) * np.exp(-1j * at_rest), 0.1 * (1 + 0.1j), atol=1e-12)
@@ -341,8 +335,7 @@ def test_microphone_hears_less_of_many_nodal_diameters():
     housing = heard({TEETH - 6: 1.0, TEETH - 3: 1.0, TEETH: 1.0}).isel(speed=[1])
     band = elastic_figures.microphone_spectrum(housing).axes[1]
     accelerometer, microphone = (
-        {round(float(line[0, 0])): float(line[1, 1]) for line in bars.get_segments()}
-        for bars in band.collections
+        {round(float(line[0, 0])): float(line[1, 1]) for line in bars.get_segments()} for bars in band.collections
     )
     assert accelerometer == pytest.approx(dict.fromkeys((TEETH - 6, TEETH - 3, TEETH), 0.0), abs=1e-9)
     order, n = TEETH - np.array([6, 3, 0]), np.array([6, 3, 0])
@@ -374,9 +367,7 @@ def test_motion_of_the_housing_is_that_of_one_cosine():
         time, values = right.get_lines()[0].get_data()
         assert time[-1] == pytest.approx(4e3 * 2 * np.pi / omega)
         phase = omega * 1e-3 * time
-        assert np.abs(values) == pytest.approx(
-            size * np.abs([np.cos, np.sin][row % 2](phase)), abs=2e-3 * size
-        )
+        assert np.abs(values) == pytest.approx(size * np.abs([np.cos, np.sin][row % 2](phase)), abs=2e-3 * size)
 
 
 def test_sweep_marks_speeds_without_convergence():
@@ -397,9 +388,7 @@ def test_sweep_draws_the_rms_of_the_fluctuation(figures):
 
 def test_colours_differ_for_deuteranopes():
     """Vienot, Brettel and Mollon (1999): colours of lines stay apart when red and green are confused."""
-    to_lms = np.array(
-        [[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]]
-    )
+    to_lms = np.array([[17.8824, 43.5161, 4.11935], [3.45565, 27.1554, 3.86714], [0.0299566, 0.184309, 1.46709]])
     rgb = np.array([[int(c[i : i + 2], 16) / 255 for i in (1, 3, 5)] for c in COLOURS]) ** 2.2
     lms = rgb @ to_lms.T
     lms[:, 1] = 0.494207 * lms[:, 0] + 1.24827 * lms[:, 2]
@@ -433,9 +422,13 @@ def test_campbell_diagram_names_its_lines_and_marks_the_critical_speeds():
     speed = np.linspace(0, 300, 40)
     modes = np.column_stack([743 - speed / 7, 743 + speed / 7, 1475 + 0 * speed])
     figure = campbell(
-        speed, modes, orders=np.array([73, 146]) / (2 * np.pi), order_names=["mesh", "2 x mesh"],
-        critical=[(62.0, 735.0)], speed_unit="rpm",
-    )  # fmt: skip
+        speed,
+        modes,
+        orders=np.array([73, 146]) / (2 * np.pi),
+        order_names=["mesh", "2 x mesh"],
+        critical=[(62.0, 735.0)],
+        speed_unit="rpm",
+    )
     (ax,) = figure.axes
     texts = [text.get_text() for text in figure.legends[0].get_texts()]
     assert texts == ["mode", "mesh", "2 x mesh", "critical speed"]
@@ -477,9 +470,7 @@ def shifted(dataset, names):
     found = dataset.copy(deep=True)
     for name in names:
         for row in range(found.sizes["mesh"]):
-            found[name].values[row] = np.roll(found[name].values[row], 3 * row + 1, axis=-1) * (
-                1 + 0.01 * row
-            )
+            found[name].values[row] = np.roll(found[name].values[row], 3 * row + 1, axis=-1) * (1 + 0.01 * row)
     return found
 
 
@@ -493,17 +484,13 @@ def of_planets(dataset, planets):
 
 def looks(lines):
     """Colour, dash and width of lines that hold something."""
-    return [
-        (one.get_color(), one.get_linestyle(), one.get_linewidth()) for one in lines if len(one.get_xdata())
-    ]
+    return [(one.get_color(), one.get_linestyle(), one.get_linewidth()) for one in lines if len(one.get_xdata())]
 
 
 @pytest.mark.parametrize("planets", [3, 4, 7])
 def test_meshes_that_differ_have_lines_that_differ(planets):
     """Colour and dash of all meshes, thick and thin of both kinds of stiffness."""
-    static = shifted(
-        of_planets(synthetic.static(), planets), ("ste", "mesh_stiffness", "mesh_stiffness_secant")
-    )
+    static = shifted(of_planets(synthetic.static(), planets), ("ste", "mesh_stiffness", "mesh_stiffness_secant"))
     left = static_figures.static_transmission_error(static).axes[0]
     assert len(set(looks(left.get_lines()))) == 2 * planets
     figure = static_figures.mesh_stiffness(static)
@@ -619,9 +606,7 @@ def test_equal_planets_that_mesh_one_after_the_other_are_drawn_once():
         assert ("others shifted" in ax.get_title(loc="left")) == (count == 1)
 
 
-@pytest.mark.parametrize(
-    ("defect", "words"), [(0.0, "all 3 planets carry 33.33 %"), (0.2, "planet 3 carries up")]
-)
+@pytest.mark.parametrize(("defect", "words"), [(0.0, "all 3 planets carry 33.33 %"), (0.2, "planet 3 carries up")])
 def test_load_sharing_says_what_the_planets_carry(defect, words):
     static = synthetic.static(defect=defect)
     ax = static_figures.load_sharing(static).axes[0]
@@ -672,9 +657,7 @@ def test_names_lie_on_no_curve():
     height, beside = 0.085 * 20.0, x > 0.9
     for text in ax.texts:
         bottom = text.xy[1]
-        assert all(
-            (v[beside] <= bottom + 1e-9).all() or (v[beside] > bottom + height).all() for v in curves.values()
-        )
+        assert all((v[beside] <= bottom + 1e-9).all() or (v[beside] > bottom + height).all() for v in curves.values())
     assert [text.get_text() for text in sorted(ax.texts, key=lambda one: one.xy[1])] == list(curves)
 
 

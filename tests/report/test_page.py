@@ -12,11 +12,11 @@ from edited_manifests import finish
 from femgear.errors import StorageError
 from femgear.report import style
 from femgear.report.page import page as html
+from femgear.stages import static_figures as static_figures
 from femgear.storage.files import write_dataset, write_text
 from femgear.storage.results import prepare_output
 from femgear.trains.elastic.stages import ELASTIC
 from femgear.trains.reading import open_results, parse_case, read_case, with_value
-from femgear.trains.static import figures as static_figures
 
 _HERE = Path(__file__).parents[1]
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -156,9 +156,7 @@ def test_control_characters_are_escaped(tmp_path):
     """Of a manifest that somebody else has written, and of the text of the case."""
     case = parse_case(CASE.read_text(encoding="utf-8") + "# \u202eotfel\n")
     results = open_results(make_run(tmp_path / "out", case=case))
-    results = replace(
-        results, manifest=replace(results.manifest, versions={"femgear": "1\x1b[31m\x00\ud800"})
-    )
+    results = replace(results, manifest=replace(results.manifest, versions={"femgear": "1\x1b[31m\x00\ud800"}))
     text = html(ELASTIC, results)
     assert r"1\x1b[31m\x00\ud800" in text and r"# \u202eotfel" in text
     assert all(one.isprintable() or one in "\n\u00a0" for one in text)
@@ -185,8 +183,11 @@ def test_verdict_stands_before_the_stages_and_trust_is_folded_away_at_the_end(tm
     results = open_results(make_run(tmp_path / "out", change=change))
     for static in (False, True):
         text = html(ELASTIC, results, static=static)
-        keys = ("<caption>Verdict", '<details id="gears"', *(f'id="{one}"' for one in (
-            "static", "modes", "dynamics", "housing", "trust", "warnings")))  # fmt: skip
+        keys = (
+            "<caption>Verdict",
+            '<details id="gears"',
+            *(f'id="{one}"' for one in ("static", "modes", "dynamics", "housing", "trust", "warnings")),
+        )
         places = [text.index(key) for key in (*keys, "did not converge at 3100 rpm", "Case as run")]
         assert places == sorted(places) and text.count("did not converge at 3100 rpm") == 1
         assert 'href="#warnings">Warnings: ' in text[: places[0]]

@@ -8,11 +8,11 @@ import imageio.v3 as iio
 import numpy as np
 import pytest
 from matplotlib.path import Path as Polygon
-from validation.planetary import reference_set
 
 from femgear.errors import CaseError, FemgearError, StorageError
 from femgear.gears.gear import half_thickness_angle
 from femgear.report import scene
+from validation.planetary import reference_set
 
 _HERE = Path(__file__).parents[1]
 _SPEC = importlib.util.spec_from_file_location("synthetic_results", _HERE / "synthetic_results.py")
@@ -49,9 +49,7 @@ def test_set_of_bodies():
 
 def test_placing_turns_then_moves():
     grid = type("Grid", (), {"points": np.array([[2.0, 0.0]]), "triangles": np.zeros((1, 6), int)})
-    body = scene.placed(
-        grid, name="planet", centre=(10.0, 0.0), angle=np.pi / 2, displacement=np.array([[1.0, 0.0]])
-    )
+    body = scene.placed(grid, name="planet", centre=(10.0, 0.0), angle=np.pi / 2, displacement=np.array([[1.0, 0.0]]))
     np.testing.assert_allclose(body.points, [[10.0, 2.0]], atol=1e-15)
     np.testing.assert_allclose(body.displacement, [[0.0, 1.0]], atol=1e-15)
 
@@ -154,9 +152,7 @@ def test_field_is_the_double_sum():
     radial, tangential = rng.normal(size=(2, 4, 7)) + 1j * rng.normal(size=(2, 4, 7))
     field = scene._Field(radial, tangential, 1.0, 36)
     phi_world, carrier = 1.1, 0.7
-    for component, got in zip(
-        (radial, tangential), field.at(np.array([phi_world]), np.array([0.2, carrier]))
-    ):
+    for component, got in zip((radial, tangential), field.at(np.array([phi_world]), np.array([0.2, carrier]))):
         expected = sum(
             (component[h, n + 3] * np.exp(1j * (n * (phi_world - carrier) + h * 36 * carrier))).real
             for h in range(1, 4)

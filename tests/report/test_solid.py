@@ -28,11 +28,14 @@ def drawn():
     places += [(f"planet {n + 1}", "planet", pin) for n, pin in enumerate(pins)]
     bodies = [
         DeformedBody(
-            name, kind, np.array([pin.real, pin.imag]), 0.1,
+            name,
+            kind,
+            np.array([pin.real, pin.imag]),
+            0.1,
             np.zeros((of_kind[kind].gear.teeth, of_kind[kind].grid.n_nodes, 2)),
         )
         for name, kind, pin in places
-    ]  # fmt: skip
+    ]
     grids = {kind: sector.grid for kind, sector in of_kind.items()}
     materials = dict(zip(of_kind, materials_of(case), strict=True))
     return gears, lambda modes=None, **look: solid(gears, grids, bodies, materials, modes, **look)
@@ -82,9 +85,7 @@ def test_pins_stand_in_their_planets(drawn):
     gears, model = drawn
     pins = model()["pins"]
     assert 0.0 < pins["radius"] < 1e3 * gears.planet.rim_radius
-    assert [math.hypot(*centre) for centre in pins["centres"]] == pytest.approx(
-        [1e3 * gears.centre_distance] * 3
-    )
+    assert [math.hypot(*centre) for centre in pins["centres"]] == pytest.approx([1e3 * gears.centre_distance] * 3)
 
 
 @pytest.mark.parametrize("backwards", (False, True))

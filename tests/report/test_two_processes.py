@@ -7,7 +7,7 @@ import pytest
 
 from femgear import second_process
 from femgear.report import page, style
-from femgear.trains.protocol import Drawn, Figures, Stage, Train
+from femgear.stages.protocol import Drawn, Figures, Stage, Train
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="one process elsewhere")
 
@@ -27,9 +27,6 @@ def test_figures_are_the_same_bytes(tmp_path, monkeypatch):
     drawn = Drawn(None, {str(n): None for n in range(3)})
     begun = threading.active_count()
     names = page.write_figures(tmp_path, train, drawn)
-    assert (
-        names == [*(f"picture_{n}.png" for n in range(3)), "charts.json"]
-        and threading.active_count() == begun
-    )
+    assert names == [*(f"picture_{n}.png" for n in range(3)), "charts.json"] and threading.active_count() == begun
     for n in range(3):
         assert (tmp_path / names[n]).read_bytes() == style.png_bytes(drawn_by(n)[f"picture_{n}"])

@@ -87,16 +87,19 @@ def transient(
     return xr.Dataset(
         {
             "mesh_force": (("variant", "time", "mesh"), np.full((1, 3, 1), 1500.0)),
-            "least_force": (vm, least * one), "largest_force": (vm, 4000.0 * one),
-            "pulling": (vm, pulling * one), "lost": (vm, lost * one),
-            "growth": (("variant",), [growth]), "gain": (("variant",), [gain]),
+            "least_force": (vm, least * one),
+            "largest_force": (vm, 4000.0 * one),
+            "pulling": (vm, pulling * one),
+            "lost": (vm, lost * one),
+            "growth": (("variant",), [growth]),
+            "gain": (("variant",), [gain]),
             "energy_error": (("variant",), [energy]),
             "momentum_error": (("variant",), [momentum]),
             "speed": (("variant", "time", "body"), np.full((1, 3, 1), 10.0)),
         },
         {"variant": ["with bending"], "mesh": ["a-b"], "body": ["a"]},
         {"steps": 40_000, "step": 5e-5, "every": 1, "contact": contact, "damping_ratio": 0.02},
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.parametrize(

@@ -34,9 +34,16 @@ ANSWERS = {
     "veering": r"\d\d stiffnesses, places left unresolved: 0",
 }
 LONG = {
-    "drivetrain_spectrum", "envelope_lobes", "face_load", "iso_stiffness", "pin_error_lobes", "six_bolts",
-    "sound_to_wav", "speed_sweep", "tolerance_samples",
-}  # fmt: skip
+    "drivetrain_spectrum",
+    "envelope_lobes",
+    "face_load",
+    "iso_stiffness",
+    "pin_error_lobes",
+    "six_bolts",
+    "sound_to_wav",
+    "speed_sweep",
+    "tolerance_samples",
+}
 
 
 @pytest.fixture

@@ -24,10 +24,7 @@ def test_quick_studies(tmp_path):
     # complex multipliers: half the trace of the damping, -zeta omega_n
     assert float(rows[2.2]["largest exponent [omega_n]"]) == pytest.approx(-0.05, abs=0.01)
     with open(tmp_path / "eccentricity.csv", newline="", encoding="utf-8") as stream:
-        size = {
-            (r["case"], float(r["mesh frequency [Hz]"])): float(r["amplitude [N]"])
-            for r in csv.DictReader(stream)
-        }
+        size = {(r["case"], float(r["mesh frequency [Hz]"])): float(r["amplitude [N]"]) for r in csv.DictReader(stream)}
     assert size["held sun, E = 15 µm", 400.0] > 10.0 * size["floating sun, E = 15 µm", 400.0]
 
 

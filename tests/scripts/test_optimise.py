@@ -10,8 +10,8 @@ import pytest
 from script_runs import run_script, wait_for_lines
 from soak import programs
 
+from femgear.stages.static import solve_static, solve_stress
 from femgear.trains.reading import read_case
-from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
@@ -92,10 +92,25 @@ def test_the_optimum_that_is_printed_is_that_of_a_run(tmp_path):
     case.write_text(text + tables + 'shape = "parabolic"\n', encoding="utf-8")
     of = "ste overall", "ste planet-ring", "contact pressure", "root stress sun", "root stress planet"
     done = run(
-        case, "--vary", "sun.modifications[0].amount=0 um..8 um +- 1 um", "--objective", "ste sun-planet",
-        *(word for name in of for word in ("--of", name)), "--samples", "2", "--max-designs", "4",
-        "--positions", "8", "--flank-elements", "4", "--no-check", "-o", tmp_path / "out", folder=tmp_path,
-    )  # fmt: skip
+        case,
+        "--vary",
+        "sun.modifications[0].amount=0 um..8 um +- 1 um",
+        "--objective",
+        "ste sun-planet",
+        *(word for name in of for word in ("--of", name)),
+        "--samples",
+        "2",
+        "--max-designs",
+        "4",
+        "--positions",
+        "8",
+        "--flank-elements",
+        "4",
+        "--no-check",
+        "-o",
+        tmp_path / "out",
+        folder=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     with open(tmp_path / "out" / "optimum.csv", newline="", encoding="utf-8") as stream:
         printed = [float(row["optimum"]) for row in csv.DictReader(stream)]
@@ -105,9 +120,13 @@ def test_the_optimum_that_is_printed_is_that_of_a_run(tmp_path):
     kinds = errors["ste_peak_to_peak"].values.reshape(2, -1).max(axis=1)
     root = stress["root_worst"].values.reshape(2, -1, 2).max(axis=1)
     expected = [
-        kinds[0], errors["ste_overall_peak_to_peak"].values.max(), kinds[1],
-        stress["largest_pressure"].values.max(), root[0, 0], max(root[0, 1], root[1, 0]),
-    ]  # fmt: skip
+        kinds[0],
+        errors["ste_overall_peak_to_peak"].values.max(),
+        kinds[1],
+        stress["largest_pressure"].values.max(),
+        root[0, 0],
+        max(root[0, 1], root[1, 0]),
+    ]
     assert printed == pytest.approx(expected, rel=1e-5)
 
 

@@ -16,9 +16,15 @@ SET = ["--ring", 70, "--sun", 30, "--planet", 20]
 SET += [word for angle in (0, 86.4, 180, 266.4) for word in ("--angle", angle)]
 # order and amplitude of what is in the record, in steps of 0.02, and what it is
 KNOWN = {
-    66.0: (0.6, NORMAL), 70.0: (1.0, NORMAL), 71.0: (0.2, UNEQUAL), 73.34: (0.15, UNEQUAL),
-    77.5: (0.2, UNEQUAL), 66.18: (0.12, FOREIGN), 140.0: (0.4, NORMAL), 143.0: (0.1, UNEQUAL),
-}  # fmt: skip
+    66.0: (0.6, NORMAL),
+    70.0: (1.0, NORMAL),
+    71.0: (0.2, UNEQUAL),
+    73.34: (0.15, UNEQUAL),
+    77.5: (0.2, UNEQUAL),
+    66.18: (0.12, FOREIGN),
+    140.0: (0.4, NORMAL),
+    143.0: (0.1, UNEQUAL),
+}
 
 
 def run(folder, *arguments):
@@ -82,9 +88,7 @@ def test_factor_of_a_case_without_a_spectrum(tmp_path):
     done = run(tmp_path, "--harmonics", 1, "--half-width", 4)
     assert done.returncode == 0 and "multiples of 3 alone" in done.stdout
     rows = table(tmp_path / "out" / "array_factor.csv")
-    found = {
-        int(row["carrier order"]): (round(float(row["array factor"]), 9), row["symmetry"]) for row in rows
-    }
+    found = {int(row["carrier order"]): (round(float(row["array factor"]), 9), row["symmetry"]) for row in rows}
     assert found == {o: (1.0, "") if o % 3 == 0 else (0.0, "forbidden") for o in range(104, 113)}
     assert (tmp_path / "out" / "side_bands.png").stat().st_size > 5000
 
@@ -103,9 +107,10 @@ def test_universal_file_that_femgear_exports(tmp_path):
     assert done.returncode == 0, done.stderr
     rows = table(tmp_path / "out" / "lines.csv")
     assert [(float(row["order"]), row["verdict"]) for row in rows] == [
-        (pytest.approx(645, abs=1e-5), NORMAL), (pytest.approx(648, abs=1e-5), NORMAL),
+        (pytest.approx(645, abs=1e-5), NORMAL),
+        (pytest.approx(648, abs=1e-5), NORMAL),
         (pytest.approx(649, abs=1e-5), UNEQUAL),
-    ]  # fmt: skip
+    ]
 
 
 @pytest.mark.parametrize(

@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
-
-from femgear.errors import CaseError
 from soak import __main__ as program
 from soak import case_text, damage, faults, kills, page, programs, state, supply, trials
+
+from femgear.errors import CaseError
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +85,7 @@ def test_what_must_not_come_out_of_a_case_file_is_a_failure(happens, words, fold
     gc.collect()  # memory that is freed meanwhile would hide what is taken
     tally = trials.run_trials("case_text", [7], folder)
     assert tally.failed == 1 and words in tally.failures[0]
-    assert tally.failures[0].startswith("python tests/soak case_text 7: ")
+    assert tally.failures[0].startswith("python validation/soak case_text 7: ")
 
 
 def test_a_reader_that_crashes_or_has_a_traceback_is_seen():
@@ -127,14 +127,8 @@ def test_records_are_kept_and_pieces_go_on(tmp_path):
     assert total.worst_seconds == [0.5, 3] and total.counts["kills"] == 6
     page.write_page(again, tmp_path / "page.md", tmp_path / "absent.md")
     text = (tmp_path / "page.md").read_text()
-    assert (
-        page.page(again, "# Mutants\n\n| **all** | 7 |\n\n## Survivors\n\nNone.\n").count("\n### Survivors")
-        == 1
-    )
-    assert (
-        "`python tests/soak case_text 4: too slow`" in text
-        and "| Case files | 3 | 6 | 3 | 0.50 (3) |" in text
-    )
+    assert page.page(again, "# Mutants\n\n| **all** | 7 |\n\n## Survivors\n\nNone.\n").count("\n### Survivors") == 1
+    assert "`python validation/soak case_text 4: too slow`" in text and "| Case files | 3 | 6 | 3 | 0.50 (3) |" in text
 
 
 def test_the_program_runs_pieces_and_repeats_a_trial(tmp_path, capsys, monkeypatch):
@@ -144,14 +138,14 @@ def test_the_program_runs_pieces_and_repeats_a_trial(tmp_path, capsys, monkeypat
     stand_in = tmp_path / "soak"
     stand_in.write_text(f"print({json.dumps(json.dumps(made.record()))})\n")
     monkeypatch.setattr(program, "ROOT", tmp_path)
-    (tmp_path / "tests").mkdir()
-    stand_in.rename(tmp_path / "tests" / "soak")
+    (tmp_path / "validation").mkdir()
+    stand_in.rename(tmp_path / "validation" / "soak")
     where = ["--folder", str(tmp_path / "out")]
     assert program.main(["sets", "--minutes", "0.01", *where, "--page", str(tmp_path / "page.md")]) == 1
     said = capsys.readouterr().out
-    assert "sets 0: 1 trials, 1 failures" in said and "python tests/soak sets 9: no equilibrium" in said
+    assert "sets 0: 1 trials, 1 failures" in said and "python validation/soak sets 9: no equilibrium" in said
     assert "no equilibrium" in (tmp_path / "page.md").read_text()
-    (tmp_path / "tests" / "soak").write_text("import os\nos.abort()\n")
+    (tmp_path / "validation" / "soak").write_text("import os\nos.abort()\n")
     assert program.main(["sets", "--minutes", "0.001", "--processes", "1", *where]) == 1
     assert "ended with -6" in capsys.readouterr().out
     monkeypatch.setattr(program, "run_trials", lambda *_: made)

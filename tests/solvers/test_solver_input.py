@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from validation.reference.free_vibration import solve_free_vibration
-from validation.reference.sections import bifurcation_diagram, stroboscopic_section
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
@@ -17,6 +15,8 @@ from femgear.solvers.time.stroboscopic import (
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import PolynomialSprings
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from validation.reference.free_vibration import solve_free_vibration
+from validation.reference.sections import bifurcation_diagram, stroboscopic_section
 
 STARTS = (([np.nan], [0.0]), ([0.0, 0.0], [0.0]), ([0.0],), (0.0, 0.0), "ab")
 
@@ -68,9 +68,7 @@ def test_the_top_between_two_wells_is_a_start():
     other = solve_harmonic_balance(problem, 1.0, harmonics=30, start=found.solution.deflection)
     assert other.converged
     np.testing.assert_allclose(found.solution.deflection, other.deflection, atol=1e-6)
-    moved = solve_transient(
-        problem, 1.0, found.time[:200], start=(found.motion[0], found.velocity), method="DOP853"
-    )
+    moved = solve_transient(problem, 1.0, found.time[:200], start=(found.motion[0], found.velocity), method="DOP853")
     np.testing.assert_allclose(moved.displacement, found.motion[:200], atol=1e-6)
 
 

@@ -9,11 +9,11 @@ from page_examples import check_documented
 
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_signal, stored_lines
+from femgear.stages.static import solve_static
+from femgear.stages.static_results import HELIX_VARIABLES, SLICE_VARIABLES
 from femgear.storage.results import _attribute, response_entries
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_value
-from femgear.trains.static.results import HELIX_VARIABLES, SLICE_VARIABLES
-from femgear.trains.static.stages import solve_static
 
 pytestmark = pytest.mark.usefixtures("coarse_states")
 
@@ -119,9 +119,7 @@ def test_exported_attributes_have_units(datasets, stage):
 
 def test_static_attributes_and_labels(datasets):
     static = datasets["static"]
-    assert list(static.mesh.values) == [f"sun-planet {n}" for n in (1, 2, 3)] + [
-        f"planet {n}-ring" for n in (1, 2, 3)
-    ]
+    assert list(static.mesh.values) == [f"sun-planet {n}" for n in (1, 2, 3)] + [f"planet {n}-ring" for n in (1, 2, 3)]
     assert np.degrees(static.attrs["working_pressure_angle_sun_planet"]) == pytest.approx(22.1995, abs=5e-5)
     assert np.degrees(static.attrs["working_pressure_angle_planet_ring"]) == pytest.approx(20.0, abs=5e-5)
     assert static.attrs["contact_ratio_sun_planet"] == pytest.approx(1.5507, abs=5e-5)
@@ -168,9 +166,7 @@ def test_housing_lines_are_those_of_the_result_and_make_the_signal(results, data
         signal = fixed_sensor_signal(lines)
         assert np.sqrt(np.mean(signal.acceleration**2)) == pytest.approx(order_level(lines), rel=1e-12)
         samples = len(signal.seconds)
-        assert signal.seconds[-1] * samples / (samples - 1) == pytest.approx(
-            (108 / 90.0, 108 / 1116.0)[s], rel=1e-12
-        )
+        assert signal.seconds[-1] * samples / (samples - 1) == pytest.approx((108 / 90.0, 108 / 1116.0)[s], rel=1e-12)
     assert housing.attrs["sensor_angle"] == 0.0
 
 

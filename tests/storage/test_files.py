@@ -272,9 +272,7 @@ def finished(folder):
     prepare_output(folder)
     write_text("title = 'x'\n", folder / "case.toml")
     write_dataset(dataset(), folder / "static.nc")
-    return finish(
-        folder, ["case.toml", "static.nc"], timings={"static": 0.5}, convergence={"a": np.float64("nan")}
-    )
+    return finish(folder, ["case.toml", "static.nc"], timings={"static": 0.5}, convergence={"a": np.float64("nan")})
 
 
 def test_a_finished_folder_is_opened_and_verified(tmp_path):

@@ -74,9 +74,7 @@ def refused(act, code="E-OUTPUT"):
 # --- names -----------------------------------------------------------------------------------------
 
 
-def test_temporary_names_cannot_be_foretold_and_what_is_there_is_not_written_into(
-    tmp_path, elsewhere, monkeypatch
-):
+def test_temporary_names_cannot_be_foretold_and_what_is_there_is_not_written_into(tmp_path, elsewhere, monkeypatch):
     seen = []
     for _ in range(2):
         with replaced_file(tmp_path / "a.txt") as path:
@@ -309,9 +307,7 @@ def test_a_finished_run_whose_files_differ_from_its_manifest_is_refused(results)
     assert contents(results) == before
 
 
-@pytest.mark.parametrize(
-    "text", ["", "{}", '{"femgear_format": 4, "complete": true, "files": {"../x": "0"}}']
-)
+@pytest.mark.parametrize("text", ["", "{}", '{"femgear_format": 4, "complete": true, "files": {"../x": "0"}}'])
 def test_a_finished_run_without_a_valid_manifest_is_refused(results, text):
     (finished(results) / MANIFEST).write_text(text)
     before = contents(results)

@@ -56,9 +56,7 @@ def started(folder, secret=None, workers=2):
     options = {"env": environment, "cwd": folder, "stderr": subprocess.PIPE, "text": True}
     protocol, command = "tls" if secret else "tcp", [sys.executable, "-m", "dask"]
     place = ["--host", "127.0.0.1", "--no-dashboard"]
-    scheduler = subprocess.Popen(
-        [*command, "scheduler", "--protocol", protocol, "--port", "0", *place], **options
-    )
+    scheduler = subprocess.Popen([*command, "scheduler", "--protocol", protocol, "--port", "0", *place], **options)
     found = (re.search(rf"{protocol}://127\.0\.0\.1:\d+", line) for line in scheduler.stderr)
     address = next(filter(None, found))[0]
     options["stderr"] = subprocess.DEVNULL
@@ -82,8 +80,11 @@ def certificates(tmp_path_factory):
     request = ["openssl", "req", "-x509", *subject, "-keyout", "key.pem", "-out", "ca.pem"]
     subprocess.run(request, cwd=folder, check=True, capture_output=True)
     files = {"CA_FILE": "ca.pem"}
-    files |= {f"{who}__{what}": file for who in ("SCHEDULER", "WORKER", "CLIENT")
-              for what, file in (("CERT", "ca.pem"), ("KEY", "key.pem"))}  # fmt: skip
+    files |= {
+        f"{who}__{what}": file
+        for who in ("SCHEDULER", "WORKER", "CLIENT")
+        for what, file in (("CERT", "ca.pem"), ("KEY", "key.pem"))
+    }
     return {f"DASK_DISTRIBUTED__COMM__TLS__{name}": str(folder / file) for name, file in files.items()}
 
 
@@ -139,8 +140,7 @@ def test_three_hundred_cases_have_the_same_bits(runners):
     case = with_values(read_case(CASE), coarse)
     over = {"operation.torque": [f"{20 + n} N m" for n in range(100)], "sun.mass": ["1 kg", "2 kg", "3 kg"]}
     found = [
-        sweep(case, over, [transmission_error()], cache=grid_cache(), runner=runner)
-        for runner in (Runner(), *runners)
+        sweep(case, over, [transmission_error()], cache=grid_cache(), runner=runner) for runner in (Runner(), *runners)
     ]
     assert np.isfinite(found[0].values).all() and len(np.unique(found[0].values)) == 100
     for one in found:
@@ -170,9 +170,10 @@ def test_an_optimisation_has_the_same_bits(runners):
     assert found[0].designs > 20 and found[0].gain() > 0.1
     for one in found[1:]:
         assert one.x.tobytes() == found[0].x.tobytes() and one.message == found[0].message
-        np.testing.assert_equal((one.after, one.course, one.all_off), tuple(
-            getattr(found[0], name) for name in ("after", "course", "all_off")
-        ))  # fmt: skip
+        np.testing.assert_equal(
+            (one.after, one.course, one.all_off),
+            tuple(getattr(found[0], name) for name in ("after", "course", "all_off")),
+        )
 
 
 def test_without_certificates_none_gets_in(words, secure, tmp_path):
@@ -218,9 +219,12 @@ def test_a_full_disk_of_the_client_leaves_a_good_journal(words, secure, tmp_path
     """A limit on the size of files, which the system meets in the middle of a line as it does a full disk."""
     limit = (3000, resource.getrlimit(resource.RLIMIT_FSIZE)[1])
     full = programs.start(
-        [*words, "--cluster", secure.address], tmp_path, fresh=True, environment=secure.environment,
+        [*words, "--cluster", secure.address],
+        tmp_path,
+        fresh=True,
+        environment=secure.environment,
         before=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, limit),
-    ).wait()  # fmt: skip
+    ).wait()
     journal = tmp_path / "out" / "sweep.jsonl"
     assert full.code == 4 and not full.crash and "sweep.jsonl" in full.err
     lines = len(keys_of(journal))
@@ -246,8 +250,7 @@ def test_memory_does_not_grow_with_the_number_of_tasks(tmp_path, capsys):
         task = cluster.address, cluster.scheduler.pid, folder
         sizes = client.submit(small_tasks.memory_of_client_and_scheduler, *task).result()
     with capsys.disabled():
-        print("".join(f"\n{client:.1f} MB of client, {scheduler:.1f} MB of scheduler"
-                      for client, scheduler in sizes))  # fmt: skip
+        print("".join(f"\n{client:.1f} MB of client, {scheduler:.1f} MB of scheduler" for client, scheduler in sizes))
     assert small_tasks.marks(folder) == [*range(30_000)]
     client, scheduler = np.subtract(sizes[2], sizes[1])
     assert client < 3.0 and scheduler < 10.0

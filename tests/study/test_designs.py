@@ -9,6 +9,7 @@ from femgear.case.dependencies import Steps, compliance_entries, fingerprint, ri
 from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import FREQUENCY, SPEED
 from femgear.errors import CaseError
+from femgear.stages.static import solve_static
 from femgear.study.objectives import (
     Quantity,
     at_speeds,
@@ -28,7 +29,6 @@ from femgear.study.problem import parse_limit, parse_variable, tip_reliefs
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 RANGE = (1000.0 * SPEED.scale, 3500.0 * SPEED.scale, 6)
@@ -80,14 +80,12 @@ def test_variants_are_what_the_pipeline_computes(reused, whole):
     assert variant.static.bodies is first.static.bodies
     for name in ("sun_arc", "deflection", "force", "stiffness"):
         np.testing.assert_array_equal(getattr(variant.static.cycle, name), getattr(static.cycle, name))
-    np.testing.assert_allclose(
-        response_at(variant, RANGE).force, dynamics.response.force, rtol=1e-9, atol=1e-7
-    )
+    np.testing.assert_allclose(response_at(variant, RANGE).force, dynamics.response.force, rtol=1e-9, atol=1e-7)
     assert np.ptp(variant.static.cycle.sun_arc) < 0.9 * np.ptp(first.static.cycle.sun_arc)
 
 
 def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
-    from femgear.trains.static.stages import solve_stress
+    from femgear.stages.static import solve_stress
 
     variant, (case, static, dynamics, housing) = reused[1], whole
     data, forces = static.dataset(), dynamics.dataset()
@@ -114,9 +112,7 @@ def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
     assert contact_pressure().compute(variant) == data["max_pressure"].values.max()
     found = solve_modes(variant.case, static).modes.frequency
     assert natural_frequency(11).compute(variant) == pytest.approx(found[10], rel=1e-9)
-    with pytest.raises(
-        CaseError, match=f"ends before this mode, with number {len(found)} at {found[-1]:.5g} Hz"
-    ):
+    with pytest.raises(CaseError, match=f"ends before this mode, with number {len(found)} at {found[-1]:.5g} Hz"):
         natural_frequency(999).compute(variant)
 
 
@@ -261,7 +257,5 @@ def test_the_optimum_of_the_page_is_one():
         assert ste.compute(after) < 0.4 * ste.compute(before)
     ste = transmission_error("planet-ring")
     assert ste.compute(after) < ste.compute(before)
-    forces = [
-        forces_over_time(response_at(one, RANGE).force, dynamic=True).max(axis=1) for one in (before, after)
-    ]
+    forces = [forces_over_time(response_at(one, RANGE).force, dynamic=True).max(axis=1) for one in (before, after)]
     assert np.all(forces[1] < forces[0]) and forces[1].max() < 0.5 * forces[0].max()

@@ -171,7 +171,7 @@ DAMAGED = {
     "sealed: a list": (edited((3, forged(b'["number", 2]'))), [3]),
     "sealed: too deep": (edited((3, forged(b'{"number":' + b"[" * 99_999 + b"}"))), [3]),
     "sealed: not finite": (edited((3, not_finite)), [3]),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", DAMAGED)
@@ -213,11 +213,7 @@ def test_many_damaged_lines_are_one_warning(problem, whole, tmp_path):
     right, text = whole
     (tmp_path / "j").write_bytes(lines_of(text)[0] + b"\n" * 20)
     found, computed, (words,) = work(problem, tmp_path / "j")
-    assert (
-        found == right
-        and computed == len(PLACES)
-        and "lines 2, 3, 4, 5, 6, 7, 8, 9, 10 and 11 more;" in words
-    )
+    assert found == right and computed == len(PLACES) and "lines 2, 3, 4, 5, 6, 7, 8, 9, 10 and 11 more;" in words
 
 
 REFUSED = {
@@ -225,9 +221,7 @@ REFUSED = {
     "a digit of the checksum": edited((1, lambda line, *_: line[:-4] + b'x"}\n')),
     "another format": edited((1, lambda line, *_: _sealed({"format": 3, "femgear": "9.9"}))),
     "a format of text": edited((1, lambda line, *_: line.replace(b"2", b'"2"', 1))),
-    "the first format": edited(
-        (1, lambda line, *_: re.sub(rb', "checksum".*', b"}", line.replace(b"2", b"1", 1)))
-    ),
+    "the first format": edited((1, lambda line, *_: re.sub(rb', "checksum".*', b"}", line.replace(b"2", b"1", 1)))),
     "more in the header": edited((1, lambda line, *_: _sealed({"more": 1}))),
     "no header": lambda text: b"".join(lines_of(text)[1:]),
     "a header below": lambda text: b"".join([*lines_of(text)[1:], lines_of(text)[0]]),
@@ -288,11 +282,7 @@ def mutant(text, random):
         elif kind == 2:
             text = text[:place] + random.randbytes(random.randrange(1, 20)) + text[place:]
         elif kind == 3:
-            text = (
-                text[:place]
-                + random.choice((b"NaN", b'"abc"', b"5", b"-Infinity", b"\n", b"null"))
-                + text[place:]
-            )
+            text = text[:place] + random.choice((b"NaN", b'"abc"', b"5", b"-Infinity", b"\n", b"null")) + text[place:]
         elif kind == 4:
             digits = [match.start() for match in re.finditer(rb"\d", text)]
             place = random.choice(digits or [0])
@@ -387,9 +377,7 @@ def test_a_sweep_replaces_its_own_table_and_figure_alone(free, tmp_path, name, m
 
     def refused():
         with monkeypatch.context() as patch, pytest.raises(StorageError, match="move it away") as error:
-            patch.setattr(
-                sys.modules["femgear.study.sweep"], "sweep", lambda *_, **__: pytest.fail("computed")
-            )
+            patch.setattr(sys.modules["femgear.study.sweep"], "sweep", lambda *_, **__: pytest.fail("computed"))
             sweep_into(free, tmp_path, over=OVER, of=OF)
         assert error.value.code == "E-OUTPUT" and error.value.file == str(theirs)
 

@@ -129,8 +129,8 @@ def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
 
 
 def test_supports_are_those_of_the_static_stage():
+    from femgear.stages.static import case_supports
     from femgear.trains.reading import with_value
-    from femgear.trains.static.stages import case_supports
 
     case = with_value(read_case(CASE), "planet.bearing_clearance", "3 um")
     assert case_supports(case) == Supports(sun=5e7, carrier=2e8, planet=3e8, planet_clearance=3e-6)

@@ -105,9 +105,7 @@ def test_the_default_window_follows_the_workers(remote):
 def test_what_kills_workers_is_given_up_after_the_second(remote, tmp_path):
     found = dict(remote.map(small_tasks.poisoned, [(str(tmp_path), x) for x in range(20)]))
     lost = found.pop(13)
-    assert (
-        isinstance(lost, FemgearError) and lost.code == "E-WORKER" and "ends its worker, twice" in str(lost)
-    )
+    assert isinstance(lost, FemgearError) and lost.code == "E-WORKER" and "ends its worker, twice" in str(lost)
     assert found == {x: x * x for x in range(20) if x != 13}
     tries = {x: len((tmp_path / f"{x}").read_text().split()) for x in range(20)}
     assert tries[13] == 2 and tries[17] == 2
@@ -184,8 +182,7 @@ def test_a_sweep_has_the_same_bits_whoever_computes(case, processes, dask_runner
     free = with_values(case, coarse | {"sun.profile_shift": None, "ring.profile_shift": None})
     quantities = [named_quantity("ste"), named_quantity("contact pressure"), tip_thickness("planet")]
     whole, *others = (
-        sweep(free, over, quantities, cache=grids, runner=runner)
-        for runner in (Runner(), processes, dask_runner)
+        sweep(free, over, quantities, cache=grids, runner=runner) for runner in (Runner(), processes, dask_runner)
     )
     assert np.isfinite(whole.values).any() and any(whole.errors) and not all(whole.errors)
     for other in others:
@@ -205,9 +202,7 @@ def test_a_search_has_the_same_bits_whoever_computes(case, processes, dask_runne
         found = minimise(problem, **options, journal=journal, runner=runner)
         keys = keys_of(journal)
         assert len(keys) == len(set(keys)) == found.designs == found.computed
-        runs.append(
-            (found.x.tobytes(), found.after, found.course, found.message, found.all_off, sorted(keys))
-        )
+        runs.append((found.x.tobytes(), found.after, found.course, found.message, found.all_off, sorted(keys)))
     # outside the limit there is no course
     assert runs[0][2] != runs[0][2] or len(runs[0][2]) > 9
     np.testing.assert_equal(runs[1], runs[0])

@@ -223,9 +223,7 @@ def assert_equal(found, expected, rtol):
 
 
 @pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
-@pytest.mark.parametrize(
-    "supports", [RIGID, SPRUNG, Supports(sun=0.0)], ids=["fixed", "sprung", "floating sun"]
-)
+@pytest.mark.parametrize("supports", [RIGID, SPRUNG, Supports(sun=0.0)], ids=["fixed", "sprung", "floating sun"])
 def test_samples_are_those_of_the_walk_through_the_mesh_cycle(basis, torque, supports):
     basis = replace(basis, supports=supports)
     model = sample_model(basis, PITCH_AND_PINS, sun_torque=torque)
@@ -257,9 +255,7 @@ def test_planets_out_of_phase(case, planets):
     model = sample_model(basis, PITCH_AND_PINS, sun_torque=TORQUE)
     errors = model.draw(2, 0, 2)
     exact, springs = exact_numbers(model, errors), spring_numbers(model, errors)
-    assert_equal(
-        {name: values[1] for name, values in exact.items()}, walked(basis, model, errors[1], TORQUE), 1e-9
-    )
+    assert_equal({name: values[1] for name, values in exact.items()}, walked(basis, model, errors[1], TORQUE), 1e-9)
     assert_equal(springs, exact, 1e-2)
 
 
@@ -326,10 +322,13 @@ def test_over_a_turn_is_the_walk_over_as_many_periods(basis):
 
 
 def test_a_sample_is_a_case(case, basis):
-    own = with_values(case, {
-        "sun.modifications": [{"kind": "profile crowning", "amount": "2 um"}],
-        "planet.errors.runout_amplitude": "3 um",
-    })  # fmt: skip
+    own = with_values(
+        case,
+        {
+            "sun.modifications": [{"kind": "profile crowning", "amount": "2 um"}],
+            "planet.errors.runout_amplitude": "3 um",
+        },
+    )
     model = sample_model(replace(basis, deviations=set_deviations(own)), ALL, sun_torque=TORQUE)
     made = set_deviations(sample_case(own, model, 4, 11))
     wanted = model.deviations(model.draw(4, 11, 1)[0])
@@ -418,9 +417,7 @@ def test_members_that_move_share_better_and_are_told(case, tmp_path):
     medians = []
     for members, note in (("fixed", "all centres held"), ("elastic", "planet-ring with the ring on its fou")):
         one = with_value(case, "static.members", members)
-        (block, *_), _ = samples_into(
-            one, tmp_path / members, prepared(one, path, cache=grid_cache()), count=20
-        )
+        (block, *_), _ = samples_into(one, tmp_path / members, prepared(one, path, cache=grid_cache()), count=20)
         assert [note in line for line in block.notes].count(True) == 1
         # the column "ideal" is what a run of the case finds
         of_run = 1e6 * solve(one, "static")["static"].cycle.peak_to_peak("sun_arc")
@@ -508,11 +505,11 @@ def test_samples_that_are_killed_go_on_with_the_same_command(tmp_path, method):
         ('[sun]\npitch = { distribution = "normal", sigma = "-3 um" }', "not plausible"),
         ('[ring]\npitch = { distribution = "normal", sigma = "90 um" }', "2: ring.pitch: errors of 450 um"),
         ('[sun]\npitch = { distribution = "uniform", sigma = "3 um", limit = "1 um" }', "has no sigma"),
-        ('[gear]\npitch = 3', "gear: unknown key"),
-        ('[sun]\n[carrier]', "no error has a tolerance"),
+        ("[gear]\npitch = 3", "gear: unknown key"),
+        ("[sun]\n[carrier]", "no error has a tolerance"),
         ('[pin_errors]\nradial = "3 um"', "a table is needed, not a text"),
     ],
-)  # fmt: skip
+)
 def test_mistakes_of_a_tolerances_file(text, said, tmp_path):
     path = tmp_path / "wrong.toml"
     path.write_text(text, encoding="utf-8")
@@ -534,9 +531,12 @@ def test_refusals(basis, case, tmp_path, capsys):
     path.write_text(with_value(case, "static.back_flanks", True).source, encoding="utf-8")
     words = ["samples", str(path), "--tolerances", str(TOLERANCES), "-o", str(tmp_path / "out")]
     for more, said in (
-        ([], "static.back_flanks"), (["-n", "0"], "--number"), (["--positions", "4"], "--positions"),
-        (["--seed=-1"], "--seed"), (["--index=-2"], "--index"),
-    ):  # fmt: skip
+        ([], "static.back_flanks"),
+        (["-n", "0"], "--number"),
+        (["--positions", "4"], "--positions"),
+        (["--seed=-1"], "--seed"),
+        (["--index=-2"], "--index"),
+    ):
         assert main([*words, *more]) == 2
         assert said in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
@@ -554,9 +554,13 @@ def test_samples_have_the_errors_of_runs_with_many_positions(basis, torque):
     many = np.append(np.arange(128) / 128, 1.0)
     for i in np.argsort(found)[[0, 1, 31, 63]]:
         walk = partial(
-            walk_mesh_cycle, basis.gears, basis.bodies, sun_torque=torque, supports=basis.supports,
+            walk_mesh_cycle,
+            basis.gears,
+            basis.bodies,
+            sun_torque=torque,
+            supports=basis.supports,
             deviations=model.deviations(errors[i]),
-        )  # fmt: skip
+        )
         exact = np.ptp(walk(positions=many).sun_arc)
         assert found[i] == pytest.approx(exact, rel=0.03)
         # a run of the sample has it too, with positions between as far as the end
@@ -639,15 +643,11 @@ def test_leads_and_axes_askew_need_slices_of_spur_teeth(basis, case):
     with pytest.raises(CaseError, match=r"E-SLICES.*lead_slope"):
         sample_model(basis, tolerances(sun={"lead_slope": law()}), sun_torque=TORQUE)
     with pytest.raises(CaseError, match=r"E-SLICES.*planet\.misalignment\.radial"):
-        sample_model(
-            basis, tolerances(planet={"misalignment": {"radial": law("0.1 mrad")}}), sun_torque=TORQUE
-        )
+        sample_model(basis, tolerances(planet={"misalignment": {"radial": law("0.1 mrad")}}), sun_torque=TORQUE)
     with pytest.raises(CaseError, match=r"E-SLICES.*set\.helix_angle"):
         design_basis(with_values(case, {"set.helix_angle": "10 deg", "static.slices": 25}), slices=True)
 
 
 def test_slopes_of_axes_have_a_plausible_size():
     with pytest.raises(ValidationError, match="20 mrad"):
-        Tolerances.model_validate(
-            {"sun": {"misalignment": {"x": law("10 mrad")}}}, context={"module": 1.5e-3}
-        )
+        Tolerances.model_validate({"sun": {"misalignment": {"x": law("10 mrad")}}}, context={"module": 1.5e-3})

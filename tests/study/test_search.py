@@ -45,9 +45,7 @@ def case():
 
 def function(name, value):
     """Quantity of the damping ratio and the mass of the carrier [kg]."""
-    return Quantity(
-        name, NUMBER, "gears", lambda v: float(value(v.case.dynamics.damping_ratio, v.case.carrier.mass))
-    )
+    return Quantity(name, NUMBER, "gears", lambda v: float(value(v.case.dynamics.damping_ratio, v.case.carrier.mass)))
 
 
 ROSENBROCK = function("Rosenbrock", lambda x, y: 1.0 + (0.6 - x) ** 2 + 10.0 * (y - x**2 / 0.6**2) ** 2)
@@ -137,9 +135,7 @@ def relief_problem(case):
 
     gears = planetary_set(case)
     starts = relief_starts(gears, length=1.0)
-    places = [
-        f"{2e3 * math.hypot(s, g.base_radius):.9g} mm" for s, g in zip(starts, (gears.sun, gears.planet))
-    ]
+    places = [f"{2e3 * math.hypot(s, g.base_radius):.9g} mm" for s, g in zip(starts, (gears.sun, gears.planet))]
     tables = [{"kind": "tip relief", "amount": "0 um", "start_diameter": place} for place in places]
     tables[1]["flank"] = "sun side"
     coarse = with_values(
@@ -354,9 +350,7 @@ def test_an_optimum_tells_its_findings_and_a_front_those_of_its_designs(case, tm
 
 def test_an_optimum_of_the_teeth_has_the_findings_of_its_contact(case):
     """Ten times the torque presses more than any steel carries, whatever the objective is."""
-    pressed = with_values(
-        case, {"operation.torque": "8000 N m", "static.positions": 8, "static.flank_elements": 6}
-    )
+    pressed = with_values(case, {"operation.torque": "8000 N m", "static.positions": 8, "static.flank_elements": 6})
     problem = Problem(pressed, [X], transmission_error("overall"))
     with pytest.warns(FindingWarning):
         found = minimise(problem, method="simplex", options=SearchOptions(max_designs=3), sensitivity=False)

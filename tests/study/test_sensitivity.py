@@ -80,9 +80,7 @@ def parameter(name, gears, back):
 
 def differences(gears, bodies, variant, value, step, **options):
     """Central differences of whole solutions: sun_arc, deflection, share."""
-    low, high = (
-        walk_mesh_cycle(gears, bodies, deviations=variant(value + h), **options) for h in (-step, step)
-    )
+    low, high = (walk_mesh_cycle(gears, bodies, deviations=variant(value + h), **options) for h in (-step, step))
     names = "sun_arc", "deflection", "load_share"
     return [(getattr(high, name) - getattr(low, name)) / (2 * step) for name in names]
 
@@ -159,9 +157,7 @@ def test_a_pitch_error_is_that_of_the_case_file(basis):
         ("planet", 40, ["planet_pitch", "planet_ring_side_pitch"]),
     ):
         errors = {"cumulative_pitch": [f"{4 if i == 5 else 0} um" for i in range(teeth)]}
-        key, entry = (
-            ("sun.errors", errors) if gear == "sun" else ("planet.individual", [{"planet": 3, **errors}])
-        )
+        key, entry = ("sun.errors", errors) if gear == "sun" else ("planet.individual", [{"planet": 3, **errors}])
         read = set_deviations(with_value(read_case(CASE), key, entry))
         made = tooth_pitch_error(no_deviations(gears), gears, gear=gear, tooth=5, planet=3)(4e-6)
         for name in attributes:
@@ -271,9 +267,7 @@ def test_slopes_of_the_peak_to_peak_are_those_of_whole_solutions(basis):
         left, right = slopes_of_extremes(linear.deflection[:3], found.deflection[:3], step=1e-10)
         peaks = [
             np.ptp(
-                walk_mesh_cycle(gears, basis.bodies, deviations=variant(amount + h), **options).deflection[
-                    :3
-                ],
+                walk_mesh_cycle(gears, basis.bodies, deviations=variant(amount + h), **options).deflection[:3],
                 axis=1,
             ).max()
             for h in (-1e-10, 0.0, 1e-10)

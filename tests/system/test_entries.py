@@ -3,10 +3,6 @@
 import numpy as np
 import pytest
 from small_trains import gear_pair
-from validation.reference.cornered_springs import PiecewiseSprings
-from validation.reference.free_vibration import solve_free_vibration
-from validation.reference.sections import bifurcation_diagram, stroboscopic_section
-from validation.reference.stability_boundary import stability_boundary
 
 from femgear.errors import CaseError, ConvergenceError, checked_numbers, checked_tolerance
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
@@ -27,6 +23,10 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, StepSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from validation.reference.cornered_springs import PiecewiseSprings
+from validation.reference.free_vibration import solve_free_vibration
+from validation.reference.sections import bifurcation_diagram, stroboscopic_section
+from validation.reference.stability_boundary import stability_boundary
 
 SYSTEM = gear_pair((1.2e-3, 4.5e-3), (0.04, 0.07), torque=120.0, mesh_damping=900.0)
 PROBLEM = NonlinearSystem(SYSTEM, (GearMeshes([0], FourierSeries([[3e8, 6e7]])),))
@@ -55,15 +55,11 @@ BY_TOLERANCE = {
     "free vibration": lambda e: solve_free_vibration(PROBLEM, None, 1.0, tolerance=e),
     "sweep": lambda e: sweep_response(PROBLEM, [OMEGA], tolerance=e),
     "curve": lambda e: frequency_response_curve(PROBLEM, (2.6e4, OMEGA), harmonics=3, tolerance=e),
-    "curve of a parameter": lambda e: parameter_curve(
-        lambda _: PROBLEM, (0.0, 1.0), OMEGA, harmonics=3, tolerance=e
-    ),
+    "curve of a parameter": lambda e: parameter_curve(lambda _: PROBLEM, (0.0, 1.0), OMEGA, harmonics=3, tolerance=e),
     "transient": lambda e: solve_transient(PROBLEM, OMEGA, [0.0, 1e-4], tolerance=e),
     "diagram": lambda e: bifurcation_diagram(lambda _: (PROBLEM, OMEGA), [1.0], tolerance=e),
     "chart": lambda e: stability_chart(PROBLEM, FourierSeries([[3e8]]), [OMEGA], [0.0], tolerance=e),
-    "boundary": lambda e: stability_boundary(
-        PROBLEM, FourierSeries([[3e8]]), (0.0, 1.0), frequency=OMEGA, tolerance=e
-    ),
+    "boundary": lambda e: stability_boundary(PROBLEM, FourierSeries([[3e8]]), (0.0, 1.0), frequency=OMEGA, tolerance=e),
 }
 
 
@@ -133,9 +129,7 @@ def test_a_negative_stiffness_of_a_turning_system_names_the_speed():
     G = np.array([[0.0, -2.0], [2.0, 0.0]])
     for gyroscopic, told in ((G, True), (None, False)):
         K = (1.0 - 1.5**2) * np.eye(2)
-        system = MechanicalSystem(
-            np.eye(2), np.zeros((2, 2)), K, np.eye(2)[:, :1], np.zeros(2), ("x", "y"), gyroscopic
-        )
+        system = MechanicalSystem(np.eye(2), np.zeros((2, 2)), K, np.eye(2)[:, :1], np.zeros(2), ("x", "y"), gyroscopic)
         problem = NonlinearSystem(system, (PolynomialSprings([0], [[0.1]]),), speed=1.5)
         with pytest.raises(ConvergenceError, match="stiffness matrix is negative") as error:
             reduce_problem(problem)

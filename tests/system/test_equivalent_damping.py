@@ -35,16 +35,12 @@ def test_two_free_gears_have_the_ratio_of_their_mesh():
 
 
 def test_one_body_has_the_ratio_of_its_support():
-    np.testing.assert_allclose(
-        ratios(np.eye(1) * 2.0, support_dampers(8.0, 2.0, 0.1) * np.eye(1), [[8.0]]), [0.1]
-    )
+    np.testing.assert_allclose(ratios(np.eye(1) * 2.0, support_dampers(8.0, 2.0, 0.1) * np.eye(1), [[8.0]]), [0.1])
 
 
 def test_supports_alone_damp_the_members_of_a_set():
     # without meshes and planet bearings every member is alone with its supports
-    data = replace(
-        lin_parker_set(3), stiffness_sun_planet=1e-6, stiffness_planet_ring=1e-6, planet_bearing=1e-6
-    )
+    data = replace(lin_parker_set(3), stiffness_sun_planet=1e-6, stiffness_planet_ring=1e-6, planet_bearing=1e-6)
     system = gear_set_system(data)
     C = equivalent_damping(data, mesh_ratio=0.0, support_ratio=0.07)
     K = system.K + (system.W * data.mesh_stiffness) @ system.W.T
@@ -56,10 +52,7 @@ def test_supports_alone_damp_the_members_of_a_set():
 def test_whole_matrix_is_the_sum_of_its_dampers():
     data, rng = lin_parker_set(3), np.random.default_rng(4)
     C = equivalent_damping(data, mesh_ratio=0.05, support_ratio=0.02)
-    assert (
-        np.abs(C - C.T).max() < 1e-12 * np.abs(C).max()
-        and np.linalg.eigvalsh(C).min() > -1e-9 * np.abs(C).max()
-    )
+    assert np.abs(C - C.T).max() < 1e-12 * np.abs(C).max() and np.linalg.eigvalsh(C).min() > -1e-9 * np.abs(C).max()
     velocity, system = rng.standard_normal(len(C)), gear_set_system(data)
     turning = {
         name: body.inertia / radius**2
@@ -96,9 +89,7 @@ def test_held_members_have_no_dampers():
     np.testing.assert_allclose(dampers, 2 * 0.05 * np.sqrt(5e8 * planet))
 
 
-@pytest.mark.parametrize(
-    "values", [(-1.0, 1, 1, 0.1), (1, 0.0, 1, 0.1), (1, 1, 1, -0.1), (1, np.inf, np.inf, 0)]
-)
+@pytest.mark.parametrize("values", [(-1.0, 1, 1, 0.1), (1, 0.0, 1, 0.1), (1, 1, 1, -0.1), (1, np.inf, np.inf, 0)])
 def test_wrong_springs_are_refused(values):
     with pytest.raises(CaseError, match="E-DAMPING"):
         mesh_dampers(*values)

@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import quad
-from validation.reference.cornered_springs import BearingSprings, PiecewiseSprings
 
 from femgear.errors import CaseError
 from femgear.system.force_laws import (
@@ -16,6 +15,7 @@ from femgear.system.force_laws import (
 )
 from femgear.system.fourier import FourierSeries, StepSeries, constant, harmonics_of
 from femgear.system.system import MeshExcitation, gear_meshes
+from validation.reference.cornered_springs import BearingSprings, PiecewiseSprings
 
 RNG = np.random.default_rng(4)
 THETA = RNG.uniform(0.0, 6.0, (200, 1))
@@ -25,9 +25,7 @@ ELEMENTS = {
     "meshes": GearMeshes([0, 2], STIFFNESS, deflection=constant([0.1, 0.0]), backlash=[0.5, np.inf]),
     "loaded meshes": GearMeshes([0, 1], STIFFNESS, force=constant([0.2, 0.4]), backlash=0.3),
     "smooth meshes": GearMeshes([0, 1], STIFFNESS, backlash=0.3, smoothing=0.05),
-    "smooth meshes with and without back side": GearMeshes(
-        [0, 2], STIFFNESS, backlash=[0.3, np.inf], smoothing=0.05
-    ),
+    "smooth meshes with and without back side": GearMeshes([0, 2], STIFFNESS, backlash=[0.3, np.inf], smoothing=0.05),
     "meshes that hold": GearMeshes([0, 1], STIFFNESS, force=constant([0.2, 0.4]), separates=False),
     "stepped meshes": GearMeshes([0], StepSeries([[1.0, 2.0]], [0.0, 0.4])),
     "bearings": RadialBearings([[0, 1], [2, 3]], [2.0, 3.0], clearance=[0.4, 0.0]),
@@ -67,17 +65,13 @@ def test_mesh_pushes_hangs_free_and_pushes_back():
     mesh = GearMeshes([0], constant([2.0]), deflection=constant([0.1]), backlash=0.5)
     x = np.array([0.6, 0.1, -0.2, -0.4, -0.9])[:, None, None]
     # teeth touch above 0.1 and, on the back side, below 0.1 - 0.5
-    np.testing.assert_allclose(
-        mesh.evaluate(x, np.zeros((5, 1)))[0].ravel(), [1.0, 0, 0, 0, -1.0], atol=1e-14
-    )
+    np.testing.assert_allclose(mesh.evaluate(x, np.zeros((5, 1)))[0].ravel(), [1.0, 0, 0, 0, -1.0], atol=1e-14)
 
 
 def test_loaded_mesh_is_the_tangent_of_its_static_state():
     mesh = GearMeshes([0], constant([2.0]), deflection=constant([0.3]), force=constant([0.4]))
     x = np.array([0.3, 0.5, 0.1, 0.0])[:, None, None]
-    np.testing.assert_allclose(
-        mesh.evaluate(x, np.zeros((4, 1)))[0].ravel(), [0.4, 0.8, 0.0, 0.0], atol=1e-15
-    )
+    np.testing.assert_allclose(mesh.evaluate(x, np.zeros((4, 1)))[0].ravel(), [0.4, 0.8, 0.0, 0.0], atol=1e-15)
     held = replace(mesh, separates=False)
     np.testing.assert_allclose(held.evaluate(x, np.zeros((4, 1)))[0].ravel(), [0.4, 0.8, 0, -0.2], atol=1e-15)
 
@@ -116,9 +110,7 @@ def test_continuous_bearing_is_the_integral_over_its_arc(radius, clearance):
     force = bearing.evaluate(x, np.zeros((1, 1)))[0][0, 0]
     half = np.arccos(clearance / radius)
     wanted = quad(lambda p: (radius * np.cos(p) - clearance) * np.cos(p), -half, half, epsabs=1e-13)[0]
-    np.testing.assert_allclose(
-        force, 2.0 * 3.0 / np.pi * wanted * np.array([np.cos(angle), np.sin(angle)]), rtol=1e-9
-    )
+    np.testing.assert_allclose(force, 2.0 * 3.0 / np.pi * wanted * np.array([np.cos(angle), np.sin(angle)]), rtol=1e-9)
 
 
 def test_bearing_is_free_within_its_clearance_and_linear_without():

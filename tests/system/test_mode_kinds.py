@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
-from validation.reference.mode_energy import motion_planes, signed_phase_shares
 
+from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.mode_kinds import (
     SetMotions,
@@ -19,7 +19,7 @@ from femgear.system.mode_kinds import (
     phasing,
     set_motions,
 )
-from femgear.trains.rigid import gear_set_modes
+from validation.reference.mode_energy import motion_planes, signed_phase_shares
 
 
 def rigid_ring_set(planets, *, spread=0.0):
@@ -43,13 +43,18 @@ def rigid_ring_set(planets, *, spread=0.0):
     for n, angle in enumerate(psi):
         p, soft = f"planet_{n + 1}", 1 + spread * n
         on_sun, on_ring = angle + np.pi / 2 - ws, angle - np.pi / 2 + wr
-        K += spring(5e8 * soft, **{
-            "sun__x": np.cos(on_sun), "sun__y": np.sin(on_sun), "sun__rotation": rs,
-            f"{p}__x": -np.cos(on_sun), f"{p}__y": -np.sin(on_sun), f"{p}__rotation": rp,
-        })  # fmt: skip
-        K += spring(7e8, **{
-            f"{p}__x": np.cos(on_ring), f"{p}__y": np.sin(on_ring), f"{p}__rotation": -rp
-        })  # fmt: skip
+        K += spring(
+            5e8 * soft,
+            **{
+                "sun__x": np.cos(on_sun),
+                "sun__y": np.sin(on_sun),
+                "sun__rotation": rs,
+                f"{p}__x": -np.cos(on_sun),
+                f"{p}__y": -np.sin(on_sun),
+                f"{p}__rotation": rp,
+            },
+        )
+        K += spring(7e8, **{f"{p}__x": np.cos(on_ring), f"{p}__y": np.sin(on_ring), f"{p}__rotation": -rp})
         K += spring(3e8, **{f"{p}__x": 1, "carrier__x": -1, "carrier__rotation": arm * np.sin(angle)})
         K += spring(3e8, **{f"{p}__y": 1, "carrier__y": -1, "carrier__rotation": -arm * np.cos(angle)})
     return K, mass, tuple(names), psi
@@ -155,16 +160,16 @@ def test_phase_shares_are_the_discrete_fourier_transform(planets):
     local = np.exp(-1j * psi)[:, None] * (motion[:, 0].real + 1j * motion[:, 1].real)
     other = np.exp(-1j * psi)[:, None] * (motion[:, 0].imag + 1j * motion[:, 1].imag)
     axes = (local.real + 1j * other.real, local.imag + 1j * other.imag, motion[:, 2])
-    energy = np.array([
-        sum(abs(sum(a[n] * np.exp(-2j * np.pi * j * n / planets) for n in range(planets))) ** 2 for a in axes)
-        for j in range(planets)
-    ])  # fmt: skip
+    energy = np.array(
+        [
+            sum(abs(sum(a[n] * np.exp(-2j * np.pi * j * n / planets) for n in range(planets))) ** 2 for a in axes)
+            for j in range(planets)
+        ]
+    )
     energy /= energy.sum(axis=0)
     motions = moved(shape, names, psi)
     assert signed_phase_shares(motions) == pytest.approx(energy, abs=1e-12)
-    folded = [
-        energy[j] + (energy[planets - j] if 0 < j < planets - j else 0.0) for j in range(planets // 2 + 1)
-    ]
+    folded = [energy[j] + (energy[planets - j] if 0 < j < planets - j else 0.0) for j in range(planets // 2 + 1)]
     assert phase_shares(motions) == pytest.approx(np.array(folded), abs=1e-12)
 
 
@@ -176,9 +181,7 @@ def test_travelling_motions_are_told_apart_by_sign():
     expected[1, 0] = expected[4, 1] = 1.0
     expected[2, 2] = expected[3, 2] = 0.5
     assert signed_phase_shares(moved(shape, names, psi)) == pytest.approx(expected, abs=1e-12)
-    assert phasing(moved(shape.real, names, psi)) == ("sequentially phased 1",) * 2 + (
-        "sequentially phased 2",
-    )
+    assert phasing(moved(shape.real, names, psi)) == ("sequentially phased 1",) * 2 + ("sequentially phased 2",)
 
 
 @pytest.mark.parametrize("planets", [3, 4, 5, 6, 7])
@@ -189,10 +192,7 @@ def test_phasing_goes_with_the_kind(planets):
     _, kinds, _ = kinds_of(K, mass, names, psi)
     shape = shape @ phase_basis(moved(shape, names, psi, mass), frequency)
     assert np.abs(shape.T @ (mass[:, None] * shape) - np.eye(len(mass))).max() < 1e-9
-    assert (
-        np.abs(K @ shape - mass[:, None] * shape * (2 * np.pi * frequency) ** 2).max()
-        < 1e-7 * np.abs(K).max()
-    )
+    assert np.abs(K @ shape - mass[:, None] * shape * (2 * np.pi * frequency) ** 2).max() < 1e-7 * np.abs(K).max()
     found = phasing(moved(shape, names, psi, mass))
     for kind, phase in zip(kinds, found):
         if kind == "rotational":

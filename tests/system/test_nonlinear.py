@@ -102,7 +102,7 @@ def test_problems_that_do_not_fit_are_refused(geared_chain, make):
 def test_periodic_solution_in_time():
     solution = PeriodicSolution(
         [2.0, 3.0], [[0, 0], [1, 0], [-1, 2]], [[1.0, 0.5, 0.2j]], np.zeros((1, 3)), True, 0.0, 1, 1, 0.0, ""
-    )  # fmt: skip
+    )
     np.testing.assert_array_equal(solution.line_frequency, [0.0, 2.0, 4.0])
     t = np.linspace(0.0, 5.0, 11)
     wanted = 1.0 + 0.5 * np.cos(2.0 * t) - 0.2 * np.sin(4.0 * t)

@@ -18,10 +18,10 @@ from published.transmission_errors import (
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
+from femgear.stages.lumped_set import gear_set_problem
 from femgear.system.fourier import tooth_lines
 from femgear.system.mesh_directions import gear_set_system, mesh_elements
 from femgear.system.rigid_bodies import PlanarTorque
-from femgear.trains.rigid import gear_set_problem
 
 DATA = lin_parker_set(3)
 TEETH = {"sun": 28, "planet": 36, "ring": 101}
@@ -55,9 +55,11 @@ def test_planets_act_on_both_of_their_meshes():
 
 def test_frequencies_and_spectrum():
     full = errors(
-        sun=Eccentricity(10e-6), planet=Eccentricity(4e-6), ring=Eccentricity(8e-6),
+        sun=Eccentricity(10e-6),
+        planet=Eccentricity(4e-6),
+        ring=Eccentricity(8e-6),
         tooth=tooth_lines([3e-6, 1e-6], [2e-6], np.arange(6) / 6),
-    )  # fmt: skip
+    )
     mesh = 28.0 * 36.0 * 101.0
     frequency = full.frequency(mesh)
     np.testing.assert_allclose(frequency, [mesh, 36.0 * 101.0, 28.0 * 101.0, 28.0 * 36.0])
@@ -113,9 +115,11 @@ def test_dampers_act_on_the_rate_less_the_error():
 def test_two_bases_against_integration():
     # few teeth, so that both repeat soon, but no two lines coincide; light torque, so that teeth part
     eccentric = TransmissionErrors(
-        data=DATA, teeth={"sun": 7, "planet": 9, "ring": 25}, sun=Eccentricity(9e-6),
+        data=DATA,
+        teeth={"sun": 7, "planet": 9, "ring": 25},
+        sun=Eccentricity(9e-6),
         tooth=tooth_lines([2e-6], [1e-6], np.arange(6) / 3),
-    )  # fmt: skip
+    )
     meshes = mesh_elements(DATA, backlash=40e-6)
     problem = gear_set_problem(DATA, meshes=meshes, torque=PlanarTorque(12.0), damping=0.08)
     problem, frequency = with_errors(problem, eccentric), eccentric.frequency(2 * np.pi * 2200.0)

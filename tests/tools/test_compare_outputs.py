@@ -1,4 +1,4 @@
-"""tests/tools/compare_outputs.py: finds what differs between two folders of outputs, and nothing else."""
+"""validation/tools/compare_outputs.py: finds what differs between two folders of outputs, and nothing else."""
 
 import importlib.util
 import json
@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-PATH = Path(__file__).parents[1] / "tools" / "compare_outputs.py"
+PATH = Path(__file__).parents[2] / "validation" / "tools" / "compare_outputs.py"
 TABLE = """
 Static
 

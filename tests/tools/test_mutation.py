@@ -1,4 +1,4 @@
-"""tests/tools/mutation.py, mutants.py: what is changed, what kills it, and no file of the tree is touched."""
+"""validation/tools/mutation.py, mutants.py: what is changed, what kills it, and no file of the tree is touched."""
 
 import ast
 import json
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-TOOLS = Path(__file__).parent
+TOOLS = Path(__file__).parents[2] / "validation" / "tools"
 sys.path.append(str(TOOLS))
 
 from mutants import CORE, drawn, modules, mutants, mutated  # noqa: E402
@@ -50,7 +50,7 @@ CHANGES = {
     ("size", "5", "6"),
     ("branch", "total.reshape(-1, 5) if n else not total", "not total if n else total.reshape(-1, 5)"),
     ("logic", "not total", "total"),
-}  # fmt: skip
+}
 
 
 def test_every_kind_of_change_and_no_other():
@@ -141,12 +141,12 @@ sys.exit(mutation.main(["--modules", "gears", "--count", "99", "--jobs", "1"]))
 @pytest.fixture
 def toy(tmp_path):
     for name in ("mutation.py", "mutants.py"):
-        (tmp_path / "tests/tools").mkdir(parents=True, exist_ok=True)
-        shutil.copy(TOOLS / name, tmp_path / "tests/tools")
+        (tmp_path / "validation/tools").mkdir(parents=True, exist_ok=True)
+        shutil.copy(TOOLS / name, tmp_path / "validation/tools")
     equivalent = "gears/toy.py ;; same ;; abs(a) ;; a ;; a square has no sign\n"
-    (tmp_path / "tests/tools/equivalent_mutants.txt").write_text(equivalent)
+    (tmp_path / "validation/tools/equivalent_mutants.txt").write_text(equivalent)
     (tmp_path / "femgear/gears").mkdir(parents=True)
-    (tmp_path / "tests/gears").mkdir()
+    (tmp_path / "tests/gears").mkdir(parents=True)
     shutil.copy(TOOLS.parents[1] / "pyproject.toml", tmp_path)
     for name in ("femgear/__init__.py", "femgear/gears/__init__.py"):
         (tmp_path / name).touch()
@@ -156,7 +156,7 @@ def toy(tmp_path):
 
 
 def _campaign(folder):
-    path = folder / "tests" / "tools"
+    path = folder / "validation" / "tools"
     done = subprocess.run(
         [sys.executable, "-B", "-c", COMMAND],
         cwd=path,
@@ -189,9 +189,7 @@ def test_a_campaign_finds_the_gaps_and_goes_on_when_tests_are_added(toy):
     assert all(path.read_bytes() == content for path, content in before.items())
 
     path = toy / "tests/gears/test_toy.py"
-    path.write_text(
-        path.read_text() + "\ndef test_all():\n    assert (toy.weak(2), toy.unused(1)) == (6, -1)\n"
-    )
+    path.write_text(path.read_text() + "\ndef test_all():\n    assert (toy.weak(2), toy.unused(1)) == (6, -1)\n")
     done, more = _campaign(toy)
     assert _outcomes(more)["gears/toy.py:11", "3.0  ->  6.0"] == "killed"
     assert _outcomes(more)["gears/toy.py:14", "-a  ->  a"] == "killed"

@@ -49,9 +49,9 @@ def test_two_parallel_stages_are_a_drivetrain_and_two_pairs(tmp_path, monkeypatc
     )
     first, second = read_case("unit_51.toml"), read_case("unit_52.toml")
     assert (first.operation.torque, second.operation.torque) == (100.0, pytest.approx(200.0))
-    assert [
-        one * 30 / math.pi for one in (*first.operation.speeds, *second.operation.speeds)
-    ] == pytest.approx([1500.0, 750.0])
+    assert [one * 30 / math.pi for one in (*first.operation.speeds, *second.operation.speeds)] == pytest.approx(
+        [1500.0, 750.0]
+    )
     assert planetary_set(second).centre_distance == 0.12 and second.gear_2.teeth == 60
     # two bearings of 2e8 N/m
     assert first.gear_1.bearing_stiffness == 4e8
@@ -108,9 +108,7 @@ def test_an_internal_pair(tmp_path):
     box = ParallelUnit().set(44, number_of_teeth=(60, NONE))
     box.components[44]["type"] = "ring_gear"
     box = box.set(52, center_distance=(60.0, "mm"))
-    box.components[31]["attributes"] |= {
-        "outer_diameter_begin": (220.0, "mm"), "outer_diameter_end": (220.0, "mm")
-    }  # fmt: skip
+    box.components[31]["attributes"] |= {"outer_diameter_begin": (220.0, "mm"), "outer_diameter_end": (220.0, "mm")}
     for flank in (1044, 2044):
         box = box.set(flank, addendum_coefficient_basic_profile=(0.8, NONE))
     found, _ = drafts_of(box, tmp_path)
@@ -139,14 +137,10 @@ def test_load_cases_of_pairs(tmp_path):
     </load_case>"""
     spectrum = "".join(case.format(*one) for one in ((1, 1000, 50), (2, 3000, 80)))
     path = tmp_path / "unit.rexs"
-    text = (
-        ParallelUnit().xml().replace("</model>", f'<load_spectrum id="1">{spectrum}</load_spectrum></model>')
-    )
+    text = ParallelUnit().xml().replace("</model>", f'<load_spectrum id="1">{spectrum}</load_spectrum></model>')
     path.write_text(text, encoding="utf-8")
     model = read_model(path)
-    second = {
-        one.suffix: parse_case(one.text) for one in case_drafts(model, "u.toml", load_case=2) if one.suffix
-    }
+    second = {one.suffix: parse_case(one.text) for one in case_drafts(model, "u.toml", load_case=2) if one.suffix}
     assert second["_52"].operation.torque == pytest.approx(160.0)
     assert [one * 30 / math.pi for one in second["_52"].operation.speeds] == pytest.approx([1500.0])
     assert any(one.key == "52: operation" and "1: 500 rpm, 100 N m" in one.text for one in model.findings)
@@ -185,23 +179,25 @@ def test_ids_are_no_paths(tmp_path, monkeypatch):
     box = ParallelUnit()
     names = {51: "../51", 52: "/x\\y:52", 41: "a gear!", 12: "a/b", 13: "a_b", 5: "\u00fc" * 60}
     box.components = {names.get(id, id): one for id, one in box.components.items()}
-    box.relations = [
-        (type, {role: names.get(id, id) for role, id in roles.items()}) for type, roles in box.relations
-    ]
+    box.relations = [(type, {role: names.get(id, id) for role, id in roles.items()}) for type, roles in box.relations]
     written(box, tmp_path, monkeypatch)
     assert {path.name for path in tmp_path.iterdir()} == {
-        "unit.rexs", "unit.toml", "unit____51.toml", "unit__x_y_52.toml"
-    }  # fmt: skip
+        "unit.rexs",
+        "unit.toml",
+        "unit____51.toml",
+        "unit__x_y_52.toml",
+    }
     chain = read_case("unit.toml")
     assert {"gear a_gear_", "bearing a_b", "bearing a_b-2"} <= {one.name for one in chain.body}
 
 
 def test_ends_beside_the_flank_are_left_out(tmp_path):
     box = Gearbox()
-    at = {"diameter_where_profile_crowning_root_is_specified": (60.0, "mm"),
-          "diameter_where_profile_crowning_tip_is_specified": (90.0, "mm")}  # fmt: skip
-    box.add(9999, "profile_crowning", profile_crowning_at_tip=(5.0, "mum"),
-            profile_crowning_at_root=(5.0, "mum"), **at)  # fmt: skip
+    at = {
+        "diameter_where_profile_crowning_root_is_specified": (60.0, "mm"),
+        "diameter_where_profile_crowning_tip_is_specified": (90.0, "mm"),
+    }
+    box.add(9999, "profile_crowning", profile_crowning_at_tip=(5.0, "mum"), profile_crowning_at_root=(5.0, "mum"), **at)
     for flank in (2053, 3053):
         box.relate("reference", origin=flank, referenced=9999)
     found, findings = drafts_of(box, tmp_path)
@@ -211,9 +207,10 @@ def test_ends_beside_the_flank_are_left_out(tmp_path):
     assert len(told) == 1 and told[0].severity == DOUBT and "taken to the end of the flank" in told[0].text
     # a relief that starts beside it is none
     box.components[9999] = {
-        "type": "tip_relief", "name": "",
+        "type": "tip_relief",
+        "name": "",
         "attributes": {"tip_relief_depth": (5.0, "mum"), "tip_relief_datum_diameter": (90.0, "mm")},
-    }  # fmt: skip
+    }
     found, findings = drafts_of(box, tmp_path)
     assert not parse_case(found[""].text).sun.modifications
     assert any("tip relief is not taken" in one.text for one in findings)

@@ -120,12 +120,31 @@ CHANGES: tuple[dict[str, object], ...] = (
 )
 # entries of files, of slices, or without which no set is: others of their tables decide the same
 ELSEWHERE = (
-    "format", "set.helix_angle", "teeth", "sun.module", "operation.fixed", "tilt_stiffness", "misalignment",
-    "torque_end", "torsion_diameter", "wind_up_stiffness", "housing.structure", "housing.published",
-    ".errors", "modifications", "individual", ".material", ".rack", "planet.profile_shift",
-    "ring.profile_shift", "ring.root_diameter", "material.root_stress_limit", "inner_diameter",
-    "support.angle", "pin_errors",
-)  # fmt: skip
+    "format",
+    "set.helix_angle",
+    "teeth",
+    "sun.module",
+    "operation.fixed",
+    "tilt_stiffness",
+    "misalignment",
+    "torque_end",
+    "torsion_diameter",
+    "wind_up_stiffness",
+    "housing.structure",
+    "housing.published",
+    ".errors",
+    "modifications",
+    "individual",
+    ".material",
+    ".rack",
+    "planet.profile_shift",
+    "ring.profile_shift",
+    "ring.root_diameter",
+    "material.root_stress_limit",
+    "inner_diameter",
+    "support.angle",
+    "pin_errors",
+)
 
 
 @pytest.fixture(scope="module")
@@ -184,9 +203,7 @@ def test_every_entry_is_changed():
         return {key.replace("runup.from", "runup.start")}
 
     given = {inner for changes in CHANGES for key, value in changes.items() for inner in keys(key, value)}
-    assert [
-        key for key in leaves(Case) if key not in given and not any(one in key for one in ELSEWHERE)
-    ] == []
+    assert [key for key in leaves(Case) if key not in given and not any(one in key for one in ELSEWHERE)] == []
 
 
 def apply(handle, changes, coarse):
@@ -241,8 +258,10 @@ def test_a_refused_change_leaves_the_case_as_it_was(coarse, grids):
     with pytest.raises(CaseError) as refused:
         handle.change({"operation.torqe": "90 N m", "sun.teeth": "many", "dynamics.damping_ratio": -1})
     assert {one.key for one in refused.value.problems} == {
-        "operation.torqe", "sun.teeth", "dynamics.damping_ratio",
-    }  # fmt: skip
+        "operation.torqe",
+        "sun.teeth",
+        "dynamics.damping_ratio",
+    }
     with pytest.raises(CaseError) as refused:
         handle.change({"operation.torque.more": 1, "sun.modifications[4].amount": "1 um"})
     assert len(refused.value.problems) == 2

@@ -96,8 +96,6 @@ def test_a_package_that_ends_the_program_stops_no_other_train(install, tmp_path,
 
 
 def test_the_help_looks_for_none():
-    program = (
-        "import sys, femgear.cli as c; c.main(['--help']); print('femgear.trains.registry' in sys.modules)"
-    )
+    program = "import sys, femgear.cli as c; c.main(['--help']); print('femgear.trains.registry' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.endswith("False\n")

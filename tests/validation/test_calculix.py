@@ -61,9 +61,15 @@ def test_two_bars_pressed_together_by_a_rotation():
         named(block(x, (0.0, length)), "above", "below"),
     )
     found = pair_contact(
-        bodies, [Mates((0, 0), (0.0, 0.0))], [radius * theta, 2 * radius * theta], base_radius=radius,
-        width=width, material=WITHOUT_CONTRACTION, states=(PLANE_STRAIN, PLANE_STRAIN), penalty=1e17,
-    )  # fmt: skip
+        bodies,
+        [Mates((0, 0), (0.0, 0.0))],
+        [radius * theta, 2 * radius * theta],
+        base_radius=radius,
+        width=width,
+        material=WITHOUT_CONTRACTION,
+        states=(PLANE_STRAIN, PLANE_STRAIN),
+        penalty=1e17,
+    )
     rate = 206e9 * theta / (2 * length)
     torque = rate * width * (height * radius**2 + height**3 / 12)
     assert found.torque == pytest.approx([torque, 2 * torque], rel=1e-3)
@@ -80,9 +86,13 @@ def test_block_on_springs():
     corners = [0, 4, 20, 24]
     mass = 7850.0 * a * b
     found = natural_frequencies(
-        body, WITHOUT_CONTRACTION, PLANE_STRAIN, springs=dict.fromkeys(corners, 1e6),
-        masses=dict.fromkeys(corners, 0.1 * mass), count=3,
-    )  # fmt: skip
+        body,
+        WITHOUT_CONTRACTION,
+        PLANE_STRAIN,
+        springs=dict.fromkeys(corners, 1e6),
+        masses=dict.fromkeys(corners, 0.1 * mass),
+        count=3,
+    )
     square = 4e6 / (1.4 * mass)
     arm = (a**2 + b**2) / 4
     turning = 4e6 * arm / (mass * (a**2 + b**2) / 12 + 0.4 * mass * arm)
@@ -100,9 +110,7 @@ def test_shares_over_an_arc():
     angle = np.linspace(-np.pi, np.pi, 73)[:-1]
     points = np.column_stack([np.cos(angle), np.sin(angle)])
     i = np.arange(0, 72, 2)
-    body = PlaneBody(
-        points, np.zeros((0, 6), int), {"rim": np.column_stack([i, (i + 2) % 72, i + 1])}, i > 99
-    )
+    body = PlaneBody(points, np.zeros((0, 6), int), {"rim": np.column_stack([i, (i + 2) % 72, i + 1])}, i > 99)
     shares = over_arc(body, "rim", 3.1, 0.5)
     assert sum(shares.values()) == pytest.approx(1.0)
     mean = sum(share * points[node] for node, share in shares.items())
@@ -137,9 +145,14 @@ def test_two_blocks_pressed_over_their_width():
         named(block(x, (0.0, length), 2), "above", "below"),
     )
     found = solid_contact(
-        bodies, [radius * theta, 2 * radius * theta], base_radius=radius, width=width,
-        material=WITHOUT_CONTRACTION, slope=0.0, penalty=1e17,
-    )  # fmt: skip
+        bodies,
+        [radius * theta, 2 * radius * theta],
+        base_radius=radius,
+        width=width,
+        material=WITHOUT_CONTRACTION,
+        slope=0.0,
+        penalty=1e17,
+    )
     torque = 206e9 * theta / (2 * length) * width * (height * radius**2 + height**3 / 12)
     assert found.torque == pytest.approx([torque, 2 * torque], rel=1e-3)
     assert found.layer_torque == pytest.approx(found.torque[:, None] / LAYERS * np.ones(LAYERS), rel=1e-6)

@@ -56,9 +56,7 @@ def unit_square(n, *, shift=None, rising=False):
     corner = corner.reshape(-1, 2)
     i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
     right, above, across = i + 1, i + n + 1, i + n + 2
-    halves = (
-        ((i, right, across), (i, across, above)) if rising else ((i, right, above), (right, across, above))
-    )
+    halves = ((i, right, across), (i, across, above)) if rising else ((i, right, above), (right, across, above))
     t = np.vstack([np.stack(half, 1) for half in halves])
     pairs = np.sort(t[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2)
     edges, where = np.unique(pairs, axis=0, return_inverse=True)
@@ -113,9 +111,7 @@ def test_rates_of_a_manufactured_solution():
             ((1 - 2 * x) * y * (1 - y), x * (1 - x) * (1 - 2 * y)),
         )
         l2 = sum((((fields[c] - exact[c]) ** 2) * scalar.dx).sum() for c in range(2))
-        h1 = sum(
-            (((fields[c].grad[d] - slopes[c][d]) ** 2) * scalar.dx).sum() for c in range(2) for d in range(2)
-        )
+        h1 = sum((((fields[c].grad[d] - slopes[c][d]) ** 2) * scalar.dx).sum() for c in range(2) for d in range(2))
         errors.append(np.sqrt([l2, h1]))
     rates = np.log2(errors[0] / errors[1])
     assert np.allclose(rates, [3.0, 2.0], atol=0.05)

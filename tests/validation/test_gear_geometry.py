@@ -81,9 +81,7 @@ def test_contact_ratio_of_internal_pairs():
     assert contact_ratio((20, 80), A20, internal=True) == pytest.approx(1.88968133, abs=5e-9)
     assert contact_ratio((40, 100), A25, internal=True) == pytest.approx(1.62987813, abs=5e-9)
     base = 17 * math.cos(A20), 81 * math.cos(A20)  # 17/81, m = 2, both shifted by 0.2: standard distance
-    value = limits.contact_ratio_internal(
-        17 + 2.4, base[0], 81 - 1.6, base[1], 64.0, 2 * math.pi * math.cos(A20)
-    )
+    value = limits.contact_ratio_internal(17 + 2.4, base[0], 81 - 1.6, base[1], 64.0, 2 * math.pi * math.cos(A20))
     assert value == pytest.approx(1.74362843, abs=5e-9)
 
 
@@ -196,9 +194,16 @@ def test_nrel_stage_2_circles_follow_from_rack_and_shifts():
     """The printed root diameters; the tips are shortened in the report."""
     for gear in (nrel_stage_2().sun, nrel_stage_2().planet, nrel_stage_2().ring):
         free = Gear(
-            gear.teeth, gear.module, A20, gear.profile_shift, 0.55, gear.rim_radius, internal=gear.internal,
-            tip_diameter=gear.tip_diameter, rack=gear.rack,
-        )  # fmt: skip
+            gear.teeth,
+            gear.module,
+            A20,
+            gear.profile_shift,
+            0.55,
+            gear.rim_radius,
+            internal=gear.internal,
+            tip_diameter=gear.tip_diameter,
+            rack=gear.rack,
+        )
         assert 2 * free.root_radius == pytest.approx(gear.root_diameter, abs=1e-6)
 
 

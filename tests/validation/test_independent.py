@@ -66,26 +66,25 @@ def test_half_units():
 
 def test_derivatives_of_the_balance():
     model = weighed(
-        independent.wind_turbine_a(flank=-1.0), torque=3e5, turning=1.0, ratios=(0.05,), play=1e-4,
-        back=independent.wind_turbine_a(), bearing=(3.2e9, 2e-5),
-    )  # fmt: skip
+        independent.wind_turbine_a(flank=-1.0),
+        torque=3e5,
+        turning=1.0,
+        ratios=(0.05,),
+        play=1e-4,
+        back=independent.wind_turbine_a(),
+        bearing=(3.2e9, 2e-5),
+    )
     balance, rng = Balance(model, 2, 64), np.random.default_rng(1)
     c, way = 1e-4 * rng.normal(size=(5, len(model.M))), rng.normal(size=(5, len(model.M)))
     _, J, by_omega = balance.residual(c, 200.0)
     ahead, behind = (balance.residual(c + s * 1e-9 * way, 200.0)[0] for s in (1, -1))
-    np.testing.assert_allclose(
-        (ahead - behind) / 2e-9, J @ way.ravel(), rtol=1e-3, atol=1e-5 * np.abs(J).max()
-    )
+    np.testing.assert_allclose((ahead - behind) / 2e-9, J @ way.ravel(), rtol=1e-3, atol=1e-5 * np.abs(J).max())
     ahead, behind = (balance.residual(c, 200.0 + s * 1e-3)[0] for s in (1, -1))
-    np.testing.assert_allclose(
-        (ahead - behind) / 2e-3, by_omega, rtol=1e-5, atol=1e-6 * np.abs(by_omega).max()
-    )
+    np.testing.assert_allclose((ahead - behind) / 2e-3, by_omega, rtol=1e-5, atol=1e-6 * np.abs(by_omega).max())
 
 
 def test_response_of_a_set_that_keeps_contact_is_linear():
-    model = weighed(
-        independent.wind_turbine_b(flank=-1.0), torque=1.8e5, turning=1.0, ratios=DAMPING_B, play=5e-4
-    )
+    model = weighed(independent.wind_turbine_b(flank=-1.0), torque=1.8e5, turning=1.0, ratios=DAMPING_B, play=5e-4)
     _, c = branch(model, (20.0, 20.1), harmonics=3, most=1)
     omega, drive = 2.0 * math.pi * 20.0, model.play == 0.0
     K = model.K + (model.W[drive].T * model.k[drive]) @ model.W[drive]

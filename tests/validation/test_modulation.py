@@ -50,8 +50,7 @@ def test_planet_passage_rule(z_ring, planets, expected, direction):
     # and the same from the windows themselves, in time
     theta = THETA
     signal = sum(
-        (1 + np.cos(direction * theta + psi)) / 2 * np.cos(z_ring * (theta + direction * psi))
-        for psi in angles
+        (1 + np.cos(direction * theta + psi)) / 2 * np.cos(z_ring * (theta + direction * psi)) for psi in angles
     )
     in_time = order_spectrum(signal).amplitude
     for heard in (amplitude, in_time):
@@ -66,9 +65,7 @@ def test_linear_interpolation_attenuates_and_makes_images(n):
     points, z_ring, n_max = 54, 108, 24
     field = np.zeros((2, 2 * n_max + 1), dtype=complex)
     field[1, n + n_max] = 1.0
-    amplitude = np.abs(
-        heaviside_linear_lines(field, z_ring, 5.0, 0.0, points=points, max_order=400).displacement
-    )
+    amplitude = np.abs(heaviside_linear_lines(field, z_ring, 5.0, 0.0, points=points, max_order=400).displacement)
     attenuated = (np.sin(np.pi * n / points) / (np.pi * n / points)) ** 2
     assert amplitude[z_ring - n] == pytest.approx(attenuated, rel=1e-13)
     images = [n + q * points for q in (-5, -4, -3, -2, -1, 1)]

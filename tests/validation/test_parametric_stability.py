@@ -30,12 +30,17 @@ def mathieu_matrix(a, q, damping=0.0, steps=600):
 @pytest.mark.parametrize(
     ("q", "value", "trace"),
     [
-        (1.0, -0.4551386041, 2.0), (1.0, 1.8591080725, -2.0), (1.0, 4.3713009827, 2.0),
-        (1.0, -0.1102488170, -2.0), (1.0, 3.9170247730, 2.0),
-        (5.0, -5.8000460209, 2.0), (5.0, 1.8581875415, -2.0),
-        (5.0, -5.7900805986, -2.0), (5.0, 2.0994604455, 2.0),
+        (1.0, -0.4551386041, 2.0),
+        (1.0, 1.8591080725, -2.0),
+        (1.0, 4.3713009827, 2.0),
+        (1.0, -0.1102488170, -2.0),
+        (1.0, 3.9170247730, 2.0),
+        (5.0, -5.8000460209, 2.0),
+        (5.0, 1.8581875415, -2.0),
+        (5.0, -5.7900805986, -2.0),
+        (5.0, 2.0994604455, 2.0),
     ],
-)  # fmt: skip
+)
 def test_mathieu_characteristic_values(q, value, trace):
     """Abramowitz and Stegun 20; the digits also from scipy.special."""
     known = [mathieu_a(n, q) for n in range(3)] + [mathieu_b(n, q) for n in (1, 2)]
@@ -47,9 +52,7 @@ def test_mathieu_multipliers():
     values = np.sort(np.linalg.eigvals(mathieu_matrix(1.0, 1.0)).real)
     np.testing.assert_allclose(values, [-4.15605494, -0.2406128], rtol=1e-7)
     assert np.abs(np.linalg.eigvals(mathieu_matrix(2.5, 1.0))).max() == pytest.approx(1.0, abs=1e-10)
-    assert np.linalg.det(mathieu_matrix(1.0, 1.0, damping=0.3)) == pytest.approx(
-        np.exp(-0.3 * np.pi), rel=1e-10
-    )
+    assert np.linalg.det(mathieu_matrix(1.0, 1.0, damping=0.3)) == pytest.approx(np.exp(-0.3 * np.pi), rel=1e-10)
 
 
 @pytest.mark.parametrize(("damping", "threshold"), [(0.1, 0.1000546711), (0.2, 0.2004369763)])
@@ -105,10 +108,13 @@ def test_rectangular_stiffness_unstable_bands(low, high):
 @pytest.mark.parametrize(
     ("ratio", "decay", "value"),
     [
-        (2, 0.02, 1.1198031), (1, 0.02, 1.0608524), (0.5, 0.02, 0.8858646),
-        (2, 0.05, 1.0124401), (1, 0.05, 0.8660985),
+        (2, 0.02, 1.1198031),
+        (1, 0.02, 1.0608524),
+        (0.5, 0.02, 0.8858646),
+        (2, 0.05, 1.0124401),
+        (1, 0.05, 0.8660985),
     ],
-)  # fmt: skip
+)
 def test_rectangular_stiffness_multipliers(ratio, decay, value):
     assert rectangular_multiplier(ratio, decay) == pytest.approx(value, abs=1e-7)
 

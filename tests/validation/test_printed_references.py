@@ -44,9 +44,7 @@ def test_contact_ratio_of_external_pairs(z1, z2, degrees, printed):
 )
 def test_contact_ratio_of_internal_pairs(z1, z2, degrees, x, printed):
     # equal shifts of both leave the centre distance
-    found = contact_ratio(
-        z1, z2, math.radians(degrees), tips=(0.5 * z1 + 1 + x, 0.5 * z2 - 1 + x), internal=True
-    )
+    found = contact_ratio(z1, z2, math.radians(degrees), tips=(0.5 * z1 + 1 + x, 0.5 * z2 - 1 + x), internal=True)
     assert found == pytest.approx(printed, abs=5e-9)
 
 
@@ -77,9 +75,7 @@ def test_root_form_diameters_of_a_helical_pair():
     for z, x, printed in ((24, 0.48, 328.991), (95, 0.6691, 1341.487)):
         d = 14 * z / math.cos(beta)
         height = 14 * (1.25 - x - 0.38 * (1 - math.sin(alpha)))
-        root = math.hypot(
-            d * math.sin(transverse) - 2 * height / math.sin(transverse), d * math.cos(transverse)
-        )
+        root = math.hypot(d * math.sin(transverse) - 2 * height / math.sin(transverse), d * math.cos(transverse))
         assert root == pytest.approx(printed, abs=5e-4)
 
 
@@ -98,9 +94,7 @@ def test_shifted_pair_and_limits():
         assert half == pytest.approx(0.0, abs=5e-8)
 
 
-@pytest.mark.parametrize(
-    ("z1", "z2", "printed"), [(20, 40, 13.0180259), (17, 17, 11.1811762), (50, 50, 14.41483)]
-)
+@pytest.mark.parametrize(("z1", "z2", "printed"), [(20, 40, 13.0180259), (17, 17, 11.1811762), (50, 50, 14.41483)])
 def test_single_stiffness_of_iso_6336(z1, z2, printed):
     # q' of method B without shifts, C_M = 0.8
     assert 13.0180259 * (0.75 * 1.6351859636 + 0.25) == pytest.approx(19.2196764, abs=5e-8)
@@ -128,9 +122,7 @@ def test_multipliers_of_mathieu():
 
 @pytest.mark.parametrize(("damping", "printed"), [(0.1, 0.1000546711), (0.2, 0.2004369763)])
 def test_threshold_of_damped_mathieu(damping, printed):
-    found = brentq(
-        lambda q: np.abs(mathieu(1.0, q, damping)).max() - 1.0, 0.9 * printed, 1.1 * printed, xtol=1e-12
-    )
+    found = brentq(lambda q: np.abs(mathieu(1.0, q, damping)).max() - 1.0, 0.9 * printed, 1.1 * printed, xtol=1e-12)
     assert found == pytest.approx(printed, abs=5e-11)
 
 
@@ -145,8 +137,7 @@ def test_fixed_point_and_multipliers_of_a_rectangular_stiffness(ratio, radius, m
     omega, damping = ratio * natural, 2 * 0.03 * natural
     period = 2 * math.pi / omega
     parts = [
-        expm(np.array([[0.0, 1.0], [-k, -damping]]) * share * period)
-        for k, share in ((1.0, 0.635), (0.65, 0.365))
+        expm(np.array([[0.0, 1.0], [-k, -damping]]) * share * period) for k, share in ((1.0, 0.635), (0.65, 0.365))
     ]
     if multiplier is not None:
         found = np.abs(np.linalg.eigvals(parts[1] @ parts[0])).max()
@@ -208,9 +199,7 @@ def quadrilaterals(corners, across, along):
     """Second-order quadrilaterals on the image of the unit square, and the blocks of plane stress."""
     from skfem import MeshQuad, MeshQuad2
 
-    mesh = MeshQuad2.from_mesh(
-        MeshQuad.init_tensor(np.linspace(0, 1, across + 1), np.linspace(0, 1, along + 1))
-    )
+    mesh = MeshQuad2.from_mesh(MeshQuad.init_tensor(np.linspace(0, 1, across + 1), np.linspace(0, 1, along + 1)))
     names = {
         "left": lambda x: x[0] == 0,
         "bottom": lambda x: x[1] == 0,
@@ -242,9 +231,7 @@ def test_tapered_membrane():
 
     mesh = quadrilaterals(lambda u, v: (10 * u, (v - 0.5) * (5 - 4 * u)), 64, 32)
     basis, K, M = plane_stress(mesh, 200e9, 0.3, 8000.0)
-    values, _ = solve(
-        *condense(K, M, D=basis.get_dofs("left")), solver=solver_eigen_scipy_sym(k=6, sigma=0.0)
-    )
+    values, _ = solve(*condense(K, M, D=basis.get_dofs("left")), solver=solver_eigen_scipy_sym(k=6, sigma=0.0))
     printed = (44.617, 130.010, 162.689, 245.986, 379.718, 391.405)
     np.testing.assert_allclose(np.sqrt(np.sort(values)) / (2 * math.pi), printed, rtol=2e-5)
 

@@ -19,8 +19,13 @@ def unit_mass(omega, force, *, load=0.0, drive=0.0, damping, start=(0.0, 0.0), p
     times = 2.0 * np.pi / omega * (periods - 1 + np.arange(512) / 512)
     run = solve_ivp(
         lambda t, y: (y[1], load + drive * np.cos(omega * t) - damping * y[1] - force(y[0], t)),
-        (0.0, times[-1]), start, method="DOP853", rtol=1e-8, atol=1e-10, t_eval=times,
-    )  # fmt: skip
+        (0.0, times[-1]),
+        start,
+        method="DOP853",
+        rtol=1e-8,
+        atol=1e-10,
+        t_eval=times,
+    )
     return harmonics_of(run.y[:1], 15)
 
 
@@ -36,9 +41,13 @@ def test_duffing_against_an_integration_without_femgear():
     found, run = routes.duffing_motion()
     line = nonlinear.one_harmonic(2.5091975811, 1.2)
     lines = unit_mass(
-        1.2, lambda x, t: x + 0.1 * x**3, drive=0.18, damping=0.05, periods=110,
+        1.2,
+        lambda x, t: x + 0.1 * x**3,
+        drive=0.18,
+        damping=0.05,
+        periods=110,
         start=(line.real, -1.2 * line.imag),
-    )  # fmt: skip
+    )
     for other in (found.balance.deflection, found.shooting.solution.deflection, run.lines):
         assert difference(lines, other) < GATE
 
@@ -65,9 +74,7 @@ def test_planetary_train_against_an_integration_without_femgear():
     waves, offset = meshes.stiffness.amplitudes, meshes.deflection.mean
     late = np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
     shares = np.array([1.0, 0.25, 0.075, 0.0375])
-    np.testing.assert_allclose(
-        waves, 5e8 * shares * np.exp(-2j * np.pi * late[:, None] * np.arange(4)), atol=1e-3
-    )
+    np.testing.assert_allclose(waves, 5e8 * shares * np.exp(-2j * np.pi * late[:, None] * np.arange(4)), atol=1e-3)
 
     def rate(t, y):
         x = system.W.T @ y[:n] - offset

@@ -130,9 +130,10 @@ def continue_curve(
         first = correct(curve, curve.scaled(start, parameter), axis, along=np.sign(direction) * axis)
     except LostError as error:
         raise ConvergenceError(
-            f"no solution found near the start at {describe(parameter)}: {error}", code="E-START",
+            f"no solution found near the start at {describe(parameter)}: {error}",
+            code="E-START",
             remedy="give a better start, or start away from a limit point",
-        ) from error  # fmt: skip
+        ) from error
     return _collect(curve, first)
 
 

@@ -156,9 +156,12 @@ class CurveOptions:
     def balance(self, problem: NonlinearSystem) -> HarmonicBalance:
         """Make the harmonic equations of a problem on these lines."""
         return harmonic_balance(
-            problem, harmonics=self.harmonics, orders=self.orders, samples=self.samples,
+            problem,
+            harmonics=self.harmonics,
+            orders=self.orders,
+            samples=self.samples,
             reduction=self.reduction,
-        )  # fmt: skip
+        )
 
     @property
     def with_radius(self) -> bool:
@@ -196,19 +199,22 @@ def frequency_response_curve(
     others = np.ones(bases) if held is None and bases == 1 else held
     if others is None or np.shape(others) != (bases,) or not 0 <= base < bases:
         raise CaseError(
-            f"base {base} with the other base frequencies {others}", code="E-RANGE", key="held",
+            f"base {base} with the other base frequencies {others}",
+            code="E-RANGE",
+            key="held",
             limit=f"{bases} base frequencies and one of them to vary",
-        )  # fmt: skip
-    if not 0.0 <= min(frequency) < max(frequency) < np.inf:
-        raise CaseError(
-            f"a range of frequencies {frequency}", code="E-RANGE", limit="two different ones, not negative"
         )
+    if not 0.0 <= min(frequency) < max(frequency) < np.inf:
+        raise CaseError(f"a range of frequencies {frequency}", code="E-RANGE", limit="two different ones, not negative")
     if chosen.stability and bases == 1:
         require_period(min(frequency))
     equations = ContinuationProblem(
-        balance, tuple(np.asarray(others, float).tolist()), (min(frequency), max(frequency)), base=base,
+        balance,
+        tuple(np.asarray(others, float).tolist()),
+        (min(frequency), max(frequency)),
+        base=base,
         radius=chosen.with_radius,
-    )  # fmt: skip
+    )
     return _follow(equations, frequency, chosen)
 
 
@@ -237,9 +243,13 @@ def parameter_curve(
     balance = chosen.balance(family(parameter[0] if chosen.start_at is None else chosen.start_at))
     held = checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s")
     equations = ContinuationProblem(
-        balance, tuple(np.atleast_1d(held).tolist()), (min(parameter), max(parameter)), family=family,
-        samples=chosen.samples, radius=chosen.with_radius,
-    )  # fmt: skip
+        balance,
+        tuple(np.atleast_1d(held).tolist()),
+        (min(parameter), max(parameter)),
+        family=family,
+        samples=chosen.samples,
+        radius=chosen.with_radius,
+    )
     return _follow(equations, parameter, chosen)
 
 
@@ -286,9 +296,11 @@ class ContinuationProblem:
             return known
         problem = self.family(parameter)
         return harmonic_balance(
-            problem, orders=known.orders, samples=self.samples,
+            problem,
+            orders=known.orders,
+            samples=self.samples,
             reduction=known.reduction if _same_linear_part(problem, known.problem) else None,
-        )  # fmt: skip
+        )
 
     def evaluate(self, y, parameter: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Compute the residual (n_y,) [m], its derivatives by unknowns (n_y, n_y) and parameter (n_y,)."""
@@ -316,9 +328,14 @@ class ContinuationProblem:
         """Solve for the start of the curve, near a given solution or lines (n_columns, L) [m]."""
         balance = self.balance
         return solve_harmonic_balance(
-            balance.problem, self.frequency_at(parameter), orders=balance.orders, start=start,
-            samples=balance.grid.samples, reduction=balance.reduction, stability=False,
-        )  # fmt: skip
+            balance.problem,
+            self.frequency_at(parameter),
+            orders=balance.orders,
+            start=start,
+            samples=balance.grid.samples,
+            reduction=balance.reduction,
+            stability=False,
+        )
 
     def solution(self, y, parameter: float, error: float, iterations: int = 0) -> PeriodicSolution:
         """Make the solution of a corrected point, unknowns y (n_y,) [m], with its last Newton step."""
@@ -326,9 +343,14 @@ class ContinuationProblem:
         message = f"Point of a branch; last Newton step {error:.1e} of the scaled unknowns."
         message += coincidence_note(self.balance.orders, frequency)
         return self.balance_at(parameter).solution(
-            y, frequency, radius=self.radius, converged=True, iterations=iterations,
-            factorisations=iterations, message=message,
-        )  # fmt: skip
+            y,
+            frequency,
+            radius=self.radius,
+            converged=True,
+            iterations=iterations,
+            factorisations=iterations,
+            message=message,
+        )
 
     def judged(self, parameters, solutions, tolerance: float) -> tuple[PeriodicSolution, ...]:
         """Judge the stability of solutions at parameters (p,), each of its own system."""
@@ -346,22 +368,31 @@ def _follow(equations: ContinuationProblem, ends: tuple[float, float], chosen: C
     begin = ends[0] if chosen.start_at is None else float(chosen.start_at)
     if not limits[0] <= begin <= limits[1]:
         raise CaseError(
-            f"the start at {describe(begin)} lies outside the range", code="E-RANGE", key="start_at",
+            f"the start at {describe(begin)} lies outside the range",
+            code="E-RANGE",
+            key="start_at",
             limit=f"{limits[0]:.6g} to {limits[1]:.6g}",
-        )  # fmt: skip
+        )
     first = equations.first(begin, chosen.start)
     if not first.converged:
         raise ConvergenceError(
-            f"no periodic solution found at the start, {describe(begin)}: {first.message}", code="E-START",
+            f"no periodic solution found at the start, {describe(begin)}: {first.message}",
+            code="E-START",
             remedy="give a start, or start where the response is nearly linear",
-        )  # fmt: skip
+        )
     scale = chosen.scale
     if scale is None:
         scale = max(equations.scale, float(np.abs(first.deflection).max()))
     curve = continue_curve(
-        equations.evaluate, equations.balance.unknowns(first.deflection), begin, limits=limits, scale=scale,
-        direction=1 if ends[1] > ends[0] else -1, options=chosen.options, describe=describe,
-    )  # fmt: skip
+        equations.evaluate,
+        equations.balance.unknowns(first.deflection),
+        begin,
+        limits=limits,
+        scale=scale,
+        direction=1 if ends[1] > ends[0] else -1,
+        options=chosen.options,
+        describe=describe,
+    )
     return _branch(equations, curve, chosen.stability, chosen.tolerance)
 
 
@@ -380,9 +411,12 @@ def _ends(value, key: str, unit: str) -> tuple[float, float]:
     ends = checked_numbers(value, key, code="E-RANGE", unit=unit)
     if ends.shape != (2,):
         raise CaseError(
-            f"a range of shape {ends.shape}", code="E-RANGE", key=key, limit="(first, last)",
+            f"a range of shape {ends.shape}",
+            code="E-RANGE",
+            key=key,
+            limit="(first, last)",
             remedy="give the first and the last value",
-        )  # fmt: skip
+        )
     return float(ends[0]), float(ends[1])
 
 

@@ -84,22 +84,24 @@ class StepOptions:
     def __post_init__(self):
         if not 0.0 < self.smallest <= self.first or not self.smallest <= self.largest < np.inf:
             raise CaseError(
-                f"steps from {self.smallest} over {self.first} to {self.largest}", code="E-RANGE",
+                f"steps from {self.smallest} over {self.first} to {self.largest}",
+                code="E-RANGE",
                 limit="0 < smallest <= first, smallest <= largest",
-            )  # fmt: skip
-        if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
-            raise CaseError(
-                "a step option is not positive", code="E-RANGE", limit="> 0; two iterations or more"
             )
+        if min(self.angle, self.contraction, self.tolerance, self.max_iterations - 1, self.max_points) <= 0:
+            raise CaseError("a step option is not positive", code="E-RANGE", limit="> 0; two iterations or more")
         # the chord is compared with the mean of two tangents, and Newton's method must contract
         for name, bound in (("angle", 0.5), ("contraction", 0.25)):
             value = getattr(self, name)
             if not value <= bound:
                 raise CaseError(
-                    f"the step option {name} is {value}", code="E-RANGE", key=name, value=value,
+                    f"the step option {name} is {value}",
+                    code="E-RANGE",
+                    key=name,
+                    value=value,
                     limit=f"up to {bound}: beyond, a jump to another curve may look like a step",
                     remedy="lengthen the steps by largest instead",
-                )  # fmt: skip
+                )
 
 
 @dataclass(frozen=True)
@@ -239,9 +241,7 @@ def _factored(matrix: np.ndarray):
     return factors, float(np.prod(np.sign(diagonal)) * (-1) ** swaps)
 
 
-def step_effort(
-    options: StepOptions, point: CurvePoint, new: CurvePoint, *, corner: bool, sharp: bool
-) -> float:
+def step_effort(options: StepOptions, point: CurvePoint, new: CurvePoint, *, corner: bool, sharp: bool) -> float:
     """Compare a step between two points with the angle [rad] and contraction aimed at: 1 on target.
 
     On one smooth curve a chord makes the same angle with the tangents at both ends (exactly so on a circle);

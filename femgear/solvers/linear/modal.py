@@ -75,9 +75,7 @@ class ComplexModes:
     @property
     def right(self) -> np.ndarray:
         """Right vectors (n, p) with ``x^H M x = 1``; of rigid modes their velocity."""
-        return np.where(
-            self.rigid, self.drift, self.shape + self.drift / np.where(self.rigid, 1.0, self.eigenvalue)
-        )
+        return np.where(self.rigid, self.drift, self.shape + self.drift / np.where(self.rigid, 1.0, self.eigenvalue))
 
     @property
     def frequency(self) -> np.ndarray:
@@ -87,9 +85,7 @@ class ComplexModes:
     @property
     def damping_ratio(self) -> np.ndarray:
         """``-Re lambda / |lambda|`` (p,): negative where motions grow, +-1 for real poles, 0 if rigid."""
-        return np.where(
-            self.rigid, 0.0, -self.eigenvalue.real / np.where(self.rigid, 1.0, np.abs(self.eigenvalue))
-        )
+        return np.where(self.rigid, 0.0, -self.eigenvalue.real / np.where(self.rigid, 1.0, np.abs(self.eigenvalue)))
 
 
 def solve_modes(
@@ -136,9 +132,11 @@ def solve_modes(
     stiffness = total_stiffness(system, mesh_stiffness)
     if system.gyroscopic is not None and np.any(system.gyroscopic):
         raise CaseError(
-            "real modes cannot carry gyroscopic terms", code="E-CHOICE", key="gyroscopic",
+            "real modes cannot carry gyroscopic terms",
+            code="E-CHOICE",
+            key="gyroscopic",
             remedy="leave them out of the system that is reduced to modes",
-        )  # fmt: skip
+        )
     values, shape, rigid = _eigen(system.M, stiffness, count, max_frequency)
     if np.any(rigid):
         shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
@@ -264,11 +262,14 @@ def complex_modes(system: MechanicalSystem, mesh_stiffness, *, speed: float = 0.
     kept = np.flatnonzero(np.imag(value) >= 0.0)
     kept = kept[np.argsort(np.abs(value[kept]), kind="stable")]
     modes = ComplexModes(
-        eigenvalue=value[kept], shape=real[:, elastic] @ vector[:m, kept],
+        eigenvalue=value[kept],
+        shape=real[:, elastic] @ vector[:m, kept],
         drift=real[:, rigid] @ vector[2 * m :, kept] * scale,
         left=(inverse[kept, m:] @ real[:, order].T).conj().T / scale,
-        paired=np.imag(value[kept]) > 0.0, speed=float(speed), dofs=system.dofs,
-    )  # fmt: skip
+        paired=np.imag(value[kept]) > 0.0,
+        speed=float(speed),
+        dofs=system.dofs,
+    )
     return _normalised(modes, system.M)
 
 
@@ -331,9 +332,11 @@ def viscous_damping(still: MechanicalSystem, reference: np.ndarray, damping) -> 
         return modal_damping(still, reference, damping)
     if array.shape != still.M.shape or not np.all(np.isfinite(array)):
         raise CaseError(
-            f"a damping matrix of shape {array.shape}", code="E-SHAPE", key="damping",
+            f"a damping matrix of shape {array.shape}",
+            code="E-SHAPE",
+            key="damping",
             limit=f"{still.M.shape} finite numbers",
-        )  # fmt: skip
+        )
     return array
 
 
@@ -347,8 +350,10 @@ def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     if not np.all(np.isfinite(meshes)) or np.any(meshes < 0.0):
         raise CaseError(
             "mesh stiffnesses must be finite and not negative",
-            code="E-STIFFNESS", value=meshes.tolist(), limit=">= 0 N/m",
-        )  # fmt: skip
+            code="E-STIFFNESS",
+            value=meshes.tolist(),
+            limit=">= 0 N/m",
+        )
     carried = np.diag(meshes)
     if system.flexibility is not None:
         carried = meshes[:, None] * _spring_share(system, meshes)
@@ -386,9 +391,10 @@ def pseudo_solve(mass, stiffness, rigid, loads) -> np.ndarray:
 def mass_error() -> ConvergenceError:
     """Make the refusal of a mass matrix that is not positive definite (E-MASS)."""
     return ConvergenceError(
-        "the mass matrix is not positive definite", code="E-MASS",
+        "the mass matrix is not positive definite",
+        code="E-MASS",
         remedy="give every degree of freedom some mass or condense it",
-    )  # fmt: skip
+    )
 
 
 def _spring_share(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
@@ -424,9 +430,10 @@ def _eigen(mass, stiffness, count, max_frequency):
     values, vectors = scipy.linalg.eigh(standard, **subset)
     if not np.all(np.isfinite(values)) or not len(values):
         raise ConvergenceError(
-            f"no natural frequency below {max_frequency} Hz", code="E-MODES",
+            f"no natural frequency below {max_frequency} Hz",
+            code="E-MODES",
             remedy="raise the highest frequency",
-        )  # fmt: skip
+        )
     if count is not None:
         kept = min(int(count), len(values))
         while kept < len(values) and values[kept] - values[kept - 1] < _MULTIPLE * abs(values[kept]):
@@ -443,8 +450,9 @@ def _rigid(values: np.ndarray, scale: float, n: int) -> np.ndarray:
     if values[0] < -threshold:
         raise ConvergenceError(
             f"the stiffness matrix is negative on some motion: smallest eigenvalue {values[0]:.3e} 1/s^2",
-            code="E-STIFFNESS", remedy="check the signs of supports, couplings and mesh directions",
-        )  # fmt: skip
+            code="E-STIFFNESS",
+            remedy="check the signs of supports, couplings and mesh directions",
+        )
     return np.abs(values) <= threshold
 
 
@@ -468,9 +476,10 @@ def _held(mass, stiffness, rigid):
         return scipy.linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)
     except scipy.linalg.LinAlgError:
         raise ConvergenceError(
-            "rounding of the largest stiffness hides the smallest", code="E-STIFFNESS",
+            "rounding of the largest stiffness hides the smallest",
+            code="E-STIFFNESS",
             remedy="bring the stiffnesses closer together",
-        ) from None  # fmt: skip
+        ) from None
 
 
 def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
@@ -479,9 +488,10 @@ def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
     if np.any(strain > allowed):
         mesh = int(np.argmax((strain - allowed).max(axis=1)))
         raise ConvergenceError(
-            f"a motion without stiffness strains column {mesh + 1} of W: its mean stiffness is missing or "
-            "too small", code="E-RIGID-MODE", remedy="give every mesh, bearing or spring a mean stiffness",
-        )  # fmt: skip
+            f"a motion without stiffness strains column {mesh + 1} of W: its mean stiffness is missing or too small",
+            code="E-RIGID-MODE",
+            remedy="give every mesh, bearing or spring a mean stiffness",
+        )
     work, allowed = np.abs(system.load @ rigid), _allowed(system.load[:, None], rigid)[0]
     if np.any(work > allowed):
         mode = int(np.argmax(work - allowed))
@@ -489,12 +499,12 @@ def _check_rigid(system: MechanicalSystem, rigid: np.ndarray) -> None:
         dof = int(np.argmax(np.abs(rigid[:, mode])))
         name = system.dofs[dof] if system.dofs else str(dof)
         raise CaseError(
-            f"the constant load does work on a rigid-body motion (largest at {name}): "
-            f"{work[mode]:.3e} of {size:.3e}",
-            code="E-LOAD-BALANCE", limit="a load in equilibrium with itself",
+            f"the constant load does work on a rigid-body motion (largest at {name}): {work[mode]:.3e} of {size:.3e}",
+            code="E-LOAD-BALANCE",
+            limit="a load in equilibrium with itself",
             remedy="add the reaction torque of the output, hold that motion by a support, or check the unit "
             "of the spring that holds it: one far softer than the others counts as none",
-        )  # fmt: skip
+        )
 
 
 def _allowed(columns: np.ndarray, rigid: np.ndarray) -> np.ndarray:
@@ -517,26 +527,35 @@ def _damping_ratios(system: MechanicalSystem, shape, omega, damping_ratio) -> np
         off = np.abs(modal - np.diag(np.diag(modal))).max(initial=0.0)
         if off > 1e-6 * np.abs(modal).max(initial=0.0):
             raise CaseError(
-                "the viscous damping couples the modes", code="E-DAMPING", key="damping_ratio",
+                "the viscous damping couples the modes",
+                code="E-DAMPING",
+                key="damping_ratio",
                 remedy="give a modal damping ratio, or a damping matrix proportional to mass and stiffness",
-            )  # fmt: skip
+            )
         return np.where(omega > 0.0, np.diag(modal) / (2.0 * np.where(omega > 0.0, omega, 1.0)), 0.0)
     if np.any(system.C):
         raise CaseError(
-            "a damping ratio and a damping matrix are given", code="E-DAMPING", key="damping_ratio",
+            "a damping ratio and a damping matrix are given",
+            code="E-DAMPING",
+            key="damping_ratio",
             remedy="keep one of them",
-        )  # fmt: skip
+        )
     ratio = np.asarray(damping_ratio, dtype=float)
     if ratio.ndim > 1 or (ratio.ndim == 1 and len(ratio) != len(omega)):
         raise CaseError(
-            f"{ratio.size} damping ratios for {len(omega)} modes", code="E-DAMPING", key="damping_ratio",
+            f"{ratio.size} damping ratios for {len(omega)} modes",
+            code="E-DAMPING",
+            key="damping_ratio",
             limit="one number, or one a mode",
-        )  # fmt: skip
+        )
     if not np.all(np.isfinite(ratio)) or np.any(ratio < 0.0):
         raise CaseError(
-            "damping ratios must be finite and not negative", code="E-DAMPING", key="damping_ratio",
-            value=ratio.tolist(), limit=">= 0",
-        )  # fmt: skip
+            "damping ratios must be finite and not negative",
+            code="E-DAMPING",
+            key="damping_ratio",
+            value=ratio.tolist(),
+            limit=">= 0",
+        )
     return np.where(omega > 0.0, ratio, 0.0)
 
 
@@ -545,9 +564,10 @@ def _inverse(vector: np.ndarray) -> np.ndarray:
     if not size[-1] * _DEFECTIVE > size[0]:
         raise ConvergenceError(
             f"two poles share one vector: condition {size[0] / max(size[-1], 1e-300):.1e} of the modes",
-            code="E-SOLVE", limit=f"{_DEFECTIVE:.0e}",
+            code="E-SOLVE",
+            limit=f"{_DEFECTIVE:.0e}",
             remedy="a mode is critically damped or a speed is critical: change damping or speed a little",
-        )  # fmt: skip
+        )
     return np.linalg.inv(vector)
 
 
@@ -557,10 +577,6 @@ def _normalised(modes: ComplexModes, mass: np.ndarray) -> ComplexModes:
     size = np.sqrt(np.einsum("ip,ip->p", right.conj(), mass @ right).real)
     square = np.einsum("ip,ip->p", right, mass @ right)
     # circular orbits have x^T M x = 0 and any phase
-    phase = np.where(
-        np.abs(square) > 1e-9 * size**2, np.sqrt(square / np.abs(np.where(square == 0, 1, square))), 1.0
-    )
+    phase = np.where(np.abs(square) > 1e-9 * size**2, np.sqrt(square / np.abs(np.where(square == 0, 1, square))), 1.0)
     factor = 1.0 / (size * phase)
-    return replace(
-        modes, shape=modes.shape * factor, drift=modes.drift * factor, left=modes.left / factor.conj()
-    )  # fmt: skip
+    return replace(modes, shape=modes.shape * factor, drift=modes.drift * factor, left=modes.left / factor.conj())

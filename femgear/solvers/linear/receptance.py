@@ -140,14 +140,18 @@ def modal_error_response(modes: Modes, mesh_frequency, error, *, harmonics=None)
     harmonics = np.arange(1, error.shape[-1] + 1) if harmonics is None else np.atleast_1d(harmonics)
     if harmonics.ndim != 1 or harmonics.dtype.kind not in "iu" or np.any(harmonics < 1):
         raise CaseError(
-            f"harmonics {harmonics.tolist()} of the mesh frequency", code="E-HARMONICS", key="harmonics",
-            limit="whole numbers from 1", remedy="the mean of a transmission error is a static load",
-        )  # fmt: skip
+            f"harmonics {harmonics.tolist()} of the mesh frequency",
+            code="E-HARMONICS",
+            key="harmonics",
+            limit="whole numbers from 1",
+            remedy="the mean of a transmission error is a static load",
+        )
     if error.shape[1:] != (len(k), len(harmonics)) or not np.all(np.isfinite(error)):
         raise CaseError(
-            f"transmission errors of shape {error.shape}", code="E-SHAPE",
+            f"transmission errors of shape {error.shape}",
+            code="E-SHAPE",
             limit=f"(cases, {len(k)} meshes, {len(harmonics)} harmonics), finite",
-        )  # fmt: skip
+        )
     frequency = np.atleast_1d(np.asarray(mesh_frequency, float))
     elastic = np.flatnonzero(modes.frequency > 0.0)
     left = modes.mesh_deflection[:, elastic]
@@ -404,28 +408,36 @@ def reduce_problem(problem: NonlinearSystem, *, reference=None) -> Reduction:
     if off > _COUPLED * np.abs(modal).max(initial=0.0):
         return _complex_modes(modal, modes, common)
     return Reduction(
-        **common, constant=(2.0 * np.pi * modes.frequency) ** 2, linear=np.diag(modal).copy(), square=1.0,
-        inputs=np.ascontiguousarray(rows.T), pairs=_pairs(rows[:columns], rows.T), shape=modes.shape,
-    )  # fmt: skip
+        **common,
+        constant=(2.0 * np.pi * modes.frequency) ** 2,
+        linear=np.diag(modal).copy(),
+        square=1.0,
+        inputs=np.ascontiguousarray(rows.T),
+        pairs=_pairs(rows[:columns], rows.T),
+        shape=modes.shape,
+    )
 
 
 def _modes_with_loads(problem: NonlinearSystem, reference: np.ndarray) -> Modes:
     """Modes of the undamped system, with the loads as further columns of ``W``."""
     steady = [np.real(force.force) for force in problem.forces if not any(force.orders)]
     bare = replace(
-        problem.system, C=np.zeros_like(problem.system.C), gyroscopic=None,
+        problem.system,
+        C=np.zeros_like(problem.system.C),
+        gyroscopic=None,
         load=problem.system.load + sum(steady),
-    )  # fmt: skip
+    )
     try:
         modes = solve_modes(bare, reference, damping_ratio=0.0)
     except ConvergenceError as error:
         if error.code != "E-STIFFNESS" or problem.system.gyroscopic is None:
             raise
         raise ConvergenceError(
-            error.message + ", in a system that turns", code=error.code,
+            error.message + ", in a system that turns",
+            code=error.code,
             remedy="where K holds centripetal terms (-speed^2) the speed is above a critical one: lower the "
             "speed or leave those terms out; else check the signs of supports, couplings and mesh directions",
-        ) from error  # fmt: skip
+        ) from error
     loads = [bare.load]
     for force in problem.forces:
         loads += [np.real(force.force), np.imag(force.force)]
@@ -470,10 +482,15 @@ def _complex_modes(modal, modes: Modes, common) -> Reduction:
     inputs = np.linalg.solve(vectors, drive.astype(complex))
     columns = len(common["reference"])
     reduction = Reduction(
-        **common, constant=-poles, linear=np.ones(len(poles)), square=0.0, inputs=inputs,
+        **common,
+        constant=-poles,
+        linear=np.ones(len(poles)),
+        square=0.0,
+        inputs=inputs,
         pairs=_pairs(rows[:columns, elastic] @ vectors[:m], inputs),
-        shape=modes.shape[:, elastic] @ vectors[:m], drift=modes.shape[:, rigid] @ vectors[2 * m :] * scale,
-    )  # fmt: skip
+        shape=modes.shape[:, elastic] @ vectors[:m],
+        drift=modes.shape[:, rigid] @ vectors[2 * m :] * scale,
+    )
     _check_poles(reduction, modal, natural, scale)
     return reduction
 
@@ -487,8 +504,9 @@ def _check_poles(reduction: Reduction, modal, natural, omega: float) -> None:
     if not error <= _POLES * np.abs(direct).max(initial=np.finfo(float).tiny):
         raise ConvergenceError(
             f"the complex modes give a receptance that is wrong by {error:.2e} of {np.abs(direct).max():.2e}",
-            code="E-SOLVE", remedy="modes are critically damped together: change the damping a little",
-        )  # fmt: skip
+            code="E-SOLVE",
+            remedy="modes are critically damped together: change the damping a little",
+        )
 
 
 def _times(gain: np.ndarray, pairs: np.ndarray) -> np.ndarray:
@@ -515,8 +533,9 @@ def source_columns(problem: NonlinearSystem, orders: np.ndarray) -> np.ndarray:
         if np.any(given[bases:]) or not len(same) + len(mirror):
             raise CaseError(
                 f"harmonic force {number + 1} has the orders {tuple(force.orders)}, which no line has",
-                code="E-HARMONICS", remedy="add that line",
-            )  # fmt: skip
+                code="E-HARMONICS",
+                remedy="add that line",
+            )
         line, sign = (same[0], 1.0) if len(same) else (mirror[0], -1.0)
         out[1 + 2 * number : 3 + 2 * number, line] = 1.0, 1j * sign
     return out
@@ -528,9 +547,10 @@ def _checked(frequency, inputs, outputs, n: int):
     inputs = inputs[:, None] if inputs.ndim == 1 else inputs
     if inputs.ndim != 2 or len(inputs) != n or outputs.ndim != 2 or outputs.shape[1] != n:
         raise CaseError(
-            f"inputs of shape {inputs.shape} and outputs of shape {outputs.shape}", code="E-SHAPE",
+            f"inputs of shape {inputs.shape} and outputs of shape {outputs.shape}",
+            code="E-SHAPE",
             limit=f"({n}, inputs) and (outputs, {n})",
-        )  # fmt: skip
+        )
     return _angular(frequency), inputs, outputs
 
 
@@ -540,10 +560,12 @@ def _angular(frequency) -> np.ndarray:
     finite = np.all(np.isfinite(frequency)) and np.all(frequency >= 0.0)
     if frequency.ndim != 1 or not len(frequency) or not finite:
         raise CaseError(
-            f"frequencies of shape {frequency.shape} must be finite and not negative", code="E-RANGE",
-            key="frequency", limit="a list of one or more numbers >= 0 Hz",
+            f"frequencies of shape {frequency.shape} must be finite and not negative",
+            code="E-RANGE",
+            key="frequency",
+            limit="a list of one or more numbers >= 0 Hz",
             remedy="list the frequencies of the response",
-        )  # fmt: skip
+        )
     return 2.0 * np.pi * frequency
 
 
@@ -558,9 +580,5 @@ def _gain(modes: Modes, kept: np.ndarray | slice, omega: np.ndarray) -> np.ndarr
     return 1.0 / below
 
 
-def _resonance(
-    where: str, remedy: str = "give the motion some damping or move the frequency"
-) -> ConvergenceError:
-    return ConvergenceError(
-        f"undamped resonance {where}: infinite response", code="E-RESONANCE", remedy=remedy
-    )
+def _resonance(where: str, remedy: str = "give the motion some damping or move the frequency") -> ConvergenceError:
+    return ConvergenceError(f"undamped resonance {where}: infinite response", code="E-RESONANCE", remedy=remedy)

@@ -176,8 +176,6 @@ def unresolved(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, dam
     expected; arguments as of `refined_speeds`.
     """
     expected = heard / np.where(damping > 0.0, damping, np.inf)
-    counted = (
-        (expected > 0.05 * expected.max(initial=0.0)) & (resonance >= speeds[0]) & (resonance <= speeds[-1])
-    )
+    counted = (expected > 0.05 * expected.max(initial=0.0)) & (resonance >= speeds[0]) & (resonance <= speeds[-1])
     distance = np.abs(speeds[:, None] - resonance[counted]).min(axis=0)
     return int(np.count_nonzero(distance > 0.5 * damping[counted] * resonance[counted]))

@@ -230,15 +230,19 @@ def campbell_data(
     speeds = np.asarray(speeds, float)
     if speeds.ndim != 1 or len(speeds) < 2 or not np.all(np.isfinite(speeds)):
         raise CaseError(
-            f"a Campbell diagram over speeds of shape {speeds.shape}", code="E-RANGE", key="speeds",
+            f"a Campbell diagram over speeds of shape {speeds.shape}",
+            code="E-RANGE",
+            key="speeds",
             limit="two or more finite speeds [rad/s], ascending or descending",
             remedy="list the speeds at which the modes are wanted",
-        )  # fmt: skip
+        )
     mass = np.asarray(system_at(float(speeds[0])).M)
     tracked = track_modes(
         lambda speed: oscillating(complex_modes(system_at(speed), mesh_stiffness, speed=speed)),
-        speeds, mass, count=count,
-    )  # fmt: skip
+        speeds,
+        mass,
+        count=count,
+    )
     senses = np.zeros(tracked.eigenvalue.shape)
     if planes is not None:
         senses = np.array([whirl(shape, np.diag(mass), planes) for shape in tracked.shape])
@@ -267,9 +271,10 @@ def _assigned(old: _Point, new: _Point) -> tuple[_Point, np.ndarray]:
     m, value = len(old.eigenvalue), new.eigenvalue
     if len(value) < m:
         raise ConvergenceError(
-            f"{m} modes are followed, {len(value)} are there at {new.value:.6g}", code="E-MODES",
+            f"{m} modes are followed, {len(value)} are there at {new.value:.6g}",
+            code="E-MODES",
             remedy="end before it, or follow fewer modes: one became rigid, overdamped or unstable",
-        )  # fmt: skip
+        )
     plain = np.abs(old.vector.conj().T @ new.vector) ** 2
     space = _space_agreement(old, new)
     ahead = old.eigenvalue if old.slope is None else old.eigenvalue + old.slope * (new.value - old.value)

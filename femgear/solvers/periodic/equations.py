@@ -214,9 +214,7 @@ class HarmonicBalance:
                 found |= bool(pulled.any())
         return self.unknowns(lines) if found else None
 
-    def solution(
-        self, y, frequency, *, radius: bool = False, forces: Any = None, **what_happened
-    ) -> PeriodicSolution:
+    def solution(self, y, frequency, *, radius: bool = False, forces: Any = None, **what_happened) -> PeriodicSolution:
         """Make a solution of unknowns (n_y,) [m]; keywords are fields of `PeriodicSolution` on how it came.
 
         With ``radius`` the spectral radius of the fixed point is among them, where the lines are finite;
@@ -239,9 +237,7 @@ class HarmonicBalance:
             told |= {"converged": False, "message": f"Not converged: {note}."}
             told["residual"] = max(told["residual"], 1.0)
         force = beyond + self.reduction.reference[:, None] * lines
-        return PeriodicSolution(
-            frequency, self.orders, lines, force, tail=line_tail(lines, self.orders), **told
-        )
+        return PeriodicSolution(frequency, self.orders, lines, force, tail=line_tail(lines, self.orders), **told)
 
     def _respond(self, receptance, force) -> np.ndarray:
         """``T force - T_load S`` (n_columns, L)."""
@@ -288,9 +284,10 @@ def harmonic_balance(
     bases = orders.shape[1]
     if bases < problem.bases:
         raise CaseError(
-            f"lines of {bases} base frequencies, elements and forces of {problem.bases}", code="E-HARMONICS",
+            f"lines of {bases} base frequencies, elements and forces of {problem.bases}",
+            code="E-HARMONICS",
             remedy="give one order a base frequency",
-        )  # fmt: skip
+        )
     if samples is not None:
         samples = (samples,) * bases if np.ndim(samples) == 0 else tuple(samples)
         if len(samples) != bases or any(int(count) != count for count in samples):
@@ -330,10 +327,12 @@ def reduced(problem: NonlinearSystem, lines: int | None = None) -> Reduction | D
             raise
         raise ConvergenceError(
             f"{_element_name(problem, column)} has no linear stiffness, and nothing else holds the motion "
-            "that strains it", code="E-RIGID-MODE", limit="a stiffness at rest, or a reference in its place",
+            "that strains it",
+            code="E-RIGID-MODE",
+            limit="a stiffness at rest, or a reference in its place",
             remedy="where it stiffens with the deflection pass reduction=reduce_problem(problem, "
             "reference=stiffness of every column at the expected amplitude [N/m]); else give it a stiffness",
-        ) from error  # fmt: skip
+        ) from error
 
 
 def _element_name(problem: NonlinearSystem, column: int) -> str:
@@ -404,9 +403,15 @@ def krylov_radius(tangent: LineTangent) -> float | None:
     start = np.random.default_rng(0).standard_normal(size)
     try:
         values = eigs(
-            operator, k=1, ncv=30, v0=start, which="LM", tol=1e-2,  # type: ignore[arg-type]
-            maxiter=60, return_eigenvectors=False,
-        )  # fmt: skip
+            operator,
+            k=1,
+            ncv=30,
+            v0=start,
+            which="LM",
+            tol=1e-2,  # type: ignore[arg-type]
+            maxiter=60,
+            return_eigenvectors=False,
+        )
     except ArpackError:
         return None
     return float(np.abs(values).max())
@@ -522,9 +527,12 @@ def _check_harmonics(problem: NonlinearSystem, harmonics: int) -> None:
         if wanted > harmonics >= 0:
             raise CaseError(
                 f"{harmonics} harmonics, but harmonic force {number + 1} has orders {tuple(force.orders)}",
-                code="E-HARMONICS", key="harmonics", value=harmonics, limit=f"{wanted} or more",
+                code="E-HARMONICS",
+                key="harmonics",
+                value=harmonics,
+                limit=f"{wanted} or more",
                 remedy="raise the number of harmonics",
-            )  # fmt: skip
+            )
 
 
 def _longest(problem) -> float:

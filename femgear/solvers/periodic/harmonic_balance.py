@@ -188,10 +188,17 @@ def _newton(
     converged, steps = bool(history[-1] <= tolerance), len(history) - 1 + bool(trouble)
     forces = tangent if evaluate is _with_matrix and not trouble else None
     return balance.solution(
-        y, frequency, radius=radius, forces=forces, converged=converged, residual=history[-1],
-        iterations=steps, factorisations=steps,
-        message=_message(converged, steps, history[-1], trouble, tolerance), history=tuple(history),
-    )  # fmt: skip
+        y,
+        frequency,
+        radius=radius,
+        forces=forces,
+        converged=converged,
+        residual=history[-1],
+        iterations=steps,
+        factorisations=steps,
+        message=_message(converged, steps, history[-1], trouble, tolerance),
+        history=tuple(history),
+    )
 
 
 def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **wanted) -> PeriodicSolution:
@@ -214,8 +221,13 @@ def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **want
 
     scale = max(float(np.linalg.norm(linear)), balance.scale)
     options = StepOptions(
-        first=_FIRST, smallest=_LEAST, largest=_LONGEST, angle=0.3, contraction=0.25, max_points=_STEPS,
-    )  # fmt: skip
+        first=_FIRST,
+        smallest=_LEAST,
+        largest=_LONGEST,
+        angle=0.3,
+        contraction=0.25,
+        max_points=_STEPS,
+    )
     try:
         curve = continue_curve(evaluate, linear, 0.0, limits=(0.0, 1.0), scale=scale, options=options)
     except ConvergenceError:
@@ -227,9 +239,11 @@ def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **want
     note = f" Newton's method alone failed; started from {len(curve.points) - 1} steps of embedding."
     work = failed.factorisations + int(curve.iterations.sum()) + found.factorisations
     return replace(
-        found, factorisations=work, iterations=failed.iterations + found.iterations,
+        found,
+        factorisations=work,
+        iterations=failed.iterations + found.iterations,
         message=found.message + note,
-    )  # fmt: skip
+    )
 
 
 def _with_matrix(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
@@ -263,22 +277,20 @@ def _checked_frequency(balance: HarmonicBalance, frequency) -> np.ndarray:
     """Base frequencies (n_bases,), finite and not negative."""
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.shape != balance.orders.shape[1:]:
-        raise CaseError(
-            f"{frequency.size} base frequencies for lines of {balance.orders.shape[1]}", code="E-RANGE"
-        )
+        raise CaseError(f"{frequency.size} base frequencies for lines of {balance.orders.shape[1]}", code="E-RANGE")
     if not np.all(np.isfinite(frequency)) or np.any(frequency < 0.0):
-        raise CaseError(
-            f"base frequencies {frequency.tolist()} rad/s", code="E-RANGE", limit="finite, not negative"
-        )
+        raise CaseError(f"base frequencies {frequency.tolist()} rad/s", code="E-RANGE", limit="finite, not negative")
     near = np.abs(frequency[:, None] - frequency) <= 1e-9 * frequency.max(initial=0.0)
     equal = near & (frequency > 0.0)
     if np.any(same := np.triu(equal, 1)):
         one, other = np.eye(len(frequency), dtype=int)[np.argwhere(same)[0]].tolist()
         raise CaseError(
             f"base frequencies {frequency.tolist()} rad/s: the lines {one} and {other} are one",
-            code="E-RANGE", key="frequency", limit="no two base frequencies equal to 1e-9",
+            code="E-RANGE",
+            key="frequency",
+            limit="no two base frequencies equal to 1e-9",
             remedy="take one base frequency and add up the orders of elements and forces",
-        )  # fmt: skip
+        )
     return frequency
 
 
@@ -295,7 +307,5 @@ def _start(balance: HarmonicBalance, frequency, start) -> np.ndarray:
     else:
         lines = checked_numbers(start, "start", code="E-START", unit="m", kind=complex)
     if lines.shape != shape or not np.all(np.isfinite(lines)):
-        raise CaseError(
-            f"a start of shape {lines.shape}", code="E-START", limit=f"finite lines of shape {shape}"
-        )
+        raise CaseError(f"a start of shape {lines.shape}", code="E-START", limit=f"finite lines of shape {shape}")
     return balance.unknowns(lines)

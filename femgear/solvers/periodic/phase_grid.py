@@ -112,16 +112,23 @@ def phase_grid(orders: np.ndarray, samples: tuple[int, ...]) -> PhaseGrid:
     for base, (count, highest) in enumerate(zip(samples, top)):
         if count < 2 * highest + 1:
             raise CaseError(
-                f"{count} samples along base {base + 1} cannot show order {highest}", code="E-HARMONICS",
-                limit=f"at least {2 * highest + 1}", remedy="ask for more samples or fewer harmonics",
-            )  # fmt: skip
+                f"{count} samples along base {base + 1} cannot show order {highest}",
+                code="E-HARMONICS",
+                limit=f"at least {2 * highest + 1}",
+                remedy="ask for more samples or fewer harmonics",
+            )
     theta = equidistant_phases(samples)
     left, right = orders[:, None, :], orders[None, :, :]
     flat = np.flatnonzero(orders[:, -1] == 0)
     return PhaseGrid(
-        orders, samples, theta, _places(orders, samples), _places(left - right, samples),
-        _places(left + right, samples), (flat, _places(-orders[flat], samples)[0]),
-    )  # fmt: skip
+        orders,
+        samples,
+        theta,
+        _places(orders, samples),
+        _places(left - right, samples),
+        _places(left + right, samples),
+        (flat, _places(-orders[flat], samples)[0]),
+    )
 
 
 def equidistant_phases(samples: Sequence[int]) -> np.ndarray:

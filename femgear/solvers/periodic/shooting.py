@@ -98,9 +98,10 @@ class ShootingOptions:
         object.__setattr__(self, "max_iterations", most)
         if self.harmonics < 1 or self.samples < 4 * self.harmonics:
             raise CaseError(
-                f"{self.harmonics} harmonics, {self.samples} samples", code="E-RANGE",
+                f"{self.harmonics} harmonics, {self.samples} samples",
+                code="E-RANGE",
                 limit="a harmonic or more, four samples a harmonic or more",
-            )  # fmt: skip
+            )
 
     def integrator(self, moving: Flow, start) -> dict[str, Any]:
         """Make the options of `trajectory` for motions of the size of a start, (n,) [m] and (n,) [m/s]."""
@@ -244,10 +245,14 @@ def _result(
     force = element_forces(moving.problem, x, times[:, None] * moving.frequency)[0]
     deflection, forces = harmonics_of(x.T, chosen.harmonics), harmonics_of(force.T, chosen.harmonics)
     converged = history[-1] <= chosen.tolerance
-    message = "the motion returns to its start" if converged else (
-        f"after {len(history) - 1} iterations start and end differ by {history[-1]:.2g} of the motion: "
-        "give a better start"
-    )  # fmt: skip
+    message = (
+        "the motion returns to its start"
+        if converged
+        else (
+            f"after {len(history) - 1} iterations start and end differ by {history[-1]:.2g} of the motion: "
+            "give a better start"
+        )
+    )
     if stuck and not converged:
         message = (
             f"no start returns: a period changes the motion by {history[-1]:.2g} of it where "
@@ -255,20 +260,23 @@ def _result(
         )
     orders = np.arange(chosen.harmonics + 1)[:, None]
     solution = PeriodicSolution(
-        frequency=np.array([omega]), orders=orders, deflection=deflection, force=forces,
-        converged=converged, residual=history[-1], iterations=len(history) - 1,
-        factorisations=len(history) - 1 + stuck, message=message,
-        tail=line_tail(deflection, orders, rounding=10.0 * chosen.tolerance), history=tuple(history),
-    )  # fmt: skip
-    values = np.linalg.eigvals(monodromy)
-    return ShootingSolution(
-        solution, period, q[0], v[0], monodromy, values[np.argsort(-np.abs(values))], times, q
+        frequency=np.array([omega]),
+        orders=orders,
+        deflection=deflection,
+        force=forces,
+        converged=converged,
+        residual=history[-1],
+        iterations=len(history) - 1,
+        factorisations=len(history) - 1 + stuck,
+        message=message,
+        tail=line_tail(deflection, orders, rounding=10.0 * chosen.tolerance),
+        history=tuple(history),
     )
+    values = np.linalg.eigvals(monodromy)
+    return ShootingSolution(solution, period, q[0], v[0], monodromy, values[np.argsort(-np.abs(values))], times, q)
 
 
-def _judged(
-    moving: Flow, found: ShootingSolution, chosen: ShootingOptions, *, trivial: int = 0
-) -> ShootingSolution:
+def _judged(moving: Flow, found: ShootingSolution, chosen: ShootingOptions, *, trivial: int = 0) -> ShootingSolution:
     """The motion with the verdict of its monodromy matrix, without ``trivial`` multipliers one.
 
     Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
@@ -279,7 +287,12 @@ def _judged(
     if found.solution.converged:
         matrix, positions = _without_free_motions(moving.problem, found.monodromy)
         verdict = verdict_of(
-            np.linalg.eigvals(matrix), found.period, "shooting", chosen.integration, np.inf,
-            positions=trivial + positions, velocities=positions,
-        )  # fmt: skip
+            np.linalg.eigvals(matrix),
+            found.period,
+            "shooting",
+            chosen.integration,
+            np.inf,
+            positions=trivial + positions,
+            velocities=positions,
+        )
     return replace(found, solution=replace(found.solution, verdict=verdict))

@@ -187,9 +187,12 @@ def compliance(modes: Modes, omega: np.ndarray, chosen: Any = slice(None)) -> np
             mode = np.arange(len(modes.frequency))[chosen][np.argwhere(resonant & moved)[0][-1]]
             raise ConvergenceError(
                 f"undamped resonance of mode {mode + 1} at {modes.frequency[mode]:.6g} Hz: infinite response",
-                code="E-RESONANCE", key="damping_ratio", value=float(modes.damping_ratio[mode]), limit="> 0",
+                code="E-RESONANCE",
+                key="damping_ratio",
+                value=float(modes.damping_ratio[mode]),
+                limit="> 0",
                 remedy="give the mode some damping or move the speed",
-            )  # fmt: skip
+            )
         denominator[resonant] = 1.0
     return np.where(elastic, 1.0 / (w * w), 0.0) / denominator
 
@@ -394,18 +397,28 @@ def _response(frequency, found: _Solved, method: str, tolerance: float, periods:
         worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
         raise ConvergenceError(
             f"residual {residual[worst]:.3e} of the harmonic equations at {frequency[worst]:.6g} Hz",
-            code="E-RESONANCE", limit=f"{10.0 * tolerance:.1e}",
+            code="E-RESONANCE",
+            limit=f"{10.0 * tolerance:.1e}",
             remedy="the equations are nearly singular there: give the modes more damping or move the speed",
-        )  # fmt: skip
+        )
     for array in (found.deflection, found.force, found.modal, found.tail, found.lowest):
         array[~converged] = np.nan
         array.setflags(write=False)
     response = Response(
-        mesh_frequency=frequency, deflection=found.deflection, force=found.force, modal=found.modal,
-        converged=converged, residual=residual, iterations=found.iterations, spectral_radius=found.radius,
-        tail=found.tail, method=tuple("direct" if flag else "fixed point" for flag in found.direct),
-        lowest_force=found.lowest, message="", periods=periods,
-    )  # fmt: skip
+        mesh_frequency=frequency,
+        deflection=found.deflection,
+        force=found.force,
+        modal=found.modal,
+        converged=converged,
+        residual=residual,
+        iterations=found.iterations,
+        spectral_radius=found.radius,
+        tail=found.tail,
+        method=tuple("direct" if flag else "fixed point" for flag in found.direct),
+        lowest_force=found.lowest,
+        message="",
+        periods=periods,
+    )
     return replace(response, message=joint_message([response]))
 
 
@@ -415,9 +428,11 @@ def _check_harmonics(excitation_harmonics: np.ndarray, response_harmonics: np.nd
         wanted, given = excitation_harmonics[short][0], response_harmonics[short][0]
         raise CaseError(
             f"{given} response harmonics cannot follow {wanted} of the excitation",
-            code="E-HARMONICS", key="response_harmonics", value=int(given),
+            code="E-HARMONICS",
+            key="response_harmonics",
+            value=int(given),
             limit=f">= {wanted}, better twice as many",
-        )  # fmt: skip
+        )
 
 
 def _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations) -> np.ndarray:
@@ -428,23 +443,30 @@ def _checked(modes, excitation, mesh_frequency, method, tolerance, max_iteration
     if np.any(bad):
         raise CaseError(
             "mesh frequencies must be finite and not negative",
-            code="E-RANGE", key="mesh_frequency", value=float(frequency[bad][0]), limit=">= 0 Hz",
-        )  # fmt: skip
+            code="E-RANGE",
+            key="mesh_frequency",
+            value=float(frequency[bad][0]),
+            limit=">= 0 Hz",
+        )
     if len(modes.mesh_stiffness) != len(excitation.stiffness):
         raise CaseError(
             f"modes of {len(modes.mesh_stiffness)} meshes, excitation of {len(excitation.stiffness)}",
             code="E-SHAPE",
-        )  # fmt: skip
+        )
     if method not in ("auto", "fixed point", "direct"):
         raise CaseError(
-            f"unknown method {method!r}", code="E-CHOICE", key="method", value=method,
+            f"unknown method {method!r}",
+            code="E-CHOICE",
+            key="method",
+            value=method,
             limit="auto, fixed point, direct",
-        )  # fmt: skip
+        )
     if not 1e-12 <= tolerance < 1.0 or max_iterations < 1:
         raise CaseError(
             f"tolerance {tolerance} and {max_iterations} iterations cannot be used",
-            code="E-RANGE", limit="1e-12 <= tolerance < 1, at least one iteration",
-        )  # fmt: skip
+            code="E-RANGE",
+            limit="1e-12 <= tolerance < 1, at least one iteration",
+        )
     return frequency
 
 
@@ -459,9 +481,7 @@ class _Data:
     classes: list[_Class]
 
     @classmethod
-    def build(
-        cls, modes: Modes, excitation: MeshExcitation, excited: int, count: int, fastest: float
-    ) -> _Data:
+    def build(cls, modes: Modes, excitation: MeshExcitation, excited: int, count: int, fastest: float) -> _Data:
         excited //= excitation.periods
         stiffness, deflection, force = (pad(one, count) for one in mesh_harmonics(excitation, excited))
         load = pad(modes.load_deflection[:, None], count)
@@ -493,8 +513,7 @@ def _solve_batch(modes, data: _Data, part, fundamental, kept, found: _Solved, ho
     n, size, groups = len(group), len(lines), len(leaders)
     heard = lines <= own[:, None]
     stiffness, deflection, force = (
-        one[leaders, None, :size] * (lines <= excited[:, None])
-        for one in (data.stiffness, data.deflection, data.force)
+        one[leaders, None, :size] * (lines <= excited[:, None]) for one in (data.stiffness, data.deflection, data.force)
     )
     forcing = (force - Product(stiffness)(deflection)) * heard
     stiffness[..., 0] -= modes.mesh_stiffness[leaders, None]

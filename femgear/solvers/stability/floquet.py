@@ -81,8 +81,9 @@ def stiffness_in_series(change: np.ndarray, flexibility: np.ndarray) -> np.ndarr
     if np.linalg.eigvals(carried).real.min() <= 0.0:
         raise ConvergenceError(
             "the modes left out are more flexible than the meshes or elements at their lowest stiffness",
-            code="E-RESIDUAL", remedy="keep more modes",
-        )  # fmt: skip
+            code="E-RESIDUAL",
+            remedy="keep more modes",
+        )
     return change @ np.linalg.inv(carried)
 
 
@@ -151,9 +152,7 @@ class Frame:
         both = np.concatenate([np.ones(n), np.full(n, self.fastest or 1.0)])
         return monodromy(self.state_matrices(self.kappa(tangents)) * both / both[:, None], durations)
 
-    def verdict(
-        self, multipliers, period: float, method: str, error: float, tolerance: float
-    ) -> FloquetVerdict:
+    def verdict(self, multipliers, period: float, method: str, error: float, tolerance: float) -> FloquetVerdict:
         """Judge multipliers (m,) of a period [s] as `verdict_of`, which has to know of free motions."""
         free = {"positions": self.positions, "velocities": self.positions, "drift": self.drift}
         return verdict_of(multipliers, period, method, error, tolerance, **free)
@@ -258,8 +257,9 @@ def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
     if np.any(square <= 0.0):
         raise ConvergenceError(
             "a motion without stiffness moves an element: static flexibilities do not exist",
-            code="E-RESIDUAL", remedy="keep all modes",
-        )  # fmt: skip
+            code="E-RESIDUAL",
+            remedy="keep all modes",
+        )
     out = system.W.T @ flexible - (rows / square) @ rows.T
     return 0.5 * (out + out.T)
 
@@ -405,9 +405,7 @@ def floquet_verdict(problem: NonlinearSystem, solution: PeriodicSolution, **opti
     return floquet_verdicts(problem, [solution], **options)[0]
 
 
-def judged(
-    problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], **options
-) -> tuple[PeriodicSolution, ...]:
+def judged(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], **options) -> tuple[PeriodicSolution, ...]:
     """Join solutions with their verdicts; options as for :func:`floquet_verdicts`.
 
     Where the modes kept do not carry the motion the verdict says "not determined".
@@ -424,11 +422,14 @@ def require_period(frequency) -> None:
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     if frequency.size == 1 and frequency.ravel()[0] == 0.0:
         raise CaseError(
-            "stability needs a period, and the base frequency is zero", code="E-RANGE", key="frequency",
-            value=0.0, limit="> 0 rad/s",
+            "stability needs a period, and the base frequency is zero",
+            code="E-RANGE",
+            key="frequency",
+            value=0.0,
+            limit="> 0 rad/s",
             remedy="give a positive frequency, or solve without stability: solve_harmonic_balance, "
             "stability=False of a curve",
-        )  # fmt: skip
+        )
 
 
 def tangents_of(problem: NonlinearSystem, solutions: Sequence[PeriodicSolution]):
@@ -481,9 +482,12 @@ def _by_monodromy(frame: Frame, problem, solutions, tolerance: float) -> list[Fl
     open_states = np.array([i for i, pieces in enumerate(exact) if pieces is None], int)
     for rest in _portions(frame, period, open_states):
         matrix, errors = passage(
-            frame, period[rest], lambda f, states, rest=rest: tangents(f, rest[states]),
-            [breaks[i] for i in rest], tolerance=tolerance,
-        )  # fmt: skip
+            frame,
+            period[rest],
+            lambda f, states, rest=rest: tangents(f, rest[states]),
+            [breaks[i] for i in rest],
+            tolerance=tolerance,
+        )
         values = np.linalg.eigvals(matrix)
         for i, multipliers, error in zip(rest, values, errors):
             out[i] = frame.verdict(multipliers, float(period[i]), "splitting", float(error), tolerance)

@@ -161,8 +161,14 @@ class LyapunovOptions:
 
     def __post_init__(self):
         least = {
-            "points": 2 * PARTS, "skip": 0, "directions": 1, "count": 1, "seed": 0, "steps": 8, "periods": 1,
-        }  # fmt: skip
+            "points": 2 * PARTS,
+            "skip": 0,
+            "directions": 1,
+            "count": 1,
+            "seed": 0,
+            "steps": 8,
+            "periods": 1,
+        }
         for name, lowest in least.items():
             number = checked_count(getattr(self, name), name, code="E-RANGE", least=lowest)
             object.__setattr__(self, name, number)
@@ -213,9 +219,7 @@ def exponents_of(
     """
     count, points = chosen.count, chosen.points
     if count > finer.size:
-        raise CaseError(
-            f"{count} exponents", code="E-RANGE", key="count", limit=f"1 to {finer.size}, two a coordinate"
-        )
+        raise CaseError(f"{count} exponents", code="E-RANGE", key="count", limit=f"1 to {finer.size}, two a coordinate")
     random = np.random.default_rng(chosen.seed)
     frames = np.linalg.qr(random.standard_normal((chosen.directions, finer.size, count)))[0]
     passages = finer.passages(start)
@@ -230,9 +234,17 @@ def exponents_of(
     _check_sum(exponents, scatter, finer)
     time = finer.period * (chosen.skip + np.arange(points))
     return LyapunovExponents(
-        exponents, scatter, step_error, growth, finer.period, PoincareSection(time, q, v, x), low.min(axis=0),
-        high.max(axis=0), finer.divergence, same,
-    )  # fmt: skip
+        exponents,
+        scatter,
+        step_error,
+        growth,
+        finer.period,
+        PoincareSection(time, q, v, x),
+        low.min(axis=0),
+        high.max(axis=0),
+        finer.divergence,
+        same,
+    )
 
 
 def _turned(frames, matrices):
@@ -266,19 +278,21 @@ def _check_sum(exponents, scatter, run) -> None:
     if off > max(_SUM * np.abs(exponents).max(), _CLEAR * scatter.max(), _ROUNDING / run.period):
         raise ConvergenceError(
             f"the exponents add up to {exponents.sum():.6g} 1/s, the damping to {run.divergence:.6g} 1/s",
-            code="E-INTEGRATION", limit="the same to 2 % of the largest one",
+            code="E-INTEGRATION",
+            limit="the same to 2 % of the largest one",
             remedy="take more steps a period or a smaller tolerance",
-        )  # fmt: skip
+        )
 
 
 def check_bounded(q, v) -> None:
     """Refuse displacements q (n,) [m] and velocities v (n,) [m/s] beyond all bounds (E-DIVERGED)."""
     if not (np.abs(q).max(initial=0.0) < _BEYOND and np.abs(v).max(initial=0.0) < _BEYOND):
         raise ConvergenceError(
-            "the motion grows beyond all bounds and has no attractor", code="E-DIVERGED",
+            "the motion grows beyond all bounds and has no attractor",
+            code="E-DIVERGED",
             limit=f"displacements and velocities below {_BEYOND:g}",
             remedy="start elsewhere, or give supports or damping that hold the motion",
-        )  # fmt: skip
+        )
 
 
 def pieces(damping, period: float) -> int:

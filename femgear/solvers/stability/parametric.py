@@ -106,14 +106,20 @@ def stability(
     frequency = np.atleast_1d(np.array(mesh_frequency, dtype=float))
     if frequency.ndim != 1 or not np.all(np.isfinite(frequency)) or np.any(frequency <= 0.0):
         raise CaseError(
-            "a period needs finite, positive mesh frequencies", code="E-RANGE", key="mesh_frequency",
-            value=frequency.tolist(), limit="> 0 Hz",
-        )  # fmt: skip
+            "a period needs finite, positive mesh frequencies",
+            code="E-RANGE",
+            key="mesh_frequency",
+            value=frequency.tolist(),
+            limit="> 0 Hz",
+        )
     if not frequency_ratio >= 1.0:
         raise CaseError(
-            "modes up to the highest excitation frequency must be followed", code="E-MODES",
-            key="frequency_ratio", value=frequency_ratio, limit=">= 1",
-        )  # fmt: skip
+            "modes up to the highest excitation frequency must be followed",
+            code="E-MODES",
+            key="frequency_ratio",
+            value=frequency_ratio,
+            limit=">= 1",
+        )
     stiffness = mesh_harmonics(excitation, excitation_harmonics)[0]
     stiffness[:, 0] -= modes.mesh_stiffness
     lines = excitation_harmonics * excitation.periods
@@ -231,9 +237,10 @@ def _prepared(system, stiffness, harmonics: int) -> tuple[Frame, FourierSeries |
         stiffness = series_of(stiffness.stiffness, harmonics * stiffness.periods)
     if len(stiffness.mean) != len(frame.rows):
         raise CaseError(
-            f"stiffness of {len(stiffness.mean)} meshes for {len(frame.rows)} columns", code="E-SHAPE",
+            f"stiffness of {len(stiffness.mean)} meshes for {len(frame.rows)} columns",
+            code="E-SHAPE",
             limit="one series a column",
-        )  # fmt: skip
+        )
     breaks = np.zeros(0)
     if isinstance(stiffness, StepSeries):
         fluctuation, eye = _fluctuation(stiffness), np.eye(len(frame.rows))
@@ -246,9 +253,7 @@ def _largest_of_cells(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Multiplier of largest modulus and error (p,) of pairs of frequency and depth."""
     if not np.all(np.isfinite(depth)) or not np.all(np.isfinite(frequency)) or np.any(frequency <= 0.0):
-        raise CaseError(
-            "a chart needs positive frequencies and finite depths", code="E-RANGE", limit="> 0 rad/s"
-        )
+        raise CaseError("a chart needs positive frequencies and finite depths", code="E-RANGE", limit="> 0 rad/s")
     eye, mean, fluctuation = np.eye(len(frame.rows)), series.mean, _fluctuation(series)
     multiplier, error = np.empty(len(frequency), complex), np.zeros(len(frequency))
     # cells of similar period take similar steps
@@ -272,8 +277,9 @@ def _largest_of_cells(
     if np.any(error > 1e3 * tolerance):
         raise ConvergenceError(
             f"the monodromy matrix has an error of {error.max():.1e}, aimed at {tolerance:.1e}",
-            code="E-CONVERGENCE", remedy="take a looser tolerance or fewer harmonics",
-        )  # fmt: skip
+            code="E-CONVERGENCE",
+            remedy="take a looser tolerance or fewer harmonics",
+        )
     return multiplier, error
 
 

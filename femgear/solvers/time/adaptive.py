@@ -130,17 +130,30 @@ def flow(problem: NonlinearSystem, frequency, *, variational=False) -> Flow:
     stiffness, damping = linalg.cho_solve(factor, system.K), linalg.cho_solve(factor, problem.damping)
     matrix = state_matrix(stiffness, damping, rate)
     return Flow(
-        problem, frequency, rate, matrix, linalg.cho_solve(factor, system.W) / rate,
+        problem,
+        frequency,
+        rate,
+        matrix,
+        linalg.cho_solve(factor, system.W) / rate,
         linalg.cho_solve(factor, loads.T).T / rate,
         np.array([float(phase_of(frequency, f.orders)) for f in problem.forces]),
-        np.ascontiguousarray(system.W.T), variational,
-    )  # fmt: skip
+        np.ascontiguousarray(system.W.T),
+        variational,
+    )
 
 
 def trajectory(
-    motion: Flow, start, begin: float, end: float, *, method="DOP853", tolerance=1e-10, scale=None,
-    events=False, max_steps=1_000_000,
-) -> Iterator[tuple]:  # fmt: skip
+    motion: Flow,
+    start,
+    begin: float,
+    end: float,
+    *,
+    method="DOP853",
+    tolerance=1e-10,
+    scale=None,
+    events=False,
+    max_steps=1_000_000,
+) -> Iterator[tuple]:
     """Integrate the motion from a state; yields accepted steps (from, to [s], interpolation of y).
 
     ConvergenceError: the integrator gives up, contact chatters, too many steps.
@@ -181,9 +194,10 @@ def trajectory(
             taken += 1
             if taken > max_steps:
                 raise ConvergenceError(
-                    f"more than {max_steps} steps up to {t1:.6g} s of {end:.6g} s", code="E-INTEGRATION",
+                    f"more than {max_steps} steps up to {t1:.6g} s of {end:.6g} s",
+                    code="E-INTEGRATION",
                     remedy="loosen the tolerance, shorten the time or take method Radau",
-                )  # fmt: skip
+                )
             yield t0, t1, dense
         t, y = stop, dense(stop)
 
@@ -226,10 +240,12 @@ def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.
             return q, v
         found = f"shapes {q.shape} and {v.shape}" + ("" if finite else ", not all finite")
     raise CaseError(
-        f"a start of {found} for {n} degrees of freedom", code="E-START", key="start",
+        f"a start of {found} for {n} degrees of freedom",
+        code="E-START",
+        key="start",
         limit=f"finite displacements [m] and velocities [m/s], each of shape ({n},)",
         remedy="give start=(displacement, velocity), one number a degree of freedom in each",
-    )  # fmt: skip
+    )
 
 
 def motion_scale(motion: Flow, start) -> float | None:
@@ -262,8 +278,9 @@ def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, toler
             if solver.status == "failed" or not np.all(np.isfinite(solver.y)):
                 raise ConvergenceError(
                     f"{method} stopped at {solver.t:.6g} s: {message or 'numbers overflow'}",
-                    code="E-INTEGRATION", remedy="loosen the tolerance, smooth the contact or use events",
-                )  # fmt: skip
+                    code="E-INTEGRATION",
+                    remedy="loosen the tolerance, smooth the contact or use events",
+                )
             dense, t0, t1 = solver.dense_output(), solver.t_old, solver.t
             if has_switches:
                 t1, which = _first_change(motion, law, dense, t0, t1, small)
@@ -275,9 +292,10 @@ def _smooth_pieces(motion: Flow, law: Contacts, y, t, stop, small, method, toler
                 t, y, law = t1, dense(t1), law.flipped(which)
         if stuck > _CHATTER:
             raise ConvergenceError(
-                f"contact opens and closes without end at {t:.9g} s", code="E-INTEGRATION",
+                f"contact opens and closes without end at {t:.9g} s",
+                code="E-INTEGRATION",
                 remedy="integrate without events or with a smoothing length",
-            )  # fmt: skip
+            )
         if not changed:
             return
 

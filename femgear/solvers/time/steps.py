@@ -57,24 +57,25 @@ class StepRule:
         numbers = np.array([self.gamma, self.beta, self.mass, self.force], float)
         if not np.all(np.isfinite(numbers)) or self.beta < 0.0 or max(self.mass, self.force) >= 1.0:
             raise CaseError(
-                f"a step rule with gamma = {self.gamma}, beta = {self.beta}", code="E-RANGE",
+                f"a step rule with gamma = {self.gamma}, beta = {self.beta}",
+                code="E-RANGE",
                 limit="finite numbers, beta of 0 or more, weights below 1",
-            )  # fmt: skip
+            )
         # below this the rule feeds energy in at every step length
         if self.gamma < 0.5 - self.mass + self.force - 1e-12:
             raise CaseError(
-                f"a step rule with gamma = {self.gamma} has negative damping", code="E-RANGE",
-                limit=f"gamma of {0.5 - self.mass + self.force:.4g} or more", remedy="take gamma = 1/2",
-            )  # fmt: skip
+                f"a step rule with gamma = {self.gamma} has negative damping",
+                code="E-RANGE",
+                limit=f"gamma of {0.5 - self.mass + self.force:.4g} or more",
+                remedy="take gamma = 1/2",
+            )
 
     def predictor(self, h: float) -> np.ndarray:
         """Make rows (6, 3) on (q, v, a) for a step h [s].
 
         q, v and a without ``a_1``, then q, v and inertia of the force balance.
         """
-        predict = np.array(
-            [[1.0, h, h * h * (0.5 - self.beta)], [0.0, 1.0, h * (1.0 - self.gamma)], [0.0] * 3]
-        )
+        predict = np.array([[1.0, h, h * h * (0.5 - self.beta)], [0.0, 1.0, h * (1.0 - self.gamma)], [0.0] * 3])
         mixed = (1.0 - self.force) * predict[:2] + self.force * np.eye(3)[:2]
         return np.vstack([predict, mixed, [0.0, 0.0, self.mass]])
 
@@ -97,9 +98,7 @@ def generalised_alpha(radius: float) -> StepRule:
     Unconditionally stable and of second order; 1 loses no energy, 0 kills the highest modes in one step.
     """
     if not 0.0 <= radius <= 1.0:
-        raise CaseError(
-            f"a spectral radius of {radius} at infinite frequency", code="E-RANGE", limit="0 to 1"
-        )
+        raise CaseError(f"a spectral radius of {radius} at infinite frequency", code="E-RANGE", limit="0 to 1")
     mass, force = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
     return StepRule(0.5 - mass + force, 0.25 * (1.0 - mass + force) ** 2, mass, force)
 
@@ -129,16 +128,15 @@ class RuleScheme:
     def __init__(self, problem: NonlinearSystem, rule: StepRule, step: float):
         system, part = problem.system, 1.0 - rule.force
         stiffness, damping = problem.stiffness, problem.damping
-        matrix = (1.0 - rule.mass) * system.M + part * step * (
-            rule.gamma * damping + rule.beta * step * stiffness
-        )
+        matrix = (1.0 - rule.mass) * system.M + part * step * (rule.gamma * damping + rule.beta * step * stiffness)
         factor = linalg.lu_factor(matrix, check_finite=True)
         pivots = np.abs(np.diag(factor[0]))
         if not np.all(np.isfinite(pivots)) or pivots.min() <= 1e-14 * pivots.max():
             raise ConvergenceError(
-                "the matrix of the time step is singular", code="E-MASS",
+                "the matrix of the time step is singular",
+                code="E-MASS",
                 remedy="give every degree of freedom some mass or condense it",
-            )  # fmt: skip
+            )
         blocks = [stiffness, damping, system.M] if rule.mass else [stiffness, damping]
         loads = np.stack([system.load.astype(complex), *(f.force for f in problem.forces)])
         self.problem, self.rule, self.step, self.stiffness = problem, rule, step, stiffness
@@ -155,12 +153,7 @@ class RuleScheme:
         """Make the state, with the acceleration that the equation of motion asks for, and column forces."""
         system = self.problem.system
         g, _ = law(0, self.rows @ q)
-        force = (
-            external_force(self.problem, theta[0])
-            - self.problem.damping @ v
-            - self.stiffness @ q
-            - system.W @ g
-        )
+        force = external_force(self.problem, theta[0]) - self.problem.damping @ v - self.stiffness @ q - system.W @ g
         return np.stack([q, v, linalg.solve(system.M, force, assume_a="pos")]), g
 
     def table(self, theta):
@@ -197,9 +190,7 @@ class RuleScheme:
         change = np.diff(states[:, 2], axis=0)
         bend = np.diff(change, axis=0, prepend=change[:1])
         beta, square = self.rule.beta, self.step * self.step
-        error = square * np.abs((beta - 1.0 / 6.0) * change) + square * np.abs(
-            (0.5 * beta - 1.0 / 24.0) * bend
-        )
+        error = square * np.abs((beta - 1.0 / 6.0) * change) + square * np.abs((0.5 * beta - 1.0 / 24.0) * bend)
         return np.sqrt(np.abs(np.einsum("ti,ij,tj->t", error, self.problem.system.M, error, optimize=True)))
 
 
@@ -216,17 +207,21 @@ class ModalScheme:
         system = problem.system
         if system.gyroscopic is not None and problem.speed and np.any(system.gyroscopic):
             raise CaseError(
-                "modal steps cannot carry gyroscopic terms", code="E-CHOICE", key="method",
+                "modal steps cannot carry gyroscopic terms",
+                code="E-CHOICE",
+                key="method",
                 remedy='take method "average acceleration" or "generalised alpha"',
-            )  # fmt: skip
+            )
         system = replace(system, gyroscopic=None)
         modes = solve_modes(system, problem.reference, count=count)
         natural, every = 2.0 * np.pi * modes.frequency, np.eye(len(system.M))
         transition, first, last = step_matrices(natural, modes.damping_ratio, step)
         self.problem, self.step, self.modes, self.rows = problem, step, modes, modes.mesh_deflection
         self.transition, self.first, self.last = (
-            np.ascontiguousarray(transition.transpose(1, 2, 0)), first.T, last.T,
-        )  # fmt: skip
+            np.ascontiguousarray(transition.transpose(1, 2, 0)),
+            first.T,
+            last.T,
+        )
         self.pushed, self.drawn = (
             (part[:, :, None] * self.rows.T).reshape(-1, len(self.rows)) for part in (first.T, last.T)
         )
@@ -376,9 +371,7 @@ class Marched:
     iterations: int
 
 
-def march(
-    scheme: Scheme, law: Law, loads, state, g, count, *, tolerance, max_iterations, size=0.0
-) -> Marched:
+def march(scheme: Scheme, law: Law, loads, state, g, count, *, tolerance, max_iterations, size=0.0) -> Marched:
     """Take ``count`` steps; stops early where the columns do not converge or the numbers overflow.
 
     Parameters

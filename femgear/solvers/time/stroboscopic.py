@@ -48,14 +48,14 @@ class StroboscopicMap:
 
     def run(self, state, g) -> Marched:
         """Integrate one period of motion from a state at phase zero and its column forces g (n_c,) [N]."""
-        block = march(
-            self.scheme, self.law, self.loads, state, g, len(self.loads), tolerance=1e-10, max_iterations=30
-        )
+        block = march(self.scheme, self.law, self.loads, state, g, len(self.loads), tolerance=1e-10, max_iterations=30)
         if block.steps < len(self.loads):
             raise ConvergenceError(
                 f"the column equations did not converge in step {block.steps + 1} of a period at "
-                f"{self.frequency[0]:.6g} rad/s", code="E-CONVERGENCE", remedy="take more steps a period",
-            )  # fmt: skip
+                f"{self.frequency[0]:.6g} rad/s",
+                code="E-CONVERGENCE",
+                remedy="take more steps a period",
+            )
         return block
 
     def columns(self, block: Marched) -> np.ndarray:
@@ -94,9 +94,7 @@ def stroboscopic_map(
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
     period = common_period(frequency, periods)
     if not 4 <= steps <= _MOST_STEPS:
-        raise CaseError(
-            f"{steps} steps in a period", code="E-RANGE", key="steps", limit=f"4 to {_MOST_STEPS}"
-        )
+        raise CaseError(f"{steps} steps in a period", code="E-RANGE", key="steps", limit=f"4 to {_MOST_STEPS}")
     scheme, _ = step_scheme(problem, frequency, method, period / steps, period / steps)
     theta = (period * np.arange(steps + 1) / steps)[:, None] * frequency
     # the last instant is the first of the next period
@@ -111,16 +109,20 @@ def common_period(frequency, periods: int) -> float:
     periods = checked_count(periods, "periods", code="E-RANGE")
     if not np.all(np.isfinite(frequency)) or not frequency[0] > 0.0:
         raise CaseError(
-            f"{periods} periods of {frequency.tolist()} rad/s", code="E-RANGE", key="frequency",
+            f"{periods} periods of {frequency.tolist()} rad/s",
+            code="E-RANGE",
+            key="frequency",
             limit="one period or more of a positive frequency",
-        )  # fmt: skip
+        )
     turns = frequency * periods / frequency[0]
     if np.any(np.abs(turns - np.rint(turns)) > 1e-9):
         raise CaseError(
             f"base frequencies {frequency.tolist()} rad/s do not repeat after {periods} periods of the first",
-            code="E-RANGE", key="periods", limit="whole numbers of periods of every base frequency",
+            code="E-RANGE",
+            key="periods",
+            limit="whole numbers of periods of every base frequency",
             remedy="raise the number of periods, or use harmonic balance with two base frequencies",
-        )  # fmt: skip
+        )
     return float(2.0 * np.pi * periods / frequency[0])
 
 
@@ -228,10 +230,12 @@ def sweep_response(
     valid = frequencies.ndim == 1 and len(frequencies) and np.all(np.isfinite(frequencies))
     if not valid or np.any(frequencies <= 0.0) or not 1 <= least <= most:
         raise CaseError(
-            "a sweep needs positive frequencies and a period or more to settle", code="E-RANGE",
-            key="frequencies", limit="one or more > 0 rad/s, 1 <= least <= most",
+            "a sweep needs positive frequencies and a period or more to settle",
+            code="E-RANGE",
+            key="frequencies",
+            limit="one or more > 0 rad/s, 1 <= least <= most",
             remedy="list the frequencies in the order of the sweep",
-        )  # fmt: skip
+        )
     rows = []
     for value in frequencies:
         case, bases = problem(value) if callable(problem) else (problem, value)

@@ -129,9 +129,7 @@ def solve_transient(
     """
     times = checked_numbers(times, "times", code="E-RANGE", unit="s").copy()
     if times.ndim != 1 or len(times) < 2 or not np.all(np.isfinite(times)) or np.any(np.diff(times) <= 0.0):
-        raise CaseError(
-            "instants must be finite and ascend", code="E-RANGE", key="times", limit="two instants or more"
-        )
+        raise CaseError("instants must be finite and ascend", code="E-RANGE", key="times", limit="two instants or more")
     if tolerance is not None:
         tolerance = checked_tolerance(tolerance)
     start = checked_start(problem, start)
@@ -142,9 +140,12 @@ def solve_transient(
         return _adaptive(problem, frequency, times, start, method, tolerance or _LOCAL, events)
     if events:
         raise CaseError(
-            f"method {method} steps over contact changes", code="E-CHOICE", key="events",
-            limit=", ".join(adaptive.METHODS), remedy="take an adaptive method",
-        )  # fmt: skip
+            f"method {method} steps over contact changes",
+            code="E-CHOICE",
+            key="events",
+            limit=", ".join(adaptive.METHODS),
+            remedy="take an adaptive method",
+        )
     scheme, number = step_scheme(problem, frequency, method, times[-1] - times[0], step, **parameters)
     return _stepped(problem, scheme, frequency, times, start, number, method, tolerance or _COLUMNS)
 
@@ -219,15 +220,15 @@ def _steps(problem, frequency, rule, span, step) -> tuple[int, float]:
     if step > limit * period:
         raise CaseError(
             f"a step of {step:.6g} s is {step / period:.4g} of the shortest natural period, {period:.6g} s",
-            code="E-RANGE", key="step", limit=f"h / T up to {limit:.4g}, {limit * period:.6g} s",
+            code="E-RANGE",
+            key="step",
+            limit=f"h / T up to {limit:.4g}, {limit * period:.6g} s",
             remedy="shorten the step, or take average acceleration, which is stable for any",
-        )  # fmt: skip
+        )
     return number, step
 
 
-def _stepped(
-    problem, scheme: Scheme, frequency, times, start, number, method, tolerance
-) -> TransientResponse:
+def _stepped(problem, scheme: Scheme, frequency, times, start, number, method, tolerance) -> TransientResponse:
     """March with a fixed step and interpolate at the instants."""
     begin, step = times[0], scheme.step
     first = begin * frequency[None]
@@ -242,9 +243,17 @@ def _stepped(
     steps = iterations = 0
     residual = error = size = 0.0
     for done, block, theta in march_times(
-        problem, scheme, frequency, state, g, begin=begin, step=step, count=number, tolerance=tolerance,
+        problem,
+        scheme,
+        frequency,
+        state,
+        g,
+        begin=begin,
+        step=step,
+        count=number,
+        tolerance=tolerance,
         max_iterations=_ITERATIONS,
-    ):  # fmt: skip
+    ):
         known = slice(0, block.steps + 1)
         states, excess, theta = block.states[known], block.excess[known], theta[known]
         inside = (index >= done) & (index < done + block.steps)
@@ -265,9 +274,20 @@ def _stepped(
     converged, message = _verdict(steps, number, begin + steps * step, relative, step)
     message += drift_note(problem) if converged else ""
     return TransientResponse(
-        times, q, v, x, force, method, converged, residual, relative, steps, iterations,
-        scheme.factorisations, message,
-    )  # fmt: skip
+        times,
+        q,
+        v,
+        x,
+        force,
+        method,
+        converged,
+        residual,
+        relative,
+        steps,
+        iterations,
+        scheme.factorisations,
+        message,
+    )
 
 
 def _between(at, motion, step) -> tuple[np.ndarray, np.ndarray]:
@@ -331,6 +351,17 @@ def _adaptive(problem, frequency, times, start, method, tolerance, events) -> Tr
     q, v, x = (part.T for part in motion.split(found.T))
     force = element_forces(problem, x, times[:, None] * frequency)[0]
     return TransientResponse(
-        times, q, v, x, force, method, True, 0.0, tolerance, steps, 0, 1,
+        times,
+        q,
+        v,
+        x,
+        force,
+        method,
+        True,
+        0.0,
+        tolerance,
+        steps,
+        0,
+        1,
         f"{method} with a relative tolerance of {tolerance:.3g}" + drift_note(problem),
-    )  # fmt: skip
+    )

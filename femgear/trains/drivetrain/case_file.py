@@ -204,9 +204,12 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
     for i, name in enumerate(names):
         if name in names[:i]:
             yield CaseError(
-                "two bodies have one name", code="E-DUPLICATE", key=f"body[{i}].name", value=name,
+                "two bodies have one name",
+                code="E-DUPLICATE",
+                key=f"body[{i}].name",
+                value=name,
                 remedy="give every body a name of its own",
-            )  # fmt: skip
+            )
     used = [(key, name) for key, *ends in _joints(case) if ".between" in key for name in ends]
     for i, stage in enumerate(case.planetary):
         used += [(f"planetary[{i}].carrier", stage.carrier), (f"planetary[{i}].sun", stage.sun)]
@@ -216,14 +219,16 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
         if name not in names:
             near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
             yield CaseError(
-                "there is no such body", code="E-CHOICE", key=key, value=name, limit=", ".join(names[:20]),
+                "there is no such body",
+                code="E-CHOICE",
+                key=key,
+                value=name,
+                limit=", ".join(names[:20]),
                 remedy=f"did you mean {near[0]}?" if near else "name a body of a [[body]] table",
-            )  # fmt: skip
+            )
     for key, first, second in _joints(case):
         if first == second:
-            yield CaseError(
-                "a body is joined to itself", code="E-CHOICE", key=key, value=first, limit="two bodies"
-            )
+            yield CaseError("a body is joined to itself", code="E-CHOICE", key=key, value=first, limit="two bodies")
 
 
 def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -233,10 +238,12 @@ def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
         if groups[first] is groups[second]:
             if key.startswith("shaft"):
                 yield CaseError(
-                    f"the shaft closes a loop: {first} and {second} are joined already", code="E-DRIVETRAIN",
-                    key=key, limit="one way by shafts from body to body",
+                    f"the shaft closes a loop: {first} and {second} are joined already",
+                    code="E-DRIVETRAIN",
+                    key=key,
+                    limit="one way by shafts from body to body",
                     remedy="leave one of the shafts out",
-                )  # fmt: skip
+                )
             continue
         groups[first] |= groups[second]
         groups |= dict.fromkeys(groups[second], groups[first])
@@ -245,9 +252,12 @@ def _chain(case: DrivetrainCase) -> Iterator[CaseError]:
     if apart:
         i, name = apart[0]
         yield CaseError(
-            f"nothing joins {', '.join(name for _, name in apart)} to {start}", code="E-DRIVETRAIN",
-            key=f"body[{i}].name", value=name, remedy="add a [[shaft]], a [[parallel]] or a [[planetary]]",
-        )  # fmt: skip
+            f"nothing joins {', '.join(name for _, name in apart)} to {start}",
+            code="E-DRIVETRAIN",
+            key=f"body[{i}].name",
+            value=name,
+            remedy="add a [[shaft]], a [[parallel]] or a [[planetary]]",
+        )
 
 
 def _bodies(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -267,28 +277,38 @@ def _bearings(case: DrivetrainCase) -> Iterator[CaseError]:
         inside = (one.shaft is not None, one.station is not None)
         if inside != (one.body is None,) * 2:
             yield CaseError(
-                "a bearing sits on one body, or on one station inside a shaft", code="E-CHOICE",
-                key=f"bearing[{i}].{'body' if one.body else 'shaft'}", limit="body, or shaft with station",
-            )  # fmt: skip
+                "a bearing sits on one body, or on one station inside a shaft",
+                code="E-CHOICE",
+                key=f"bearing[{i}].{'body' if one.body else 'shaft'}",
+                limit="body, or shaft with station",
+            )
         elif one.shaft and one.station and not one.station < elements.get(one.shaft, 0):
             stations = elements.get(one.shaft, 0) - 1
             yield CaseError(
-                "there is no such station", code="E-CHOICE", key=f"bearing[{i}].station", value=one.station,
-                limit=f"1 to {stations}"
-                if stations > 0
-                else "a [[shaft]] with this between and 2 elements or more",
-            )  # fmt: skip
+                "there is no such station",
+                code="E-CHOICE",
+                key=f"bearing[{i}].station",
+                value=one.station,
+                limit=f"1 to {stations}" if stations > 0 else "a [[shaft]] with this between and 2 elements or more",
+            )
         if one.radial == one.tilt == 0.0:
             yield CaseError(
-                "a bearing without stiffness", code="E-RANGE", key=f"bearing[{i}].radial", value="0 N/m",
-                limit="one of radial and tilt above 0", remedy="give it, or leave the [[bearing]] out",
-            )  # fmt: skip
+                "a bearing without stiffness",
+                code="E-RANGE",
+                key=f"bearing[{i}].radial",
+                value="0 N/m",
+                limit="one of radial and tilt above 0",
+                remedy="give it, or leave the [[bearing]] out",
+            )
         if math.isinf(one.radial) and one.offset:
             yield CaseError(
-                "a rigid bearing beside the centre of its body", code="E-CHOICE", key=f"bearing[{i}].offset",
-                value=LENGTH.show(one.offset), limit="0 mm where radial is rigid",
+                "a rigid bearing beside the centre of its body",
+                code="E-CHOICE",
+                key=f"bearing[{i}].offset",
+                value=LENGTH.show(one.offset),
+                limit="0 mm where radial is rigid",
                 remedy="give a finite stiffness",
-            )  # fmt: skip
+            )
 
 
 def _shafts(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -296,26 +316,37 @@ def _shafts(case: DrivetrainCase) -> Iterator[CaseError]:
         springs = shaft.given("bending", "torsion", "shear")
         if message := _shaft_problem(shaft, springs):
             yield CaseError(
-                message, code="E-CHOICE", key=f"shaft[{i}].{springs[0] if springs else 'outer_diameter'}",
+                message,
+                code="E-CHOICE",
+                key=f"shaft[{i}].{springs[0] if springs else 'outer_diameter'}",
                 limit="bending and torsion, or outer_diameter with what else the section needs",
-            )  # fmt: skip
+            )
         if shaft.outer_diameter is not None and not shaft.inner_diameter < shaft.outer_diameter:
             yield CaseError(
-                "the bore is as large as the shaft", code="E-RANGE", key=f"shaft[{i}].inner_diameter",
-                value=LENGTH.show(shaft.inner_diameter), limit=f"below {LENGTH.show(shaft.outer_diameter)}",
-            )  # fmt: skip
+                "the bore is as large as the shaft",
+                code="E-RANGE",
+                key=f"shaft[{i}].inner_diameter",
+                value=LENGTH.show(shaft.inner_diameter),
+                limit=f"below {LENGTH.show(shaft.outer_diameter)}",
+            )
         if shaft.torsion is not None and math.isinf(shaft.torsion):
             yield CaseError(
-                "a shaft that is rigid in torsion makes one body of two", code="E-CHOICE",
-                key=f"shaft[{i}].torsion", value="rigid", limit="a finite spring",
+                "a shaft that is rigid in torsion makes one body of two",
+                code="E-CHOICE",
+                key=f"shaft[{i}].torsion",
+                value="rigid",
+                limit="a finite spring",
                 remedy="give a spring, or one body with the inertia of both",
-            )  # fmt: skip
+            )
         if shaft.elements > 1 and shaft.density == 0.0:
             yield CaseError(
-                "stations inside a shaft without mass", code="E-RANGE", key=f"shaft[{i}].density",
-                value="0 kg/m^3", limit="above 0 kg/m^3 with 2 elements or more",
+                "stations inside a shaft without mass",
+                code="E-RANGE",
+                key=f"shaft[{i}].density",
+                value="0 kg/m^3",
+                limit="above 0 kg/m^3 with 2 elements or more",
                 remedy="give its density, or elements = 0",
-            )  # fmt: skip
+            )
 
 
 def _shaft_problem(shaft: ShaftSection, springs: list[str]) -> str:
@@ -342,22 +373,29 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
         elif one.times is not None and one.torques is not None:
             if len(one.times) != len(one.torques) or any(b <= a for a, b in pairwise(one.times)):
                 yield CaseError(
-                    "the series needs ascending times, and as many torques", code="E-TORQUE",
-                    key=f"{key}.times", value=f"{len(one.times)} times, {len(one.torques)} torques",
+                    "the series needs ascending times, and as many torques",
+                    code="E-TORQUE",
+                    key=f"{key}.times",
+                    value=f"{len(one.times)} times, {len(one.torques)} torques",
                     remedy="sort the points by time, and keep one of every instant",
-                )  # fmt: skip
+                )
         if one.body in bodies:
             yield CaseError(
-                "a second torque on one body", code="E-DUPLICATE", key=f"{key}.body", value=one.body,
+                "a second torque on one body",
+                code="E-DUPLICATE",
+                key=f"{key}.body",
+                value=one.body,
                 remedy="add the torques up in one table",
-            )  # fmt: skip
+            )
         bodies.append(one.body)
         shares += [key] if one.share is not None else []
     if len(shares) > 1 or (shares and len(bodies) == 1):
         yield CaseError(
-            "a share needs other torques that it balances, none of them a share", code="E-TORQUE",
-            key=f"{shares[-1]}.share", limit="one share, beside torques that are given",
-        )  # fmt: skip
+            "a share needs other torques that it balances, none of them a share",
+            code="E-TORQUE",
+            key=f"{shares[-1]}.share",
+            limit="one share, beside torques that are given",
+        )
 
 
 def _simulation(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -365,15 +403,21 @@ def _simulation(case: DrivetrainCase) -> Iterator[CaseError]:
     steps = s.duration * s.rate
     if steps > _MOST_STEPS:
         yield CaseError(
-            f"{steps:.3g} steps are too many", code="E-RANGE", key="simulation.duration",
-            value=TIME.show(s.duration), limit=f"{_MOST_STEPS:g} steps: {TIME.show(_MOST_STEPS / s.rate)}",
+            f"{steps:.3g} steps are too many",
+            code="E-RANGE",
+            key="simulation.duration",
+            value=TIME.show(s.duration),
+            limit=f"{_MOST_STEPS:g} steps: {TIME.show(_MOST_STEPS / s.rate)}",
             remedy="take a shorter duration or a lower simulation.rate",
-        )  # fmt: skip
+        )
     if s.settle is not None and not s.settle < s.duration:
         yield CaseError(
-            "the spectra would leave out the whole run", code="E-RANGE", key="simulation.settle",
-            value=TIME.show(s.settle), limit=f"below {TIME.show(s.duration)} (simulation.duration)",
-        )  # fmt: skip
+            "the spectra would leave out the whole run",
+            code="E-RANGE",
+            key="simulation.settle",
+            value=TIME.show(s.settle),
+            limit=f"below {TIME.show(s.duration)} (simulation.duration)",
+        )
     elif s.record is not None:
         yield from record_problems(case, s.record)
 
@@ -383,20 +427,25 @@ def record_problems(case: DrivetrainCase, record: float) -> Iterator[CaseError]:
     s, ratio = case.simulation, case.simulation.rate / record
     if ratio < 1.0 - 1e-9 or abs(ratio - round(ratio)) > 1e-6 * ratio:
         yield CaseError(
-            "a record is kept after a whole number of steps", code="E-RANGE", key="simulation.record",
+            "a record is kept after a whole number of steps",
+            code="E-RANGE",
+            key="simulation.record",
             value=FREQUENCY.show(record),
             limit=f"{FREQUENCY.show(s.rate)} (simulation.rate) over a whole number",
             remedy=f"take {FREQUENCY.show(s.rate / max(1, round(ratio)))}",
-        )  # fmt: skip
+        )
     # motion, velocity and torque of a body, a force and an approach of a mesh
     meshes = len(case.parallel) + sum(2 * len(stage.angles) for stage in case.planetary)
     size = s.duration * record * (2 * len(case.body) + 2 * meshes + 2)
     if size > _MOST_VALUES:
         yield CaseError(
-            f"{size:.3g} kept numbers are too many", code="E-RANGE", key="simulation.record",
-            value=FREQUENCY.show(record), limit=f"{_MOST_VALUES:g} numbers",
+            f"{size:.3g} kept numbers are too many",
+            code="E-RANGE",
+            key="simulation.record",
+            value=FREQUENCY.show(record),
+            limit=f"{_MOST_VALUES:g} numbers",
             remedy=f"take {FREQUENCY.show(record * _MOST_VALUES / size)} or less, or a shorter duration",
-        )  # fmt: skip
+        )
 
 
 def _coordinates(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -424,9 +473,12 @@ def _sizes(case: DrivetrainCase) -> Iterator[CaseError]:
         yield from _gear_sizes(stage, "planetary", key)
         if not stage.sun_teeth < stage.ring_teeth:
             yield CaseError(
-                "the ring has no more teeth than the sun", code="E-TEETH", key=f"{key}.ring_teeth",
-                value=stage.ring_teeth, limit=f"more than {stage.sun_teeth}",
-            )  # fmt: skip
+                "the ring has no more teeth than the sun",
+                code="E-TEETH",
+                key=f"{key}.ring_teeth",
+                value=stage.ring_teeth,
+                limit=f"more than {stage.sun_teeth}",
+            )
         yield from _assembly(stage, key)
 
 
@@ -439,9 +491,12 @@ def _meshes(case: DrivetrainCase) -> Iterator[CaseError]:
             yield CaseError("missing", code="E-KEY-MISSING", key=f"{key}.mesh", remedy=remedy)
         elif stage.mesh is not None and stage.stiffness is not None:
             yield CaseError(
-                "the stiffness of the mesh is given twice", code="E-CHOICE", key=f"{key}.stiffness",
-                limit="mesh, or stiffness with the case file of a pair", remedy="leave one of them out",
-            )  # fmt: skip
+                "the stiffness of the mesh is given twice",
+                code="E-CHOICE",
+                key=f"{key}.stiffness",
+                limit="mesh, or stiffness with the case file of a pair",
+                remedy="leave one of them out",
+            )
         elif stage.stiffness is not None:
             try:
                 pair = pair_of(case_text.write(stage.stiffness))
@@ -492,31 +547,43 @@ def _unlike(pair: Any, stage: ParallelSection, key: str) -> Iterator[CaseError]:
         if not np.allclose(found, wanted, rtol=_UNLIKE, atol=0.0):
             limit = f"{shown[1]}, transverse module {LENGTH.show(gears.gear_1.module)}"
             yield CaseError(
-                "the stage has not the gears of the pair that gives its stiffness", code="E-TEETH",
-                key=f"{key}.{name}", value=shown[0], limit=limit if name == size else shown[1],
+                "the stage has not the gears of the pair that gives its stiffness",
+                code="E-TEETH",
+                key=f"{key}.{name}",
+                value=shown[0],
+                limit=limit if name == size else shown[1],
                 remedy="give the stage the gears of the pair, or name the case file of its own",
-            )  # fmt: skip
+            )
 
 
 def _unfit(pair: Any, harmonics: int) -> Iterator[CaseError]:
     """What leaves no stiffness over one mesh period: no torque, errors of several periods, few positions."""
     if not pair.operation.torque:
         yield CaseError(
-            "without torque no flanks touch", code="E-RANGE", key="operation.torque", value="0 N m",
+            "without torque no flanks touch",
+            code="E-RANGE",
+            key="operation.torque",
+            value="0 N m",
             remedy="give the torque that the stage carries",
-        )  # fmt: skip
+        )
     periods, _ = common_period(set_deviations(pair), planetary_set(pair), limit=sys.maxsize)
     if periods > 1:
         yield CaseError(
-            f"the errors of the pair span {periods} mesh periods", code="E-RANGE", key="gear_1.errors",
-            limit="one mesh period", remedy="leave pitch errors and runout out",
-        )  # fmt: skip
+            f"the errors of the pair span {periods} mesh periods",
+            code="E-RANGE",
+            key="gear_1.errors",
+            limit="one mesh period",
+            remedy="leave pitch errors and runout out",
+        )
     if pair.static.positions <= 2 * harmonics:
         yield CaseError(
-            f"so few positions hold no {harmonics} harmonics", code="E-RANGE", key="static.positions",
-            value=pair.static.positions, limit=f"more than {2 * harmonics}",
+            f"so few positions hold no {harmonics} harmonics",
+            code="E-RANGE",
+            key="static.positions",
+            value=pair.static.positions,
+            limit=f"more than {2 * harmonics}",
             remedy="take more of them, or fewer simulation.harmonics",
-        )  # fmt: skip
+        )
 
 
 def _gear_sizes(stage: ParallelSection | PlanetarySection, kind: str, key: str) -> Iterator[CaseError]:
@@ -525,17 +592,21 @@ def _gear_sizes(stage: ParallelSection | PlanetarySection, kind: str, key: str) 
     given = [name for way in ways for name in stage.given(*way)]
     if tuple(given) not in ways:
         yield CaseError(
-            "the sizes of the gears are needed once", code="E-CHOICE",
-            key=f"{key}.{given[0] if given else ways[0][0]}", limit=words,
-        )  # fmt: skip
+            "the sizes of the gears are needed once",
+            code="E-CHOICE",
+            key=f"{key}.{given[0] if given else ways[0][0]}",
+            limit=words,
+        )
         return
     for name, radii, teeth in _ratios(stage):
         if abs(teeth / radii - 1.0) > _RATIO_TOLERANCE:
             yield CaseError(
-                f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}", code="E-TEETH",
-                key=f"{key}.{name}", limit=f"ratios within {_RATIO_TOLERANCE:.0%} of one another",
+                f"the teeth have the ratio {teeth:.5g}, the radii {radii:.5g}",
+                code="E-TEETH",
+                key=f"{key}.{name}",
+                limit=f"ratios within {_RATIO_TOLERANCE:.0%} of one another",
                 remedy="correct the teeth or the radii, or give module in place of the radii",
-            )  # fmt: skip
+            )
     if isinstance(stage, PlanetarySection):
         yield from _planet_teeth(stage, key)
 
@@ -545,32 +616,41 @@ def _planet_teeth(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
     between, least = 0.5 * (stage.ring_teeth - stage.sun_teeth), math.cos(_STEEPEST)
     if stage.planet_teeth is None and stage.module is not None and between % 1.0:
         yield CaseError(
-            f"no planet has {between:g} teeth", code="E-KEY-MISSING", key=f"{key}.planet_teeth",
+            f"no planet has {between:g} teeth",
+            code="E-KEY-MISSING",
+            key=f"{key}.planet_teeth",
             limit=f"a whole number near {between:g}",
             remedy=f"give planet_teeth (say {math.floor(between)}), and centre_distance of the shifted gears",
-        )  # fmt: skip
+        )
         return
     if stage.planet_teeth is not None and abs(stage.planet_teeth - between) > _SHIFTED:
         yield CaseError(
-            "the planet has other teeth than fit between sun and ring", code="E-TEETH",
-            key=f"{key}.planet_teeth", value=stage.planet_teeth,
+            "the planet has other teeth than fit between sun and ring",
+            code="E-TEETH",
+            key=f"{key}.planet_teeth",
+            value=stage.planet_teeth,
             limit=f"{between:g}, or up to {_SHIFTED} more or less with profile shift",
-        )  # fmt: skip
+        )
     elif stage.centre_distance is not None and stage.sun_radius is not None:
         yield CaseError(
-            "pitch radii give the centre distance already", code="E-CHOICE", key=f"{key}.centre_distance",
-            limit="module or base radii beside it", remedy="leave it out",
-        )  # fmt: skip
+            "pitch radii give the centre distance already",
+            code="E-CHOICE",
+            key=f"{key}.centre_distance",
+            limit="module or base radii beside it",
+            remedy="leave it out",
+        )
     elif not all(least <= share <= 1.0 + _REMARK**2 for share in stage.base_shares):
         sun, planet, ring = stage.base_radii
         low, high = max(sun + planet, ring - planet), min(sun + planet, ring - planet) / least
         near = f"{LENGTH.show(low)} to {LENGTH.show(high)}" if low < high else "gears that mesh at one"
         yield CaseError(
-            "at this distance of the axes sun, planet and ring do not mesh", code="E-CENTRE-DISTANCE",
+            "at this distance of the axes sun, planet and ring do not mesh",
+            code="E-CENTRE-DISTANCE",
             key=f"{key}.{'centre_distance' if stage.sun_radius is None else 'sun_radius'}",
-            value=LENGTH.show(stage.axis_distance), limit=near,
+            value=LENGTH.show(stage.axis_distance),
+            limit=near,
             remedy="give the centre distance of the gears, or correct teeth and sizes",
-        )  # fmt: skip
+        )
 
 
 def _ratios(stage: ParallelSection | PlanetarySection) -> list[tuple[str, float, float]]:
@@ -594,30 +674,36 @@ def _assembly(stage: PlanetarySection, key: str) -> Iterator[CaseError]:
     key = f"{key}.{'planets' if equal else 'planet_angles'}"
     if any(b <= a for a, b in pairwise(angles)) or angles[-1] - angles[0] >= 2.0 * math.pi - 1e-9:
         yield CaseError(
-            "the planet angles do not ascend within one turn", code="E-RANGE", key=key,
+            "the planet angles do not ascend within one turn",
+            code="E-RANGE",
+            key=key,
             limit="ascending angles, the last less than 360 deg after the first",
-        )  # fmt: skip
+        )
     # sizes by the teeth
     share = (stage.ring_teeth - stage.sun_teeth) / both
     apart = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
     if share > 0.0 and math.sin(0.5 * min(apart, math.pi)) <= share:
         yield CaseError(
-            "neighbouring planets overlap", code="E-NEIGHBOURS", key=key,
+            "neighbouring planets overlap",
+            code="E-NEIGHBOURS",
+            key=key,
             value=f"{math.degrees(apart):.4g} deg from one to the next",
             limit=f"more than {math.degrees(2.0 * math.asin(share)):.4g} deg",
             remedy="take fewer planets, or smaller ones",
-        )  # fmt: skip
+        )
     steps = [(angle - angles[0]) * both / (2.0 * math.pi) for angle in angles]
     if any(abs(step - round(step)) > 1e-3 for step in steps):
         yield CaseError(
             f"{len(angles)} equally spaced planets do not assemble"
             if equal
             else "the planets do not assemble at these angles",
-            code="E-ASSEMBLY", key=key, value=stage.planets if equal else None,
+            code="E-ASSEMBLY",
+            key=key,
+            value=stage.planets if equal else None,
             limit=f"a divisor of ring_teeth + sun_teeth = {both}"
             if equal
             else f"whole multiples of 360 deg / {both} from one another",
-        )  # fmt: skip
+        )
 
 
 def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
@@ -662,12 +748,14 @@ def _teeth_notices(stage: ParallelSection | PlanetarySection, key: str) -> Itera
         if abs(sun / ring - 1.0) > _REMARK:
             angles = " and ".join(f"{math.degrees(angle):.4g}" for angle in stage.working_angles)
             yield Finding(
-                "W-TEETH", f"{key}.centre_distance",
+                "W-TEETH",
+                f"{key}.centre_distance",
                 f"a planet of {stage.planet_teeth_or_half:g} teeth needs profile shifts, and the distance of "
                 f"the axes is not given: {1e3 * stage.axis_distance:.6g} mm is taken, half-way between those "
                 f"of both meshes without shift, with working pressure angles of {angles} deg",
-                remedy="give centre_distance", severity=DOUBT,
-            )  # fmt: skip
+                remedy="give centre_distance",
+                severity=DOUBT,
+            )
 
 
 def embed_files(data: dict, name: str) -> dict[str, str]:
@@ -717,9 +805,12 @@ def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
     for (before, after), line in zip(pairwise(times), found.lines[1:], strict=True):
         if not after > before:
             raise found.problem(
-                "the times do not ascend", line, value=f"{after:g} s", limit=f"above {before:g} s",
+                "the times do not ascend",
+                line,
+                value=f"{after:g} s",
+                limit=f"above {before:g} s",
                 remedy="sort the lines by time, and keep one line of every instant",
-            )  # fmt: skip
+            )
     return {"times": times, "torques": torques}
 
 
@@ -730,10 +821,12 @@ def _column(found: Columns, key: str) -> list[float]:
     for value, line in zip(values, found.lines, strict=True):
         if not low <= value <= high:
             raise found.problem(
-                f"{dimension.name} of {dimension.show(value)} is not plausible", line,
-                value=dimension.show(value), limit=f"{dimension.show(low)} to {dimension.show(high)}",
+                f"{dimension.name} of {dimension.show(value)} is not plausible",
+                line,
+                value=dimension.show(value),
+                limit=f"{dimension.show(low)} to {dimension.show(high)}",
                 remedy=f"check the number, and the unit of the column {key} in the heading",
-            )  # fmt: skip
+            )
     return values
 
 

@@ -221,17 +221,21 @@ def _check_records(case: DrivetrainCase, record: float) -> None:
     late, key = s.duration - settle_time(case), "settle" if s.settle is not None else "duration"
     if late * record < _LEAST_RECORDS:
         raise CaseError(
-            f"{late * record:.3g} records are too few for the spectra", code="E-RANGE",
-            key=f"simulation.{key}", value=TIME.show(getattr(s, key)),
+            f"{late * record:.3g} records are too few for the spectra",
+            code="E-RANGE",
+            key=f"simulation.{key}",
+            value=TIME.show(getattr(s, key)),
             limit=f"{_LEAST_RECORDS} records or more after simulation.settle",
             remedy="take a longer duration, a shorter settle or more records, or write --only transient",
-        )  # fmt: skip
+        )
     if s.resolution is not None and not 1.0 / late <= s.resolution <= record / 16.0:
         raise CaseError(
-            "the record has no such resolution", code="E-RANGE", key="simulation.resolution",
+            "the record has no such resolution",
+            code="E-RANGE",
+            key="simulation.resolution",
             value=FREQUENCY.show(s.resolution),
             limit=f"{FREQUENCY.show(1.0 / late)} to {FREQUENCY.show(record / 16.0)}",
-        )  # fmt: skip
+        )
 
 
 def check_turning(lowest: float, mean: float) -> None:
@@ -240,10 +244,11 @@ def check_turning(lowest: float, mean: float) -> None:
         raise CaseError(
             f"the first body nearly stops or turns back: {lowest / RPM:.6g} rpm at the slowest, "
             f"{mean / RPM:.6g} rpm in the mean; there are no orders",
-            code="E-SPECTRUM", key="operation.torque",
+            code="E-SPECTRUM",
+            key="operation.torque",
             limit=f"never slower than {_SLOWEST:.0%} of its mean speed where spectra are taken",
             remedy="give torques that keep it turning, or write --only transient",
-        )  # fmt: skip
+        )
 
 
 def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
@@ -259,9 +264,11 @@ def _check_stiffness(case: DrivetrainCase, model: DrivetrainModel) -> None:
     raise CaseError(
         f"the series of the stiffness of {model.meshes[wrong[0]]} falls to {least[wrong[0]]:.3g} N/m: with "
         f"{case.simulation.harmonics} terms it overshoots the jump by about 9 %",
-        code="E-STIFFNESS", key=key, limit="above 0 N/m at any time",
+        code="E-STIFFNESS",
+        key=key,
+        limit="above 0 N/m at any time",
         remedy="give a larger low_share",
-    )  # fmt: skip
+    )
 
 
 def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
@@ -280,10 +287,12 @@ def _check_rate(case: DrivetrainCase, model: DrivetrainModel) -> None:
     raise CaseError(
         f"{rate / hertz:.3g} steps a period ({FREQUENCY.show(rate)}) cannot follow the {name}, "
         f"{FREQUENCY.show(hertz)} at {SPEED.show(speeds.fastest)} of {first}",
-        code="E-RATE", key=key, value=value,
+        code="E-RATE",
+        key=key,
+        value=value,
         limit=f"{_LEAST_STEPS} steps a period at any time: {FREQUENCY.show(_LEAST_STEPS * hertz)} or more",
         remedy=remedy,
-    )  # fmt: skip
+    )
 
 
 def drivetrain_warnings(case: DrivetrainCase) -> tuple[Finding, ...]:
@@ -317,15 +326,15 @@ def _runaway(case: DrivetrainCase, speeds: SpeedRange) -> Iterator[Finding]:
     if speeds.highest <= _CHANGE * first and speeds.lowest >= first / _CHANGE:
         return
     rpm = [f"{value / RPM:.6g}" for value in (first, speeds.last, speeds.lowest, speeds.highest)]
-    between = (
-        "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
-    )
+    between = "" if speeds.last in (speeds.lowest, speeds.highest) else f" ({rpm[2]} to {rpm[3]} rpm on the way)"
     turns = " and turn it back" if speeds.lowest < 0.0 else ""
     yield Finding(
-        "W-SPEED", "operation.torque",
+        "W-SPEED",
+        "operation.torque",
         f"the torques take {case.body[0].name} from {rpm[0]} to {rpm[1]} rpm in "
-        f"{case.simulation.duration:g} s{between}{turns}", remedy="share = 1.0 on another body balances them",
-    )  # fmt: skip
+        f"{case.simulation.duration:g} s{between}{turns}",
+        remedy="share = 1.0 on another body balances them",
+    )
 
 
 def _rates(case: DrivetrainCase, model: DrivetrainModel, speeds: SpeedRange) -> Iterator[Finding]:
@@ -440,9 +449,13 @@ def _check_spread(train: Drivetrain, *, turning: bool) -> None:
         remedy += second.split(":")[0]
     raise CaseError(
         "natural frequencies are too far apart for double precision: "
-        f"{fast} by itself has {own.max():.3g} Hz, and {slow} by more than {factor}", code="E-STIFFNESS",
-        key=key, value=value, limit=f"frequencies within {factor}", remedy=remedy,
-    )  # fmt: skip
+        f"{fast} by itself has {own.max():.3g} Hz, and {slow} by more than {factor}",
+        code="E-STIFFNESS",
+        key=key,
+        value=value,
+        limit=f"frequencies within {factor}",
+        remedy=remedy,
+    )
 
 
 def _slowest(model: DrivetrainModel, stiffness) -> str:

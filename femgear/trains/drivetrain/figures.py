@@ -11,13 +11,13 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.report.response import campbell
 from femgear.report.style import COLOURS, GREY, SIZE, digits, label, legend_below, new_figure, show_changes
+from femgear.stages.protocol import Drawn, Figures
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.mode_pictures import write_mode_pictures
 from femgear.trains.drivetrain.model import DrivetrainModel, case_model
 from femgear.trains.drivetrain.parts import ComputedMesh, MeshSection, numbered
 from femgear.trains.drivetrain.results import MOST_PANELS, chosen_meshes, pass_band, separating, symbols
 from femgear.trains.drivetrain.simulation import PASS_BAND
-from femgear.trains.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -190,10 +190,17 @@ def _name_lines(ax, lines: Sequence[tuple], width: float) -> None:
     places = 0.5 * (right + left)
     for (text, at), place in zip(lines, places):
         ax.annotate(
-            text, (at, 1.0), (place, 1.06), xycoords=ax.get_xaxis_transform(), rotation=90,
-            textcoords=ax.get_xaxis_transform(), fontsize=SIZE - 3, ha="center", va="bottom",
+            text,
+            (at, 1.0),
+            (place, 1.06),
+            xycoords=ax.get_xaxis_transform(),
+            rotation=90,
+            textcoords=ax.get_xaxis_transform(),
+            fontsize=SIZE - 3,
+            ha="center",
+            va="bottom",
             arrowprops={"arrowstyle": "-", "color": GREY, "linewidth": 0.6, "shrinkA": 0, "shrinkB": 0},
-        )  # fmt: skip
+        )
 
 
 def stiffness_figure(model: DrivetrainModel) -> Figure:
@@ -237,10 +244,13 @@ def _campbell_figure(modes: xr.Dataset) -> Figure:
     top = frequency.max()
     critical = zip(modes["critical_speed"].values, modes["critical_frequency"].values)
     return campbell(
-        modes["campbell_speed"].values, frequency, orders=modes["base_order"].values / 60.0,
+        modes["campbell_speed"].values,
+        frequency,
+        orders=modes["base_order"].values / 60.0,
         order_names=[str(name) for name in modes["base"].values],
-        critical=[pair for pair in critical if pair[1] < top], speed_unit="rpm of the first body",
-    )  # fmt: skip
+        critical=[pair for pair in critical if pair[1] < top],
+        speed_unit="rpm of the first body",
+    )
 
 
 def transient_figures(data: xr.Dataset) -> dict[str, Figure]:
@@ -283,10 +293,7 @@ def _curves(data: xr.Dataset, name: str, columns, kept=slice(None)) -> list[tupl
     values = data[name].transpose("variant", owner, ...).values[..., kept]
     # one variant needs no name
     variants = [str(text) if data.sizes["variant"] > 1 else "_" for text in data["variant"].values]
-    return [
-        (str(data[owner].values[i]), [(text, values[v, i]) for v, text in enumerate(variants)])
-        for i in columns
-    ]
+    return [(str(data[owner].values[i]), [(text, values[v, i]) for v, text in enumerate(variants)]) for i in columns]
 
 
 def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> dict:
@@ -312,10 +319,14 @@ def spectrum_figures(data: xr.Dataset, transient: xr.Dataset | None = None) -> d
     from_to, changes = _speeds(data, transient)
     figures = {
         "mesh_force_spectrum": spectra(
-            frequency[low], [(title, curves), *others], lines=marks, unit="force [kN]", factor=1e-3,
+            frequency[low],
+            [(title, curves), *others],
+            lines=marks,
+            unit="force [kN]",
+            factor=1e-3,
             title=f"{from_to}: lines smear over frequency, not over orders" if changes else from_to,
         )
-    }  # fmt: skip
+    }
     for base in lines:
         if (figure := _side_bands(data, base, lines, from_to)) is not None:
             figures[f"side_bands_{bases[base].replace(' ', '_')}"] = figure
@@ -365,10 +376,14 @@ def _side_bands(data, base: int, lines, title: str):
     marks = [(f"{k:+d} {text}" if k else "mesh", centre + k * shift) for k in range(-3, 4)]
     mesh = data["mesh_base"].values.tolist().index(base)
     return spectra(
-        all_orders[near], _curves(data, "order_amplitude", [mesh], near),
-        lines=[mark for mark in marks if abs(mark[1] - centre) <= width], unit="force [kN]", factor=1e-3,
-        x="order of the first body [1]", title=title,
-    )  # fmt: skip
+        all_orders[near],
+        _curves(data, "order_amplitude", [mesh], near),
+        lines=[mark for mark in marks if abs(mark[1] - centre) <= width],
+        unit="force [kN]",
+        factor=1e-3,
+        x="order of the first body [1]",
+        title=title,
+    )
 
 
 def _modes_figures(drawn: Drawn) -> dict[str, Figure]:

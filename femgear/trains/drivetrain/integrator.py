@@ -151,10 +151,14 @@ class Scheme:
         moved = whole[:, : 2 * n]
         advance = np.hstack([moved, whole[:, 2 * n : ends[2]] - moved @ drawn])
         return cls(
-            np.ascontiguousarray(advance.T), whole[:, ends[2] : ends[3]].T,
-            whole[:, ends[3] : ends[4]].T, np.ascontiguousarray(drawn.T),
-            -whole[2 * n :, ends[4] :], U, n,
-        )  # fmt: skip
+            np.ascontiguousarray(advance.T),
+            whole[:, ends[2] : ends[3]].T,
+            whole[:, ends[3] : ends[4]].T,
+            np.ascontiguousarray(drawn.T),
+            -whole[2 * n :, ends[4] :],
+            U,
+            n,
+        )
 
     @cached_property
     def of_pairs(self) -> np.ndarray:
@@ -273,9 +277,7 @@ def _march_pairs(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -
     found = np.zeros((pairs + 1, 2, at + 2 * m))
     found[0, :, :at], found[0, :, at + m :] = rows[start, :, :at], rows[start, :, at:]
     dot, double, after = np.dot, scheme.of_pairs, found[1:]
-    for before, end, motion, drawn, load, closed in zip(
-        found, after, after[:, 0], after[:, :, at:], added, forces
-    ):
+    for before, end, motion, drawn, load, closed in zip(found, after, after[:, 0], after[:, :, at:], added, forces):
         dot(before, double, out=end)
         motion += load
         drawn[:] = dot(drawn, closed)
@@ -321,9 +323,10 @@ def solve_overlaps(
         closed = closed.copy()
         closed[wrong] = found[wrong]
     raise ConvergenceError(
-        "no contacts of the meshes fit the end of a step", code="E-CONTACT",
-        remedy="take shorter steps, or the start \"zero\"",
-    )  # fmt: skip
+        "no contacts of the meshes fit the end of a step",
+        code="E-CONTACT",
+        remedy='take shorter steps, or the start "zero"',
+    )
 
 
 def _changed(u, closed, rounding: float) -> np.ndarray:

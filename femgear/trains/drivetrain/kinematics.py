@@ -190,9 +190,11 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
     spins = len(rotations) - int(np.count_nonzero(values > 1e-10 * values.max(initial=1.0)))
     if spins != 1 or abs(vectors[-1, 0]) < 1e-12:
         raise CaseError(
-            f"the stages leave {spins} independent rotations", code="E-DRIVETRAIN", limit="one",
+            f"the stages leave {spins} independent rotations",
+            code="E-DRIVETRAIN",
+            limit="one",
             remedy="check the radii of stages that lie side by side, and what joins the bodies",
-        )  # fmt: skip
+        )
     spin = np.zeros(place.count)
     spin[rotations] = vectors[-1] / vectors[-1, rotations.index(turn[train.bodies[0].name])]
     for stage, planets in zip(train.planetary, place.planets):
@@ -307,11 +309,18 @@ def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
     return PlanarSet(
         ring=PlanarBody(1.0, 1.0, math.inf, math.inf),
         planet=PlanarBody(stage.planet_mass, stage.planet_inertia),
-        sun_radius=sun, ring_radius=ring, planet_radius=planet, centre_distance=stage.axis_distance,
-        planet_angles=stage.angles, pressure_angle_sun_planet=sun_angle,
-        pressure_angle_planet_ring=ring_angle, stiffness_sun_planet=stage.sun_mesh.stiffness,
-        stiffness_planet_ring=stage.ring_mesh.stiffness, planet_bearing=stage.planet_bearing, **bodies,
-    )  # fmt: skip
+        sun_radius=sun,
+        ring_radius=ring,
+        planet_radius=planet,
+        centre_distance=stage.axis_distance,
+        planet_angles=stage.angles,
+        pressure_angle_sun_planet=sun_angle,
+        pressure_angle_planet_ring=ring_angle,
+        stiffness_sun_planet=stage.sun_mesh.stiffness,
+        stiffness_planet_ring=stage.ring_mesh.stiffness,
+        planet_bearing=stage.planet_bearing,
+        **bodies,
+    )
 
 
 def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.ndarray:
@@ -399,9 +408,7 @@ class FlankContacts:
         return total, touched
 
 
-def flank_contacts(
-    train: Drivetrain, place: Coordinates, spin, T, geometry: MeshGeometry, backlash
-) -> FlankContacts:
+def flank_contacts(train: Drivetrain, place: Coordinates, spin, T, geometry: MeshGeometry, backlash) -> FlankContacts:
     """Make the contacts of the drive and back flanks of all meshes.
 
     Parameters

@@ -191,12 +191,15 @@ def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
     """
     xi, phi = np.asarray(xi, float), shear_ratio
     rest = 1.0 - xi
-    return np.stack([
-        1.0 - 3.0 * xi**2 + 2.0 * xi**3 + phi * rest,
-        length * (xi * rest**2 + 0.5 * phi * xi * rest),
-        3.0 * xi**2 - 2.0 * xi**3 + phi * xi,
-        -length * (xi**2 * rest + 0.5 * phi * xi * rest),
-    ], axis=-1) / (1.0 + phi)  # fmt: skip
+    return np.stack(
+        [
+            1.0 - 3.0 * xi**2 + 2.0 * xi**3 + phi * rest,
+            length * (xi * rest**2 + 0.5 * phi * xi * rest),
+            3.0 * xi**2 - 2.0 * xi**3 + phi * xi,
+            -length * (xi**2 * rest + 0.5 * phi * xi * rest),
+        ],
+        axis=-1,
+    ) / (1.0 + phi)
 
 
 def draw_motion(
@@ -272,10 +275,17 @@ def _add_texts(plotter, title: str, layout: Layout, size: int, height: int) -> N
     named = [i for i, name in enumerate(layout.names) if "planet" not in name]
     plotter.add_point_labels(
         layout.centre[named] + np.array([0.0, 1.0, 0.0]) * radius[named, None] * 1.15,
-        [layout.names[i] for i in named], font_size=max(size // 45, 10), bold=False, shape="rect",
-        shape_color="white", shape_opacity=0.7, margin=1, show_points=False, text_color="black",
+        [layout.names[i] for i in named],
+        font_size=max(size // 45, 10),
+        bold=False,
+        shape="rect",
+        shape_color="white",
+        shape_opacity=0.7,
+        margin=1,
+        show_points=False,
+        text_color="black",
         always_visible=True,
-    )  # fmt: skip
+    )
     if title:
         place = (0.02 * size, height - 0.6 * _TITLE * size)
         plotter.add_text(title, position=place, font_size=max(size / 75, 7.0), color="black", name="title")
@@ -317,9 +327,7 @@ def _spoke(wheel: Wheel) -> np.ndarray:
 def _disc(pv, wheel: Wheel):
     """A disc with its axis along z."""
     axis = (0.0, 0.0, 1.0)
-    disc = pv.Cylinder(
-        center=wheel.centre, direction=axis, radius=wheel.radius, height=wheel.width, resolution=48
-    )
+    disc = pv.Cylinder(center=wheel.centre, direction=axis, radius=wheel.radius, height=wheel.width, resolution=48)
     return disc.triangulate()
 
 

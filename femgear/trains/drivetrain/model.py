@@ -30,6 +30,7 @@ from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import beam_element, disc_matrices
 from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
+from femgear.stages.static import solve_static
 from femgear.system.force_laws import positive_part
 from femgear.system.fourier import FourierSeries, orders_of, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
@@ -55,7 +56,6 @@ from femgear.trains.drivetrain.parts import (
     TorqueHistory,
     numbered,
 )
-from femgear.trains.static.stages import solve_static
 
 BENDING, TORSIONAL = "with bending", "torsional"
 # Terms of the mesh stiffness: as many as the paper takes.
@@ -151,9 +151,7 @@ class DrivetrainModel:
         return self.base_ratio * speed
 
 
-def drivetrain_model(
-    train: Drivetrain, *, harmonics: int = HARMONICS, turning: bool = True
-) -> DrivetrainModel:
+def drivetrain_model(train: Drivetrain, *, harmonics: int = HARMONICS, turning: bool = True) -> DrivetrainModel:
     """Assemble matrices, mesh directions and mesh stiffness of a drivetrain.
 
     The series of the mesh stiffness has so many ``harmonics``. Mesh directions of planetary stages turn with
@@ -177,9 +175,14 @@ def drivetrain_model(
         weight[place.names.index(name)] = -train.gravity
     geometry = replace(geometry, basic=T.T @ geometry.basic)
     reduced = MechanicalSystem(
-        T.T @ M @ T, np.zeros((len(names), len(names))), T.T @ K @ T, geometry.frozen, np.zeros(len(names)),
-        names, T.T @ G @ T,
-    )  # fmt: skip
+        T.T @ M @ T,
+        np.zeros((len(names), len(names))),
+        T.T @ K @ T,
+        geometry.frozen,
+        np.zeros(len(names)),
+        names,
+        T.T @ G @ T,
+    )
     stiffness = _stiffness(train, place, spin, harmonics)
     backlash = np.array([np.inf if m.section.backlash is None else m.section.backlash for m in train.meshes])
     bases, base_ratio, of_stage = _bases(train, place, spin)
@@ -195,9 +198,21 @@ def drivetrain_model(
     system = replace(reduced, C=C, load=load)
     ratio = {name: float(spin[first + 4]) for name, first in place.body.items()}
     return DrivetrainModel(
-        train, system, geometry, stiffness, backlash, tuple(bases), np.array(base_ratio), mesh_base, turning,
-        rigid, ratio, flank_contacts(train, place, spin, T, geometry, backlash), place, T,
-    )  # fmt: skip
+        train,
+        system,
+        geometry,
+        stiffness,
+        backlash,
+        tuple(bases),
+        np.array(base_ratio),
+        mesh_base,
+        turning,
+        rigid,
+        ratio,
+        flank_contacts(train, place, spin, T, geometry, backlash),
+        place,
+        T,
+    )
 
 
 def drivetrain_problem(
@@ -276,9 +291,7 @@ class _TurningMeshes:
         return force[..., None] * S, slope[..., None, None] * S[..., :, None] * S[..., None, :]
 
 
-def _flanks(
-    model: DrivetrainModel, geometry: MeshGeometry, own, stage: int, separates: bool
-) -> _TurningMeshes:
+def _flanks(model: DrivetrainModel, geometry: MeshGeometry, own, stage: int, separates: bool) -> _TurningMeshes:
     """Element of like flanks of a stage."""
     contacts, planetary = model.contacts, stage < len(geometry.even)
     meshes, n_bases = contacts.mesh[own], len(model.bases)
@@ -306,10 +319,11 @@ def _check_turning(train: Drivetrain) -> None:
         unequal = [abs(np.exp(1j * order * angles).sum()) for order in (1, 2)]
         if max(unequal) > 1e-6 * len(angles) or math.isfinite(stage.planet_bearing):
             raise CaseError(
-                f"planets of {stage.name} do not allow turning mesh directions", code="E-TURNING",
+                f"planets of {stage.name} do not allow turning mesh directions",
+                code="E-TURNING",
                 limit="three planets or more, equally spaced, fixed to their pins (planet_bearing infinite)",
                 remedy="take turning=False, which freezes the carrier angle",
-            )  # fmt: skip
+            )
 
 
 def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
@@ -398,9 +412,12 @@ def contact_model(model: DrivetrainModel) -> DrivetrainModel:
     """Put every contact in the place of a mesh, for integration in time."""
     contacts = model.contacts
     return replace(
-        model, geometry=contacts.geometry, stiffness=model.stiffness[contacts.mesh],
-        backlash=model.backlash[contacts.mesh], mesh_base=model.mesh_base[contacts.mesh],
-    )  # fmt: skip
+        model,
+        geometry=contacts.geometry,
+        stiffness=model.stiffness[contacts.mesh],
+        backlash=model.backlash[contacts.mesh],
+        mesh_base=model.mesh_base[contacts.mesh],
+    )
 
 
 def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:

@@ -49,9 +49,11 @@ def _name(value: object) -> str:
         raise CaseError(message, code="E-TYPE", value=value, remedy="write it in quotation marks")
     if not _NAME.fullmatch(value) or value != value.strip() or re.match(r"(planet|shaft)\b", value):
         raise CaseError(
-            "not a name for a body", code="E-CHOICE", value=value,
+            "not a name for a body",
+            code="E-CHOICE",
+            value=value,
             limit="40 letters, digits, blanks, - or _; planet and shaft are taken as first words",
-        )  # fmt: skip
+        )
     return value
 
 
@@ -78,9 +80,11 @@ def _driver(value: str | None, info: ValidationInfo) -> str | None:
     ends = info.data.get("between", ()) or [info.data[key] for key in ("carrier", "sun") if key in info.data]
     if value is not None and len(ends) == 2 and value not in ends:
         raise CaseError(
-            "the driver is none of the two bodies of its stage", code="E-CHOICE", value=value,
+            "the driver is none of the two bodies of its stage",
+            code="E-CHOICE",
+            value=value,
             limit=" or ".join(ends),
-        )  # fmt: skip
+        )
     return value
 
 
@@ -98,9 +102,7 @@ BOTH = BeforeValidator(_two)
 """Of entries of the first and the second body, in `Annotated`."""
 
 
-PairTables = Annotated[
-    dict[str, Any], BeforeValidator(_tables), WithJsonSchema({"type": ["string", "object"]})
-]
+PairTables = Annotated[dict[str, Any], BeforeValidator(_tables), WithJsonSchema({"type": ["string", "object"]})]
 """Of the name of a case file, in whose place its tables stand when it was read."""
 
 

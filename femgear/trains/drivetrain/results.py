@@ -16,6 +16,7 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.findings import Finding
 from femgear.report.tables import Block, describe_modes, pull, tabulate
+from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries, shape_entries
 from femgear.trains.drivetrain.case_file import DrivetrainCase, torque_histories
@@ -23,7 +24,6 @@ from femgear.trains.drivetrain.checks import case_speeds, check_drivetrain, reco
 from femgear.trains.drivetrain.model import DrivetrainModel
 from femgear.trains.drivetrain.parts import PlanetarySection, TorqueHistory, numbered
 from femgear.trains.drivetrain.simulation import BALANCE, PASS_BAND, DrivetrainRun
-from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -136,21 +136,34 @@ class TransientResult(StageResult):
         time, mesh, moving = ("time",), ("mesh",), ("time", "body")
         of_runs = (
             ("spin", time, lambda r: r.spin, "rad", "angle of the first body without its deviation"),
-            ("speed", moving, lambda r: r.spin_speed[:, None] * ratio + r.velocity, "rad/s",
-             "speed of rotation"),
-            ("deviation", moving, lambda r: r.motion, "rad",
-             "rotation less that of the free spin, ratio times spin"),
-            ("mesh_force", ("time", "mesh"), lambda r: r.force, "N",
-             f"mesh force along the line of action; negative {negative}"),
+            ("speed", moving, lambda r: r.spin_speed[:, None] * ratio + r.velocity, "rad/s", "speed of rotation"),
+            ("deviation", moving, lambda r: r.motion, "rad", "rotation less that of the free spin, ratio times spin"),
+            (
+                "mesh_force",
+                ("time", "mesh"),
+                lambda r: r.force,
+                "N",
+                f"mesh force along the line of action; negative {negative}",
+            ),
             ("least_force", mesh, lambda r: r.extremes[0], "N", "least mesh force at any step"),
             ("largest_force", mesh, lambda r: r.extremes[1], "N", "largest mesh force at any step"),
             ("pulling", mesh, lambda r: r.pulling, "1", "share of steps with a negative force"),
             ("lost", mesh, lambda r: r.lost, "1", "share of steps in which no flank touches"),
-            ("growth", (), lambda r: r.growth, "1/s",
-             "mean rate of the logarithm of the free motion: above zero it grows"),
-            ("gain", (), lambda r: r.gain, "1",
-             "largest growth of the free motion between two instants of the run, as a factor"),
-        )  # fmt: skip
+            (
+                "growth",
+                (),
+                lambda r: r.growth,
+                "1/s",
+                "mean rate of the logarithm of the free motion: above zero it grows",
+            ),
+            (
+                "gain",
+                (),
+                lambda r: r.gain,
+                "1",
+                "largest growth of the free motion between two instants of the run, as a factor",
+            ),
+        )
         variables = {
             name: (("variant", *dims), [value(run) for run in runs], unit, text)
             for name, dims, value, unit, text in of_runs
@@ -248,9 +261,7 @@ class SpectrumResult(StageResult):
         lines, distance = self.lines, self.order_distance
         amplitude = [self.spectra[v].amplitude for v in variants]
         by_order = [tracked[v].amplitude[:, :length] for v in variants]
-        averaged = (
-            "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values"
-        )
+        averaged = "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values"
         single = "amplitude of the mesh force over orders of the first body, one segment, peak values"
         line, orders = [self.amplitudes[v] for v in variants], np.array([one.order for one in lines])
         hertz, multiples = orders * self.speed / (2 * np.pi), [one.orders for one in lines]
@@ -307,9 +318,7 @@ def _energies(model, shape):
 
 def _kinds(frequency, rotation) -> list[str]:
     rigid = frequency < 1e-7 * frequency.max(initial=1e-300)
-    words = np.where(
-        rotation > _TORSION, "torsional", np.where(rotation < 1.0 - _TORSION, "bending", "mixed")
-    )
+    words = np.where(rotation > _TORSION, "torsional", np.where(rotation < 1.0 - _TORSION, "bending", "mixed"))
     return [str(word) for word in np.where(rigid, "rigid", words)]
 
 
@@ -448,9 +457,15 @@ def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
             )
         )
     header = (
-        "stage", "driver", "teeth", "pitch radii [mm]", "ratio", "contact ratio", "stiffness [N/m]",
+        "stage",
+        "driver",
+        "teeth",
+        "pitch radii [mm]",
+        "ratio",
+        "contact ratio",
+        "stiffness [N/m]",
         "mesh [Hz]",
-    )  # fmt: skip
+    )
     return Block("Gear stages", header, tuple(rows))
 
 
@@ -467,8 +482,7 @@ def _operation(case: DrivetrainCase, model: DrivetrainModel) -> Block:
     notes = (
         f"first body {case.operation.speed / RPM:.6g} rpm at the start, where the torques change it by "
         f"{round(change, 6) + 0.0:.4g} rpm a second; {last:.6g} rpm at the end",
-        f"{s.duration:g} s at {s.rate:g} steps a second, {record_rate(case, model):g} records a second; "
-        f"{contact}",
+        f"{s.duration:g} s at {s.rate:g} steps a second, {record_rate(case, model):g} records a second; {contact}",
         _damping(s.damping_ratio),
     )
     return Block("Operation", ("torque on", "[N m]"), tuple(rows), notes)
@@ -577,9 +591,7 @@ def _newtons(value: float) -> str:
 def _combination(orders, names) -> str:
     """A line as the sum of base frequencies, the largest first: ``f1 - 2 t``."""
     terms = ""
-    for base in sorted(
-        np.flatnonzero(orders), key=lambda base: (orders[base] < 0, names[base][0] == "t", -base)
-    ):
+    for base in sorted(np.flatnonzero(orders), key=lambda base: (orders[base] < 0, names[base][0] == "t", -base)):
         count, name = int(orders[base]), names[base]
         size = name if abs(count) == 1 else f"{abs(count)} {name}"
         terms += f" {'-' if count < 0 else '+'} {size}" if terms else size

@@ -166,9 +166,7 @@ def march_drivetrain(
         The motion outgrows the numbers (E-DIVERGED); no flanks fit a step (E-CONTACT).
     """
     if not 0.0 < step <= duration < np.inf:
-        raise CaseError(
-            f"{duration} s in steps of {step} s", code="E-RANGE", limit="0 < step <= duration", key="step"
-        )
+        raise CaseError(f"{duration} s in steps of {step} s", code="E-RANGE", limit="0 < step <= duration", key="step")
     count = max(1, round(duration / step))
     stepped = contact_model(model) if contact_loss else model
     spin = Spin(stepped, torques, step, speed)
@@ -188,10 +186,18 @@ def march_drivetrain(
             motion.state = balances.without_drift(states[-1])
             records.told(min(first + _BLOCK, count) / count)
     return DrivetrainRun(
-        outputs=tuple(outputs), **record.columns(step), meshes=model.meshes, energy_balance=balances.works(),
-        drift=balances.drift, momentum=balances.momentum_error(), steps=count, step=step,
-        contact_loss=contact_loss, growth=motion.free.growth(), gain=motion.free.gain(),
-    )  # fmt: skip
+        outputs=tuple(outputs),
+        **record.columns(step),
+        meshes=model.meshes,
+        energy_balance=balances.works(),
+        drift=balances.drift,
+        momentum=balances.momentum_error(),
+        steps=count,
+        step=step,
+        contact_loss=contact_loss,
+        growth=motion.free.growth(),
+        gain=motion.free.gain(),
+    )
 
 
 class _Motion:
@@ -268,11 +274,12 @@ def _static_deviations(model: DrivetrainModel, W, k, load, contacts: FlankContac
     if loose.max() > _CARRIED * scale:
         raise CaseError(
             f"the first loads part the flanks of {model.meshes[int(np.argmax(loose))]}, and nothing else"
-            " holds the gears", code="E-START", key="operation.torque",
+            " holds the gears",
+            code="E-START",
+            key="operation.torque",
             limit="loads that close the drive flanks, or a backlash",
-            remedy="name the driver of the stage that these loads press, give the mesh a backlash, or"
-            " start = \"zero\"",
-        )  # fmt: skip
+            remedy='name the driver of the stage that these loads press, give the mesh a backlash, or start = "zero"',
+        )
     return q - drawn @ (np.where(closed, touching, parted) * u)
 
 
@@ -406,9 +413,7 @@ class _Balances:
     def without_drift(self, state):
         """The state less the spin that rounding has put into the deviations."""
         n, rigid = self.scheme.n, self.model.rigid
-        angle, rate = (
-            float(self.carried @ part) / self.spin.inertia for part in (state[:n], state[n : 2 * n])
-        )
+        angle, rate = (float(self.carried @ part) / self.spin.inertia for part in (state[:n], state[n : 2 * n]))
         self.drift = max(self.drift, abs(angle))
         state = state.copy()
         state[:n] -= angle * rigid
@@ -438,8 +443,10 @@ class _Balances:
         raise ConvergenceError(
             f"the motion has outgrown the numbers by t = {self.spin.step * (first + last):.4g} s ({missed})"
             f"{self._mesh(states[last], block, last)}; the free motion {_rate(free.growth())}",
-            code="E-DIVERGED", limit=f"balances of energy and momentum to {BALANCE:g}", remedy=remedy,
-        )  # fmt: skip
+            code="E-DIVERGED",
+            limit=f"balances of energy and momentum to {BALANCE:g}",
+            remedy=remedy,
+        )
 
     def _mesh(self, state, block: Block, last: int) -> str:
         """The mesh with the most strain energy."""

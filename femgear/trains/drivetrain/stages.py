@@ -18,6 +18,7 @@ from femgear.curves import not_a_knot
 from femgear.errors import ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import campbell_data
+from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.drivetrain.case_file import DrivetrainCase, settle_time, torque_histories
 from femgear.trains.drivetrain.checks import (
     check_drivetrain,
@@ -41,7 +42,6 @@ from femgear.trains.drivetrain.results import (
     describe_transient,
 )
 from femgear.trains.drivetrain.simulation import PASS_BAND, DrivetrainRun, Records, march_drivetrain
-from femgear.trains.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -134,10 +134,11 @@ def _check_sense(run: DrivetrainRun, variant: str, ratio) -> None:
     raise ConvergenceError(
         f"{variant}: {body} vibrates with {vibration[worst]:.3g} rad/s beside {fastest[worst]:.3g} rad/s of "
         f"its own speed: the free motion grows {run.gain:.2g} times within the run{cause}",
-        code="E-DIVERGED", key="simulation.damping_ratio",
+        code="E-DIVERGED",
+        key="simulation.damping_ratio",
         limit=f"vibration below {_WILD:g} times the speed of the body, where motions grow",
         remedy=f"give more damping, or {remedy}",
-    )  # fmt: skip
+    )
 
 
 def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> SpectrumResult:
@@ -165,9 +166,7 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
         spectra[variant] = averaged_spectrum(force, step, resolution=resolution)
         found = order_spectrum(force, angle, resolution=distance, per_turn=per_turn)
         kept = found.frequency <= _ORDERS * rate * 2.0 * np.pi / run.spin_speed[late].max()
-        tracked[variant] = replace(
-            found, frequency=found.frequency[kept], amplitude=found.amplitude[..., kept]
-        )
+        tracked[variant] = replace(found, frequency=found.frequency[kept], amplitude=found.amplitude[..., kept])
         amplitudes[variant] = line_amplitudes(force, angle, run.spin_speed[late], lines, record_rate=rate)
     resolved = resolved_lines(model, lines, distance)
     return SpectrumResult(transient, settle, speed, spectra, tracked, lines, amplitudes, distance, resolved)
@@ -334,4 +333,4 @@ DRIVETRAIN = Train(
     warnings=drivetrain_warnings,
     figures=FiguresOf("femgear.trains.drivetrain.figures:FIGURES"),
     remarks=remarks,
-)  # fmt: skip
+)

@@ -24,13 +24,13 @@ from femgear.findings import Finding
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import mesh_normals, torques
 from femgear.gears.planetary import mesh_names
-from femgear.housing.structure import FixedStructure, Support
+from femgear.housing.two_way.structure import FixedStructure, Support
 from femgear.report.style import NOTICEABLE
 from femgear.report.tables import first_speeds, pulling_meshes, pulls_of, response_warnings
 from femgear.solvers.periodic.solution import CIRCLE
+from femgear.stages.lumped_set import check_one_period, member_speeds
+from femgear.stages.static_results import set_warnings
 from femgear.trains.elastic.model import MAX_DIAMETER
-from femgear.trains.rigid import check_one_period, member_speeds
-from femgear.trains.static.results import set_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -97,11 +97,14 @@ def record_periods(case: Case, gears: PlanetarySet) -> int:
     periods, told = common_period(set_deviations(case), gears, limit=sys.maxsize)
     if periods > longest:
         raise CaseError(
-            f"modes, dynamics and housing need the whole record: {told}", code="E-PERIODS",
-            key="static.longest_record", value=longest, limit=f"{periods} with these errors",
+            f"modes, dynamics and housing need the whole record: {told}",
+            code="E-PERIODS",
+            key="static.longest_record",
+            value=longest,
+            limit=f"{periods} with these errors",
             remedy="raise it, which takes time and memory in proportion, run with --only static, or leave "
             "the errors of a member out",
-        )  # fmt: skip
+        )
     return periods
 
 
@@ -141,10 +144,12 @@ def _check_housing_supports(case: Case) -> None:
     idle = next((i for i, one in enumerate(found) if not _acts(one)), None)
     if idle is not None:
         raise CaseError(
-            "a support without stiffness and mass does nothing", code="E-SUPPORT",
-            key=f"housing.support[{idle}]", limit="a stiffness or mass above zero",
+            "a support without stiffness and mass does nothing",
+            code="E-SUPPORT",
+            key=f"housing.support[{idle}]",
+            limit="a stiffness or mass above zero",
             remedy="give one of them, or leave the support out",
-        )  # fmt: skip
+        )
     angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in found]
     again = next((i for i, angle in enumerate(angles) if angle in angles[:i]), None)
     if again is not None:
@@ -158,17 +163,22 @@ def _check_housing_supports(case: Case) -> None:
         if wide > room * (1 + 1e-9):
             message = "supports overlap" if i != j else "a support is longer than the ring is around"
             raise CaseError(
-                message, code="E-SUPPORT", key=f"housing.support[{j}].width",
+                message,
+                code="E-SUPPORT",
+                key=f"housing.support[{j}].width",
                 value=f"{1e3 * found[i].width:g} and {1e3 * found[j].width:g} mm, {1e3 * room:.4g} mm apart",
                 limit="half of both widths up to the distance along the circumference",
                 remedy="make them narrower, or one of both",
-            )  # fmt: skip
+            )
     if case.housing.stands_still and case.housing.form == "linear":
         raise CaseError(
             "the linear form interpolates a field that turns with the carrier; a ring on supports or in a "
-            "casing has none", code="E-CHOICE", key="housing.form", value="linear",
+            "casing has none",
+            code="E-CHOICE",
+            key="housing.form",
+            value="linear",
             limit='"exact" with housing.support and housing.structure',
-        )  # fmt: skip
+        )
     fixed_diameters(case)
 
 
@@ -191,18 +201,26 @@ def imported_casing(
     try:
         if checksum_of_all(checksum(one) for one in (file, nodes) if one) != section.sha256:
             raise CaseError(
-                "these are not the files that the case was read with", code="E-OTHER-CASE", key="file",
-                value=section.file, limit=f"SHA-256 {section.sha256}",
+                "these are not the files that the case was read with",
+                code="E-OTHER-CASE",
+                key="file",
+                value=section.file,
+                limit=f"SHA-256 {section.sha256}",
                 remedy="put them beside the case file, or leave out sha256 for those that are there",
-            )  # fmt: skip
-        from femgear.housing.casing_files import named_outputs, read_casing
+            )
+        from femgear.exchange.casing_files import named_outputs, read_casing
 
         structure = read_casing(
-            file, direction=turned @ on_ring, max_diameter=fixed_diameters(case), units=section.units,
+            file,
+            direction=turned @ on_ring,
+            max_diameter=fixed_diameters(case),
+            units=section.units,
             pitch_radius=gears.ring.base_radius / math.cos(gears.working_pressure_angle_planet_ring),
-            damping_ratio=section.damping_ratio, nodes=nodes,
-            max_frequency=section.max_frequency or max_frequency, expected_stiffness=expected_stiffness,
-        )  # fmt: skip
+            damping_ratio=section.damping_ratio,
+            nodes=nodes,
+            max_frequency=section.max_frequency or max_frequency,
+            expected_stiffness=expected_stiffness,
+        )
         return structure, *named_outputs(structure, nodes)
     except CaseError as error:
         known = error.key in type(section).model_fields

@@ -105,9 +105,13 @@ def first_limit(case: Case, modes: ModesResult, frequency: np.ndarray) -> Freque
 
 
 def excitation_end(
-    case: Case, modes: ModesResult, heard: Heard, frequency: np.ndarray, carrier: np.ndarray,
+    case: Case,
+    modes: ModesResult,
+    heard: Heard,
+    frequency: np.ndarray,
+    carrier: np.ndarray,
     level: np.ndarray | None = None,
-) -> tuple[float, float, np.ndarray]:  # fmt: skip
+) -> tuple[float, float, np.ndarray]:
     """Choose where the excitation ends, from some speeds, so that the level has converged if it may.
 
     Frequency [Hz], that to which the level was compared [Hz], and its changes at the speeds [dB], nan where

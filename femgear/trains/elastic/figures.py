@@ -61,20 +61,20 @@ from femgear.report.style import (
     thinned,
 )
 from femgear.report.waterfall import KIND_COLOURS, RUNUP_CAPTIONS, runup_figures
+from femgear.stages.protocol import Drawn, Figures
+from femgear.stages.static import ring_foundation
+from femgear.stages.static_figures import FIGURES as STATIC
+from femgear.stages.static_figures import picture_sectors
 from femgear.storage.files import write_text
 from femgear.trains.elastic.checks import housing_supports
 from femgear.trains.elastic.results import hanning_spectrum, run_up_lines
-from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.figures import FIGURES as STATIC
-from femgear.trains.static.figures import picture_sectors
-from femgear.trains.static.stages import ring_foundation
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
     from femgear.gears.planetary import PlanetarySet
-    from femgear.housing.structure import Support
+    from femgear.housing.two_way.structure import Support
 
 _BADGE = {"boxstyle": "circle", "facecolor": "white", "edgecolor": VERMILION}
 
@@ -115,10 +115,15 @@ def natural_frequencies(modes: xr.Dataset) -> Figure:
         member = kind.removeprefix("ring, ")
         # as in the Campbell diagram; filled where the bodies move, open where the ring does
         ax.plot(
-            diameter[rows], frequency[rows], _MARKS.get(member, "D"), color=KIND_COLOURS.get(member, GREY),
-            markersize=6, markerfacecolor="none" if member != kind else None, markeredgewidth=1.5,
+            diameter[rows],
+            frequency[rows],
+            _MARKS.get(member, "D"),
+            color=KIND_COLOURS.get(member, GREY),
+            markersize=6,
+            markerfacecolor="none" if member != kind else None,
+            markeredgewidth=1.5,
             label=f"{kind} ({sum(len(groups[i]) for i in rows)})",
-        )  # fmt: skip
+        )
     ax.set_yscale("log")
     ax.set_ylim(0.6 * frequency.min(initial=1.0), 1.7 * frequency.max(initial=1.0))
     ax.yaxis.set_major_formatter("{x:g}")
@@ -311,9 +316,12 @@ def _labelled(order, amplitude, candidates, *, spacing):
 
 
 def modulation_polar(
-    housing: xr.Dataset, planet_angles=(), *, windowed: OrderSpectrum | None = None,
+    housing: xr.Dataset,
+    planet_angles=(),
+    *,
+    windowed: OrderSpectrum | None = None,
     supports: Sequence[Support] = (),
-) -> Figure:  # fmt: skip
+) -> Figure:
     """Draw envelopes of the acceleration of housing.nc over the sensor's angle to the carrier.
 
     At the first speed, around the two mesh harmonics with the strongest lines, as if the carrier, drawn with
@@ -326,9 +334,7 @@ def modulation_polar(
     from scipy.ndimage import uniform_filter1d
 
     harmonics, spectrum = _strongest_bands(housing) or [1], _spectrum(housing)
-    figure, axes = new_figure(
-        columns=len(harmonics), width=0.5 * WIDTH * len(harmonics), height=4.9, polar=True
-    )
+    figure, axes = new_figure(columns=len(harmonics), width=0.5 * WIDTH * len(harmonics), height=4.9, polar=True)
     start, turn = float(housing.attrs["sensor_angle"]), np.sign(float(housing["carrier_speed"][0]))
     for ax, harmonic in zip(axes, harmonics):
         found = analyse_band(spectrum, _ring_teeth(housing), harmonic)
@@ -350,13 +356,12 @@ def modulation_polar(
         for one in supports:
             half = max(0.5 * one.width, 0.02)
             arc, edge = np.linspace(one.angle - half, one.angle + half, 9), [1.36 * largest] * 9
-            ax.plot(arc, edge, color=BLACK, linewidth=7, solid_capstyle="butt", label="supports at the start",
-                    clip_on=False)  # fmt: skip
+            ax.plot(
+                arc, edge, color=BLACK, linewidth=7, solid_capstyle="butt", label="supports at the start", clip_on=False
+            )
         ax.plot([start], [1.28 * largest], "^", color=GREEN, markersize=9, label="sensor at the start")
         ax.set_ylim(0, 1.36 * largest)
-        ax.set_yticks(
-            [tick for tick in MaxNLocator(3, steps=_STEPS).tick_values(0.0, largest) if 0 < tick <= largest]
-        )
+        ax.set_yticks([tick for tick in MaxNLocator(3, steps=_STEPS).tick_values(0.0, largest) if 0 < tick <= largest])
         ax.set_rlabel_position(float(np.degrees(lowest)))
         speed = rpm(housing["speed"].values[0])
         text = f"{speed}, mesh harmonic {harmonic}: {len(lobes.position)} lobes up to {largest:.3g} m/s²"
@@ -481,9 +486,7 @@ def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
         rest = modes["supported_position"].values, modes["supported_force"].values
     return response_figures(
         dynamics,
-        dynamic_transmission_error=transmission_error_period(
-            dynamics, _on_supports(modes, drawn.data.get("static"))
-        ),
+        dynamic_transmission_error=transmission_error_period(dynamics, _on_supports(modes, drawn.data.get("static"))),
         mesh_forces=mesh_force_period(dynamics, rest),
         ring_static_deflection=ring_mean_deflection(dynamics, planetary_set(drawn.case)),
     )

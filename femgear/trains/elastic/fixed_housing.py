@@ -1,6 +1,6 @@
 """Elastic set in a housing that stands still: a ring on supports, or a casing of a file, and what is heard.
 
-The set turns in a structure without symmetry (`femgear.housing.two_way`); sensors and microphone stand on and
+The set turns in a structure without symmetry (`femgear.housing.two_way.response`); sensors and microphone stand on and
 beside it.
 """
 
@@ -16,18 +16,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.exchange.casing_files import may_lack_compliance, missing_compliance
 from femgear.findings import Finding
 from femgear.gears.deviations import common_period, no_deviations, rotational_symmetry
-from femgear.housing.carrier_orders import MeshPaths, mean_excitation
-from femgear.housing.casing_files import may_lack_compliance, missing_compliance
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import SensorLines
-from femgear.housing.set_damping import with_set_damping
 from femgear.housing.sound import equivalent_sound, surface_sound
-from femgear.housing.structure import FixedStructure, equal_sectors, supported_ring
-from femgear.housing.turn_stability import turn_stability
-from femgear.housing.two_way import TwoWayResponse, solve_two_way, structure_lines
+from femgear.housing.two_way.carrier_orders import MeshPaths, mean_excitation
+from femgear.housing.two_way.response import TwoWayResponse, solve_two_way, structure_lines
+from femgear.housing.two_way.set_damping import with_set_damping
+from femgear.housing.two_way.structure import FixedStructure, equal_sectors, supported_ring
+from femgear.housing.two_way.turn_stability import turn_stability
 from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.stages.lumped_set import member_speeds
 from femgear.trains.elastic.checks import (
     fixed_diameters,
     housing_supports,
@@ -43,7 +44,6 @@ from femgear.trains.elastic.model import gears_alone, mesh_springs, ring_mesh_co
 from femgear.trains.elastic.outputs import lines_method
 from femgear.trains.elastic.results import DynamicsResult, FixedHousing, HousingResult, ModesResult
 from femgear.trains.elastic.runup import HeardSpeeds, heard_speeds
-from femgear.trains.rigid import member_speeds
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -76,10 +76,16 @@ class _Surroundings:
     def solve(self, carrier: np.ndarray, limit: FrequencyLimit, tolerance: float, **known) -> TwoWayResponse:
         """Solve for the forces at speeds of the carrier (n_speeds,) [rad/s], with a limit of each."""
         return solve_two_way(
-            self.gears, self.excitation, self.structure, self.paths, carrier, damping=self.damping,
-            harmonics=(limit.excitation, limit.response), tolerance=tolerance,
+            self.gears,
+            self.excitation,
+            self.structure,
+            self.paths,
+            carrier,
+            damping=self.damping,
+            harmonics=(limit.excitation, limit.response),
+            tolerance=tolerance,
             **{"coupled_diameters": self.coupled} | known,
-        )  # fmt: skip
+        )
 
 
 class HousingModel:
@@ -159,7 +165,7 @@ class HousingModel:
 
 def fixed_housing(
     case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit, *, judged_at: Any = ()
-) -> FixedHousing:  # fmt: skip
+) -> FixedHousing:
     """Make the structure of ring and casing, and solve for forces at speeds of the carrier [rad/s].
 
     Of the set in it, and in the ring on its foundation alone; the excitation has a limit at every speed.
@@ -175,9 +181,14 @@ def fixed_housing(
     two_way, multiplier = housing.solve(carrier, limit, tolerance), np.full(len(carrier), np.nan)
     if len(judged_at):
         multiplier[judged_at] = turn_stability(
-            housing.gears, housing.excitation, housing.structure, housing.paths, carrier[judged_at],
-            damping=housing.damping, harmonics=min(int(limit.excitation.min()), _JUDGED),
-        ).modulus  # fmt: skip
+            housing.gears,
+            housing.excitation,
+            housing.structure,
+            housing.paths,
+            carrier[judged_at],
+            damping=housing.damping,
+            harmonics=min(int(limit.excitation.min()), _JUDGED),
+        ).modulus
     multiplier **= 1.0 / two_way.turns
     named = model.sensors, model.forces, model.missing
     return FixedHousing(housing.structure, two_way, one_way, *named, multiplier)
@@ -202,9 +213,7 @@ def _first_lines(case: Case, modes: ModesResult, model, structure, two_way: TwoW
     first = _radial_sensor(structure, model, case.housing.sensor_angle, modes.max_diameter)[:, None]
     order, moved = structure_lines(structure.combined(first), two_way)
     place = case.housing.sensor_angle, case.ring.teeth
-    return SensorLines(
-        order, moved[:, 0], two_way.carrier_speed, *place, lines_method(case), turns=two_way.turns
-    )
+    return SensorLines(order, moved[:, 0], two_way.carrier_speed, *place, lines_method(case), turns=two_way.turns)
 
 
 def _casing(
@@ -240,16 +249,20 @@ def _ring_on_supports(
     # those around are asked for places between them
     waves = np.where(np.arange(len(angle)) < points, modes.max_diameter, np.inf)
     structure = supported_ring(
-        modes.ring.modes, supports, **known, sensor_angles=angle, sensor_directions=turned,
-        sensor_widths=width, sensor_waves=waves, rim=modes.ring.rim_compliance,
-    )  # fmt: skip
+        modes.ring.modes,
+        supports,
+        **known,
+        sensor_angles=angle,
+        sensor_directions=turned,
+        sensor_widths=width,
+        sensor_waves=waves,
+        rim=modes.ring.rim_compliance,
+    )
     ways = [f"support {i} {way}" for i in range(1, len(supports) + 1) for way in ("radial", "tangential")]
     return structure.combined(np.diag(factor)), tuple(one.name for one in case.housing.sensor), tuple(ways)
 
 
-def lines_in_housing(
-    case: Case, dynamics: DynamicsResult, found: HousingResult, fixed: FixedHousing
-) -> HousingResult:
+def lines_in_housing(case: Case, dynamics: DynamicsResult, found: HousingResult, fixed: FixedHousing) -> HousingResult:
     """What sensors and the microphone hear of the structure, by the forces of both routes."""
     structure, exact, top = fixed.structure, found.exact, dynamics.ring_radial.shape[-1] // 2
     count, first = structure.sensor_shape.shape[1], _radial_sensor(structure, fixed, exact.sensor_angle, top)
@@ -276,15 +289,21 @@ def lines_in_housing(
         apart = 20.0 * np.log10(order_level(lines) / level)
     told = {
         "turn_multiplier": fixed.multiplier,
-        "one_way_level": level, "one_way_difference": apart,
-        "two_way_residual": fixed.two_way.residual, "order_tail": fixed.two_way.tail,
-        "two_way_radius": fixed.two_way.spectral_radius, "two_way_products": fixed.two_way.products,
-    }  # fmt: skip
+        "one_way_level": level,
+        "one_way_difference": apart,
+        "two_way_residual": fixed.two_way.residual,
+        "order_tail": fixed.two_way.tail,
+        "two_way_radius": fixed.two_way.spectral_radius,
+        "two_way_products": fixed.two_way.products,
+    }
     return replace(
-        found, exact=lines, supported=told, missing=fixed.missing,
+        found,
+        exact=lines,
+        supported=told,
+        missing=fixed.missing,
         outputs={kind: one for kind, one in outputs.items() if one[0]},
         sound=sound,
-    )  # fmt: skip
+    )
 
 
 def _radial_sensor(structure: FixedStructure, named, angle: float, top: int) -> np.ndarray:
@@ -297,9 +316,7 @@ def _radial_sensor(structure: FixedStructure, named, angle: float, top: int) -> 
     points, weights = count - len(named.sensors) - len(named.forces), np.eye(count)[0]
     if points:
         n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / points
-        weights[:points] = (
-            np.real(np.exp(1j * np.subtract.outer(angle, place)[:, None] * n).sum(axis=1)) / points
-        )
+        weights[:points] = np.real(np.exp(1j * np.subtract.outer(angle, place)[:, None] * n).sum(axis=1)) / points
     return weights
 
 
@@ -361,8 +378,9 @@ def turning_errors_time(case: Case) -> Iterator[Finding]:
     seconds = kept.sum() * periods * gears.n_planets * bands**2 * (8 * bands + 20 * _PRODUCTS) / _FLOPS
     if seconds > 60.0:
         yield Finding(
-            "W-SIZE", "housing.support" if case.housing.support else "housing.structure",
+            "W-SIZE",
+            "housing.support" if case.housing.support else "housing.structure",
             f"errors that turn over {periods} mesh periods may take up to {seconds / 60.0:.0f} min in a "
             f"housing that stands still, at {len(speeds)} speeds",
             remedy="fewer speeds or nodal diameters, or a lower dynamics.up_to, if that is too much",
-        )  # fmt: skip
+        )

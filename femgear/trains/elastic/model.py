@@ -23,9 +23,9 @@ from femgear.fe.compliance import cyclic_harmonics, rim_compliance, static_cut_s
 from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis, smooth_cut_shapes
 from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import mesh_normals, torques
-from femgear.housing.structure import circumferential
+from femgear.housing.two_way.structure import circumferential
+from femgear.stages.static import mesh_backlash
 from femgear.system.system import MechanicalSystem, MeshExcitation
-from femgear.trains.static.stages import mesh_backlash
 
 if TYPE_CHECKING:
     from femgear.case.sections import Case
@@ -111,8 +111,7 @@ def elastic_set(
     angles = np.asarray(planetary_set.planet_angles) + ring.load_angle
     W[n_rigid:, n_p:] -= ring_displacement(modes, ring_mode, ring_phase, angles)
     ring_names = tuple(
-        f"ring: n={modes.nodal_diameter[m]} mode {m} {'sine' if p else 'cosine'}"
-        for m, p in zip(ring_mode, ring_phase)
+        f"ring: n={modes.nodal_diameter[m]} mode {m} {'sine' if p else 'cosine'}" for m, p in zip(ring_mode, ring_phase)
     )
     system = MechanicalSystem(M=np.diag(M), C=np.zeros((n, n)), K=K, W=W, load=load, dofs=names + ring_names)
     system = replace(system, flexibility=flexibility)
@@ -134,9 +133,15 @@ def gears_alone(model: ElasticSet, flexibility) -> MechanicalSystem:
     """
     system, own = model.system, slice(model.ring_slice.start)
     return replace(
-        system, M=system.M[own, own], C=system.C[own, own], K=system.K[own, own], dofs=system.dofs[own],
-        W=model.rigid_directions[own], load=system.load[own], flexibility=flexibility,
-    )  # fmt: skip
+        system,
+        M=system.M[own, own],
+        C=system.C[own, own],
+        K=system.K[own, own],
+        dofs=system.dofs[own],
+        W=model.rigid_directions[own],
+        load=system.load[own],
+        flexibility=flexibility,
+    )
 
 
 def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.ndarray:
@@ -307,9 +312,10 @@ def mesh_excitation(
     between = np.diag(remaining.min(axis=1)) + flexibility
     if remaining.min() <= 0 or np.linalg.eigvalsh(between)[0] <= 0:
         raise ContactError(
-            "the compliance of the ring model exceeds that of the loaded mesh", code="E-CONTACT-COMPLIANCE",
+            "the compliance of the ring model exceeds that of the loaded mesh",
+            code="E-CONTACT-COMPLIANCE",
             remedy="refine the grid: more static.flank_elements",
-        )  # fmt: skip
+        )
     spring = deflection - flexibility @ force
     spring[N:] -= ring_compliance @ force[N:]
     return MeshExcitation(
@@ -446,9 +452,7 @@ def _outer_surface_outputs(grid: Grid) -> np.ndarray:
     return outputs
 
 
-def mesh_springs(
-    gears: PlanetarySet, ring: RingModel, state: LoadedPeriod
-) -> tuple[MeshExcitation, np.ndarray]:
+def mesh_springs(gears: PlanetarySet, ring: RingModel, state: LoadedPeriod) -> tuple[MeshExcitation, np.ndarray]:
     """Mesh springs of the loaded state, and the compliance (2N, 2N) of the bodies between them [m/N]."""
     held, compliance = (
         ring_mesh_compliance(values, gears.ring.teeth, gears.planet_angles)

@@ -47,10 +47,12 @@ def mesh_and_ring_outputs(
     rows: Any = linalg.block_diag(np.eye(n_meshes), field[heard])
     outputs = np.vstack([model.rigid_directions.T, ring_rows])
     values = output_response(
-        basis, response, rows @ (outputs @ basis.shape),
+        basis,
+        response,
+        rows @ (outputs @ basis.shape),
         residual=rows @ residual_output(model.system, basis, outputs),
         load=rows @ output_load(model.system, basis, outputs),
-    )  # fmt: skip
+    )
     found = np.zeros((len(values), values.shape[-1], len(heard)), complex)
     found[..., heard] = np.swapaxes(values[:, n_meshes:], 1, 2)
     return values[:, :n_meshes], found

@@ -63,6 +63,18 @@ from femgear.report.tables import (
 )
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.solvers.stability.parametric import stability
+from femgear.stages.protocol import StageResult, one_blas_thread
+from femgear.stages.static_results import (
+    HELD,
+    LARGE,
+    SIDES,
+    UNEQUAL,
+    largest_pressure,
+    peak_to_peak,
+    pressure_doubts,
+    root_doubts,
+    shares,
+)
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
     FOURIER,
@@ -75,18 +87,6 @@ from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import checked_speeds, dynamics_warnings, housing_warnings
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 from femgear.trains.elastic.runup import KINDS, LEVEL_CHANGE, largest_factors, loudest, meeting_columns
-from femgear.trains.protocol import StageResult, one_blas_thread
-from femgear.trains.static.results import (
-    HELD,
-    LARGE,
-    SIDES,
-    UNEQUAL,
-    largest_pressure,
-    peak_to_peak,
-    pressure_doubts,
-    root_doubts,
-    shares,
-)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,8 +95,8 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
-    from femgear.housing.structure import FixedStructure
-    from femgear.housing.two_way import TwoWayResponse
+    from femgear.housing.two_way.response import TwoWayResponse
+    from femgear.housing.two_way.structure import FixedStructure
     from femgear.solvers.stability.parametric import Stability
     from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes, Response
@@ -116,9 +116,7 @@ _OF_LEVEL = "dynamics", "housing"
 _HEARD = {"microphone [dB(A)]": "pressure_level", "sound power [dB(A)]": "power_level"}
 BEARING_FACTORS = 0.5, 2.0
 """Multiples of the bearing stiffness of planets between which load sharing is shown."""
-_RING_ALONE = (
-    "of the ring alone: a casing of 2 to 3.5 times its width that moves as it does radiates 6 to 11 dB more"
-)
+_RING_ALONE = "of the ring alone: a casing of 2 to 3.5 times its width that moves as it does radiates 6 to 11 dB more"
 """Sound pressure far away grows with the length that moves, while that is short of a wavelength."""
 _NEAR, _COUNTS = 10.0, 0.05
 """Distance of a resonance from an operating speed [%], at most, and share of its level there, at least."""
@@ -222,10 +220,13 @@ class ModesResult(StageResult):
                 **factors,
             },
             attrs={
-                "title": "modal basis with mean mesh stiffnesses", "unknowns": len(model.system.M),
-                "planet_angles": model.planet_angles, "excitation_reach": self.reach,
-            } | ({"periods": state.periods} if state.periods > 1 else {}),
-        )  # fmt: skip
+                "title": "modal basis with mean mesh stiffnesses",
+                "unknowns": len(model.system.M),
+                "planet_angles": model.planet_angles,
+                "excitation_reach": self.reach,
+            }
+            | ({"periods": state.periods} if state.periods > 1 else {}),
+        )
 
 
 @dataclass(frozen=True)
@@ -336,16 +337,20 @@ class DynamicsResult(StageResult):
         return Contents(
             response_entries(self) | reach | complex_entries(entries, single=True),
             coords=coordinates(
-                speed=self.input_speed / RPM, mesh=mesh_names(self.dte.shape[1] // 2),
+                speed=self.input_speed / RPM,
+                mesh=mesh_names(self.dte.shape[1] // 2),
                 harmonic=harmonic if periods == 1 else harmonic / periods,
                 circumferential=np.arange(-n_max, n_max + 1),
             ),
-            attrs=({"periods": periods} if periods > 1 else {}) | {
-                "title": "periodic response by the spectral method", "message": response.message,
+            attrs=({"periods": periods} if periods > 1 else {})
+            | {
+                "title": "periodic response by the spectral method",
+                "message": response.message,
                 "compared_to": self.compared_to,
-                "ring_teeth": self.ring_teeth, "fourier_convention": FOURIER,
+                "ring_teeth": self.ring_teeth,
+                "fourier_convention": FOURIER,
             },
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)
@@ -396,9 +401,7 @@ class HousingResult(StageResult):
         values = exact.displacement
         if len(values) > _MANY:
             values = rounded_lines(exact, _ROUNDED)
-            rounding = (
-                f"less than {_ROUNDED:g} of the largest acceleration of a speed; smaller lines are zero"
-            )
+            rounding = f"less than {_ROUNDED:g} of the largest acceleration of a speed; smaller lines are zero"
         cylinder, frequency, sound = self.cylinder, exact.frequency, self.sound
         stored: list[Any] = [("lines", "speed order", values, "m", words)]
         if sound is not None:
@@ -430,18 +433,27 @@ class HousingResult(StageResult):
         names = {kind: (kind, one[0], "1", f"name of the {kind}") for kind, one in self.outputs.items()}
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return Contents(
-            variables | supported, coords=coordinates(speed=self.input_speed / RPM) | order | names,
+            variables | supported,
+            coords=coordinates(speed=self.input_speed / RPM) | order | names,
             attrs=({"missing_compliance": self.missing} if self.missing else {})
-            | ({"turns": exact.turns} if exact.turns > 1 else {}) | {
-                "title": "what a sensor fixed on the housing hears", "sensor_angle": exact.sensor_angle,
-                "form": self.form, "points": self.points, "method": exact.method, "ring_teeth": exact.z_ring,
-                "symmetry": self.symmetry, "rounding": rounding,
+            | ({"turns": exact.turns} if exact.turns > 1 else {})
+            | {
+                "title": "what a sensor fixed on the housing hears",
+                "sensor_angle": exact.sensor_angle,
+                "form": self.form,
+                "points": self.points,
+                "method": exact.method,
+                "ring_teeth": exact.z_ring,
+                "symmetry": self.symmetry,
+                "rounding": rounding,
                 "microphone_distance": self.microphone.distance,
                 "microphone_angle": self.microphone.angle,
-                "outer_radius": cylinder.radius, "face_width": cylinder.length,
-                "air_density": cylinder.density, "sound_speed": cylinder.sound_speed,
+                "outer_radius": cylinder.radius,
+                "face_width": cylinder.length,
+                "air_density": cylinder.density,
+                "sound_speed": cylinder.sound_speed,
             },
-        )  # fmt: skip
+        )
 
 
 def verdict(results: Results) -> Iterator[Block]:
@@ -599,9 +611,7 @@ def _safeties(
     """
     limits = {name: gear_material(case, name) for name in case.gear_names}
     of_parts = [limits[part.split(",")[0]] for part in _PARTS]
-    flims, hlims = (
-        [getattr(one, f"{kind}_stress_limit") for one in of_parts] for kind in ("root", "contact")
-    )
+    flims, hlims = ([getattr(one, f"{kind}_stress_limit") for one in of_parts] for kind in ("root", "contact"))
     safe = [
         None if limit is None else root_safety(limit, root[i], factors[i // 2], reversed_bending=i in (1, 2))
         for i, limit in enumerate(flims)
@@ -674,8 +684,7 @@ def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int
     columns = {
         "speed [rpm]": lambda i: f"{speeds[i]:.6g}",
         **{
-            f"K_v {kind}": lambda i, k=k: marked(f"{factors[shown.index(i), k]:.3f}", i)
-            for k, kind in enumerate(KINDS)
+            f"K_v {kind}": lambda i, k=k: marked(f"{factors[shown.index(i), k]:.3f}", i) for k, kind in enumerate(KINDS)
         },
         "level [m/s²]": lambda i: level(i) if housing else "-",
     }
@@ -777,11 +786,7 @@ def describe_housing(
         "excited up to [kHz]": lambda i: f"{float(data.excitation_limit[i]) / 1e3:.2f}",
         "rms [m/s^2]": lambda i: level(data.level, i),
         **({"one way [m/s^2]": one_way} if both else {}),
-        **(
-            {"microphone [dB(A)]": lambda i: marked(f"{float(data.pressure_level[i]):.1f}", i)}
-            if audible
-            else {}
-        ),
+        **({"microphone [dB(A)]": lambda i: marked(f"{float(data.pressure_level[i]):.1f}", i)} if audible else {}),
         "largest lines: carrier order (amplitude [m/s^2])": lambda i: marked(
             _largest_lines(data.isel(speed=i)), i, "W-POINTS"
         ),
@@ -945,9 +950,16 @@ def mesh_bands(results: Results) -> Block:
             published = _published(case, rpm, h)
             rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *two[:2], third, lobes, hanning, published))
     header = (
-        "speed [rpm]", "harmonic", "order", "strongest line [m/s²]", "second line [m/s²]", "third [dB]",
-        "lobes", "Hanning lobes", "published",
-    )  # fmt: skip
+        "speed [rpm]",
+        "harmonic",
+        "order",
+        "strongest line [m/s²]",
+        "second line [m/s²]",
+        "third [dB]",
+        "lobes",
+        "Hanning lobes",
+        "published",
+    )
     notes = [
         f"lobes of the envelope a carrier revolution that stand out by {threshold:.0%} of its largest value; "
         "third: level of the third line below the strongest; Hanning lobes: of the classical model, in which "
@@ -975,10 +987,12 @@ def hanning_spectrum(dynamics: xr.Dataset, housing: xr.Dataset, planet_angles, s
     ring = [str(name).endswith("ring") for name in dynamics["mesh"].values]
     force = harmonics_of(dynamics.isel(speed=speed), "mesh_force")[ring]
     lines = component_lines(
-        hanning_model(force, planet_angles), int(housing.attrs["ring_teeth"]),
-        float(housing["carrier_speed"][speed]), float(housing.attrs["sensor_angle"]),
+        hanning_model(force, planet_angles),
+        int(housing.attrs["ring_teeth"]),
+        float(housing["carrier_speed"][speed]),
+        float(housing.attrs["sensor_angle"]),
         periods=int(dynamics.attrs.get("periods", 1)),
-    )  # fmt: skip
+    )
     return OrderSpectrum(lines.order, lines.acceleration, lines.turns)
 
 

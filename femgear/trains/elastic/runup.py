@@ -29,11 +29,11 @@ from femgear.report.tables import (
     tabulate,
 )
 from femgear.solvers.linear.resonances import EXCITED
+from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import as_written, complex_entries, coordinates, declared
 from femgear.system.fourier import fluctuation, sample
 from femgear.trains.elastic.checks import missing_level
-from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -233,18 +233,22 @@ class RunupResult(StageResult):
         }
         return Contents(
             variables,
-            coords=coordinates(speed=self.input_speed / RPM) | {
+            coords=coordinates(speed=self.input_speed / RPM)
+            | {
                 "mesh_kind": ("mesh_kind", list(KINDS), "1", "kind of mesh"),
                 "order": ("order", heard.order, "1", "carrier order"),
             },
             attrs={
                 "title": "run-up: sensor, mesh forces and resonances over the speed",
-                "sensor_angle": self.sensor_angle, "method": self.method, "ring_teeth": self.ring_teeth,
+                "sensor_angle": self.sensor_angle,
+                "method": self.method,
+                "ring_teeth": self.ring_teeth,
                 "compared_to": self.compared_to,
-                "reference_acceleration": REFERENCE_ACCELERATION, "unresolved_resonances": self.unresolved,
+                "reference_acceleration": REFERENCE_ACCELERATION,
+                "unresolved_resonances": self.unresolved,
                 "operating_speeds": as_written(self.operating_speeds / RPM),
             },
-        )  # fmt: skip
+        )
 
 
 def meeting_columns(value: Mapping[str, np.ndarray]) -> dict[str, Callable[[int], str]]:
@@ -292,9 +296,7 @@ def describe_runup(data: xr.Dataset) -> Block:
         **meeting_columns(value),
         "force share": lambda i: f"{value['share'][i]:.3f}",
         "alone [m/s²]": lambda i: marks(f"{value['resonance_alone'][i]:.4g}", "W-DAMPING"),
-        "level [m/s²]": lambda i: shown_level(
-            float(value["resonance_level"][i]), float(change[i]), marks, *codes
-        ),
+        "level [m/s²]": lambda i: shown_level(float(value["resonance_level"][i]), float(change[i]), marks, *codes),
         "K_v": lambda i: marks(
             f"{value['resonance_factor'][i].max():.3f}", *doubtful_excitation(float(change[i])), *codes
         ),
@@ -303,8 +305,7 @@ def describe_runup(data: xr.Dataset) -> Block:
         f"{len(strongest)} of {data.sizes['resonance']} meetings of a mode with a mesh harmonic that excites "
         "it: those with the highest level by this mode at this harmonic alone; modes together may give less",
         f"excited: modal force of {EXCITED:g} or more of the largest of that harmonic (force share)",
-        f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; "
-        f"largest level {loudest(data, marks)}",
+        f"{len(speed)} speeds from {speed[0]:.6g} to {speed[-1]:.6g} rpm; largest level {loudest(data, marks)}",
     ]
     if data.attrs.get("method", "exact") != "exact":
         notes.append("levels and K_v in the housing that stands still; modes, and alone, on the foundation")
@@ -323,9 +324,7 @@ def runup_warnings(data: xr.Dataset) -> Iterator[Finding]:
         beyond = float(data.attrs["compared_to"])
         yield from missing_level(data["speed"].values, change, limit, beyond, of="run-up: ")
     if missed := int(data.attrs.get("unresolved_resonances", 0)):
-        text = (
-            f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels there may be higher"
-        )
+        text = f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels there may be higher"
         yield Finding("W-STEPS", "runup.count", text, remedy="take more speeds, or a narrower range")
     lowest, speed = data["lowest_force"].values, data["speed"].values
     if (pulling := lowest < -1e-3 * data["force_peak"].values.max()).any():

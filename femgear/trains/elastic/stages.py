@@ -57,6 +57,29 @@ from femgear.solvers.linear.resonances import (
 )
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics
+from femgear.stages.lumped_set import member_speeds, parts_of_speeds
+from femgear.stages.protocol import (
+    FiguresOf,
+    Progress,
+    Recorded,
+    Stage,
+    Train,
+    modes_verdict,
+    one_blas_thread,
+    response_verdict,
+    silent,
+)
+from femgear.stages.static import (
+    STATIC,
+    STRESS,
+    case_supports,
+    foundation_entries,
+    gear_entries,
+    loaded_over_width,
+    record_positions,
+    ring_foundation,
+)
+from femgear.stages.static_results import StaticResult, describe_set
 from femgear.system.mode_kinds import mode_kinds
 from femgear.system.system import Response
 from femgear.trains.elastic.checks import (
@@ -129,29 +152,6 @@ from femgear.trains.elastic.runup import (
     joined,
     mode_levels,
     resonances,
-)
-from femgear.trains.protocol import (
-    FiguresOf,
-    Progress,
-    Recorded,
-    Stage,
-    Train,
-    modes_verdict,
-    one_blas_thread,
-    response_verdict,
-    silent,
-)
-from femgear.trains.rigid import member_speeds, parts_of_speeds
-from femgear.trains.static.results import StaticResult, describe_set
-from femgear.trains.static.stages import (
-    STATIC,
-    STRESS,
-    case_supports,
-    foundation_entries,
-    gear_entries,
-    loaded_over_width,
-    record_positions,
-    ring_foundation,
 )
 
 _FEW_SPEEDS = 8
@@ -235,9 +235,7 @@ def solve_modes(
     modes = replace(modes, kind=kinds, nodal_diameter=diameters)
     symmetry = rotational_symmetry(deviations, gears)
     sharing = _sharing_over_bearings(case, gears, bodies[0], state, steps)
-    return ModesResult(
-        ring, model, excitation, modes, bodies, state, reach, symmetry, modal_entries(case), sharing
-    )
+    return ModesResult(ring, model, excitation, modes, bodies, state, reach, symmetry, modal_entries(case), sharing)
 
 
 def _sharing_over_bearings(
@@ -381,16 +379,26 @@ def dynamics_parts(
             response = replace(response, message=joint_message(told))
         last = replace(response, **{name: getattr(response, name)[-1:] for name in _LINES})
         heard = response if any(math.sin(one.direction) for one in case.housing.sensor) else last
-        yield part, DynamicsResult(
-            input_speed=speeds[own], response=response, dte=dte, ring_radial=radial,
-            speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
-            judged=Judged(basis, excitation, frequency[own], decisive),
-            ring_tangential=mesh_and_ring_outputs(modes, heard, TANGENTIAL)[1],
-            ring_teeth=gears.ring.teeth, symmetry=modes.symmetry, harmonics=int(limit.response.max()),
-            excitation_limit=limit.frequency[own], level_change=level_change[own], compared_to=beyond,
-            entries=dynamic_entries(part),
-            fixed=_fixed_part(case, modes, carrier, limit, own) if case.housing.stands_still else None,
-        )  # fmt: skip
+        yield (
+            part,
+            DynamicsResult(
+                input_speed=speeds[own],
+                response=response,
+                dte=dte,
+                ring_radial=radial,
+                speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
+                judged=Judged(basis, excitation, frequency[own], decisive),
+                ring_tangential=mesh_and_ring_outputs(modes, heard, TANGENTIAL)[1],
+                ring_teeth=gears.ring.teeth,
+                symmetry=modes.symmetry,
+                harmonics=int(limit.response.max()),
+                excitation_limit=limit.frequency[own],
+                level_change=level_change[own],
+                compared_to=beyond,
+                entries=dynamic_entries(part),
+                fixed=_fixed_part(case, modes, carrier, limit, own) if case.housing.stands_still else None,
+            ),
+        )
         progress("dynamics", float(own[-1] + 1), float(len(speeds)))
 
 
@@ -446,9 +454,7 @@ def _solved_before(case: Case, modes: ModesResult, limit: FrequencyLimit, memory
     return not (case.housing.stands_still or _known_ends(case, modes)) and few and room <= memory
 
 
-def _excitation_end(
-    case: Case, modes: ModesResult, level: np.ndarray | None = None
-) -> tuple[float, float, np.ndarray]:
+def _excitation_end(case: Case, modes: ModesResult, level: np.ndarray | None = None) -> tuple[float, float, np.ndarray]:
     """Choose where the excitation ends by the operating speeds, for run-up and dynamics alike.
 
     With the ``level`` (n,) at those that are compared where it is known.
@@ -492,10 +498,14 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     found = HousingResult(
         input_speed=np.array(case.operation.speeds),
         exact=component_lines(dynamics.ring_radial, *place, **known),
-        form=case.housing.form, points=case.housing.points, harmonics=dynamics.harmonics,
-        symmetry=dynamics.symmetry, excitation_limit=dynamics.excitation_limit,
-        cylinder=Cylinder(case.ring.outer_radius, width), microphone=Microphone(heard.distance, angle),
-    )  # fmt: skip
+        form=case.housing.form,
+        points=case.housing.points,
+        harmonics=dynamics.harmonics,
+        symmetry=dynamics.symmetry,
+        excitation_limit=dynamics.excitation_limit,
+        cylinder=Cylinder(case.ring.outer_radius, width),
+        microphone=Microphone(heard.distance, angle),
+    )
     if case.housing.sensor:
         found = replace(found, outputs={"sensor": named_sensors(case, dynamics)})
     if (periods := dynamics.response.periods) > 1:
@@ -652,11 +662,12 @@ def _warnings(case: Case) -> Iterator[Finding]:
     size = numbers * (2 * meshes + (2 * max_nodal_diameter(case) + 1) / symmetry)
     if size > _NOTICED:
         yield Finding(
-            "W-SIZE", "operation.speeds",
+            "W-SIZE",
+            "operation.speeds",
             f"{len(speeds)} speeds with up to {most} harmonics each fill about {size / 1e9:.2g} GB and "
             f"take about {max(kept.sum() * _SECONDS / 60.0, 1.0):.0f} min of one core",
             remedy="fewer speeds, or a lower dynamics.up_to, if that is too much",
-        )  # fmt: skip
+        )
     if case.housing.stands_still:
         from femgear.trains.elastic.fixed_housing import turning_errors_time
 
@@ -674,13 +685,19 @@ _FORMATS = {"wav": ("housing",), "uff": ("housing", "modes"), "quality": ("housi
 
 
 ELASTIC = Train(
-    name="elastic", words="a case with an elastic ring",
+    name="elastic",
+    words="a case with an elastic ring",
     stages=(
         STATIC,
         STRESS,
         Stage(
-            name="modes", title="Modes", solve=solve_modes, takes=("static",), options=("progress", "steps"),
-            decided_by=_basis_entries, verdict=modes_verdict,
+            name="modes",
+            title="Modes",
+            solve=solve_modes,
+            takes=("static",),
+            options=("progress", "steps"),
+            decided_by=_basis_entries,
+            verdict=modes_verdict,
             describe=lambda results: describe_modes(results.modes),
             needs=lambda case: ("static", "stress") if case.static.stresses else ("static",),
             check=lambda case: check_dynamic_case(case, planetary_set(case)),
@@ -699,24 +716,36 @@ ELASTIC = Train(
             unavailable=no_runup,
         ),
         Stage(
-            name="dynamics", title="Dynamics", solve=solve_dynamics, parts=dynamics_parts,
-            takes=("static", "modes"), options=("progress",), decided_by=response_entries,
-            verdict=response_verdict, describe=lambda results: describe_response(results.dynamics),
-            warnings=DynamicsResult.warnings, concerned_by={"": ("W-DAMPING",)},
+            name="dynamics",
+            title="Dynamics",
+            solve=solve_dynamics,
+            parts=dynamics_parts,
+            takes=("static", "modes"),
+            options=("progress",),
+            decided_by=response_entries,
+            verdict=response_verdict,
+            describe=lambda results: describe_response(results.dynamics),
+            warnings=DynamicsResult.warnings,
+            concerned_by={"": ("W-DAMPING",)},
         ),
         Stage(
-            name="housing", title="Housing", solve=solve_housing, takes=("dynamics",),
-            decided_by=heard_entries, verdict=lambda result: {"form": result.form},
+            name="housing",
+            title="Housing",
+            solve=solve_housing,
+            takes=("dynamics",),
+            decided_by=heard_entries,
+            verdict=lambda result: {"form": result.form},
             describe=lambda results: describe_housing(
                 results.housing, level_changes(results), results.findings, level_doubts(results)
             ),
-            tables=lambda results: (mesh_bands(results),), warnings=HousingResult.warnings,
+            tables=lambda results: (mesh_bands(results),),
+            warnings=HousingResult.warnings,
             concerned_by={"": ("W-DAMPING", "W-POINTS"), "dynamics": ("W-EXCITATION", *RESPONSE_DOUBTS)},
         ),
     ),
-    describe=describe_set, warnings=_warnings, verdict=verdict,
+    describe=describe_set,
+    warnings=_warnings,
+    verdict=verdict,
     figures=FiguresOf("femgear.trains.elastic.figures:FIGURES"),
-    recorded=Recorded(
-        sensor_signals, signal_extent, _FORMATS, 2, sensor_spectra, ring_shapes, order_cuts
-    ),
-)  # fmt: skip
+    recorded=Recorded(sensor_signals, signal_extent, _FORMATS, 2, sensor_spectra, ring_shapes, order_cuts),
+)

@@ -40,10 +40,10 @@ from femgear.report.style import (
     rpm,
     xy,
 )
+from femgear.stages.protocol import Drawn, Figures
+from femgear.stages.static_figures import FIGURES as STATIC
 from femgear.system.fourier import fluctuation
 from femgear.system.rigid_bodies import CENTRAL, gear_geometry
-from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.figures import FIGURES as STATIC
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -165,9 +165,7 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
         names = " and ".join(str(mode + 1) for mode in pair)
         words = f"mode{'s' * (len(pair) > 1)} {names}: {float(f'{frequency[first]:.4g}'):g} Hz"
         front.set_title(f"{words}\n{kind}\n{phasing}", fontsize=SIZE - 1)
-        side.set_title(
-            f"axial motion, tilt: {rounded(100.0 * across / inside)} % of the above", fontsize=SIZE - 2
-        )
+        side.set_title(f"axial motion, tilt: {rounded(100.0 * across / inside)} % of the above", fontsize=SIZE - 2)
     legend_below(figure, columns=5)
     return figure
 
@@ -293,10 +291,16 @@ def _mark(ax, modes: xr.Dataset, top: float) -> None:
         here = found[(phasing == name) & (found > 0.0) & (found <= top)]
         if len(here):
             ax.plot(
-                1e-3 * here, np.full(len(here), 0.03), _MARKS.get(name, "^"), color=BLACK, markersize=5,
-                markerfacecolor="none", label=f"modes {name}", linestyle="none",
+                1e-3 * here,
+                np.full(len(here), 0.03),
+                _MARKS.get(name, "^"),
+                color=BLACK,
+                markersize=5,
+                markerfacecolor="none",
+                label=f"modes {name}",
+                linestyle="none",
                 transform=ax.get_xaxis_transform(),
-            )  # fmt: skip
+            )
 
 
 def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 4)) -> Figure:
@@ -334,11 +338,7 @@ def phase_diagram(phasing: MeshPhasing, *, harmonics: Sequence[int] = (1, 2, 3, 
 def _what_is_left(table: PhasingTable, row: int) -> str:
     """Tell what is left of the mesh forces on sun and ring."""
     torque, lateral = table.members[row, :2, :2].max(axis=0)
-    left = [
-        f"{name} {100 * size:.0f} %"
-        for name, size in (("torque", torque), ("lateral", lateral))
-        if size > 1e-9
-    ]
+    left = [f"{name} {100 * size:.0f} %" for name, size in (("torque", torque), ("lateral", lateral)) if size > 1e-9]
     return "\n".join(left) or "nothing on\nsun and ring"
 
 

@@ -4,7 +4,7 @@ Carrier, ring, sun and N planets have three translations and three rotations eac
 Kahraman, Planetary Gear Train Dynamics, J. Mech. Des. 116, 1994, 713-720: rigid bodies, gear meshes as
 springs along the tooth normals, supports and planet pins in all directions, without terms of the carrier's
 speed. The matrices are those of `femgear.system.mesh_directions.gear_set_system`; with the meshes as
-elements, `femgear.trains.rigid.gear_set_problem`, they have a stiffness that changes, play and contact loss.
+elements, `femgear.stages.lumped_set.gear_set_problem`, they have a stiffness that changes, play and contact loss.
 
 The mesh stiffness follows from that of spur teeth. Teeth are solved as spur gears of the transverse section;
 those of the normal section, the virtual gears, tell by how much their stiffness differs. A helical gear is
@@ -36,6 +36,8 @@ from femgear.gears.iso6336 import material_factor
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import virtual_set
 from femgear.solvers.linear.modal import solve_modes
+from femgear.stages.lumped_set import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
+from femgear.stages.protocol import one_blas_thread
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import (
     ContactLines,
@@ -48,8 +50,6 @@ from femgear.system.rigid_bodies import (
 )
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.section import HelicalCase
-from femgear.trains.protocol import one_blas_thread
-from femgear.trains.rigid import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -111,11 +111,13 @@ class HelicalSet(RigidSet):
         worst = max(self.closure, key=abs)
         if abs(worst) > _CLOSURE:
             raise CaseError(
-                f"centre distance of {self.centre_distance} m", code="E-RANGE", key="centre_distance",
+                f"centre distance of {self.centre_distance} m",
+                code="E-RANGE",
+                key="centre_distance",
                 value=self.centre_distance,
                 limit=f"(r_s + r_p) / cos alpha_sp and (r_r - r_p) / cos alpha_pr, within {_CLOSURE:.0%}",
                 remedy=f"radii, centre distance and pressure angles miss each other by {abs(worst):.3g}",
-            )  # fmt: skip
+            )
 
     @property
     def column_stiffness(self) -> np.ndarray:
@@ -185,9 +187,7 @@ def contact_ratios(planetary_set: PlanetarySet, *, helix_angle: float) -> np.nda
     return np.array([[s.contact_ratio_sun_planet, s.contact_ratio_planet_ring], overlap]).T
 
 
-def helical_excitation(
-    record: MeshExcitation, overlap_ratio, *, slices: int = 1, hand: int = 1
-) -> MeshExcitation:
+def helical_excitation(record: MeshExcitation, overlap_ratio, *, slices: int = 1, hand: int = 1) -> MeshExcitation:
     """Make the record of helical meshes, or of their slices, from that of spur meshes of the same period.
 
     Height z above mid-face runs ahead of it by ``eps_beta z / b`` mesh periods, so that
@@ -231,9 +231,10 @@ def helical_excitation(
     stiffness, force, weighted = (values.reshape(-1, values.shape[-1]) for values in filtered)
     if np.any(stiffness <= 0.0):
         raise CaseError(
-            "the spur record has positions without stiffness for a whole slice", code="E-STIFFNESS",
+            "the spur record has positions without stiffness for a whole slice",
+            code="E-STIFFNESS",
             remedy="give a record whose meshes stay closed",
-        )  # fmt: skip
+        )
     return MeshExcitation(
         stiffness=stiffness,
         deflection=weighted / stiffness,
@@ -299,9 +300,7 @@ class SectionStiffness:
 
 
 @one_blas_thread()
-def section_stiffness(
-    case: HelicalCase, gears: PlanetarySet, *, cache: Path | None = None
-) -> SectionStiffness:
+def section_stiffness(case: HelicalCase, gears: PlanetarySet, *, cache: Path | None = None) -> SectionStiffness:
     """Compute the stiffness of the teeth of both sections, from one planet each under equal load a length.
 
     The mean stiffness of a mesh over its contact ratio: c' of ISO 6336-1. Flanks are exact, grids coarse. The
@@ -324,11 +323,14 @@ def _virtual_gears(case: HelicalCase, gears: PlanetarySet) -> PlanetarySet:
         return virtual_set(gears, case.helical.helix_angle)
     except GeometryError as error:
         raise CaseError(
-            f"the virtual gears of the normal section cannot be made: {error.message}", code="E-GEOMETRY",
-            key="helical.section", value=case.helical.section, limit='"transverse" for these teeth',
+            f"the virtual gears of the normal section cannot be made: {error.message}",
+            code="E-GEOMETRY",
+            key="helical.section",
+            value=case.helical.section,
+            limit='"transverse" for these teeth',
             remedy='write section = "transverse": teeth then are those of the transverse section, too stiff',
             file=case.location("helical.section"),
-        ) from None  # fmt: skip
+        ) from None
 
 
 def normal_record(
@@ -375,9 +377,7 @@ def shared_load(record: MeshExcitation) -> MeshExcitation:
     closing = (total + (gap / compliance).sum(axis=0)) / (1.0 / compliance).sum(axis=0)
     force = (closing - gap) / compliance
     deflection = intercept + force / k
-    return replace(
-        record, force=np.concatenate([force, force]), deflection=deflection.reshape(record.deflection.shape)
-    )
+    return replace(record, force=np.concatenate([force, force]), deflection=deflection.reshape(record.deflection.shape))
 
 
 def _line_load(case: HelicalCase, gears: PlanetarySet) -> float:
@@ -428,12 +428,14 @@ def _check_torque(case: HelicalCase, gears: PlanetarySet) -> None:
     share = _line_load(case, gears) / (stiffness * gears.sun.module)
     if share > _MOST:
         raise CaseError(
-            f"a tooth pair would give way by {share:.3g} modules under this torque", code="E-RANGE",
-            key="operation.torque", value=f"{case.operation.torque:.6g} N m",
+            f"a tooth pair would give way by {share:.3g} modules under this torque",
+            code="E-RANGE",
+            key="operation.torque",
+            value=f"{case.operation.torque:.6g} N m",
             limit=f"{abs(case.operation.torque) * _MOST / share:.3g} N m, by {_MOST} modules, for this set",
             remedy="check the unit of the torque, or give the teeth a wider face or a larger module",
             file=case.location("operation.torque"),
-        )  # fmt: skip
+        )
 
 
 def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
@@ -479,12 +481,14 @@ def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
     names = [f"helical.{body}.{entry}" for body, entry in cures]
     lost = " or the ".join(dict.fromkeys(_AXES[entry][1] for _, entry in cures)) or "torque"
     raise CaseError(
-        f"nothing takes up the {lost} of the helical teeth", code="E-MECHANISM",
-        key=names[0] if names else "helical", value="0" if names else None,
+        f"nothing takes up the {lost} of the helical teeth",
+        code="E-MECHANISM",
+        key=names[0] if names else "helical",
+        value="0" if names else None,
         limit=f"above 0: {' or '.join(names)}" if names else "supports of sun, ring and carrier above 0",
         remedy="give axial_stiffness, tilt_stiffness and support_stiffness",
         file=case.location(names[0] if names else "helical"),
-    )  # fmt: skip
+    )
 
 
 def _supported(data: HelicalSet, body: str, entry: str) -> HelicalSet:

@@ -15,14 +15,14 @@ import numpy as np
 from femgear.case.quantities import RPM
 from femgear.gears.planetary import virtual_teeth
 from femgear.report.tables import Block, response_warnings
+from femgear.stages.lumped_set import modes_dataset, stiffness_text, torsion_text
+from femgear.stages.protocol import StageResult
+from femgear.stages.static_results import mean_over_period, peak_to_peak
 from femgear.storage.contents import Contents
 from femgear.storage.results import FOURIER, complex_entries, coordinates, response_entries
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness
-from femgear.trains.protocol import StageResult
-from femgear.trains.rigid import modes_dataset, stiffness_text, torsion_text
-from femgear.trains.static.results import mean_over_period, peak_to_peak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,8 +35,12 @@ if TYPE_CHECKING:
     from femgear.trains.helical.section import HelicalCase
 
 _BODIES = (
-    "", "mass [kg]", "polar, diametral inertia [kg m^2]", "radial, axial [N/m]", "tilt, torsional [N m/rad]",
-)  # fmt: skip
+    "",
+    "mass [kg]",
+    "polar, diametral inertia [kg m^2]",
+    "radial, axial [N/m]",
+    "tilt, torsional [N m/rad]",
+)
 
 
 @dataclass(frozen=True)
@@ -73,11 +77,19 @@ class HelicalModesResult(StageResult):
         along, where = np.cos(self.data.base_helix_angle), ("mesh", "position")
         position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
         curves = {
-            "helical_stiffness": (where, whole.stiffness * along**2, "N/m",
-                                  "mesh stiffness along the transverse line of action"),
-            "helical_ste": (where, whole.deflection / along, "m",
-                            "static transmission error along the transverse line of action, centres fixed"),
-        }  # fmt: skip
+            "helical_stiffness": (
+                where,
+                whole.stiffness * along**2,
+                "N/m",
+                "mesh stiffness along the transverse line of action",
+            ),
+            "helical_ste": (
+                where,
+                whole.deflection / along,
+                "m",
+                "static transmission error along the transverse line of action, centres fixed",
+            ),
+        }
         return found.merge(Contents(curves, coords=coordinates(position=position), attrs={}))
 
 
@@ -127,18 +139,33 @@ class HelicalDynamicsResult(StageResult):
         on_planet = ("speed", "planet", "direction", "harmonic")
         on_member = ("speed", "member", "axis", "harmonic")
         entries = (
-            ("dte", lines, deflection.mean(axis=2) / along, "m",
-             "dynamic transmission error along the transverse line of action at mid-face"),
+            (
+                "dte",
+                lines,
+                deflection.mean(axis=2) / along,
+                "m",
+                "dynamic transmission error along the transverse line of action at mid-face",
+            ),
             ("mesh_force", lines, force.sum(axis=2), "N", "dynamic mesh force along the tooth normals"),
-            ("mesh_deflection", lines, deflection.mean(axis=2), "m",
-             "deflection of the mesh spring along the tooth normals at mid-face"),
-            ("slice_force", ("speed", "mesh", "slice", "harmonic"), force, "N",
-             "dynamic force of a slice along the tooth normals"),
+            (
+                "mesh_deflection",
+                lines,
+                deflection.mean(axis=2),
+                "m",
+                "deflection of the mesh spring along the tooth normals at mid-face",
+            ),
+            (
+                "slice_force",
+                ("speed", "mesh", "slice", "harmonic"),
+                force,
+                "N",
+                "dynamic force of a slice along the tooth normals",
+            ),
             ("pin_force", on_planet, pin[:, :, :3], "N", "force of the pin on the planet"),
             ("pin_moment", on_planet, pin[:, :, 3:], "N m", "moment of the pin on the planet"),
             ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
             ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
-        )  # fmt: skip
+        )
         return Contents(
             response_entries(self) | complex_entries(entries),
             coords=_coordinates(self),

@@ -20,7 +20,7 @@ from femgear.case.sections import (
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError
 from femgear.findings import Finding
-from femgear.trains.rigid import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
+from femgear.stages.lumped_set import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
 
 _MOST_SLICES = 30
 # measured with 8 meshes of 10 to 30 slices: the time of one speed grows with the cube of the columns
@@ -143,20 +143,29 @@ def check_helical(case: HelicalCase) -> Iterator[CaseError]:
     helical = case.helical
     if helical.helix_angle == 0.0:
         yield CaseError(
-            "without a helix the teeth are spur teeth", code="E-RANGE", key="helical.helix_angle",
-            value="0 deg", limit=f"above 0 deg up to {ANGLE.show(LARGEST_HELIX)}",
+            "without a helix the teeth are spur teeth",
+            code="E-RANGE",
+            key="helical.helix_angle",
+            value="0 deg",
+            limit=f"above 0 deg up to {ANGLE.show(LARGEST_HELIX)}",
             remedy="leave the section helical out",
-        )  # fmt: skip
+        )
     if case.set.helix_angle:
         yield CaseError(
-            "the section helical has the helix angle", code="E-RANGE", key="set.helix_angle",
-            value=ANGLE.show(case.set.helix_angle), remedy="leave set.helix_angle out",
-        )  # fmt: skip
+            "the section helical has the helix angle",
+            code="E-RANGE",
+            key="set.helix_angle",
+            value=ANGLE.show(case.set.helix_angle),
+            remedy="leave set.helix_angle out",
+        )
     if case.static.slices > 1 and helical.slices > 1:
         yield CaseError(
-            "the contact over the width gives the stiffness of whole meshes", code="E-SLICES",
-            key="helical.slices", value=helical.slices, remedy="leave helical.slices or static.slices out",
-        )  # fmt: skip
+            "the contact over the width gives the stiffness of whole meshes",
+            code="E-SLICES",
+            key="helical.slices",
+            value=helical.slices,
+            remedy="leave helical.slices or static.slices out",
+        )
     yield from rigid_refusals(case, "helical", without_torque=", so there is no mesh stiffness")
     fixed = case.operation.fixed
     if getattr(helical, fixed).torsional_stiffness == 0.0:
@@ -167,6 +176,4 @@ def check_helical(case: HelicalCase) -> Iterator[CaseError]:
         )
 
 
-FILE = CaseFile(
-    HelicalCase, check_helical, lambda tables, case: helical_notices(tables, case.helical.helix_angle)
-)
+FILE = CaseFile(HelicalCase, check_helical, lambda tables, case: helical_notices(tables, case.helical.helix_angle))

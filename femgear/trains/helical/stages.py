@@ -20,6 +20,26 @@ from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
+from femgear.stages.lumped_set import (
+    driving_torque,
+    gear_set_modes,
+    member_speeds,
+    needed,
+    parts_of_speeds,
+    rotation_sense,
+)
+from femgear.stages.protocol import (
+    FiguresOf,
+    Progress,
+    Stage,
+    Train,
+    modes_verdict,
+    one_blas_thread,
+    response_verdict,
+    silent,
+)
+from femgear.stages.static import STATIC, STRESS, mesh_backlash, solve_static, solve_stress
+from femgear.stages.static_results import StaticResult, StressResult, describe_set, set_warnings
 from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
@@ -41,26 +61,6 @@ from femgear.trains.helical.results import (
     describe_helical_static,
 )
 from femgear.trains.helical.section import HelicalCase
-from femgear.trains.protocol import (
-    FiguresOf,
-    Progress,
-    Stage,
-    Train,
-    modes_verdict,
-    one_blas_thread,
-    response_verdict,
-    silent,
-)
-from femgear.trains.rigid import (
-    driving_torque,
-    gear_set_modes,
-    member_speeds,
-    needed,
-    parts_of_speeds,
-    rotation_sense,
-)
-from femgear.trains.static.results import StaticResult, StressResult, describe_set, set_warnings
-from femgear.trains.static.stages import STATIC, STRESS, mesh_backlash, solve_static, solve_stress
 
 if TYPE_CHECKING:
     from femgear.storage.results import Results
@@ -83,9 +83,7 @@ def solve_helical_static(
     return solve_static(_drive_flanks(case), cache=cache, progress=progress, steps=steps)
 
 
-def solve_helical_stress(
-    case: HelicalCase, static: StaticResult, *, progress: Progress = silent
-) -> StressResult:
+def solve_helical_stress(case: HelicalCase, static: StaticResult, *, progress: Progress = silent) -> StressResult:
     """Find the stresses of the teeth whose contact was solved in slices over the width."""
     return solve_stress(_drive_flanks(case), static, progress=progress)
 
@@ -142,9 +140,7 @@ def solve_helical_modes(
     torque = driving_torque(case)
     system, flank = gear_set_system(data, torque=torque), flank_sign(data, torque)
     stiffness = data.column_stiffness if excitation is None else excitation.stiffness.mean(axis=1)
-    modes = gear_set_modes(
-        data, system=system, mesh_stiffness=stiffness, damping_ratio=case.dynamics.damping_ratio
-    )
+    modes = gear_set_modes(data, system=system, mesh_stiffness=stiffness, damping_ratio=case.dynamics.damping_ratio)
     phases = phasing(gear_set_motions(data, modes.shape))
     return HelicalModesResult(gears, data, system, modes, phases, flank, section, excitation, whole)
 
@@ -183,9 +179,7 @@ def helical_dynamics_parts(
             response_harmonics=case.response_harmonics,
             tolerance=case.dynamics.tolerance,
         )
-        verdict = floquet_verdict(
-            modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics
-        )
+        verdict = floquet_verdict(modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics)
         told.append(response.without_lines())
         loads = _loads(modes, response)
         response = replace(response, message=joint_message(told))
@@ -244,9 +238,7 @@ HELICAL = Train(
                 results.static,
                 results.modes if "modes" in results.stages else None,
             ),
-            unavailable=lambda case: (
-                _NO_TEETH if _given(case) else ""
-            ),
+            unavailable=lambda case: _NO_TEETH if _given(case) else "",
         ),
         replace(
             STRESS,
@@ -274,9 +266,7 @@ HELICAL = Train(
             options=("progress",),
             verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
-            unavailable=lambda case: (
-                _NOTHING_EXCITES if _given(case) else ""
-            ),
+            unavailable=lambda case: _NOTHING_EXCITES if _given(case) else "",
             warnings=HelicalDynamicsResult.warnings,
         ),
     ),
@@ -284,4 +274,4 @@ HELICAL = Train(
     warnings=set_warnings,
     figures=FiguresOf("femgear.trains.helical.figures:FIGURES"),
     remarks=_remarks,
-)  # fmt: skip
+)

@@ -64,9 +64,12 @@ _MEMBER = re.compile(r"stage ([1-9]\d?) (carrier|ring|sun)")
 
 # entries of the file for those that refusals of gears and of lumped sets name
 _ENTRIES = {
-    "profile_shift": "gears.profile_shifts", "centre_distance": "gears.profile_shifts",
-    "teeth": "gears.teeth", "root_radius": "gears.addendum", "tip_diameter": "gears.addendum",
-}  # fmt: skip
+    "profile_shift": "gears.profile_shifts",
+    "centre_distance": "gears.profile_shifts",
+    "teeth": "gears.teeth",
+    "root_radius": "gears.addendum",
+    "tip_diameter": "gears.addendum",
+}
 _REMEDIES = {
     "E-COAXIAL": "choose teeth with sun + 2 planet = ring, or profile shifts that close the set",
 }
@@ -216,31 +219,42 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
             yield CaseError("the sizes of the gears are needed once", code="E-CHOICE", key=key, limit=limit)
         if case.operation is not None and stage.radii is not None and stage.radii.teeth is None:
             yield CaseError(
-                f"no tooth numbers in stage {n + 1}", code="E-TEETH", key=f"stage[{n}].radii.teeth",
-                limit="given where there is an operation", remedy="give the teeth of sun, planet and ring",
-            )  # fmt: skip
+                f"no tooth numbers in stage {n + 1}",
+                code="E-TEETH",
+                key=f"stage[{n}].radii.teeth",
+                limit="given where there is an operation",
+                remedy="give the teeth of sun, planet and ring",
+            )
     named = [(f"coupling[{n}].between", one) for n, c in enumerate(case.coupling) for one in c.between]
     if case.operation is not None:
         named += [(f"operation.{key}", getattr(case.operation, key)) for key in ("input", "output")]
     for key, member in named:
         if member is not None and _member_of(member).stage > len(case.stage):
             yield CaseError(
-                "there is no such stage", code="E-RANGE", key=key, value=member,
+                "there is no such stage",
+                code="E-RANGE",
+                key=key,
+                value=member,
                 limit=f"stage 1 to stage {len(case.stage)}",
-            )  # fmt: skip
+            )
     for n, one in enumerate(case.coupling):
         sizes = len(one.given("diameter", "length"))
         if sizes == 1 or (not sizes and one.torsional is None):
             yield CaseError(
-                "the shaft has neither a torsional stiffness nor a whole section", code="E-CHOICE",
-                key=f"coupling[{n}].between", limit="torsional, or diameter and length",
-            )  # fmt: skip
+                "the shaft has neither a torsional stiffness nor a whole section",
+                code="E-CHOICE",
+                key=f"coupling[{n}].between",
+                limit="torsional, or diameter and length",
+            )
     response = case.response
     if response is not None and not response.lowest < response.highest:
         yield CaseError(
-            "the speeds do not ascend", code="E-RANGE", key="response.highest",
-            value=SPEED.show(response.highest), limit=f"above {SPEED.show(response.lowest)}",
-        )  # fmt: skip
+            "the speeds do not ascend",
+            code="E-RANGE",
+            key="response.highest",
+            value=SPEED.show(response.highest),
+            limit=f"above {SPEED.show(response.lowest)}",
+        )
 
 
 def multistage_of(case: MultistageCase) -> MultistageSet:
@@ -267,9 +281,13 @@ def _named(make, key: str, section):
         entry = _entry(error.key or "")
         remedy, value = _REMEDIES.get(error.code, error.remedy), error.value
         raise CaseError(
-            error.message, code=error.code, key=f"{key}.{entry}" if entry else key,
-            value=None if error.code in _REMEDIES else value, limit=error.limit, remedy=remedy,
-        ) from None  # fmt: skip
+            error.message,
+            code=error.code,
+            key=f"{key}.{entry}" if entry else key,
+            value=None if error.code in _REMEDIES else value,
+            limit=error.limit,
+            remedy=remedy,
+        ) from None
 
 
 def _member_of(text: str) -> Member:
@@ -302,13 +320,21 @@ def stage_gears(stage: StageSection) -> PlanetarySet:
     rims = (0.3 * sun, 0.5 * planet, ring + 4.0 * given.module)
     gears = [
         Gear(
-            z, given.module, given.pressure_angle, shift, given.face_width, rim, internal=name == "ring",
-            rack=BasicRack(addendum=addendum), name=name, tip_open=True,
+            z,
+            given.module,
+            given.pressure_angle,
+            shift,
+            given.face_width,
+            rim,
+            internal=name == "ring",
+            rack=BasicRack(addendum=addendum),
+            name=name,
+            tip_open=True,
         )
         for name, z, shift, rim, addendum in zip(
             ("sun", "planet", "ring"), given.teeth, given.profile_shifts, rims, given.addendum
         )
-    ]  # fmt: skip
+    ]
     closed = settled_tips(close_set(*gears, planet_angles=stage.angles))
     check_set(closed)
     return closed
@@ -333,8 +359,7 @@ def _entry(key: str) -> str:
 def _stage(stage: StageSection) -> PlanetaryStage:
     members = (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
     lumped: dict[str, Any] = {
-        name: PlanarBody(one.mass, one.inertia, one.support_stiffness, one.torsional_stiffness)
-        for name, one in members
+        name: PlanarBody(one.mass, one.inertia, one.support_stiffness, one.torsional_stiffness) for name, one in members
     }
     lumped["planet"] = PlanarBody(stage.planet.mass, stage.planet.inertia)
     lumped["planet_bearing"] = stage.planet.bearing_stiffness
@@ -346,15 +371,18 @@ def _stage(stage: StageSection) -> PlanetaryStage:
     if isinstance(size, GearsSection):
         gears = stage_gears(stage)
         data = planar_from_set(gears, **_iso_stiffness(gears) | lumped)
-        return PlanetaryStage(
-            data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle
-        )
+        return PlanetaryStage(data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle)
     alpha = size.pressure_angle
     data = PlanarSet(
-        **lumped, sun_radius=size.sun, planet_radius=size.planet, ring_radius=size.sun + 2.0 * size.planet,
-        centre_distance=(size.sun + size.planet) / math.cos(alpha), planet_angles=stage.angles,
-        pressure_angle_sun_planet=alpha, pressure_angle_planet_ring=alpha,
-    )  # fmt: skip
+        **lumped,
+        sun_radius=size.sun,
+        planet_radius=size.planet,
+        ring_radius=size.sun + 2.0 * size.planet,
+        centre_distance=(size.sun + size.planet) / math.cos(alpha),
+        planet_angles=stage.angles,
+        pressure_angle_sun_planet=alpha,
+        pressure_angle_planet_ring=alpha,
+    )
     return PlanetaryStage(data=data, teeth=size.teeth, fixed=fixed, angle=stage.angle)
 
 
@@ -362,8 +390,7 @@ def _iso_stiffness(gears: PlanetarySet) -> dict[str, float]:
     """Mean stiffness of both meshes after ISO 6336-1, method B, with C_B of the stage's own rack [N/m]."""
     names = "stiffness_sun_planet", "stiffness_planet_ring"
     return {
-        name: gears.sun.face_width * pair_mesh_stiffness(pair)[1]
-        for name, pair in zip(names, gears.kinds, strict=True)
+        name: gears.sun.face_width * pair_mesh_stiffness(pair)[1] for name, pair in zip(names, gears.kinds, strict=True)
     }
 
 

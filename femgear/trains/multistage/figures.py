@@ -8,7 +8,7 @@ import numpy as np
 
 from femgear.report.response import harmonics_of
 from femgear.report.style import BLACK, COLOURS, SIZE, label, legend_below, line_style, new_figure, rpm
-from femgear.trains.protocol import Drawn, Figures
+from femgear.stages.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -81,9 +81,13 @@ def mesh_orders(modes: xr.Dataset, response: xr.Dataset) -> Figure:
                     label="peak of the force",
                 )
                 ax.annotate(
-                    f"{hertz[mode]:.0f}", (speed[at], h * line[at]), xytext=(-5, 4), ha="right",
-                    textcoords="offset points", fontsize=SIZE - 2,
-                )  # fmt: skip
+                    f"{hertz[mode]:.0f}",
+                    (speed[at], h * line[at]),
+                    xytext=(-5, 4),
+                    ha="right",
+                    textcoords="offset points",
+                    fontsize=SIZE - 2,
+                )
     ax.set_xlim(speed.min(), speed.max())
     ax.set_ylim(0.0, 1.02 * top)
     words = f"{' and '.join(below)}: all harmonics below the first mode, {lowest:.4g} Hz" if below else ""

@@ -92,9 +92,11 @@ class PlanetaryStage:
     def __post_init__(self):
         if self.fixed is not None and not getattr(self.data, self.fixed).torsional_support > 0.0:
             raise CaseError(
-                f"the {self.fixed} is fixed but has no torsional support", code="E-MECHANISM",
-                key=f"{self.fixed}.torsional_support", limit="above 0, or infinite",
-            )  # fmt: skip
+                f"the {self.fixed} is fixed but has no torsional support",
+                code="E-MECHANISM",
+                key=f"{self.fixed}.torsional_support",
+                limit="above 0, or infinite",
+            )
         if self.teeth is None:
             return
         data, (sun, planet, ring) = self.data, self.teeth
@@ -104,9 +106,12 @@ class PlanetaryStage:
         ):
             if abs(radii / ratio - 1.0) > _RADII:
                 raise CaseError(
-                    f"{name} and sun have {ratio:.6g} as ratio of teeth and {radii:.6g} as ratio of base "
-                    "radii", code="E-TEETH", key="teeth", value=self.teeth, limit="the same to 0.1 %",
-                )  # fmt: skip
+                    f"{name} and sun have {ratio:.6g} as ratio of teeth and {radii:.6g} as ratio of base radii",
+                    code="E-TEETH",
+                    key="teeth",
+                    value=self.teeth,
+                    limit="the same to 0.1 %",
+                )
 
 
 @dataclass(frozen=True)
@@ -162,9 +167,10 @@ class MultistageSet:
         for member in (self.input, self.output):
             if self.input == self.output or self.stages[member.stage - 1].fixed == member.name:
                 raise CaseError(
-                    f"input {self.input} and output {self.output}", code="E-MECHANISM",
+                    f"input {self.input} and output {self.output}",
+                    code="E-MECHANISM",
                     limit="two members that turn",
-                )  # fmt: skip
+                )
 
     @property
     def n_meshes(self) -> int:
@@ -172,16 +178,13 @@ class MultistageSet:
         return sum(2 * stage.data.n_planets for stage in self.stages)
 
 
-def in_series(
-    stages: Sequence[PlanetaryStage], *, torsional: float = math.inf, lateral: float = 0.0
-) -> MultistageSet:
+def in_series(stages: Sequence[PlanetaryStage], *, torsional: float = math.inf, lateral: float = 0.0) -> MultistageSet:
     """Join stages one after the other: each carrier turns the next sun.
 
     All couplings have the same torsional [N m/rad] and lateral [N/m] stiffness, see `StageCoupling`.
     """
     couplings = tuple(
-        StageCoupling(Member(n, "carrier"), Member(n + 1, "sun"), torsional, lateral)
-        for n in range(1, len(stages))
+        StageCoupling(Member(n, "carrier"), Member(n + 1, "sun"), torsional, lateral) for n in range(1, len(stages))
     )
     ends = {"input": Member(1, "sun"), "output": Member(len(stages), "carrier")}
     return MultistageSet(stages=tuple(stages), couplings=couplings, **ends)
@@ -254,9 +257,7 @@ def speed_ratio(data: MultistageSet) -> float:
     output = train_speeds(data, 1.0).of(data.output)
     if abs(output) < 1e-12:
         message = f"the output, {data.output}, stands still"
-        raise CaseError(
-            message, code="E-MECHANISM", key="operation.output", remedy="name a member that turns"
-        )
+        raise CaseError(message, code="E-MECHANISM", key="operation.output", remedy="name a member that turns")
     return 1.0 / output
 
 
@@ -268,10 +269,11 @@ def check_turns(data: MultistageSet) -> None:
         what = "cannot turn" if rank == rows.shape[1] else "is held twice in a loop"
         raise CaseError(
             f"the train {what}: {len(data.stages)} stages, {len(data.couplings)} couplings and "
-            f"{sum(stage.fixed is not None for stage in data.stages)} fixed members", code="E-MECHANISM",
+            f"{sum(stage.fixed is not None for stage in data.stages)} fixed members",
+            code="E-MECHANISM",
             limit="couplings and fixed members that close no loop",
             remedy="leave out a coupling, or hold one member less",
-        )  # fmt: skip
+        )
 
 
 def _rows(data: MultistageSet, weights: np.ndarray) -> np.ndarray:
@@ -291,9 +293,11 @@ def _tooth_weights(data: MultistageSet) -> np.ndarray:
     for number, stage in enumerate(data.stages, 1):
         if stage.teeth is None:
             raise CaseError(
-                f"no tooth numbers in stage {number}", code="E-TEETH", key=f"stages[{number - 1}].teeth",
+                f"no tooth numbers in stage {number}",
+                code="E-TEETH",
+                key=f"stages[{number - 1}].teeth",
                 remedy="give the teeth of sun, planet and ring",
-            )  # fmt: skip
+            )
         ratios = torque_ratios(stage.teeth[0], stage.teeth[2])
         weights.append([ratios[name] for name in CENTRAL])
     return np.array(weights)
@@ -321,10 +325,11 @@ def _solved(data: MultistageSet, matrix: np.ndarray, right: np.ndarray) -> np.nd
         fixed = sum(stage.fixed is not None for stage in data.stages)
         raise CaseError(
             f"{len(data.stages)} stages, {len(data.couplings)} couplings and {fixed} fixed members do not "
-            "determine all speeds and torques", code="E-MECHANISM",
+            "determine all speeds and torques",
+            code="E-MECHANISM",
             limit="stages + couplings + fixed members + 1 = 3 x stages, none of them idle",
             remedy="hold one member of every stage of a plain train",
-        )  # fmt: skip
+        )
     solution = np.linalg.solve(matrix, right)
     # one step of refinement: ratios of hundreds keep their last digits
     return solution + np.linalg.solve(matrix, right - matrix @ solution)
@@ -364,9 +369,7 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     # torques that load the flanks of every stage; without any those of suns that drive counter-clockwise
     on_sun = train_torques(data, torque, radii=True).sun if torque else np.ones(len(data.stages))
     flanks = [flank_sign(one.data, PlanarTorque(float(t))) for one, t in zip(data.stages, on_sun)]
-    meshes = [
-        free_motions(one.data).T @ mesh_directions(one.data, flank) for one, flank in zip(data.stages, flanks)
-    ]
+    meshes = [free_motions(one.data).T @ mesh_directions(one.data, flank) for one, flank in zip(data.stages, flanks)]
     turned = [member for n in turning for member in (data.couplings[n].first, data.couplings[n].second)]
     ends = [motions[member][:2].T for member in turned]
     load = np.concatenate([part.load for part in parts]) + _torque_load(data, motions, torque)
@@ -410,9 +413,11 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
         if math.isinf(one.lateral):
             raise CaseError(
                 f"the centres of {one.first} and {one.second} are one, in frames of different speeds",
-                code="E-RANGE", key=f"couplings[{number}].lateral", limit="a finite stiffness",
+                code="E-RANGE",
+                key=f"couplings[{number}].lateral",
+                limit="a finite stiffness",
                 remedy="give the stiffness of the shaft",
-            )  # fmt: skip
+            )
         found[number] = float(relative)
     return found
 
@@ -519,9 +524,10 @@ def _torque_load(data: MultistageSet, motions: dict[Member, np.ndarray], torque:
         rotation = motions[member][2]
         if not np.any(rotation):
             raise CaseError(
-                f"the torque acts on the {member}, which is held", code="E-MECHANISM",
+                f"the torque acts on the {member}, which is held",
+                code="E-MECHANISM",
                 remedy="choose members that can turn",
-            )  # fmt: skip
+            )
         load += rotation * value
     return load
 

@@ -15,6 +15,7 @@ from femgear.case.quantities import RPM
 from femgear.findings import Finding
 from femgear.gears.planetary import mesh_names
 from femgear.report.tables import Block, describe_modes, first_speeds, tabulate
+from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import FOURIER, complex_entries, coordinates, mode_entries
 from femgear.trains.multistage.case_file import MultistageCase, multistage_of, stage_warnings
@@ -27,7 +28,6 @@ from femgear.trains.multistage.model import (
     train_speeds,
     train_torques,
 )
-from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -193,9 +193,7 @@ def _first_meshes(data: MultistageSet) -> list[int]:
 
 def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
     """Stages, meshes, and speeds of the input where there are some."""
-    names = [
-        f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in mesh_names(one.data.n_planets)
-    ]
+    names = [f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in mesh_names(one.data.n_planets)]
     found = {**coordinates(mesh=names), "stage": ("stage", range(1, len(data.stages) + 1), "1", "stage")}
     return found if speed is None else found | coordinates(speed=speed / RPM)
 

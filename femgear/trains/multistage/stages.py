@@ -15,6 +15,8 @@ import numpy as np
 from femgear.solvers.linear.modal import solve_modes, viscous_damping
 from femgear.solvers.linear.receptance import MeshErrorResponse, modal_error_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.stages.lumped_set import mixed_modes
+from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, one_blas_thread, silent
 from femgear.system.force_laws import GearMeshes, TurningSprings, turning_wave
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, orders_of, sample, tooth_lines
 from femgear.system.mesh_directions import gear_set_system, mesh_elements
@@ -47,8 +49,6 @@ from femgear.trains.multistage.results import (
     describe_stage_modes,
     multistage_warnings,
 )
-from femgear.trains.protocol import FiguresOf, Progress, Stage, Train, one_blas_thread, silent
-from femgear.trains.rigid import mixed_modes
 
 
 def multistage_modes(data: MultistageSet, *, damping_ratio: float | Sequence[float] = 0.0) -> MultistageModes:
@@ -218,9 +218,7 @@ def multistage_problem(
     return replace(problem, system=replace(system, C=viscous_damping(centred, problem.reference, damping)))
 
 
-def _stage_elements(
-    data: MultistageSet, meshes: Mapping[int, GearMeshes], forward, bases: int
-) -> Iterator[GearMeshes]:
+def _stage_elements(data: MultistageSet, meshes: Mapping[int, GearMeshes], forward, bases: int) -> Iterator[GearMeshes]:
     """The meshes of all stages on their columns, each with its own base frequency."""
     for number, (stage, columns) in enumerate(zip(data.stages, mesh_columns(data)), 1):
         made = meshes.get(number) or mesh_elements(stage.data)
@@ -272,9 +270,7 @@ def solve_balance(case: MultistageCase, *, progress: Progress = silent) -> Balan
     for number, speed in enumerate(speeds):
         progress("balance", number, len(speeds))
         frequency = base_frequencies(train, speed)[:stages]
-        found.append(
-            solve_harmonic_balance(problem, frequency, orders=distinct_lines(orders), stability=False)
-        )
+        found.append(solve_harmonic_balance(problem, frequency, orders=distinct_lines(orders), stability=False))
     force, converged = np.array([one.force for one in found]), np.array([one.converged for one in found])
     return BalanceResult(train, speeds, found[0].orders, force, converged)
 
@@ -322,9 +318,7 @@ def _wave_meshes(case: MultistageCase, train: MultistageSet) -> dict[int, GearMe
     made = {}
     for number, stage in enumerate(train.stages, 1):
         mean = stage.data.mesh_stiffness
-        lines = np.column_stack(
-            [np.ones(len(mean)), tooth_lines(*_stiffness_waves(case, number), stage.phases)]
-        )
+        lines = np.column_stack([np.ones(len(mean)), tooth_lines(*_stiffness_waves(case, number), stage.phases)])
         stiffness = FourierSeries(mean[:, None] * lines)
         made[number] = mesh_elements(stage.data, stiffness=stiffness, separates=False)
     return made

@@ -22,7 +22,7 @@ from femgear.case.gear_set import (
     pitch_of,
     runout_of,
 )
-from femgear.case.mistakes import added_material
+from femgear.case.messages import added_material
 from femgear.case.quantities import ANGLE, LENGTH, TORQUE, Count, Quantity, Section, Title, Values
 from femgear.case.sections import (
     FORMAT,
@@ -57,7 +57,7 @@ from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import SetDeviations, no_deviations
 from femgear.gears.pair import GearPair, close_pair
 from femgear.gears.tips import settled_tips
-from femgear.trains.rigid import listed, strength_entries
+from femgear.stages.lumped_set import listed, strength_entries
 
 
 class SetSection(Section):
@@ -207,25 +207,34 @@ def cross_check(case: PairCase) -> Iterator[CaseError]:
     two, shifts = case.gear_2, [getattr(case, name).profile_shift for name in case.gear_names]
     if (two.bore_radius is None) == (two.outer_radius is None):
         yield CaseError(
-            "gear 2 needs one radius of its rim", code="E-CHOICE", key="gear_2.bore_radius",
+            "gear 2 needs one radius of its rim",
+            code="E-CHOICE",
+            key="gear_2.bore_radius",
             limit="bore_radius of an external, outer_radius of an internal gear",
-        )  # fmt: skip
+        )
     elif not two.internal and two.cutter_teeth is not None:
         yield CaseError(
-            "the teeth of an external gear are made by its rack", code="E-CHOICE", key="gear_2.cutter_teeth",
+            "the teeth of an external gear are made by its rack",
+            code="E-CHOICE",
+            key="gear_2.cutter_teeth",
             remedy="leave it out, or give outer_radius in place of bore_radius",
-        )  # fmt: skip
+        )
     if shifts.count(None) > (case.set.centre_distance is not None):
         yield CaseError(
-            "the profile shifts leave the pair open", code="E-KEY-MISSING",
+            "the profile shifts leave the pair open",
+            code="E-KEY-MISSING",
             key=f"gear_{1 + shifts.index(None)}.profile_shift",
             remedy="give both profile shifts, or one of them and set.centre_distance",
-        )  # fmt: skip
+        )
     if case.static.members != "fixed":
         yield CaseError(
-            "both gears stand on fixed axes", code="E-CHOICE", key="static.members",
-            value=case.static.members, limit="'fixed'", remedy="leave static.members out",
-        )  # fmt: skip
+            "both gears stand on fixed axes",
+            code="E-CHOICE",
+            key="static.members",
+            value=case.static.members,
+            limit="'fixed'",
+            remedy="leave static.members out",
+        )
     yield from check_face_widths(case)
     yield from check_torque(case.operation.torque)
     yield from check_speeds(case) if case.operation.speeds else ()

@@ -23,7 +23,7 @@ from femgear.report.style import (
     runs,
 )
 from femgear.report.waterfall import RUNUP_CAPTIONS, campbell_diagram
-from femgear.trains.protocol import Drawn, Figures
+from femgear.stages.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
     import xarray as xr

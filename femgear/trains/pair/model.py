@@ -24,11 +24,11 @@ from femgear.contact.loaded_period import loaded_period
 from femgear.gears.kinematics import mesh_normals
 from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
+from femgear.stages.static import over_width, record_positions
+from femgear.stages.static_results import StaticResult
 from femgear.system.mesh_directions import assemble, stiffness_matrix
 from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem, gear_meshes
 from femgear.trains.pair.case_file import PairCase
-from femgear.trains.static.results import StaticResult
-from femgear.trains.static.stages import over_width, record_positions
 
 _RECORD = 2**13
 """Positions of the excitation in the mesh period."""
@@ -88,8 +88,12 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     normal = mesh_normals(gears)[0] * [1.0, flank]
     turning = flank * np.array([radii[0], -gears.senses[1] * radii[1]])
     mesh = np.concatenate([normal, turning[:1], -normal, turning[1:], np.zeros(len(machines))])
-    mass = np.array([*(value for one in sections for value in (one.mass, one.mass, one.inertia)),
-                     *(one.inertia for *_, one in machines)])  # fmt: skip
+    mass = np.array(
+        [
+            *(value for one in sections for value in (one.mass, one.mass, one.inertia)),
+            *(one.inertia for *_, one in machines),
+        ]
+    )
     bearing = np.repeat([one.bearing_stiffness or np.inf for one in sections], 2)
     lateral, columns, load = [0, 1, 3, 4], np.eye(size)[:, [0, 1, 3, 4]], np.zeros(size)
     springs, torque = list(bearing), case.operation.torque
@@ -104,9 +108,13 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     names = [f"gear {i}: {axis}" for i in (1, 2) for axis in _NAMES]
     names += [f"{name}: rotation" for _, name, _ in machines]
     system = assemble(
-        mass, stiffness_matrix(columns, np.array(springs)), mesh[:, None], load,
-        motions=np.eye(size)[:, free], dofs=[names[i] for i in free],
-    )  # fmt: skip
+        mass,
+        stiffness_matrix(columns, np.array(springs)),
+        mesh[:, None],
+        load,
+        motions=np.eye(size)[:, free],
+        dofs=[names[i] for i in free],
+    )
     rotation = np.where(np.isin(np.arange(size), (2, 5)), mesh, 0.0)
     return PairModel(system, rotation[free], np.eye(size)[lateral][:, free], bearing, normal)
 
@@ -118,17 +126,20 @@ def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
     if slices:
         slices |= {"held_waves": slices["waves"]}
     state = loaded_period(
-        gears, static.bodies, static.bodies, sun_torque=static.sun_torque,
-        positions=record_positions(cast(Any, case), gears), contact=case.static.contact,
-        deviations=None if deviations.ideal else deviations, options=CycleOptions(**slices),
-    )  # fmt: skip
+        gears,
+        static.bodies,
+        static.bodies,
+        sun_torque=static.sun_torque,
+        positions=record_positions(cast(Any, case), gears),
+        contact=case.static.contact,
+        deviations=None if deviations.ideal else deviations,
+        options=CycleOptions(**slices),
+    )
     record = (state.resampled(name, _RECORD) for name in ("stiffness", "deflection", "force"))
     return MeshExcitation(*record, backlash=np.array([line_play(case)]))
 
 
-def separating_pair(
-    model: PairModel, modes: Modes, excitation: MeshExcitation, harmonics: int
-) -> NonlinearSystem:
+def separating_pair(model: PairModel, modes: Modes, excitation: MeshExcitation, harmonics: int) -> NonlinearSystem:
     """Make the pair whose flanks part and meet their back sides, with so many harmonics of the excitation.
 
     The modes give the viscous damping, which flanks that are apart have too, as in A. Kahraman and R. Singh,

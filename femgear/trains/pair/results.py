@@ -15,6 +15,7 @@ from femgear.findings import Finding, tell
 from femgear.gears.pair import GearPair
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
 from femgear.report.tables import Block, chosen, first_speeds, response_warnings, tabulate
+from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
     FOURIER,
@@ -28,7 +29,6 @@ from femgear.storage.results import (
 )
 from femgear.system.fourier import fluctuation
 from femgear.trains.pair.model import PairModel
-from femgear.trains.protocol import StageResult
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -288,8 +288,7 @@ def _recordings(results: Results, stage: str) -> Iterator[tuple[str, str, np.nda
     """
     data = results[stage]
     order, speed = data["harmonic"].values * results.case.gear_1.teeth, data["speed"].values * RPM
-    dte, force = (data[f"{name}_real"].values + 1j * data[f"{name}_imag"].values
-                  for name in ("dte", "bearing_force"))  # fmt: skip
+    dte, force = (data[f"{name}_real"].values + 1j * data[f"{name}_imag"].values for name in ("dte", "bearing_force"))
     yield "transmission_error", "m/s^2", order, speed, -(np.outer(speed, order) ** 2) * dte[:, 0]
     mean = np.real(force[..., :1])
     along = (mean / np.linalg.norm(mean, axis=2, keepdims=True) * force).sum(axis=2)

@@ -43,6 +43,28 @@ from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmo
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
+from femgear.stages.lumped_set import parts_of_speeds
+from femgear.stages.protocol import (
+    Figures,
+    Progress,
+    Recorded,
+    Stage,
+    Train,
+    modes_verdict,
+    one_blas_thread,
+    silent,
+)
+from femgear.stages.static import LARGEST_APPROACH, STATIC, STRESS
+from femgear.stages.static_figures import FIGURES
+from femgear.stages.static_results import (
+    StaticResult,
+    describe_gears,
+    describe_materials,
+    describe_meshes,
+    describe_static,
+    load_warnings,
+    mean_over_period,
+)
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import fluctuation, sample
 from femgear.system.system import Modes, NonlinearSystem, Response
@@ -65,28 +87,6 @@ from femgear.trains.pair.results import (
     signal_extent,
     signals,
 )
-from femgear.trains.protocol import (
-    Figures,
-    Progress,
-    Recorded,
-    Stage,
-    Train,
-    modes_verdict,
-    one_blas_thread,
-    silent,
-)
-from femgear.trains.rigid import parts_of_speeds
-from femgear.trains.static.figures import FIGURES
-from femgear.trains.static.results import (
-    StaticResult,
-    describe_gears,
-    describe_materials,
-    describe_meshes,
-    describe_static,
-    load_warnings,
-    mean_over_period,
-)
-from femgear.trains.static.stages import LARGEST_APPROACH, STATIC, STRESS
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -95,8 +95,7 @@ if TYPE_CHECKING:
 
 _CAPTIONS = {
     "static_transmission_error": (
-        "Static transmission error over one mesh period along the line of action: gear 1 against gear 2, "
-        "which is held."
+        "Static transmission error over one mesh period along the line of action: gear 1 against gear 2, which is held."
     ),
     "deformed_set": (
         "Deformed pair under the static load at position 0, whole and at the pitch point; at rest in grey. "
@@ -222,13 +221,20 @@ def _linear(
     """Solve for the response with flanks held together at mesh frequencies (s,) [Hz]."""
     basis, model = found.modes, found.model
     response = solve_spectral(
-        basis, found.excitation, frequency, excitation_harmonics=harmonics[0],
-        response_harmonics=harmonics[1], tolerance=case.dynamics.tolerance,
-    )  # fmt: skip
+        basis,
+        found.excitation,
+        frequency,
+        excitation_harmonics=harmonics[0],
+        response_harmonics=harmonics[1],
+        tolerance=case.dynamics.tolerance,
+    )
     motion = output_response(
-        basis, response, model.rows @ basis.shape, load=output_load(model.system, basis, model.rows),
+        basis,
+        response,
+        model.rows @ basis.shape,
+        load=output_load(model.system, basis, model.rows),
         residual=residual_output(model.system, basis, model.rows),
-    )  # fmt: skip
+    )
     force = sample(response.force[:, 0], 4 * response.force.shape[-1])
     measured = model.measured(motion, response.force[:, 0])
     extremes, closed = (force.max(axis=1), force.min(axis=1)), np.ones(len(force))
@@ -236,9 +242,7 @@ def _linear(
     return response, PairMotion(*lines, *measured, *extremes, closed, np.zeros(len(force)))
 
 
-def _parted(
-    model: PairModel, problem: NonlinearSystem, found: Sequence[PeriodicSolution], size: int
-) -> PairMotion:
+def _parted(model: PairModel, problem: NonlinearSystem, found: Sequence[PeriodicSolution], size: int) -> PairMotion:
     """Collect the motion of solutions with play, their lines filled with zeros up to a harmonic."""
     lines, known, mesh = np.zeros((len(found), 7, size + 1), complex), reduced(problem), problem.elements[0]
     assert isinstance(mesh, GearMeshes)
@@ -253,9 +257,7 @@ def _parted(
     return PairMotion(lines[:, :1], lines[:, 1:2], *model.measured(lines[:, 2:], lines[:, 1]), *told)
 
 
-def _with_play(
-    problem: NonlinearSystem, frequency: float, start: np.ndarray, case: PairCase
-) -> PeriodicSolution:
+def _with_play(problem: NonlinearSystem, frequency: float, start: np.ndarray, case: PairCase) -> PeriodicSolution:
     """Solve the balance with play at a mesh frequency [Hz] from lines (1, H + 1) of the approach on."""
     options = {"harmonics": start.shape[-1] - 1, "radius": False}
     found = solve_harmonic_balance(problem, 2.0 * np.pi * frequency, start=start, **options)
@@ -266,16 +268,17 @@ def _with_play(
         key = "operation.speeds" if damped else "dynamics.damping_ratio"
         raise ConvergenceError(
             f"no motion with contact loss at a mesh frequency of {frequency:.6g} Hz; {found.message}",
-            code="E-CONVERGENCE", key=key, value=f"relative residual {found.residual:.2e}",
-            file=case.location(key), remedy="raise dynamics.damping_ratio, or leave the speed out",
-        )  # fmt: skip
+            code="E-CONVERGENCE",
+            key=key,
+            value=f"relative residual {found.residual:.2e}",
+            file=case.location(key),
+            remedy="raise dynamics.damping_ratio, or leave the speed out",
+        )
     return found
 
 
 @one_blas_thread()
-def solve_pair_dynamics(
-    case: PairCase, modes: PairModesResult, *, progress: Progress = silent
-) -> PairDynamicsResult:
+def solve_pair_dynamics(case: PairCase, modes: PairModesResult, *, progress: Progress = silent) -> PairDynamicsResult:
     """Solve for the periodic response at all speeds, with play where the linear one pulls, and its stability.
 
     ConvergenceError: an undamped resonance, or a motion with contact loss that is not found.
@@ -337,15 +340,27 @@ def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
     nearest, beside = (np.abs(one[:, None] - resonance).argmin(axis=0) for one in (speeds, operating))
     alone = np.abs(row[mode] * response.modal[nearest, mode, met.harmonic]) / math.sqrt(2.0)
     found = {
-        "mode": mode + 1, "kind": [basis.kind[i] for i in mode], "mesh_harmonic": met.harmonic,
-        "frequency": forces.frequency[met.row], "resonance_speed": resonance / RPM,
-        "share": forces.share[met.row, met.harmonic - 1], "resonance_alone": alone,
-        "operating_speed": operating[beside] / RPM, "distance": 100.0 * (resonance / operating[beside] - 1.0),
-    }  # fmt: skip
+        "mode": mode + 1,
+        "kind": [basis.kind[i] for i in mode],
+        "mesh_harmonic": met.harmonic,
+        "frequency": forces.frequency[met.row],
+        "resonance_speed": resonance / RPM,
+        "share": forces.share[met.row, met.harmonic - 1],
+        "resonance_alone": alone,
+        "operating_speed": operating[beside] / RPM,
+        "distance": 100.0 * (resonance / operating[beside] - 1.0),
+    }
     return PairRunupResult(
-        modes.gears, speeds, speeds * per_speed, motion, harmonics[0] * speeds * per_speed, found, operating,
-        unresolved(speeds, resonance, heard, damping), *_branch(case, modes, speeds, motion.lowest),
-    )  # fmt: skip
+        modes.gears,
+        speeds,
+        speeds * per_speed,
+        motion,
+        harmonics[0] * speeds * per_speed,
+        found,
+        operating,
+        unresolved(speeds, resonance, heard, damping),
+        *_branch(case, modes, speeds, motion.lowest),
+    )
 
 
 def _branch(case: PairCase, modes: PairModesResult, speeds: np.ndarray, lowest: np.ndarray):
@@ -426,18 +441,14 @@ PAIR = Train(
             verdict=lambda result: result.verdict,
             describe=lambda results: describe_runup(results.runup),
             wanted=lambda case: case.runup.count > 1,
-            unavailable=lambda case: (
-                _no_speeds(case) or ("" if case.runup.count > 1 else "runup.count leaves it out")
-            ),
+            unavailable=lambda case: _no_speeds(case) or ("" if case.runup.count > 1 else "runup.count leaves it out"),
             warnings=PairRunupResult.warnings,
         ),
     ),
     describe=_describe_case,
     warnings=_warnings,
     figures={
-        name: Figures({**figures.captions, **_CAPTIONS}, figures.draw, figures.write)
-        if name == "static"
-        else figures
+        name: Figures({**figures.captions, **_CAPTIONS}, figures.draw, figures.write) if name == "static" else figures
         for name, figures in FIGURES.items()
     }
     | {"dynamics": DYNAMICS, "runup": RUNUP},

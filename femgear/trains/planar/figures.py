@@ -15,9 +15,9 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.report.response import MODE_CAPTIONS, harmonics_of, mode_shapes, shown_speeds
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure, runs
+from femgear.stages.protocol import Drawn, Figures
+from femgear.stages.static_figures import FIGURES as STATIC
 from femgear.trains.planar.model import TAIL_LIMIT, merged_folds
-from femgear.trains.protocol import Drawn, Figures
-from femgear.trains.static.figures import FIGURES as STATIC
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,9 +64,7 @@ def orbits(curves: Sequence[tuple], *, title: str = "") -> Figure:
     return figure
 
 
-def bearing_forces(
-    angle, curves: Sequence[tuple], *, title: str = "", over: str = "phase of the weight [°]"
-) -> Figure:
+def bearing_forces(angle, curves: Sequence[tuple], *, title: str = "", over: str = "phase of the weight [°]") -> Figure:
     """Draw sizes of bearing forces over one turn, of the weight against the carrier or of the carrier.
 
     Over the angle (n,) [rad], whose name is ``over``: curves (text, force (2, n) [N]).
@@ -109,9 +107,7 @@ def weight_response(branch: xr.Dataset) -> Figure:
         _mark_tails(ax, hertz, size, branch["tail"].values)
         for dash, text, part in _parts(branch):
             ax.plot(hertz[part], size[part], color=colour, linestyle=dash, label=text)
-        ax.plot(
-            hertz[folds], size[folds], "o", color=BLACK, markersize=6, markerfacecolor="none", label="fold"
-        )
+        ax.plot(hertz[folds], size[folds], "o", color=BLACK, markersize=6, markerfacecolor="none", label="fold")
         ax.set_ylim(bottom=0.0)
         label(ax, y=f"{member} x, r.m.s. [µm]")
     # many labels would hide one another; the table of the report has them all
@@ -119,10 +115,13 @@ def weight_response(branch: xr.Dataset) -> Figure:
         # outside of the turn, where the curve is not
         right = hertz[point] >= hertz[max(point - 1, 0)]
         axes[0].annotate(
-            f"{hertz[point]:.2f} Hz", (hertz[point], 1e6 * branch["rms"].values[point, 0, 0]),
-            xytext=(10, -3) if right else (-8, -14), ha="left" if right else "right",
-            textcoords="offset points", fontsize=SIZE - 1,
-        )  # fmt: skip
+            f"{hertz[point]:.2f} Hz",
+            (hertz[point], 1e6 * branch["rms"].values[point, 0, 0]),
+            xytext=(10, -3) if right else (-8, -14),
+            ha="left" if right else "right",
+            textcoords="offset points",
+            fontsize=SIZE - 1,
+        )
     label(axes[-1], _AXIS)
     legend_below(figure, axes[0], columns=4)
     return figure
@@ -133,8 +132,16 @@ def _mark_tails(ax, x, values, tail) -> None:
     doubtful = tail > TAIL_LIMIT
     if np.any(doubtful):
         # a point alone has no length to be drawn along
-        ax.plot(x, np.where(doubtful, values, np.nan), "o-", color=_PALE, linewidth=9.0, markersize=8.0,
-                zorder=1.5, label=_DOUBTFUL)  # fmt: skip
+        ax.plot(
+            x,
+            np.where(doubtful, values, np.nan),
+            "o-",
+            color=_PALE,
+            linewidth=9.0,
+            markersize=8.0,
+            zorder=1.5,
+            label=_DOUBTFUL,
+        )
 
 
 def _tails(data: xr.Dataset) -> np.ndarray:
@@ -380,8 +387,7 @@ FIGURES = STATIC | {
         {
             "response_orbit": "Paths of the centres of carrier, ring and sun in the carrier frame during "
             "one turn of the carrier ({}).",
-            "response_bearing_forces": "Force between every planet and its pin during one turn of the "
-            "carrier ({}).",
+            "response_bearing_forces": "Force between every planet and its pin during one turn of the carrier ({}).",
             "response_mesh_forces": "Mesh forces of planet 1 during one turn of the carrier ({}), and "
             "during six mesh periods where the mesh stiffness varies. They are drawn from their lines.",
             "response_spectrum": "Lines of a mesh force and of the carrier's displacement ({}): multiples "

@@ -22,12 +22,7 @@ from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.phase_grid import equidistant_phases
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
-from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import constant, fluctuation, line_tail, orders_of
-from femgear.system.mesh_directions import free_motions, mesh_elements, pin_directions
-from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
-from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
-from femgear.trains.rigid import (
+from femgear.stages.lumped_set import (
     Bearings,
     Gravity,
     MemberBearing,
@@ -40,8 +35,13 @@ from femgear.trains.rigid import (
     torsional_support,
     working_springs,
 )
-from femgear.trains.static.results import StaticResult
-from femgear.trains.static.stages import mesh_backlash
+from femgear.stages.static import mesh_backlash
+from femgear.stages.static_results import StaticResult
+from femgear.system.force_laws import GearMeshes
+from femgear.system.fourier import constant, fluctuation, line_tail, orders_of
+from femgear.system.mesh_directions import free_motions, mesh_elements, pin_directions
+from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
+from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -157,7 +157,7 @@ def carrier_sense(case: PlanarCase, gears: PlanetarySet) -> int:
 
 
 def planar_ratios(case: PlanarCase) -> float | tuple[float, ...]:
-    """Read the damping ratios of a case: of all modes, or see `femgear.trains.rigid.mode_ratios`."""
+    """Read the damping ratios of a case: of all modes, or see `femgear.stages.lumped_set.mode_ratios`."""
     return case.planar.damping_ratios or case.dynamics.damping_ratio
 
 
@@ -194,8 +194,9 @@ def _gravity(case: PlanarCase, gears: PlanetarySet, mesh_frequency: bool) -> Gra
 
 MOTIONS = {
     "force_tail": (
-        "", "1", "share of the fluctuating force in the upper half of the lines, of the kind of mesh with "
-        "more of it",
+        "",
+        "1",
+        "share of the fluctuating force in the upper half of the lines, of the kind of mesh with more of it",
     ),
     "motion": ("", "m", "farthest that a member's centre moves from its place"),
     "rms": ("member axis", "m", "displacement about its mean, r.m.s."),
@@ -205,10 +206,12 @@ MOTIONS = {
     "planet_bearing_force": ("planet direction line", "N", "force of the pin on the planet"),
     "carrier_bearing_force": ("axis line", "N", "force of the carrier bearing on the carrier"),
     "drive_contact": (
-        "mesh", "1", "share of the time in which the drive flanks touch: 1 in contact, 0 not",
+        "mesh",
+        "1",
+        "share of the time in which the drive flanks touch: 1 in contact, 0 not",
     ),
     "back_contact": ("mesh", "1", "share of the time in which the back flanks touch: 1 in contact, 0 not"),
-}  # fmt: skip
+}
 """Of `MotionLines`, under the names of branch.nc and response.nc: dimensions, unit, and what they are."""
 
 

@@ -21,6 +21,9 @@ from femgear.findings import NOTE, Finding, findings_in
 from femgear.gears.kinematics import torques
 from femgear.report.response import harmonics_of
 from femgear.report.tables import Block, Marks, chosen, first_speeds, significant, tabulate
+from femgear.stages.lumped_set import modes_dataset, needed, stiffness_text, torsion_text
+from femgear.stages.protocol import StageResult
+from femgear.stages.static_results import set_warnings
 from femgear.storage.contents import Contents
 from femgear.storage.results import complex_entries, coordinates
 from femgear.system.fourier import fluctuation
@@ -33,9 +36,6 @@ from femgear.trains.planar.model import (
     merged_folds,
     shown_points,
 )
-from femgear.trains.protocol import StageResult
-from femgear.trains.rigid import modes_dataset, needed, stiffness_text, torsion_text
-from femgear.trains.static.results import set_warnings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -158,11 +158,14 @@ class BranchResult(StageResult):
             "stable": (point, stable, "1", "stability: 1 stable, 0 not stable, -1 not known"),
             "stability_note": (point, notes, "1", "why stability is not known"),
             "largest_multiplier": (point, largest, "1", "largest Floquet multiplier"),
-            "multiplier_distance": (point, [_nearest(one) for one in verdicts] or nothing, "1",
-                                    "distance of the nearest Floquet multiplier from 1, "
-                                    "which is zero at a limit point of the motion"),
+            "multiplier_distance": (
+                point,
+                [_nearest(one) for one in verdicts] or nothing,
+                "1",
+                "distance of the nearest Floquet multiplier from 1, which is zero at a limit point of the motion",
+            ),
             "loss": (point, loss, "1", "how stability is lost"),
-        }  # fmt: skip
+        }
         variables |= _flank_forces(self, stable) | _motions(self.lines, "point", "harmonic")
         coords = _coordinates(self.planetary_set) | {
             "point": (point, np.arange(count), "1", "point along the branch"),
@@ -219,15 +222,22 @@ class PlanarResponseResult(StageResult):
         found, speed = self.solutions, ("speed",)
         mesh = [one.mesh_frequency for one in self.speeds]
         variables = {
-            "carrier_speed": (speed, [one.carrier for one in self.speeds], "rad/s",
-                              "speed of the carrier, counter-clockwise positive"),
+            "carrier_speed": (
+                speed,
+                [one.carrier for one in self.speeds],
+                "rad/s",
+                "speed of the carrier, counter-clockwise positive",
+            ),
             "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
-            "frequency": (("speed", "line"), [one.line_frequency / (2 * np.pi) for one in found], "Hz",
-                          "frequency of the line in the carrier frame"),
-        }  # fmt: skip
+            "frequency": (
+                ("speed", "line"),
+                [one.line_frequency / (2 * np.pi) for one in found],
+                "Hz",
+                "frequency of the line in the carrier frame",
+            ),
+        }
         variables |= {
-            name: (speed, [getattr(one, name) for one in found], "1", text)
-            for name, text in _OF_SOLUTIONS.items()
+            name: (speed, [getattr(one, name) for one in found], "1", text) for name, text in _OF_SOLUTIONS.items()
         }
         variables |= _motions(self.lines, "speed", "line")
         orders, line = found[0].orders, ("line",)
@@ -389,9 +399,7 @@ def describe_branch(data: xr.Dataset) -> Block:
         "carrier x rms [um]": lambda point: marks(significant(1e6 * rms[point, 0, 0], 3), *doubtful(point)),
         "ring x rms [um]": lambda point: marks(significant(1e6 * rms[point, 1, 0], 3), *doubtful(point)),
         "sun x rms [um]": lambda point: marks(significant(1e6 * rms[point, 2, 0], 3), *doubtful(point)),
-        "back contact": lambda point: marks(
-            f"{float(data['back_contact'].values[point].max()):.3f}", *doubtful(point)
-        ),
+        "back contact": lambda point: marks(f"{float(data['back_contact'].values[point].max()):.3f}", *doubtful(point)),
         "stable": lambda point: _STABLE[int(stable[point])] if known else "-",
     }
     notes = [

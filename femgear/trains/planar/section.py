@@ -36,7 +36,7 @@ from femgear.case.sections import (
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError
 from femgear.findings import Finding
-from femgear.trains.rigid import (
+from femgear.stages.lumped_set import (
     Gravity,
     entries_without_effect,
     flank_entries,
@@ -179,8 +179,7 @@ def planar_notices(data: dict) -> Iterator[Finding]:
             yield Finding(
                 "W-EXCITATION",
                 "planar.response",
-                "nothing varies in time, every response is static: planar.mesh_stiffness is "
-                f"constant and {still}",
+                f"nothing varies in time, every response is static: planar.mesh_stiffness is constant and {still}",
             )
     if data["planet"].get("bearing_clearance") and not {"branch", "response"} & planar.keys():
         text = "has no effect without planar.branch or planar.response"
@@ -212,9 +211,13 @@ def check_planar(case: PlanarCase) -> Iterator[CaseError]:
     yield from rigid_refusals(case, "planar", without_torque=": the planar set would rattle in its play")
     if planar.back_flanks and planar.line_backlash == 0.0:
         yield CaseError(
-            "back flanks need play", code="E-BACKLASH", key="planar.line_backlash", value="0 mm",
-            limit="above 0 mm", remedy="give the play, or write planar.back_flanks = false",
-        )  # fmt: skip
+            "back flanks need play",
+            code="E-BACKLASH",
+            key="planar.line_backlash",
+            value="0 mm",
+            limit="above 0 mm",
+            remedy="give the play, or write planar.back_flanks = false",
+        )
     yield from _check_torsion(case)
     yield from _check_branch(case)
 
@@ -224,9 +227,7 @@ def _check_torsion(case: PlanarCase) -> Iterator[CaseError]:
     planar, operation = case.planar, case.operation
     output = output_member(case)
     if getattr(planar.torsion, operation.fixed) == 0.0:
-        yield unheld_member(
-            case, f"planar.torsion.{operation.fixed}", "leave it out: the fixed member is then held"
-        )
+        yield unheld_member(case, f"planar.torsion.{operation.fixed}", "leave it out: the fixed member is then held")
     if planar.reaction == "supports" and not getattr(planar.torsion, output):
         yield CaseError(
             f"the torque is to be carried by supports, but the {output}, which is the output, turns freely",
@@ -244,25 +245,37 @@ def _check_branch(case: PlanarCase) -> Iterator[CaseError]:
         return
     if not branch.start < branch.to:
         yield CaseError(
-            "the range of frequencies ends before it begins", code="E-RANGE", key="planar.branch.to",
-            value=FREQUENCY.show(branch.to), limit=f"above {FREQUENCY.show(branch.start)}, where it begins",
-        )  # fmt: skip
+            "the range of frequencies ends before it begins",
+            code="E-RANGE",
+            key="planar.branch.to",
+            value=FREQUENCY.show(branch.to),
+            limit=f"above {FREQUENCY.show(branch.start)}, where it begins",
+        )
     if planar.gravity is None:
         yield CaseError(
-            "the branch follows the response to the weight, and there is none", code="E-KEY-MISSING",
-            key="planar.gravity", remedy="add the section planar.gravity, or leave planar.branch out",
-        )  # fmt: skip
+            "the branch follows the response to the weight, and there is none",
+            code="E-KEY-MISSING",
+            key="planar.gravity",
+            remedy="add the section planar.gravity, or leave planar.branch out",
+        )
     if case.operation.fixed == "carrier":
         yield CaseError(
-            "the weight does not turn against a carrier that stands", code="E-MECHANISM", key="planar.branch",
-            value="operation.fixed = carrier", limit="a carrier that turns", remedy="leave planar.branch out",
-        )  # fmt: skip
+            "the weight does not turn against a carrier that stands",
+            code="E-MECHANISM",
+            key="planar.branch",
+            value="operation.fixed = carrier",
+            limit="a carrier that turns",
+            remedy="leave planar.branch out",
+        )
     if planar.gyroscopic:
         yield CaseError(
-            "the gyroscopic terms would change along the branch, which is not computed", code="E-CHOICE",
-            key="planar.gyroscopic", value="true", limit="false with planar.branch",
+            "the gyroscopic terms would change along the branch, which is not computed",
+            code="E-CHOICE",
+            key="planar.gyroscopic",
+            value="true",
+            limit="false with planar.branch",
             remedy="leave one of them out",
-        )  # fmt: skip
+        )
 
 
 FILE = CaseFile(PlanarCase, check_planar, lambda tables, case: planar_notices(tables))

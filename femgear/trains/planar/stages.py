@@ -19,6 +19,19 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.stages.lumped_set import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
+from femgear.stages.protocol import (
+    FiguresOf,
+    Progress,
+    Stage,
+    Train,
+    blaming_start,
+    modes_verdict,
+    one_blas_thread,
+    silent,
+)
+from femgear.stages.static import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
+from femgear.stages.static_results import StaticResult, describe_set
 from femgear.system.fourier import side_bands
 from femgear.trains.planar.model import (
     carrier_sense,
@@ -41,19 +54,6 @@ from femgear.trains.planar.results import (
     published_modes,
 )
 from femgear.trains.planar.section import PlanarCase
-from femgear.trains.protocol import (
-    FiguresOf,
-    Progress,
-    Stage,
-    Train,
-    blaming_start,
-    modes_verdict,
-    one_blas_thread,
-    silent,
-)
-from femgear.trains.rigid import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
-from femgear.trains.static.results import StaticResult, describe_set
-from femgear.trains.static.stages import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
 
 if TYPE_CHECKING:
     from femgear.gears.planetary import PlanetarySet
@@ -78,11 +78,14 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
     planar, play = case.planar, _least_play(case, gears)
     if planar.back_flanks and planar.line_backlash is None and not play > _NO_PLAY:
         raise CaseError(
-            f"back flanks need play, and the gears have {max(play, 0.0) * 1e6:.3g} um", code="E-BACKLASH",
-            key="planar.back_flanks", value="true", limit="play above 0 in every mesh",
+            f"back flanks need play, and the gears have {max(play, 0.0) * 1e6:.3g} um",
+            code="E-BACKLASH",
+            key="planar.back_flanks",
+            value="true",
+            limit="play above 0 in every mesh",
             remedy="give planar.line_backlash or set.backlash, or write planar.back_flanks = false",
             file=case.location("planar.back_flanks"),
-        )  # fmt: skip
+        )
     if planar.mesh_stiffness is None:
         check_one_period(case, gears, "the planar model takes")
 
@@ -110,10 +113,14 @@ def check_smoothing(case: PlanarCase, gears: PlanetarySet, model: PlanarModel) -
         if smoothing > limit:
             raise CaseError(
                 f"contact sets in over {smoothing * 1e6:.4g} um, more than {words}: teeth would carry across "
-                "their play", code="E-RANGE", key="planar.smoothing", value=f"{smoothing * 1e6:.6g} um",
-                limit=f"{limit * 1e6:.4g} um or less", remedy="leave it out: 0.3 um",
+                "their play",
+                code="E-RANGE",
+                key="planar.smoothing",
+                value=f"{smoothing * 1e6:.6g} um",
+                limit=f"{limit * 1e6:.4g} um or less",
+                remedy="leave it out: 0.3 um",
                 file=case.location("planar.smoothing"),
-            )  # fmt: skip
+            )
 
 
 def mean_compression(model: PlanarModel) -> float:
@@ -139,11 +146,14 @@ def _check_damping(case: PlanarCase, model: PlanarModel, spans: Iterable[tuple[f
         met = bare[(bare >= lowest) & (bare <= highest)]
         if len(met):
             raise CaseError(
-                f"the natural frequency {met[0]:.6g} Hz has no damping and {words}: "
-                "the response has no bound there", code="E-RESONANCE", key=key, value="0",
+                f"the natural frequency {met[0]:.6g} Hz has no damping and {words}: the response has no bound there",
+                code="E-RESONANCE",
+                key=key,
+                value="0",
                 limit="above 0 at a resonance",
-                remedy="give the mode some damping, or move the range or the speed", file=case.location(key),
-            )  # fmt: skip
+                remedy="give the mode some damping, or move the range or the speed",
+                file=case.location(key),
+            )
 
 
 def _excited_spans(frequency: np.ndarray, orders: np.ndarray) -> Iterator[tuple[float, float, str]]:
@@ -228,9 +238,11 @@ def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
 
 def _moved_too_far(key: str, where: str, words: str) -> ConvergenceError:
     return ConvergenceError(
-        f"{where} {words}: the model is one of small displacements", code="E-MOTION", key=key,
+        f"{where} {words}: the model is one of small displacements",
+        code="E-MOTION",
+        key=key,
         remedy="raise the damping, stiffen the supports, or leave the resonance out",
-    )  # fmt: skip
+    )
 
 
 def _end_of_branch(branch: Branch, wanted: BranchSection) -> str:
@@ -265,9 +277,7 @@ def solve_planar_modes(case: PlanarCase, static: StaticResult | None = None) -> 
 
 
 @one_blas_thread()
-def solve_branch(
-    case: PlanarCase, static: StaticResult | None = None, *, progress: Progress = silent
-) -> BranchResult:
+def solve_branch(case: PlanarCase, static: StaticResult | None = None, *, progress: Progress = silent) -> BranchResult:
     """Follow periodic responses to the weight past limit points, with a Floquet verdict at each.
 
     Mesh stiffnesses are constant: the given ones, or the mean of the static solution's. The branch ends
@@ -419,4 +429,4 @@ PLANAR = Train(
     warnings=planar_warnings,
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
-)  # fmt: skip
+)

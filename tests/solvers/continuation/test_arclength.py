@@ -1,10 +1,10 @@
 import numpy as np
 import pytest
-from validation.reference.branch_switching import switch_branch
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.arclength import continue_curve
 from femgear.solvers.continuation.corrector import StepOptions
+from validation.reference.branch_switching import switch_branch
 
 
 def circle(u, p):
@@ -100,8 +100,7 @@ def test_transcritical_crossing_of_two_curved_branches():
     index = known.branch_points[0]
     assert known.parameter[index] == pytest.approx(0.0, abs=1e-9)
     ends = {
-        side.parameter[-1]: side.points[-1, 0]
-        for side in switch_branch(crossing, known, index, limits=(-1.0, 1.0))
+        side.parameter[-1]: side.points[-1, 0] for side in switch_branch(crossing, known, index, limits=(-1.0, 1.0))
     }
     assert ends == pytest.approx({-1.0: 1.0, 1.0: -3.0}, abs=1e-10)
 

@@ -4,9 +4,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from validation.reference.branch_switching import branch_maximum, crossing_branches
-from validation.reference.cornered_springs import PiecewiseSprings
-from validation.reference.stability_boundary import stability_boundary
 
 from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import (
@@ -19,6 +16,9 @@ from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmo
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
+from validation.reference.branch_switching import branch_maximum, crossing_branches
+from validation.reference.cornered_springs import PiecewiseSprings
+from validation.reference.stability_boundary import stability_boundary
 
 ONE = np.ones((1, 1))
 
@@ -95,9 +95,7 @@ def test_force_amplitude_as_parameter_reaches_the_same_solutions(eleven):
 def gear_pair(backlash=2.0, depth=0.3):
     """One mesh with play, loaded by 0.5: it parts at resonance."""
     system = MechanicalSystem(ONE, 0.06 * ONE, 0.0 * ONE, ONE, np.array([0.5]), ("x",))
-    return NonlinearSystem(
-        system, (GearMeshes(np.array([0]), FourierSeries([[1.0, depth]]), backlash=backlash),)
-    )
+    return NonlinearSystem(system, (GearMeshes(np.array([0]), FourierSeries([[1.0, depth]]), backlash=backlash),))
 
 
 def test_gear_pair_with_backlash_bends_over_twice():
@@ -177,9 +175,7 @@ def test_subharmonic_motions_of_order_three_form_an_isola():
     """Nayfeh and Mook, Nonlinear Oscillations (1979), section 4.2.2: none grows out of the forced motion."""
     options = {"harmonics": 9, "scale": 1.0, "options": StepOptions(largest=0.2)}
     loops = [
-        frequency_response_curve(
-            subharmonic(), ends, start_at=w, start=on_the_loop(w, a), stability=k == 0, **options
-        )
+        frequency_response_curve(subharmonic(), ends, start_at=w, start=on_the_loop(w, a), stability=k == 0, **options)
         for k, (ends, w, a) in enumerate(
             [((0.9, 2.3), 1.6, 3.2369), ((2.3, 0.9), 1.2, 1.5102), ((0.9, 2.3), 1.8, 3.7703)]
         )
@@ -207,8 +203,13 @@ def test_motion_on_the_isola_is_what_integration_in_time_settles_on():
     times = period * (40 + np.arange(64) / 64)
     run = solve_ivp(
         lambda t, y: [y[1], 4.0 * np.cos(4.8 * t) - 0.05 * y[1] - y[0] - 0.2 * y[0] ** 3],
-        (0.0, times[-1]), start, method="DOP853", rtol=1e-9, atol=1e-10, t_eval=times,
-    )  # fmt: skip
+        (0.0, times[-1]),
+        start,
+        method="DOP853",
+        rtol=1e-9,
+        atol=1e-10,
+        t_eval=times,
+    )
     settled = 2.0 * abs(np.fft.rfft(run.y[0])[1]) / 64
     assert settled == pytest.approx(first(found.deflection), rel=2e-3)
 
@@ -287,9 +288,7 @@ def test_two_masses_with_stops_against_integration_in_time(stops, hertz, leg):
     i = part[np.argmin(np.abs(stops.parameter[part] - 2 * np.pi * hertz))]
     solution, omega = stops.solutions[i], stops.parameter[i]
     lines = displacements(problem, solution)
-    start = 1.01 * np.concatenate(
-        [lines.sum(axis=1).real, (1j * solution.line_frequency * lines).sum(1).real]
-    )
+    start = 1.01 * np.concatenate([lines.sum(axis=1).real, (1j * solution.line_frequency * lines).sum(1).real])
     system, gap, soft = problem.system, 1e-4, 1e-6
     (k1, k2, k3), (c1, c2, c3) = ((m[0, 0], m[0, 1], m[1, 1]) for m in (system.K, system.C))
 
@@ -322,9 +321,7 @@ def test_motions_that_lost_their_symmetry_form_a_closed_loop(stops):
 def test_sharp_corners_of_sampled_contact_are_passed():
     """Without smoothing the first samples in contact turn the tangent by 0.4 rad at once, at 85.8 Hz."""
     problem = two_masses(0.0, between=True, forced=1)
-    found = frequency_response_curve(
-        problem, TWO_HZ, harmonics=9, stability=False, options=StepOptions(max_points=150)
-    )
+    found = frequency_response_curve(problem, TWO_HZ, harmonics=9, stability=False, options=StepOptions(max_points=150))
     assert found.message.startswith("stopped") and found.parameter[-1] > 2 * np.pi * 86.0
     corrected = np.delete(found.residual, found.branch_points)
     assert corrected.max() < 1e-10 and found.residual.max() < 1e-7

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
-from validation.reference.mode_energy import motion_planes
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes, solve_modes, whirl
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.system import MechanicalSystem, damping_matrix
+from validation.reference.mode_energy import motion_planes
 
 NO_MESH = np.zeros(0)
 
@@ -19,9 +19,7 @@ def plain(M, K, C=None, G=None):
     n = len(M)
     C = np.zeros((n, n)) if C is None else np.asarray(C, float)
     names = tuple(f"q{i}" for i in range(n))
-    return MechanicalSystem(
-        np.asarray(M, float), C, np.asarray(K, float), np.zeros((n, 0)), np.zeros(n), names, G
-    )
+    return MechanicalSystem(np.asarray(M, float), C, np.asarray(K, float), np.zeros((n, 0)), np.zeros(n), names, G)
 
 
 def rotating_mass(speed, *, m=2.0, k=800.0, damping=0.0):
@@ -71,9 +69,7 @@ def test_single_mass_with_damping_of_every_size():
         if zeta < 1.0:
             assert modes.frequency == pytest.approx([10.0 / (2 * np.pi)])
             assert modes.damping_ratio == pytest.approx([zeta], abs=1e-13)
-            assert modes.eigenvalue.imag / (2 * np.pi) == pytest.approx(
-                modes.frequency * np.sqrt(1 - zeta**2)
-            )
+            assert modes.eigenvalue.imag / (2 * np.pi) == pytest.approx(modes.frequency * np.sqrt(1 - zeta**2))
     with pytest.raises(ConvergenceError, match="E-SOLVE"):
         complex_modes(plain([[1.0]], [[100.0]], [[20.0]]), NO_MESH)
 
@@ -99,9 +95,7 @@ def test_vectors_solve_their_equations_and_are_biorthonormal():
     x, y = np.hstack([modes.right, modes.right.conj()]), np.hstack([modes.left, modes.left.conj()])
     pencil = poles[:, None, None] ** 2 * system.M + poles[:, None, None] * D + stiffness
     size = np.linalg.norm(pencil, axis=(1, 2))
-    assert np.abs(np.einsum("pij,jp->pi", pencil, x)).max(axis=1) == pytest.approx(
-        0.0 * size, abs=1e-10 * size.max()
-    )
+    assert np.abs(np.einsum("pij,jp->pi", pencil, x)).max(axis=1) == pytest.approx(0.0 * size, abs=1e-10 * size.max())
     left = np.abs(np.einsum("ip,pij->pj", y.conj(), pencil)).max(axis=1) / np.linalg.norm(y, axis=0)
     assert left.max() < 1e-10 * size.max()
     gram = (poles[:, None] + poles[None, :]) * (y.conj().T @ system.M @ x) + y.conj().T @ D @ x
@@ -115,11 +109,7 @@ def test_left_vectors_are_the_right_ones_of_the_reversed_rotation():
     modes, back = complex_modes(system, k, speed=2.0), complex_modes(system, k, speed=-2.0)
     assert modes.eigenvalue == pytest.approx(back.eigenvalue, rel=1e-11)
     left, right = modes.left.conj(), back.right
-    cosine = (
-        np.abs((left.conj() * right).sum(axis=0))
-        / np.linalg.norm(left, axis=0)
-        / np.linalg.norm(right, axis=0)
-    )
+    cosine = np.abs((left.conj() * right).sum(axis=0)) / np.linalg.norm(left, axis=0) / np.linalg.norm(right, axis=0)
     assert cosine == pytest.approx(np.ones(7), rel=1e-10)
 
 
@@ -163,9 +153,7 @@ def test_planar_set_at_rest_and_with_small_speed():
     assert rest.frequency == pytest.approx(real.frequency, rel=1e-9, abs=1e-6)
     system = gear_set_system(data, carrier_speed=speed)
     turning = complex_modes(system, k, speed=speed)
-    assert (
-        np.abs(turning.eigenvalue[turning.paired].imag - 2 * np.pi * real.frequency[1:]).max() <= 1.01 * speed
-    )
+    assert np.abs(turning.eigenvalue[turning.paired].imag - 2 * np.pi * real.frequency[1:]).max() <= 1.01 * speed
     sense = whirl(turning.right[:, turning.paired], np.diag(system.M), motion_planes(system.dofs))
     # central members on round supports: each pair has a forward and a backward mode
     pair = np.flatnonzero(np.abs(real.frequency[1:] - 727.2673) < 0.01)

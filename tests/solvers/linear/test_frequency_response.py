@@ -6,6 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.solvers.linear.modal import complex_modes, solve_modes
+from femgear.solvers.linear.receptance import modal_response
+from femgear.stages.lumped_set import gear_set_modes
+from femgear.system.mesh_directions import gear_set_system
+from femgear.system.system import MechanicalSystem
 from validation.reference.frequency_response import (
     complex_modal_response,
     direct_response,
@@ -13,13 +20,6 @@ from validation.reference.frequency_response import (
     resonance_peaks,
     unit_force,
 )
-
-from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import complex_modes, solve_modes
-from femgear.solvers.linear.receptance import modal_response
-from femgear.system.mesh_directions import gear_set_system
-from femgear.system.system import MechanicalSystem
-from femgear.trains.rigid import gear_set_modes
 
 NO_MESH = np.zeros(0)
 
@@ -53,9 +53,7 @@ def test_superposition_agrees_with_the_direct_solution(geared_chain):
     modes = solve_modes(geared_chain, k, damping_ratio=np.array([0.01, 0.02, 0.03, 0.05]))
     inputs = np.column_stack([geared_chain.W, unit_force(geared_chain, "a", "d")])
     outputs = np.vstack([np.eye(4), geared_chain.W.T])
-    direct = direct_response(
-        geared_chain, f, inputs, outputs, mesh_stiffness=k, damping_ratio=modes.damping_ratio
-    )
+    direct = direct_response(geared_chain, f, inputs, outputs, mesh_stiffness=k, damping_ratio=modes.damping_ratio)
     assert difference(modal_response(geared_chain, modes, f, inputs, outputs), direct) < 1e-10
 
 
@@ -124,17 +122,13 @@ def test_mesh_error_response_is_the_solution_of_the_equations(geared_chain):
     system, k = chain_with_damping(geared_chain, [1.0, 1.4], 0.03 * np.eye(4))
     draw = np.random.default_rng(5)
     error = draw.normal(size=(2, 3)) + 1j * draw.normal(size=(2, 3))
-    found = mesh_error_response(
-        system, [0.07, 0.11], error, mesh_stiffness=k, harmonics=[1, 2, 5], outputs=np.eye(4)
-    )
+    found = mesh_error_response(system, [0.07, 0.11], error, mesh_stiffness=k, harmonics=[1, 2, 5], outputs=np.eye(4))
     assert found.output.shape == (2, 3, 4)
     for i, f in enumerate((0.07, 0.11)):
         for j, h in enumerate((1, 2, 5)):
             w, q = 2 * np.pi * f * h, found.output[i, j]
             assert found.deflection[i, j] == pytest.approx(system.W.T @ q, rel=1e-12)
-            rest = (
-                -(w**2) * system.M @ q + 1j * w * system.C @ q + system.K @ q + system.W @ found.force[i, j]
-            )
+            rest = -(w**2) * system.M @ q + 1j * w * system.C @ q + system.K @ q + system.W @ found.force[i, j]
             assert np.abs(rest).max() < 1e-12
             assert found.force[i, j] == pytest.approx(k * (system.W.T @ q - error[:, j]), rel=1e-12)
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from validation.reference.guyan import choose_masters, condensation_error, condense
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.system import MechanicalSystem
+from validation.reference.guyan import choose_masters, condensation_error, condense
 
 
 @pytest.fixture
@@ -33,9 +33,13 @@ def test_statics_of_loads_on_masters_are_exact(chain):
 def test_two_masses_in_closed_form():
     """Fixed - k - m1 - k - m2: with m2 as master, q1 = q2 / 2, M = m2 + m1 / 4, K = k / 2."""
     system = MechanicalSystem(
-        np.diag([2.0, 3.0]), np.zeros((2, 2)), np.array([[8.0, -4.0], [-4.0, 4.0]]), np.zeros((2, 0)),
-        np.array([1.0, 5.0]), (),
-    )  # fmt: skip
+        np.diag([2.0, 3.0]),
+        np.zeros((2, 2)),
+        np.array([[8.0, -4.0], [-4.0, 4.0]]),
+        np.zeros((2, 0)),
+        np.array([1.0, 5.0]),
+        (),
+    )
     reduction = condense(system, [1])
     assert reduction.system.M[0, 0] == pytest.approx(3.5)
     assert reduction.system.K[0, 0] == pytest.approx(2.0)

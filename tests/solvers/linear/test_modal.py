@@ -81,9 +81,13 @@ def test_multiple_eigenvalue_is_not_cut(planet_set):
 def test_damping_from_a_proportional_matrix(geared_chain):
     stiffness = geared_chain.K + (geared_chain.W * [1.0, 1.4]) @ geared_chain.W.T
     system = MechanicalSystem(
-        geared_chain.M, 0.01 * geared_chain.M + 0.02 * stiffness, geared_chain.K, geared_chain.W,
-        geared_chain.load, geared_chain.dofs,
-    )  # fmt: skip
+        geared_chain.M,
+        0.01 * geared_chain.M + 0.02 * stiffness,
+        geared_chain.K,
+        geared_chain.W,
+        geared_chain.load,
+        geared_chain.dofs,
+    )
     modes = solve_modes(system, [1.0, 1.4])
     omega = 2 * np.pi * modes.frequency
     np.testing.assert_allclose(modes.damping_ratio, 0.005 / omega + 0.01 * omega, rtol=1e-10)
@@ -103,9 +107,7 @@ def test_outputs_of_few_modes_follow_those_of_all(planet_set, planet_excitation)
         outputs.append(output_response(modes, response, rows @ modes.shape, residual=residual, load=load))
         if count is None:
             assert np.abs(residual).max() < 1e-10
-            np.testing.assert_allclose(
-                np.einsum("om,smh->soh", rows @ modes.shape, response.modal), outputs[0]
-            )
+            np.testing.assert_allclose(np.einsum("om,smh->soh", rows @ modes.shape, response.modal), outputs[0])
     assert np.abs(outputs[0] - outputs[1]).max() < 1e-5 * np.abs(outputs[0]).max()
 
 
@@ -189,9 +191,7 @@ def test_weak_strain_of_a_rigid_mode_is_still_refused():
 def test_no_multiple_frequency_is_cut(size, apart, kept):
     """Squares 1, 2, 2 (1 + apart) and 5 times a size: two modes are asked for."""
     stiffness = size * np.diag([5.0, 2.0, 1.0, 2.0 * (1.0 + apart)])
-    system = MechanicalSystem(
-        np.eye(4), np.zeros((4, 4)), stiffness, np.eye(4, 1), np.zeros(4), ("a", "b", "c", "d")
-    )
+    system = MechanicalSystem(np.eye(4), np.zeros((4, 4)), stiffness, np.eye(4, 1), np.zeros(4), ("a", "b", "c", "d"))
     modes = solve_modes(system, [0.0], damping_ratio=0.0, count=2)
     wanted = size * np.array([1.0, 2.0, 2.0])[:kept]
     np.testing.assert_allclose((2.0 * np.pi * modes.frequency) ** 2, wanted, rtol=2e-6)
@@ -206,9 +206,13 @@ def test_rounding_chooses_neither_sign_nor_pair():
     for noise in (0.0, 1e-15):
         stiffness = 0.5 * (K + K.T) * (1.0 + noise * rng.normal(size=(n, n)))
         system = MechanicalSystem(
-            M=np.eye(n), C=np.zeros((n, n)), K=0.5 * (stiffness + stiffness.T), W=np.zeros((n, 1)),
-            load=np.zeros(n), dofs=tuple(map(str, range(n))),
-        )  # fmt: skip
+            M=np.eye(n),
+            C=np.zeros((n, n)),
+            K=0.5 * (stiffness + stiffness.T),
+            W=np.zeros((n, 1)),
+            load=np.zeros(n),
+            dofs=tuple(map(str, range(n))),
+        )
         shape = solve_modes(system, np.ones(1), damping_ratio=0.0).shape
         for pair in ([0], [1, 2], [3], [4, 5, 6]):
             # the projector on the space of the modes knows nothing of their choice

@@ -7,15 +7,6 @@ import pytest
 from published.planetary_sets import lin_parker_set
 from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
-from validation.reference.mode_approaches import approaches, coupling_factor, mac
-from validation.reference.mode_energy import (
-    body_groups,
-    gear_set_springs,
-    kinetic_shares,
-    motion_planes,
-    stiffness_of,
-    strain_shares,
-)
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import complex_modes
@@ -27,10 +18,19 @@ from femgear.solvers.linear.tracking import (
     oscillating,
     track_modes,
 )
+from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.mode_kinds import gear_set_kinds
 from femgear.system.system import MechanicalSystem
-from femgear.trains.rigid import gear_set_modes
+from validation.reference.mode_approaches import approaches, coupling_factor, mac
+from validation.reference.mode_energy import (
+    body_groups,
+    gear_set_springs,
+    kinetic_shares,
+    motion_planes,
+    stiffness_of,
+    strain_shares,
+)
 
 # two masses 1 on springs 1 + p and 2 - p, joined by kc: eigenvalues 1.5 + kc -+ sqrt((p - 1/2)^2 + kc^2)
 SPLIT = np.diag([1.0, -1.0])
@@ -52,9 +52,7 @@ def real_family(stiffness, mass):
 @pytest.mark.parametrize("steps", [2, 4, 9])
 def test_known_veering(kc, steps):
     """Even one step over the veering is not taken for a crossing."""
-    tracked = track_modes(
-        real_family(lambda p: pair(p, kc), np.eye(2)), np.linspace(0.1, 0.9, steps), np.eye(2)
-    )
+    tracked = track_modes(real_family(lambda p: pair(p, kc), np.eye(2)), np.linspace(0.1, 0.9, steps), np.eye(2))
     assert tracked.unresolved == () and tracked.agreement.min() >= 0.9
     low = tracked.frequency[:, 0]
     exact = np.sqrt(1.5 + kc - np.sqrt((tracked.value - 0.5) ** 2 + kc**2)) / (2 * np.pi)
@@ -106,9 +104,7 @@ def planet_veering(data, near):
 
     def distance(k):
         stiffness = meshes + np.diag([k, k, 0.0])
-        return np.diff(np.sqrt(np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(mass, mass)))))[1] / (
-            2 * np.pi
-        )
+        return np.diff(np.sqrt(np.linalg.eigvalsh(stiffness / np.sqrt(np.outer(mass, mass)))))[1] / (2 * np.pi)
 
     best = minimize_scalar(distance, bounds=(0.7 * near, 1.4 * near), method="bounded")
     return best.x, best.fun
@@ -215,9 +211,13 @@ def test_critical_speeds_converge():
 def test_campbell_of_the_planar_set():
     data = lin_parker_set(3)
     found = campbell_data(
-        lambda speed: gear_set_system(data, carrier_speed=speed), np.linspace(0.0, 300.0, 4),
-        data.mesh_stiffness, orders=[73.0], count=17, planes=motion_planes(gear_set_system(data).dofs),
-    )  # fmt: skip
+        lambda speed: gear_set_system(data, carrier_speed=speed),
+        np.linspace(0.0, 300.0, 4),
+        data.mesh_stiffness,
+        orders=[73.0],
+        count=17,
+        planes=motion_planes(gear_set_system(data).dofs),
+    )
     assert found.tracked.unresolved == ()
     # translational pairs split into one forward and one backward mode
     first = np.flatnonzero(np.abs(found.frequency[0] - 743.1639) < 0.01)
@@ -267,9 +267,7 @@ def test_energy_of_two_masses_by_hand():
     assert strain["ground"] == pytest.approx([1.0, 1.0 / 9.0])
     # complex shapes count with their mean over a period
     assert strain_shares(parts, shape * np.exp(0.3j))["joint"] == pytest.approx([0.0, 8.0 / 9.0])
-    assert kinetic_shares(np.diag([3.0, 1.0]), shape, {"a": [0], "b": [1]})["a"] == pytest.approx(
-        [0.75, 0.75]
-    )
+    assert kinetic_shares(np.diag([3.0, 1.0]), shape, {"a": [0], "b": [1]})["a"] == pytest.approx([0.75, 0.75])
     with pytest.raises(CaseError, match="E-SHAPE"):
         kinetic_shares(np.eye(2), shape, {"a": [0]})
 
@@ -318,9 +316,7 @@ def test_damping_ratio_is_the_cosine_of_the_eigenvalue():
     value = np.array([[-0.6 + 0.8j, 3.0 + 4.0j], [-5.0, 0.0], [10.0j, -0.03 + 0.04j]])
     tracked = TrackedModes(np.arange(3.0), np.ones(3, bool), value, np.ones((3, 2, 2)), np.ones((2, 2)), ())
     assert tracked.damping_ratio == pytest.approx(np.array([[0.6, -0.6], [1.0, 0.0], [0.0, 0.6]]))
-    assert tracked.frequency == pytest.approx(
-        np.array([[1.0, 5.0], [5.0, 0.0], [10.0, 0.05]]) / (2.0 * np.pi)
-    )
+    assert tracked.frequency == pytest.approx(np.array([[1.0, 5.0], [5.0, 0.0], [10.0, 0.05]]) / (2.0 * np.pi))
 
 
 def test_members_of_a_multiple_eigenvalue_are_found_whatever_their_rounding():

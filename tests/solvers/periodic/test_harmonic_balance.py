@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, root
 from scipy.special import ellipk
-from validation.reference.adapted_harmonics import adapt_harmonics
-from validation.reference.cornered_springs import PiecewiseSprings
 
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.periodic import harmonic_balance as newton
@@ -19,6 +17,8 @@ from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, harmonic_lines, harmonics_of, side_bands
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
+from validation.reference.adapted_harmonics import adapt_harmonics
+from validation.reference.cornered_springs import PiecewiseSprings
 
 
 def oscillator(*elements, damping=0.0, stiffness=0.0, load=0.0, forces=()):
@@ -30,9 +30,7 @@ def oscillator(*elements, damping=0.0, stiffness=0.0, load=0.0, forces=()):
 
 def duffing(force=0.18, damping=0.05, cubic=0.1):
     """``x'' + zeta x' + x + gamma x^3 = P cos Omega t``: example 1 of NLvib (Krack and Gross, 2019)."""
-    return oscillator(
-        PolynomialSprings([0], [[1.0, 0.0, cubic]]), damping=damping, forces=[(force, (1,))]
-    )  # fmt: skip
+    return oscillator(PolynomialSprings([0], [[1.0, 0.0, cubic]]), damping=damping, forces=[(force, (1,))])
 
 
 def first_line(amplitude, phase, count):
@@ -144,9 +142,14 @@ def test_linear_limit_is_the_spectral_solution(planet_set, planet_excitation):
     mean = excitation.stiffness.mean(axis=1)
     frequency = np.array([0.0, 0.05, 0.2, 0.35])
     wanted = solve_spectral(
-        solve_modes(system, mean, damping_ratio=0.03), excitation, frequency, excitation_harmonics=4,
-        response_harmonics=10, method="direct", tolerance=1e-12,
-    )  # fmt: skip
+        solve_modes(system, mean, damping_ratio=0.03),
+        excitation,
+        frequency,
+        excitation_harmonics=4,
+        response_harmonics=10,
+        method="direct",
+        tolerance=1e-12,
+    )
     system = replace(system, C=modal_damping(system, mean, 0.03))
     problem = NonlinearSystem(system, (gear_meshes(excitation, harmonics=4, separates=False),))
     for number, f in enumerate(frequency):
@@ -224,9 +227,7 @@ def test_derivative_of_a_polynomial_law_to_rounding():
     y = np.random.default_rng(1).standard_normal(balance.size)
     jacobian = balance.evaluate(y, [0.8])[1]
     for direction in np.eye(balance.size):
-        far, near, back, behind = (
-            balance.evaluate(y + step * direction, [0.8])[0] for step in (1.0, 0.5, -0.5, -1.0)
-        )
+        far, near, back, behind = (balance.evaluate(y + step * direction, [0.8])[0] for step in (1.0, 0.5, -0.5, -1.0))
         wanted = (8.0 * (near - back) - (far - behind)) / 6.0
         np.testing.assert_allclose(jacobian @ direction, wanted, atol=1e-12 * np.abs(jacobian).max())
 
@@ -268,15 +269,11 @@ def test_unknowns_and_lines_are_inverse():
 def test_parametric_duffing_of_another_package():
     """``x'' + 2 z x' + (1 + e cos wt) x + a x^3 = F cos wt`` solved with harmonicbalance 0.2.0 (PyPI)."""
     mesh = GearMeshes([0], FourierSeries([[1.0, 0.2]]), separates=False)
-    problem = oscillator(
-        mesh, PolynomialSprings([0], [[0.0, 0.0, 0.3]]), damping=0.1, forces=[(0.2, (1,))]
-    )  # fmt: skip
+    problem = oscillator(mesh, PolynomialSprings([0], [[0.0, 0.0, 0.3]]), damping=0.1, forces=[(0.2, (1,))])
     start = first_line(1.0, 0.0, 12)
     found = solve_harmonic_balance(problem, 1.1, harmonics=12, start=start)
     assert found.converged
-    np.testing.assert_allclose(
-        np.abs(found.deflection[0, 1:4]), [1.22096098, 0.02960864, 0.01465221], atol=1e-8
-    )
+    np.testing.assert_allclose(np.abs(found.deflection[0, 1:4]), [1.22096098, 0.02960864, 0.01465221], atol=1e-8)
     assert found.deflection[0, 0].real == pytest.approx(-0.0598195866, abs=1e-9)
 
 
@@ -294,9 +291,7 @@ def test_same_lines_as_the_package_harmonicbalance():
     begin = Fourier(0.0, np.eye(n)[0], 0.1 * np.eye(n)[0], omega=omega, n=n)
     theirs = Fourier.from_coeffs(root(equations, begin.coeffs(), tol=1e-12).x, omega)
     mesh = GearMeshes([0], FourierSeries([[1.0, 0.2]]), separates=False)
-    problem = oscillator(
-        mesh, PolynomialSprings([0], [[0.0, 0.0, 0.3]]), damping=0.1, forces=[(0.2, (1,))]
-    )  # fmt: skip
+    problem = oscillator(mesh, PolynomialSprings([0], [[0.0, 0.0, 0.3]]), damping=0.1, forces=[(0.2, (1,))])
     ours = solve_harmonic_balance(problem, omega, harmonics=n, start=first_line(1.0, 0.0, n))
     # its derivative turns (cos, sin) into (-omega sin, omega cos): the lines are cos + i sin
     wanted = np.append(theirs.coeff_dc, np.array(theirs.coeffs_cos) + 1j * np.array(theirs.coeffs_sin))

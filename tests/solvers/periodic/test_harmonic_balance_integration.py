@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
 from scipy.integrate import solve_ivp
-from validation.reference.cornered_springs import BearingSprings
 
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.stages.lumped_set import Bearings, MemberBearing, gear_set_problem
 from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, harmonic_lines, harmonics_of
 from femgear.system.mesh_directions import mesh_elements
@@ -21,7 +21,7 @@ from femgear.system.system import (
     element_forces,
     external_force,
 )
-from femgear.trains.rigid import Bearings, MemberBearing, gear_set_problem
+from validation.reference.cornered_springs import BearingSprings
 
 
 def state_of(problem, solution):
@@ -57,9 +57,14 @@ def periodic(problem, omega, state, *, rtol=1e-9, instants=256, count=20):
     for _ in range(6):
         start = np.column_stack([state, np.diag(size)])
         found = solve_ivp(
-            motion(problem, omega), (0.0, period), start.ravel(), method="DOP853", rtol=rtol,
-            atol=0.1 * rtol * np.repeat(size, 2 * n + 1), t_eval=times,
-        ).y.reshape(2 * n, 2 * n + 1, -1)  # fmt: skip
+            motion(problem, omega),
+            (0.0, period),
+            start.ravel(),
+            method="DOP853",
+            rtol=rtol,
+            atol=0.1 * rtol * np.repeat(size, 2 * n + 1),
+            t_eval=times,
+        ).y.reshape(2 * n, 2 * n + 1, -1)
         gap = found[:, 0, -1] - state
         if np.abs(gap / size).max() < 20.0 * rtol:
             return harmonics_of(problem.system.W.T @ found[:n, 0, :-1], count)
@@ -83,9 +88,7 @@ def difference(solution, lines):
 )
 def test_gear_pair_with_backlash(depth, frequency, backlash, sides):
     stiffness = FourierSeries([[1.0, depth, 0.3 * depth]])
-    system = MechanicalSystem(
-        np.eye(1), np.array([[0.1]]), np.zeros((1, 1)), np.eye(1), np.array([0.1]), ("x",)
-    )
+    system = MechanicalSystem(np.eye(1), np.array([[0.1]]), np.zeros((1, 1)), np.eye(1), np.array([0.1]), ("x",))
     problem = NonlinearSystem(system, (GearMeshes([0], stiffness, backlash=backlash),))
     found = solve_harmonic_balance(problem, frequency, harmonics=32, samples=16384)
     x = found.at(np.linspace(0.0, 2.0 * np.pi / frequency, 1000))
@@ -99,9 +102,7 @@ def test_gear_pair_with_backlash(depth, frequency, backlash, sides):
 
 def test_gear_pair_from_rest_settles_on_the_solution():
     """Long integration from rest, without knowledge of the solution."""
-    system = MechanicalSystem(
-        np.eye(1), np.array([[0.1]]), np.zeros((1, 1)), np.eye(1), np.array([0.1]), ("x",)
-    )
+    system = MechanicalSystem(np.eye(1), np.array([[0.1]]), np.zeros((1, 1)), np.eye(1), np.array([0.1]), ("x",))
     problem = NonlinearSystem(system, (GearMeshes([0], FourierSeries([[1.0, 0.3, 0.09]]), backlash=1.0),))
 
     def rate(t, y):
@@ -123,9 +124,11 @@ def test_planetary_set_with_backlash():
     mesh = 5e8 * np.array([1.0, 0.25, 0.075, 0.0375])
     stiffness = FourierSeries(mesh * np.exp(-2j * np.pi * phases[:, None] * np.arange(4)))
     problem = gear_set_problem(
-        data, meshes=mesh_elements(data, stiffness=stiffness, backlash=20e-6), torque=PlanarTorque(300.0),
+        data,
+        meshes=mesh_elements(data, stiffness=stiffness, backlash=20e-6),
+        torque=PlanarTorque(300.0),
         damping=0.03,
-    )  # fmt: skip
+    )
     omega = 2.0 * np.pi * 7400.0
     found = solve_harmonic_balance(problem, omega, harmonics=8)
     assert found.converged
@@ -157,9 +160,7 @@ def test_rotor_in_a_bearing_with_clearance(bearing):
 
 def test_double_well_works_about_its_own_reference():
     """Negative stiffness at rest; motion in one well."""
-    system = MechanicalSystem(
-        np.eye(1), np.array([[0.3]]), np.zeros((1, 1)), np.eye(1), np.zeros(1), ("x",)
-    )  # fmt: skip
+    system = MechanicalSystem(np.eye(1), np.array([[0.3]]), np.zeros((1, 1)), np.eye(1), np.zeros(1), ("x",))
     springs = PolynomialSprings([0], [[-1.0, 0.0, 1.0]])
     problem = NonlinearSystem(system, (springs,), (HarmonicForce([0.15], (1,)),))
     start = np.zeros((1, 17))
@@ -171,14 +172,10 @@ def test_double_well_works_about_its_own_reference():
 
 
 def test_two_tones_against_long_integration():
-    system = MechanicalSystem(
-        np.eye(1), np.array([[0.4]]), np.zeros((1, 1)), np.eye(1), np.zeros(1), ("x",)
-    )  # fmt: skip
+    system = MechanicalSystem(np.eye(1), np.array([[0.4]]), np.zeros((1, 1)), np.eye(1), np.zeros(1), ("x",))
     springs = PolynomialSprings([0], [[1.0, 0.0, 0.3]])
     frequency = np.array([0.7, 0.7 * np.sqrt(3.0)])
-    problem = NonlinearSystem(
-        system, (springs,), (HarmonicForce([0.4], (1, 0)), HarmonicForce([0.3], (0, 1)))
-    )
+    problem = NonlinearSystem(system, (springs,), (HarmonicForce([0.4], (1, 0)), HarmonicForce([0.3], (0, 1))))
     found = solve_harmonic_balance(problem, frequency, orders=harmonic_lines(13, 2))
     assert found.converged and found.tail < 1e-3
     combination = np.flatnonzero(np.all(found.orders == [2, 1], axis=1))[0]
@@ -186,10 +183,16 @@ def test_two_tones_against_long_integration():
     times = np.linspace(150.0, 750.0, 6001)
     run = solve_ivp(
         lambda t, y: [
-            y[1], 0.4 * np.cos(0.7 * t) + 0.3 * np.cos(frequency[1] * t) - 0.4 * y[1] - y[0] - 0.3 * y[0] ** 3
+            y[1],
+            0.4 * np.cos(0.7 * t) + 0.3 * np.cos(frequency[1] * t) - 0.4 * y[1] - y[0] - 0.3 * y[0] ** 3,
         ],
-        (0.0, 750.0), np.zeros(2), method="DOP853", rtol=1e-9, atol=1e-11, t_eval=times,
-    )  # fmt: skip
+        (0.0, 750.0),
+        np.zeros(2),
+        method="DOP853",
+        rtol=1e-9,
+        atol=1e-11,
+        t_eval=times,
+    )
     wave = np.exp(1j * times[:, None] * found.line_frequency)
     table = np.hstack([wave.real, -wave.imag[:, 1:]])
     fit = np.linalg.lstsq(table, run.y[0], rcond=None)[0]
@@ -203,17 +206,16 @@ def test_two_tones_against_long_integration():
 
 def test_commensurable_bases_give_the_one_base_signal():
     """A mesh frequency of three carrier frequencies: lines coincide in frequency, their sum is the signal."""
-    system = MechanicalSystem(
-        np.eye(1), np.array([[0.2]]), np.zeros((1, 1)), np.eye(1), np.array([0.3]), ("x",)
-    )
+    system = MechanicalSystem(np.eye(1), np.array([[0.2]]), np.zeros((1, 1)), np.eye(1), np.array([0.3]), ("x",))
     mesh = GearMeshes([0], FourierSeries([[1.0, 0.3]], (0, 1)), separates=False)
     cubic = PolynomialSprings([0], [[0.0, 0.0, 0.4]])
     problem = NonlinearSystem(system, (mesh, cubic), (HarmonicForce([0.2], (1, 0)),))
     two = solve_harmonic_balance(problem, [0.5, 1.5], orders=harmonic_lines(13, 2))
     one = replace(
-        problem, elements=(replace(mesh, stiffness=FourierSeries([[1.0, 0.3]], (3,))), cubic),
+        problem,
+        elements=(replace(mesh, stiffness=FourierSeries([[1.0, 0.3]], (3,))), cubic),
         forces=(HarmonicForce([0.2], (1,)),),
-    )  # fmt: skip
+    )
     single = solve_harmonic_balance(one, 0.5, harmonics=24)
     times = np.linspace(0.0, 4.0 * np.pi, 200)
     assert two.converged and single.converged

@@ -56,9 +56,7 @@ def test_either_way_gives_the_same_solution(load, monkeypatch):
     monkeypatch.setattr(solvers_periodic_harmonic_balance, "MANY", 0)
     products = solve_harmonic_balance(problem, [0.21, 1.3], orders=orders)
     assert direct.converged and products.converged
-    np.testing.assert_allclose(
-        products.deflection, direct.deflection, atol=1e-9 * abs(direct.deflection).max()
-    )
+    np.testing.assert_allclose(products.deflection, direct.deflection, atol=1e-9 * abs(direct.deflection).max())
 
 
 def test_the_matrix_helps_where_products_do_not_suffice(balance, monkeypatch):

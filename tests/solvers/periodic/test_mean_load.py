@@ -26,9 +26,7 @@ def pair(torque, **mesh):
 
 def one_mass(load, stiffness=0.0, **mesh):
     """A mass on a support with one contact; static deflections follow from balance."""
-    system = MechanicalSystem(
-        np.eye(1), 0.1 * np.eye(1), stiffness * np.eye(1), np.eye(1), np.array([load]), ("x",)
-    )
+    system = MechanicalSystem(np.eye(1), 0.1 * np.eye(1), stiffness * np.eye(1), np.eye(1), np.array([load]), ("x",))
     return NonlinearSystem(system, (GearMeshes([0], FourierSeries([[1.0, 0.1]]), **mesh),))
 
 
@@ -122,9 +120,7 @@ def test_a_steady_force_is_a_mean_load(load, steady):
 
 
 def test_of_two_contacts_the_one_that_is_pulled_is_named():
-    two = MechanicalSystem(
-        np.eye(2), 0.1 * np.eye(2), np.zeros((2, 2)), np.eye(2), np.array([0.4, -0.1]), ("x", "y")
-    )
+    two = MechanicalSystem(np.eye(2), 0.1 * np.eye(2), np.zeros((2, 2)), np.eye(2), np.array([0.4, -0.1]), ("x", "y"))
     mesh = FourierSeries([[1.0, 0.1]])
     found = solve_harmonic_balance(
         NonlinearSystem(two, (GearMeshes([0], mesh), GearMeshes([1], mesh))), 1.3, harmonics=4

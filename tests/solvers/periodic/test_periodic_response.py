@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.parametric import NATURAL, one_pair, rectangular_monodromy
 
 from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
@@ -17,6 +16,7 @@ from femgear.solvers.stability.floquet import floquet_verdict, floquet_verdicts
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, harmonics_of
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
+from validation.parametric import NATURAL, one_pair, rectangular_monodromy
 
 ONE = np.ones((1, 1))
 
@@ -46,9 +46,12 @@ def test_fixed_point_that_converges_does_not_mean_stable(ratio, radius, multipli
         assert largest == pytest.approx(multiplier, abs=5e-4)
     modes, excitation = one_pair(0.03)
     linear = solve_spectral(
-        modes, excitation, np.array([ratio * NATURAL / (2.0 * np.pi)]), excitation_harmonics=40,
+        modes,
+        excitation,
+        np.array([ratio * NATURAL / (2.0 * np.pi)]),
+        excitation_harmonics=40,
         response_harmonics=80,
-    )  # fmt: skip
+    )
     assert found.spectral_radius == pytest.approx(linear.spectral_radius[0], rel=1e-5)
 
 
@@ -56,16 +59,18 @@ def test_radius_of_two_coupled_meshes_equals_that_of_the_linear_solver(geared_ch
     excitation = chain_excitation(0.3)
     mean = excitation.stiffness.mean(axis=1)
     system = MechanicalSystem(
-        geared_chain.M, modal_damping(geared_chain, mean, 0.04), geared_chain.K, geared_chain.W,
-        geared_chain.load, geared_chain.dofs,
-    )  # fmt: skip
+        geared_chain.M,
+        modal_damping(geared_chain, mean, 0.04),
+        geared_chain.K,
+        geared_chain.W,
+        geared_chain.load,
+        geared_chain.dofs,
+    )
     problem = NonlinearSystem(system, (gear_meshes(excitation, harmonics=3, separates=False),))
     modes = solve_modes(geared_chain, mean, damping_ratio=0.04)
     frequency = np.array([0.05, 0.12, 0.2, 0.31])
     linear = solve_spectral(modes, excitation, frequency, excitation_harmonics=3, response_harmonics=10)
-    found = [
-        solve_harmonic_balance(problem, 2.0 * np.pi * f, harmonics=10).spectral_radius for f in frequency
-    ]
+    found = [solve_harmonic_balance(problem, 2.0 * np.pi * f, harmonics=10).spectral_radius for f in frequency]
     np.testing.assert_allclose(found, linear.spectral_radius, rtol=1e-8)
 
 

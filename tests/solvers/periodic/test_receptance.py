@@ -41,9 +41,7 @@ def chain(n=6, *, damping="proportional", gyroscopic=False, ground=(0.5,), seed=
         C[2, 2], C[3, 3] = 0.2, 0.4
     skew = rng.standard_normal((n, n))
     load = rng.standard_normal(n) if ground else np.zeros(n)
-    system = MechanicalSystem(
-        M, C, K, W, load, tuple("abcdefghij"[:n]), skew - skew.T if gyroscopic else None
-    )
+    system = MechanicalSystem(M, C, K, W, load, tuple("abcdefghij"[:n]), skew - skew.T if gyroscopic else None)
     force = rng.standard_normal(n) + 1j * rng.standard_normal(n)
     return NonlinearSystem(system, (springs,), (HarmonicForce(force, (2,)),), speed=0.3)
 

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import ellipk
-from validation.reference.cornered_springs import PiecewiseSprings
-from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping
@@ -19,6 +17,8 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings, RadialBearings
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
+from validation.reference.cornered_springs import PiecewiseSprings
+from validation.reference.free_vibration import solve_free_vibration
 
 # Omega = 1.2 of NLvib example 01 (Krack and Gross, Harmonic Balance for Nonlinear Vibration Problems, 2019)
 DUFFING = {
@@ -97,18 +97,12 @@ def test_gear_pair_with_backlash_against_integration_and_harmonic_balance(gear_p
     assert x.min() < 0.0 < x.max()
     times = found.period * np.arange(5)
     start = found.displacement, found.velocity
-    again = solve_transient(
-        gear_pair, omega, times, start=start, method="DOP853", events=True, tolerance=1e-12
-    )
+    again = solve_transient(gear_pair, omega, times, start=start, method="DOP853", events=True, tolerance=1e-12)
     np.testing.assert_allclose(again.displacement[:, 0], found.displacement[0], atol=1e-8 * np.abs(x).max())
-    balance = solve_harmonic_balance(
-        gear_pair, omega, harmonics=60, start=found.solution.deflection, samples=2048
-    )
+    balance = solve_harmonic_balance(gear_pair, omega, harmonics=60, start=found.solution.deflection, samples=2048)
     largest = np.abs(found.solution.deflection[:, 1:]).max()
     assert balance.converged
-    np.testing.assert_allclose(
-        balance.deflection[:, :20], found.solution.deflection[:, :20], atol=1e-5 * largest
-    )
+    np.testing.assert_allclose(balance.deflection[:, :20], found.solution.deflection[:, :20], atol=1e-5 * largest)
     # mean force balances the load
     assert force[0, 0].real == pytest.approx(0.4, abs=1e-5)
 
@@ -130,18 +124,14 @@ def test_planet_set_with_backlash_against_harmonic_balance(planet_set, planet_ex
     excitation = planet_excitation([0, 1 / 3, 2 / 3, 0.2, 0.2 + 1 / 3, 0.2 + 2 / 3], depth=0.5)
     excitation = replace(excitation, backlash=np.full(6, 0.5))
     system = planet_set(3)
-    system = replace(
-        system, C=modal_damping(system, excitation.stiffness.mean(axis=1), 0.03), load=0.3 * system.load
-    )
+    system = replace(system, C=modal_damping(system, excitation.stiffness.mean(axis=1), 0.03), load=0.3 * system.load)
     problem = NonlinearSystem(system, (gear_meshes(excitation, harmonics=3),))
     found = solve_shooting(problem, 1.9, harmonics=24, settle=60, integration=1e-9, tolerance=1e-8)
     balance = solve_harmonic_balance(problem, 1.9, harmonics=24, start=found.solution.deflection)
     assert found.solution.at(np.linspace(0.0, found.period, 200)).min() < 0.0
     assert found.solution.converged and balance.converged
     largest = np.abs(balance.deflection[:, 1:]).max()
-    np.testing.assert_allclose(
-        found.solution.deflection[:, :9], balance.deflection[:, :9], atol=1e-5 * largest
-    )
+    np.testing.assert_allclose(found.solution.deflection[:, :9], balance.deflection[:, :9], atol=1e-5 * largest)
 
 
 def test_a_limit_cycle_finds_its_own_amplitude_and_period():

@@ -20,16 +20,9 @@ def series(amplitudes, angle):
 
 def integrate(system, excitation, modes, frequency, harmonics, instants=64):
     """Periodic mesh deflections by DOP853 and linear shooting in physical coordinates."""
-    k, s, f = (
-        harmonics_of(a, harmonics) for a in (excitation.stiffness, excitation.deflection, excitation.force)
-    )
+    k, s, f = (harmonics_of(a, harmonics) for a in (excitation.stiffness, excitation.deflection, excitation.force))
     n, omega = len(system.M), 2 * np.pi * frequency
-    damping = (
-        system.M
-        @ (modes.shape * (4 * np.pi * modes.frequency * modes.damping_ratio))
-        @ modes.shape.T
-        @ system.M
-    )
+    damping = system.M @ (modes.shape * (4 * np.pi * modes.frequency * modes.damping_ratio)) @ modes.shape.T @ system.M
     inverse = np.linalg.inv(system.M)
 
     def rate(t, y, forced):
@@ -77,9 +70,7 @@ def test_quasi_static_response_is_the_static_state(geared_chain, chain_excitatio
         response = solve_spectral(modes, excitation, [0.0, 1e-7], method=method, tolerance=1e-12)
         for h in range(7):
             expected = harmonics_of(excitation.deflection, 6)[:, h]
-            np.testing.assert_allclose(
-                response.deflection[:, :, h], [expected] * 2, atol=1e-6 * abs(expected).max()
-            )
+            np.testing.assert_allclose(response.deflection[:, :, h], [expected] * 2, atol=1e-6 * abs(expected).max())
             expected = harmonics_of(excitation.force, 6)[:, h]
             np.testing.assert_allclose(response.force[:, :, h], [expected] * 2, atol=2e-6)
         assert np.abs(response.deflection[:, :, 7:]).max() < 1e-6
@@ -89,9 +80,7 @@ def test_quasi_static_state_does_not_depend_on_the_stiffness_in_the_modes(geared
     excitation = chain_excitation(0.2)
     modes = solve_modes(geared_chain, [1.2, 1.1], damping_ratio=0.05)
     response = solve_spectral(modes, excitation, 0.0, tolerance=1e-12)
-    np.testing.assert_allclose(
-        response.deflection[0, :, :7], harmonics_of(excitation.deflection, 6), atol=1e-9
-    )
+    np.testing.assert_allclose(response.deflection[0, :, :7], harmonics_of(excitation.deflection, 6), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -120,9 +109,7 @@ def test_fixed_point_equals_direct_solution_where_it_contracts(geared_chain, cha
     modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
     frequency = np.linspace(0.01, 0.6, 60)
     direct = solve_spectral(modes, excitation, frequency, method="direct")
-    fixed = solve_spectral(
-        modes, excitation, frequency, method="fixed point", tolerance=1e-11, max_iterations=3000
-    )
+    fixed = solve_spectral(modes, excitation, frequency, method="fixed point", tolerance=1e-11, max_iterations=3000)
     contracts = direct.spectral_radius < 0.98
     np.testing.assert_array_equal(fixed.converged[contracts], True)
     scale = np.abs(direct.deflection).max(axis=(1, 2))[contracts]
@@ -144,9 +131,7 @@ def test_response_equals_time_integration(geared_chain, chain_excitation):
 
 
 def test_single_mass_equals_time_integration():
-    system = MechanicalSystem(
-        np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.ones(1), ("x",)
-    )
+    system = MechanicalSystem(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.ones(1), ("x",))
     stiffness = (1.0 + 0.3 * np.cos(2 * np.pi * np.arange(32) / 32))[None]
     excitation = MeshExcitation(stiffness, 1 / stiffness, np.ones_like(stiffness), np.zeros(1))
     modes = solve_modes(system, [1.0], damping_ratio=0.1)
@@ -213,8 +198,7 @@ def dense(problem):
     n, speeds, size = problem.source.shape
     units = np.eye(2 * n * size)[np.arange(2 * n * size) % (2 * size) != 1]
     columns = [
-        spectral._rows(spectral._apply(problem, spectral._lines(np.tile(unit, (speeds, 1)), n)))
-        for unit in units
+        spectral._rows(spectral._apply(problem, spectral._lines(np.tile(unit, (speeds, 1)), n))) for unit in units
     ]
     return np.stack(columns, axis=-1)[:, np.arange(2 * n * size) % (2 * size) != 1]
 
@@ -296,9 +280,7 @@ def test_nearly_identical_planets_meet_the_full_equations(planet_set, planet_exc
 
 
 @pytest.mark.parametrize(("ratio", "apart", "count"), [(0.001, 1e-10, 2), (0.001, 1e-6, 6), (0.05, 1e-6, 6)])
-def test_rounding_of_natural_frequencies_keeps_planets_equal(
-    planet_set, planet_excitation, ratio, apart, count
-):
+def test_rounding_of_natural_frequencies_keeps_planets_equal(planet_set, planet_excitation, ratio, apart, count):
     """At resonances with little damping it shows five hundred times as much; other planets stay others."""
     system = planet_set()
     mass = system.M.copy()
@@ -494,9 +476,7 @@ def test_speeds_of_different_harmonics_together_equal_those_alone(planet_set, pl
         modes, excitation, frequency, excitation_harmonics=excited, response_harmonics=3 * excited, **options
     )
     for i, (f, h) in enumerate(zip(frequency, excited)):
-        alone = solve_spectral(
-            modes, excitation, f, excitation_harmonics=h, response_harmonics=3 * h, **options
-        )
+        alone = solve_spectral(modes, excitation, f, excitation_harmonics=h, response_harmonics=3 * h, **options)
         for name in ("deflection", "force", "modal"):
             found, expected = getattr(together, name)[i], getattr(alone, name)[0]
             assert not found[..., 3 * h + 1 :].any()

@@ -6,9 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from validation.parametric import NATURAL, one_pair, rectangular_monodromy
-from validation.reference.branch_switching import branch_maximum
-from validation.reference.free_vibration import solve_free_vibration
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
@@ -38,6 +35,9 @@ from femgear.system.fourier import (
     side_bands,
 )
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from validation.parametric import NATURAL, one_pair, rectangular_monodromy
+from validation.reference.branch_switching import branch_maximum
+from validation.reference.free_vibration import solve_free_vibration
 
 ONE = np.ones((1, 1))
 
@@ -126,9 +126,7 @@ def test_loops_do_without_and_say_so(monkeypatch):
 
 
 def test_what_has_no_verdict_says_why():
-    problem = oscillator(
-        PolynomialSprings([0], [[1.0, 0.0, 0.1]]), forces=[(0.1, (1, 0)), (0.05, (0, 1))]
-    )  # fmt: skip
+    problem = oscillator(PolynomialSprings([0], [[1.0, 0.0, 0.1]]), forces=[(0.1, (1, 0)), (0.05, (0, 1))])
     found = solve_harmonic_balance(problem, [0.7, 0.7 * np.sqrt(3.0)], harmonics=4)
     assert found.stable is None and "not covered: a solution with several" in found.verdict.message
     assert 0.0 < found.spectral_radius < 1.0 and 0.0 < found.tail < 1.0
@@ -183,19 +181,13 @@ def test_free_rotation_and_free_phase_are_left_out_of_the_verdict():
     """A free shaft has two multipliers one, which rounding splits; a free vibration has its phase."""
     W = np.array([[1.0], [-1.0]])
     system = MechanicalSystem(np.diag([1.0, 2.0]), 0.05 * W @ W.T, np.zeros((2, 2)), W, np.zeros(2), ())
-    problem = NonlinearSystem(
-        system, (PolynomialSprings([0], [[1.0, 0.0, 0.1]]),), (HarmonicForce([0.2, -0.2]),)
-    )
+    problem = NonlinearSystem(system, (PolynomialSprings([0], [[1.0, 0.0, 0.1]]),), (HarmonicForce([0.2, -0.2]),))
     shot = solve_shooting(problem, 0.9)
     found = floquet_verdict(problem, solve_harmonic_balance(problem, 0.9, harmonics=12))
     assert len(shot.multipliers) == 4 and np.sum(np.abs(shot.multipliers - 1.0) < 1e-4) == 2
     assert len(shot.verdict.multipliers) == len(found.multipliers) == 2
-    np.testing.assert_allclose(
-        np.sort_complex(shot.verdict.multipliers), np.sort_complex(found.multipliers), atol=1e-7
-    )
-    free = solve_free_vibration(
-        oscillator(PolynomialSprings([0], [[1.0, 0.0, 1.0]]), damping=0.0), ([1.0], [0.0]), 4.8
-    )
+    np.testing.assert_allclose(np.sort_complex(shot.verdict.multipliers), np.sort_complex(found.multipliers), atol=1e-7)
+    free = solve_free_vibration(oscillator(PolynomialSprings([0], [[1.0, 0.0, 1.0]]), damping=0.0), ([1.0], [0.0]), 4.8)
     assert free.stable and not len(free.verdict.multipliers) and "phase" in free.verdict.message
 
 
@@ -209,9 +201,11 @@ def test_tail_of_what_does_not_fluctuate_is_zero():
     assert line_tail(np.array([[0.0, 3e-15, 0.0, 4e-15]]), orders) == pytest.approx(0.8)
     modes, excitation = one_pair(0.03)
     flat = replace(
-        excitation, stiffness=np.full_like(excitation.stiffness, excitation.stiffness.mean()),
-        deflection=np.zeros_like(excitation.deflection), force=np.zeros_like(excitation.force),
-    )  # fmt: skip
+        excitation,
+        stiffness=np.full_like(excitation.stiffness, excitation.stiffness.mean()),
+        deflection=np.zeros_like(excitation.deflection),
+        force=np.zeros_like(excitation.force),
+    )
     assert solve_spectral(modes, flat, [100.0], excitation_harmonics=3, response_harmonics=6).tail[0] == 0.0
 
 
@@ -329,9 +323,7 @@ def test_cubic_spring_alone_is_solved_with_the_reference_that_the_refusal_names(
 @pytest.mark.parametrize(("push", "drifts"), [(0.0, False), (0.4, True)])
 def test_a_mean_that_drifts_is_said(push, drifts, method):
     W = np.array([[1.0], [-1.0]])
-    system = MechanicalSystem(
-        np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), W, np.array([1.0, push - 1.0]), ("a", "b")
-    )
+    system = MechanicalSystem(np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), W, np.array([1.0, push - 1.0]), ("a", "b"))
     problem = NonlinearSystem(system, (PolynomialSprings([0], [[1.0]]),))
     times = np.linspace(0.0, 20.0, 11)
     found = solve_transient(problem, 1.0, times, method=method)

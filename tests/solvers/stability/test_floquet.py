@@ -160,9 +160,7 @@ def test_rigid_modes_are_left_out():
 
 def test_monodromy_multiplies_in_the_order_of_time():
     a, b = np.array([[0.0, 1.0], [0.0, 0.0]]), np.array([[0.0, 0.0], [1.0, 0.0]])
-    np.testing.assert_allclose(
-        monodromy([a, b], [2.0, 3.0]), np.array([[1, 0], [3, 1]]) @ np.array([[1, 2], [0, 1]])
-    )
+    np.testing.assert_allclose(monodromy([a, b], [2.0, 3.0]), np.array([[1, 0], [3, 1]]) @ np.array([[1, 2], [0, 1]]))
 
 
 @pytest.mark.parametrize("options", [{"steps": 3}, {"frequency_ratio": 0.5}, {"excitation_harmonics": 0}])

@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from validation.parametric import RATIO, SOFT, mathieu_monodromy, rectangular_monodromy
-from validation.reference.hill import hill_verdict
 
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -20,6 +18,8 @@ from femgear.solvers.stability.parametric import stability
 from femgear.system.force_laws import GearMeshes, PolynomialSprings, tangent_jumps
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem, gear_meshes
+from validation.parametric import RATIO, SOFT, mathieu_monodromy, rectangular_monodromy
+from validation.reference.hill import hill_verdict
 
 ONE = np.ones((1, 1))
 MEAN = RATIO + (1.0 - RATIO) * SOFT
@@ -130,9 +130,7 @@ def switches(solution):
         grid = np.linspace(0.0, 1.0, 2001)
         gap = lambda f, level=level: solution.at(f * period)[0] - level  # noqa: E731
         value = solution.at(grid * period)[:, 0] - level
-        found += [
-            brentq(gap, grid[i], grid[i + 1], xtol=1e-15) for i in np.flatnonzero(value[:-1] * value[1:] < 0)
-        ]
+        found += [brentq(gap, grid[i], grid[i + 1], xtol=1e-15) for i in np.flatnonzero(value[:-1] * value[1:] < 0)]
     return np.sort(found)
 
 
@@ -173,9 +171,14 @@ def test_verdicts_of_the_planet_set_equal_the_linear_solver(planet_set, planet_e
 def test_gyroscopic_terms_equal_time_integration():
     whirl = np.array([[0.0, -1.0], [1.0, 0.0]])
     system = MechanicalSystem(
-        np.diag([1.0, 2.0]), np.array([[0.05, 0.02], [0.02, 0.08]]), np.diag([0.3, 0.5]), np.eye(2),
-        np.array([1.0, 0.0]), ("x", "y"), whirl,
-    )  # fmt: skip
+        np.diag([1.0, 2.0]),
+        np.array([[0.05, 0.02], [0.02, 0.08]]),
+        np.diag([0.3, 0.5]),
+        np.eye(2),
+        np.array([1.0, 0.0]),
+        ("x", "y"),
+        whirl,
+    )
     mesh = GearMeshes(np.array([0, 1]), FourierSeries([[1.0, 0.5], [1.5, 0.3j]]), separates=False)
     problem, solution = pair(NonlinearSystem(system, (mesh,), speed=0.7), 1.3)
     verdict = floquet_verdict(problem, solution, tolerance=1e-11)
@@ -201,18 +204,14 @@ def test_combination_resonance_is_a_complex_pair():
 def test_no_verdict_is_never_stable(duffing):
     problem, solution = pair(duffing, 1.2, 5)
     assert floquet_verdict(problem, replace(solution, converged=False)).stable is None
-    both = replace(
-        solution, frequency=np.array([1.0, 1.3]), orders=np.column_stack([solution.orders, solution.orders])
-    )
+    both = replace(solution, frequency=np.array([1.0, 1.3]), orders=np.column_stack([solution.orders, solution.orders]))
     verdict = floquet_verdict(problem, both)
     assert verdict.stable is None and "not covered" in verdict.message and not len(verdict.multipliers)
 
 
 def test_kinds_of_loss():
     assert [loss_of(v) for v in (1.2 + 0j, -1.2 + 0j, 0.9 + 0.8j)] == ["fold", "flip", "Neimark-Sacker"]
-    constant_spring = oscillator(
-        0.1, (GearMeshes(np.array([0]), constant([1.0]), separates=False),), load=1.0
-    )
+    constant_spring = oscillator(0.1, (GearMeshes(np.array([0]), constant([1.0]), separates=False),), load=1.0)
     verdict = floquet_verdict(*pair(constant_spring, 0.7, 2))
     root = -0.05 + 1j * np.sqrt(1 - 0.05**2)
     np.testing.assert_allclose(abs(verdict.multipliers[0]), abs(np.exp(root * 2 * np.pi / 0.7)), rtol=1e-12)
@@ -236,9 +235,13 @@ def test_a_hundred_modes_are_followed():
     count = 103
     damping = np.linspace(0.02, 0.3, count)
     system = MechanicalSystem(
-        np.eye(count), np.diag(damping), np.diag(np.linspace(1.0, 3.0, count)), np.eye(count, 1),
-        np.zeros(count), tuple(f"x{i}" for i in range(count)),
-    )  # fmt: skip
+        np.eye(count),
+        np.diag(damping),
+        np.diag(np.linspace(1.0, 3.0, count)),
+        np.eye(count, 1),
+        np.zeros(count),
+        tuple(f"x{i}" for i in range(count)),
+    )
     mesh = GearMeshes([0], constant([0.001]), separates=False)
     problem = NonlinearSystem(system, (mesh,), (HarmonicForce(np.ones(count)),))
     solution = solve_harmonic_balance(problem, 1.3, harmonics=1, stability=False)

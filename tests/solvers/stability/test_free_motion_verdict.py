@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from small_trains import gear_pair
-from validation.reference.hill import hill_verdict
 
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
@@ -11,6 +10,7 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from validation.reference.hill import hill_verdict
 
 OMEGA, PERIOD = 0.7, 2 * np.pi / 0.7
 RELATIVE = np.array([[1.0, -1.0], [-1.0, 1.0]])

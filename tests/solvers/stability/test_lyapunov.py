@@ -7,7 +7,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from small_trains import example_pair, lightly_loaded_pair
-from validation.reference.adaptive_lyapunov import adaptive_exponents
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -16,6 +15,7 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.system.force_laws import GearMeshes, PolynomialSprings
 from femgear.system.fourier import FourierSeries, constant
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from validation.reference.adaptive_lyapunov import adaptive_exponents
 
 
 def oscillator(element, damping, force=0.0):
@@ -78,8 +78,7 @@ def test_chaotic_pair_by_tangents_and_by_neighbours():
     for place in (20, 80, 140, 200):
         q, v = found.section.displacement[place], found.section.velocity[place]
         runs = [
-            solve_transient(problem, 1.0, times, start=(q + d, v), method="DOP853", events=True)
-            for d in (0.0, 1e-9)
+            solve_transient(problem, 1.0, times, start=(q + d, v), method="DOP853", events=True) for d in (0.0, 1e-9)
         ]
         gap = np.hypot(*(getattr(runs[1], n) - getattr(runs[0], n) for n in ("displacement", "velocity")))
         rates.append(np.log(gap[-1, 0] / gap[1, 0]) / (times[-1] - times[1]))

@@ -3,8 +3,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.special import mathieu_a, mathieu_b
-from validation.parametric import NATURAL, RATIO, SOFT, rectangular_monodromy
-from validation.reference.stability_boundary import stability_boundary
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import solve_modes
@@ -12,6 +10,8 @@ from femgear.solvers.stability import parametric
 from femgear.solvers.stability.parametric import stability, stability_chart
 from femgear.system.fourier import FourierSeries, StepSeries
 from femgear.system.system import MechanicalSystem, NonlinearSystem
+from validation.parametric import NATURAL, RATIO, SOFT, rectangular_monodromy
+from validation.reference.stability_boundary import stability_boundary
 
 ONE = np.ones((1, 1))
 RECTANGLE = StepSeries([[1.0, SOFT]], [0.0, RATIO])
@@ -72,9 +72,7 @@ def test_chart_of_a_modal_basis_equals_the_linear_solver(geared_chain, chain_exc
     frequency = np.array([0.2, 2 * modes.frequency[3], modes.frequency[2] + modes.frequency[3]])
     chart = stability_chart(modes, excitation, 2 * np.pi * frequency, [0.5, 1.0])
     for column, depth in enumerate((0.3, 0.6)):
-        expected = stability(
-            modes, chain_excitation(depth), frequency, frequency_ratio=1e3, steps=400
-        ).modulus
+        expected = stability(modes, chain_excitation(depth), frequency, frequency_ratio=1e3, steps=400).modulus
         np.testing.assert_allclose(np.abs(chart.multiplier[:, column]), expected, rtol=1e-7)
 
 

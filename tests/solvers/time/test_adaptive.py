@@ -74,9 +74,7 @@ def test_a_switch_at_zero_is_where_its_rate_takes_it(size, pace):
     x = np.array([0.0, -0.3 * size, size])
     for rate in np.array([[2.0, -3.0, 0.0], [-2.0, 3.0, 0.0], [-2.0, -3.0, 0.0]]):
         (closed,) = _contacts(problem, x, np.zeros(1), pace * rate, events=True).closed
-        now, later = (
-            mesh.switches((x + t * (size or 1.0) * rate)[mesh.columns], np.zeros(1)) for t in (0.0, 0.01)
-        )
+        now, later = (mesh.switches((x + t * (size or 1.0) * rate)[mesh.columns], np.zeros(1)) for t in (0.0, 0.01))
         touching = np.abs(now) < 1e-15
         assert touching.sum() >= 2
         assert closed.tolist() == np.where(touching, later > 0.0, now > 0.0).tolist()
@@ -154,9 +152,7 @@ def test_steps_of_a_stiffness_are_borders_in_every_period():
         (3.1, [(3, 0.2), (1, 0.7), (3, 0.3), (1, 0.45)]),
     ):
         borders = begin + np.cumsum([duration for _, duration in parts])
-        pieces = list(
-            trajectory(moving, moving.state([0.4], [0.1]), begin, borders[-1], events=True, max_steps=400)
-        )
+        pieces = list(trajectory(moving, moving.state([0.4], [0.1]), begin, borders[-1], events=True, max_steps=400))
         ends = np.array([end for _, end, _ in pieces])
         assert np.abs(ends[:, None] - borders).min(axis=0).max() < 1e-12
         exact = np.array([0.4, 0.1])

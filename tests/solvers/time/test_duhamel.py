@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
-from validation.reference.force_history import modal_history, solve_force_history, state_history
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.solvers.time.steps import step_matrices
 from femgear.system.system import MechanicalSystem
+from validation.reference.force_history import modal_history, solve_force_history, state_history
 
 NATURAL = np.array([0.0, 0.4, 3.0, 3.0, 3.0, 40.0])
 RATIO = np.array([0.0, 0.05, 0.2, 1.0, 1.7, 0.01])
@@ -54,9 +54,7 @@ def test_rigid_and_critical_modes_have_their_closed_forms():
     t, step = 0.25 * np.arange(41), 0.25
     force = np.zeros((41, 2))
     force[:, 0] = 2.0 + 3.0 * t
-    y, v = modal_history(
-        [0.0, 3.0], [0.0, 1.0], step, force, start=(np.array([1.0, 1.0]), np.array([0.5, 0.0]))
-    )
+    y, v = modal_history([0.0, 3.0], [0.0, 1.0], step, force, start=(np.array([1.0, 1.0]), np.array([0.5, 0.0])))
     np.testing.assert_allclose(y[:, 0], 1.0 + 0.5 * t + t**2 + 0.5 * t**3, rtol=1e-13)
     np.testing.assert_allclose(v[:, 0], 0.5 + 2.0 * t + 1.5 * t**2, rtol=1e-13)
     np.testing.assert_allclose(y[:, 1], (1.0 + 3.0 * t) * np.exp(-3.0 * t), atol=1e-14)

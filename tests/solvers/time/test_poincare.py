@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from validation.reference.sections import bifurcation_diagram, stroboscopic_section
 
 from femgear.errors import CaseError
 from femgear.solvers.time.stroboscopic import stroboscopic_map
 from femgear.system.force_laws import PolynomialSprings
 from femgear.system.system import HarmonicForce, MechanicalSystem, NonlinearSystem
+from validation.reference.sections import bifurcation_diagram, stroboscopic_section
 
 
 def oscillator(c, k, *elements, force=None):
@@ -35,9 +35,12 @@ def test_bifurcation_diagram_carries_the_motion():
     assert diagram.repeats.tolist() == [1, 2]
     assert diagram.displacement.shape == (2, 16, 1)
     again = stroboscopic_section(
-        *two_wells(0.28), points=16, skip=100, steps=100,
+        *two_wells(0.28),
+        points=16,
+        skip=100,
+        steps=100,
         start=(diagram.displacement[0, -1], diagram.velocity[0, -1]),
-    )  # fmt: skip
+    )
     np.testing.assert_allclose(diagram.displacement[1], again.displacement, atol=1e-12)
 
 
@@ -46,9 +49,7 @@ def test_linear_motion_is_one_point_at_every_phase():
     problem, omega = oscillator(0.4, 2.0, force=1.0), 1.1
     line = 1.0 / (2.0 - omega**2 + 0.4j * omega)
     for phase in (0.0, 0.3):
-        section = stroboscopic_section(
-            problem, omega, points=4, skip=40, steps=100, phase=phase, method="modal"
-        )
+        section = stroboscopic_section(problem, omega, points=4, skip=40, steps=100, phase=phase, method="modal")
         wave = line * np.exp(2j * np.pi * phase)
         np.testing.assert_allclose(section.displacement[:, 0], wave.real, atol=1e-3)
         np.testing.assert_allclose(section.velocity[:, 0], (1j * omega * wave).real, atol=1e-3)

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from validation.reference.cornered_springs import BearingSprings, PiecewiseSprings
-from validation.reference.step_rules import numerical_damping, period_error
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import modal_damping
@@ -29,6 +27,8 @@ from femgear.system.system import (
     gear_meshes,
     tabulated_law,
 )
+from validation.reference.cornered_springs import BearingSprings, PiecewiseSprings
+from validation.reference.step_rules import numerical_damping, period_error
 
 RATIOS = np.array([0.01, 0.05, 0.1, 0.2])
 FIXED = (
@@ -63,9 +63,7 @@ def geared_set(planet_set, planet_excitation):
     excitation = planet_excitation([0, 1 / 3, 2 / 3, 0.2, 0.2 + 1 / 3, 0.2 + 2 / 3], depth=0.3)
     excitation = replace(excitation, backlash=np.full(6, 0.5))
     system = planet_set(3)
-    system = replace(
-        system, C=modal_damping(system, excitation.stiffness.mean(axis=1), 0.03), load=0.3 * system.load
-    )
+    system = replace(system, C=modal_damping(system, excitation.stiffness.mean(axis=1), 0.03), load=0.3 * system.load)
     return NonlinearSystem(system, (gear_meshes(excitation, harmonics=3),))
 
 
@@ -89,9 +87,7 @@ def test_marched_period_is_the_predicted_one():
         h = 0.1
         times = h * np.arange(550)
         # a start off the crest so that no step falls on a crossing
-        found = solve_transient(
-            oscillator(k=(2.0 * np.pi) ** 2), 0.0, times, start=([1.0], [0.3]), method=name, step=h
-        )
+        found = solve_transient(oscillator(k=(2.0 * np.pi) ** 2), 0.0, times, start=([1.0], [0.3]), method=name, step=h)
         x = found.displacement[:, 0]
         angle = np.angle(np.exp(2j * np.pi * h / (1.0 + period_error(rule, h))))
         # a free step obeys x_2 - 2 cos(angle) x_1 + x_0 = 0
@@ -161,9 +157,13 @@ def test_fox_goodwin_is_of_second_order_and_gamma_above_a_half_of_first():
 @pytest.mark.parametrize("method", ["DOP853", "Radau", "LSODA"])
 def test_adaptive_methods_reach_the_closed_form(method):
     found = solve_transient(
-        oscillator(1.0, 0.1, 4.0, force=1.0), 3.0, [0.0, 4.0, 10.0], start=([1.0], [0.0]), method=method,
+        oscillator(1.0, 0.1, 4.0, force=1.0),
+        3.0,
+        [0.0, 4.0, 10.0],
+        start=([1.0], [0.0]),
+        method=method,
         tolerance=1e-9,
-    )  # fmt: skip
+    )
     assert found.displacement[-1, 0] == pytest.approx(FORCED_END, abs=1e-7)
 
 
@@ -218,9 +218,7 @@ def test_modal_steps_are_exact_without_excess_forces(geared_chain):
     """Free motion of a linear system with meshes, one long step against the matrix exponential."""
     stiffness = np.array([1.0, 1.4])
     C = modal_damping(geared_chain, stiffness, 0.07)
-    system = MechanicalSystem(
-        geared_chain.M, C, geared_chain.K, geared_chain.W, np.zeros(4), geared_chain.dofs
-    )
+    system = MechanicalSystem(geared_chain.M, C, geared_chain.K, geared_chain.W, np.zeros(4), geared_chain.dofs)
     problem = NonlinearSystem(system, (GearMeshes([0, 1], constant(stiffness), separates=False),))
     q, v = np.array([1.0, -0.5, 0.3, 0.2]), np.array([0.1, 0.4, -0.2, 0.0])
     found = solve_transient(problem, 1.0, [0.0, 3.0, 6.0], start=(q, v), method="modal", step=3.0)
@@ -249,9 +247,7 @@ def test_planet_set_with_backlash_approaches_contact_events_by_the_square_of_the
     times = np.linspace(0.0, 4.0 * np.pi, 81)
     # the sun turns backwards at first, so that the drive flanks part
     start = np.zeros(15), np.where(np.arange(15) == 2, -0.6, 0.0)
-    exact = solve_transient(
-        geared_set, 1.0, times, start=start, method="DOP853", events=True, tolerance=1e-11
-    )
+    exact = solve_transient(geared_set, 1.0, times, start=start, method="DOP853", events=True, tolerance=1e-11)
     assert (exact.force[1:] == 0.0).sum() > 20 and (exact.force > 0.0).any()
     errors = []
     for count in (400, 1600):
@@ -260,9 +256,7 @@ def test_planet_set_with_backlash_approaches_contact_events_by_the_square_of_the
         assert found.converged and found.residual < 1e-9
         force, _ = element_forces(geared_set, found.deflection, times[:, None])
         np.testing.assert_allclose(found.force, force, atol=1e-14)
-        errors.append(
-            np.abs(found.displacement - exact.displacement).max() / np.abs(exact.displacement).max()
-        )
+        errors.append(np.abs(found.displacement - exact.displacement).max() / np.abs(exact.displacement).max())
     assert np.log2(errors[0] / errors[1]) / 2.0 == pytest.approx(2.0, abs=0.25)
     assert errors[1] < 1e-4
 
@@ -274,9 +268,14 @@ def test_free_vibration_over_a_dead_zone_with_contact_events(amplitude):
     period = 2.0 * np.pi + 4.0 / (amplitude - 1.0)
     times = period * np.arange(6)
     found = solve_transient(
-        oscillator(elements=[spring]), 0.0, times, start=([amplitude], [0.0]), method="DOP853",
-        events=True, tolerance=1e-13,
-    )  # fmt: skip
+        oscillator(elements=[spring]),
+        0.0,
+        times,
+        start=([amplitude], [0.0]),
+        method="DOP853",
+        events=True,
+        tolerance=1e-13,
+    )
     np.testing.assert_allclose(found.displacement[:, 0], amplitude, atol=1e-10)
     np.testing.assert_allclose(found.velocity, 0.0, atol=1e-9)
 
@@ -389,8 +388,6 @@ def test_a_singular_matrix_of_the_step_is_refused():
 def test_a_step_that_does_not_converge_ends_the_motion_with_a_message():
     """A spring that pulls ever harder outwards leaves no solution at the end of a long step."""
     spring = PolynomialSprings([0], [[0.0, -1.0]])
-    found = solve_transient(
-        oscillator(elements=[spring]), 0.0, [0.0, 1.0, 50.0], start=([1.0], [0.0]), step=0.5
-    )
+    found = solve_transient(oscillator(elements=[spring]), 0.0, [0.0, 1.0, 50.0], start=([1.0], [0.0]), step=0.5)
     assert not found.converged and "shorten" in found.message
     assert np.isnan(found.displacement[-1]).all() and np.isfinite(found.displacement[1]).all()

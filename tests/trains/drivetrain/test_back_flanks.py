@@ -70,9 +70,7 @@ def on_elastic_pins(train):
     return replace(train, planetary=(train.planetary[0].changed(planet_bearing=1e9),))
 
 
-@pytest.mark.parametrize(
-    ("train", "turning"), [(helical(TRAIN), True), (on_elastic_pins(helical(TRAIN)), False)]
-)
+@pytest.mark.parametrize(("train", "turning"), [(helical(TRAIN), True), (on_elastic_pins(helical(TRAIN)), False)])
 def test_back_flanks_are_the_drive_flanks_of_the_other_driver(train, turning):
     one, two = (drivetrain_model(t, turning=turning) for t in (train, other_drivers(train)))
     both, drive = one.contacts.geometry, two.geometry
@@ -87,9 +85,7 @@ def test_back_flanks_are_the_drive_flanks_of_the_other_driver(train, turning):
     assert np.abs(back + front).max() > 0.1 * np.abs(front).max()
 
 
-@pytest.mark.parametrize(
-    ("train", "turning"), [(helical(TRAIN), True), (on_elastic_pins(helical(TRAIN)), False)]
-)
+@pytest.mark.parametrize(("train", "turning"), [(helical(TRAIN), True), (on_elastic_pins(helical(TRAIN)), False)])
 def test_elements_of_the_general_solvers_have_the_same_contacts(train, turning):
     """Forces on all coordinates at a random place, from the normals of both drivers."""
     one, two = (drivetrain_model(t, turning=turning, harmonics=0) for t in (train, other_drivers(train)))
@@ -235,8 +231,7 @@ def test_thinned_records_are_those_of_all_steps():
     model = drivetrain_model(TRAIN)
     options = {"duration": 0.2, "step": 1e-4, "speed": 0.63, "start": "zero", "contact_loss": True}
     every, tenth = (
-        march_drivetrain(model, constant_torques(paper_torques()), records=Records(n), **options)
-        for n in (1, 10)
+        march_drivetrain(model, constant_torques(paper_torques()), records=Records(n), **options) for n in (1, 10)
     )
     assert np.array_equal(every.force[::10], tenth.force)
     assert np.array_equal(every.approach[::10], tenth.approach)

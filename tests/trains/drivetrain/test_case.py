@@ -130,7 +130,7 @@ def refused(case, **changes):
         ("simulation.contact_loss", "yes", "E-TYPE", "simulation.contact_loss"),
         ("model", 3, "E-TYPE", "model"),
     ],
-)  # fmt: skip
+)
 def test_refusals(own, key, value, code, named):
     error = refused(own, **{key: value})
     assert error.code == code

@@ -48,9 +48,7 @@ def test_the_fastest_speed_counts(own):
     assert warnings_of(still, "steps a period", "W-RECORD", "W-SPEED")[0] == set()
     fast = re.search(r"(\d+\.?\d*) Hz at (\d+\.?\d*) rpm", notes)
     rpm = 1480.0 + 60.0 / case_model(case).inertia * 2.0 * 30.0 / math.pi
-    assert float(fast[2]) == pytest.approx(rpm, rel=1e-4) and float(fast[1]) == pytest.approx(
-        23 * rpm / 60, rel=1e-3
-    )
+    assert float(fast[2]) == pytest.approx(rpm, rel=1e-4) and float(fast[1]) == pytest.approx(23 * rpm / 60, rel=1e-3)
 
 
 def test_speeds_that_run_away_are_said(own):
@@ -68,9 +66,7 @@ def test_steps_that_lower_the_modes_of_the_mesh_are_said(own):
     found, notes = warnings_of(with_value(own, "simulation.rate", "20 kHz"), "W-RATE", "steps a period")
     assert found == {"W-RATE"}
     hertz, percent = (float(re.search(text, notes)[1]) for text in (r"mode of (\S+) Hz", r"by (\S+)%;"))
-    assert 1400.0 < hertz < 1450.0 and percent == pytest.approx(
-        100.0 * (math.pi * hertz / 20e3) ** 2 / 3, rel=0.05
-    )
+    assert 1400.0 < hertz < 1450.0 and percent == pytest.approx(100.0 * (math.pi * hertz / 20e3) ** 2 / 3, rel=0.05)
     fast = re.search(r"; (\S+) Hz lowers it by 1%, (\S+) Hz by 0.1%", notes)
     assert float(fast[2]) / float(fast[1]) == pytest.approx(math.sqrt(10.0), rel=0.01)
     for rate, said in ((float(fast[1]) * 0.98, {"W-RATE"}), (float(fast[1]) * 1.01, set())):
@@ -173,9 +169,7 @@ def test_chains_too_large_for_dense_matrices_are_refused():
         {
             "model": "drivetrain",
             "title": "long",
-            "body": [
-                {"name": f"b{i}", "inertia": "1 kg m^2", "mass": "1 kg", "tilts": False} for i in range(n)
-            ],
+            "body": [{"name": f"b{i}", "inertia": "1 kg m^2", "mass": "1 kg", "tilts": False} for i in range(n)],
             "shaft": [
                 {"between": [f"b{i}", f"b{i + 1}"], "length": "1 m", "outer_diameter": "9 cm", "elements": 20}
                 for i in range(n - 1)
@@ -199,10 +193,7 @@ def test_stiffness_that_the_series_makes_negative_is_refused(own, paper):
     assert -0.12 < least / (3e8 / 0.68) < -0.07
     assert check_drivetrain(with_value(own, "parallel[0].mesh.low_share", 0.2))
     mesh = {"stiffness": "0.73e8 N/m", "contact_ratio": 1.9, "low_share": 1e-3}
-    assert (
-        refused_model(with_value(paper, "planetary[0].ring_mesh", mesh)).key
-        == "planetary[0].ring_mesh.low_share"
-    )
+    assert refused_model(with_value(paper, "planetary[0].ring_mesh", mesh)).key == "planetary[0].ring_mesh.low_share"
 
 
 def test_teeth_of_planets_are_compared():

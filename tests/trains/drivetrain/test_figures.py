@@ -113,8 +113,9 @@ def results(contact="linear", last=1.0, step=1e-4):
             "mesh_force": (("variant", "time", "mesh"), np.ones((1, 2001, 1))),
             "lost": (("variant", "mesh"), [[0.0123]]),
         },
-        both | mesh, {"step": step, "every": 10, "filter": "low pass", "contact": contact},
-    )  # fmt: skip
+        both | mesh,
+        {"step": step, "every": 10, "filter": "low pass", "contact": contact},
+    )
     frequency = np.linspace(0.0, 500.0, 1001)
     spectrum = xr.Dataset(
         {

@@ -84,9 +84,7 @@ def test_borders_of_the_principal_instability():
     """Mathieu's equation: a = 4 / ratio^2, q = 2 share / ratio^2 between b_1 and a_1 grow."""
     model = pair(harmonics=1)
     share = abs(model.stiffness[0, 1]) / model.mean_stiffness[0]
-    borders = [
-        brentq(lambda r, f=f: 4.0 / r**2 - f(1, 2.0 * share / r**2), 1.5, 2.5) for f in (mathieu_a, mathieu_b)
-    ]
+    borders = [brentq(lambda r, f=f: 4.0 / r**2 - f(1, 2.0 * share / r**2), 1.5, 2.5) for f in (mathieu_a, mathieu_b)]
     assert borders[1] - borders[0] == pytest.approx(share, rel=0.02)
     w = natural(model)
     peak = run_at(model, 2.0).growth
@@ -146,9 +144,7 @@ def test_nothing_but_the_spin_has_no_growth():
         (BodySection.in_si(name="a", mass=10.0, inertia=0.2, tilts=False),),
         bearings=(BearingSection.in_si(body="a", radial=math.inf),),
     )
-    run = march_drivetrain(
-        drivetrain_model(train), constant_torques({"a": 1.0}), duration=0.1, step=1e-3, speed=1.0
-    )
+    run = march_drivetrain(drivetrain_model(train), constant_torques({"a": 1.0}), duration=0.1, step=1e-3, speed=1.0)
     assert math.isnan(run.growth) and run.spin_speed[-1] == pytest.approx(1.5)
 
 
@@ -169,9 +165,7 @@ def test_gain_of_a_run_through_a_resonance():
         return [y[1], -2.0 * damping * w * y[1] - stiffness(t) * y[0]]
 
     times = np.arange(0.0, duration, PIECE * step)
-    x, v = solve_ivp(
-        rate, (0.0, duration), [0.0, 1.0], t_eval=times, rtol=1e-9, atol=1e-13, method="DOP853"
-    ).y
+    x, v = solve_ivp(rate, (0.0, duration), [0.0, 1.0], t_eval=times, rtol=1e-9, atol=1e-13, method="DOP853").y
     sizes = 0.5 * np.log(v * v + np.array([stiffness(t) for t in times.tolist()]) * x * x)
     wanted = (sizes - np.minimum.accumulate(sizes)).max()
     assert math.log(run.gain) == pytest.approx(wanted, rel=5e-3) and wanted > math.log(1e3)

@@ -97,8 +97,7 @@ def at(model, q, body):
 def test_order_of_the_bodies_does_not_matter(torque):
     """Motor at the origin, fan along x; the radial force T / r tan(alpha) pushes the two apart."""
     (one, q, force), (two, p, other) = (
-        driven(make(), sign * torque, "motor", "fan")
-        for make, sign in ((motor_and_fan, 1.0), (fan_and_motor, -1.0))
+        driven(make(), sign * torque, "motor", "fan") for make, sign in ((motor_and_fan, 1.0), (fan_and_motor, -1.0))
     )
     # the first body turns forwards in either file, so that the second is its mirror image about x
     wanted = 60.0 / (0.0345 * math.cos(ALPHA))
@@ -151,9 +150,7 @@ def test_planetary_set_is_pressed_by_either_driver(torque):
 def test_generator_as_motor_is_the_mirror_image():
     """Reversed torques: everything mirrored about the common line of centres, planets 2 and 3 exchanged."""
     train = replace(TRAIN, parallel=tuple(one.changed(direction=0.0) for one in TRAIN.parallel), gravity=0.0)
-    (one, q, force), (two, p, other) = (
-        driven(train, torque, "rotor", "generator") for torque in (15000.0, -15000.0)
-    )
+    (one, q, force), (two, p, other) = (driven(train, torque, "rotor", "generator") for torque in (15000.0, -15000.0))
     assert two.train.planetary[0].driver == "sun" and one.train == train
     assert [stage.driver for stage in two.train.parallel] == ["gear 2", "gear 3"]
     swap = {"planet 2": "planet 3", "planet 3": "planet 2"}

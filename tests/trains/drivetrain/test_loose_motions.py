@@ -54,10 +54,7 @@ def test_true_mechanisms_are_counted(own):
         bearings=(BearingSection.in_si(body="a", radial=1e8),),
     )
     assert loose_motions(hinge)[0] == 2
-    assert (
-        loose_motions(replace(hinge, bearings=(BearingSection.in_si(body="a", radial=1e8, tilt=1e-3),)))[0]
-        == 0
-    )
+    assert loose_motions(replace(hinge, bearings=(BearingSection.in_si(body="a", radial=1e8, tilt=1e-3),)))[0] == 0
     assert (
         loose_motions(
             replace(
@@ -71,9 +68,7 @@ def test_true_mechanisms_are_counted(own):
         == 0
     )
     assert (
-        loose_motions(
-            replace(hinge, bearings=(BearingSection.in_si(body="a", radial=math.inf, tilt=math.inf),))
-        )[0]
+        loose_motions(replace(hinge, bearings=(BearingSection.in_si(body="a", radial=math.inf, tilt=math.inf),)))[0]
         == 0
     )
 

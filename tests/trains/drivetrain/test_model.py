@@ -134,8 +134,7 @@ def test_stiff_bearings_tend_to_the_torsional_model():
     errors = []
     for stiff in (1e13, 1e14):
         bearings = tuple(
-            BearingSection.in_si(body=b.name, radial=stiff, tilt=stiff if b.tilts else 0.0)
-            for b in TRAIN.bodies
+            BearingSection.in_si(body=b.name, radial=stiff, tilt=stiff if b.tilts else 0.0) for b in TRAIN.bodies
         )
         model = drivetrain_model(replace(TRAIN, bearings=bearings, damping_ratio=0.0))
         k, system = model.mean_stiffness, model.system
@@ -176,9 +175,7 @@ def test_turning_directions_against_the_carrier_frame():
     train = planetary_stage()
     model = drivetrain_model(train, harmonics=0)
     lumped = planar_of(train, train.planetary[0])
-    lumped = replace(
-        lumped, carrier=replace(lumped.carrier, support=2e8), sun=replace(lumped.sun, support=3e7)
-    )
+    lumped = replace(lumped, carrier=replace(lumped.carrier, support=2e8), sun=replace(lumped.sun, support=3e7))
     system = gear_set_system(lumped, carrier_speed=speed)
     # x, y of carrier and sun, then rotations: u = r theta
     start = np.zeros(len(model.rigid))
@@ -226,9 +223,7 @@ def test_beam_shafts_tend_to_the_joint_of_springs():
         BearingSection.in_si(body="two", radial=2e7, tilt=1e5),
     )
     joint = drivetrain_model(
-        Drivetrain(
-            ends, (ShaftSection.in_si(between=("one", "two"), length=0.6, **section),), (), (), bearings
-        )
+        Drivetrain(ends, (ShaftSection.in_si(between=("one", "two"), length=0.6, **section),), (), (), bearings)
     )
     beam = drivetrain_model(
         Drivetrain(
@@ -277,9 +272,7 @@ def test_tilted_and_helical_mesh_by_virtual_work():
     normal = np.array([part["x"], part["y"], lean / math.hypot(1.0, lean)])
     assert np.linalg.norm(normal) == pytest.approx(1.0, rel=1e-12)
     arm = np.array([0.29 * math.cos(0.7), 0.29 * math.sin(0.7), 0.05])
-    assert [part["tilt x"], part["tilt y"], part["rotation"]] == pytest.approx(
-        np.cross(arm, normal), abs=1e-12
-    )
+    assert [part["tilt x"], part["tilt y"], part["rotation"]] == pytest.approx(np.cross(arm, normal), abs=1e-12)
     # radial share: sin of the pressure angle, towards the second gear
     assert normal @ np.append(arm[:2] / 0.29, 0.0) * math.hypot(1.0, lean) == pytest.approx(
         math.sin(stage.pressure_angle), rel=1e-12

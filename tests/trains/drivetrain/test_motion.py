@@ -43,9 +43,7 @@ def test_march_against_the_general_integrator():
     """The same steps by `solve_transient` on the same meshes, and far finer adaptive ones."""
     model = drivetrain_model(TRAIN)
     torques, speed, step = paper_torques(balanced=True), PRINTED.speed, 1e-4
-    run = march_drivetrain(
-        model, constant_torques(torques), duration=0.05, step=step, speed=speed, start="zero"
-    )
+    run = march_drivetrain(model, constant_torques(torques), duration=0.05, step=step, speed=speed, start="zero")
     problem = drivetrain_problem(model, torques=torques, speed=speed)
     zero = np.zeros(len(model.rigid))
     other = solve_transient(problem, model.frequencies(speed), run.time, start=(zero, zero), step=step)
@@ -59,7 +57,7 @@ def test_march_against_the_general_integrator():
         records=Records(16),
         speed=speed,
         start="zero",
-    )  # fmt: skip
+    )
     exact = solve_transient(
         problem, model.frequencies(speed), run.time, start=(zero, zero), method="DOP853", tolerance=1e-8
     )

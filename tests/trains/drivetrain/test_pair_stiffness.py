@@ -9,19 +9,23 @@ import pytest
 
 from femgear.case.text import write
 from femgear.errors import CaseError
+from femgear.stages.static import solve_static
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.case_file import pair_of
 from femgear.trains.drivetrain.figures import stiffness_figure
 from femgear.trains.drivetrain.model import case_model
 from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_values
-from femgear.trains.static.stages import solve_static
 
 CASES = Path(__file__).parents[3] / "cases"
 PAIR = {
-    "teeth = 24": "teeth = 23", "teeth = 36 ": "teeth = 71 ", '"91.5 mm"': '"142 mm"',
-    '# backlash = "0.1 mm"': 'backlash = "0.12 mm"', "positions = 64": "positions = 32",
-    'tip_diameter = "79.8 mm"': "", 'tip_diameter = "115.3786 mm"': "",
-}  # fmt: skip
+    "teeth = 24": "teeth = 23",
+    "teeth = 36 ": "teeth = 71 ",
+    '"91.5 mm"': '"142 mm"',
+    '# backlash = "0.1 mm"': 'backlash = "0.12 mm"',
+    "positions = 64": "positions = 32",
+    'tip_diameter = "79.8 mm"': "",
+    'tip_diameter = "115.3786 mm"': "",
+}
 ENTRY = "parallel[0].stiffness"
 
 
@@ -99,8 +103,7 @@ def test_flanks_without_play_have_no_back_side_and_it_is_said(chain):
     [
         ({"parallel[0].teeth": [24, 74]}, "E-TEETH", "parallel[0].teeth"),
         ({"parallel[0].module": "4 mm"}, "E-TEETH", "parallel[0].module"),
-        ({"parallel[0].module": None, "parallel[0].radii": ["35 mm", "108 mm"]}, "E-TEETH",
-         "parallel[0].radii"),
+        ({"parallel[0].module": None, "parallel[0].radii": ["35 mm", "108 mm"]}, "E-TEETH", "parallel[0].radii"),
         ({"parallel[0].pressure_angle": "25 deg"}, "E-TEETH", "parallel[0].pressure_angle"),
         ({"parallel[0].helix_angle": "10 deg"}, "E-TEETH", "parallel[0].helix_angle"),
         ({ENTRY: None}, "E-KEY-MISSING", "parallel[0].mesh"),
@@ -115,7 +118,7 @@ def test_flanks_without_play_have_no_back_side_and_it_is_said(chain):
         ({f"{ENTRY}.gear_1.errors": {"runout_amplitude": "5 um"}}, "E-RANGE", f"{ENTRY}.gear_1.errors"),
         ({f"{ENTRY}.set.centre_distance": "120 mm"}, "E-CENTRE-DISTANCE", f"{ENTRY}.set.centre_distance"),
     ],
-)  # fmt: skip
+)
 def test_refusals_name_the_entry(chain, changes, code, key):
     with pytest.raises(CaseError) as found:
         with_values(chain, changes)
@@ -125,6 +128,9 @@ def test_refusals_name_the_entry(chain, changes, code, key):
 def test_working_circles_are_sizes_of_the_same_gears(chain):
     """Pitch radii at the centre distance of the pair, with the pressure angle there."""
     radii, angle = (142.0 * 23 / 94, 142.0 * 71 / 94), np.degrees(np.arccos(141.0 / 142 * np.cos(np.pi / 9)))
-    changes = {"parallel[0].module": None, "parallel[0].radii": [f"{one:.4f} mm" for one in radii],
-               "parallel[0].pressure_angle": f"{angle:.4f} deg"}  # fmt: skip
+    changes = {
+        "parallel[0].module": None,
+        "parallel[0].radii": [f"{one:.4f} mm" for one in radii],
+        "parallel[0].pressure_angle": f"{angle:.4f} deg",
+    }
     assert with_values(chain, changes).parallel[0].stiffness == chain.parallel[0].stiffness

@@ -67,9 +67,7 @@ def test_speeds_of_the_late_part(model):
     found = speed_range(model, torques, duration=2.0, speed=50.0, start=0.7)
     speed, angle = run.spin_speed[late], run.spin[late]
     wanted = (speed[0], speed[-1], speed.min(), speed.max(), (angle[-1] - angle[0]) / 1.3)
-    assert (found.first, found.last, found.lowest, found.highest, found.mean) == pytest.approx(
-        wanted, rel=1e-5
-    )
+    assert (found.first, found.last, found.lowest, found.highest, found.mean) == pytest.approx(wanted, rel=1e-5)
     whole = speed_range(model, torques, duration=2.0, speed=50.0)
     assert abs(whole.mean - found.mean) > 0.5 and whole.lowest < found.lowest
 

@@ -188,11 +188,7 @@ def test_records_do_not_fold_back(own):
     def line(name, frequency):
         time, values = force[name]
         window = np.hanning(len(time))
-        return (
-            2.0
-            * abs((window * (values - values.mean())) @ np.exp(-2j * np.pi * frequency * time))
-            / window.sum()
-        )
+        return 2.0 * abs((window * (values - values.mean())) @ np.exp(-2j * np.pi * frequency * time)) / window.sum()
 
     mesh = 23 * 1480.0 / 60.0
     assert line("slow", mesh) == pytest.approx(line("fast", mesh), rel=1e-3)
@@ -345,9 +341,12 @@ def test_a_motion_beyond_sense_is_refused_though_its_books_are_exact(resonant):
 def test_impacts_that_the_steps_blow_up_are_refused():
     """Finer steps keep this motion at some 40 kN; coarse ones feed its impacts with energy."""
     run = SimpleNamespace(
-        contact_loss=True, gain=1e9, spin_speed=np.full(3, 10.0), velocity=np.array([[0.0, 5.0], [1.0, 9e4]]),
+        contact_loss=True,
+        gain=1e9,
+        spin_speed=np.full(3, 10.0),
+        velocity=np.array([[0.0, 5.0], [1.0, 9e4]]),
         outputs=("motor: rotation", "fan: rotation"),
-    )  # fmt: skip
+    )
     with pytest.raises(ConvergenceError, match="fan vibrates with 9e") as caught:
         _check_sense(run, "with bending", [1.0, 0.25])
     assert caught.value.code == "E-DIVERGED" and "simulation.rate" in caught.value.remedy
@@ -389,9 +388,7 @@ def keys_of(model) -> set[str]:
     while pending:
         for name, field in pending.pop().model_fields.items():
             found.add(field.alias or name)
-            pending += [
-                t for t in parts_of(field.annotation) if isinstance(t, type) and issubclass(t, BaseModel)
-            ]
+            pending += [t for t in parts_of(field.annotation) if isinstance(t, type) and issubclass(t, BaseModel)]
     return found
 
 

@@ -196,9 +196,7 @@ def test_no_loss_of_contact_is_the_linear_march():
     torques = constant_torques(paper_torques(balanced=True))
     for contact_loss in (False, True):
         runs.append(
-            march_drivetrain(
-                model, torques, duration=0.5, step=1e-4, speed=PRINTED.speed, contact_loss=contact_loss
-            )
+            march_drivetrain(model, torques, duration=0.5, step=1e-4, speed=PRINTED.speed, contact_loss=contact_loss)
         )
     assert runs[1].lost.max() == 0.0 and runs[1].force.min() > 0.0
     assert np.abs(runs[0].force - runs[1].force).max() < 1e-9 * runs[0].force.max()
@@ -210,9 +208,7 @@ def brute_force(flexibility, free, k):
     n = len(k)
     closed = np.arange(2**n)[:, None] // 2 ** np.arange(n) % 2 == 1
     slope = np.where(closed, k, 0.0)
-    u = np.linalg.solve(np.eye(n) + flexibility * slope[:, None, :], np.tile(free, (2**n, 1))[..., None])[
-        ..., 0
-    ]
+    u = np.linalg.solve(np.eye(n) + flexibility * slope[:, None, :], np.tile(free, (2**n, 1))[..., None])[..., 0]
     return u[np.where(closed, u >= 0.0, u < 0.0).all(axis=1)]
 
 

@@ -27,15 +27,20 @@ BASE = [0.5 * 0.045 * z * COSINE for z in (SUN, PLANET, RING)]
 
 def stage_of(**sizes):
     return PlanetarySection.in_si(
-        carrier="carrier", sun="sun", ring_teeth=RING, sun_teeth=SUN, planet_mass=100.0, planet_inertia=10.0,
-        sun_mesh=MESH, ring_mesh=MESH, **sizes,
-    )  # fmt: skip
+        carrier="carrier",
+        sun="sun",
+        ring_teeth=RING,
+        sun_teeth=SUN,
+        planet_mass=100.0,
+        planet_inertia=10.0,
+        sun_mesh=MESH,
+        ring_mesh=MESH,
+        **sizes,
+    )
 
 
 def train_of(stage):
-    bodies = tuple(
-        BodySection.in_si(name=name, inertia=10.0, mass=100.0, tilts=False) for name in ("carrier", "sun")
-    )
+    bodies = tuple(BodySection.in_si(name=name, inertia=10.0, mass=100.0, tilts=False) for name in ("carrier", "sun"))
     bearings = tuple(BearingSection.in_si(body=name, radial=1e9) for name in ("carrier", "sun"))
     return Drivetrain(bodies, planetary=(stage,), bearings=bearings)
 
@@ -56,8 +61,7 @@ def test_speeds_are_those_of_willis_by_the_teeth(way, bearing):
     train = train_of(stage)
     place = coordinates_of(train)
     spin = rigid_rotation(train, place)
-    carrier, sun, planet = (spin[i] for i in (place.body["carrier"] + 4, place.body["sun"] + 4,
-                                              place.planets[0][0, 2]))  # fmt: skip
+    carrier, sun, planet = (spin[i] for i in (place.body["carrier"] + 4, place.body["sun"] + 4, place.planets[0][0, 2]))
     assert sun / carrier == pytest.approx(1.0 + RING / SUN, rel=1e-12)
     assert (planet - carrier) / (sun - carrier) == pytest.approx(-SUN / PLANET, rel=1e-12)
     # the free spin presses no flank: base radii, centre distance and working angles belong together
@@ -83,9 +87,17 @@ def test_base_radii_are_those_of_the_teeth():
 
 def test_without_shift_nothing_changes():
     stage = PlanetarySection.in_si(
-        carrier="c", sun="s", ring_teeth=99, sun_teeth=21, planet_teeth=39, module=0.01, planet_mass=1.0,
-        planet_inertia=1.0, sun_mesh=MESH, ring_mesh=MESH,
-    )  # fmt: skip
+        carrier="c",
+        sun="s",
+        ring_teeth=99,
+        sun_teeth=21,
+        planet_teeth=39,
+        module=0.01,
+        planet_mass=1.0,
+        planet_inertia=1.0,
+        sun_mesh=MESH,
+        ring_mesh=MESH,
+    )
     assert stage.axis_distance == pytest.approx(0.3)
     assert (*stage.pitch_radii, stage.ring_radius) == pytest.approx((0.105, 0.195, 0.495))
     assert stage.working_angles == pytest.approx([math.radians(20.0)] * 2)
@@ -112,10 +124,13 @@ def test_a_distance_that_nobody_gave_is_said():
         ({"planet_teeth": None, "ring_teeth": 96}, "E-KEY-MISSING", "planet_teeth"),
         ({"planet_teeth": 38, "centre_distance": "250 mm"}, "E-CENTRE-DISTANCE", "centre_distance"),
         ({"centre_distance": "600 mm"}, "E-CENTRE-DISTANCE", "centre_distance"),
-        ({"module": None, "sun_radius": "107.8 mm", "planet_radius": "200.2 mm",
-          "centre_distance": "308 mm"}, "E-CHOICE", "centre_distance"),
+        (
+            {"module": None, "sun_radius": "107.8 mm", "planet_radius": "200.2 mm", "centre_distance": "308 mm"},
+            "E-CHOICE",
+            "centre_distance",
+        ),
     ],
-)  # fmt: skip
+)
 def test_what_makes_no_planets_is_refused(changes, code, key):
     with pytest.raises(FemgearError) as caught:
         grc(**changes)
@@ -126,7 +141,10 @@ def test_what_makes_no_planets_is_refused(changes, code, key):
 def test_true_base_radii_of_shifted_gears_are_read():
     base = [0.5 * 0.01 * z * math.cos(math.radians(24.6)) for z in (21, 38)]
     case = grc(
-        module=None, planet_teeth=38, sun_base_radius=f"{base[0]!r} m", planet_base_radius=f"{base[1]!r} m",
+        module=None,
+        planet_teeth=38,
+        sun_base_radius=f"{base[0]!r} m",
+        planet_base_radius=f"{base[1]!r} m",
         centre_distance="298 mm",
-    )  # fmt: skip
+    )
     assert case.planetary[0].base_radii == pytest.approx([*base, base[0] * 99 / 21])

@@ -14,13 +14,13 @@ from femgear.errors import CaseError
 from femgear.housing.orders import order_level
 from femgear.housing.sensor import stored_lines
 from femgear.housing.sound import pressure_level, stored_sound
+from femgear.stages.static import solve_static
 from femgear.trains.elastic import checks, stages
 from femgear.trains.elastic.checks import case_warnings, fixed_diameters, housing_warnings
 from femgear.trains.elastic.results import describe_housing, run_up_lines
 from femgear.trains.elastic.runup import describe_runup
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import parse_case, read_case, with_values
-from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 FEET = [
@@ -29,10 +29,15 @@ FEET = [
 ]
 NOTHING = ("radial_stiffness", "tangential_stiffness")
 SMALL = {
-    "static.positions": 8, "static.flank_elements": 6, "static.stresses": False, "housing.published": [],
-    "dynamics.mesh_harmonics": 2, "operation.speeds": ["400 rpm", "3100 rpm"], "runup.count": 0,
+    "static.positions": 8,
+    "static.flank_elements": 6,
+    "static.stresses": False,
+    "housing.published": [],
+    "dynamics.mesh_harmonics": 2,
+    "operation.speeds": ["400 rpm", "3100 rpm"],
+    "runup.count": 0,
     "dynamics.tolerance": 1e-8,
-}  # fmt: skip
+}
 WEAK = [{"angle": "10 deg", "radial_stiffness": "1 N/m", "tangential_stiffness": "1 N/m", "width": "9 mm"}]
 
 
@@ -241,12 +246,14 @@ def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path, monkey
     around = np.exp(1j * np.outer(2 * np.pi * np.arange(count) / count, np.arange(-top, top + 1))) / count
     at = np.real(around.conj() @ np.exp(1j * np.arange(-top, top + 1) * np.radians(20.0)))
     arrays = {
-        "natural_frequency": one.natural_frequency, "damping_ratio": one.damping_ratio, "ring_angle": angle,
+        "natural_frequency": one.natural_frequency,
+        "damping_ratio": one.damping_ratio,
+        "ring_angle": angle,
         "ring_shape": (one.ring_shape @ wave.T).real[..., None] * WAYS,
         "sensor_shape": (one.sensor_shape @ at)[:, None],
         "ring_compliance": (wave @ one.residual @ wave.conj().T).real,
         "sensor_compliance": (at @ one.sensor_residual @ wave.conj().T).real[None],
-    }  # fmt: skip
+    }
     np.savez(tmp_path / "ring.npz", **arrays)
     held = in_casing(tmp_path, {"file": "ring.npz"}, **{"housing.nodal_diameters": n_max} | undamped)
     ours, theirs = solve_housing(case, dynamics), heard(held, *before)
@@ -314,9 +321,7 @@ def test_both_ways_are_told_beside_one_way(before):
 
 def test_one_casing_in_three_kinds_of_files(before, folder):
     nodes = {"npz": "nodes_held.csv", "pch": "nodes.csv", "uff": "nodes_held.csv"}
-    held = {
-        kind: {"file": f"casing.{kind}", "nodes": one, "damping_ratio": 0.02} for kind, one in nodes.items()
-    }
+    held = {kind: {"file": f"casing.{kind}", "nodes": one, "damping_ratio": 0.02} for kind, one in nodes.items()}
     found = {kind: heard(in_casing(folder, table), *before) for kind, table in held.items()}
     names, lines = found["npz"].outputs["sensor"]
     assert names == ("top", "flange") and list(found) == ["npz", "pch", "uff"]
@@ -343,9 +348,7 @@ def test_one_casing_in_three_kinds_of_files(before, folder):
 def test_modes_that_lack_compliance_are_said(before, folder):
     """Modes of the example up to 900 Hz, without residual; matrices lack nothing, however few are kept."""
     with np.load(folder / "casing.npz") as arrays:
-        few = {
-            name: one[:3] if name.endswith(("frequency", "shape")) else one for name, one in arrays.items()
-        }
+        few = {name: one[:3] if name.endswith(("frequency", "shape")) else one for name, one in arrays.items()}
     np.savez(folder / "few.npz", **few)
     for table, codes in (
         ({"file": "few.npz"}, ["W-RESIDUAL"]),
@@ -397,11 +400,10 @@ def test_results_belong_to_what_the_files_hold(before, folder):
         ({"file": "casing.npz"}, {"housing.nodal_diameters": 7}, "E-COUNT", "housing.structure.file"),
         ({"file": "casing.npz", "nodes": "nodes.csv"}, {}, "E-SHAPE", "housing.structure.nodes"),
         ({"file": "casing.pch"}, {}, "E-KEY-MISSING", "housing.structure.nodes"),
-        ({"file": "casing.pch", "nodes": "nodes.csv"}, {}, "E-KEY-MISSING",
-         "housing.structure.damping_ratio"),
+        ({"file": "casing.pch", "nodes": "nodes.csv"}, {}, "E-KEY-MISSING", "housing.structure.damping_ratio"),
         ({"file": "casing.npz", "units": "inch"}, {}, "E-CHOICE", "housing.structure.units"),
     ],
-)  # fmt: skip
+)
 def test_refused_casings(before, folder, table, entries, code, key):
     with pytest.raises(CaseError) as error:
         solve_modes(in_casing(folder, table, **entries), before[0])
@@ -410,9 +412,7 @@ def test_refused_casings(before, folder, table, entries, code, key):
 
 def test_supports_side_by_side_are_allowed(before):
     touching = [{**FEET[0], "angle": f"{angle} deg", "width": "17.4 mm"} for angle in (355, 5)]
-    case = reference(
-        **{"housing.support": touching, "operation.speeds": ["400 rpm"], "dynamics.tolerance": 1e-9}
-    )
+    case = reference(**{"housing.support": touching, "operation.speeds": ["400 rpm"], "dynamics.tolerance": 1e-9})
     assert heard(case, *before).supported["two_way_residual"].max() < 1e-10
 
 

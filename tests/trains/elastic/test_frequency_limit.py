@@ -11,6 +11,7 @@ from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_lines
 from femgear.report.tables import pulling_meshes, pulls_of
 from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.stages.static import solve_static
 from femgear.trains.elastic.checks import dynamics_warnings, missing_level
 from femgear.trains.elastic.excitation_limit import HARMONICS, highest_excitation, limited
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs
@@ -22,7 +23,6 @@ from femgear.trains.elastic.stages import (
     solve_runup,
 )
 from femgear.trains.reading import read_case, with_value, with_values
-from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[3]
 
@@ -59,9 +59,7 @@ def levels(case, static, modes):
     return dynamics, order_level(solve_housing(case, dynamics).lines)
 
 
-def test_default_reaches_the_modes_of_the_meshes_and_the_level_has_converged(
-    case, static, modes, reference, steps
-):
+def test_default_reaches_the_modes_of_the_meshes_and_the_level_has_converged(case, static, modes, reference, steps):
     """Also by hand: the level with a limit of twice the frequency that is found."""
     dynamics, found = reference
     meshes = modes.modes.frequency[modes.modes.frequency < 16e3].max()
@@ -117,13 +115,9 @@ def test_speeds_too_slow_for_the_record_are_estimated_from_faster_ones(case, sta
     """At 60 rpm 512 harmonics end at 11 kHz, below the modes of the meshes; twice as many by hand."""
     slow = with_value(case, "operation.speeds", ["60 rpm", "250 rpm"])
     dynamics, found = levels(slow, static, modes)
-    assert (
-        dynamics.excitation_limit[0] == pytest.approx(512 * 21.6) and "at 60 rpm" in dynamics.findings[0].text
-    )
+    assert dynamics.excitation_limit[0] == pytest.approx(512 * 21.6) and "at 60 rpm" in dynamics.findings[0].text
     assert np.abs(dynamics.level_change[1]) < 1.0
-    wide = solve_spectral(
-        modes.modes, modes.excitation, [21.6], excitation_harmonics=1041, response_harmonics=1053
-    )
+    wide = solve_spectral(modes.modes, modes.excitation, [21.6], excitation_harmonics=1041, response_harmonics=1053)
     field = mesh_and_ring_outputs(modes, wide)[1]
     lines = fixed_sensor_lines(field, 108, np.array([dynamics.speeds[0].carrier]), 0.0)
     missing = 20 * np.log10(order_level(lines)[0] / found[0])
@@ -153,9 +147,7 @@ def test_only_a_noticeable_change_is_told():
     assert "at 200 rpm" in text and "-3.0 dB" in text and "1 of the 2 speeds" in text
 
 
-def test_results_of_another_case_are_refused_with_the_entries_that_differ(
-    case, static, modes, reference, steps
-):
+def test_results_of_another_case_are_refused_with_the_entries_that_differ(case, static, modes, reference, steps):
     """Every stage; entries on which a result does not depend may change."""
     dynamics, _ = reference
     for changes, stage, named in (
@@ -219,16 +211,12 @@ def test_meshes_that_pull_are_warned_of_by_result_and_file(case, torque):
     assert said == [one for one in dynamics_warnings(dynamics.dataset()) if one.code == "W-PULL"]
 
 
-SUPPORT = {
-    "angle": "35 deg", "radial_stiffness": "4e8 N/m", "tangential_stiffness": "2e8 N/m", "width": "20 mm"
-}  # fmt: skip
+SUPPORT = {"angle": "35 deg", "radial_stiffness": "4e8 N/m", "tangential_stiffness": "2e8 N/m", "width": "20 mm"}
 
 
 def held(case, **entries):
     """The ring on a support too, at one speed."""
-    return with_values(
-        case, {"housing.support": [SUPPORT], "housing.published": [], "runup.count": 0} | entries
-    )
+    return with_values(case, {"housing.support": [SUPPORT], "housing.published": [], "runup.count": 0} | entries)
 
 
 def test_a_ring_on_a_support_is_excited_as_far_as_on_its_foundation(case, static, modes):

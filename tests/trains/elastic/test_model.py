@@ -93,9 +93,7 @@ def bodies(*, motor=MOTOR, brake=BRAKE, bearing=PLANET.bearing_stiffness):
     """What `elastic_set` reads of a case."""
     planet = SimpleNamespace(mass=PLANET.mass, inertia=PLANET.inertia, bearing_stiffness=bearing)
     operation = SimpleNamespace(input="sun")
-    return SimpleNamespace(
-        sun=SUN, carrier=CARRIER, planet=planet, motor=motor, brake=brake, operation=operation
-    )
+    return SimpleNamespace(sun=SUN, carrier=CARRIER, planet=planet, motor=motor, brake=brake, operation=operation)
 
 
 def make(gears, ring, *, motor=MOTOR, brake=BRAKE, torque=TORQUE):
@@ -296,9 +294,7 @@ def test_ring_on_its_foundation_is_the_whole_ring_of_finite_elements():
         turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
         for axis in range(2):
             np.add.at(columns[:, n], 2 * nodes[18 * n] + axis, (load @ turn.T)[:, axis])
-    direct = columns.T @ splu(K.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(
-        columns
-    )
+    direct = columns.T @ splu(K.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}).solve(columns)
     teeth = 2 * np.pi * np.arange(3) / 3
     R = ring_displacement(ring.modes, model.ring_mode, model.ring_phase, teeth)
     omega2 = np.diag(model.system.K)[model.ring_slice]
@@ -387,11 +383,10 @@ def test_meshes_that_cannot_be_linearised_are_refused():
 
 def test_motor_and_brake_follow_the_driven_member():
     """With the carrier driven the motor hangs on the carrier and the brake on the sun."""
-    from validation.cases import reference_case
-
+    from femgear.stages.static import solve_static
     from femgear.trains.elastic.stages import solve_modes
     from femgear.trains.reading import with_value
-    from femgear.trains.static.stages import solve_static
+    from validation.cases import reference_case
 
     case = with_value(reference_case(), "operation.input", "carrier")
     case = with_value(with_value(case, "static.positions", 13), "static.flank_elements", 6)
@@ -470,9 +465,7 @@ def test_turning_terms_are_those_of_the_kinetic_energy(sector, ring):
         a, b = shown * rng.normal(size=(2, len(shown)))
         still = b @ system.M @ b / 2
         assert energy(0 * b, b) == pytest.approx(still, rel=1e-7)
-        assert cross(b, a) - cross(a, b) == pytest.approx(
-            a @ system.gyroscopic @ b, rel=1e-6, abs=1e-7 * still
-        )
+        assert cross(b, a) - cross(a, b) == pytest.approx(a @ system.gyroscopic @ b, rel=1e-6, abs=1e-7 * still)
         planets = 3 * 0.355 * 0.051**2 * speed**2 * b[place(model, "carrier: rotation")] ** 2
         centripetal = b @ (model.system.K - system.K) @ b + planets
         assert 2 * energy(b, 0 * b) == pytest.approx(centripetal, rel=1e-6)
@@ -556,9 +549,14 @@ def test_turning_set_with_a_rigid_ring_is_the_planar_set():
     gears, speed = gear_set(), 900.0
     # one mode that no mesh moves, above all others
     rigid = CyclicModes(
-        count=108, nodal_diameter=np.zeros(1, int), frequency=np.array([1e5]), load=np.zeros((1, 1)),
-        output=np.zeros((1, 2)), reduced=np.zeros((1, 1)), recovery=np.zeros((2, 1)),
-    )  # fmt: skip
+        count=108,
+        nodal_diameter=np.zeros(1, int),
+        frequency=np.array([1e5]),
+        load=np.zeros((1, 1)),
+        output=np.zeros((1, 2)),
+        reduced=np.zeros((1, 1)),
+        recovery=np.zeros((2, 1)),
+    )
     model = make(gears, RingModel(rigid, 0.0, np.zeros(1), np.zeros(1)), motor=None, brake=None)
     system = turning(model, speed)
     K = np.array(system.K)

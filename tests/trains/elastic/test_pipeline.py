@@ -5,21 +5,21 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validation.cases import reference_case
-from validation.reference.sensor_in_time import symmetry_leakage
 
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, order_level
 from femgear.housing.sensor import fixed_sensor_lines, heaviside_linear_lines, stored_lines
+from femgear.stages.static import solve_static
 from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.checks import max_nodal_diameter
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 from femgear.trains.elastic.results import _passing
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import parse_case, read_case, with_value, with_values
-from femgear.trains.static.stages import solve_static
+from validation.cases import reference_case
+from validation.reference.sensor_in_time import symmetry_leakage
 
 ROOT = Path(__file__).parents[3]
 
@@ -179,12 +179,8 @@ def test_the_default_signal_has_only_lines_of_the_ring(case, dynamics):
     # and so are those of the file, but for its single precision
     data = linear.dataset().isel(speed=1)
     stored, heard = stored_lines(data), linear.lines
-    assert (
-        np.abs(stored.acceleration - heard.acceleration[1]).max() < 1e-6 * np.abs(heard.acceleration[1]).max()
-    )
-    assert np.allclose(
-        order_level(stored_lines(data, form="exact")), order_level(housing.exact)[1], rtol=1e-7
-    )
+    assert np.abs(stored.acceleration - heard.acceleration[1]).max() < 1e-6 * np.abs(heard.acceleration[1]).max()
+    assert np.allclose(order_level(stored_lines(data, form="exact")), order_level(housing.exact)[1], rtol=1e-7)
 
 
 def test_the_verdict_tells_how_far_the_ring_moves_past_the_sensor(case, dynamics):

@@ -15,6 +15,8 @@ from femgear.report.style import excited_to
 from femgear.report.tables import Marks, describe_response
 from femgear.report.waterfall import campbell_diagram, order_cuts, runup_levels, waterfall
 from femgear.solvers.linear.resonances import unresolved
+from femgear.stages.static import solve_static, solve_stress
+from femgear.stages.static_results import describe_stress
 from femgear.storage.results import Manifest, Results
 from femgear.system.fourier import fluctuation, sample
 from femgear.trains.elastic.checks import runup_ends
@@ -23,8 +25,6 @@ from femgear.trains.elastic.runup import describe_runup, loudest, runup_warnings
 from femgear.trains.elastic.stages import ELASTIC, solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value, with_values
 from femgear.trains.registry import check_case, stages_of
-from femgear.trains.static.results import describe_stress
-from femgear.trains.static.stages import solve_static, solve_stress
 
 ROOT = Path(__file__).parents[3]
 
@@ -66,9 +66,7 @@ def test_at_its_speeds_it_is_the_dynamics_and_the_housing(case, static, modes, f
     force = dynamics.response.force
     peak = sample(force, 4 * force.shape[-1]).max(axis=-1)
     for kind, own in enumerate((slice(3), slice(3, 6))):
-        assert found.heard.force_rms[chosen, kind] == pytest.approx(
-            fluctuation(force)[:, own].max(axis=1), rel=1e-9
-        )
+        assert found.heard.force_rms[chosen, kind] == pytest.approx(fluctuation(force)[:, own].max(axis=1), rel=1e-9)
         # instants of another number of harmonics
         assert found.heard.force_peak[chosen, kind] == pytest.approx(peak[:, own].max(axis=1), rel=1e-3)
     assert np.isclose(found.input_speed / RPM, 3100.0).any()
@@ -99,18 +97,13 @@ def test_the_antisymmetric_ring_mode_has_its_nodes_at_the_meshes(modes, data):
     listed = set(data["mode"].values - 1)
     left_out = [i for i in near if i not in listed]
     assert len(left_out) == 1 and kinds[list(near).index(left_out[0])] == "ring, rotational"
-    assert (
-        np.abs(modes.modes.mesh_deflection[:, left_out[0]]).max()
-        < 1e-6 * np.abs(modes.modes.mesh_deflection).max()
-    )
+    assert np.abs(modes.modes.mesh_deflection[:, left_out[0]]).max() < 1e-6 * np.abs(modes.modes.mesh_deflection).max()
 
 
 def test_the_strongest_resonances_are_of_the_size_of_the_level(data):
     alone, level = data["resonance_alone"].values, data["resonance_level"].values
     strongest = np.argsort(-alone)[:10]
-    assert (alone[strongest] < 1.5 * level[strongest]).all() and (
-        alone[strongest] > 0.05 * level[strongest]
-    ).all()
+    assert (alone[strongest] < 1.5 * level[strongest]).all() and (alone[strongest] > 0.05 * level[strongest]).all()
     block = describe_runup(data)
     assert len(block.rows) == 12 and all(len(row) == len(block.header) for row in block.rows)
 
@@ -226,10 +219,7 @@ def test_the_verdict_states_factors_stresses_and_what_they_assume(case, files, f
     assert "static.members" not in notes and "at one instant" not in notes + " ".join(told)
     at_3100 = np.argmin(np.abs(found.input_speed / RPM - 3100.0))
     sun, ring = found.heard.dynamic_factor[at_3100]
-    assert (
-        told["largest dynamic factor K_v, at operating speeds"]
-        == f"sun-planet {sun:.3f}, planet-ring {ring:.3f}"
-    )
+    assert told["largest dynamic factor K_v, at operating speeds"] == f"sun-planet {sun:.3f}, planet-ring {ring:.3f}"
     assert told["planet load factor K_gamma"] == "sun-planet 1.000, planet-ring 1.000"
     nominal = files["stress"]["iso_root_stress"].values[0, 1]
     safety = 2 * 0.7 * 430e6 / (nominal * sun)
@@ -269,21 +259,14 @@ def test_the_verdict_says_what_shares_belong_to(case, files):
     unequal = files["static"].assign(load_share=share, largest_load_share=share.max("position"))
     one_off = files | {"static": unequal}
     rows, notes = told_of(case, one_off)
-    assert {"largest root stress, all centres held", "transmission error, peak to peak, all centres held"} < {
-        *rows
-    }
+    assert {"largest root stress, all centres held", "transmission error, peak to peak, all centres held"} < {*rows}
     assert "largest root stress, static" in told_of(case, files)[0]
-    assert (
-        "on supports and bearings; static stresses and load shares (static.members): all centres held"
-        in notes
-    )
+    assert "on supports and bearings; static stresses and load shares (static.members): all centres held" in notes
     assert "largest share 1.500 of the equal one, at one instant 1.500: there the teeth alone" in notes
     assert notes.count("K_gamma = ") == 0
     force = files["modes"]["supported_force"].values.copy()
     force[0, :5] *= 1.9
-    turning = files | {
-        "modes": files["modes"].assign(supported_force=(("mesh", "supported_position"), force))
-    }
+    turning = files | {"modes": files["modes"].assign(supported_force=(("mesh", "supported_position"), force))}
     rows = told_of(case, turning)[0]
     assert rows["planet load factor K_gamma"] == "sun-planet 1.000, planet-ring 1.000"
     # 1.9 of 1.9 + 1 + 1
@@ -308,16 +291,10 @@ def test_the_verdict_says_where_the_run_up_ends(case, files):
     runup.attrs["method"] = "supports"
     rows, notes = told_of(case, files | {"runup": runup, "housing": housing})
     assert rows["largest level of the run-up"] == "999 m/s² at 3500 rpm, the end of its range"
-    assert (
-        "in the housing that stands still" in describe_runup(runup).notes[-1]
-        and "mesh harmonics" not in notes
-    )
+    assert "in the housing that stands still" in describe_runup(runup).notes[-1] and "mesh harmonics" not in notes
     fast = 12 * 1116.0 / 1e3
     points = list(verdict(results_of(case, files | {"runup": runup, "housing": housing})))[1]
-    assert (
-        f"excitation up to 1.08 to {fast:.4g} kHz" in points.notes[-2]
-        and "of the ring alone" in points.notes[-1]
-    )
+    assert f"excitation up to 1.08 to {fast:.4g} kHz" in points.notes[-2] and "of the ring alone" in points.notes[-1]
     assert "equivalent radiated power" not in " ".join(points.notes)
     housing.attrs["method"] = "casing"
     points = list(verdict(results_of(case, files | {"housing": housing})))[1]
@@ -401,9 +378,7 @@ def test_numbers_whose_excitation_ends_short_are_marked_where_they_stand(case, s
     level, factor = runup.header.index("level [m/s²]"), runup.header.index("K_v")
     assert all(row[level].startswith("> ") and row[factor].endswith("†") for row in runup.rows)
     assert "largest level > " in " ".join(runup.notes)
-    housing = describe_housing(
-        results.housing, level_changes(results), results.findings, level_doubts(results)
-    )
+    housing = describe_housing(results.housing, level_changes(results), results.findings, level_doubts(results))
     assert all(row[2].startswith("> ") and row[3][-1] == row[4][-1] == "†" for row in housing.rows)
 
 
@@ -518,10 +493,7 @@ def test_the_campbell_diagram_holds_what_the_levels_name(files):
     shown = {
         f"{mode} × {harmonic}"
         for mode, harmonic, speed, frequency in zip(
-            *(
-                files["runup"][name].values
-                for name in ("mode", "mesh_harmonic", "resonance_speed", "frequency")
-            )
+            *(files["runup"][name].values for name in ("mode", "mesh_harmonic", "resonance_speed", "frequency"))
         )
         if (np.abs(circles - [speed, 1e-3 * frequency]) < 1e-9).all(axis=1).any()
         and 1e-3 * frequency <= ax.get_ylim()[1]

@@ -42,7 +42,7 @@ CHAIN = (
     "case.quantities.to_si",
     "run.run_case",
     "run._compute",
-    "trains.static.stages.solve_static",
+    "stages.static.solve_static",
     "contact.cycle.walk_mesh_cycle",
     "trains.elastic.stages.solve_modes",
     "contact.loaded_period.loaded_period",

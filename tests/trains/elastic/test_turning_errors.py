@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validation.turning import FOUR_PLANETS, in_time, off_the_rule, pitch
 
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import planetary_set
@@ -16,12 +15,13 @@ from femgear.housing.sensor import component_lines, fixed_sensor_signal, stored_
 from femgear.housing.sound import component_sound, sound_power, sound_pressure
 from femgear.report import response
 from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.stages.static import solve_static
 from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic import figures
 from femgear.trains.elastic.checks import check_dynamic_case, no_runup
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.static.stages import solve_static
+from validation.turning import FOUR_PLANETS, in_time, off_the_rule, pitch
 
 pytestmark = pytest.mark.usefixtures("coarse_states")
 ROOT = Path(__file__).parents[3]
@@ -105,9 +105,7 @@ def test_one_component_a_line_sounds_as_the_lines_do(three):
     field = dynamics.ring_radial[:, ::15]  # whole mesh harmonics alone
     place = case.ring.teeth, housing.exact.carrier_speed
     lines = component_lines(field, *place, 0.0)
-    pressure, power, equivalent = component_sound(
-        field, *place, housing.cylinder, housing.microphone, periods=1
-    )
+    pressure, power, equivalent = component_sound(field, *place, housing.cylinder, housing.microphone, periods=1)
     expected = sound_pressure(lines, housing.cylinder, housing.microphone)
     assert np.abs(pressure - expected).max() < 1e-12 * np.abs(expected).max()
     for ours, same in ((power, False), (equivalent, True)):
@@ -209,9 +207,7 @@ def test_a_ring_on_next_to_no_support_is_heard_as_on_its_foundation(solved):
     """Hardly damped, at low speed, the convective terms of the ring are all that differs."""
     errors = {"sun.errors": {"cumulative_pitch": pitch(2, -1, 0, teeth=27)}, "dynamics.damping_ratio": 1e-4}
     few = {**FEW, "operation.speeds": ["250 rpm"], **errors, "housing.form": "exact"}
-    present, held = (
-        solved({**few, **more})[3].exact for more in ({}, {"housing.support": [support(0, "1")]})
-    )
+    present, held = (solved({**few, **more})[3].exact for more in ({}, {"housing.support": [support(0, "1")]}))
     assert held.turns == present.turns == 1
     middle = present.order - 36 * np.rint(present.order / 36)
     # thirds of mesh harmonics, waves up to the sixth

@@ -11,17 +11,23 @@ import pytest
 from random_sets import random_set
 
 from femgear.case.sections import face_width
-from femgear.housing.two_way import structure_lines
+from femgear.housing.two_way.response import structure_lines
+from femgear.stages.static import solve_static
 from femgear.trains.elastic import stages
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import with_values
-from femgear.trains.static.stages import solve_static
 
 FEW = {
-    "static.positions": 16, "static.flank_elements": 6, "static.stresses": False, "runup.count": 0,
-    "dynamics.mesh_harmonics": 6, "dynamics.response_harmonics": 12, "dynamics.damping_ratio": 0.04,
-    "dynamics.up_to": None, "housing.support": None,
-}  # fmt: skip
+    "static.positions": 16,
+    "static.flank_elements": 6,
+    "static.stresses": False,
+    "runup.count": 0,
+    "dynamics.mesh_harmonics": 6,
+    "dynamics.response_harmonics": 12,
+    "dynamics.damping_ratio": 0.04,
+    "dynamics.up_to": None,
+    "housing.support": None,
+}
 # five planets out of phase, whose lines of 15 and more nodal diameters carry the level
 SHOWN = 10
 NONE = 1e-7

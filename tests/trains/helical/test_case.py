@@ -11,10 +11,10 @@ from published.planetary_sets import kahraman_set
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.checks import check_set
+from femgear.stages.lumped_set import rotation_sense
 from femgear.trains.helical.model import HelicalSet, check_helical_case, contact_ratios, helical_data
 from femgear.trains.helical.stages import HELICAL
 from femgear.trains.reading import parse_case, read_case, to_toml, with_value
-from femgear.trains.rigid import rotation_sense
 
 ROOT = Path(__file__).parents[3]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200 N/um"}
@@ -131,7 +131,7 @@ BODIES, STIFFNESS = ("sun", "ring", "carrier", "planet"), "helical.mesh_stiffnes
         ("static.members", "elastic", "E-CHOICE", "static.members"),
         ("operation.torque", "0 N m", "E-NO-LOAD", "operation.torque"),
     ],
-)  # fmt: skip
+)
 def test_what_is_refused(case, key, value, code, named):
     error = refused(case, key, value)
     assert code in {problem.code for problem in error.problems}
@@ -231,9 +231,7 @@ def test_contact_points_of_the_paper_and_many_slices_are_warned_of(case):
     assert said.startswith("[W-CONTACT-POINTS] helical.contact_points:") and "13 %" in said
     assert with_value(case, "helical.slices", 10).notices == ()
     (said,) = map(str, with_value(case, "helical.slices", 30).notices)
-    assert (
-        said.startswith("[W-SLICES] helical.slices: 30 slices of 8 meshes at 95 speeds") and "6 min" in said
-    )
+    assert said.startswith("[W-SLICES] helical.slices: 30 slices of 8 meshes at 95 speeds") and "6 min" in said
     assert with_value(with_value(case, "helical.slices", 30), "operation.speeds", ["250 rpm"]).notices == ()
 
 

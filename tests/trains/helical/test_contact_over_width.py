@@ -11,9 +11,9 @@ from femgear.contact import root_stress
 from femgear.contact.bodies import helical_stiffness
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError
+from femgear.stages.static import record_positions, solve_static, solve_stress
 from femgear.trains.helical.stages import solve_helical_modes, solve_helical_static, solve_helical_stress
 from femgear.trains.registry import stages_of
-from femgear.trains.static.stages import record_positions, solve_static, solve_stress
 
 ROOT = Path(__file__).parents[3]
 TEXT = (ROOT / "cases" / "helical_23_24_73.toml").read_text(encoding="utf-8")
@@ -64,12 +64,8 @@ def test_elastic_set_with_a_helix(few_waves, tmp_path):
     ratios = np.repeat([pair.contact_ratio for pair in gears.kinds], 3)
     assert file["iso_contact_ratio_factor"].values == pytest.approx(ratios**-0.5, rel=1e-3)
     assert file.attrs["iso_contact_helix_factor"] == pytest.approx(np.cos(np.radians(15.5)) ** -0.5)
-    hertz = (
-        file["iso_contact_stress"] / file["iso_contact_ratio_factor"] / file.attrs["iso_contact_helix_factor"]
-    )
-    hertz *= np.sqrt(
-        file["contact_worst_load"] / file.attrs["nominal_load"] * file["contact_worst_curvature"]
-    )
+    hertz = file["iso_contact_stress"] / file["iso_contact_ratio_factor"] / file.attrs["iso_contact_helix_factor"]
+    hertz *= np.sqrt(file["contact_worst_load"] / file.attrs["nominal_load"] * file["contact_worst_curvature"])
     assert file["contact_pressure"].max("position").values == pytest.approx(hertz.values, rel=0.01)
     roots = (file["root_worst"] / file["iso_root_stress"]).values
     assert roots[:3] == pytest.approx(0.85, abs=0.05) and roots[3:, 0] == pytest.approx(0.85, abs=0.05)
@@ -101,14 +97,10 @@ def test_steep_helices_of_rigid_sets_are_told(angle, steep):
 def test_rigid_set_takes_the_meshes_of_the_contact(few_waves, tmp_path):
     """The quick estimate has another section factor, and slices that do not draw one another along."""
     text = (ROOT / "cases" / "helical_30_20_70.toml").read_text(encoding="utf-8")
-    text = (
-        text.replace("[helical.mesh_stiffness]", "[ignored]") if "[helical.mesh_stiffness]" in text else text
-    )
+    text = text.replace("[helical.mesh_stiffness]", "[ignored]") if "[helical.mesh_stiffness]" in text else text
     quick = case_with(tmp_path, text)
     if quick.helical.mesh_stiffness is not None:
-        quick = quick.model_copy(
-            update={"helical": quick.helical.model_copy(update={"mesh_stiffness": None})}
-        )
+        quick = quick.model_copy(update={"helical": quick.helical.model_copy(update={"mesh_stiffness": None})})
     sliced = quick.static.model_copy(update={"slices": 12, "positions": 16})
     full = quick.model_copy(update={"static": sliced})
     quick = quick.model_copy(update={"static": quick.static.model_copy(update={"positions": 16})})

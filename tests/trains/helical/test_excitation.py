@@ -103,9 +103,7 @@ def test_height_runs_ahead_by_the_twist_of_the_flanks(helix):
     base = 0.5 * teeth * module / math.cos(beta) * math.cos(transverse)
     twist = math.tan(profile.base_helix_angle(normal_angle, beta)) / base
     height = kahraman_set(slices=4, face_width=width).slice_heights
-    ahead = slice_phases(
-        [0.2], profile.overlap_ratio(width, module, beta), slices=4, hand=int(np.sign(helix))
-    )  # fmt: skip
+    ahead = slice_phases([0.2], profile.overlap_ratio(width, module, beta), slices=4, hand=int(np.sign(helix)))
     assert ahead == pytest.approx(0.2 + height * twist * teeth / (2 * math.pi), rel=1e-12)
 
 

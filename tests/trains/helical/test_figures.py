@@ -10,10 +10,10 @@ from published.planetary_sets import kahraman_set
 
 from femgear.errors import CaseError
 from femgear.report.style import png_bytes
+from femgear.stages.lumped_set import gear_set_modes, in_space
 from femgear.system.mesh_directions import free_motions, gear_set_system
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.trains.helical.figures import spatial_mode_shapes
-from femgear.trains.rigid import gear_set_modes, in_space
 
 GEARS = ("sun", "planet", "ring")
 
@@ -57,9 +57,7 @@ def test_front_view_shows_where_the_bodies_go():
     data = kahraman_set()
     figure = drawn(data, "planet 2: radial", 0.7)
     front, side = figure.axes
-    circles = [
-        line for line in front.get_lines() if len(line.get_xdata()) > 2 and line.get_label() == "planets"
-    ]
+    circles = [line for line in front.get_lines() if len(line.get_xdata()) > 2 and line.get_label() == "planets"]
     centre = [np.mean([line.get_xdata()[:-1], line.get_ydata()[:-1]], axis=1) for line in circles]
     expected = data.centre_distance * np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
     expected[1, 1] += 0.1 * data.ring_radius

@@ -9,9 +9,6 @@ from published.planetary_sets import kahraman_set, lin_parker_set
 from scipy.linalg import eigh, null_space
 from scipy.optimize import root
 from uneven_set import ANGLES, UNEVEN
-from validation import helical
-from validation.helical import rigid_motions
-from validation.planetary import nrel_set
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
@@ -24,6 +21,9 @@ from femgear.system.mesh_directions import (
 )
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque, body_masses, gear_geometry
 from femgear.trains.helical.model import HelicalSet, contact_ratios
+from validation import helical
+from validation.helical import rigid_motions
+from validation.planetary import nrel_set
 
 
 def uneven(**changes):
@@ -95,8 +95,10 @@ def test_mesh_columns_are_the_approach_of_exact_helicoids(flank, gear, hand):
     # the side of the tooth: its involute unwinds against the way in which it pushes
     sun_side = -flank
     sides = (sun_side, sun_side) if gear == "sun" else (flank, flank)
-    tangent = [helicoid_normal(*args, contact - c) for args, c in zip(
-        ((base, twist[0], sides[0]), (base_p, twist[1], sides[1])), centres.values())]  # fmt: skip
+    tangent = [
+        helicoid_normal(*args, contact - c)
+        for args, c in zip(((base, twist[0], sides[0]), (base_p, twist[1], sides[1])), centres.values())
+    ]
     normal = tangent[0] if tangent[0] @ out > 0 else -tangent[0]
     assert abs(normal @ tangent[1]) == pytest.approx(1.0, abs=1e-12)
 
@@ -152,8 +154,7 @@ def test_forces_at_the_base_circles_make_the_published_helical_pair(hand):
         found = W[18 + 6 * n : 24 + 6 * n, n].copy()
         for row in (0, 3):  # from radial and tangential to x and y
             found[row : row + 2] = (
-                np.array([[math.cos(phi), -math.sin(phi)], [math.sin(phi), math.cos(phi)]])
-                @ (found[row : row + 2])
+                np.array([[math.cos(phi), -math.sin(phi)], [math.sin(phi), math.cos(phi)]]) @ (found[row : row + 2])
             )
         assert W[12:18, n] == pytest.approx(first, abs=1e-15)
         assert found == pytest.approx(second, abs=1e-15)
@@ -198,9 +199,7 @@ def spur_pair(**changes):
     def body(name, **supports):
         b = getattr(planar, name)
         support = HelicalSupport(b.support, 1e8, 1e5, b.torsional_support)
-        return HelicalBody(
-            b.mass, b.inertia, 0.6 * b.inertia, HelicalSupport() if name == "planet" else support
-        )
+        return HelicalBody(b.mass, b.inertia, 0.6 * b.inertia, HelicalSupport() if name == "planet" else support)
 
     names = ("sun_radius", "ring_radius", "planet_radius", "centre_distance", "planet_angles")
     names += ("stiffness_sun_planet", "stiffness_planet_ring")
@@ -228,9 +227,7 @@ def test_without_helix_the_plane_motions_are_those_of_the_planar_set(torque, con
     size = np.abs(flat.K).max()
     for name in ("M", "K"):
         ours, theirs = getattr(system, name), getattr(flat, name)
-        assert ours[np.ix_(plane, plane)] == pytest.approx(
-            theirs, rel=1e-12, abs=1e-12 * np.abs(theirs).max()
-        )
+        assert ours[np.ix_(plane, plane)] == pytest.approx(theirs, rel=1e-12, abs=1e-12 * np.abs(theirs).max())
         assert np.abs(ours[np.ix_(plane, rest)]).max() <= 1e-12 * size
     assert system.W[plane] == pytest.approx(flat.W, abs=1e-15)
     assert np.abs(system.W[rest]).max() == 0.0
@@ -287,9 +284,7 @@ def test_pins_feel_no_rigid_motion_and_all_relative_ones():
     assert np.abs(strain).max() < 1e-12
     r = data.planet_radius
     own = np.array([pin_directions(data)[18 + 6 * n : 24 + 6 * n, n] for n in range(3)])
-    assert own == pytest.approx(
-        np.broadcast_to(np.diag([1, 1, 1, 1 / r, 1 / r, 1 / r]), own.shape), rel=1e-15
-    )
+    assert own == pytest.approx(np.broadcast_to(np.diag([1, 1, 1, 1 / r, 1 / r, 1 / r]), own.shape), rel=1e-15)
 
 
 def test_torque_is_carried_by_meshes_and_pins_in_equilibrium():
@@ -300,9 +295,7 @@ def test_torque_is_carried_by_meshes_and_pins_in_equilibrium():
     force = data.column_stiffness * modes.load_deflection
     around = 100.0 / 4 / 0.024 / math.cos(math.radians(20.0))
     assert force == pytest.approx(np.full(8, around), rel=1e-6)
-    assert system.load @ (system.load != 0) == pytest.approx(
-        100 / 0.024 * (1 - 2 * math.cos(math.radians(21.34)))
-    )
+    assert system.load @ (system.load != 0) == pytest.approx(100 / 0.024 * (1 - 2 * math.cos(math.radians(21.34))))
     axial = mesh_directions(data)[20::6] @ force
     assert np.abs(axial).max() < 1e-6 * force[0]
     with pytest.raises(CaseError, match="E-MECHANISM"):
@@ -315,10 +308,18 @@ def test_data_of_a_geared_set():
     body = HelicalBody(2.0, 0.3, 0.2)
     base = math.atan(math.tan(math.radians(8.0)) * math.cos(gears.sun.pressure_angle))
     data = HelicalSet(
-        **gear_geometry(gears), base_helix_angle=base, sun=body, ring=body, carrier=body, planet=body,
-        stiffness_sun_planet=1e9, stiffness_planet_ring=2e9, planet_bearing=HelicalSupport(1e9, 1e9, 1e6),
-        slices=4, face_width=0.1,
-    )  # fmt: skip
+        **gear_geometry(gears),
+        base_helix_angle=base,
+        sun=body,
+        ring=body,
+        carrier=body,
+        planet=body,
+        stiffness_sun_planet=1e9,
+        stiffness_planet_ring=2e9,
+        planet_bearing=HelicalSupport(1e9, 1e9, 1e6),
+        slices=4,
+        face_width=0.1,
+    )
     assert np.abs(mesh_directions(data).T @ rigid_motions(data)).max() < 1e-12
     assert data.column_stiffness == pytest.approx(np.repeat([0.25e9, 0.5e9], 4 * gears.n_planets))
     ratios = contact_ratios(gears, helix_angle=math.radians(8.0))

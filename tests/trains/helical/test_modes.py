@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import kahraman_set
-from validation.reference.mode_energy import gear_set_springs, stiffness_of, strain_shares
 
 from femgear.errors import CaseError
+from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.mode_kinds import gear_set_kinds, gear_set_motions, phase_basis, phasing
 from femgear.system.rigid_bodies import HelicalSupport
-from femgear.trains.rigid import gear_set_modes
+from validation.reference.mode_energy import gear_set_springs, stiffness_of, strain_shares
 
 
 def equal(planets, **changes):

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from phase_patterns import phased_errors
 from published.planetary_sets import cases, kahraman_set, lin_parker_set
-from validation.routes import state_of
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import solve_modes
@@ -15,11 +14,12 @@ from femgear.solvers.linear.receptance import modal_error_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.shooting import solve_shooting
 from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.stages.lumped_set import gear_set_modes, gear_set_problem, phased_series
 from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import HelicalBody, HelicalSupport, PlanarTorque
 from femgear.system.system import MeshExcitation, element_forces
 from femgear.trains.helical.model import HelicalSet, helical_excitation
-from femgear.trains.rigid import gear_set_modes, gear_set_problem, phased_series
+from validation.routes import state_of
 
 TORQUE = PlanarTorque(300.0)
 PHASES = -np.array([0.0, 1 / 3, 2 / 3, 0.15, 0.15 + 1 / 3, 0.15 + 2 / 3])
@@ -62,9 +62,7 @@ def both_problems(backlash):
 def test_without_helix_the_train_with_contact_loss_is_the_planar_one(hertz):
     """7400 Hz: the meshes with the ring part."""
     lines = [
-        solve_harmonic_balance(
-            p, 2 * math.pi * hertz, harmonics=6, samples=256, stability=False, tolerance=1e-12
-        )
+        solve_harmonic_balance(p, 2 * math.pi * hertz, harmonics=6, samples=256, stability=False, tolerance=1e-12)
         for p in both_problems(20e-6)
     ]
     assert all(found.converged for found in lines)
@@ -86,9 +84,7 @@ def test_without_helix_phased_errors_do_the_same():
 def waves(data, phases, depth, count=64):
     """Tangent record of constant force: k(tau + phi), loaded by 500 N along every normal."""
     tau = np.arange(count) / count + np.asarray(phases)[:, None]
-    k = data.mesh_stiffness[:, None] * (
-        1 + depth * np.cos(2 * np.pi * tau) + 0.3 * depth * np.sin(4 * np.pi * tau)
-    )
+    k = data.mesh_stiffness[:, None] * (1 + depth * np.cos(2 * np.pi * tau) + 0.3 * depth * np.sin(4 * np.pi * tau))
     force = np.full_like(k, 500.0)
     return MeshExcitation(k, force / k, force, np.zeros(len(k)))
 

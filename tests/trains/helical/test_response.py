@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from phase_patterns import phased_errors
 from published.planetary_sets import TABLE_2, cases, kahraman_set
-from validation.reference.frequency_response import mesh_error_response
-from validation.reference.mode_energy import gear_set_springs, signed_phase_shares
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears.phasing import MeshPhasing
 from femgear.solvers.linear.receptance import modal_error_response
+from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mesh_directions import free_motions, gear_set_system
 from femgear.system.mode_kinds import gear_set_motions
 from femgear.system.rigid_bodies import body_masses
-from femgear.trains.rigid import gear_set_modes
+from validation.reference.frequency_response import mesh_error_response
+from validation.reference.mode_energy import gear_set_springs, signed_phase_shares
 
 HERTZ = np.linspace(60.0, 15e3, 150)
 AMPLITUDES = np.array([1.0, 0.5j, -0.25, 0.1 + 0.1j]) * 1e-6
@@ -21,17 +21,24 @@ AMPLITUDES = np.array([1.0, 0.5j, -0.25, 0.1 + 0.1j]) * 1e-6
 
 def direct(data, error, outputs=None, hertz=HERTZ):
     return mesh_error_response(
-        gear_set_system(data), hertz, error, mesh_stiffness=data.column_stiffness, outputs=outputs,
+        gear_set_system(data),
+        hertz,
+        error,
+        mesh_stiffness=data.column_stiffness,
+        outputs=outputs,
         damping_ratio=0.05,
-    )  # fmt: skip
+    )
 
 
-@pytest.mark.parametrize("changes", [
-    {},
-    {"contact_points": "pitch_point", "slices": 3, "face_width": 0.03},
-    {"planet_angles": [0.0, 1.3, 3.0, 4.9]},
-    {"planet_angles": 2 * np.pi * np.arange(5) / 5},
-])  # fmt: skip
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"contact_points": "pitch_point", "slices": 3, "face_width": 0.03},
+        {"planet_angles": [0.0, 1.3, 3.0, 4.9]},
+        {"planet_angles": 2 * np.pi * np.arange(5) / 5},
+    ],
+)
 def test_sum_of_modes_is_the_direct_solution(changes):
     data = kahraman_set(**changes)
     modes = gear_set_modes(data, damping_ratio=0.05)

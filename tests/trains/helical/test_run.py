@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from validation.helical import PHASINGS, TABLE_4
 
 from femgear import cli
 from femgear.case import text as case_text
@@ -14,6 +13,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.iso6336 import mesh_stiffness_method_b
 from femgear.run import grid_cache, run_case
+from femgear.stages.static_results import mean_over_period
 from femgear.storage.results import run_folder
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.figures import FIGURES, transmission_errors
@@ -28,7 +28,7 @@ from femgear.trains.helical.stages import (
 from femgear.trains.planar.stages import solve_planar_modes
 from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
-from femgear.trains.static.results import mean_over_period
+from validation.helical import PHASINGS, TABLE_4
 
 ROOT = Path(__file__).parents[3]
 GIVEN = {"sun_planet": "200e6 N/m", "planet_ring": "200e6 N/m"}
@@ -64,9 +64,11 @@ def given():
 def coarse():
     case = read_case(ROOT / "cases" / "helical_30_20_70.toml")
     changes = {
-        "static.positions": 16, "static.flank_elements": 6, "dynamics.mesh_harmonics": 5,
+        "static.positions": 16,
+        "static.flank_elements": 6,
+        "dynamics.mesh_harmonics": 5,
         "operation.speeds": ["0.01 rpm", "3000 rpm", "9000 rpm", "12000 rpm"],
-    }  # fmt: skip
+    }
     return changed(case, changes)
 
 
@@ -137,9 +139,7 @@ def test_shapes_are_motions_in_space(given):
     # planet 2 stands on the y axis: its radial direction is y, its tangential -x
     for axis, local, sign in (("y", "radial", 1), ("x", "tangential", -1), ("z", "z", 1)):
         row = model.dofs.index(f"planet 2: {local}")
-        np.testing.assert_allclose(
-            shape[names.index(f"planet 2: {axis}")], sign * model.shape[row], atol=1e-12
-        )
+        np.testing.assert_allclose(shape[names.index(f"planet 2: {axis}")], sign * model.shape[row], atol=1e-12)
     turn = shape[names.index("planet 2: tilt y")] * result.data.planet_radius
     np.testing.assert_allclose(turn, model.shape[model.dofs.index("planet 2: tilt radial")], atol=1e-12)
 
@@ -152,9 +152,7 @@ def test_a_vanishing_helix_gives_the_modes_of_the_planar_set(given):
     helical = parse_case(case_text.write(data))
     space = data.pop("helical")
     ring = {key: space["ring"][key] for key in ("mass", "inertia", "support_stiffness")}
-    data["planar"] = {
-        "ring": ring, "mesh_stiffness": GIVEN, "torsion": {"ring": space["ring"]["torsional_stiffness"]}
-    }  # fmt: skip
+    data["planar"] = {"ring": ring, "mesh_stiffness": GIVEN, "torsion": {"ring": space["ring"]["torsional_stiffness"]}}
     planar = solve_planar_modes(parse_case(case_text.write(data))).modes.frequency
     found = solve_helical_modes(helical).modes.frequency
     away = np.abs(found[:, None] / np.where(planar > 0.0, planar, 1.0) - 1.0).min(axis=0)
@@ -212,9 +210,13 @@ def test_slow_turning_stiffly_held_gears_follow_their_static_transmission_error(
 ):
     case = changed(coarse, STIFF)
     changes = {
-        "helical.slices": slices, "helical.hand": hand, "operation.torque": torque,
-        "operation.speeds": ["0.01 rpm"], "dynamics.mesh_harmonics": 7, "dynamics.response_harmonics": 14,
-    }  # fmt: skip
+        "helical.slices": slices,
+        "helical.hand": hand,
+        "operation.torque": torque,
+        "operation.speeds": ["0.01 rpm"],
+        "dynamics.mesh_harmonics": 7,
+        "dynamics.response_harmonics": 14,
+    }
     case = changed(case, changes)
     record = static if torque[0] != "-" else solve_helical_static(case, cache=grid_cache())
     found = again(case, record)
@@ -289,9 +291,7 @@ def test_meshes_that_pull_are_warned_of(coarse, static):
     assert 0 < count < 41
     (said,) = next(stage for stage in HELICAL.stages if stage.name == "dynamics").warnings(data)
     where = f"at {data['speed'].values[speed]:.6g} rpm: "
-    assert said.code == "W-PULL" and said.text.startswith(
-        tuple(f"{where}{mesh} pulls for " for mesh in worst)
-    )
+    assert said.code == "W-PULL" and said.text.startswith(tuple(f"{where}{mesh} pulls for " for mesh in worst))
     assert f"meshes pull at {count} of the 41 speeds" in said.text
 
 
@@ -375,9 +375,7 @@ def test_both_meshes_of_a_planet_have_a_style_each(results):
     lines = [line for line in ax.get_lines() if len(line.get_xdata())]
     drawn = [line for line in lines if line.get_label() in results.modes["mesh"].values]
     # each beside its static curve
-    assert len(lines) == 4 and len(drawn) == 2 == len(
-        {(line.get_color(), line.get_linestyle()) for line in drawn}
-    )
+    assert len(lines) == 4 and len(drawn) == 2 == len({(line.get_color(), line.get_linestyle()) for line in drawn})
 
 
 def drawn_dynamics(results, dynamics):
@@ -400,9 +398,7 @@ def test_pin_forces_are_fluctuations_about_the_mean(results):
         assert f"{rms.max():.3g} N" in ax.get_title(loc="left")
     # the torque of the carrier hangs on four pins
     mean = float(np.abs(dynamics["pin_force_real"].values[0, :, 1, 0]).max())
-    assert f"tangential: mean {mean:.4g} N" in " ".join(
-        line.get_label() for line in figure.axes[0].get_lines()
-    )
+    assert f"tangential: mean {mean:.4g} N" in " ".join(line.get_label() for line in figure.axes[0].get_lines())
 
 
 def test_slices_show_their_load_per_width(results):

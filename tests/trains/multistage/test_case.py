@@ -34,9 +34,7 @@ def test_gears_phases_and_stiffness_follow_from_the_module(case):
         assert stage.teeth == section.gears.teeth and stage.fixed == "ring"
         assert stage.data.sun_radius == gears.sun.base_radius
         assert stage.phases == pytest.approx(gears.mesh_phases)
-    given = with_value(
-        case, "stage[0].gears.mesh_stiffness", {"sun_planet": "3e8 N/m", "planet_ring": "5e8 N/m"}
-    )
+    given = with_value(case, "stage[0].gears.mesh_stiffness", {"sun_planet": "3e8 N/m", "planet_ring": "5e8 N/m"})
     assert multistage_of(given).stages[0].data.mesh_stiffness.tolist() == [3e8] * 3 + [5e8] * 3
 
 
@@ -70,9 +68,7 @@ def test_stages_without_couplings_are_joined_rigidly_in_series(printed):
     train = multistage_of(printed)
     assert train.couplings == in_series(train.stages).couplings and len(train.couplings) == 3
     assert (train.input, train.output) == (Member(1, "sun"), Member(4, "carrier"))
-    assert train.stages[0].data.centre_distance == pytest.approx(
-        (0.013652 + 0.040254) / math.cos(math.radians(20.0))
-    )
+    assert train.stages[0].data.centre_distance == pytest.approx((0.013652 + 0.040254) / math.cos(math.radians(20.0)))
     assert train.stages[0].data.ring_radius == pytest.approx(0.013652 + 2 * 0.040254)
 
 
@@ -80,9 +76,8 @@ def test_another_input_and_a_free_ring(case):
     """The first ring driven beside a held sun: Willis with the sun at rest."""
     turned = with_values(
         case,
-        {"stage[0].fixed": "sun", "stage[0].sun.torsional_stiffness": "1e8 N m/rad",
-         "operation.input": "stage 1 ring"},
-    )  # fmt: skip
+        {"stage[0].fixed": "sun", "stage[0].sun.torsional_stiffness": "1e8 N m/rad", "operation.input": "stage 1 ring"},
+    )
     speeds = train_speeds(multistage_of(turned), 100.0)
     assert speeds.carrier[0] == pytest.approx(100.0 * 105 / 126) and speeds.sun[0] == 0.0
 

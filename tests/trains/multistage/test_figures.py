@@ -44,9 +44,7 @@ def test_lines_of_mesh_frequencies_and_modes_in_reach():
     force = np.ones((2, 3, 2, 2))
     # harmonic 1 of stage 1 has a peak near the mode at 10 Hz, in the mesh that the mode moves
     force[0, 1, 0, 0] = 50.0
-    data = response(
-        speed, (1, 2), mesh_frequency=mesh.T, mesh_force_real=force, mesh_force_imag=np.zeros_like(force)
-    )
+    data = response(speed, (1, 2), mesh_frequency=mesh.T, mesh_force_real=force, mesh_force_imag=np.zeros_like(force))
     (ax,) = mesh_orders(MODES, data).axes
     levels = [line.get_ydata()[0] for line in ax.lines if len(line.get_ydata()) == 2]
     assert levels == [10.0, 20.0, 20.0, 30.0]

@@ -13,6 +13,7 @@ from scipy.linalg import eigh
 from small_trains import closed_set, published_table, stage, two_stages
 
 from femgear.errors import CaseError
+from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.trains.multistage.model import (
@@ -31,7 +32,6 @@ from femgear.trains.multistage.model import (
     train_torques,
 )
 from femgear.trains.multistage.stages import multistage_modes, multistage_problem
-from femgear.trains.rigid import gear_set_modes
 
 # --- speeds and torques -------------------------------------------------------------------------------
 
@@ -143,9 +143,7 @@ class Springs:
         return [(x, 1.0, 0.0), (y, 0.0, 1.0), (turn, -point[1], point[0])]
 
     def mass(self, body, own):
-        self.masses += [
-            (self.place(body, axis), m) for axis, m in zip("xyt", (own.mass, own.mass, own.inertia))
-        ]
+        self.masses += [(self.place(body, axis), m) for axis, m in zip("xyt", (own.mass, own.mass, own.inertia))]
 
     def spring(self, k, direction, moving, other=()):
         terms = [(i, x * direction[0] + y * direction[1]) for i, x, y in moving]
@@ -279,9 +277,7 @@ def test_example_train_has_the_structure_of_coupled_stages():
         assert np.allclose(*pair, rtol=1e-9) == same
     # the angle between the stages does not matter at equal spacing
     turned = replace(train, stages=(train.stages[0], replace(train.stages[1], angle=0.9), *train.stages[2:]))
-    assert multistage_modes(turned).modes.frequency == pytest.approx(
-        found.modes.frequency, rel=1e-9, abs=1e-9
-    )
+    assert multistage_modes(turned).modes.frequency == pytest.approx(found.modes.frequency, rel=1e-9, abs=1e-9)
     assert "planet, stage 4 (100 %)" in found.labels
 
 
@@ -337,7 +333,7 @@ def test_turning_stages_are_planar_sets_at_their_own_speeds():
         (lambda: multistage_system(two_stages(lateral=math.inf), speed=10.0), "E-RANGE"),
         (lambda: multistage_problem(two_stages(), damping=np.eye(3)), "E-SHAPE"),
     ],
-)  # fmt: skip
+)
 def test_refusals(make, code):
     with pytest.raises(CaseError) as caught:
         make()

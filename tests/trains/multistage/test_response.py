@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from published.multistage_example import four_stage_case, four_stage_train
 from small_trains import two_stages
-from validation.reference.frequency_response import mesh_error_response
 
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
+from femgear.stages.lumped_set import gear_set_problem, phased_series
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonic_lines, tooth_lines
 from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import PlanarTorque
@@ -27,7 +27,7 @@ from femgear.trains.multistage.model import (
     turning_couplings,
 )
 from femgear.trains.multistage.stages import base_frequencies, error_response, multistage_problem
-from femgear.trains.rigid import gear_set_problem, phased_series
+from validation.reference.frequency_response import mesh_error_response
 
 SPEED, TORQUE = 50.0 * np.pi, 350.0
 
@@ -85,9 +85,7 @@ def linear_meshes(one, error):
 
 def test_harmonic_balance_of_linear_meshes_is_the_modal_summation():
     train, speed = two_stages(), 90.0
-    errors = {
-        n: tooth_lines([3e-6, 1e-6j], [-2e-6, 4e-7], one.phases) for n, one in enumerate(train.stages, 1)
-    }
+    errors = {n: tooth_lines([3e-6, 1e-6j], [-2e-6, 4e-7], one.phases) for n, one in enumerate(train.stages, 1)}
     meshes = {n: linear_meshes(one, errors[n]) for n, one in enumerate(train.stages, 1)}
     problem = multistage_problem(train, meshes=meshes, damping=0.02)
     frequency = base_frequencies(train, speed)[:2]
@@ -125,9 +123,7 @@ def test_two_base_frequencies_agree_with_their_common_one():
         replace(made, columns=columns, stiffness=replace(made.stiffness, orders=(order,)))
         for made, columns, order in zip(meshes.values(), mesh_columns(train), (4, 1))
     )
-    common = solve_harmonic_balance(
-        replace(problem, elements=elements), bases[1], harmonics=30, stability=False
-    )  # fmt: skip
+    common = solve_harmonic_balance(replace(problem, elements=elements), bases[1], harmonics=30, stability=False)
     assert found.converged and common.converged
     times = np.linspace(0.0, 2.0 * np.pi / bases[1], 100, endpoint=False)
     one, other = found.at(times), common.at(times)
@@ -141,9 +137,7 @@ def test_turning_train_agrees_with_integration(speed, limits):
     The integration starts on the solution and has to stay on it; what is left falls with the orders.
     """
     train = two_stages()
-    problem = multistage_problem(
-        train, meshes=parametric_meshes(train, 0.03), torque=500.0, speed=speed, damping=0.05
-    )
+    problem = multistage_problem(train, meshes=parametric_meshes(train, 0.03), torque=500.0, speed=speed, damping=0.05)
     bases = base_frequencies(train, speed)
     assert len(bases) == 3
     for H, limit in limits.items():

@@ -20,23 +20,26 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import stability
 from femgear.solvers.time.transient import solve_transient
+from femgear.stages.protocol import Drawn
+from femgear.stages.static import solve_static
 from femgear.system.system import MeshExcitation
-from femgear.trains.gear_pair.model import ImpactPair
+from femgear.trains.impacts.model import ImpactPair
 from femgear.trains.pair import stages
 from femgear.trains.pair.figures import RUNUP
 from femgear.trains.pair.model import pair_model, separating_pair
 from femgear.trains.pair.results import dynamics_warnings, runup_warnings
 from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, solve_pair_runup
-from femgear.trains.protocol import Drawn
 from femgear.trains.reading import read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
-from femgear.trains.static.stages import solve_static
 
 CASE = Path(__file__).parents[3] / "cases" / "spur_pair.toml"
 PLAIN = {
-    "static.positions": 16, "static.stresses": False, "set.backlash": "0.1 mm",
-    "operation.speeds": ["1500 rpm", "7700 rpm", "15150 rpm"], "runup.count": 60,
-}  # fmt: skip
+    "static.positions": 16,
+    "static.stresses": False,
+    "set.backlash": "0.1 mm",
+    "operation.speeds": ["1500 rpm", "7700 rpm", "15150 rpm"],
+    "runup.count": 60,
+}
 BEARINGS = {"gear_1.bearing_stiffness": "8e8 N/m", "gear_2.bearing_stiffness": "1e9 N/m"}
 STIFFNESS, TAU = 4e8, np.arange(512) / 512
 
@@ -81,8 +84,10 @@ def test_natural_frequency_in_closed_form():
 
 def test_bearings_that_hardly_give_way_leave_the_torsional_mode():
     stiff = {key: "1e14 N/m" for key in BEARINGS}
-    found = [solve_modes(pair_model(c, gears()).system, [STIFFNESS], damping_ratio=0.05)
-             for c in (pair_case(), pair_case(**stiff))]  # fmt: skip
+    found = [
+        solve_modes(pair_model(c, gears()).system, [STIFFNESS], damping_ratio=0.05)
+        for c in (pair_case(), pair_case(**stiff))
+    ]
     assert found[1].frequency[1] == pytest.approx(found[0].frequency[1], rel=1e-4)
 
 
@@ -149,8 +154,13 @@ def test_the_mean_mesh_force_carries_the_torque_at_every_speed(changes):
     np.testing.assert_allclose(mean[:, 0], -mean[:, 1], rtol=1e-6)
 
 
-HELICAL = (("set.helix_angle", "20 deg"), ("set.centre_distance", "97 mm"), ("static.slices", 9),
-           ("gear_1.tip_diameter", None), ("gear_2.tip_diameter", None))  # fmt: skip
+HELICAL = (
+    ("set.helix_angle", "20 deg"),
+    ("set.centre_distance", "97 mm"),
+    ("static.slices", 9),
+    ("gear_1.tip_diameter", None),
+    ("gear_2.tip_diameter", None),
+)
 CROWNED = (("static.slices", 9), ("gear_1.modifications", [{"kind": "lead crowning", "amount": "10 um"}]))
 
 
@@ -165,9 +175,7 @@ def test_slow_gears_follow_the_static_solution(changes):
 
 
 def test_the_sign_of_the_torque_turns_time_around_at_rest_and_not_the_modes():
-    (_, one, _), (_, two, _) = (
-        solved(("operation.torque", t), *BEARINGS.items()) for t in ("200 N m", "-200 N m")
-    )
+    (_, one, _), (_, two, _) = (solved(("operation.torque", t), *BEARINGS.items()) for t in ("200 N m", "-200 N m"))
     np.testing.assert_allclose(two.modes.frequency[1:], one.modes.frequency[1:], rtol=1e-6)
     np.testing.assert_allclose(two.model.normal, one.model.normal * [1.0, -1.0], rtol=1e-12)
     assert (two.model.system.load == -one.model.system.load).all()
@@ -182,8 +190,9 @@ def test_twice_the_size_under_eight_times_the_torque_at_half_the_speed():
     speeds = ("750 rpm", "3850 rpm", "7575 rpm")
     reach = "10 kHz"
     one = solved(("dynamics.up_to", "20 kHz"))[2]
-    two = solved(*large.items(), ("operation.torque", "1600 N m"), ("operation.speeds", speeds),
-                 ("dynamics.up_to", reach))[2]  # fmt: skip
+    two = solved(
+        *large.items(), ("operation.torque", "1600 N m"), ("operation.speeds", speeds), ("dynamics.up_to", reach)
+    )[2]
     np.testing.assert_allclose(two.motion.dte, 2.0 * one.motion.dte, atol=1e-5 * abs(one.motion.dte).max())
     np.testing.assert_allclose(two.motion.peak, 4.0 * one.motion.peak, rtol=1e-5)
 
@@ -269,9 +278,7 @@ def test_sound_of_a_pair_is_that_of_its_lines(tmp_path):
     assert force.std() == pytest.approx(data.bearing_rms[0, 1].item(), rel=1e-3)
     assert b"1.0 = 1 N" in (found / "bearing_force_gear_2_1500_rpm.wav").read_bytes()
     _, error = wavfile.read(found / "transmission_error_1500_rpm.wav")
-    scale = float(
-        re.search(rb"1\.0 = (\S+) m/s\^2", (found / "transmission_error_1500_rpm.wav").read_bytes())[1]
-    )
+    scale = float(re.search(rb"1\.0 = (\S+) m/s\^2", (found / "transmission_error_1500_rpm.wav").read_bytes())[1])
     harmonic = np.arange(data.sizes["harmonic"])
     dte = np.hypot(data.dte_real, data.dte_imag).values[0, 0]
     rms = np.sqrt(0.5 * ((2.0 * np.pi * 600.0 * harmonic) ** 4 * dte**2).sum())

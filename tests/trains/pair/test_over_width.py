@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from trains.pair.test_pair import CASE, INTERNAL, STEEL, TAU, pair_case
-from validation.planetary import reference_set
 
 from femgear.case.gear_set import planetary_set
 from femgear.contact.bodies import Bodies, make_bodies, make_sectors
@@ -17,13 +16,14 @@ from femgear.errors import FemgearError
 from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, LeadSlope
 from femgear.gears.pair import GearPair
+from femgear.stages.static import solve_static
+from femgear.stages.static_figures import contact_pattern
+from femgear.stages.static_results import _helical, load_warnings, static_warnings
 from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.pair.stages import iso_stiffness
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import check_case, train_of
-from femgear.trains.static.figures import contact_pattern
-from femgear.trains.static.results import _helical, load_warnings, static_warnings
-from femgear.trains.static.stages import solve_static
+from validation.planetary import reference_set
 
 SLICES = 12
 HEIGHT = (np.arange(SLICES) + 0.5) / SLICES - 0.5
@@ -92,9 +92,13 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
         flanks = ("sun",) if gears.gears[0].name == "planet" else ("planet_sun_side", "planet_ring_side")
         slope = replace(no_deviations(gears), **dict.fromkeys(flanks, lead))
         return walk_mesh_cycle(
-            gears, bodies, sun_torque=torque, positions=positions, deviations=slope,
+            gears,
+            bodies,
+            sun_torque=torque,
+            positions=positions,
+            deviations=slope,
             options=CycleOptions(waves=waves, slices=SLICES, ahead=ahead),
-        )  # fmt: skip
+        )
 
     whole = walked(s, bodies, waves, 30.0, TAU)
     for mesh, (one, two) in enumerate((("sun", "planet"), ("planet", "ring"))):
@@ -140,12 +144,20 @@ def test_a_slope_loads_one_end_more_than_linear_teeth_would(kind):
         ({"set.face_width": "15 mm"}, "E-SLICES", "static.slices", "give static.slices = 18"),
         ({"set.face_width": "150 mm"}, "E-SLICES", "static.slices", "give static.slices = 34"),
         ({**SLICED, "static.back_flanks": True}, "E-SLICES", "static.back_flanks", "no back flanks"),
-        ({"set.helix_angle": "35 deg", **SLICED, "set.centre_distance": "91.5 mm"}, "E-CENTRE-DISTANCE",
-         "set.centre_distance", "transverse section"),
-        ({"gear_1.rack": {"root_radius": 0.6}, **SLICED}, "E-ROOT-RADIUS", "gear_1.rack.root_radius",
-         "transverse section"),
+        (
+            {"set.helix_angle": "35 deg", **SLICED, "set.centre_distance": "91.5 mm"},
+            "E-CENTRE-DISTANCE",
+            "set.centre_distance",
+            "transverse section",
+        ),
+        (
+            {"gear_1.rack": {"root_radius": 0.6}, **SLICED},
+            "E-ROOT-RADIUS",
+            "gear_1.rack.root_radius",
+            "transverse section",
+        ),
     ],
-)  # fmt: skip
+)
 def test_refusals_name_the_entries_of_the_file(changes, code, key, words):
     with pytest.raises(FemgearError) as found:
         check_case(helical({}, 20, **{"static.slices": 0, **changes}))
@@ -156,9 +168,7 @@ def test_refusals_name_the_entries_of_the_file(changes, code, key, words):
 
 @pytest.mark.parametrize(("angle", "steep"), [("30 deg", False), ("-31 deg", True)])
 def test_helices_beyond_those_validated_are_told(angle, steep):
-    found = [
-        one for one in load_warnings(helical({}, 20, **{"set.helix_angle": angle})) if "HELIX" in one.code
-    ]
+    found = [one for one in load_warnings(helical({}, 20, **{"set.helix_angle": angle})) if "HELIX" in one.code]
     assert [(one.code, one.key) for one in found] == [("W-HELIX", "set.helix_angle")] * steep
 
 
@@ -201,10 +211,7 @@ def test_overlap_keeps_teeth_of_a_low_transverse_contact_ratio_in_contact():
     """A transverse contact ratio of 0.98: always in contact, softer, and the load runs over the width."""
     whole = read_case(new_case("pair", teeth=(20, 30), form=ToothForm(helix="20 deg")))
     coarse = with_values(whole, {"static.positions": 8, "static.flank_elements": 6})
-    tips = {
-        f"{gear.name}.tip_diameter": f"{2e3 * gear.tip_radius - 1.5} mm"
-        for gear in planetary_set(coarse).gears
-    }
+    tips = {f"{gear.name}.tip_diameter": f"{2e3 * gear.tip_radius - 1.5} mm" for gear in planetary_set(coarse).gears}
     short = with_values(coarse, tips)
     assert planetary_set(short).contact_ratio == pytest.approx(0.977, abs=1e-3)
     (said,) = (one for one in train_of(short).case_warnings(short) if one.code == "W-CONTACT-RATIO")

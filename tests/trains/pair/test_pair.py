@@ -6,25 +6,30 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from validation.planetary import reference_set
 
 from femgear.contact.bodies import Bodies, make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import FemgearError
 from femgear.fe.elasticity import Material
 from femgear.gears.pair import GearPair
+from femgear.stages.static import solve_static, solve_stress
 from femgear.trains.pair.stages import PAIR
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import check_case
-from femgear.trains.static.stages import solve_static, solve_stress
+from validation.planetary import reference_set
 
 CASE = Path(__file__).parents[3] / "cases" / "spur_pair.toml"
 STEEL, TAU = Material(206e9, 0.3, 7850.0), np.arange(8) / 8
 INTERNAL = {
-    "gear_2.teeth": 60, "gear_2.bore_radius": None, "gear_2.outer_radius": "100 mm",
-    "gear_2.cutter_teeth": 30, "set.centre_distance": "54 mm", "gear_1.profile_shift": 0.0,
-    "gear_1.tip_diameter": "78 mm", "gear_2.tip_diameter": "175 mm",
-}  # fmt: skip
+    "gear_2.teeth": 60,
+    "gear_2.bore_radius": None,
+    "gear_2.outer_radius": "100 mm",
+    "gear_2.cutter_teeth": 30,
+    "set.centre_distance": "54 mm",
+    "gear_1.profile_shift": 0.0,
+    "gear_1.tip_diameter": "78 mm",
+    "gear_2.tip_diameter": "175 mm",
+}
 LARGE_TIPS = {"gear_1.tip_diameter": 159.6, "gear_2.tip_diameter": 230.7572}
 """Twice those of the case [mm]."""
 
@@ -54,9 +59,11 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs():
     )
     for mesh, ((one, body_1), (two, body_2)) in enumerate(sets):
         cycle = walk_mesh_cycle(
-            GearPair(one, two, s.centre_distance), Bodies(body_1, body_2, None, (one.face_width,)),
-            sun_torque=force * one.base_radius, positions=TAU + s.mesh_phases[mesh],
-        )  # fmt: skip
+            GearPair(one, two, s.centre_distance),
+            Bodies(body_1, body_2, None, (one.face_width,)),
+            sun_torque=force * one.base_radius,
+            positions=TAU + s.mesh_phases[mesh],
+        )
         for name in ("deflection", "stiffness", "force"):
             expected = getattr(whole, name)[mesh]
             np.testing.assert_allclose(getattr(cycle, name)[0], expected, rtol=1e-9, err_msg=name)
@@ -87,9 +94,7 @@ def test_twice_the_size_under_eight_times_the_torque():
     np.testing.assert_allclose(two.cycle.deflection, 2.0 * one.cycle.deflection, rtol=1e-6)
     np.testing.assert_allclose(two.cycle.stiffness, 2.0 * one.cycle.stiffness, rtol=1e-6)
     changes = {}, {**large, "operation.torque": "1600 N m"}
-    first, second = (
-        solve_stress(pair_case(c), s).dataset() for c, s in zip(changes, (one, two), strict=True)
-    )
+    first, second = (solve_stress(pair_case(c), s).dataset() for c, s in zip(changes, (one, two), strict=True))
     for name in ("root_worst", "contact_pressure", "iso_root_stress", "iso_contact_stress"):
         np.testing.assert_allclose(second[name], first[name], rtol=1e-6)
     nominal = first.iso_root_stress.values
@@ -137,11 +142,14 @@ def test_a_displaced_tooth_of_gear_2(changes, sign):
         ({"gear_2.cutter_teeth": 30}, "E-CHOICE", "gear_2.cutter_teeth"),
         ({"static.members": "elastic"}, "E-CHOICE", "static.members"),
         ({"operation.torque": "1e-8 N m"}, "E-RANGE", "operation.torque"),
-        ({"gear_1.modifications": [{"kind": "lead crowning", "amount": "5 um"}]}, "E-SLICES",
-         "gear_1.modifications[0]"),
+        (
+            {"gear_1.modifications": [{"kind": "lead crowning", "amount": "5 um"}]},
+            "E-SLICES",
+            "gear_1.modifications[0]",
+        ),
         ({"gear_2.errors": {"pitch": ["1 um", "-1 um"]}}, "E-COUNT", "gear_2.errors.pitch"),
     ],
-)  # fmt: skip
+)
 def test_refusals_name_the_entries_of_the_file(changes, code, key):
     with pytest.raises(FemgearError) as found:
         check_case(pair_case(changes))

@@ -47,9 +47,7 @@ def test_the_problem_of_set_b_is_the_one_of_the_script(pgb):
     ours, other = planar_model(pgb, gears).problem, gravity_problem_b()
     for name in ("M", "C", "K", "W", "load"):
         scale = np.abs(getattr(other.system, name)).max()
-        np.testing.assert_allclose(
-            getattr(ours.system, name), getattr(other.system, name), rtol=0, atol=1e-6 * scale
-        )
+        np.testing.assert_allclose(getattr(ours.system, name), getattr(other.system, name), rtol=0, atol=1e-6 * scale)
     np.testing.assert_allclose(ours.forces[0].force, other.forces[0].force, atol=1e-9)
     assert ours.forces[0].orders == other.forces[0].orders
     for one, two in zip(ours.elements, other.elements):

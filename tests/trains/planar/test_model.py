@@ -8,11 +8,11 @@ import pytest
 from published.planetary_sets import lin_parker_set, torsional_set
 from scipy.linalg import eig, eigh
 from uneven_set import ANGLES, UNEVEN
-from validation.planetary import nrel_set
 
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.solvers.linear.modal import solve_modes
+from femgear.stages.lumped_set import Bearings
 from femgear.system.mesh_directions import (
     dof_names,
     free_motions,
@@ -21,7 +21,7 @@ from femgear.system.mesh_directions import (
     pin_directions,
 )
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarTorque, planar_from_set, torque_shares
-from femgear.trains.rigid import Bearings
+from validation.planetary import nrel_set
 
 
 def uneven(**changes):
@@ -185,9 +185,15 @@ def test_geared_set_gives_radii_angles_and_the_torques_of_willis():
     gears = nrel_set()
     body = PlanarBody(10.0, 1.0, 1e8)
     data = planar_from_set(
-        gears, sun=body, ring=replace(body, torsional_support=1e9), carrier=body, planet=PlanarBody(5.0, 0.5),
-        stiffness_sun_planet=1e9, stiffness_planet_ring=1e9, planet_bearing=2e9,
-    )  # fmt: skip
+        gears,
+        sun=body,
+        ring=replace(body, torsional_support=1e9),
+        carrier=body,
+        planet=PlanarBody(5.0, 0.5),
+        stiffness_sun_planet=1e9,
+        stiffness_planet_ring=1e9,
+        planet_bearing=2e9,
+    )
     assert np.abs(data.closure).max() < 1e-12
     assert math.degrees(data.pressure_angle_sun_planet) == pytest.approx(24.169, abs=1e-3)
     system = gear_set_system(data, torque=PlanarTorque(100.0))
@@ -204,10 +210,13 @@ def test_geared_set_gives_radii_angles_and_the_torques_of_willis():
 @pytest.mark.parametrize(
     ("torque", "compressed"),
     [
-        (PlanarTorque(50.0), True), (PlanarTorque(-50.0), True), (PlanarTorque(50.0, "carrier", "sun"), True),
-        (PlanarTorque(-50.0, "carrier", "sun"), True), (PlanarTorque(50.0, "sun", None), True),
+        (PlanarTorque(50.0), True),
+        (PlanarTorque(-50.0), True),
+        (PlanarTorque(50.0, "carrier", "sun"), True),
+        (PlanarTorque(-50.0, "carrier", "sun"), True),
+        (PlanarTorque(50.0, "sun", None), True),
     ],
-)  # fmt: skip
+)
 def test_columns_follow_the_loaded_flanks(torque, compressed):
     data = uneven(carrier=replace(uneven().carrier, torsional_support=1e6))
     system = gear_set_system(data, torque=torque)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
 from published.wind_turbine import wind_turbine_b
-from validation.planar import by_kind, torsional
 
 from femgear.errors import CaseError
+from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mode_kinds import class_shares, gear_set_kinds
-from femgear.trains.rigid import gear_set_modes
+from validation.planar import by_kind, torsional
 
 # the matrices of Lin and Parker (1999) set up elsewhere and solved in double precision [Hz]
 PLANET = (1808.18088204, 5963.76002161, 6981.70516704)
@@ -87,9 +87,7 @@ def test_unequal_spacing_mixes_all_but_the_planet_modes():
     energy = np.array(modes.shape) ** 2
     central = energy[:9].reshape(3, 3, -1).sum(axis=0)
     named = np.array(modes.kind)
-    assert np.all(
-        central[2, named == "translational"] < 0.02 * energy[:, named == "translational"].sum(axis=0)
-    )
+    assert np.all(central[2, named == "translational"] < 0.02 * energy[:, named == "translational"].sum(axis=0))
     assert np.all(central[:, named == "planet"] < 1e-12)
 
 

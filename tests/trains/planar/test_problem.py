@@ -6,10 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from published.planetary_sets import lin_parker_set
-from validation import planar
-from validation.planar import sharing_set, static_mesh_forces, sun_forces
 
 from femgear.errors import CaseError
+from femgear.stages.lumped_set import (
+    Bearings,
+    Gravity,
+    MemberBearing,
+    gear_set_problem,
+    phased_series,
+    pin_deflections,
+)
 from femgear.system.fourier import FourierSeries, StepSeries, constant
 from femgear.system.mesh_directions import (
     dof_names,
@@ -20,14 +26,8 @@ from femgear.system.mesh_directions import (
 )
 from femgear.system.rigid_bodies import CENTRAL, PlanarTorque, torque_shares
 from femgear.system.system import MeshExcitation, element_forces, external_force
-from femgear.trains.rigid import (
-    Bearings,
-    Gravity,
-    MemberBearing,
-    gear_set_problem,
-    phased_series,
-    pin_deflections,
-)
+from validation import planar
+from validation.planar import sharing_set, static_mesh_forces, sun_forces
 
 ANGLES = np.array([0.3, 1.9, 4.1])
 
@@ -72,9 +72,7 @@ def test_pin_errors_act_as_forces_of_the_bearings(sign):
     """Other route: displaced springs, load k_p e on the planets and its reaction on the carrier."""
     data = supported(planet_angles=ANGLES, planet_bearing=[1e8, 2e8, 3e8])
     pins, torque = np.array([[3e-6, 5e-6], [-4e-6, 1e-6], [2e-6, -7e-6]]), PlanarTorque(sign * 900.0)
-    problem = gear_set_problem(
-        data, torque=torque, pin_errors=pins, meshes=mesh_elements(data, separates=False)
-    )
+    problem = gear_set_problem(data, torque=torque, pin_errors=pins, meshes=mesh_elements(data, separates=False))
     system = gear_set_system(data, torque=torque)
     pushed = np.einsum("ina,n,na->i", pin_directions(data), data.planet_bearing, pins)
     q = np.linalg.solve(system.K + (system.W * 5e8) @ system.W.T, system.load + pushed)
@@ -97,9 +95,7 @@ def test_torque_of_the_mirrored_set():
     two = replace(one, planet_angles=2 * np.pi - ANGLES[::-1])
     forces = [
         static_mesh_forces(
-            gear_set_problem(
-                data, torque=PlanarTorque(t), pin_errors=p, meshes=mesh_elements(data, separates=False)
-            )
+            gear_set_problem(data, torque=PlanarTorque(t), pin_errors=p, meshes=mesh_elements(data, separates=False))
         )
         for data, t, p in ((one, 400.0, pins), (two, -400.0, pins[::-1] * [1.0, -1.0]))
     ]
@@ -144,8 +140,11 @@ def test_bearings_with_no_clearance_are_the_linear_ones():
     members = tuple(MemberBearing(getattr(data, name).support, 0.0, name) for name in CENTRAL)
     plain = gear_set_problem(data, torque=torque, gravity=gravity)
     loose = gear_set_problem(
-        unsupported(data), torque=torque, gravity=gravity, bearings=Bearings(0.0, members),
-    )  # fmt: skip
+        unsupported(data),
+        torque=torque,
+        gravity=gravity,
+        bearings=Bearings(0.0, members),
+    )
     q = np.random.default_rng(3).normal(scale=1e-6, size=18)
     parts = []
     for problem in (plain, loose):
@@ -181,9 +180,7 @@ def test_carrier_drops_through_its_clearance():
     x[columns] = [[0.0, 3.0 * clearance]]
     p = math.acos(1.0 / 3.0)
     expected = 2e8 / math.pi * clearance * (3 * (p + math.sin(p) / 3) - 2 * math.sin(p))
-    assert element_forces(problem, x, np.zeros(1))[0][columns] == pytest.approx(
-        np.array([[0.0, expected]]), rel=1e-12
-    )
+    assert element_forces(problem, x, np.zeros(1))[0][columns] == pytest.approx(np.array([[0.0, expected]]), rel=1e-12)
 
 
 def test_static_record_is_the_quasi_static_solution():
@@ -195,9 +192,7 @@ def test_static_record_is_the_quasi_static_solution():
     states = np.array([np.linalg.solve(system.K + (system.W * row) @ system.W.T, system.load) for row in k.T])
     deflection = (states @ system.W).T
     record = MeshExcitation(k, deflection, k * deflection, np.full(6, 5e-5))
-    problem = gear_set_problem(
-        data, torque=torque, meshes=mesh_elements(data, stiffness=record, harmonics=15)
-    )
+    problem = gear_set_problem(data, torque=torque, meshes=mesh_elements(data, stiffness=record, harmonics=15))
     assert np.array_equal(problem.elements[0].backlash, np.full(6, 5e-5))
     for i in (0, 5, 17):
         force = element_forces(problem, states[i] @ problem.system.W, np.array([2 * np.pi * tau[i]]))[0]
@@ -268,13 +263,17 @@ def test_back_flanks_of_a_record_touch_beyond_its_unloaded_deflection(theta):
 def test_damping_is_modal_at_standstill_with_closed_meshes():
     data = supported()
     problem = gear_set_problem(
-        data, damping=0.03, carrier_speed=50.0, back_flanks=True,
-        meshes=mesh_elements(data, backlash=1e-5), bearings=Bearings(1e-4),
-    )  # fmt: skip
+        data,
+        damping=0.03,
+        carrier_speed=50.0,
+        back_flanks=True,
+        meshes=mesh_elements(data, backlash=1e-5),
+        bearings=Bearings(1e-4),
+    )
     plain = gear_set_system(data)
     value, shape = np.linalg.eigh(
-        np.linalg.solve(np.sqrt(plain.M), np.linalg.solve(
-            np.sqrt(plain.M), plain.K + (plain.W * 5e8) @ plain.W.T).T))  # fmt: skip
+        np.linalg.solve(np.sqrt(plain.M), np.linalg.solve(np.sqrt(plain.M), plain.K + (plain.W * 5e8) @ plain.W.T).T)
+    )
     modes = np.linalg.solve(np.sqrt(plain.M), shape)
     expected = np.diag(2 * 0.03 * np.sqrt(value))
     found = modes.T @ problem.system.C @ modes
@@ -311,8 +310,9 @@ def test_pin_deflections_are_the_approach_of_the_flanks():
     alpha, beta = data.pressure_angle_sun_planet, data.pressure_angle_planet_ring
     expected = [-math.sin(alpha), -math.cos(alpha), 0, math.sin(beta), -math.cos(beta), 0]
     assert found == pytest.approx(1e-6 * np.array(expected), abs=1e-20)
-    assert found == pytest.approx(mesh_directions(data).T @ np.eye(18)[:, 9] * 1e-6
-                                  + mesh_directions(data).T @ np.eye(18)[:, 13] * 1e-6)  # fmt: skip
+    assert found == pytest.approx(
+        mesh_directions(data).T @ np.eye(18)[:, 9] * 1e-6 + mesh_directions(data).T @ np.eye(18)[:, 13] * 1e-6
+    )
 
 
 def test_only_meshes_that_part_must_press_at_every_instant():
@@ -331,18 +331,25 @@ def test_impossible_requests_are_refused():
     steps = StepSeries(np.full((6, 2), 5e8), [0.0, 0.5])
     for error, call in (
         ("E-BACKLASH", lambda: gear_set_problem(data, back_flanks=True)),
-        ("E-BACKLASH", lambda: gear_set_problem(
-            data, back_flanks=True,
-            meshes=replace(mesh_elements(data, stiffness=steps, backlash=1e-5), force=constant(np.ones(6))))),
-        ("E-BEARING", lambda: gear_set_problem(
-            replace(data, planet_bearing=np.inf), bearings=Bearings(1e-5))),
+        (
+            "E-BACKLASH",
+            lambda: gear_set_problem(
+                data,
+                back_flanks=True,
+                meshes=replace(mesh_elements(data, stiffness=steps, backlash=1e-5), force=constant(np.ones(6))),
+            ),
+        ),
+        ("E-BEARING", lambda: gear_set_problem(replace(data, planet_bearing=np.inf), bearings=Bearings(1e-5))),
         ("E-SHAPE", lambda: gear_set_problem(data, pin_errors=np.zeros((3, 3)))),
         ("E-SHAPE", lambda: gear_set_problem(data, damping=np.zeros((4, 4)))),
-        ("E-SHAPE", lambda: gear_set_problem(
-            data, meshes=replace(mesh_elements(data), columns=np.arange(1, 7)))),
+        ("E-SHAPE", lambda: gear_set_problem(data, meshes=replace(mesh_elements(data), columns=np.arange(1, 7)))),
         ("E-SHAPE", lambda: mesh_elements(data, stiffness=constant(np.ones(4)))),
-        ("E-HARMONICS", lambda: mesh_elements(
-            data, stiffness=MeshExcitation(np.ones((6, 4)), np.ones((6, 4)), np.ones((6, 4)), np.zeros(6)))),
-    ):  # fmt: skip
+        (
+            "E-HARMONICS",
+            lambda: mesh_elements(
+                data, stiffness=MeshExcitation(np.ones((6, 4)), np.ones((6, 4)), np.ones((6, 4)), np.zeros(6))
+            ),
+        ),
+    ):
         with pytest.raises(CaseError, match=error):
             call()

@@ -16,6 +16,7 @@ from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.solution import open_verdict
 from femgear.solvers.stability.floquet import floquet_verdicts
 from femgear.solvers.time.transient import solve_transient
+from femgear.stages.static import solve_static
 from femgear.storage.results import run_folder
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import PlanarTorque
@@ -37,7 +38,6 @@ from femgear.trains.planar.results import branch_warnings, comparisons, describe
 from femgear.trains.planar.stages import PLANAR, solve_branch, solve_planar_modes, solve_planar_response
 from femgear.trains.reading import open_results, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
-from femgear.trains.static.stages import solve_static
 
 ROOT = Path(__file__).parents[3]
 FIGURES = ("weight_response", "carrier_orbit", "planet_bearing_forces", "tooth_contact", "wedged_teeth")
@@ -149,9 +149,16 @@ def test_verdicts_agree_with_fine_ones(pgb):
 def test_verdicts_near_the_unit_circle_are_judged_again(pgb, monkeypatch):
     """Within 1e-3 and 100 times the error of the coarse one, inside as outside, and where there is none."""
     coarse = [
-        (1.0009, 0.0), (0.9991, 0.0), (1.0011, 0.0), (0.9989, 0.0), (1.05, 6e-4), (1.05, 4e-4), (-0.95, 6e-4),
-        (-0.95, 4e-4), (2.0, 1e-6),
-    ]  # fmt: skip
+        (1.0009, 0.0),
+        (0.9991, 0.0),
+        (1.0011, 0.0),
+        (0.9989, 0.0),
+        (1.05, 6e-4),
+        (1.05, 4e-4),
+        (-0.95, 6e-4),
+        (-0.95, 4e-4),
+        (2.0, 1e-6),
+    ]
     close = [0, 1, 4, 6, 9]
     tolerances = []
 
@@ -262,9 +269,11 @@ def test_ring_swings_against_a_carrier_bearing_that_closes_for_a_part_of_the_tim
     clearance, limits = 20e-6, (110.0, 118.0)
     case = read_case(ROOT / "cases" / "nrel_pga.toml")
     case = changed(
-        case, planar__back_flanks=False, planar__carrier_bearing__clearance="20 um",
+        case,
+        planar__back_flanks=False,
+        planar__carrier_bearing__clearance="20 um",
         planar__branch={"from": "110 Hz", "to": "118 Hz", "stability": False, "harmonics": 3},
-    )  # fmt: skip
+    )
     data = solve_branch(case).dataset()
     problem = bearing_problem_a(clearance)
     other = weight_branch(problem, limits, harmonics=3)
@@ -295,13 +304,20 @@ def test_mesh_stiffness_of_the_static_solution_goes_into_modes_and_branch(coarse
 @pytest.mark.parametrize(("fixed", "sense"), [("ring", 1), ("sun", -1)])
 def test_slow_turning_stiffly_held_gears_follow_their_static_solution(coarse, static, fixed, sense):
     stiff = changed(
-        coarse, planar__gravity=None, planar__back_flanks=False, planar__smoothing="0 um",
-        sun__support_stiffness="1e14 N/m", carrier__support_stiffness="1e14 N/m",
-        planet__bearing_stiffness="1e14 N/m", planar__ring__support_stiffness="1e14 N/m",
+        coarse,
+        planar__gravity=None,
+        planar__back_flanks=False,
+        planar__smoothing="0 um",
+        sun__support_stiffness="1e14 N/m",
+        carrier__support_stiffness="1e14 N/m",
+        planet__bearing_stiffness="1e14 N/m",
+        planar__ring__support_stiffness="1e14 N/m",
         planar__torsion={"sun": "1e12 N m/rad", "ring": "1e14 N m/rad"},
-        operation__fixed=fixed, operation__speeds=["0.01 rpm"],
-        dynamics__mesh_harmonics=5, dynamics__response_harmonics=10,
-    )  # fmt: skip
+        operation__fixed=fixed,
+        operation__speeds=["0.01 rpm"],
+        dynamics__mesh_harmonics=5,
+        dynamics__response_harmonics=10,
+    )
     found = solve_planar_response(stiff, static).dataset().isel(speed=0)
     lines = (found["mesh_force_real"] + 1j * found["mesh_force_imag"]).values
     # against a sun that stands the carrier runs through the record from its end
@@ -316,9 +332,14 @@ def test_slow_turning_stiffly_held_gears_follow_their_static_solution(coarse, st
 
 def test_weight_alone_in_a_turning_frame_is_the_linear_response(pgb):
     case = changed(
-        pgb, planar__branch=None, planar__back_flanks=False, planar__gyroscopic=True,
-        planar__smoothing="0 um", planar__reaction="supports", operation__speeds=["900 rpm"],
-    )  # fmt: skip
+        pgb,
+        planar__branch=None,
+        planar__back_flanks=False,
+        planar__gyroscopic=True,
+        planar__smoothing="0 um",
+        planar__reaction="supports",
+        operation__speeds=["900 rpm"],
+    )
     found = solve_planar_response(case).dataset().isel(speed=0)
     model = planar_model(case, planetary_set(case), mesh_frequency=True)
     omega = 900 * np.pi / 30
@@ -340,9 +361,7 @@ def test_clearance_of_the_planet_bearings_acts_in_the_response(pgb):
     tight = solve_planar_response(with_value(case, "planet.bearing_clearance", None)).dataset()
     loose = solve_planar_response(case).dataset()
     force = [np.abs(one["planet_bearing_force_real"].values[0, :, 1, 0]).sum() for one in (tight, loose)]
-    assert force[1] == pytest.approx(force[0], rel=1e-6) and force[0] == pytest.approx(
-        180e3 / 0.294, rel=1e-6
-    )
+    assert force[1] == pytest.approx(force[0], rel=1e-6) and force[0] == pytest.approx(180e3 / 0.294, rel=1e-6)
     model = planar_model(case, planetary_set(case), mesh_frequency=True)
     assert model.groups["planets"].shape == (3, 2)
     solution = solve_planar_response(case).solutions[0]
@@ -376,9 +395,7 @@ def test_an_undamped_resonance_is_refused(pgb):
         solve_branch(over)
     assert info.value.code == "E-RESONANCE" and info.value.exit_code == 2
     # beside it the response is that of the undamped set
-    beside = changed(
-        bare, planar__branch={"from": "30 Hz", "to": "32 Hz", "harmonics": 3, "stability": False}
-    )
+    beside = changed(bare, planar__branch={"from": "30 Hz", "to": "32 Hz", "harmonics": 3, "stability": False})
     assert solve_branch(beside).branch.complete
     with pytest.raises(CaseError, match="E-RESONANCE"):
         solve_planar_response(changed(bare, operation__speeds=["2445.665 rpm"]))
@@ -386,9 +403,11 @@ def test_an_undamped_resonance_is_refused(pgb):
 
 def test_a_branch_ends_before_motions_that_are_not_small(pgb):
     faint = changed(
-        pgb, planar__damping_ratios=[1e-4], planar__back_flanks=False,
+        pgb,
+        planar__damping_ratios=[1e-4],
+        planar__back_flanks=False,
         planar__branch={"from": "39 Hz", "to": "45 Hz", "harmonics": 2, "stability": False, "points": 40},
-    )  # fmt: skip
+    )
     found = solve_branch(faint)
     data, module = found.dataset(), 14e-3
     assert not data.attrs["complete"] and "more than 28 mm (2 modules)" in data.attrs["message"]

@@ -21,20 +21,24 @@ from published.wind_turbine_response import (
     wedging_onset,
     weight_branch,
 )
-from validation import nrel
 
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.stroboscopic import sweep_response
-from femgear.trains.rigid import gear_set_modes
+from femgear.stages.lumped_set import gear_set_modes
+from validation import nrel
 
 
 def solved(problem, hertz, harmonics=9, **options):
     """Balanced motion at a frequency of the weight; no test here asks for its stability."""
     found = solve_harmonic_balance(
-        problem, 2 * np.pi * hertz, harmonics=harmonics, reduction=drive_reduction(problem), stability=False,
+        problem,
+        2 * np.pi * hertz,
+        harmonics=harmonics,
+        reduction=drive_reduction(problem),
+        stability=False,
         **options,
-    )  # fmt: skip
+    )
     assert found.converged, found.message
     return found
 

@@ -1,0 +1,266 @@
+"""Mistakes of a case file in the words of its author.
+
+`translate` turns the validation errors of pydantic into errors of femgear with the nearest valid key,
+`combine` makes one of several, with the lines of the file. `in_terms_of_the_case` lets a refusal of the gears
+name what the file gives. `added_material` and `notices` are remarks on what is accepted.
+"""
+
+from __future__ import annotations
+
+import difflib
+import math
+import re
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from femgear.case import text as case_text
+from femgear.case.quantities import ANGLE, LENGTH, wrong_length
+from femgear.case.sections import Case, RackSection
+from femgear.errors import MOST_SHOWN, CaseError, GeometryError
+from femgear.findings import Finding, remark
+
+_DIMENSIONS = {
+    "centre_distance": LENGTH,
+    "bore_radius": LENGTH,
+    "outer_radius": LENGTH,
+    "tip_diameter": LENGTH,
+    "root_diameter": LENGTH,
+    "module": LENGTH,
+    "pressure_angle": ANGLE,
+}
+"""Of entries whose values the refusals of gears give as SI numbers."""
+_WANTED = dict.fromkeys(("tuple_type", "list_type"), "a list")
+_WANTED |= {"bool_type": "true or false", "string_type": "a text"}
+"""What pydantic needed, by the kind of its error."""
+_MOST = 100
+
+
+def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") -> list[CaseError]:
+    """Make a `CaseError` of each mistake that pydantic found.
+
+    The field names of ``model`` are the valid keys, ``prefix`` is the key of the table that was validated.
+    Of very many mistakes it is the first hundred.
+    """
+    problems = []
+    details: Any = error.errors(include_url=False)
+    # a list whose entries are refused has too few left
+    inside = {one["loc"][:length] for one in details for length in range(len(one["loc"]))}
+    for item in details[:_MOST]:
+        if item["type"] == "too_short" and item["loc"] in inside:
+            continue
+        key = case_text.dotted(item["loc"], prefix)
+        nested = item.get("ctx", {}).get("error")
+        if isinstance(nested, ValidationError):
+            problems += translate(nested, model, key)
+        elif isinstance(nested, CaseError):
+            nested.key = key
+            problems.append(nested)
+        else:
+            problems.append(_problem(item, key, model))
+    return problems
+
+
+def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
+    """One error of pydantic's list."""
+    kind, context, value = item["type"], item.get("ctx", {}), item.get("input")
+    if kind == "missing":
+        section = _section(model, item["loc"])
+        remedy = f"add it: {_description(model, item['loc'])}".removesuffix(": ")
+        if section is not None:
+            needed = [name for name, field in section.model_fields.items() if field.is_required()]
+            remedy = f"add the section with {', '.join(needed)}"
+        return CaseError("missing", code="E-KEY-MISSING", key=key, remedy=remedy)
+    if kind == "extra_forbidden":
+        return _unknown_key(item["loc"], key, model)
+    if kind == "literal_error":
+        limit = context["expected"]
+        near = difflib.get_close_matches(str(value).lower(), re.findall("'(.+?)'", limit), n=1)
+        remedy = f"did you mean {near[0]!r}?" if near else None
+        return CaseError("not one of the choices", code="E-CHOICE", key=key, value=value, limit=limit, remedy=remedy)
+    if kind in ("model_type", "model_attributes_type", "dict_type"):
+        message = f"a table is needed, not {case_text.described(value)}"
+        section = f"[[{key.partition('[')[0]}]]" if key.endswith("]") else f"[{key}]"
+        return CaseError(message, code="E-TYPE", key=key, value=value, remedy=f"write the section {section}")
+    if kind in _WANTED:
+        words = _WANTED[kind]
+        message = f"{words} is needed, not {case_text.described(value)}"
+        remedy = "write it in quotation marks" if words == "a text" else f"write {words}, without quotation marks"
+        if words == "a list":
+            remedy = f"write [[{key}]]" if _section(model, item["loc"]) else "write it in brackets: [...]"
+        return CaseError(message, code="E-TYPE", key=key, value=value, remedy=remedy)
+    if kind in ("too_long", "too_short"):
+        many = kind == "too_long"
+        limit = f"at most {context['max_length']}" if many else f"{context['min_length']} or more"
+        error = wrong_length(context["actual_length"], limit, many=many)
+        error.key = key
+        return error
+    return CaseError(f"not what is needed here: {item['msg'].lower()}", key=key, value=value)
+
+
+def _unknown_key(location: tuple, key: str, model: type[BaseModel]) -> CaseError:
+    """Refusal of a key that nobody reads, with where it may belong."""
+    parent = _section(model, location[:-1])
+    valid = _keys(parent) if parent else []
+    last = str(location[-1])
+    near = difflib.get_close_matches(last, valid, n=1, cutoff=0.6)
+    homes = [name for name in model.model_fields if last in _keys(_section(model, (name,)))]
+    if near:
+        remedy = f"did you mean {near[0]}?"
+    elif homes:
+        remedy = f"{last} belongs in [{'] or ['.join(homes)}]"
+    else:
+        remedy = None
+    return CaseError("unknown key", code="E-KEY-UNKNOWN", key=key, limit=", ".join(valid) or None, remedy=remedy)
+
+
+def _description(model: type[BaseModel], location: tuple) -> str:
+    """What the schema says about the entry."""
+    section = _section(model, location[:-1]) or model
+    schema = _properties(section).get(str(location[-1]), {})
+    choices = " or ".join(str(choice) for choice in schema.get("enum", ()))
+    kind = str(schema.get("type", ""))
+    return str(schema.get("description") or choices or {"string": "a text", "array": "a list"}.get(kind, kind))
+
+
+@cache
+def _properties(section: type[BaseModel]) -> dict[str, dict]:
+    return section.model_json_schema()["properties"]
+
+
+def _keys(section: type[BaseModel] | None) -> list[str]:
+    """Names of its entries as the file gives them."""
+    return [field.alias or name for name, field in section.model_fields.items()] if section else []
+
+
+def _section(model: type[BaseModel], location: tuple) -> type[BaseModel] | None:
+    """Model of the table at ``location``, None where that is no table."""
+    current: type[BaseModel] | None = model
+    for part in location:
+        if isinstance(part, int):
+            continue
+        field = current.model_fields.get(str(part)) if current else None
+        candidates = (field.annotation, *getattr(field.annotation, "__args__", ())) if field else ()
+        current = next((c for c in candidates if isinstance(c, type) and issubclass(c, BaseModel)), None)
+    return current
+
+
+def combine(problems: list[CaseError], text: str, name: str, count: int = 0) -> CaseError:
+    """Make one error that lists all (at least one); its ``problems`` holds them one by one.
+
+    ``count`` is their number where `translate` left some out.
+    ``text`` is the file, for line numbers (empty where the text is not the user's), ``name`` its name.
+    """
+    for problem in problems:
+        line = case_text.line_of(text, problem.key) if problem.key and name else None
+        if problem.file in (None, name):  # or that of another file
+            problem.file = f"{name}:{line}" if line else name
+    if len(problems) == 1:
+        combined = problems[0]
+    else:
+        count = count if count > _MOST else len(problems)
+        first = f", the first {MOST_SHOWN} of them" if count > MOST_SHOWN else ""
+        combined = CaseError(f"{count} problems{first}", file=name)
+        combined.code = problems[0].code if len({p.code for p in problems}) == 1 else "E-CASE"
+    combined.problems = tuple(problems)
+    return combined
+
+
+def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
+    """Let a refusal of the gears name the entries that the case gives, with their values and keys that exist.
+
+    The fields of the error are changed, ``file`` (with the line) among them; of its values lengths [m] are
+    shown in mm, angles [rad] in degrees.
+    """
+    if error.code == "E-BACKLASH":
+        gear = (error.key or "").partition(".")[0]
+        error.remedy = (
+            f"leave {gear}.profile_shift out so that it is found, give set.backlash, or another set.centre_distance"
+        )
+    if error.code == "E-ASSEMBLY":
+        _assembly(error, case)
+    if error.key == "rack.root_radius":
+        if getattr(getattr(case, error.gear or "", None), "rack", None) is not None:
+            error.key = f"{error.gear}.rack.root_radius"
+        error.value = rack_at(case, error.key).root_radius
+    _shift_left_out(error, case)
+    _in_transverse_section(error, case)
+    dimension = _DIMENSIONS.get((error.key or "").rpartition(".")[2])
+    if dimension is not None and isinstance(error.value, float):
+        error.value = dimension.show(error.value)
+    error.file = case.location(error.key or "")
+
+
+def rack_at(case: Case, key: str) -> RackSection:
+    """Find the rack section of a key, that of all gears or of one."""
+    gear = key.partition(".")[0]
+    return case.rack if gear == "rack" else getattr(case, gear).rack
+
+
+def _assembly(error: GeometryError, case: Case) -> None:
+    """Planets that cannot be assembled: the angles given, or the number of equally spaced planets."""
+    angles = case.set.planet_angles
+    if angles is None:
+        error.key, error.value = "set.planets", case.set.planets
+        return
+    error.value = ", ".join(f"{math.degrees(angle):.6g}" for angle in angles[:24]) + " deg"
+
+
+def _shift_left_out(error: GeometryError, case: Case) -> None:
+    """A shift that was found is no entry to change: name the one that it follows from."""
+    others = {"sun": "ring", "ring": "sun", "gear_1": "gear_2", "gear_2": "gear_1"}
+    sections = {name: getattr(case, name) for name in case.gear_names if name in others}
+    gear, _, entry = (error.key or "").partition(".")
+    if gear not in sections or entry != "profile_shift" or sections[gear].profile_shift is not None:
+        return
+    if case.set.centre_distance is not None:
+        error.key, given = "set.centre_distance", f"{1e3 * case.set.centre_distance:.6g} mm"
+        remedy = "change the centre distance or the tooth numbers"
+    else:
+        other = others[gear]
+        error.key, given = f"{other}.profile_shift", sections[other].profile_shift
+        remedy = f"change the {other}'s profile shift or the tooth numbers"
+    found = f"{error.value:.5g}" if isinstance(error.value, float) else error.value
+    error.message += f" (the {gear}'s profile shift of {found} is what closes the set)"
+    if error.code == "E-SHIFT":
+        error.limit = f"such that the {gear}'s shift is {error.limit}"
+    error.value, error.remedy = given, remedy
+
+
+def _in_transverse_section(error: GeometryError, case: Case) -> None:
+    """Gears of a helical case are refused in their transverse section, the file gives the normal one."""
+    if case.helix_angle is None:
+        return
+    error.message += " (in the transverse section of the helical gears"
+    factor = math.cos(case.helix_angle)
+    if factor < 0.999 and ((error.key or "").endswith("profile_shift") or "rack." in (error.key or "")):
+        error.message += f", whose coefficients are {factor:.6g} times those of the file"
+    error.message += ")"
+
+
+def added_material(case: Any) -> Iterator[Finding]:
+    """Find reliefs and crownings with a negative amount [m]: most are slips of the sign."""
+    for gear in case.gear_names:
+        for i, one in enumerate(getattr(case, gear).modifications):
+            if one.kind in ("tip relief", "root relief", "profile crowning") and one.amount < 0.0:
+                yield Finding(
+                    "W-RELIEF-SIGN",
+                    f"{gear}.modifications[{i}].amount",
+                    f"a {one.kind} of {one.amount * 1e6:.6g} um adds material",
+                    remedy="a positive amount takes it off (usual: 0 um or above)",
+                )
+
+
+def notices(data: dict, case: Case) -> Iterator[Finding]:
+    """Remark on what a case file, its tables checked, gives in a way that deserves to be said."""
+    if (teeth := data["ring"]["teeth"]) < 0:
+        yield remark(
+            f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
+            "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
+        )
+    if not case.rigid and "bearing_clearance" in data["planet"] and case.static.members == "fixed":
+        text = 'has no effect while static.members is "fixed"'
+        remedy = 'write static.members = "elastic"'
+        yield Finding("W-UNUSED", "planet.bearing_clearance", text, remedy=remedy)

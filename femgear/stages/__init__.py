@@ -1,0 +1,1 @@
+"""What several trains run: the protocol of a stage, the static solution, the lumped set."""

@@ -1,0 +1,663 @@
+"""Stages "static" and "stress": what the teeth of a planetary set carry over one mesh period.
+
+"static" solves the FE contact of all meshes for transmission error, load sharing and mesh stiffness; "stress"
+finds root stresses, contact pressures, load spectra and nominal stresses of that solution. Both stages,
+`STATIC` and `STRESS` at the end, stand in the tables of the trains that compute with FE contact.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from femgear.case.dependencies import (
+    Entries,
+    Steps,
+    check_entries,
+    compliance_entries,
+    solution_entries,
+    static_entries,
+)
+from femgear.case.gear_set import (
+    case_overlap,
+    driving_torque,
+    material_of,
+    materials_of,
+    planetary_set,
+    set_deviations,
+)
+from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES, Case
+from femgear.contact.bodies import (
+    Bodies,
+    Sector,
+    Sectors,
+    flank_widths,
+    helical_stiffness,
+    make_bodies,
+    make_sectors,
+)
+from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
+from femgear.contact.root_stress import (
+    RootStresses,
+    computed_waves,
+    observed_root_stress,
+    root_ranges,
+    root_stress,
+    root_stress_cycle,
+    root_waves,
+)
+from femgear.contact.supports import RIGID, UPRIGHT, Supports, WidthSupports, tilting_members
+from femgear.contact.tooth_loads import load_spectrum, loaded_teeth
+from femgear.contact.width_waves import (
+    WidthWaves,
+    common_width,
+    condensed_waves,
+    waves_of_gears,
+    with_ring_waves,
+)
+from femgear.errors import CaseError, ContactError, GeometryError
+from femgear.fe.elasticity import Material, foundation, material_of_each
+from femgear.gears.deviations import common_period
+from femgear.gears.iso6336 import (
+    contact_ratio_factor,
+    nominal_contact_stress,
+    nominal_root_stress,
+    overlap_of,
+    root_face_width,
+)
+from femgear.gears.planetary import PlanetarySet
+from femgear.gears.profile import base_helix_angle
+from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
+from femgear.stages.static_results import (
+    SLICES,
+    NominalStresses,
+    StaticResult,
+    StressResult,
+    describe_static,
+    describe_stress,
+)
+
+# beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
+# would take a quarter of a gigabyte for three planets
+WHOLE_RECORD = 16
+_PER_OVERLAP = 6
+"""Slices of helical teeth in the part of the width in which they turn by a pitch."""
+_MORE = 64
+"""Positions beside three times those that are wanted, for the sake of slices."""
+LARGEST_MOTION, LARGEST_APPROACH = 2.0, 0.5
+"""Of a member and of the flanks of a mesh for which displacements count as small [modules]."""
+
+
+@one_blas_thread()
+def solve_static(
+    case: Case, *, cache: Path | None = None, progress: Progress = silent, steps: Steps | None = None
+) -> StaticResult:
+    """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
+
+    ``cache`` is the folder of generated grids, ``progress`` is called with (stage, done, total), and flank
+    compliances of other cases are taken from ``steps`` where they are those of this one. GeometryError,
+    GridError, ContactError.
+    """
+    gears, deviations, steps = planetary_set(case), set_deviations(case), steps or Steps()
+    sectors, bodies = known_compliances(case, gears, steps, cache=cache)
+    width = over_width(case, gears, cache=cache, steps=steps)
+    sun_torque = driving_torque(case)
+    periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
+    cycle = walk_mesh_cycle(
+        gears,
+        bodies,
+        sun_torque=sun_torque,
+        positions=record_positions(case, gears),
+        contact=case.static.contact,
+        # thickness errors separate the back flanks alone
+        deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
+        supports=static_supports(case),
+        periods=periods,
+        options=CycleOptions(
+            both_flanks=case.static.back_flanks,
+            # pressures of the plane contact are not those of slices
+            pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
+            peaks=True,
+            progress=partial(progress, "contact"),
+            **width,
+        ),
+    )
+    _check_motions(case, cycle, gears.gears[0].module)
+    overlap = _overlap(case, gears) if cycle.helical else 0.0
+    base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
+    found = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
+    return StaticResult(*found, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"))
+
+
+def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:
+    """Refuse flanks that approach by half a module, members that move by two: no small displacements."""
+    moved = np.abs(cycle.member_motion).max(axis=1, initial=0.0)
+    member = cycle.member_names[int(moved.argmax())].split(":")[0] if len(moved) else ""
+    support = {"sun": "sun.support_stiffness", "carrier": "carrier.support_stiffness"}
+    support["ring"] = "ring.foundation_radial"
+    for name, motion, key, modules, remedy in (
+        (
+            "the flanks approach",
+            # an offset of leads is none of the flanks' own
+            cycle.deflection - (0.0 if cycle.lead_offset is None else cycle.lead_offset),
+            "operation.torque",
+            LARGEST_APPROACH,
+            "reduce operation.torque or the errors",
+        ),
+        (
+            f"the {member} moves",
+            cycle.member_motion,
+            support.get(member, "planet.bearing_stiffness"),
+            LARGEST_MOTION,
+            "stiffen the supports and bearings, reduce the clearance or operation.torque",
+        ),
+    ):
+        largest = float(np.abs(motion).max(initial=0.0))
+        if largest > modules * module:
+            raise ContactError(
+                f"{name} by {largest * 1e3:.4g} mm: the model is one of small displacements",
+                code="E-MOTION",
+                key=key,
+                file=case.location(key),
+                value=f"{largest * 1e3:.4g} mm",
+                limit=f"{modules:g} modules, {modules * module * 1e3:.4g} mm",
+                remedy=remedy,
+            )
+
+
+def known_compliances(
+    case: Case, gears: PlanetarySet, steps: Steps, *, cache: Path | None = None
+) -> tuple[Sectors, Bodies]:
+    """Take sector grids and flank compliances of a case from what others have left, or make them."""
+    known = compliance_entries(case)
+    return steps.kept("flank compliances", known) or steps.keep(
+        "flank compliances", known, flank_compliances(case, gears, cache=cache, steps=steps)
+    )
+
+
+def flank_compliances(
+    case: Case, gears: PlanetarySet, *, cache: Path | None = None, steps: Steps | None = None
+) -> tuple[Sectors, Bodies]:
+    """Make the sector grids of all gears and their flank compliances, the ring held or on its foundation.
+
+    The gears are those of the case; ``cache`` is the folder of generated grids. What other cases with some of
+    the same gears have left is taken from ``steps``.
+    """
+    steps, materials = steps or Steps(), materials_of(case)
+    names = [gear.name for gear in gears.gears]
+    entries = [gear_entries(case, gears, number) for number in range(len(names))]
+    sectors = make_sectors(
+        gears,
+        materials,
+        flank_elements=case.static.flank_elements,
+        cache=cache,
+        known=[steps.kept(f"sector of the {name}", one) for name, one in zip(names, entries)],
+    )
+    for name, one, sector in zip(names, entries, sectors.gears, strict=True):
+        steps.keep(f"sector of the {name}", one, sector)
+    elastic = case.static.members == "elastic"
+    foundation = ring_foundation(case, sectors.ring) if elastic else None
+    if elastic:
+        entries[-1] = {**entries[-1], **foundation_entries(case)}
+    bodies = make_bodies(
+        sectors,
+        materials,
+        depth=case.static.depth,
+        ring_foundation=foundation,
+        known=[steps.kept(f"flanks of the {name}", one) for name, one in zip(names, entries)],
+    )
+    for name, one, body in zip(names, entries, bodies.gears):
+        steps.keep(f"flanks of the {name}", one, body)
+    base, softer = _helical(case, gears)
+    return sectors, replace(bodies, helical=softer, base_helix_angle=base)
+
+
+def gear_entries(case: Case, gears: PlanetarySet, number: int) -> Entries:
+    """List all that decides sector and flanks of a gear of a set, whatever the others are."""
+    gear = gears.gears[number]
+    return {
+        "gear": repr(gear),
+        "material": repr(materials_of(case)[number]),
+        "widths": flank_widths([one.face_width for one in gears.gears])[number],
+        "static.flank_elements": case.static.flank_elements,
+        "static.depth": case.static.depth,
+    }
+
+
+def foundation_entries(case: Case) -> Entries:
+    """List what decides the foundation of the ring."""
+    ring = case.ring
+    return {"foundation": (ring.foundation_radial, ring.foundation_tangential)}
+
+
+def _helical(case: Case, gears: PlanetarySet) -> tuple[float, tuple[float, ...]]:
+    """Base helix angle [rad], and stiffness of the teeth of every kind of mesh over that of straight ones.
+
+    Plane contact knows no helix.
+    """
+    base = 0.0
+    if case.helix_angle is not None and case.static.slices > 1:
+        base = base_helix_angle(case.pressure_angle, case.helix_angle)
+    return base, tuple(helical_stiffness(base, internal=pair.gear_2.internal) for pair in gears.kinds)
+
+
+def check_slices(case: Case, gears: PlanetarySet) -> None:
+    """Refuse (CaseError, E-SLICES) what slices over the width cannot do, and leads without slices.
+
+    Slices together with back flanks or with clearance in the bearings of planets, or thinner than a quarter
+    of a module.
+    """
+    static, count, first = case.static, case.static.slices, gears.gears[0]
+    where, overlap = {"code": "E-SLICES", "file": case.location("static.slices")}, _overlap(case, gears)
+    width = min(gears.mesh_widths)
+    least, most = math.ceil(_PER_OVERLAP * abs(overlap)) + 1, int(4 * width / first.module)
+    needed, other = max(min(SLICES, most), least), ", or leave static.slices out"
+    other = "" if case.set.helix_angle else other
+    if case.set.helix_angle and count < max(2, _PER_OVERLAP * abs(overlap)):
+        raise CaseError(
+            f"helical teeth with an overlap ratio of {abs(overlap):.3g} need slices over the width",
+            key="static.slices",
+            value=count,
+            limit=f"at least {least}",
+            remedy=f"give static.slices = {needed}",
+            **where,
+        )
+    _check_width_entries(case, needed, helical=bool(overlap))
+    if count < 2:
+        for gear in case.gear_names:
+            for i, one in enumerate(getattr(case, gear).modifications):
+                if one.kind in OVER_WIDTH:
+                    key = f"{gear}.modifications[{i}]"
+                    raise CaseError(
+                        f"a {one.kind} needs slices over the width",
+                        code="E-SLICES",
+                        key=key,
+                        file=case.location(key),
+                        remedy=f"give static.slices = {needed}",
+                    )
+        return
+    try:
+        tilting_members(gears, width_supports(case, gears), count)
+    except ContactError as error:
+        error.file = case.location(error.key or "")
+        raise
+    if static.back_flanks:
+        remedy = f"leave static.back_flanks out{other}"
+        raise CaseError("slices have no back flanks", key="static.back_flanks", remedy=remedy, **where)
+    if static.members == "elastic" and case.planet.bearing_clearance:
+        remedy = f"leave planet.bearing_clearance out{other}"
+        raise CaseError("slices know no clearance", key="planet.bearing_clearance", remedy=remedy, **where)
+    if width < 0.25 * count * first.module:
+        raise CaseError(
+            "slices are thinner than a quarter of the module",
+            key="static.slices",
+            value=count,
+            limit=f"at most {most}",
+            remedy=f"use at most {most} slices{other}",
+            **where,
+        )
+
+
+def _check_width_entries(case: Case, needed: int, *, helical: bool) -> None:
+    """Refuse tilts and twists without slices, and those of helical teeth, which axial motions press too."""
+    if case.static.slices > 1 and not helical:
+        return
+    for name, entries in WIDTH_ENTRIES.items():
+        given = vars(getattr(case, name)) if name in type(case).model_fields else dict.fromkeys(entries)
+        for key in (f"{name}.{entry}" for entry in entries if given[entry] not in (None, ())):
+            raise CaseError(
+                "tilts and twists over the face width are those of spur teeth in slices",
+                code="E-SLICES",
+                key=key,
+                file=case.location(key),
+                remedy="leave them out, or take a lead slope" if helical else f"give static.slices = {needed}",
+            )
+
+
+def over_width(
+    case: Case,
+    gears: PlanetarySet,
+    *,
+    waves: WidthWaves | None = None,
+    cache: Path | None = None,
+    steps: Steps | None = None,
+) -> dict[str, Any]:
+    """Compute what bodies yield across the width: options of the mesh cycle, none without slices.
+
+    ``waves`` where they are there already, as `StaticResult.waves`; what other cases with some of the same
+    gears have left is taken from ``steps``. CaseError: see `check_slices`.
+    """
+    check_slices(case, gears)
+    count = case.static.slices
+    if count < 2:
+        return {}
+    if waves is None:
+        waves = _waves_of_case(case, gears, steps or Steps(), cache)
+    found: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": width_supports(case, gears)}
+    if overlap := _overlap(case, gears):
+        found["ahead"] = slices_ahead(overlap, count)
+    return found
+
+
+def _waves_of_case(case: Case, gears: PlanetarySet, steps: Steps, cache: Path | None) -> WidthWaves:
+    """Condense all gears for waves across the width, and support the ring as the static stage has it."""
+    materials, width = materials_of(case), common_width(gears.gears)[0]
+    kept: list[tuple[str, Entries]] = []
+    for gear, material in zip(gears.gears, materials, strict=True):
+        entries = {"gear": repr(gear), "material": repr(material), "width": width}
+        kept.append((f"waves of the {gear.name}", {**entries, "static.slices": case.static.slices}))
+    known = [steps.kept(*one) for one in kept]
+    # half as fine as in the plane: K_H-beta changes by less than 2e-3
+    sectors = make_sectors(
+        gears,
+        materials,
+        flank_elements=6,
+        refine=0.5,
+        cache=cache,
+        known=[one and one.sector for one in known],
+    )
+    condensed = [
+        before or steps.keep(name, entries, condensed_waves(sector, material, case.static.slices, width))
+        for (name, entries), before, sector, material in zip(kept, known, sectors.gears, materials, strict=True)
+    ]
+    foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
+    return waves_of_gears(condensed, foundation, _helical(case, gears)[1])
+
+
+def loaded_over_width(case: Case, gears: PlanetarySet, waves: WidthWaves | None, steps: Steps) -> dict[str, Any]:
+    """Compute the options of `over_width` for the loaded state on all supports, with the ring held beside it.
+
+    ``waves`` are those of the static solution, whose ring is the one or the other.
+    """
+    found = over_width(case, gears, waves=waves, steps=steps)
+    if not found:
+        return {}
+    own: Any = found["waves"]
+    fixed = case.static.members == "fixed"
+    known = {"ring": repr(gears.gears[-1]), "material": repr(materials_of(case)[-1]), "width": own.width}
+    known |= {"static.slices": case.static.slices, **(foundation_entries(case) if fixed else {})}
+    rings = steps.kept("waves of the other ring", known)
+    if rings is None:
+        other = with_ring_waves(own, ring_foundation(case, own.ring.sector) if fixed else None)
+        rings = steps.keep("waves of the other ring", known, [one.ring for one in other.bodies])
+    bodies = (replace(one, ring=ring) for one, ring in zip(own.bodies, rings, strict=True))
+    other = replace(own, bodies=tuple(bodies))
+    return found | dict(zip(("waves", "held_waves"), (other, own) if fixed else (own, other)))
+
+
+def record_positions(case: Case, gears: PlanetarySet) -> int:
+    """Choose the number of equidistant positions of a mesh period, as many as the case asks for at least.
+
+    They meet all planets alike. Those of helical teeth meet the slices alike, as nearly as whole numbers
+    can: three times or more while one slice follows another, where that takes no more than three times the
+    positions and `_MORE`, so that `femgear.contact.face_width.over_slices` finds what slices add in coming
+    into contact one by one. Slices that follow one another faster than positions add little.
+    """
+    wanted, slices = case.static.positions, case.static.slices
+    if slices > 1 and (overlap := abs(_overlap(case, gears))):
+        passed = slices / overlap
+        often = 3.0 * passed <= 3.0 * wanted + _MORE
+        wanted = round(passed * max(3, math.ceil(wanted / passed)) if often else passed / (passed // wanted))
+    return gears.equal_positions(wanted)
+
+
+def _overlap(case: Case, gears: PlanetarySet) -> float:
+    """Overlap ratio, positive where gear 1 is right-handed and upper slices run ahead; zero of spur teeth."""
+    return math.copysign(case_overlap(case, gears), case.helix_angle or 1.0)
+
+
+@one_blas_thread()
+def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silent) -> StressResult:
+    """Find root stresses of every gear in every mesh, their ranges over a turn, load and nominal stresses.
+
+    The static solution of the case need not have pressures (`StaticResult.cycle.pressure`); where it has,
+    they are part of the result. ``progress`` is called with (stage, done, total).
+
+    GridError: the root of a tooth is not one chain of edges, or a body can move freely.
+    """
+    check_entries(static, StaticResult, static_entries(case), "static solution")
+    gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0
+    influences = _influences(case, static, progress)
+    repeats, _ = common_period(set_deviations(case), gears, limit=sys.maxsize)
+    closes = repeats == cycle.periods
+    teeth = loaded_teeth(cycle, reverse=reverse)
+    between = () if cycle.between is None else cycle.between.records
+    loads, *loads_between = (influences.loads(gears, record, reverse=reverse) for record in (cycle, *between))
+    ranges = root_ranges(gears, influences, loads, closes=closes, between=loads_between)
+    roots, first = _root_cycles(gears, influences, cycle, ranges, reverse)
+    return StressResult(
+        planetary_set=gears,
+        cycle=cycle,
+        influences=influences,
+        roots=roots,
+        first_period=first,
+        between=tuple(root_stress_cycle(gears, influences, record, reverse=reverse) for record in between),
+        ranges=ranges,
+        spectrum=load_spectrum(teeth, gears.mates, closes=closes),
+        nominal=nominal_stresses(gears, static.sun_torque, materials_of(case)),
+        sun_torque=static.sun_torque,
+        closes=closes,
+        relief_kinks=relief_kinks(case),
+    )
+
+
+def relief_kinks(case: Case) -> tuple[bool, ...]:
+    """Tell of every kind of mesh whether a relief of its loaded flanks begins with a kink."""
+    given, back = set_deviations(case), driving_torque(case) < 0
+    kinds = range(len(planetary_set(case).kinds))
+    return tuple(
+        any(getattr(law, "power", 2.0) <= 1.0 for form in given.mesh_forms(kind, back) for law in form.profile)
+        for kind in kinds
+    )
+
+
+def nominal_stresses(
+    planetary_set: PlanetarySet, sun_torque: float, material: Material | Sequence[Material]
+) -> NominalStresses:
+    """Compute sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
+
+    The torque on the sun may have either sign [N m]; the material is that of all gears or one for each.
+    """
+    s = planetary_set
+    # torque over reference radius: the same at all gears
+    force = abs(sun_torque) / (s.n_planets * s.gears[0].reference_radius)
+    elastic = [(one.youngs_modulus, one.poisson_ratio) for one in material_of_each(material, len(s.gears))]
+    contact, root, messages = np.full(len(s.kinds), math.nan), np.full((len(s.kinds), 2), math.nan), []
+    ratio_factor = contact.copy()
+    for i, pair in enumerate(s.kinds):
+        one, two = pair.gears
+        small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
+        load = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
+        (modulus, ratio), mate = (elastic[number] for number in s.mates[i])
+        try:
+            contact[i] = nominal_contact_stress(
+                small,
+                large,
+                working_angle=pair.working_pressure_angle,
+                youngs_modulus=modulus,
+                poisson_ratio=ratio,
+                mate=mate,
+                **load,
+            )
+            ratio_factor[i] = contact_ratio_factor(pair.contact_ratio, overlap_of(small, pair.face_width))
+        except GeometryError as error:
+            messages.append(f"{one.name}-{two.name}: {error.message}")
+        for j, gear in enumerate((one, two)):
+            try:
+                root[i, j] = nominal_root_stress(gear, common_width=pair.face_width, **load).stress
+            except GeometryError as error:
+                messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
+    return NominalStresses(contact, root, ratio_factor, "; ".join(dict.fromkeys(messages)))
+
+
+def ring_foundation(case: Case, sector: Sector):
+    """Assemble the elastic foundation of one sector of the ring, a sparse matrix (2n, 2n) [N/m]."""
+    ring, width = case.ring, sector.gear.face_width
+    return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
+
+
+def static_supports(case: Case) -> Supports:
+    """Choose the supports of the static problem: rigid, or those of the bodies of the case."""
+    return RIGID if case.static.members == "fixed" else case_supports(case)
+
+
+def case_supports(case: Case) -> Supports:
+    """Make the supports of sun, carrier and planets, with the bearing clearance of the case."""
+    return Supports(
+        sun=case.sun.support_stiffness,
+        carrier=case.carrier.support_stiffness,
+        planet=case.planet.bearing_stiffness,
+        planet_clearance=case.planet.bearing_clearance,
+    )
+
+
+def width_supports(case: Case, gears: PlanetarySet) -> WidthSupports:
+    """Make what holds the members of a case against tilting and twisting over the face width.
+
+    The sun twists as a tube between its bore and its root circle, or the diameter that the case gives; gears
+    of a pair do neither.
+    """
+    if not isinstance(gears, PlanetarySet):
+        return UPRIGHT
+    sun, carrier, rigidity = case.sun, case.carrier, None
+    if sun.torque_end is not None:
+        outer = sun.torsion_diameter or 2.0 * gears.sun.root_radius
+        shear = material_of(case, "sun").shear_modulus
+        rigidity = shear * np.pi / 32 * (outer**4 - (2.0 * sun.bore_radius) ** 4)
+        if rigidity <= 0.0:
+            raise CaseError(
+                "the sun has no section to twist",
+                code="E-RANGE",
+                key="sun.torsion_diameter",
+                value=f"{outer * 1e3:.6g} mm",
+                limit=f"above its bore, {2e3 * sun.bore_radius:.6g} mm",
+                file=case.location("sun.torsion_diameter"),
+            )
+    sign = {"front": -1, "back": 1, None: 1}
+    return WidthSupports(
+        sun=sun.tilt_stiffness,
+        carrier=carrier.tilt_stiffness,
+        planet=case.planet.tilt_stiffness,
+        wind_up=carrier.wind_up_stiffness,
+        wind_up_end=sign[carrier.torque_end],
+        sun_rigidity=rigidity,
+        sun_end=sign[sun.torque_end],
+    )
+
+
+def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
+    """List the normal backlash (2N,) of all meshes [m]."""
+    return np.repeat([pair.backlash for pair in gears.kinds], gears.n_planets)
+
+
+def _influences(case: Case, static: StaticResult, progress: Progress = silent) -> RootStresses:
+    """Find the root influences of the bodies as the static solution holds them, and of waves over the width.
+
+    External gears were observed with their flanks; an internal one, whose contact has two plane states, and
+    one that is wider than its mates are solved again. The tooth of the latter is at its root as wide as
+    ISO 6336-3 takes it, and stresses of a plane body under given forces go by its width.
+    """
+    found, loads, ahead, width = [], static.cycle.slice_load, None, min(static.planetary_set.mesh_widths)
+    common = flank_widths([one.gear.face_width for one in static.sectors.gears])
+    parts = zip(static.sectors.gears, static.bodies.gears, materials_of(case), common, strict=False)
+    for i, (sector, body, material, of_flanks) in enumerate(parts):
+        progress("stress", i, len(static.sectors.gears) + 1)
+        gear, support = sector.gear, None
+        if gear.internal:
+            support = ring_foundation(case, sector) if case.static.members == "elastic" else None
+        assert body is not None
+        if body.root is None:
+            found.append(root_stress(sector.grid, gear, material, foundation=support))
+        else:
+            found.append(observed_root_stress(gear, body.root))
+        narrower = [gear.face_width / root_face_width(gear.face_width, one, case.module) for one in of_flanks]
+        if max(narrower) > 1.0:
+            loaded = np.repeat(narrower, len(found[-1].roll))
+            found[-1] = replace(found[-1], influence=found[-1].influence * loaded)
+        if loads is not None:
+            waves = computed_waves(loads.shape[2]) * np.pi / width
+            waves = max(narrower) * root_waves(sector.grid, gear, material, waves, foundation=support)
+            # helical teeth are weaker than straight ones as they are softer: within 1 %
+            weaker = 1.0 / helical_stiffness(static.base_helix_angle, internal=gear.internal)
+            one = found[-1]
+            found[-1] = replace(one, influence=weaker * one.influence, waves=weaker * waves)
+    if loads is not None:
+        ahead = slices_ahead(static.overlap_ratio, loads.shape[2])
+    return RootStresses(*found, ahead=ahead)
+
+
+def slices_ahead(overlap: float, slices: int) -> np.ndarray:
+    """Find by how much slices run ahead of mid-width at an overlap ratio, signed as `_overlap` [periods]."""
+    return overlap * ((np.arange(slices) + 0.5) / slices - 0.5)
+
+
+def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
+    """Find the root stress of every gear in every mesh, and the mesh period with which each begins."""
+    if cycle.periods <= WHOLE_RECORD:
+        roots = root_stress_cycle(gears, influences, cycle, reverse=reverse)
+        return roots, np.zeros(len(roots), int)
+    each, slots = len(cycle.position) // cycle.periods, cycle.tooth_load.shape[1]
+    # one slot more at either end, and a period before and after
+    length = min(slots + 4, cycle.periods)
+    done, roots, first = {}, [], []
+    for number, one in enumerate(ranges):
+        slot, position = one.worst
+        start = (position // each - slot - 2) % cycle.periods
+        if start not in done:
+            part = _excerpt(cycle, start, length)
+            done[start] = root_stress_cycle(gears, influences, part, reverse=reverse)
+        roots.append(done[start][number])
+        first.append(start)
+    return tuple(roots), np.array(first)
+
+
+def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
+    """Take the loads of some mesh periods of a cycle; tooth numbers stay those of its first period."""
+    each = len(cycle.position) // cycle.periods
+    take = (start * each + np.arange(length * each)) % len(cycle.position)
+    names = ("tooth_load", "slice_load", "path", "back_tooth_load", "back_path", "back_force")
+    values = {name: getattr(cycle, name) for name in names}
+    parts = {name: one[..., take] for name, one in values.items() if one is not None}
+    return replace(cycle, position=np.arange(len(take)) / each, periods=length, **parts)
+
+
+STATIC = Stage(
+    name="static",
+    title="Static",
+    solve=solve_static,
+    options=("cache", "progress", "steps"),
+    decided_by=solution_entries,
+    verdict=lambda result: {"contact": result.cycle.contact},
+    describe=lambda results: describe_static(results.static),
+    warnings=StaticResult.warnings,
+    check=lambda case: check_slices(case, planetary_set(case)),
+)
+
+
+STRESS = Stage(
+    name="stress",
+    title="Stresses",
+    solve=solve_stress,
+    takes=("static",),
+    options=("progress",),
+    decided_by=solution_entries,
+    verdict=lambda result: {
+        "root_points": sum(len(root.arc) for root in result.roots),
+        "iso": result.nominal.message,
+    },
+    describe=lambda results: describe_stress(results.stress, results.findings),
+    warnings=StressResult.warnings,
+    concerned_by={"": ("W-FILLET", "W-KINK"), "static": ("W-EDGE", "W-KINK", "W-PRESSURE")},
+    wanted=lambda case: case.static.stresses,
+    unavailable=lambda case: (
+        "" if case.helix_angle is None or case.static.slices > 1 else "helical teeth need static.slices = 25"
+    ),
+    asked=lambda case: case.model_copy(update={"static": case.static.model_copy(update={"stresses": True})}),
+)

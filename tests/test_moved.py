@@ -1,0 +1,40 @@
+"""Former names of modules."""
+
+import subprocess
+import sys
+
+import pytest
+
+from femgear.moved import MOVED
+
+
+@pytest.mark.parametrize(
+    ("former", "new", "name"),
+    [
+        ("femgear.trains.protocol", "femgear.stages.protocol", "StageResult"),
+        ("femgear.trains.static.stages", "femgear.stages.static", "solve_static"),
+        ("femgear.trains.gear_pair.model", "femgear.trains.impacts.model", "ImpactPair"),
+        ("femgear.housing.casing_files", "femgear.exchange.casing_files", "read_casing"),
+    ],
+)
+def test_former_names_are_the_modules_by_their_new_ones(former, new, name):
+    """In a process of its own, where nothing is imported yet."""
+    script = f"""
+import warnings
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    from {former} import {name} as former
+import {new}
+assert former is {new}.{name}
+messages = [str(one.message) for one in told if one.category is DeprecationWarning]
+assert messages[-1] == "{former} is called {new} now"
+"""
+    subprocess.run([sys.executable, "-c", script], check=True, timeout=60)
+
+
+def test_new_names_exist_and_former_ones_have_no_file():
+    from importlib.util import find_spec
+
+    for former, new in MOVED.items():
+        assert find_spec(new) is not None
+        assert find_spec(former).origin is None

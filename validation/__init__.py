@@ -1,0 +1,75 @@
+"""Validation: what femgear computes beside closed forms, standards and published numbers."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+
+FAILED = 3
+
+
+def validate(
+    output: str | os.PathLike | None,
+    *,
+    theme: str | None = None,
+    quick: bool = False,
+    progress: Callable[[str, float, float], None] | None = None,
+) -> int:
+    """Compute the validation tables, write them as Markdown and print which rows fail.
+
+    Parameters
+    ----------
+    output : path or None
+        Markdown file; None writes none.
+    theme : str, optional
+        Compute this theme alone and print each of its rows.
+    quick : bool
+        Leave out what takes long.
+    progress : callable, optional
+        Called as ``progress(theme, done, total)``.
+
+    Returns
+    -------
+    int
+        Exit code: 0, or 3 when a row fails its gate.
+
+    Raises
+    ------
+    CaseError
+        No theme has this name (E-THEME).
+    StorageError
+        When the file cannot be written.
+    """
+    import scipy.linalg  # noqa: F401  its BLAS is limited only if it is loaded before
+
+    from femgear.stages.protocol import one_blas_thread
+    from validation.page import row_line, summary, write_page
+    from validation.run import run_validation
+    from validation.themes import THEMES
+
+    chosen = THEMES if theme is None else tuple(one for one in THEMES if one.name == theme)
+    if not chosen:
+        raise _unknown_theme(theme, [one.name for one in THEMES])
+    with one_blas_thread():  # sums of several threads differ in the last digits
+        validation = run_validation(chosen, quick=quick, progress=progress)
+    if output is not None:
+        write_page(validation, output)
+    if theme is not None:
+        print("\n".join(row_line(row) for row in validation.rows if row.verdict != "FAILS"))
+    print(summary(validation))
+    if output is not None:
+        print(f"written: {os.fspath(output)}")
+    return FAILED if validation.failures else 0
+
+
+def _unknown_theme(theme, names):
+    from femgear.errors import CaseError
+
+    return CaseError(
+        "there is no such theme of the validation",
+        code="E-THEME",
+        key="--theme",
+        value=theme,
+        limit=", ".join(names),
+        remedy="name one of these, or leave --theme out for all",
+    )

@@ -1,0 +1,56 @@
+"""Compute the tables of docs/validation.md: ``python validation [-o FILE] [--theme NAME] ...``."""
+
+import argparse
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "scripts")]
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the themes that are asked for.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Without the program's name; those of the process when left out.
+
+    Returns
+    -------
+    int
+        Exit code: 0, 2 (bad input), 3 (a row fails its gate), 4 (storage), 130 (interrupted).
+    """
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from femgear.errors import FemgearError
+    from validation import validate
+
+    parser = argparse.ArgumentParser(prog="python validation", description=__doc__)
+    parser.add_argument("-o", "--output", type=Path, help="Markdown file; docs/validation.md without --theme")
+    parser.add_argument("--theme", help="compute this theme alone and print each of its rows")
+    parser.add_argument("--quick", action="store_true", help="leave out what takes long")
+    given = parser.parse_args(arguments)
+    if given.output is None and given.theme is None:
+        given.output = ROOT / "docs" / "validation.md"
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("")
+        try:
+            return validate(
+                given.output,
+                theme=given.theme,
+                quick=given.quick,
+                progress=lambda name, done, total: bar.update(task, description=name, completed=done, total=total),
+            )
+        except FemgearError as error:
+            print(error, file=sys.stderr)
+            return error.exit_code
+        except KeyboardInterrupt:
+            print("interrupted", file=sys.stderr)
+            return 130
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,144 @@
+"""docs/reliability.md: what soak tests did with the last commit, and all that failed."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+from soak.programs import ROOT
+from soak.state import State
+from soak.trials import KINDS, Tally
+
+HEAD = """# Reliability
+
+What femgear does with hostile case files, damaged results, killed processes and failing systems. The short
+forms run with `make test`; `make soak` goes on for as many minutes as one likes (`make soak MINUTES=60`),
+each time from where it was, and writes this page. Every trial follows from its kind and number:
+`python validation/soak KIND NUMBER` repeats it.
+"""
+WORDS = {
+    "case_text": (
+        "Case files",
+        """Case files of the repository with changed numbers, units, texts and keys, cut at every byte, with
+lines missing, repeated or exchanged, nested, up to 10 MB. Each is described or refused within 1 s
+of CPU time and 500 MB.""",
+    ),
+    "damage": (
+        "Damaged files",
+        """Results, manifests, cases as run, journals of sweeps and cached grids with changed, missing or
+foreign contents. The numbers are the same as before, or refused; no reader crashes. "Own
+checksums": the manifest was made to fit the damage, so that numbers may differ, but nothing may
+crash.""",
+    ),
+    "kills": (
+        "Kills",
+        """Runs, runs over old results, sweeps and searches, ended by SIGKILL, SIGTERM or SIGINT at a random
+moment. The same command then goes on, leaves the same bits as one that nothing disturbed, computes
+no finished stage or design again and leaves nothing behind.""",
+    ),
+    "faults": (
+        "Faults",
+        """Full, read-only and failing disks, no home, no folder for temporary files, standard output closed,
+full or of few letters, limits of memory, file size and open files, clocks that jump, two processes
+in one folder. The number behind the colon is the exit code. Each ends with a documented one and one
+message, leaves old results whole, and the same command works afterwards.""",
+    ),
+    "sets": (
+        "Random planetary sets",
+        """Valid sets beyond those of the tests: equilibrium, symmetry between planets, orders of the housing,
+static limit of the dynamics.""",
+    ),
+    "determinism": (
+        "Bits",
+        """The same files, bit for bit, with one or two BLAS threads, known and new grids, any installed
+locale, hash seed, time zone, level of optimisation and folder. Times are left out: they stand in
+the manifest, the journals and the report.""",
+    ),
+}
+KNOWN = """## What may differ or fail, and why
+
+* Times differ from run to run. They stand in `manifest.json` (`timings`), in the `seconds` of journals and in
+  the table "Time" of the report, and nowhere else.
+* Other versions of NumPy, SciPy or Gmsh, and other processors, may round differently; the manifest names the
+  versions.
+* With a limit below 600 MB (`ulimit -v`, `-d`) femgear does not begin: loading its libraries would end or
+  stop the process. Scripts import NumPy first, whose own message then comes. Where memory ends later,
+  E-MEMORY says so; within compiled libraries (BLAS, HDF5) it may also end the process; results on disk are
+  whole then, as after a kill.
+"""
+# results of a kind that are listed
+_MOST = 40
+
+
+def write_page(state: State, path: Path, mutants: Path) -> None:
+    """Write the page of the last commit of a state, with the report of ``make mutants`` if there is one."""
+    report = mutants.read_text(encoding="utf-8") if mutants.exists() else ""
+    path.write_text(page(state, report), encoding="utf-8")
+
+
+def page(state: State, mutants: str = "") -> str:
+    """Make the text of the page, with the report of mutants as its last section but one."""
+    if not state.records:
+        return f"{HEAD}\nNothing has run yet.\n\n{KNOWN}"
+    last = state.records[-1]["commit"]
+    found = {kind: state.of(kind, last) for kind in KINDS}
+    parts = [HEAD, _summary(state, last, found)]
+    for kind, (records, tally) in found.items():
+        if records:
+            parts.append(_section(kind, tally))
+    failures = [failure for _, tally in found.values() for failure in tally.failures]
+    count = sum(tally.failed for _, tally in found.values())
+    parts.append("## Failures\n")
+    if count > len(failures):
+        parts.append(f"{count} in all, of which {len(failures)} are listed.\n")
+    parts.append("\n".join(map(_item, failures)) + "\n" if failures else "None.\n")
+    if mutants:
+        parts.append(mutants.replace("\n## ", "\n### ").replace("# Mutants", "## Mutants of the core"))
+    return "\n".join([*parts, KNOWN])
+
+
+def _worst(found: list, digits: int) -> str:
+    """The largest value with the number of its trial, nothing where none was measured."""
+    return f"{found[0]:.{digits}f} ({found[1]})" if found[1] >= 0 else ""
+
+
+def _item(failure: str) -> str:
+    """A failure as an item of a list, on one line, without the place of the clone."""
+    plain = failure.replace("`", "'").replace(f"{ROOT}/", "")
+    return f"* `{' '.join(plain.split())[:300]}`"
+
+
+def _summary(state: State, last: str, found: dict[str, tuple[list[dict], Tally]]) -> str:
+    """Say what ran, and give a line for every kind."""
+    records = [record for those, _ in found.values() for record in those]
+    hours = sum(record["seconds"] for record in records) / 3600.0
+    day = time.strftime("%Y-%m-%d", time.gmtime(max(record["ended"] for record in records)))
+    before = [record for record in state.records if record["commit"] != last]
+    lines = [
+        f"Commit {last} (what later ones change in femgear/ or scripts/ is not part of it), until {day}:",
+        f"{60 * hours:.0f} minutes of processes on {records[-1]['machine']}.",
+        "",
+        "| | pieces | trials | failures | most CPU time [s] | most memory [MB] | minutes |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+    ]
+    for kind, (those, tally) in found.items():
+        minutes = sum(record["seconds"] for record in those) / 60.0
+        slow, large = _worst(tally.worst_seconds, 2), _worst(tally.worst_megabytes, 0)
+        cells = (WORDS[kind][0], len(those), tally.trials, tally.failed, slow, large, f"{minutes:.0f}")
+        lines.append(f"| {' | '.join(map(str, cells))} |")
+    lines += ["", "Behind times and memory stands the number of their trial."]
+    if before:
+        trials = sum(record["tally"]["trials"] for record in before)
+        lines.append(f"Earlier commits had {trials} trials of other numbers.")
+    return "\n".join(lines) + "\n"
+
+
+def _section(kind: str, tally: Tally) -> str:
+    """Describe a kind and count how its trials ended."""
+    title, words = WORDS[kind]
+    common = tally.said.most_common()
+    rows = [f"| {said} | {count} |" for said, count in common[:_MOST]]
+    if rest := sum(count for _, count in common[_MOST:]):
+        rows.append(f"| others | {rest} |")
+    rows += [f"| **{name}, altogether** | {count} |" for name, count in sorted(tally.counts.items())]
+    return "\n".join([f"## {title}\n\n{words}\n", "| outcome | trials |", "|---|---:|", *rows]) + "\n"
