@@ -39,7 +39,7 @@ def pytest_collection_finish():
 
 
 ROOT = TESTS.parent
-sys.path[:0] = [str(TESTS), str(ROOT / "scripts"), str(ROOT), str(ROOT / "validation")]
+sys.path[:0] = [str(TESTS), str(ROOT / "scripts"), str(ROOT)]
 
 from computed_once import kept  # noqa: E402
 from small_systems import chain_excitation, geared_chain, planet_excitation, planet_set  # noqa: E402, F401

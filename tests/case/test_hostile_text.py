@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from soak.trials import metered
 
 from femgear.case.text import parse, read_text
 from femgear.errors import MOST_SHOWN, CaseError, GeometryError
 from femgear.trains.reading import parse_case, read_case
 from femgear.trains.registry import train_of
+from validation.soak.trials import metered
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 SET = (CASES / "planetary_27_40_108.toml").read_text(encoding="utf-8")

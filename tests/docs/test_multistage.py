@@ -24,7 +24,7 @@ def test_examples_print_what_the_page_says(outputs, number):
 
 
 def test_named_modules_exist():
-    named = re.findall(r"`(?:scripts|tests)/(\w+/\w+)\.py`", PAGE)
+    named = re.findall(r"`(?:scripts/|tests/)?(\w+/\w+)\.py`", PAGE)
     assert {"published/multistage_example", "validation/multistage"} <= set(named)
     for name in named:
         importlib.import_module(name.replace("/", "."))

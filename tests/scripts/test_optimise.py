@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 from script_runs import run_script, wait_for_lines
-from soak import programs
 
 from femgear.stages.static import solve_static, solve_stress
 from femgear.trains.reading import read_case
+from validation.soak import programs
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"

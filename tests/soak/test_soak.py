@@ -9,10 +9,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from soak import __main__ as program
-from soak import case_text, damage, faults, kills, page, programs, state, supply, trials
 
 from femgear.errors import CaseError
+from validation.soak import __main__ as program
+from validation.soak import case_text, damage, faults, kills, page, programs, state, supply, trials
 
 
 @pytest.fixture(scope="module")

@@ -20,7 +20,6 @@ import psutil
 import pytest
 import small_tasks
 from script_runs import wait_for_lines
-from soak import programs
 
 from femgear.run import grid_cache
 from femgear.storage.files import read_dataset
@@ -32,6 +31,7 @@ from femgear.study.samples import prepared
 from femgear.study.search import SearchOptions, minimise
 from femgear.study.sweep import sweep
 from femgear.trains.reading import read_case, to_toml, with_values
+from validation.soak import programs
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).resolve().parents[2]

@@ -15,7 +15,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 from script_runs import wait_for_lines
-from soak import programs
 
 from femgear import cli
 from femgear.errors import ContactError, StorageError
@@ -27,6 +26,7 @@ from femgear.study.problem import Problem, Variable
 from femgear.study.search import signals
 from femgear.study.sweep import sweep_into
 from femgear.trains.reading import read_case, to_toml, with_value, with_values
+from validation.soak import programs
 
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"

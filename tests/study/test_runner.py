@@ -12,7 +12,6 @@ import psutil
 import pytest
 import small_tasks
 from script_runs import wait_for_lines
-from soak import programs
 
 from femgear import cli
 from femgear.errors import CaseError, ContactError, FemgearError
@@ -23,6 +22,7 @@ from femgear.study.runner import Dask, Processes, Runner, check_complete, open_r
 from femgear.study.search import SearchOptions, minimise
 from femgear.study.sweep import sweep
 from femgear.trains.reading import read_case, to_toml, with_values
+from validation.soak import programs
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 RATIO = "dynamics.damping_ratio"

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from script_runs import wait_for_lines
-from soak import programs
 
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.cli import main
@@ -42,6 +41,7 @@ from femgear.study.samples import (
     spring_numbers,
 )
 from femgear.trains.reading import read_case, with_value, with_values
+from validation.soak import programs
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
 CASE, TOLERANCES = CASES / "planetary_27_40_108.toml", CASES / "tolerances/3um.toml"

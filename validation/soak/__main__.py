@@ -19,14 +19,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT), *(str(ROOT / name) for name in ("validation", "tests", "scripts"))]
+sys.path[:0] = [str(ROOT), str(ROOT / "tests"), str(ROOT / "scripts")]
 for _name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(_name, "1")
 
-from soak.page import write_page  # noqa: E402
-from soak.programs import commit  # noqa: E402
-from soak.state import State, machine  # noqa: E402
-from soak.trials import KINDS, Tally, module, run_trials  # noqa: E402
+from validation.soak.page import write_page  # noqa: E402
+from validation.soak.programs import commit  # noqa: E402
+from validation.soak.state import State, machine  # noqa: E402
+from validation.soak.trials import KINDS, Tally, module, run_trials  # noqa: E402
 
 FOLDER = ROOT / "out" / "soak"
 # shares of the time

@@ -10,11 +10,10 @@ import warnings
 from functools import cache
 from pathlib import Path
 
-from soak.trials import Outcome, TooSlow, metered, place_in_package
-
 from femgear.errors import FemgearError
 from femgear.trains.reading import read_case
 from femgear.trains.registry import check_case, train_of
+from validation.soak.trials import Outcome, TooSlow, metered, place_in_package
 
 PIECE = 1000
 SECONDS, MEGABYTES = 1.0, 500.0

@@ -26,8 +26,6 @@ from unittest import mock
 
 import numpy as np
 from edited_manifests import edit_manifest
-from soak.programs import case_texts, start, undisturbed, workspace
-from soak.trials import Outcome, place_in_package
 
 from femgear.case.gear_set import planetary_set
 from femgear.errors import FemgearError
@@ -37,6 +35,8 @@ from femgear.storage.files import checksum, read_dataset
 from femgear.study.objectives import named_quantity
 from femgear.study.sweep import sweep
 from femgear.trains.reading import open_results, parse_case
+from validation.soak.programs import case_texts, start, undisturbed, workspace
+from validation.soak.trials import Outcome, place_in_package
 
 PIECE = 300
 # seconds after which a reader counts as hanging, memory that it may have [bytes]

@@ -8,8 +8,8 @@ import subprocess
 from functools import cache
 from pathlib import Path
 
-from soak.programs import COMMANDS, contents, differences, start, trial_workspace, undisturbed
-from soak.trials import Outcome
+from validation.soak.programs import COMMANDS, contents, differences, start, trial_workspace, undisturbed
+from validation.soak.trials import Outcome
 
 PIECE = 4
 

@@ -17,7 +17,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from soak.programs import (
+from femgear.stages.protocol import one_blas_thread
+from validation.soak.programs import (
     COMMANDS,
     Ended,
     contents,
@@ -28,9 +29,7 @@ from soak.programs import (
     undisturbed,
     workspace,
 )
-from soak.trials import Outcome
-
-from femgear.stages.protocol import one_blas_thread
+from validation.soak.trials import Outcome
 
 PIECE = 20
 # a user without rights where the tests run as root, whom no permission stops

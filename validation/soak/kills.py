@@ -9,7 +9,11 @@ import signal
 import time
 from pathlib import Path
 
-from soak.programs import (
+from femgear.errors import FemgearError
+from femgear.storage.results import KEPT
+from femgear.trains.reading import open_results
+from femgear.trains.registry import TRAINS
+from validation.soak.programs import (
     COMMANDS,
     QUICK,
     Undisturbed,
@@ -21,12 +25,7 @@ from soak.programs import (
     trial_workspace,
     undisturbed,
 )
-from soak.trials import Outcome
-
-from femgear.errors import FemgearError
-from femgear.storage.results import KEPT
-from femgear.trains.reading import open_results
-from femgear.trains.registry import TRAINS
+from validation.soak.trials import Outcome
 
 PIECE = 12
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)

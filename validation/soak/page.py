@@ -5,9 +5,9 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from soak.programs import ROOT
-from soak.state import State
-from soak.trials import KINDS, Tally
+from validation.soak.programs import ROOT
+from validation.soak.state import State
+from validation.soak.trials import KINDS, Tally
 
 HEAD = """# Reliability
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import test_random_sets as properties
-from soak.trials import Outcome
+
+from validation.soak.trials import Outcome
 
 PIECE = 4
 STILL = (

@@ -8,7 +8,7 @@ import platform
 from collections import Counter
 from pathlib import Path
 
-from soak.trials import Tally
+from validation.soak.trials import Tally
 
 
 class State:

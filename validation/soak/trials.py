@@ -89,7 +89,7 @@ class Tally:
 
 def module(kind: str):
     """Import the module of a kind."""
-    return importlib.import_module(f"soak.{kind}")
+    return importlib.import_module(f"validation.soak.{kind}")
 
 
 def run_trials(kind: str, numbers: Iterable[int], folder: Path) -> Tally:
