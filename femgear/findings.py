@@ -111,6 +111,8 @@ class Finding:
         One of `SEVERITIES`; empty takes that of the catalogue, for a remark ``"note"``.
     limit : str, optional
         What is usual: within it there would be no finding.
+    concerns : str, optional
+        Gear, flank or kind of mesh whose numbers it is about, where these are not all that its code is about.
     stage : str, optional
         Stage of a run whose results draw it, empty of the case. Findings that differ in it alone are equal.
 
@@ -129,6 +131,7 @@ class Finding:
     remedy: str = ""
     severity: str = ""
     limit: str = ""
+    concerns: str = ""
     stage: str = field(default="", compare=False)
 
     def __post_init__(self) -> None:

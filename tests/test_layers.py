@@ -209,3 +209,34 @@ def test_no_function_is_longer_than_70_lines():
                 if node.end_lineno - first >= 70:
                     long[f"{place(path)}:{node.name}"] = node.end_lineno - first
     assert not long
+
+
+def test_no_module_reads_prose():
+    """Refusals and findings are data: no condition hangs on words of a message, a remedy or a limit."""
+    words = {"message", "remedy", "limit", "text"}
+    reading = {
+        "startswith",
+        "endswith",
+        "removesuffix",
+        "removeprefix",
+        "replace",
+        "partition",
+        "split",
+        "find",
+        "index",
+    }
+    wrong = []
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            asked = None
+            if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in reading:
+                asked = node.func.value
+            elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("re.match", "re.search", "re.fullmatch"):
+                asked = node.args[1]
+            elif isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.In | ast.NotIn):
+                asked = node.comparators[0]
+            owner = getattr(asked, "value", None)
+            of_error = isinstance(owner, ast.Name) and owner.id in ("error", "finding", "problem", "fault", "one")
+            if isinstance(asked, ast.Attribute) and asked.attr in words and of_error:
+                wrong.append(f"{place(path)}:{node.lineno}: {ast.unparse(node)}")
+    assert wrong == []

@@ -405,6 +405,7 @@ def _fillet_contact(gear: Gear, partner: Gear, reach: float, pair: GearPair):
             f"{message}; contact is computed on the involutes alone, which this corner would part by as much",
             f"{limit} mm",
             severity=DOUBT if overlap > DOUBTFUL_OVERLAP * gear.module else "",
+            concerns=gear.name,
         )
 
 

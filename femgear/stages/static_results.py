@@ -758,6 +758,7 @@ def stress_warnings(data: xr.Dataset) -> Iterator[Finding]:
                     f"stresses are those {1e3 * NOTCH_REACH * module:.3g} mm from it and farther; the "
                     f"largest, {1e-6 * worst:.1f} MPa, grows towards it",
                     remedy="give the rounding of the tool as root_radius",
+                    concerns=gear.replace("_", " "),
                 )
             elif worst > 0.0 and float(one["root_worst_arc"]) <= 0.0 and title not in seen:
                 seen.add(title)
@@ -766,6 +767,7 @@ def stress_warnings(data: xr.Dataset) -> Iterator[Finding]:
                     "",
                     f"the largest root stress of the {title}, {1e-6 * worst:.1f} MPa, stands at the end of "
                     "the flank, where the root begins: it may be larger on the flank above",
+                    concerns=title,
                 )
     yield from _kinked_reliefs(data)
 
@@ -789,6 +791,7 @@ def _kinked_reliefs(data: xr.Dataset) -> Iterator[Finding]:
                 f"contact pressure of {kind}: a linear relief begins with a kink, under which pressure has "
                 f"no limit and grows with the cells; {largest:.2f} times that of Hertz for the same load",
                 remedy='shape = "parabolic" makes no kink',
+                concerns=kind,
             )
 
 
@@ -1051,7 +1054,7 @@ def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block
 
 def pressure_doubts(findings: Iterable[Finding], kind: str, pressure: float) -> list[str]:
     """Codes of findings that concern the largest contact pressure [Pa] of a kind of mesh."""
-    kinked = [one.code for one in findings if f"contact pressure of {kind}:" in one.text]
+    kinked = [one.code for one in findings if one.code == "W-KINK" and one.concerns == kind]
     return [*kinked, *(["W-PRESSURE"] if pressure > LARGEST_PRESSURE else []), "W-EDGE"]
 
 
@@ -1068,11 +1071,9 @@ def _marked(marks: Marks, codes: list[str], text: str) -> str:
 def _concerns(finding: Finding, title: str, mate: str) -> bool:
     """Tell whether a finding concerns the root stress of a flank, such as "planet, sun side", with a mate."""
     gear, other = (name.split(",")[0] for name in (title, mate))
-    if finding.code == "W-KINK":
-        corner = finding.key == f"{gear.replace(' ', '_')}.rack.root_radius"
-        return corner or f"root stress of the {title}," in finding.text
-    tip = finding.code == "W-FILLET" and finding.key.startswith(f"{other}.")
-    return tip and f"the {gear}'s root fillet" in finding.text
+    if finding.code == "W-FILLET":
+        return finding.concerns == gear and finding.key.startswith(f"{other}.")
+    return finding.code == "W-KINK" and finding.concerns in (gear, title)
 
 
 def _reasons(data: xr.Dataset) -> Iterator[str]:

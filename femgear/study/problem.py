@@ -222,14 +222,7 @@ def _check_variables(case: Case, variables: Sequence[Variable]) -> None:
         )
     for variable in variables:
         for bound in variable.bounds:
-            try:
-                with_values(case, dict.fromkeys(variable.keys, variable.text(bound)))
-            except CaseError as error:
-                if error.code == "E-TYPE" and error.message.endswith("is not a list"):
-                    # entries of a list can only be varied where the file has them
-                    entry = variable.name.split("[")[0]
-                    error.remedy = f"give the case a table [[{entry}]] for every entry that is varied"
-                raise
+            with_values(case, dict.fromkeys(variable.keys, variable.text(bound)))
 
 
 @dataclass(frozen=True)

@@ -244,6 +244,8 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
             key=key,
             file=name or None,
             limit='keys such as "operation.torque" or "sun.modifications[0].amount"',
+            # entries of a list can only be changed where the file has them
+            remedy=None if wanted is dict else f"give the case a table [[{key.split('[')[0]}]] for every entry",
         )
     return found
 

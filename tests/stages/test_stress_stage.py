@@ -417,7 +417,7 @@ def test_a_corner_of_the_root_is_told_with_the_entry_that_rounds_it(reference):
     assert finding.code == "W-KINK" and finding.key == "ring.rack.root_radius"
     # the figure is marked where it stands, and the one whose fillet a tip runs into
     fillet = Finding(
-        "W-FILLET", "sun.tip_diameter", "the sun's tip runs into the planet's root fillet", severity="doubt"
+        "W-FILLET", "sun.tip_diameter", "a tip runs into a root fillet", severity="doubt", concerns="planet"
     )
     block = describe_stress(corner, [finding, fillet])
     marked = {row[0]: row[1] for row in block.rows if unmarked(row[1]) != row[1]}
