@@ -181,7 +181,7 @@ def with_estimates(case: Any) -> tuple[Any, tuple[Finding, ...]]:
 
     GeometryError: gears that cannot be made, where something is left out.
     """
-    missing = [key for key in _KEYS if _left_out(case, key.split("."))]
+    missing = [key for key in _KEYS if _left_out(case, key.split(".")) and not _on_shaft(case, key)]
     if not missing:
         return case, ()
     known = estimates(case)
@@ -191,6 +191,12 @@ def with_estimates(case: Any) -> tuple[Any, tuple[Finding, ...]]:
     text = f"left out and estimated from the gears: {shown}"
     remedy = "give what is known: modes and vibration depend on it, a static solution of fixed members does not"
     return case, (Finding("W-ESTIMATED", missing[0], text, remedy=remedy),)
+
+
+def _on_shaft(case: Any, key: str) -> bool:
+    """Whether an entry is the stiffness of a support that a shaft gives."""
+    name, _, entry = key.rpartition(".")
+    return entry == "support_stiffness" and bool(getattr(getattr(case, name, None), "support_shaft", ()))
 
 
 def _left_out(section: Any, path: list[str]) -> bool:

@@ -1,7 +1,7 @@
 """Gears, deviations and shafts that a case describes; cases are read by `femgear.trains.reading`.
 
 `planetary_set` closes the gears on their centre distance and checks them, `set_deviations` turns
-modifications and errors into separations of the loaded flanks, `with_shafts` gives members that stand on a
+modifications and errors into separations of the loaded flanks, `support_stiffness` what holds members that stand on a
 shaft its support stiffness. Refusals name the entries of the case file, with file and line.
 """
 
@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import lru_cache, singledispatch
 from typing import TYPE_CHECKING, Any
@@ -29,7 +31,7 @@ from femgear.case.sections import (
 )
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.fe.elasticity import Material
-from femgear.fe.shaft import ShaftStep, shaft_support_stiffness, timoshenko_flexibility
+from femgear.fe.shaft import ShaftStep, check_shaft, shaft_support_stiffness, timoshenko_flexibility
 from femgear.gears.checks import check_set
 from femgear.gears.deviations import (
     Ovality,
@@ -423,41 +425,61 @@ def line_play(case: Any) -> float:
     return float(play) if play > _PLAY else 0.0
 
 
-def with_shafts(case: Case) -> Case:
-    """Compute the support stiffness [N/m] that shafts give their members, and set it in the case.
+def check_shafts(case: Case) -> None:
+    """Refuse parts that make no shaft (GeometryError E-SHAFT, with file and line); no element is made for it."""
+    for name in _ON_SHAFTS:
+        if getattr(case, name).support_shaft:
+            with _of_shaft(case, name):
+                check_shaft(_steps(getattr(case, name)))
+
+
+def support_stiffness(case: Any, member: str, section: Any = None) -> Any:
+    """Find the radial stiffness [N/m] that holds a member: the entry of its section, or that of its shaft.
 
     The member stands on the free end of a stepped cantilever, its face rigidly coupled to the axis, which may
     tilt: ``K = F/X``, see `femgear.fe.shaft.shaft_support_stiffness`. The shaft of the sun is of its
-    material, that of the carrier of the section ``material``. GeometryError: parts that make no shaft
-    (E-SHAFT), with file and line.
+    material, that of the carrier of the section ``material``. The section is by default that of the member.
+    None where nothing holds it.
     """
-    found = {}
-    for name in _ON_SHAFTS:
-        section = getattr(case, name)
-        if not section.support_shaft:
-            continue
-        try:
-            stiffness = _stiffness(_steps(section), _shaft_material(case, name))
-        except FemgearError as error:
-            error.key = f"{name}.support_shaft"
-            error.file = case.location(error.key)
-            raise
-        found[name] = section.model_copy(update={"support_stiffness": stiffness})
-    return case.model_copy(update=found) if found else case
+    section = getattr(case, member) if section is None else section
+    if not getattr(section, "support_shaft", ()):
+        return section.support_stiffness
+    with _of_shaft(case, member):
+        return _stiffness(_steps(section), _shaft_material(case, member))
+
+
+@contextmanager
+def _of_shaft(case: Case, member: str) -> Iterator[None]:
+    """Let a refusal name the shaft of a member, file and line."""
+    try:
+        yield
+    except FemgearError as error:
+        error.key = f"{member}.support_shaft"
+        error.file = case.location(error.key)
+        raise
 
 
 def shaft_lines(case: Case) -> tuple[str, ...]:
-    """Write the support stiffness [N/um] of every shaft in a sentence, that of Timoshenko's beam beside."""
+    """Write the support stiffness [N/um] of every shaft in a sentence, that of Timoshenko's beam.
+
+    That of finite elements is computed by the first stage that needs it, see `support_stiffness`.
+    """
     lines = []
     for name in _ON_SHAFTS:
         section = getattr(case, name)
         if section.support_shaft:
             beam = 1.0 / timoshenko_flexibility(_steps(section), _shaft_material(case, name))[0, 0]
             lines.append(
-                f"support of the {name} from its shaft: {section.support_stiffness * 1e-6:.4g} N/um "
-                f"(as a beam {beam * 1e-6:.4g})"
+                f"support of the {name} from its shaft: {beam * 1e-6:.4g} N/um as a beam; stages take it from "
+                "finite elements"
             )
     return tuple(lines)
+
+
+def support_text(case: Any, member: str, section: Any = None) -> str:
+    """Write the radial stiffness [N/m] that holds a member for a table, without computing that of a shaft."""
+    section = getattr(case, member) if section is None else section
+    return "its shaft" if getattr(section, "support_shaft", ()) else f"{section.support_stiffness:.6g}"
 
 
 def materials_of(case: Any) -> tuple[Material, ...]:

@@ -18,7 +18,7 @@ from itertools import pairwise
 from typing import Any
 
 from femgear.case.estimates import USUAL_STIFFNESS, estimates, usual_rim, usual_torque
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import planetary_set, support_stiffness
 from femgear.case.quantities import (
     ANGLE,
     DENSITY,
@@ -812,7 +812,8 @@ def _add_modifications(w: _Writer, case: Case, gear: Any, flanks: Mapping[str, s
 
 def _stiffness(case: Case, member: str, key: str) -> tuple[str, str] | None:
     """Stiffness of a bearing, none where it is the estimate to its four digits."""
-    value, estimate = getattr(getattr(case, member), key), estimates(case)[f"{member}.{key}"].value
+    given = support_stiffness(case, member) if key == "support_stiffness" else getattr(getattr(case, member), key)
+    value, estimate = given, estimates(case)[f"{member}.{key}"].value
     return None if f"{value or 0.0:.4g}" == f"{estimate:.4g}" else _attribute(value, "N / m")
 
 

@@ -250,6 +250,11 @@ def shaft_support_stiffness(steps: Sequence[ShaftStep], material, *, refine: flo
     return float(1.0 / shaft_flexibility(steps, material, refine=refine)[0, 0])
 
 
+def check_shaft(steps: Sequence[ShaftStep]) -> None:
+    """Refuse parts that make no shaft: see `shaft_flexibility` (GeometryError E-SHAFT)."""
+    _half_section(steps, 1.0)
+
+
 def _half_section(steps, refine):
     """Outline in the half plane (r, z) [m] with the end faces ``held`` (z = 0) and ``coupled``."""
     if not steps:

@@ -32,6 +32,7 @@ from femgear.case.gear_set import (
     materials_of,
     planetary_set,
     set_deviations,
+    support_stiffness,
 )
 from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES, Case
 from femgear.contact.bodies import (
@@ -511,8 +512,8 @@ def static_supports(case: Case) -> Supports:
 def case_supports(case: Case) -> Supports:
     """Make the supports of sun, carrier and planets, with the bearing clearance of the case."""
     return Supports(
-        sun=case.sun.support_stiffness,
-        carrier=case.carrier.support_stiffness,
+        sun=support_stiffness(case, "sun"),
+        carrier=support_stiffness(case, "carrier"),
         planet=case.planet.bearing_stiffness,
         planet_clearance=case.planet.bearing_clearance,
     )

@@ -20,7 +20,7 @@ from femgear.case import text as case_text
 from femgear.case.checks import cross_check
 from femgear.case.csv_columns import embed_checksum, embed_profiles
 from femgear.case.estimates import with_estimates
-from femgear.case.gear_set import with_shafts
+from femgear.case.gear_set import check_shafts
 from femgear.case.messages import added_material, combine, notices, translate
 from femgear.case.sections import FORMAT, Case, without_uncomputed
 from femgear.case.text import described, text_with_points
@@ -100,7 +100,9 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     said = (*notices(data, case), *said, *added_material(case)) if of_set else said
     case.read_from(text, lines, name, notices=said, profile_files=files)
     if hasattr(case, "gear_names"):
-        case, estimated = with_estimates(with_shafts(case) if of_set else case)
+        if of_set:
+            check_shafts(case)
+        case, estimated = with_estimates(case)
         case._notices += estimated
     return case
 

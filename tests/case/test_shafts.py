@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.gear_set import shaft_lines
+from femgear.case.gear_set import shaft_lines, support_stiffness
 from femgear.errors import CaseError, GeometryError
 from femgear.trains.reading import read_case, with_value
 
@@ -38,16 +38,17 @@ def test_a_slender_shaft_is_the_cantilever_of_bernoulli_and_timoshenko():
     E, G, d, length = 206e9, 206e9 / 2.6, 0.04, 0.4
     kappa = 6 * 1.3 / (7 + 6 * 0.3)
     soft = length**3 / (3 * E * np.pi * d**4 / 64) + length / (kappa * G * np.pi * d**2 / 4)
-    assert case.sun.support_stiffness == pytest.approx(1.0 / soft, rel=0.01)
+    assert support_stiffness(case, "sun") == pytest.approx(1.0 / soft, rel=0.01)
 
 
 def test_parts_of_a_stepped_shaft_and_what_check_says_of_them():
     case = on_shaft(PARTS, "carrier")
-    assert 1e6 < case.carrier.support_stiffness < 1e9
+    stiffness = support_stiffness(case, "carrier")
+    assert 1e6 < stiffness < 1e9
     (said,) = shaft_lines(case)
     assert said.startswith("support of the carrier from its shaft") and "beam" in said
     stiffer = with_value(case, "carrier.support_shaft", [PARTS[0]])
-    assert stiffer.carrier.support_stiffness > case.carrier.support_stiffness
+    assert support_stiffness(stiffer, "carrier") > stiffness
     assert case.location("carrier.support_shaft").startswith("case.toml:")
 
 
@@ -80,6 +81,27 @@ def test_a_shell_too_thin_for_elements_is_refused_in_words_of_the_case():
     with pytest.raises(GeometryError, match="E-SHAFT") as caught:
         on_shaft([part])
     assert "sun.support_shaft" in str(caught.value) and "thinnest wall" in str(caught.value)
+
+
+def test_cases_with_shafts_are_read_checked_and_changed_without_finite_elements(monkeypatch, tmp_path, capsys):
+    """The first stage that needs the support computes it."""
+    from femgear.cli import main
+    from femgear.fe import meshing, shaft
+    from femgear.trains.reading import to_toml
+
+    def none(*_, **__):
+        raise AssertionError("a grid of the shaft")
+
+    monkeypatch.setattr(shaft, "mesh_outline", none)
+    monkeypatch.setattr(meshing, "mesh_outline", none)
+    part = {"length": "61 mm", "outer_diameter": "31 mm"}
+    case = with_value(on_shaft([part]), "operation.torque", "120 N m")
+    path = tmp_path / "case.toml"
+    path.write_text(to_toml(case), encoding="utf-8")
+    assert main(["check", str(path)]) == 0
+    assert "N/um as a beam" in " ".join(capsys.readouterr().out.split())
+    with pytest.raises(AssertionError, match="a grid of the shaft"):
+        support_stiffness(case, "sun")
 
 
 def test_stiffness_and_shaft_together_are_refused():

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.case.gear_set import support_stiffness
 from femgear.contact.bodies import active_flank_load, active_flank_weights, flank_stations
 from femgear.errors import ContactError
 from femgear.fe.compliance import cyclic_harmonics, rim_compliance, static_cut_shapes
@@ -159,7 +160,7 @@ def _place_bodies(M, K, place, planetary_set: PlanetarySet, case: Case) -> None:
         for axis in ("x", "y"):
             i = place[f"{name}: {axis}"]
             M[i] = body.mass
-            K[i, i] += body.support_stiffness
+            K[i, i] += support_stiffness(case, name)
         M[place[f"{name}: rotation"]] = body.inertia
     a, planet = planetary_set.centre_distance, case.planet
     c = [place[f"carrier: {axis}"] for axis in ("x", "y", "rotation")]

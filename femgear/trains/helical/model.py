@@ -27,7 +27,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from femgear.case.gear_set import materials_of
+from femgear.case.gear_set import materials_of, support_stiffness
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError
@@ -152,7 +152,7 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
     for name, one in (("sun", case.sun), ("ring", helical.ring), ("carrier", case.carrier)):
         space = getattr(helical, name)
         torsional = torsional_support(case, name, space.torsional_stiffness)
-        radial = needed(one.support_stiffness, f"{name}.support_stiffness")
+        radial = needed(support_stiffness(case, name, one), f"{name}.support_stiffness")
         support = HelicalSupport(radial, space.axial_stiffness, space.tilt_stiffness, torsional)
         bodies[name] = HelicalBody(one.mass, one.inertia, space.diametral_inertia, support)
     pin = helical.planet

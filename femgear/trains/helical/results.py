@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.gear_set import support_text
 from femgear.case.quantities import RPM
 from femgear.gears.planetary import virtual_teeth
 from femgear.report.tables import Block, response_warnings
@@ -214,17 +215,17 @@ def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block,
 def _bodies(case: HelicalCase) -> Iterator[tuple[str, ...]]:
     helical, planet = case.helical, case.planet
     for name, one, radial in (
-        ("sun", case.sun, case.sun.support_stiffness),
-        ("ring", helical.ring, helical.ring.support_stiffness),
-        ("carrier", case.carrier, case.carrier.support_stiffness),
-        ("planet (pin)", planet, planet.bearing_stiffness),
+        ("sun", case.sun, support_text(case, "sun")),
+        ("ring", helical.ring, support_text(case, "ring", helical.ring)),
+        ("carrier", case.carrier, support_text(case, "carrier")),
+        ("planet (pin)", planet, f"{planet.bearing_stiffness:.6g}"),
     ):
         space = getattr(helical, name.partition(" ")[0])
         yield (
             name,
             f"{one.mass:.6g}",
             f"{one.inertia:.6g}, {space.diametral_inertia:.6g}",
-            f"{radial:.6g}, {space.axial_stiffness:.6g}",
+            f"{radial}, {space.axial_stiffness:.6g}",
             f"{space.tilt_stiffness:.6g}, {torsion_text(case, name, space.torsional_stiffness)}",
         )
 

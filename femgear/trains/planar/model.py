@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.dependencies import check_entries, static_entries
-from femgear.case.gear_set import pin_errors
+from femgear.case.gear_set import pin_errors, support_stiffness
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
@@ -98,7 +98,7 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
     planar, bodies = case.planar, {}
     for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
         torsional = torsional_support(case, name, getattr(planar.torsion, name))
-        support = needed(one.support_stiffness, f"{name}.support_stiffness")
+        support = needed(support_stiffness(case, name, one), f"{name}.support_stiffness")
         bodies[name] = PlanarBody(one.mass, one.inertia, support, torsional)
     given = planar.mesh_stiffness
     mean = needed(static, "static").cycle.mean() if given is None else None

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import planetary_set, support_text
 from femgear.case.quantities import RPM
 from femgear.case.sections import output_member
 from femgear.findings import NOTE, Finding, findings_in
@@ -324,7 +324,7 @@ def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
     planar = case.planar
     for name, one in (("sun", case.sun), ("ring", planar.ring), ("carrier", case.carrier)):
         torsion = torsion_text(case, name, getattr(planar.torsion, name))
-        yield name, f"{one.mass:.6g}", f"{one.inertia:.6g}", f"{one.support_stiffness:.6g}", torsion
+        yield name, f"{one.mass:.6g}", f"{one.inertia:.6g}", support_text(case, name, one), torsion
     planet = case.planet
     bearing = f"{planet.bearing_stiffness:.6g} (bearing)"
     yield "planet", f"{planet.mass:.6g}", f"{planet.inertia:.6g}", bearing, "0"
