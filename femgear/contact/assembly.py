@@ -193,6 +193,8 @@ class ContactProblem:
 
     Parameters
     ----------
+    n_planets : int
+        Planets whose meshes the candidates lie in.
     H : (n, n) array
         Compliance of the gears [m/N].
     gap, area : (n,) arrays
@@ -202,6 +204,9 @@ class ContactProblem:
     supports : (meshes, meshes) array
         Compliance of sprung members between the meshes [m/N], part of `compliance`.
     mesh, pair, cell : (n,) int arrays
+        Mesh, tooth pair and pressure cell of every candidate.
+    position : int
+        Index of the position among those of `MeshWindows`.
     """
 
     n_planets: int

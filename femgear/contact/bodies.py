@@ -66,7 +66,7 @@ class Sector:
 
 @dataclass(frozen=True)
 class Sectors:
-    """Sectors of the three kinds of gears; a pair has its gears 1 and 2 in place of sun and planet."""
+    """Sectors of sun, planet and ring, one tooth each; a pair has gears 1 and 2 for sun and planet, and no ring."""
 
     sun: Sector
     planet: Sector
@@ -80,21 +80,29 @@ class Sectors:
 
 @dataclass(frozen=True)
 class _FlankStations:
-    """Nodes of the left flank, ordered by roll length."""
+    """Nodes of the left flank by ascending roll length, where unit loads act on it.
 
-    nodes: np.ndarray  # (n,)
-    roll: np.ndarray  # (n,) [m]
-    points: np.ndarray  # (n, 2) [m]
-    normals: np.ndarray  # (n, 2) inward unit normals
+    Of the n stations ``nodes`` (n,) are their numbers in the grid, ``roll`` (n,) their roll lengths [m], ``points``
+    (n, 2) their coordinates in the tooth frame [m] and ``normals`` (n, 2) the unit normals into the body.
+    """
+
+    nodes: np.ndarray
+    roll: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
 
 
 @dataclass(frozen=True)
 class ObservedRoot:
-    """Root of a tooth seen by the same factorisation as its flanks; the sectors are not tied yet."""
+    """Root of a tooth seen by the same factorisation as its flanks; the sectors are not tied yet.
 
-    along: BoundaryStress  # functionals of the tangential stress along the root of the left flank
-    stations: _FlankStations  # where the loads act
-    schur: SectorSchur  # sector with these loads and observations
+    ``along`` are the functionals of the tangential stress along the root of the left flank, ``stations`` the places
+    on the flank where unit loads act, ``schur`` the sector condensed with these loads and observations.
+    """
+
+    along: BoundaryStress
+    stations: _FlankStations
+    schur: SectorSchur
 
 
 @dataclass(frozen=True)
@@ -149,12 +157,21 @@ class FlankCompliance:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Flank compliances of the three kinds of gears, and what pairs of them have in common.
+    """Flank compliances of the gears of a set or a pair, and what the meshes between them have in common.
 
-    ``widths`` are the face widths that both gears of every kind of mesh have in common [m], ``helical`` the
-    stiffnesses of helical teeth over those of spur teeth of the same transverse section, of every kind of
-    mesh, see `helical_stiffness`, at a base helix angle [rad]. A pair has its gears 1 and 2 in place of sun
-    and planet, and no ring.
+    Parameters
+    ----------
+    sun, planet : FlankCompliance
+        Of a pair its gears 1 and 2.
+    ring : FlankCompliance or None
+        None in a pair.
+    widths : tuple of float
+        Face width that both gears have in common [m], one a kind of mesh.
+    helical : tuple of float
+        Contact stiffness of helical teeth over that of spur teeth with the same transverse section [1], one a kind
+        of mesh, see `helical_stiffness`.
+    base_helix_angle : float
+        Helix angle on the base cylinder [rad]; zero for spur teeth.
     """
 
     sun: FlankCompliance

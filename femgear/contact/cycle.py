@@ -216,6 +216,8 @@ class MeshCycle:
         ``"profile"`` or ``"line_of_action"``.
     unknowns : int
         Largest number of pressure cells at one position.
+    message : str
+        How the positions were solved, and whether planets or meshes lose their load.
     pressure : (M, T, C, P) array, optional
         Pressure in the cells of the drive flanks [Pa], where it was asked for.
     pressure_offset : (M, C) array, optional
@@ -612,9 +614,35 @@ def _first_planets(
 class _Walk:
     """A set under a torque that is not negative, and the record without load at the positions to solve.
 
-    Where planets are in the same state at all times, those of the first ``sector`` are solved for all; where
-    each comes to the state of another ``repeats`` times in a mesh period, the first of these parts is solved:
-    ``turns`` rotations map the planets onto one another.
+    Parameters
+    ----------
+    planetary_set : GearSet
+        The whole set, mirrored where the torque of the case is negative.
+    sector : GearSet
+        The set with its first planets alone: those whose state all others repeat at the same time.
+    bodies : Bodies
+        Flank compliances of its gears.
+    sun_torque : float
+        Torque on the sun or gear 1 [N m], at least zero.
+    deviations : SetDeviations, optional
+        Deviations of the planets of the sector.
+    members : MovingMembers
+        Motions that the contact solves for.
+    springs : BearingSprings, optional
+        Bearings with clearance between members.
+    empty : MeshCycle
+        The record without load, which names the positions.
+    options : CycleOptions
+        How the contact is solved.
+    width : FaceWidth, optional
+        What contact in slices of the face width takes besides.
+    alike : int
+        Rotations that map the planets of the record onto one another, as in `MeshCycle`.
+    repeats : int
+        Parts of a mesh period in each of which the planets repeat the part before, one rotation further: the first
+        part alone is solved.
+    turns : int
+        Rotations that map the planets of the set onto one another, at the same time or later.
     """
 
     planetary_set: GearSet

@@ -39,6 +39,8 @@ class FaceWidth:
         Of the bodies.
     slices : int
         Their number.
+    tilting : TiltingMembers, optional
+        Tilts and wind-up of members, which approach the flanks by a different amount in every slice.
     held : Bodies and WidthWaves, optional
         Other bodies with the same flanks, for whose tangents the contact is taken too.
     helical : bool

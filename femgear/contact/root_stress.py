@@ -68,22 +68,36 @@ class _RootStress:
 
     The root of a flank runs from the end of the flank along the fillet and the root arc to the middle of
     the gap, without what is nearer to a corner (`gears.tooth.root_notches`) than `NOTCH_REACH`.
-    ``influence[k, a, b]`` is the stress at root point ``a`` of tooth ``i`` per unit inward normal force at
-    station ``b`` of tooth ``i - k``, positive in tension; the left flank first, then the right.
     The critical section of ISO 6336-3 is where the slope is 30 deg (60 deg for internal gears).
+
+    Parameters
+    ----------
+    roll : (n,) array
+        Roll lengths of the flank stations [m].
+    arc : (m,) array
+        Arc length of the root points from the end of the flank [m].
+    points : (m, 2) array
+        Root points of the left flank in the tooth frame [m].
+    slope : (m,) array
+        Angle between the tangent of the root and the centreline of the tooth, 0 to pi/2 [rad].
+    influence : (teeth, 2m, 2n) array
+        ``influence[k, a, b]``: stress at root point ``a`` of tooth ``i`` per unit inward normal force at station
+        ``b`` of tooth ``i - k`` [Pa/N], positive in tension; the left flank first, then the right.
+    waves : (K, teeth, 2m, 2n) array, optional
+        The same for loads that vary as cos(kz) across the width, one entry a wave number k [Pa/N].
     """
 
-    roll: np.ndarray  # (n,) roll lengths of the flank stations [m]
-    arc: np.ndarray  # (m,) arc length of the root points from the end of the flank [m]
-    points: np.ndarray  # (m, 2) root points of the left flank in the tooth frame [m]
-    slope: np.ndarray  # (m,) between the tangent of the root and the centreline of the tooth, 0 .. pi/2 [rad]
-    influence: np.ndarray  # (teeth, 2 m, 2 n) [Pa/N]
-    waves: np.ndarray | None = None  # (K, teeth, 2 m, 2 n) the same of loads cos(kz) across the width
+    roll: np.ndarray
+    arc: np.ndarray
+    points: np.ndarray
+    slope: np.ndarray
+    influence: np.ndarray
+    waves: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
 class RootStresses:
-    """Root stress influences of the three kinds of gears; a pair has gears 1 and 2 for sun and planet.
+    """Root stress influences of sun, planet and ring; a pair has gears 1 and 2 for sun and planet, and no ring.
 
     ``ahead`` (slices,) are the places of slices before mid-width [mesh periods], zero for spur teeth, where
     loads differ over the width.
@@ -113,12 +127,17 @@ class RootStresses:
 
 @dataclass(frozen=True)
 class _RootHistory:
-    """One tooth on its way through one mesh."""
+    """One tooth at the S instants of its way through one mesh.
 
-    path: np.ndarray  # (S,) path coordinate of its tooth pair in base pitches, 0 at the pitch point
-    load: np.ndarray  # (S,) [N]
-    stress: np.ndarray  # (S, 2, m) along the roots of the loaded and of the back flank [Pa]
-    over_width: np.ndarray  # (S, slices) largest along the root of the loaded flank [Pa]
+    ``path`` (S,) is the path coordinate of its tooth pair in base pitches, zero at the pitch point; ``load`` (S,) its
+    load [N]; ``stress`` (S, 2, m) the tangential stress along the roots of the loaded and of the back flank [Pa];
+    ``over_width`` (S, slices) the largest along the root of the loaded flank in every slice [Pa].
+    """
+
+    path: np.ndarray
+    load: np.ndarray
+    stress: np.ndarray
+    over_width: np.ndarray
 
 
 @dataclass(frozen=True)

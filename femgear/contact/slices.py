@@ -440,8 +440,9 @@ def _symmetric_solution(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Carrying:
-    """Slices of windows that carry, (P, c): whether they do, which of all n they are, and where.
+    """Those slices of windows that carry, as many places c at each of P positions.
 
+    ``on`` (P, c) tells whether a place is taken, ``at`` (P, c) which of all n slices of windows stands there.
     ``entries`` (P c c,) are the places of their pairs in a matrix (P, n, n), ``beside`` position, row and
     column of pairs in the same slice, with slice and both windows.
     """

@@ -24,13 +24,18 @@ LOAD_BINS = 20
 
 @dataclass(frozen=True)
 class _ToothLoad:
-    """Load of one tooth pair on one of its gears."""
+    """Load of one tooth pair on one of its gears over P positions.
 
-    tooth: int  # number in the first mesh period
-    step: int  # change of that number from one mesh period to the next
-    flank: int  # LEFT or RIGHT
-    roll: np.ndarray  # (P,) roll length of the contact on this gear [m]
-    load: np.ndarray  # (P,) at its point on the line of action [N]
+    ``tooth`` is the number of the tooth in the first mesh period, ``step`` the change of that number from one mesh
+    period to the next, ``flank`` LEFT or RIGHT. ``roll`` (P,) is the roll length of the contact on this gear [m],
+    ``load`` (P,) the force at its point on the line of action [N].
+    """
+
+    tooth: int
+    step: int
+    flank: int
+    roll: np.ndarray
+    load: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -111,13 +116,27 @@ class LoadSpectrum:
 
 @dataclass(frozen=True)
 class DeformedBody:
-    """One gear in the frame of the set: where its sector 0 is turned to and how every sector moves."""
+    """One gear in the frame of the set: where its sector 0 is turned to and how every sector moves.
+
+    Parameters
+    ----------
+    name : str
+        Of the body, such as ``"planet 2"``.
+    kind : str
+        Of the gear, such as ``"planet"``.
+    centre : (2,) array
+        Centre of the gear [m].
+    angle : float
+        Angle of the centreline of sector 0 [rad].
+    displacement : (count, n, 2) array
+        Of every node of every sector, in the frame of that sector [m].
+    """
 
     name: str
-    kind: str  # name of the gear, such as "planet"
-    centre: np.ndarray  # (2,) [m]
-    angle: float  # of the centreline of sector 0 [rad]
-    displacement: np.ndarray  # (count, n, 2) of every node of every sector, in the frame of that sector [m]
+    kind: str
+    centre: np.ndarray
+    angle: float
+    displacement: np.ndarray
 
 
 def loaded_teeth(cycle: MeshCycle, *, reverse: bool) -> LoadedTeeth:
