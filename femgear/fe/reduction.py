@@ -78,16 +78,17 @@ class CyclicModes:
 
 @dataclass(frozen=True)
 class _SectorBasis:
-    """Craig-Bampton basis of one of ``count`` sectors.
+    """Craig-Bampton basis of one of ``count`` sectors, its matrices in pairs: of symmetric and of antisymmetric fields.
 
-    Each of the pairs is of symmetric and of antisymmetric fields, reduced to ``(cut, eta)``.
+    The coordinates are the nb shapes of the ``cut``, radial and tangential in turn, then the nv of the interior.
+    ``stiffness`` [N/m] and ``mass`` [kg] are (nb + nv, nb + nv), ``vectors`` (2n, nb + nv) the nodal displacements.
     """
 
     count: int
-    cut: int  # shapes of the cut, nb, radial and tangential in turn
-    stiffness: tuple[np.ndarray, np.ndarray]  # (nb + nv, nb + nv) [N/m]
-    mass: tuple[np.ndarray, np.ndarray]  # [kg]
-    vectors: tuple[np.ndarray, np.ndarray]  # (2n, nb + nv)
+    cut: int
+    stiffness: tuple[np.ndarray, np.ndarray]
+    mass: tuple[np.ndarray, np.ndarray]
+    vectors: tuple[np.ndarray, np.ndarray]
 
     def tied(self, n: int) -> list[tuple[slice, np.ndarray]]:
         """For both kinds: where ``eta`` stands behind ``w``, and the factors of ``(w, eta)`` in the basis."""

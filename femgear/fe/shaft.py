@@ -38,8 +38,8 @@ class RoundSection:
     ----------
     outer_diameter, inner_diameter : float
         [m]
-    young : float
-        [Pa]
+    young, poisson : float
+        Young's modulus [Pa] and Poisson's ratio [1].
     density : float
         [kg/m^3]; zero for a shaft without mass.
     """
@@ -181,7 +181,9 @@ MAX_EDGES = 5000  # around the half section
 
 @dataclass(frozen=True)
 class ShaftStep:
-    """One part of a stepped shaft, sizes in m; a bore of zero is a solid shaft.
+    """One part of a stepped shaft, of a ``length`` [m].
+
+    Its ``outer_diameter`` and ``inner_diameter`` [m]; without a bore the latter is zero.
 
     GeometryError: numbers that no shaft has (E-SHAFT).
     """

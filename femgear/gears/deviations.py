@@ -90,7 +90,8 @@ class SetDeviations:
         Separation of each tooth's loaded flank from its cumulative pitch deviation [m].
     planet_pitch, planet_ring_side_pitch : (N, z_p) array
         The same of the sun-side (left) and ring-side (right) flanks of every planet [m].
-    planet_runout : tuple of Runout, one a planet
+    planet_runout : tuple of Runout
+        Eccentricity of every planet.
     pin_errors : (N, 2) array
         Radial (outwards) and tangential (counter-clockwise) displacement of the planet axes [m].
     sun_thickness, ring_thickness : float
@@ -103,6 +104,10 @@ class SetDeviations:
     sun_misalignment, carrier_misalignment : (2,) arrays
         Slopes of their axes along x and y of the carrier frame [rad], in which they stand still; the carrier
         takes its planets along.
+    sun_runout, ring_runout, carrier_runout : Runout
+        Eccentricity of sun, ring and carrier; that of the carrier moves all planets.
+    ovality : Ovality
+        Out-of-roundness of the ring.
     """
 
     sun: FlankForm

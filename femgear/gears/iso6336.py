@@ -64,8 +64,20 @@ class NominalRootStress:
 class _VirtualTooth:
     """Tooth of the virtual spur gear of the normal section (ISO 6336-3, section 6.2), of spur gears itself.
 
-    ``teeth`` z_n are negative for an internal gear. Shift, ``dedendum`` of the rack and ``rounding`` are in
-    normal modules; lengths in m, angles in rad.
+    Parameters
+    ----------
+    teeth : float
+        z_n [1], negative for an internal gear.
+    module : float
+        Normal module m_n [m].
+    pressure_angle : float
+        Normal pressure angle [rad].
+    shift, dedendum, rounding : float
+        Profile shift, dedendum of the rack and radius of its tip rounding, in normal modules.
+    base_radius : float
+        Base radius of the virtual gear [m], negative for an internal gear.
+    tip_roll : float
+        Roll length of its tip circle [m].
     """
 
     teeth: float

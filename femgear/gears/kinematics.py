@@ -26,7 +26,7 @@ TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class Orientations:
-    """Angles [rad] of one tooth centreline of every body of every gear, in the carrier frame."""
+    """Angles ``gears`` [rad] of one tooth centreline of every body, a tuple a gear of the set, in the carrier frame."""
 
     gears: tuple[tuple[float, ...], ...]
 
@@ -37,7 +37,10 @@ class Orientations:
 
 @dataclass(frozen=True)
 class Speeds:
-    """Absolute speeds [rad/s] (planet: its own axis too) and mesh frequency [Hz]."""
+    """Absolute speeds of ``sun``, ``ring`` and ``carrier`` and of each ``planet`` about its own axis [rad/s].
+
+    ``mesh_frequency`` is that of all meshes [Hz].
+    """
 
     sun: float
     planet: float
@@ -48,7 +51,7 @@ class Speeds:
 
 @dataclass(frozen=True)
 class Torques:
-    """External torques [N m] on the three members; they add up to zero (no losses)."""
+    """External torques on ``sun``, ``ring`` and ``carrier`` [N m]; without losses they add up to zero."""
 
     sun: float
     ring: float

@@ -42,6 +42,8 @@ class MeshPhasing:
 
     Parameters
     ----------
+    sun_teeth, ring_teeth : int
+        Numbers of teeth, both positive.
     positions : tuple of int
         m_n, assembly positions of the planets counted from the first.
     rotation : {1, -1}

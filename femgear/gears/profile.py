@@ -126,8 +126,9 @@ def overlap_ratio(face_width: float, normal_module: float, helix_angle: float) -
 
 @dataclass(frozen=True)
 class BasicRack:
-    """Basic rack: addendum, dedendum and fillet radius in modules; the defaults are profile C of ISO 53.
+    """Basic rack; the defaults are profile C of ISO 53.
 
+    ``addendum``, ``dedendum`` and ``root_radius``, the radius of the rounding that cuts the fillet, are in modules.
     ``stretch`` is how much wider than high the rounded tip is: 1, and ``1/cos(beta)`` in the transverse
     section of helical teeth, in which the circle of the normal section is an ellipse.
     """
@@ -143,7 +144,7 @@ ISO_53_C = BasicRack()
 
 @dataclass(frozen=True)
 class PinionCutter:
-    """Pinion cutter that generates the gaps of an internal gear.
+    """Pinion cutter of so many ``teeth`` that generates the gaps of an internal gear.
 
     ``profile_shift`` in modules is 0 when it is half worn, ``tip_radius`` in modules rounds its tips; None
     takes the basic rack's ``root_radius``.
@@ -244,11 +245,26 @@ class RackTip:
 
 @dataclass(frozen=True)
 class CutterTip:
-    """Rounded tip of a pinion cutter that generates an internal gear (lengths in m, angles in rad).
+    """Rounded tip of a pinion cutter that generates an internal gear.
 
-    As `RackTip`, with the pitch and base radius of the cutter and its distance from the gear;
-    ``centre_radius`` and ``centre_angle`` place the rounding's centre in the frame of the cutter tooth. A
-    stretched rounding is wider at right angles to the radius through its centre.
+    Parameters
+    ----------
+    pitch_radius, cutter_pitch_radius : float
+        Radii of the circles of gear and cutter that roll on each other [m].
+    cutter_base_radius : float
+        Base radius of the cutter [m].
+    centre_distance : float
+        Distance of the axes of gear and cutter [m].
+    centre_radius, centre_angle : float
+        Polar coordinates of the centre of the rounding in the frame of the cutter tooth [m], [rad].
+    rounding : float
+        Half the height of the rounding [m].
+    gap_angle : float
+        Angle of the gap's centreline from that of the tooth, half a pitch of the gear [rad].
+    end_angle : float
+        Direction of the normal where the fillet ends at the flank [rad].
+    stretch : float
+        Width of the rounding, at right angles to the radius through its centre, over its height [1].
     """
 
     pitch_radius: float
