@@ -64,7 +64,21 @@ _MISSING = 0.05  # part of the static compliance that may be missing without a w
 
 @dataclass(frozen=True)
 class Node:
-    """A row of the table of nodes; position (3,) in the units of the file, or None."""
+    """A row of the table of nodes.
+
+    Parameters
+    ----------
+    number : int
+        Of the node in the file.
+    role, name : str
+        What it stands for, such as a point of the ring or a sensor, and what it is called.
+    direction : str
+        Direction in which it moves or is loaded, as the table has it.
+    dofs : str
+        Its degrees of freedom in the file, as the table has them.
+    position : (3,) array or None
+        In the units of the file.
+    """
 
     number: int
     role: str
@@ -76,10 +90,26 @@ class Node:
 
 @dataclass(frozen=True)
 class _Modes:
-    """Mass-normalised modes in SI: frequency (m,) [rad/s], shape (m, r), coordinate by node and component.
+    """Mass-normalised modes of a casing in SI units.
 
-    Damping ratio (m,); forces on the feet by modes (m, o), and by the loads themselves (o, r); static
-    compliance of coordinates without mass (r, r), which no mode has [m/N], None where there are none.
+    Parameters
+    ----------
+    frequency : (m,) array
+        Natural angular frequencies [rad/s].
+    shape : (m, r) array
+        Mode shapes over the coordinates [kg^-1/2].
+    row : mapping of (int, int) to int
+        Number of a coordinate by node and component.
+    position : mapping of int to (3,) array
+        Places of nodes [m], by their numbers.
+    damping : (m,) array or None
+        Damping ratios [1]; None where the file has none.
+    foot_force : (m, o) array
+        Forces on the feet per unit of each mode.
+    foot_direct : (o, r) array
+        Forces on the feet by unit loads themselves [1].
+    compliance : (r, r) array, optional
+        Static compliance of coordinates without mass [m/N], which no mode has; None where there are none.
     """
 
     frequency: np.ndarray

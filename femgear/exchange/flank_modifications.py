@@ -49,7 +49,7 @@ _ALIKE = 1e-9
 
 @dataclass(frozen=True)
 class Flank:
-    """Modifications of a flank as tables of a case, and in words those that no case can have.
+    """Modifications of a flank: ``tables`` as a case has them, and ``left_out`` in words, those that no case can have.
 
     ``signs`` tells whether there are slopes or twists, whose signs REXS does not define.
     """
@@ -113,7 +113,25 @@ def flank_modifications(
 
 @dataclass
 class _Reader:
-    """Tables of the modifications of a flank, one after the other."""
+    """Reader of the modifications of a flank, one after the other.
+
+    Parameters
+    ----------
+    model : Model
+        What the file holds.
+    width, base_radius : float
+        Of the gear [m].
+    tip_diameter : float or None
+        Of the gear [m]; lengths from the tip need it.
+    outwards : {1.0, -1.0}
+        Change of the roll length towards the tip; -1 for internal gears.
+    up : {1.0, -1.0}
+        1 where the datum face is the end z < 0 of the teeth.
+    tables : list of dict
+        Modifications read so far, as a case has them.
+    left_out : list of str
+        Those that no case can have, in words.
+    """
 
     model: Model
     width: float

@@ -99,7 +99,10 @@ SCALES = {"Pa": "pressure_scale", "m/s^2": "acceleration_scale", "N": "force_sca
 
 @dataclass(frozen=True)
 class Signal:
-    """Sampled signal: what it is called, unit, samples a second [Hz], samples (n,), whether it is steady."""
+    """Sampled signal of a sensor: ``values`` (n,) in its ``unit``, at so many samples a second as its ``rate`` [Hz].
+
+    ``name`` is what files call it; ``steady`` tells whether the speed stays the same.
+    """
 
     name: str
     unit: str
@@ -110,7 +113,10 @@ class Signal:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Lines at the multiples 0, 1, 2, .. of a frequency [Hz]: name, unit, peak amplitudes (n,) complex."""
+    """Lines of a sensor at the multiples 0, 1, 2, .. of a frequency ``step`` [Hz].
+
+    ``name`` is what files call it; ``values`` (n,) are complex peak amplitudes in its ``unit``.
+    """
 
     name: str
     unit: str
@@ -120,7 +126,10 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Shapes:
-    """Modes at points (P, 3) [m]: frequency [Hz] and damping ratio (M,), shape (M, P, 3) [kg^-1/2]."""
+    """Modes of a structure at ``points`` (P, 3) [m].
+
+    ``frequency`` (M,) [Hz], ``damping_ratio`` (M,) [1] and mass-normalised ``shape`` (M, P, 3) [kg^-1/2].
+    """
 
     points: np.ndarray
     frequency: np.ndarray

@@ -26,9 +26,9 @@ _NOTHING = 1e-9
 
 @dataclass(frozen=True)
 class UnitStage:
-    """A stage: its shafts with the torques on them [N m] per unit of that on the first.
+    """A stage, the ``component`` of the file, with the torques on its shafts per unit of that on the first.
 
-    ``arms`` are the ids of shafts with these torques, which are the weights of their speeds, too: the sum of
+    ``arms`` are these torques [1] by the ids of the shafts. They are the weights of their speeds, too: the sum of
     weight times speed is zero.
     """
 
@@ -38,9 +38,10 @@ class UnitStage:
 
 @dataclass(frozen=True)
 class PowerFlow:
-    """Speeds of shafts [rad/s] by their ids, and torques by the meshes of a stage on its first shaft [N m].
+    """Speeds and torques of a gear unit, as far as the file tells them; what it leaves open is missing.
 
-    What a file leaves open is missing. ``joined`` are the ids of stages that other stages hang on.
+    ``speed`` holds the speeds of shafts [rad/s] by their ids, ``torque`` that which the meshes of a stage put on its
+    first shaft [N m], by the id of the stage. ``joined`` are the ids of stages that other stages hang on.
     """
 
     speed: Mapping[str, float]

@@ -50,7 +50,19 @@ RIGID = 10_000
 
 @dataclass(frozen=True)
 class _Stage:
-    """Components of a planetary stage; gears, flanks and shafts by member, those of planets together."""
+    """Components of a planetary stage or of a gear pair.
+
+    Parameters
+    ----------
+    model : Model
+        What the file holds.
+    stage : Component
+        The stage; of a pair its mesh.
+    meshes, sun_meshes : list of Component
+        All meshes, and of a planetary stage those with the sun.
+    gears, flanks, shafts : dict of list of Component
+        By member, ``"sun"``, ``"planet"`` and so on; those of planets together. Shafts have the carrier besides.
+    """
 
     model: Model
     stage: Component

@@ -56,9 +56,10 @@ _PLAIN = ("none", "-", "1", "")
 
 @dataclass(frozen=True)
 class Component:
-    """A component; its attributes are texts with their unit, ``{"face_width": ("50.0", "mm")}``.
+    """A component of a gear unit, such as a gear or a shaft.
 
-    The unit is None where the file gives none; arrays and matrices are left out.
+    ``id``, ``type`` and ``name`` are those of the file. ``attributes`` are texts with their unit,
+    ``{"face_width": ("50.0", "mm")}``: the unit is None where the file gives none; arrays and matrices are left out.
     """
 
     id: str
@@ -72,7 +73,7 @@ class Component:
 
 @dataclass(frozen=True)
 class Relation:
-    """A relation of a type: pairs of role and component id."""
+    """A relation of a ``type`` between components: ``refs`` are pairs of role and component id."""
 
     type: str
     refs: tuple[tuple[str, str], ...]
@@ -90,8 +91,12 @@ class Model:
     ----------
     name : str
         Of the file, for messages.
+    version : str
+        Of the format, such as ``"1.7"``.
     components : mapping of str to Component
         By id.
+    relations : tuple of Relation
+        Which components belong together, and in which roles.
     load_cases : tuple of mapping
         Attributes by component id that a load case of the first load spectrum gives.
     used : set of (str, str)
