@@ -85,6 +85,8 @@ class RigidSet(ABC):
 
     Parameters
     ----------
+    sun, ring, carrier : PlanarBody or HelicalBody
+        Central bodies, with their supports.
     planet : PlanarBody or HelicalBody
         Each of the N equal planets; it has no supports but its bearing.
     sun_radius, ring_radius, planet_radius : float
@@ -249,8 +251,8 @@ class PlanarTorque:
 class HelicalSupport:
     """Isotropic support of a body in all six directions; infinite holds a motion, zero leaves it free.
 
-    Radial and axial [N/m], against tilts about the two axes in the plane and against rotation about the axis
-    of the body [N m/rad]; as `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
+    ``radial`` and ``axial`` [N/m], ``tilt`` about the two axes in the plane and ``torsional`` about the axis of the
+    body [N m/rad]; as `HelicalSet.planet_bearing` the values may be (N,) arrays, one a planet.
 
     CaseError: stiffnesses that are no numbers, negative or NaN (E-RANGE).
     """

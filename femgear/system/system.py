@@ -137,6 +137,8 @@ class Modes:
         Such as ``"rigid"``, ``"rotational"``, ``"translational"``, ``"planet"``, ``"ring"``.
     nodal_diameter : (n_modes,) int array
         Dominant number of nodal diameters of the ring, -1 where there is no ring.
+    dofs : tuple of str
+        Names of the degrees of freedom, as in `MechanicalSystem`; empty where they have none.
     modal_load : (n_modes,) array, optional
         ``shape^T load``: what the constant external load does on each mode; ``None`` means no load.
     """
@@ -186,6 +188,8 @@ class Response:
         Lowest force of all meshes within the period [N]; teeth cannot pull.
     method : tuple of str
         ``"fixed point"`` or ``"direct"``, one a speed.
+    message : str
+        What the solver has to say, empty where nothing needs saying.
     periods : int
         Mesh periods in one period of the excitation record: harmonic ``h`` has the frequency
         ``h mesh_frequency / periods``.

@@ -193,7 +193,7 @@ def _collect(curve: ScaledCurve, first: CurvePoint) -> Curve:
 
 @dataclass(frozen=True)
 class _End:
-    """How a curve ended, as in `Curve`."""
+    """How a curve ended: ``message``, ``closed``, ``complete`` and ``lost`` as in `Curve`."""
 
     message: str
     closed: bool = False

@@ -159,6 +159,8 @@ class CurvePoint:
         Scaled derivative of the equations.
     orientation : float
         Sign of the determinant of the derivative bordered by the tangent.
+    iterations : int
+        Newton iterations that the correction took.
     contraction : float
         Second Newton step, with the derivative of the first one, over the first; zero when one was enough.
     error : float
@@ -340,7 +342,10 @@ def _newton_step(curve: ScaledCurve, z: np.ndarray, normal: np.ndarray):
 
 @dataclass(frozen=True)
 class Segment:
-    """The piece of a curve between a point and the next, as points in planes normal to the first tangent."""
+    """The piece of a ``curve`` from its ``first`` to its ``last`` point, two neighbours.
+
+    Its inner points lie in planes normal to the first tangent.
+    """
 
     curve: ScaledCurve
     first: CurvePoint

@@ -54,6 +54,8 @@ class ComplexModes:
         Whether the conjugate pole belongs to it.
     speed : float
         That multiplies the gyroscopic matrix [rad/s].
+    dofs : tuple of str
+        Names of the n degrees of freedom, as in `MechanicalSystem`.
     """
 
     eigenvalue: NDArray[np.complex128]

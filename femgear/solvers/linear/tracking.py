@@ -252,6 +252,12 @@ def campbell_data(
 
 @dataclass(frozen=True)
 class _Point:
+    """Modes at one ``value`` of the parameter.
+
+    ``eigenvalue`` (m,) are those of the branches followed, ``vector`` (n, m) their unit vectors by the root of the
+    mass matrix, ``slope`` (m,) their change per unit of the parameter since the point before, None at the first.
+    """
+
     value: float
     eigenvalue: NDArray[np.complex128]
     vector: np.ndarray

@@ -350,7 +350,7 @@ def _element_name(problem: NonlinearSystem, column: int) -> str:
 
 @dataclass(frozen=True)
 class LineTangent:
-    """``dR/dX`` of the harmonic equations at one deflection, without a matrix of its size.
+    """``dR/dX`` of the harmonic equations of a ``balance`` at one deflection, without a matrix of its size.
 
     ``receptance`` (L, n_columns, n_columns + n_loads) [m/N] of the lines; ``stiffness`` (N, n_pairs) [N/m]:
     tangents of the coupled pairs less the reference springs, on the grid.

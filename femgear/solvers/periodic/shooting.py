@@ -83,6 +83,8 @@ class ShootingOptions:
         Tolerance of the integrator, which stops at contact changes.
     tolerance : float
         Of the distance between start and end, relative to the size of the motion.
+    max_iterations : int
+        Newton iterations at most.
     """
 
     harmonics: int = 20

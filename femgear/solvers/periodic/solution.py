@@ -31,9 +31,13 @@ class PeriodicSolution:
         ``W^T q`` [m].
     force : (n_columns, L) complex array
         Forces of the elements [N].
+    converged : bool
+        Whether the residual is within the tolerance asked for.
     residual : float
         Largest violation of the harmonic equations relative to the largest deflection, of which a mean that
         runs away counts up to a million times the static one; one where nothing carries the mean load.
+    iterations : int
+        Newton iterations, or those of the fixed point.
     factorisations : int
         Matrices factorised on the way.
     tail : float
@@ -108,6 +112,8 @@ class FloquetVerdict:
         point, pitchfork, transcritical), ``"flip"`` (through -1) or ``"Neimark-Sacker"`` (complex pair).
     method : str
         ``"exact exponentials"``, ``"splitting"``, ``"shooting"`` or ``""``.
+    message : str
+        How the verdict was reached, or why there is none.
     error : float
         Estimated relative error of the monodromy matrix.
     """

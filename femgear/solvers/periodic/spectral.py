@@ -132,9 +132,14 @@ def _batches(frequency: np.ndarray, highest: np.ndarray) -> list[np.ndarray]:
 class HarmonicProblem:
     """``E_h + T_h (g E)_h = S_h`` for every harmonic h, mesh and speed.
 
-    Receptance T (n, n, n_speeds, H + 1) [m/N], zero beyond the harmonics of a speed; multiplication by the
-    stiffness fluctuation g (n, H + 1) or (n, n_speeds, H + 1) of each mesh [N/m]; source S
-    (n, n_speeds, H + 1) [m].
+    Parameters
+    ----------
+    receptance : (n, n, n_speeds, H + 1) complex array
+        T [m/N], zero beyond the harmonics of a speed.
+    product : Product
+        Multiplication by the stiffness fluctuation g (n, H + 1) or (n, n_speeds, H + 1) of each mesh [N/m].
+    source : (n, n_speeds, H + 1) complex array
+        S [m].
     """
 
     receptance: np.ndarray
@@ -151,8 +156,14 @@ class HarmonicProblem:
 class Twins:
     """Meshes that repeat others later in time: ``x_j(t) = x_leader(j)(t - phase_j T)``.
 
-    First mesh of every group (n_groups,), group of every mesh (n_meshes,), factors ``exp(-2 pi i h phase_j)``
-    (n_meshes, H + 1).
+    Parameters
+    ----------
+    leaders : (n_groups,) int array
+        First mesh of every group.
+    group : (n_meshes,) int array
+        Group of every mesh.
+    shift : (n_meshes, H + 1) complex array
+        Factors ``exp(-2 pi i h phase_j)``.
     """
 
     leaders: np.ndarray
@@ -376,7 +387,21 @@ def _alike(modes: Modes, twins: Twins, omega: float) -> bool:
 
 @dataclass(frozen=True)
 class _Solved:
-    """What is found of every speed: harmonics (n_speeds, n, H + 1), and numbers (n_speeds,)."""
+    """Response at all speeds, written down batch by batch.
+
+    Parameters
+    ----------
+    deflection, force : (n_speeds, n, H + 1) complex arrays
+        Harmonics of the meshes [m], [N].
+    modal : (n_speeds, n_modes, H + 1) complex array
+        Harmonics of the modal coordinates [m kg^1/2].
+    residual, radius, tail, lowest : (n_speeds,) arrays
+        ``residual``, ``spectral_radius``, ``tail`` and ``lowest_force`` of `Response`.
+    iterations : (n_speeds,) int array
+        Iterations of the fixed point.
+    direct : (n_speeds,) bool array
+        Whether the direct solution was used.
+    """
 
     deflection: np.ndarray
     force: np.ndarray
@@ -472,7 +497,17 @@ def _checked(modes, excitation, mesh_frequency, method, tolerance, max_iteration
 
 @dataclass(frozen=True)
 class _Data:
-    """What does not depend on speed: harmonics (n, H + 1) of the excitation, and who repeats whom."""
+    """Excitation and symmetry of the meshes, the same at all speeds.
+
+    Parameters
+    ----------
+    stiffness, deflection, force : (n, H + 1) complex arrays
+        Harmonics of the mesh stiffness [N/m], the free deflection [m] and the mesh force [N] of the excitation.
+    twins : Twins
+        Which meshes repeat which.
+    classes : list of _Class
+        Harmonics at which all twins have one shift.
+    """
 
     stiffness: np.ndarray
     deflection: np.ndarray
@@ -498,7 +533,11 @@ def _alone(n: int, count: int) -> Twins:
 
 @dataclass(frozen=True)
 class _How:
-    """What `solve_spectral` is asked for."""
+    """Options of `solve_spectral`.
+
+    ``method`` is one of its names, ``tolerance`` the relative residual and ``max_iterations`` the number of
+    iterations at most; ``radius`` tells whether the spectral radius is computed.
+    """
 
     method: str
     tolerance: float

@@ -27,10 +27,22 @@ _MOST_STEPS = 100_000
 
 @dataclass(frozen=True)
 class StroboscopicMap:
-    """The map of one period [s] of a problem, all tables of its steps made once.
+    """The map of one period of a problem, all tables of its steps made once.
 
-    ``frequency`` (n_bases,) [rad/s]; ``law`` and ``loads`` belong to the instants of one period, see `march`,
-    with the phases ``theta`` (steps + 1, n_bases).
+    Parameters
+    ----------
+    problem : NonlinearSystem
+        What moves.
+    frequency : (n_bases,) array
+        Base frequencies [rad/s].
+    period : float
+        Length of the period [s].
+    scheme : Scheme
+        Rule of one step, its matrices factorised.
+    law, loads
+        Forces of the columns and external loads at the instants of one period, see `march`.
+    theta : (steps + 1, n_bases) array
+        Phases of the base frequencies at these instants [rad].
     """
 
     problem: NonlinearSystem
@@ -128,9 +140,16 @@ def common_period(frequency, periods: int) -> float:
 
 @dataclass(frozen=True)
 class PoincareSection:
-    """Points of a section: times (n_points,) [s], displacement [m] and velocity [m/s] (n_points, n).
+    """Points of a section, taken once a period.
 
-    ``deflection`` (n_points, n_columns) is ``W^T q`` [m].
+    Parameters
+    ----------
+    time : (n_points,) array
+        [s].
+    displacement, velocity : (n_points, n) arrays
+        [m], [m/s].
+    deflection : (n_points, n_columns) array
+        ``W^T q`` [m].
     """
 
     time: np.ndarray

@@ -54,6 +54,8 @@ class TransientResponse:
         [m, m/s]; not a number after a step that did not converge.
     deflection, force : (n_times, n_columns) arrays
         ``W^T q`` [m] and the forces of the elements [N].
+    method : str
+        Rule of the steps, or method of the adaptive integrator.
     converged : bool
         Every step converged, and none errs by more than the whole motion (``error`` up to 1). A free system
         whose load is not balanced converges too: the message says that its mean drifts.
@@ -62,8 +64,14 @@ class TransientResponse:
     error : float
         Largest estimated local error of a step relative to the amplitude of the motion, in the norm of the
         mass matrix; the tolerance for adaptive methods.
+    steps : int
+        Steps taken.
     iterations : int
         Newton iterations of all steps, zero for adaptive methods.
+    factorisations : int
+        Matrices factorised on the way.
+    message : str
+        How the integration ended, and whether the mean of the motion drifts.
     """
 
     time: np.ndarray
