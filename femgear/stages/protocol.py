@@ -268,7 +268,10 @@ class Stage:
 
 @dataclass(frozen=True)
 class Recorded:
-    """What a test bench would record of a run: signals of every sensor, spectra, modes at points, order cuts.
+    """What a test bench would record of a run.
+
+    ``signals``, ``spectra`` and ``shapes`` take results and give those of every sensor: sampled signals, lines at
+    every speed, and modes at points (None where there are none).
 
     ``needs`` are the stages that each format takes, of "wav", "uff" and "quality" those that there are, the
     first one that of the signals, of which every speed and the run-up have ``each``. ``cuts`` takes

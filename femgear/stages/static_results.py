@@ -247,10 +247,28 @@ _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
 class StaticResult(StageResult):
     """Static transmission error, load sharing and mesh stiffness of all meshes.
 
-    ``sun_torque`` [N m] keeps its sign, ``period_message`` tells how the errors repeat, and ``entries`` are
-    those of the case that it depends on, as in the results that follow. ``overlap_ratio`` and
-    ``base_helix_angle`` [rad] are those of helical teeth, positive where the sun is right-handed; ``waves``
-    what bodies yield across the width, where it is solved in slices.
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+        The set as the case has it.
+    sectors : Sectors
+        Finite element grids of one tooth of each gear.
+    bodies : Bodies
+        Flank compliances of the gears.
+    cycle : MeshCycle
+        The static solution over the record.
+    sun_torque : float
+        Torque on the sun [N m], with its sign.
+    entries : Entries
+        Entries of the case that the result depends on, as in the results that follow.
+    period_message : str
+        How the errors repeat.
+    overlap_ratio : float
+        Of helical teeth [1]; zero for spur teeth.
+    base_helix_angle : float
+        Of helical teeth [rad], positive where the sun is right-handed.
+    waves : WidthWaves, optional
+        What bodies yield across the width, where it is solved in slices.
     """
 
     planetary_set: PlanetarySet
@@ -421,6 +439,8 @@ class StressResult(StageResult):
 
     Parameters
     ----------
+    planetary_set : PlanetarySet
+        The set as the case has it.
     cycle : MeshCycle
         The static solution that it belongs to.
     influences : RootStresses
@@ -435,6 +455,10 @@ class StressResult(StageResult):
         In the same order.
     between : tuple of tuple of RootCycle
         The same gears and meshes as those of `roots`, for every record of positions between.
+    spectrum : LoadSpectrum
+        Loads of the teeth of every mesh over time.
+    nominal : NominalStresses
+        Nominal stresses of ISO 6336 at the same load, for comparison.
     sun_torque : float
         [N m]
     closes : bool

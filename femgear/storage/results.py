@@ -262,7 +262,10 @@ class Manifest:
 
 @dataclass(frozen=True)
 class Results:
-    """A results folder; every file is read, and its checksum tested, when it is first asked for."""
+    """A results ``folder`` with its ``manifest``; ``read_case`` turns the path of the case file into the case.
+
+    Every file is read, and its checksum tested, when it is first asked for.
+    """
 
     folder: Path
     manifest: Manifest

@@ -40,6 +40,8 @@ class ParetoFront:
     ----------
     problem : Problem
         Its objective is the first one.
+    second : Quantity
+        The second objective, minimised as the first.
     x : (m, n) array
         In the units of the variables.
     values : (m, 2) array
@@ -50,6 +52,8 @@ class ParetoFront:
         Objectives of the other designs within the limits.
     findings : tuple of tuple of Finding
         Doubts and faults of every design, see `Designs.findings`.
+    designs, failures : int
+        Designs computed, and designs that could not be computed.
     complete : bool
         Whether the search was not cut short by ``max_designs``.
     """

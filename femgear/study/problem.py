@@ -267,8 +267,14 @@ class Problem:
     ----------
     case : Case
         Its positions, flank elements and harmonics are those of the search; a coarse one is fast.
+    variables : sequence of Variable
+        What is changed, within its bounds.
+    objective : Quantity
+        What is minimised.
     also : sequence of Quantity
         Reported of the case and of the optimum as well.
+    limits : sequence of Limit
+        What a design must keep to.
 
     Raises
     ------

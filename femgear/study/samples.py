@@ -294,30 +294,63 @@ def read_tolerances(path: str | os.PathLike, module: float) -> tuple[Tolerances,
 
 @dataclass(frozen=True, eq=False)
 class _OverWidth:
-    """What samples in slices of the face width share besides, in windows of one size."""
+    """What samples in S slices of the face width share besides, in windows of one size.
+
+    Parameters
+    ----------
+    springs : SliceSprings
+        Compliance of bodies and contacts between slices.
+    tilting : TiltingMembers, optional
+        Tilts of members, which approach the flanks by a different amount in every slice.
+    apart : (P, W, S) array
+        Separations of the windows of the case by leads and axes askew [m].
+    lead : (2N, S) array
+        The same of the meshes [m].
+    shifts : (2N S, K) sparse array
+        Separation of every slice of the meshes per unit of each error [m/m].
+    """
 
     springs: SliceSprings
     tilting: TiltingMembers | None
-    # separations of the case by leads and axes askew: of windows (P, W, S), of meshes (2N, S)
     apart: np.ndarray
     lead: np.ndarray
-    # of meshes per error, (2N S, K)
     shifts: csr_array
 
 
 @dataclass(frozen=True, eq=False)
 class _Level:
-    """All that samples share in windows of one size."""
+    """All that samples share in windows of one size, P positions with W windows of C cells.
+
+    Parameters
+    ----------
+    found : Candidates
+        Cells that may touch.
+    springs : PairSprings
+        Compliance of the tooth pairs.
+    touching : (P, W, C) array
+        Force under which every cell begins to touch [N], as `PairLaws` has it.
+    shifts : (P W, K) sparse array
+        Separation of the windows per unit of each of K errors [m/m].
+    tilts : (P W 3, K) sparse array, optional
+        The same at the three nodes of every window; None where no error changes along a window.
+    overflows : bool
+        Whether a contact of the case without errors reaches the end of its window.
+    other_gap : (n,) array
+        Separations of the pairs that are no candidates [m].
+    other_shifts : (n, K) sparse array
+        The same per unit of each error [m/m].
+    other_place : tuple of two (n,) int arrays
+        Position and mesh of each of these pairs.
+    over : _OverWidth, optional
+        Of contact in slices of the width.
+    """
 
     found: Candidates
     springs: PairSprings
-    # force under which every cell begins to touch, as `PairLaws` has it (P, W, C)
     touching: np.ndarray
-    # separations per error: of the windows (P W, K), at their nodes (P W 3, K) or None
     shifts: csr_array
     tilts: csr_array | None
     overflows: bool
-    # pairs that are no candidates: separations, those per error, and at which position of which mesh they are
     other_gap: np.ndarray
     other_shifts: csr_array
     other_place: tuple[np.ndarray, np.ndarray]
@@ -328,10 +361,26 @@ class _Level:
 class SampleModel:
     """What all samples of a set share; see `sample_model`.
 
-    The set, and as it is ``solved``: its mirror image where the torque is negative, of which planet ``i`` is
-    planet ``order[i]``. ``errors`` holds key, distribution, and number of bodies and of values on each,
-    ``load`` (m,) is on the motions [N], ``position`` (P,) in the solved set [mesh periods], of which so many
-    are ``equidistant``, ``windows`` are share [N] and nearest [m] of the first windows.
+    Parameters
+    ----------
+    basis, solved : DesignBasis
+        The set, and its mirror image where the torque is negative.
+    order : (N,) int array
+        Solved planet ``i`` is planet ``order[i]`` of the set.
+    errors : tuple of (str, Law, (int, int))
+        Key, distribution, and number of bodies and of values on each.
+    members : MovingMembers
+        Motions that the contact solves for.
+    load : (m,) array
+        Load on these motions [N].
+    position : (P,) array
+        In the solved set [mesh periods].
+    equidistant : int
+        Number of equidistant positions, which come first.
+    windows : (float, float)
+        Load share [N] and smallest distance [m] from which the first windows follow.
+    _levels : dict
+        What was prepared for windows of a size, by these two numbers.
     """
 
     basis: DesignBasis

@@ -58,17 +58,26 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class _TouchingCells:
-    """All M loaded cells of the record, position after position, in the numbering of the solved set."""
+    """All M loaded cells of the record, position after position, in the numbering of the solved set.
 
-    # number of the position, number of the mesh, (M,)
+    Parameters
+    ----------
+    at, mesh : (M,) int arrays
+        Number of the position and of the mesh.
+    roll_1, roll_2 : (M,) arrays
+        Roll lengths on gear 1 and gear 2 [m].
+    tooth_1, tooth_2 : (M,) int arrays
+        Tooth numbers on gear 1 and gear 2.
+    weight : (M, 2N) array
+        ``Z = H_AA^-1 J``: load of the cell per unit approach of every mesh [N/m].
+    """
+
     at: np.ndarray
     mesh: np.ndarray
-    # roll lengths [m] and tooth numbers on gear 1 and gear 2, (M,)
     roll_1: np.ndarray
     roll_2: np.ndarray
     tooth_1: np.ndarray
     tooth_2: np.ndarray
-    # Z = H_AA^-1 J, load of the cell per unit approach of every mesh [N/m], (M, 2N)
     weight: np.ndarray
 
 
@@ -92,6 +101,8 @@ class LinearContact:
         Transmission error from sun to ring [m].
     deflection, force : (2N, P) arrays
         Of every mesh, in the original order [m], [N].
+    touching : _TouchingCells
+        Loaded cells, with what each carries per unit approach.
     arc_response : (P, 2N) array
         Of the transmission error to ``v = Z^T d gap`` [m/N].
     deflection_response, force_response : (P, 2N, 2N) arrays

@@ -44,8 +44,12 @@ class Sweep:
 
     Parameters
     ----------
+    keys : tuple of str
+        Entries of the case that are varied, one a number of a point.
     points : tuple of tuple
         Values as the case file holds them; the last key runs fastest.
+    quantities : tuple of Quantity
+        What is computed of every case.
     values : (points, quantities) array
         [SI]; NaN where a case cannot be computed.
     errors : tuple of str
