@@ -376,7 +376,7 @@ class SampleModel:
     position : (P,) array
         In the solved set [mesh periods].
     equidistant : int
-        Number of equidistant positions, which come first.
+        Number of equidistant positions in a mesh period; the others lie between them.
     windows : (float, float)
         Load share [N] and smallest distance [m] from which the first windows follow.
     _levels : dict

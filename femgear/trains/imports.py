@@ -26,7 +26,11 @@ MOST_STAGES = 40
 
 @dataclass(frozen=True)
 class CaseDraft:
-    """Text of a case, with what stands behind the stem of the file's name, and what it is in words."""
+    """Case made from a gear unit, ready to be written.
+
+    ``text`` is that of the case file, ``suffix`` what stands behind the stem of its name, ``words`` say what it is a
+    case of.
+    """
 
     suffix: str
     text: str

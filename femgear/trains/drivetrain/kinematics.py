@@ -223,6 +223,8 @@ class MeshGeometry:
 
     Parameters
     ----------
+    names : tuple of str
+        Of the n_meshes meshes.
     basic : (n, m) array
         ``U``, among all coordinates or the free ones.
     fixed : (m, n_meshes) array

@@ -53,8 +53,9 @@ class Wheel:
 class Layout:
     """Discs, shafts between body centres, and places of all bodies.
 
-    ``centre`` (n_bodies, 3) [m], planets after the bodies; ``shafts`` pairs of body numbers. The drawing is a
-    scheme: bodies without gears get a radius, and two wheels of one body stand side by side.
+    ``names`` and ``centre`` (n_bodies, 3) [m] of the bodies, planets last; ``wheels`` are the discs that stand for
+    their gears, ``shafts`` pairs of body numbers. The drawing is a scheme: bodies without gears get a radius, and two
+    wheels of one body stand side by side.
     """
 
     names: tuple[str, ...]

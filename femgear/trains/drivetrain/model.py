@@ -70,6 +70,8 @@ class DrivetrainModel:
 
     Parameters
     ----------
+    train : Drivetrain
+        The bodies, shafts, stages and bearings that it was made of.
     system : MechanicalSystem
         ``W`` holds the mesh directions with the carriers at angle zero, ``load`` the weight, ``C`` the modal
         damping; ``gyroscopic`` multiplies the speed of the first body.
@@ -260,7 +262,7 @@ class _TurningMeshes:
 
     ``columns`` (g, d): those that every mesh takes part in, by ``S = fixed + cos phi even + sin phi odd``
     (g, d); ``turn``: orders of the carrier's angle ``phi`` in the base frequencies; ``stiffness`` [N/m].
-    Flanks that separate have the force ``k max(x - gap, 0)`` with the gap (g,) [m], others ``k x``.
+    Flanks that may part (``separates``) have the force ``k max(x - gap, 0)`` with the gap (g,) [m], others ``k x``.
     """
 
     columns: np.ndarray

@@ -382,7 +382,10 @@ class BearingSection(Part):
 
 @dataclass(frozen=True)
 class Mesh:
-    """A mesh of a stage: its name, the stage, its entry in the case file, the data and the planet, from 0."""
+    """A mesh of a stage: its ``name`` and the number of the ``stage`` and of the ``planet`` on it, both from 0.
+
+    ``key`` is its entry in the case file, ``section`` what stands there.
+    """
 
     name: str
     stage: int
@@ -397,6 +400,12 @@ class Drivetrain:
 
     Parameters
     ----------
+    bodies : tuple of BodySection
+        Rigid bodies, the driving one first.
+    shafts : tuple of ShaftSection
+        Elastic shafts between bodies.
+    parallel, planetary : tuples of ParallelSection and PlanetarySection
+        Gear pairs and planetary sets.
     bearings : tuple of BearingSection
         Several of a body add.
     gravity : float

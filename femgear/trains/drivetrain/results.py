@@ -55,7 +55,16 @@ _NOTHING = 1e-6
 class DrivetrainModesResult(StageResult):
     """Modes at standstill with mean mesh stiffnesses, and over the speed with gyroscopic terms.
 
-    ``speed`` is that of the first body in operation [rad/s].
+    Parameters
+    ----------
+    model : DrivetrainModel
+        The train as it is solved.
+    modes : Modes
+        At standstill.
+    campbell : CampbellData
+        Modes and critical speeds over the speed of the first body.
+    speed : float
+        Speed of the first body in operation [rad/s].
     """
 
     model: DrivetrainModel
@@ -98,7 +107,10 @@ class DrivetrainModesResult(StageResult):
 
 @dataclass(frozen=True)
 class TransientResult(StageResult):
-    """Motion in time, by variant: with bending, and torsional where it is asked for; external torques."""
+    """Motion in time, by variant: with bending of the shafts, and with their torsion alone where that is asked for.
+
+    ``models`` are the trains as they are solved, ``runs`` their motions, ``torques`` the external torques.
+    """
 
     models: dict[str, DrivetrainModel]
     runs: dict[str, DrivetrainRun]
@@ -232,8 +244,25 @@ class AveragedSpectrum:
 class SpectrumResult(StageResult):
     """Spectra of the mesh forces by variant, over frequency and order, and the named lines.
 
-    After ``settle`` [s], at the mean ``speed`` of the first body [rad/s]; ``amplitudes`` (L, n_meshes) [N] of
-    the lines, and whether the ``order_distance`` of the record parts them, ``resolved`` (L,).
+    Parameters
+    ----------
+    transient : TransientResult
+        The motion from which they are made.
+    settle : float
+        Time that is left out at the start [s].
+    speed : float
+        Mean speed of the first body after that [rad/s].
+    spectra, orders : dict of AveragedSpectrum
+        By variant, amplitudes of the mesh forces [N] over the frequency [Hz], and over the order, multiples of the
+        turn of the first body [1].
+    lines : tuple of MeshLine
+        Mesh harmonics, their side bands, and sums and differences of meshes.
+    amplitudes : dict of (L, n_meshes) array
+        By variant, amplitudes of these lines [N].
+    order_distance : float
+        Smallest distance of orders that the record parts [1].
+    resolved : (L,) bool array
+        Whether it parts a line from its neighbours.
     """
 
     transient: TransientResult

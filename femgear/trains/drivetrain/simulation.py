@@ -79,16 +79,24 @@ class DrivetrainRun:
     ----------
     time : (n,) array
         [s]
+    outputs : tuple of str
+        Names of the n_outputs motions recorded.
     motion, velocity : (n, n_outputs) arrays
         Deviations from the free spin [m, rad].
     approach, force : (n, n_meshes) arrays
         Of the drive flanks [m]; of the meshes, drive less back flank [N].
     spin, spin_speed : (n,) arrays
         Angle and speed of the first body without its deviation [rad], [rad/s].
+    meshes : tuple of str
+        Names of the n_meshes meshes.
+    energy_balance : EnergyBalance
+        Energies at both ends, and the work between.
     drift : float
         Largest spin found in the deviations after a block, before it was taken out [rad].
     momentum : float
         Error of the angular momentum about the first body's axis, over the largest impulse or momentum.
+    steps : int
+        Steps taken.
     step : float
         [s]
     extremes : (2, n_meshes) array
@@ -98,6 +106,8 @@ class DrivetrainRun:
         more than the drive flank.
     lost : (n_meshes,) array
         Share of the steps in which no flank touches; zeros where meshes are linear.
+    contact_loss : bool
+        Whether flanks may part; else the meshes are linear.
     growth : float
         Mean rate of the logarithm of the free motion after the first third of the run [1/s]; NaN where
         nothing moves but the spin.
@@ -346,7 +356,10 @@ class FreeMotion:
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Energies [J] of a run at its ends, and the work of loads, damping and meshes in between."""
+    """Energies of a run ``before`` its first step and ``after`` its last [J], and the work in between.
+
+    ``loads`` is the work of torques and weight, ``damping`` and ``meshes`` what these take [J].
+    """
 
     before: float
     after: float

@@ -62,8 +62,21 @@ _PRODUCTS, _FLOPS = 60, 1e10
 class _Surroundings:
     """Set, ring and casing for the two-way response.
 
-    ``gears`` and ``structure`` have the damping that the set as a whole gives each of their modes where
-    ``damping``, that of gears and ring together, is known.
+    Parameters
+    ----------
+    gears : Modes
+        Modes of gears and carrier without the ring.
+    excitation : MeshExcitation
+        Of the meshes, over their record.
+    structure : FixedStructure
+        Ring and casing that stand still.
+    paths : MeshPaths
+        Ways of the meshes around the ring.
+    damping : matrix or None
+        Damping of gears and ring together; where it is known, ``gears`` and ``structure`` have what it gives each
+        of their modes.
+    coupled : int
+        Largest nodal diameter in which ring and meshes act both ways.
     """
 
     gears: Modes

@@ -143,6 +143,14 @@ class ModesResult(StageResult):
 
     Parameters
     ----------
+    ring : RingModel
+        Modes of the elastic ring.
+    model : ElasticSet
+        System of gears, carrier and ring.
+    excitation : MeshExcitation
+        Mesh stiffness [N/m], deflection [m] and force [N] over the record.
+    modes : Modes
+        With mean mesh stiffness.
     bodies : tuple of Bodies
         Flank compliances with the ring on its foundation, and with the ring held.
     state : LoadedPeriod
@@ -151,6 +159,8 @@ class ModesResult(StageResult):
         Frequency for whose excitation the basis was made [Hz].
     symmetry : int
         Turns by ``2 pi/symmetry`` take every planet to the place of one like it.
+    entries : Entries
+        Entries of the case that the result depends on.
     bearing_share : (2N, 2) array, optional
         Mean force of a mesh over that of all of its kind, with `BEARING_FACTORS` of the planets' bearing
         stiffness; None where planets share equally.
@@ -233,10 +243,21 @@ class ModesResult(StageResult):
 class FixedHousing:
     """Ring and casing that stand still, the forces in them, and those in the ring on its foundation alone.
 
-    Sensors of the structure: some at equal distances around the outer
-    surface of a ring on supports, then the displacements ``sensors`` and the forces ``forces`` by name;
-    ``missing`` as in `HousingResult`. ``multiplier`` (speeds,) is the modulus of the largest Floquet
-    multiplier over a turn of the carrier, nan where none was computed.
+    Parameters
+    ----------
+    structure : FixedStructure
+        Ring and casing, with their sensors: some at equal distances around the outer surface of a ring on supports,
+        then ``sensors`` and ``forces``.
+    two_way : TwoWayResponse
+        Forces of the meshes in this structure.
+    one_way : TwoWayResponse
+        Forces of the meshes in the ring on its foundation.
+    sensors, forces : tuples of str
+        Names of displacements and of forces that it observes.
+    missing : str
+        As in `HousingResult`.
+    multiplier : (speeds,) array
+        Modulus of the largest Floquet multiplier over a turn of the carrier, nan where none was computed.
     """
 
     structure: FixedStructure
@@ -252,7 +273,8 @@ class FixedHousing:
 class Judged:
     """What the Floquet verdict on a response is made of: `femgear.solvers.stability.parametric.stability`.
 
-    At mesh frequencies (speeds,) [Hz], with so many mesh harmonics of the stiffness.
+    ``modes`` and ``excitation`` of the set, ``mesh_frequency`` (speeds,) [Hz], and the number of mesh ``harmonics``
+    of the stiffness.
     """
 
     modes: Modes
@@ -263,16 +285,43 @@ class Judged:
 
 @dataclass(frozen=True)
 class DynamicsResult(StageResult):
-    """Periodic response at every ``input_speed`` (speeds,) [rad/s], stability, and field of the ring.
+    """Periodic response at all speeds of the input, its stability, and the field of the ring.
 
-    ``dte`` (speeds, 2N, H + 1) [m] contains the deflection of the ring; ``ring_radial``
-    (speeds, H + 1, 2 n_max + 1) are circumferential components [m] at its outer surface, as
-    ``ring_tangential`` at all speeds where a sensor of the case hears it, else at the last; ``fixed`` is the
-    housing that stands still, all else of the ring on its foundation; ``symmetry`` is that of `ModesResult`,
-    ``harmonics`` their number at the speed of the case that has the most. The excitation ends at
-    ``excitation_limit`` (speeds,) [Hz]; ``level_change`` (speeds,) [dB] is what the level of the housing
-    changes when it ends at ``compared_to`` [Hz] instead, nan at speeds that were not looked at. ``warnings``
-    are of all speeds of the case, with the last of them.
+    ``warnings`` are of all speeds of the case, with the last of them.
+
+    Parameters
+    ----------
+    input_speed : (speeds,) array
+        [rad/s]
+    speeds : tuple of Speeds
+        Of the members, one a speed of the input.
+    response : Response
+        Harmonics of the meshes.
+    judged : Judged
+        What the verdict on its stability is made of.
+    dte : (speeds, 2N, H + 1) complex array
+        Dynamic transmission error of every mesh, the deflection of the ring included [m].
+    ring_radial : (speeds, H + 1, 2 n_max + 1) complex array
+        Circumferential components of the radial displacement of the ring at its outer surface [m].
+    ring_tangential : array
+        The same of the tangential displacement, at all speeds where a sensor of the case hears it, else at the last.
+    ring_teeth : int
+        Teeth of the ring: the carrier order of the mesh frequency.
+    symmetry : int
+        As in `ModesResult`.
+    harmonics : int
+        Harmonics at the speed of the case that has the most.
+    excitation_limit : (speeds,) array
+        Frequency at which the excitation ends [Hz].
+    level_change : (speeds,) array
+        What the level of the housing changes when the excitation ends at ``compared_to`` instead [dB]; nan at
+        speeds that were not looked at.
+    compared_to : float
+        [Hz]
+    entries : Entries
+        Entries of the case that the result depends on.
+    fixed : FixedHousing, optional
+        The housing that stands still; all else is of the ring on its foundation.
     """
 
     input_speed: np.ndarray
@@ -355,15 +404,35 @@ class DynamicsResult(StageResult):
 
 @dataclass(frozen=True)
 class HousingResult(StageResult):
-    """What a fixed sensor on the ring hears at every ``input_speed`` (speeds,) [rad/s].
+    """What a fixed sensor on the ring or on the housing around it hears at all speeds of the input.
 
-    ``exact`` are the lines of the components, ``lines`` those of the case's ``form``, "exact" or "linear"
-    (interpolated over ``points`` points of the ring). The excitation ends at ``excitation_limit`` (speeds,)
-    [Hz]; ``harmonics`` and ``symmetry`` are those of `DynamicsResult`. Of a housing that stands still
-    ``sound`` are the three results of `surface_sound` (speeds, n_orders), those of `equivalent_sound` as the
-    first and the last of a casing whose areas are known, else none; ``supported`` has the numbers (speeds,)
-    of `_SUPPORTED`. ``outputs`` are names and lines (speeds, n_names, n_orders) of each of `_OUTPUTS`;
-    ``missing`` says what static compliance a casing lacks.
+    Parameters
+    ----------
+    input_speed : (speeds,) array
+        [rad/s]
+    exact : SensorLines
+        Lines of the sensor by the components of the displacement.
+    form : str
+        ``"exact"`` or ``"linear"``: how the case wants ``lines``.
+    points : int
+        Points of the ring between which the linear form interpolates.
+    harmonics, symmetry : int
+        As in `DynamicsResult`.
+    excitation_limit : (speeds,) array
+        Frequency at which the excitation ends [Hz].
+    cylinder : Cylinder
+        What radiates.
+    microphone : Microphone
+        Where that is heard.
+    sound : tuple of three (speeds, n_orders) arrays, optional
+        Of a housing that stands still the results of `surface_sound`; of a casing whose areas are known those of
+        `equivalent_sound` as the first and the last.
+    supported : mapping of (speeds,) arrays
+        Numbers of `_SUPPORTED`, of a housing that stands still.
+    outputs : mapping of (names, (speeds, n_names, n_orders) complex array)
+        Lines of each of `_OUTPUTS`.
+    missing : str
+        What static compliance a casing lacks.
     """
 
     input_speed: np.ndarray

@@ -177,12 +177,33 @@ def resonances(modes: Modes, forces: ModalForces, met: Crossings, speed, operati
 
 @dataclass(frozen=True)
 class RunupResult(StageResult):
-    """Levels, mesh forces and lines over ``input_speed`` (s,) [rad/s], and the resonances between its ends.
+    """Levels, mesh forces and lines over the speed of the input, and the resonances between its ends.
 
-    Mesh frequency and end of the excitation (s,) [Hz], speed of the carrier (s,) and operating
-    speeds (n,) [rad/s]. ``level_change`` (s,) [dB] is what the level changes when the excitation ends at
-    ``compared_to`` [Hz] instead, nan at speeds that were not looked at. ``resonances`` are the variables of
-    runup.nc, (c,) each; ``method`` as in `SensorLines`.
+    Parameters
+    ----------
+    input_speed, carrier_speed : (s,) arrays
+        Speeds of the input and of the carrier [rad/s].
+    mesh_frequency, excitation_limit : (s,) arrays
+        Mesh frequency, and frequency at which the excitation ends [Hz].
+    level_change : (s,) array
+        What the level changes when the excitation ends at ``compared_to`` instead [dB]; nan at speeds that were not
+        looked at.
+    compared_to : float
+        [Hz]
+    heard : HeardSpeeds
+        Levels, forces and lines at these speeds.
+    resonances : mapping
+        Variables of runup.nc of the resonances, (c,) each.
+    ring_teeth : int
+        Teeth of the ring: the carrier order of the mesh frequency.
+    sensor_angle : float
+        Place of the sensor on the housing [rad].
+    operating_speeds : (n,) array
+        Speeds of the input in operation [rad/s].
+    unresolved : int
+        Resonances whose peaks are too narrow for the steps of the speed.
+    method : str
+        As in `SensorLines`.
     """
 
     input_speed: np.ndarray

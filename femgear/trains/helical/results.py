@@ -48,9 +48,25 @@ _BODIES = (
 class HelicalModesResult(StageResult):
     """Modes with mean mesh stiffness, and what excites them.
 
-    ``excitation`` has a row a slice, ``whole`` a row a mesh at its static state with fixed centres, both
-    along the tooth normals and None where the mesh stiffness is given; ``phasing`` is that of every mode,
-    ``flank`` the sign of `femgear.system.mesh_directions.mesh_directions`.
+    Parameters
+    ----------
+    planetary_set : PlanetarySet
+        The set in its transverse section.
+    data : HelicalSet
+        Its rigid bodies, supports and mesh stiffnesses.
+    system : MechanicalSystem
+        Its equations of motion.
+    modes : Modes
+        With mean mesh stiffness.
+    phasing : tuple of str
+        Of every mode, how its meshes must be phased to excite it.
+    flank : {1, -1}
+        Sign of `femgear.system.mesh_directions.mesh_directions`.
+    section : SectionStiffness, optional
+        Stiffness of a tooth pair in the transverse and in the normal section, where it was computed.
+    excitation, whole : MeshExcitation, optional
+        Along the tooth normals, a row a slice, and a row a mesh at its static state with fixed centres; None where
+        the mesh stiffness is given.
     """
 
     planetary_set: PlanetarySet
@@ -98,6 +114,7 @@ class HelicalModesResult(StageResult):
 class HelicalDynamicsResult(StageResult):
     """Periodic response at every ``input_speed`` (speeds,) [rad/s], its stability, and loads.
 
+    ``modes`` are those it is made of, ``speeds`` those of the members, ``response`` the harmonics of the meshes.
     ``loads`` holds complex harmonics by name: ``pin`` (speeds, N, 6, H + 1) and ``support``
     (speeds, 3, 6, H + 1), three forces [N] and three moments [N m] each.
     """

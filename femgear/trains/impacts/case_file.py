@@ -169,7 +169,11 @@ def cross_check(case: GearPairCase) -> Iterator[CaseError]:
 
 @dataclass(frozen=True)
 class PairScales:
-    """What counts as one: half backlash [m], natural angular frequency omega_n [rad/s] and force k b [N]."""
+    """Units of the equations without dimension: what counts as one.
+
+    ``length`` is half the backlash b [m], ``frequency`` the natural angular frequency
+    omega_n [rad/s], ``force`` k b [N].
+    """
 
     length: float
     frequency: float

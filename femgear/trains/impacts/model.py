@@ -48,7 +48,7 @@ _SHORT = 1e-3
 class PairBearings:
     """Bearings of both gears along the line of action, two numbers each: gear 1 and gear 2.
 
-    Masses over the equivalent mass m_e, stiffnesses over the mean mesh stiffness, and the damping ratio xi of
+    ``mass`` over the equivalent mass m_e, ``stiffness`` over the mean mesh stiffness, and ``damping_ratio`` xi of
     ``c_i = 2 xi sqrt(k_i m_i)``.
     """
 

@@ -61,10 +61,11 @@ _LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
 
 @dataclass(frozen=True, eq=False)
 class ResponseResult(StageResult):
-    """Periodic motions along the branch, and ratios (b,) where flanks part or hit, by level.
+    """Periodic motions of the ``case`` along a ``branch`` of p points.
 
-    Of every motion the extremes (p,) in half backlashes, and shares (p,) of the time with the drive flanks,
-    none or the back flanks in contact.
+    ``lowest`` and ``highest`` (p,) are the extremes of the motion in half backlashes, ``shares`` (p,) those of the time
+    with the drive flanks, none or the back flanks in contact. ``borders`` (b,) are the frequency ratios at which the
+    lowest deflection passes a level, in half backlashes: flanks begin to part or to hit there; by that level.
     """
 
     case: GearPairCase
@@ -119,7 +120,7 @@ class ResponseResult(StageResult):
 
 @dataclass(frozen=True, eq=False)
 class SweepResult(StageResult):
-    """Motions to which integration settles, over ascending ratios and back."""
+    """Motions to which integration of the ``case`` settles, ``up`` over ascending ratios and ``down`` again."""
 
     case: GearPairCase
     up: SweepResponse
@@ -166,7 +167,10 @@ class SweepResult(StageResult):
 
 @dataclass(frozen=True, eq=False)
 class ChaosResult(StageResult):
-    """Exponents and sections over the ratio (r,), and long sections at some of the ratios."""
+    """Lyapunov exponents of the motions of the ``case`` over the frequency ``ratio`` (r,).
+
+    ``found`` has exponents and a section for every ratio, ``sections`` longer ones for some, with their ratio.
+    """
 
     case: GearPairCase
     ratio: np.ndarray

@@ -50,7 +50,7 @@ _ROUNDING = 1e-12
 
 @dataclass(frozen=True, order=True)
 class Member:
-    """A central member, "carrier", "ring" or "sun", of a stage, counted from 1."""
+    """A central member of a ``stage``, counted from 1; its ``name`` is "carrier", "ring" or "sun"."""
 
     stage: int
     name: str
@@ -73,6 +73,8 @@ class PlanetaryStage:
 
     Parameters
     ----------
+    data : PlanarSet
+        Rigid bodies, base radii, supports and mesh stiffnesses of the set.
     teeth : (3,) tuple of int, optional
         Of sun, planet and ring (positive); speeds and mesh frequencies need them.
     fixed : {"carrier", "ring", "sun"}, optional
@@ -192,7 +194,11 @@ def in_series(stages: Sequence[PlanetaryStage], *, torsional: float = math.inf, 
 
 @dataclass(frozen=True, eq=False)
 class TrainSpeeds:
-    """Absolute speeds [rad/s] (planet: its own axis too), mesh frequencies [Hz]; (S,) arrays."""
+    """Speeds of S stages, all (S,) arrays.
+
+    Absolute speeds of ``sun``, ``ring``, ``carrier`` and of each ``planet`` about its own axis [rad/s], and
+    ``mesh_frequency`` [Hz].
+    """
 
     sun: np.ndarray
     ring: np.ndarray

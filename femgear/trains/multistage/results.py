@@ -42,6 +42,8 @@ class MultistageModes(StageResult):
 
     Parameters
     ----------
+    data : MultistageSet
+        The train.
     modes : Modes
         ``kind``: ``rigid``; ``rotational``, ``translational`` or ``planet`` where at least 99 % of the
         kinetic energy belongs to that class in all stages together; else ``mixed``. With equally spaced
@@ -101,7 +103,11 @@ class MultistageModes(StageResult):
 
 @dataclass(frozen=True, eq=False)
 class ResponseResult(StageResult):
-    """Answers of all meshes to the transmission errors of every stage at the input's speeds (F,) [rad/s]."""
+    """Response of all meshes to the transmission errors of every stage.
+
+    ``data`` is the train, ``speed`` (F,) that of its input [rad/s], ``answers`` are the responses by the number of the
+    stage that excites.
+    """
 
     data: MultistageSet
     speed: np.ndarray
@@ -140,10 +146,20 @@ class ResponseResult(StageResult):
 
 @dataclass(frozen=True, eq=False)
 class BalanceResult(StageResult):
-    """Mesh forces (F, meshes, lines) [N] by harmonic balance with k(t) of all meshes.
+    """Mesh forces by harmonic balance with k(t) of all meshes.
 
-    ``orders`` (lines, S) are the multiples of the mesh frequencies; the first line is the mean. At the
-    speeds (F,) of the input [rad/s]; ``found`` (F,) says at which it converged.
+    Parameters
+    ----------
+    data : MultistageSet
+        The train.
+    speed : (F,) array
+        Speeds of its input [rad/s].
+    orders : (lines, S) int array
+        Multiples of the mesh frequencies; the first line is the mean.
+    force : (F, meshes, lines) complex array
+        [N]
+    found : (F,) bool array
+        Whether the balance converged.
     """
 
     data: MultistageSet

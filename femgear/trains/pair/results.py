@@ -65,7 +65,21 @@ _PLAY = "m", "play along the line of action, 0: no back side"
 
 @dataclass(frozen=True)
 class PairModesResult(StageResult):
-    """Modes with the mean mesh stiffness, and what excites them."""
+    """Modes of a pair with the mean mesh stiffness, and what excites them.
+
+    Parameters
+    ----------
+    gears : GearPair
+        The pair in its transverse section.
+    model : PairModel
+        Its equations of motion.
+    excitation : MeshExcitation
+        Mesh stiffness [N/m], deflection [m] and force [N] over one mesh period.
+    modes : Modes
+        With the mean mesh stiffness.
+    entries : Entries
+        Entries of the case that the result depends on.
+    """
 
     gears: GearPair
     model: PairModel
@@ -121,9 +135,26 @@ class PairMotion:
 
 @dataclass(frozen=True)
 class PairDynamicsResult(StageResult):
-    """Motion at every ``input_speed`` (s,) [rad/s], its stability, and end of the excitation (s,) [Hz].
+    """Motion of a pair at all speeds of gear 1, and its stability.
 
-    Where the linear response pulls, all are those of the harmonic balance with play, ``backlash`` (1,) [m].
+    Where the linear response pulls, all are those of the harmonic balance with play.
+
+    Parameters
+    ----------
+    gears : GearPair
+        The pair.
+    input_speed : (s,) array
+        [rad/s]
+    motion : PairMotion
+        Approach, forces and shares of contact.
+    response : Response
+        Harmonics of the mesh.
+    stability : Stability
+        Floquet verdict.
+    excitation_limit : (s,) array
+        Frequency at which the excitation ends [Hz].
+    backlash : (1,) array
+        Play along the line of action [m].
     """
 
     gears: GearPair
@@ -182,10 +213,30 @@ class PairDynamicsResult(StageResult):
 
 @dataclass(frozen=True)
 class PairRunupResult(StageResult):
-    """Linear motion over ``input_speed`` (s,) [rad/s], resonances, and the branch on which flanks part.
+    """Linear motion of a pair over the speed, its resonances, and the branch on which flanks part.
 
-    ``branch`` are speeds [rad/s] (p,), motions along it and whether they are stable (p,), None where the
-    flanks stay in contact; ``ending`` tells how it ended.
+    Parameters
+    ----------
+    gears : GearPair
+        The pair.
+    input_speed : (s,) array
+        Speeds of gear 1 [rad/s].
+    mesh_frequency, excitation_limit : (s,) arrays
+        Mesh frequency, and frequency at which the excitation ends [Hz].
+    motion : PairMotion
+        Linear, over these speeds.
+    resonances : mapping
+        Variables of runup.nc of the resonances.
+    operating_speeds : (n,) array
+        Speeds of gear 1 in operation [rad/s].
+    unresolved : int
+        Resonances whose peaks are too narrow for the steps of the speed.
+    branch : ((p,) array, PairMotion, (p,) bool array) or None
+        Speeds [rad/s], motions and stability along the branch; None where the flanks stay in contact.
+    complete : bool
+        Whether the branch was followed to the end of its range.
+    ending : str
+        Where flanks part along it, and how it ended.
     """
 
     gears: GearPair

@@ -66,7 +66,8 @@ _STILL = 1e-6
 class PlanarModel:
     """A lumped set ready to be solved, and where its elements act.
 
-    ``back_flanks`` tells whether these have columns of their own.
+    ``data`` are its rigid bodies and stiffnesses, ``problem`` its equations of motion, ``bearings`` its bearings with
+    clearance. ``back_flanks`` tells whether these flanks have columns of their own.
     """
 
     data: PlanarSet
@@ -217,14 +218,31 @@ MOTIONS = {
 
 @dataclass(frozen=True, kw_only=True)
 class MotionLines:
-    """Motions, forces and contact of a solution; `MOTIONS` gives dimensions, unit and meaning of each.
+    """Motions, forces and contact of a solution; the members are carrier, ring and sun.
 
-    The members are carrier, ring and sun, the axes x and y of the carrier frame, and the directions at the
-    planet radially outwards and tangential; lines (L,) are complex. Hence ``rms`` (3, 2), ``displacement``
-    (3, 2, L) [m], forces of meshes (2N, L), planet bearings (N, 2, L) and carrier bearing (2, L) [N], and
-    contacts (2N,). ``force_tail`` is that of
-    `femgear.system.fourier.line_tail`, of drive and back flanks together; the carrier bearing has no force
-    where there is none. ``approach`` is the largest deflection of a mesh [m].
+    `MOTIONS` gives their dimensions, units and meaning in the files of results. Of L lines the arrays hold complex
+    amplitudes; the axes are x and y of the carrier frame, the directions at a planet radially outwards and tangential.
+
+    Parameters
+    ----------
+    force_tail : float
+        `femgear.system.fourier.line_tail` of the mesh forces, of drive and back flanks together [1].
+    motion : float
+        Farthest that the centre of a member moves from its place [m].
+    rms : (3, 2) array
+        Displacement of the members about its mean, r.m.s. [m].
+    displacement : (3, 2, L) array
+        Of the members [m].
+    mesh_force, back_force : (2N, L) arrays
+        Force of the drive flanks and of the back flanks of every mesh, each along its own line of action [N].
+    planet_bearing_force : (N, 2, L) array
+        Force of the pin on the planet [N].
+    carrier_bearing_force : (2, L) array
+        Force of the bearing on the carrier [N]; zero where there is none.
+    drive_contact, back_contact : (2N,) arrays
+        Shares of the time in which these flanks touch [1].
+    approach : float
+        Largest deflection of a mesh [m].
     """
 
     force_tail: float

@@ -83,7 +83,10 @@ _OF_MOTION = ("weight_response", "carrier_orbit", "response_orbit")
 
 @dataclass(frozen=True)
 class PlanarModesResult(StageResult):
-    """Modes of the set at standstill: mean mesh stiffness, bearings closed, back flanks open."""
+    """Modes of the set at standstill: mean mesh stiffness, bearings closed, back flanks open.
+
+    ``planetary_set`` is the geometry of the gears, ``data`` the rigid bodies and stiffnesses, ``modes`` what they give.
+    """
 
     planetary_set: PlanetarySet
     data: PlanarSet
@@ -102,6 +105,7 @@ class PlanarModesResult(StageResult):
 class BranchResult(StageResult):
     """Periodic responses to the weight over its frequency in the carrier frame.
 
+    ``planetary_set`` is the geometry of the gears, ``model`` the lumped set; ``branch`` are the solutions,
     ``lines`` has one entry a point of the branch; ``sense`` is 1 where the carrier turns counter-clockwise,
     else -1; ``ending`` says where the branch ended and why.
     """
@@ -189,7 +193,11 @@ class BranchResult(StageResult):
 
 @dataclass(frozen=True)
 class PlanarResponseResult(StageResult):
-    """Responses to weight and mesh frequency together, one at every ``input_speed`` (speeds,) [rad/s]."""
+    """Responses of the ``planetary_set`` to weight and mesh frequency together, one at every ``input_speed`` [rad/s].
+
+    ``speeds`` are those of the members, ``solutions`` the lines of the deflections, ``lines`` the motions and forces
+    that follow from them, all of length (speeds,).
+    """
 
     planetary_set: PlanetarySet
     input_speed: np.ndarray
