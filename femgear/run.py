@@ -155,10 +155,22 @@ _LOSS = -0.1
 
 @dataclass
 class _Run:
-    """What a run has written into its folder: files with checksums, seconds and verdicts of the stages.
+    """What a run has written into its ``folder``.
 
-    ``findings`` are those of the stages by name, under "" those of the case; ``pending`` are results that a
-    run could go on from and that are not written yet.
+    Parameters
+    ----------
+    files : dict
+        Checksums of the files by name.
+    timings : dict
+        Seconds that every stage took.
+    convergence : dict
+        Verdict of every stage on its solutions.
+    data : dict
+        Contents of the file of every stage.
+    findings : dict
+        Findings of every stage, under "" those of the case.
+    pending : dict
+        Results that a run could go on from and that are not written yet.
     """
 
     folder: Path

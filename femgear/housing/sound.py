@@ -50,7 +50,10 @@ _FREQUENCIES = 240
 
 @dataclass(frozen=True)
 class Cylinder:
-    """What radiates: radius and length of what moves [m]; density [kg/m^3], speed [m/s] of air."""
+    """Cylinder that radiates into air.
+
+    ``radius`` and ``length`` of the surface that moves [m]; ``density`` [kg/m^3] and ``sound_speed`` [m/s] of the air.
+    """
 
     radius: float
     length: float
@@ -494,9 +497,10 @@ def _between(grid: np.ndarray, turns: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SoundQuality:
-    """What is heard of a stationary sound: loudness [sone] of ISO 532-1 in a free field, tones of ECMA-418-1.
+    """How a stationary sound is heard: loudness by ISO 532-1 in a free field, tones by ECMA-418-1.
 
-    Total tone-to-noise ratio and prominence ratio [dB], nan without a tone; frequencies (n,) of tones [Hz].
+    ``loudness`` [sone]; ``tone_to_noise`` and ``prominence``, the total tone-to-noise and prominence ratios [dB], nan
+    without a tone; ``tones`` (n,) are the frequencies of the tones [Hz].
     """
 
     loudness: float

@@ -112,7 +112,10 @@ def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progre
 
 @dataclass(frozen=True)
 class _Picture:
-    """A picture of the page: file name without suffix, section, caption, kind (``"image/png"``) and bytes."""
+    """A picture of the page: ``name`` of its file without suffix, ``section`` that it stands in, and ``caption``.
+
+    ``kind`` is its media type, ``"image/png"``, and ``data`` are its bytes.
+    """
 
     name: str
     section: str

@@ -102,9 +102,10 @@ def _refuse_little_memory() -> None:
 
 @dataclass(frozen=True)
 class Body:
-    """One body of a scene: points (n, 2) [m] in the frame of the set, displacements (n, 2) [m] or None.
+    """One body of a scene, such as ``"planet 2"`` by its ``name``, in the frame of the set.
 
-    Triangles (m, 6) have their corners counter-clockwise, then the nodes between 01, 12 and 20.
+    ``points`` (n, 2) [m] and their ``displacement`` (n, 2) [m] or None. ``triangles`` (m, 6) have their corners
+    counter-clockwise, then the nodes between 01, 12 and 20.
     """
 
     name: str
@@ -411,7 +412,11 @@ def strobe_frames(ring_teeth: int, wished: int) -> int:
 
 @dataclass(frozen=True)
 class _Field:
-    """Deflection of the ring about its mean in the frame of the carrier, sampled by angle and instant."""
+    """Deflection of the ring about its mean in the frame of the carrier, sampled by angle and instant.
+
+    ``radial`` and ``tangential`` (H + 1, 2 n_max + 1) are complex components [m], ``turn`` is the sense of the carrier, 1
+    or -1, and ``teeth`` the order of the first harmonic, the teeth of the ring where errors do not turn.
+    """
 
     radial: np.ndarray
     tangential: np.ndarray

@@ -35,9 +35,10 @@ _NOTHING = 1e-3
 
 @dataclass(frozen=True)
 class Block:
-    """A titled table with notes under it; its header names the columns, or is empty.
+    """A table under its ``title``, with notes.
 
-    One ``beside`` the point is printed where it is asked for alone.
+    ``header`` names the columns, or is empty; ``rows`` are the cells as text, ``notes`` the lines under the table. One
+    ``beside`` the point is printed where it is asked for alone.
     """
 
     title: str

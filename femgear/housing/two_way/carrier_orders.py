@@ -189,17 +189,30 @@ def ring_load(symmetry: int, ring: np.ndarray, place: np.ndarray, n: np.ndarray,
 
 @dataclass(frozen=True)
 class LeadingMeshes:
-    """Gears and mean stiffness of the leading meshes, J = 2 G of them.
+    """Gears and mean stiffness of the leading meshes, J = 2 G of them, which all others repeat.
 
-    ``folded`` and ``residual`` are of all meshes that repeat them, by the residue of K + pattern modulo N.
+    Parameters
+    ----------
+    modes : Modes
+        Modes of gears and carrier.
+    rows : (J, n_modes) array
+        Deflections of the leading meshes by these modes [kg^-1/2].
+    folded : (N, J, n_modes) complex array
+        Deflections of each leader and all that repeat it, by the residue of K + pattern modulo N.
+    residual : (N, J, J) complex array
+        Static flexibility beyond the modes [m/N], by the same residue.
+    load : (J,) array
+        Deflection by the constant load [m].
+    mean : (J,) array
+        Mesh stiffness that the modes contain [N/m].
     """
 
     modes: Modes
-    rows: np.ndarray  # (J, n_modes) deflections of the leaders
-    folded: np.ndarray  # (N, J, n_modes)
-    residual: np.ndarray  # (N, J, J) [m/N]
-    load: np.ndarray  # (J,) deflection by the constant load [m]
-    mean: np.ndarray  # (J,) stiffness that the modes contain [N/m]
+    rows: np.ndarray
+    folded: np.ndarray
+    residual: np.ndarray
+    load: np.ndarray
+    mean: np.ndarray
 
     @classmethod
     def build(cls, modes: Modes, paths: MeshPaths, sense: int, groups) -> LeadingMeshes:

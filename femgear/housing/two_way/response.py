@@ -87,6 +87,8 @@ class TwoWayResponse(ReadOnlyArrays):
         Products with the fluctuating stiffness.
     harmonics : (n_speeds,) int array
         Mesh harmonics.
+    paths : MeshPaths
+        Ways of the meshes around the ring.
     drag : (n_speeds, n_lines, m) complex array, optional
         Modal forces on the structure [N kg^-1/2] by the damping of the set beyond that of its modes, at the
         orders of `structure_lines`, two-sided.
@@ -187,7 +189,21 @@ def solve_two_way(  # noqa: PLR0913
 
 @dataclass(frozen=True)
 class _Answer:
-    """Forces (J, B, R) of the leading meshes at one speed, and how they were found."""
+    """Forces of the leading meshes at one speed, and how they were found.
+
+    Parameters
+    ----------
+    force : (J, B, R) complex array
+        Of J meshes in B blocks of R side bands [N].
+    drag : (B, S, m) complex array or None
+        Modal forces of the damping on the structure [N kg^-1/2].
+    residual : float
+        Of the forces in their equations [1].
+    radius : float
+        Spectral radius of the iteration without GMRES.
+    products : int
+        Products with the fluctuating stiffness.
+    """
 
     force: np.ndarray
     drag: np.ndarray | None
@@ -388,7 +404,19 @@ def _add_at(total: np.ndarray, place: np.ndarray, values: np.ndarray) -> None:
 
 @dataclass(frozen=True)
 class _Solution:
-    """Forces e beyond k0 (J, B, R), u (G, B, R), forces of the meshes, and how GMRES found them."""
+    """Solution of the equations of one speed by GMRES.
+
+    Parameters
+    ----------
+    extra : (J, B, R) complex array
+        Forces e beyond those of the mean stiffness k0 [N].
+    way : (G, B, R) complex array
+        Displacement u of the ring at its meshes, along their lines of action [m].
+    force : (J, B, R) complex array
+        Forces of the meshes [N].
+    residual, radius, products
+        As in `_Answer`.
+    """
 
     extra: np.ndarray
     way: np.ndarray

@@ -36,29 +36,65 @@ _MOST_RATIO = 0.999
 
 @dataclass(frozen=True)
 class _Class:
-    """Side bands of a block in which the same waves meet the gears, and the damping between both."""
+    """Side bands of a block in which the same waves meet the gears, and the damping between both.
+
+    Parameters
+    ----------
+    bands : int array
+        Numbers of these side bands.
+    matrix : (n_modes + waves,) * 2 complex array
+        Damping of the modes of the gears and these waves.
+    rows : (J, n_modes) array
+        Deflections of the leading meshes by the modes of the gears.
+    number : (waves,) int array
+        Orders s n of the waves.
+    place : (bands, waves) int array
+        Place of L - s n of each wave among what sectors have of them.
+    diameters : (path_waves,) int array
+        Waves of the path, as places among the circumferential orders.
+    path_place : (bands, path_waves) int array
+        As ``place``, of the waves of the path.
+    """
 
     bands: np.ndarray
-    matrix: np.ndarray  # of modes of the gears and these waves
-    rows: np.ndarray  # (J, n_modes) deflections of the leading meshes by the modes of the gears
-    number: np.ndarray  # (waves,) orders s n
-    place: np.ndarray  # (bands, waves) of L - s n of each wave among what sectors have of them
-    diameters: np.ndarray  # (path_waves,) waves of the path among the circumferential orders
-    path_place: np.ndarray  # (bands, path_waves) the same of the path
+    matrix: np.ndarray
+    rows: np.ndarray
+    number: np.ndarray
+    place: np.ndarray
+    diameters: np.ndarray
+    path_place: np.ndarray
 
 
 @dataclass(frozen=True)
 class _Sector:
-    """Orders of the structure at which the same of its modes and waves move, with the shapes of these."""
+    """Orders of the structure at which the same of its modes and waves move, with the shapes of these.
+
+    Parameters
+    ----------
+    orders, modes : int arrays
+        Numbers of these orders and modes.
+    shape : (modes, waves) complex array
+        Waves of the ring in each mode.
+    own : (modes, modes) array
+        Damping between the modes at each order alone.
+    place : (orders, waves) int array
+        Place of K + s n of each wave among what classes have of them.
+    path : (modes, path_waves) complex array
+        Waves in each mode along the path of the meshes.
+    diameters : (path_waves,) int array
+        These waves, as places among the circumferential orders.
+    bands : (orders, path_waves) int array
+        Places of K + s n among the side bands.
+    """
 
     orders: np.ndarray
     modes: np.ndarray
-    shape: np.ndarray  # (modes, waves)
-    own: np.ndarray  # (modes, modes) what acts on each order alone
-    place: np.ndarray  # (orders, waves) of K + s n of each wave among what classes have of them
-    path: np.ndarray  # (modes, path_waves)
-    diameters: np.ndarray  # (path_waves,) waves of the path among the circumferential orders
-    bands: np.ndarray  # (orders, path_waves) places of K + s n among the side bands
+    shape: np.ndarray
+    own: np.ndarray
+    place: np.ndarray
+    path: np.ndarray
+    diameters: np.ndarray
+    bands: np.ndarray
 
     def of_modes(self, values: np.ndarray) -> np.ndarray:
         """Of values (b, S, M) those at these orders."""
@@ -67,9 +103,10 @@ class _Sector:
 
 @dataclass(frozen=True)
 class _Residue:
-    """Blocks of one residue: classes of their side bands, and sectors of the orders of the structure.
+    """Damping in the blocks of one ``residue``.
 
-    A place that there is not is the number of those that there are.
+    ``blocks`` are their numbers, ``classes`` sort their side bands, ``sectors`` the orders of the structure. A place
+    that does not exist is the number of those that do.
     """
 
     residue: int
@@ -80,10 +117,18 @@ class _Residue:
 
 @dataclass(frozen=True)
 class DampingForces:
-    """Modal forces of the damping on gears (B, R, n_modes) and structure (B, S, M), and what they move.
+    """Modal forces of the damping, and what they move, in B blocks.
 
-    Of the structure at every order the M modes, at most, that move there. Deflections of the meshes
-    ``still`` (J, B, R) and of the ring ``way`` (G, B, R) by them [m].
+    Parameters
+    ----------
+    on_gears : (B, R, n_modes) complex array
+        On the modes of the gears [N kg^-1/2].
+    on_structure : (B, S, M) complex array
+        On those modes of the structure, at most M, that move at each of its S orders [N kg^-1/2].
+    still : (J, B, R) complex array
+        Deflection of the leading meshes by these forces [m].
+    way : (G, B, R) complex array
+        Displacement of the ring at its meshes by them, along their lines of action [m].
     """
 
     on_gears: np.ndarray
@@ -103,12 +148,16 @@ class DampingForces:
 
 @dataclass(frozen=True)
 class SetDamping:
-    """Forces of the damping of a set beyond modal damping of gears and structure, see `set_damping`."""
+    """Forces of the damping of a set beyond modal damping of gears and structure, see `set_damping`.
+
+    ``orders`` are the blocks and side bands, ``residues`` the damping between what meets in them, ``structure`` ring
+    and casing; ``rows`` (J, n_modes) are the deflections of the leading meshes by the modes of the gears.
+    """
 
     orders: CarrierOrders
     residues: tuple[_Residue, ...]
     structure: FixedStructure
-    rows: np.ndarray  # (J, n_modes) deflections of the leading meshes by the modes of the gears
+    rows: np.ndarray
 
     @cached_property
     def most_modes(self) -> int:
@@ -336,13 +385,17 @@ def set_damping(matrix, leading: LeadingMeshes, structure: FixedStructure, order
 
 @dataclass(frozen=True)
 class _Waves:
-    """Waves of the ring on its path, ``near`` of its waves, and damping between them, gears and modes."""
+    """Waves of the ring on its path, and the damping between them, the gears and the modes of the structure.
+
+    ``orders`` and ``structure`` as in `SetDamping`, ``near`` numbers those of its waves that the path has. ``whole`` is
+    the damping matrix of the modes of the gears and these waves, ``own`` (m, m) that of the modes of the structure.
+    """
 
     orders: CarrierOrders
     structure: FixedStructure
     near: np.ndarray
-    whole: np.ndarray  # of modes of the gears and these waves
-    own: np.ndarray  # (m, m) of the modes of the structure
+    whole: np.ndarray
+    own: np.ndarray
 
     @cached_property
     def number(self) -> np.ndarray:

@@ -372,9 +372,10 @@ def ring_waves(order) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Places:
-    """Angles, widths and directions from outwards (p,) of places of the outer surface [rad].
+    """Places on the outer surface: p patches that are loaded or observed.
 
-    And the largest orders (p,) of the waves that they feel.
+    ``angle`` (p,) around the ring and ``width`` (p,) [rad], ``direction`` (p,) from outwards [rad], and ``waves`` (p,),
+    the largest order of the waves that each feels.
     """
 
     angle: np.ndarray
