@@ -414,8 +414,8 @@ def strobe_frames(ring_teeth: int, wished: int) -> int:
 class _Field:
     """Deflection of the ring about its mean in the frame of the carrier, sampled by angle and instant.
 
-    ``radial`` and ``tangential`` (H + 1, 2 n_max + 1) are complex components [m], ``turn`` is the sense of the carrier, 1
-    or -1, and ``teeth`` the order of the first harmonic, the teeth of the ring where errors do not turn.
+    ``radial`` and ``tangential`` (H + 1, 2 n_max + 1) are complex components [m], ``turn`` is the sense of the carrier,
+    1 or -1, and ``teeth`` the order of the first harmonic, the teeth of the ring where errors do not turn.
     """
 
     radial: np.ndarray
