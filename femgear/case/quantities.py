@@ -298,7 +298,10 @@ class Section(BaseModel):
 
 @dataclass(frozen=True, eq=False)
 class _Reader:
-    """How an entry is read and checked, and what the JSON schema says of it; stands in `Annotated`."""
+    """How an entry is read and checked, and what is said of it elsewhere; stands in `Annotated`.
+
+    ``read`` turns what the file holds into the value in SI units, ``schema`` is what the JSON schema says of it.
+    """
 
     read: Callable[[object], object]
     schema: dict[str, Any]

@@ -253,6 +253,10 @@ class Candidates:
 
     Parameters
     ----------
+    setup : MeshWindows
+        Windows of all meshes at all positions.
+    bodies : Bodies
+        Flank compliances of the gears.
     position : (P,) int array
         Indices of the positions in `setup`.
     mesh : (W,) int array

@@ -57,7 +57,7 @@ _THIN = 0.5
 
 @dataclass(frozen=True)
 class Sector:
-    """One tooth sector of a gear: grid in the tooth frame and stiffness matrix [N/m]."""
+    """One tooth sector of a ``gear``: ``grid`` in the tooth frame, sparse matrix ``stiffness`` (2n, 2n) [N/m]."""
 
     gear: Gear
     grid: Grid
@@ -66,7 +66,10 @@ class Sector:
 
 @dataclass(frozen=True)
 class Sectors:
-    """Sectors of sun, planet and ring, one tooth each; a pair has gears 1 and 2 for sun and planet, and no ring."""
+    """Sectors of one tooth of the ``sun``, ``planet`` and ``ring``.
+
+    A pair has its gears 1 and 2 for sun and planet, and no ring.
+    """
 
     sun: Sector
     planet: Sector

@@ -97,8 +97,9 @@ class _RootStress:
 
 @dataclass(frozen=True)
 class RootStresses:
-    """Root stress influences of sun, planet and ring; a pair has gears 1 and 2 for sun and planet, and no ring.
+    """Root stress influences of ``sun``, ``planet`` and ``ring``.
 
+    A pair has gears 1 and 2 for sun and planet, and no ring.
     ``ahead`` (slices,) are the places of slices before mid-width [mesh periods], zero for spur teeth, where
     loads differ over the width.
     """

@@ -68,6 +68,10 @@ class Gear:
         [m]
     rim_radius : float
         Bore radius of an external, outer radius of an internal gear [m].
+    internal : bool
+        Whether the teeth point inwards, as those of a ring.
+    rack : BasicRack
+        Basic rack of the tool; its heights are in modules.
     cutter : PinionCutter, optional
         For internal gears; None takes the cutter of `cutter_of`.
     tip_diameter, root_diameter : float, optional

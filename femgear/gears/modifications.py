@@ -62,7 +62,7 @@ class RootRelief(_Relief):
 
 @dataclass(frozen=True)
 class _WholeProfile:
-    """A change of the evaluated part of a profile by an amount [m].
+    """A change of the evaluated part of a profile by an ``amount`` [m].
 
     ``start`` and ``end`` are roll lengths [m] at the root end and the tip end of that part, by default those
     of form and tip circle.
@@ -103,7 +103,7 @@ class MeasuredProfile:
 class LeadSlope:
     """Flank turned about the middle of its width.
 
-    The amount [m] is the rise from one end to the other, positive where the end z > 0 has more material (the
+    The ``amount`` [m] is the rise from one end to the other, positive where the end z > 0 has more material (the
     sign of f_H-beta in ISO 1328-1).
     """
 
@@ -112,7 +112,7 @@ class LeadSlope:
 
 @dataclass(frozen=True)
 class LeadCrowning:
-    """Barrelling over the width: a parabola that takes the amount C_beta (ISO 21771-1) off at both ends."""
+    """Barrelling over the width: a parabola that takes the ``amount`` [m], C_beta of ISO 21771-1, off at both ends."""
 
     amount: float
 
@@ -132,7 +132,7 @@ class EndRelief:
 class FlankTwist:
     """Lead slope that varies along the profile, linearly in the roll length.
 
-    The amount [m] is the lead slope (see `LeadSlope`) at the tip circle less that at the form circle, zero
+    The ``amount`` [m] is the lead slope (see `LeadSlope`) at the tip circle less that at the form circle, zero
     halfway: the twist of a flank S_beta (ISO 21771-1).
     """
 
@@ -158,7 +158,7 @@ Modification = ProfileModification | LeadModification
 
 @dataclass(frozen=True)
 class FlankForm:
-    """All modifications of one flank; they add up."""
+    """All ``modifications`` of one flank; they add up."""
 
     modifications: tuple[Modification, ...] = ()
 

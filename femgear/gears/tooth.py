@@ -148,7 +148,7 @@ def _flank_rolls(gear: Gear, flank_elements: int, refine: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Sizes:
-    """Refined module [m], the unit of all sizes, and growth of the spacing per length."""
+    """Sizes of a grid: ``unit`` of them all, the refined module [m], and ``growth`` of the spacing per length [1]."""
 
     unit: float
     growth: float

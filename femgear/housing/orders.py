@@ -41,7 +41,10 @@ class OrderSpectrum(ReadOnlyArrays):
 
 @dataclass(frozen=True)
 class Line:
-    """One line: carrier order, amplitude in the unit of the spectrum, level [dB] over the strongest."""
+    """One line of a spectrum.
+
+    ``order`` of the carrier, ``amplitude`` in the unit of the spectrum, ``level`` [dB] over the strongest line.
+    """
 
     order: float
     amplitude: float

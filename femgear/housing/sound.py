@@ -63,7 +63,7 @@ class Cylinder:
 
 @dataclass(frozen=True)
 class Microphone:
-    """Where sound is heard: distance from the surface of the cylinder [m], and angle on the housing [rad]."""
+    """Where sound is heard: ``distance`` from the surface of the cylinder [m], and ``angle`` on the housing [rad]."""
 
     distance: float
     angle: float

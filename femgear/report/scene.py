@@ -201,7 +201,7 @@ def write_vtu(grid: pv.UnstructuredGrid, path: str | os.PathLike) -> None:
 
 @dataclass(frozen=True)
 class View:
-    """A part of a picture of its own: title, centre (2,) and half of its width [m]."""
+    """A part of a picture of its own: ``title``, ``centre`` (2,) and ``half`` of its width [m]."""
 
     title: str
     centre: Sequence[float]

@@ -237,7 +237,7 @@ class Gravity:
 class MemberBearing:
     """A radial bearing between two central members, or between one and the housing.
 
-    ``stiffness`` [N/m] and radial clearance from the centred position [m], None for columns without a
+    ``stiffness`` [N/m] and radial ``clearance`` from the centred position [m], None for columns without a
     bearing; ``inner`` and ``outer`` are "carrier", "ring" or "sun", ``outer`` also "housing".
     """
 

@@ -587,6 +587,8 @@ class Tolerance:
 
     Parameters
     ----------
+    variable : Variable
+        Which one.
     tolerance : float
         In the unit of the variable.
     less, more : dict

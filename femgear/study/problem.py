@@ -227,7 +227,7 @@ def _check_variables(case: Case, variables: Sequence[Variable]) -> None:
 
 @dataclass(frozen=True)
 class Limit:
-    """What a quantity may be, in SI units; at least one of ``low`` and ``high``."""
+    """What a ``quantity`` may be, in SI units: at least ``low``, at most ``high``; one of them is enough."""
 
     quantity: Quantity
     low: float = -math.inf

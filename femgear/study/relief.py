@@ -46,6 +46,8 @@ class DesignBasis:
 
     Parameters
     ----------
+    gears : PlanetarySet
+        The set.
     bodies : Bodies
         Flank compliances; they serve all mesh cycles.
     supports : Supports

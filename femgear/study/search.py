@@ -101,6 +101,8 @@ class Optimum:
 
     Parameters
     ----------
+    problem : Problem
+        What was searched.
     x : (n,) array
         In the units of the variables.
     case : Case

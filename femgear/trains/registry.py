@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Known:
-    """A train by name; what `reads` its cases, and what `solves` them, is imported when a case is one of it.
+    """A train by its ``name``; what `reads` its cases, and what `solves` them, is imported when a case is one of it.
 
     ``key`` is the table of the case file that makes a planetary set one of it, and the field of the model;
     ``"model"`` where a file of its own names it there, ``""`` for sets without such a table.
@@ -53,7 +53,7 @@ TRAINS = tuple(
 
 @dataclass(frozen=True)
 class Installed(Known):
-    """A train of another package, by an entry point of the group `GROUP`."""
+    """A train of another ``package``, by an entry point of the group `GROUP`."""
 
     package: str
 

@@ -47,6 +47,8 @@ class Branch:
 
     Parameters
     ----------
+    solutions : tuple of PeriodicSolution
+        One a point, in order along the curve.
     curve : Curve
         The unknowns, limit points and branch points.
     equations : ContinuationProblem

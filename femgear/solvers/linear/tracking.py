@@ -72,7 +72,10 @@ class TrackedModes:
 
 @dataclass(frozen=True)
 class CriticalSpeed:
-    """A line of excitation, ``order`` times the speed [rad/s], at a natural frequency [Hz] of a branch."""
+    """Speed at which a line of excitation meets a natural frequency.
+
+    ``order`` times the ``speed`` [rad/s] is the ``frequency`` [Hz] of the mode number ``branch``.
+    """
 
     speed: float
     frequency: float

@@ -72,8 +72,14 @@ class HarmonicBalance:
 
     Parameters
     ----------
+    problem : NonlinearSystem
+        What moves.
     orders : (L, n_bases) int array
         Lines; line 0 is the mean.
+    reduction : Reduction or DirectReduction
+        Receptances between the columns and the loads at every line.
+    grid : PhaseGrid
+        Instants at which the elements are evaluated.
     elements : tuple of Element
         With their coefficients on the grid.
     pairs : (n_pairs, 2) int array

@@ -138,7 +138,7 @@ def displacements(
 
 @dataclass(frozen=True)
 class PeriodicResponse:
-    """A periodic solution and short names of what it says about itself."""
+    """A periodic ``solution``, and short names of what it says about itself."""
 
     solution: PeriodicSolution
 

@@ -22,7 +22,7 @@ _CONTACT_SAMPLES = ((128, 2048), (8, 64))
 
 @dataclass(frozen=True)
 class _GridSeries:
-    """Coefficients on a fixed grid of phases: ``values`` (N, n), their ``mean`` (n,) and their orders."""
+    """Coefficients on a fixed grid of phases: ``values`` (N, n), their ``mean`` (n,) and their ``orders``."""
 
     values: np.ndarray
     mean: np.ndarray

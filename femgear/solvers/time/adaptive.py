@@ -38,6 +38,8 @@ class Flow:
 
     Parameters
     ----------
+    problem : NonlinearSystem
+        What moves.
     frequency : (n_bases,) array
         [rad/s].
     rate : float
@@ -352,8 +354,8 @@ def _switches(element: Element, x, theta) -> np.ndarray:
 class Contacts:
     """Elements of a problem with the contact state between two changes.
 
-    ``columns``: number of columns of ``W``. ``closed``: one bool array an element; none where the
-    elements are evaluated as they are.
+    ``elements`` are those of the problem, ``columns`` is the number of columns of ``W``. ``closed``: one bool array an
+    element; none where the elements are evaluated as they are.
     """
 
     elements: tuple[Element, ...]

@@ -63,7 +63,10 @@ _LEAST_RECORDS = 64
 
 @dataclass(frozen=True)
 class SpeedRange:
-    """Speeds of the free spin over a run: first, last, lowest, highest and mean over time [rad/s]."""
+    """Speeds of the free spin over a run [rad/s].
+
+    ``first`` and ``last`` are those at its ends; ``lowest``, ``highest`` and ``mean`` those over time.
+    """
 
     first: float
     last: float

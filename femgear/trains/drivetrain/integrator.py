@@ -115,7 +115,7 @@ class Scheme:
 
     Rows ``z = (q, v without g, g)`` go on by ``(q, v without g, x without g) = z advance + loads``; the state
     is ``(q, v) = z[:2n] - drawn g``, and ``x = U^T q`` becomes ``x without g - flexibility g``. There are
-    n coordinates, m simple motions ``basic`` (n, m), ``advance`` (2 n + m, 2 n + m), ``loads_before`` and
+    ``n`` coordinates, m simple motions ``basic`` (n, m), ``advance`` (2 n + m, 2 n + m), ``loads_before`` and
     ``loads_after`` (d, 2 n + m), by which d loads at the start and the end of the step act,
     ``drawn`` (m, 2 n) and ``flexibility`` (m, m) [m/N].
     """

@@ -68,9 +68,10 @@ def coordinates_of(train: Drivetrain) -> Coordinates:
 
 @dataclass(frozen=True)
 class Springs:
-    """Springs of a part: places (m,) that they join, ``rows`` (k, m) of deflections, stiffness (k,).
+    """Springs of a part: ``places`` (m,) of the coordinates that they join, their deflections and stiffnesses.
 
-    ``turns`` (k,): whether a spring acts against a rotation [N m/rad], else [N/m].
+    ``rows`` (k, m): deflection of every spring per unit of these coordinates. ``stiffness`` (k,): of springs that
+    act against a rotation, told by ``turns`` (k,), [N m/rad], else [N/m].
     """
 
     places: np.ndarray

@@ -40,7 +40,11 @@ _SHARE = 0.12
 
 @dataclass(frozen=True)
 class Wheel:
-    """A disc: name, centre (3,), radius and width [m]; index of the body's centre in `Layout.centre`."""
+    """A disc that stands for a gear.
+
+    ``name`` of the gear, ``centre`` (3,), ``radius`` and ``width`` [m]; ``body`` is the index of the body's centre in
+    `Layout.centre`.
+    """
 
     name: str
     centre: np.ndarray

@@ -454,7 +454,7 @@ class Drivetrain:
 
 @dataclass(frozen=True)
 class TorqueHistory:
-    """Torque on one body, linear between the instants and constant outside them.
+    """Torque on one ``body``, linear between the instants and constant outside them.
 
     ``times`` (m,) ascend [s]; ``values`` (m,) [N m] are positive about z.
     """

@@ -208,7 +208,10 @@ class TransientResult(StageResult):
 
 @dataclass(frozen=True)
 class MeshLine:
-    """A line: its name, the integer orders of the bases, and the order of the first body."""
+    """A line of a spectrum: its ``name``, and its frequency in two ways.
+
+    ``orders`` are the whole multiples of the base frequencies, ``order`` is the multiple of the turn of the first body.
+    """
 
     name: str
     orders: tuple[int, ...]

@@ -43,7 +43,10 @@ twice a frequency carry the response there."""
 
 @dataclass(frozen=True)
 class FrequencyLimit:
-    """Harmonics of excitation and response, int, and highest excitation frequency [Hz], all (n_speeds,)."""
+    """Where excitation and response end at every speed, all (n_speeds,).
+
+    ``excitation`` and ``response`` are the numbers of harmonics, ``frequency`` is the highest of the excitation [Hz].
+    """
 
     excitation: np.ndarray
     response: np.ndarray

@@ -112,7 +112,7 @@ class HelicalModesResult(StageResult):
 
 @dataclass(frozen=True)
 class HelicalDynamicsResult(StageResult):
-    """Periodic response at every ``input_speed`` (speeds,) [rad/s], its stability, and loads.
+    """Periodic response at every ``input_speed`` (speeds,) [rad/s], its ``stability``, and loads.
 
     ``modes`` are those it is made of, ``speeds`` those of the members, ``response`` the harmonics of the meshes.
     ``loads`` holds complex harmonics by name: ``pin`` (speeds, N, 6, H + 1) and ``support``

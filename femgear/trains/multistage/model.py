@@ -154,6 +154,8 @@ class MultistageSet:
 
     Parameters
     ----------
+    stages : tuple of PlanetaryStage
+        In the order of their numbers.
     couplings : tuple of StageCoupling
         `in_series` makes those of a plain train. None: stages side by side.
     input, output : Member
@@ -215,8 +217,8 @@ class TrainSpeeds:
 class TrainTorques:
     """Torques without losses [N m], positive counter-clockwise.
 
-    What couplings, housing, input and output give sun, ring and carrier, (S,) arrays which add up to zero in
-    every stage; ``output`` is that on the output member.
+    What couplings, housing, input and output give ``sun``, ``ring`` and ``carrier``, (S,) arrays which add up to zero
+    in every stage; ``output`` is that on the output member.
     """
 
     sun: np.ndarray

@@ -1,0 +1,37 @@
+"""What docstrings must hold: every field of every dataclass by its name."""
+
+import ast
+import re
+from pathlib import Path
+
+PACKAGE = Path(__file__).parents[1] / "femgear"
+
+
+def dataclasses(path: Path) -> list[ast.ClassDef]:
+    """All dataclasses of a module, public and private, wherever they stand."""
+    classes = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, ast.ClassDef)]
+    return [node for node in classes if any("dataclass" in ast.unparse(one) for one in node.decorator_list)]
+
+
+def fields(node: ast.ClassDef) -> list[str]:
+    """Names of the annotated fields of a class, without its constants and the mark of keywords."""
+    annotated = [one for one in node.body if isinstance(one, ast.AnnAssign) and isinstance(one.target, ast.Name)]
+    return [one.target.id for one in annotated if not re.search("ClassVar|KW_ONLY", ast.unparse(one.annotation))]
+
+
+def named(docstring: str) -> set[str]:
+    """Names in a docstring: between backticks, or before the colon of an entry."""
+    quoted = " ".join(re.findall(r"``?([^`]+)``?", docstring))
+    entries = " ".join(re.findall(r"^((?:\w+, )*\w+)(?: : |$)", docstring, re.MULTILINE))
+    return set(re.findall(r"\w+", f"{quoted} {entries}"))
+
+
+def test_every_field_of_a_dataclass_stands_in_its_docstring():
+    count, missing = 0, []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in dataclasses(path):
+            names = named(ast.get_docstring(node) or "")
+            count += len(fields(node))
+            missing += [f"{path.relative_to(PACKAGE)}: {node.name}.{one}" for one in fields(node) if one not in names]
+    assert count > 1500  # the walk found them
+    assert missing == []
