@@ -101,10 +101,24 @@ class Solution(dict[str, Any]):
 def solve(case: Any, only: str | None = None, *, progress: Progress = silent) -> Solution:
     """Compute the stages of a case in memory: transmission error, modes, vibration, whatever its train has.
 
-    Of a case from `femgear.read_case`, up to the stage ``only`` with what it needs; ``progress`` is called
-    with (stage, done, total). Returns results by the name of the stage, in order; ``dataset()`` of each has
-    its numbers with units. CaseError, GeometryError before anything is computed: what the stages cannot
-    represent; E-STAGE: no such stage.
+    Parameters
+    ----------
+    case : Case
+        From `femgear.read_case`.
+    only : str, optional
+        Last stage that is wanted, with what it needs; all stages when not given.
+    progress : callable
+        Called with (stage, done, total).
+
+    Returns
+    -------
+    Solution
+        Results by the name of the stage, in order; ``dataset()`` of each has its numbers with units.
+
+    Raises
+    ------
+    CaseError, GeometryError
+        Before anything is computed: what the stages cannot represent; no such stage (E-STAGE).
     """
     case, stages = _asked(case, only)
     results = Solution()

@@ -159,6 +159,20 @@ def write_wav(signal: Signal, path: Path, *, full_scale: float = 1.0) -> None:
 
     The full scale stands in the comment of the file (RIFF INFO, ICMT). Samples above 1 are kept as they are;
     most players clip them.
+
+    Parameters
+    ----------
+    signal : Signal
+        Samples in its unit.
+    path : path
+        File that is written, or replaced as a whole.
+    full_scale : float
+        Value that becomes 1.0, in the unit of the signal.
+
+    Raises
+    ------
+    StorageError
+        A full disk (E-DISK-FULL), a file that cannot be written (E-STORAGE).
     """
     from scipy.io import wavfile
 

@@ -165,7 +165,20 @@ def standard_lag(planet_teeth: int) -> float:
 
 
 def phase_factors(phasing: MeshPhasing, harmonics) -> np.ndarray:
-    """Compute the phase factors ``exp(2 pi i h gamma_j)`` (H, 2N) of the meshes in whole harmonics h (H,)."""
+    """Compute the phase factors ``exp(2 pi i h gamma_j)`` (H, 2N) of the meshes in whole harmonics h (H,).
+
+    Parameters
+    ----------
+    phasing : MeshPhasing
+        Of the 2N meshes.
+    harmonics : (H,) int array
+        Multiples of the mesh frequency.
+
+    Raises
+    ------
+    GeometryError
+        Harmonics that are no whole numbers from 1 (E-HARMONICS).
+    """
     return np.exp(2j * np.pi * np.outer(check_harmonics(harmonics), phasing.phases))
 
 
@@ -437,6 +450,8 @@ def neighbouring_teeth(
 
     Parameters
     ----------
+    sun_teeth, planet_teeth, ring_teeth, planets : int
+        Wanted numbers of teeth, all positive, and number of planets.
     distance : int
         Largest change of each tooth number, up to 30.
     ratio_tolerance : float
@@ -444,7 +459,7 @@ def neighbouring_teeth(
     closure : int
         Largest ``|z_r - z_s - 2 z_p|``; each tooth asks for about half a module of profile shift.
     harmonics : int
-        H
+        H, number of harmonics of the mesh frequency that are compared.
     fitting : bool
         Leaves out sets whose neighbouring planets overlap.
 

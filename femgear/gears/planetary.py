@@ -324,7 +324,10 @@ def _virtual(gear: Gear, teeth: int, helix_angle: float) -> Gear:
 
 
 def equal_planet_angles(planets: int) -> tuple[float, ...]:
-    """List the angles ``2 pi n / N`` (N,) [rad] of equally spaced planets, see `check_planets`."""
+    """List the angles ``2 pi n / N`` (N,) [rad] of equally spaced ``planets``.
+
+    GeometryError: no whole number of planets, 1 to 1000 (E-RANGE).
+    """
     check_planets(planets)
     return tuple(2.0 * math.pi * n / int(planets) for n in range(int(planets)))
 

@@ -308,6 +308,8 @@ def gear_set_modes(
 
     Parameters
     ----------
+    data : RigidSet
+        Bodies, supports and mesh stiffnesses.
     system : MechanicalSystem, optional
         `gear_set_system` of the set, with the flanks that a torque loads; without torque when not given.
     mesh_stiffness : (n_columns,) array, optional
@@ -358,11 +360,17 @@ def gear_set_problem(
 
     Parameters
     ----------
+    data : RigidSet
+        Bodies, supports and mesh stiffnesses.
     meshes : GearMeshes, optional
         From `mesh_elements`; constant stiffnesses without back side when not given.
     back_flanks : bool
         The back flanks act on their own lines of action, with the stiffness of the drive side, so that teeth
         can wedge; otherwise they act on the line of the drive flanks.
+    torque : PlanarTorque, optional
+        On the central members [N m], and what reacts to it.
+    bearings, gravity : Bearings, Gravity, optional
+        Bearings with clearance, and the weight of the bodies.
     pin_errors : (N, 2) array, optional
         Radial (outwards) and tangential (counter-clockwise) displacement of the pins [m], from which the
         coordinates of the planets then count. Not to be given again when the static record holds them.
@@ -458,6 +466,11 @@ def phased_series(sun_planet, planet_ring, phases, *, mean, orders: tuple[int, .
         [N/m], such as `RigidSet.mesh_stiffness`.
     orders : tuple of int
         Multiples of the base frequencies that make the mesh frequency.
+
+    Raises
+    ------
+    CaseError
+        Other numbers of mean stiffnesses and phases (E-SHAPE).
     """
     lines, mean = tooth_lines(sun_planet, planet_ring, phases), np.asarray(mean, float)
     if mean.shape != (len(lines),):

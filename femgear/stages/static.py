@@ -102,9 +102,33 @@ def solve_static(
 ) -> StaticResult:
     """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
 
-    ``cache`` is the folder of generated grids, ``progress`` is called with (stage, done, total), and flank
-    compliances of other cases are taken from ``steps`` where they are those of this one. GeometryError,
-    GridError, ContactError.
+    With errors that turn the record spans as many mesh periods as they take to repeat.
+
+    Parameters
+    ----------
+    case : Case
+        A planetary set, from `femgear.read_case`.
+    cache : path, optional
+        Folder of generated grids.
+    progress : callable
+        Called with (stage, done, total).
+    steps : Steps, optional
+        Flank compliances of other cases, taken where they are those of this one.
+
+    Returns
+    -------
+    StaticResult
+        ``cycle`` holds transmission error [m], mesh forces [N] and mesh stiffness [N/m], see
+        `femgear.contact.cycle.MeshCycle`.
+
+    Raises
+    ------
+    GeometryError
+        Gears that cannot be made, assembled or run.
+    GridError
+        Teeth that cannot be meshed.
+    ContactError
+        A load that the contact cannot carry.
     """
     gears, deviations, steps = planetary_set(case), set_deviations(case), steps or Steps()
     sectors, bodies = known_compliances(case, gears, steps, cache=cache)
@@ -418,10 +442,27 @@ def _overlap(case: Case, gears: PlanetarySet) -> float:
 def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silent) -> StressResult:
     """Find root stresses of every gear in every mesh, their ranges over a turn, load and nominal stresses.
 
-    The static solution of the case need not have pressures (`StaticResult.cycle.pressure`); where it has,
-    they are part of the result. ``progress`` is called with (stage, done, total).
+    Parameters
+    ----------
+    case : Case
+        As for `solve_static`.
+    static : StaticResult
+        Its static solution. It need not have pressures (`MeshCycle.pressure`); where it has, they are part of the
+        result.
+    progress : callable
+        Called with (stage, done, total).
 
-    GridError: the root of a tooth is not one chain of edges, or a body can move freely.
+    Returns
+    -------
+    StressResult
+        Stresses in Pa, load classes in N.
+
+    Raises
+    ------
+    CaseError
+        A static solution of another case (E-OTHER-CASE), or none (E-TYPE).
+    GridError
+        The root of a tooth is not one chain of edges, or a body can move freely.
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     gears, cycle, reverse = static.planetary_set, static.cycle, static.sun_torque < 0

@@ -112,6 +112,10 @@ def pareto_front(
 
     Parameters
     ----------
+    problem : Problem
+        Variables, first objective and limits.
+    second : Quantity
+        Second objective, minimised as well.
     points : int
         Weights, the two ends included.
     start, options, journal, cache, progress, runner

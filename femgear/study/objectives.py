@@ -203,7 +203,10 @@ def mesh_force(first: str, last: str, *, speeds: int = 51, part: Literal["dynami
     """Define the largest mesh force over equidistant input speeds, of all times and meshes [N].
 
     Part "dynamic" is the largest deviation from the mean force of a mesh, which follows from the torque
-    whatever the flanks look like; "peak" is the largest force. First and last speed have their unit.
+    whatever the flanks look like; "peak" is the largest force. ``first`` and ``last`` speed have their unit, as in
+    ``"1000 rpm"``; ``speeds`` is their number.
+
+    CaseError: no such ``part``, or not a range of speeds (E-OBJECTIVE).
     """
     at = _range(first, last, speeds)
     of_mean = _chosen(part, {"dynamic": True, "peak": False}, "part")
@@ -274,7 +277,10 @@ def _frequency(mode: int, answer: Answer) -> float:
 
 
 def contact_ratio(mesh: _MeshKind) -> Quantity:
-    """Define the transverse contact ratio [1] of a mesh, from the tip circles."""
+    """Define the transverse contact ratio [1] of a ``mesh``, "sun-planet" or "planet-ring", from the tip circles.
+
+    CaseError: no such mesh (E-OBJECTIVE).
+    """
     names = {"sun-planet": "contact_ratio_sun_planet", "planet-ring": "contact_ratio_planet_ring"}
     name = _chosen(mesh, names, "mesh")
     return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", partial(_of_gears, name))
@@ -285,7 +291,10 @@ def _of_gears(name: str, answer: Answer) -> float:
 
 
 def tip_thickness(gear: _GearName) -> Quantity:
-    """Define the thickness of the teeth on the tip circle, over the module [1]."""
+    """Define the thickness of the teeth of a ``gear`` on its tip circle, over the module [1].
+
+    CaseError: none of "sun", "planet" and "ring" (E-OBJECTIVE).
+    """
     name = _chosen(gear, {g: g for g in get_args(_GearName)}, "gear")
     return Quantity(f"tip thickness over module, {gear}", NUMBER, "gears", partial(_tip_thickness, name))
 
@@ -306,7 +315,10 @@ def _largest_pressure(answer: Answer) -> float:
 
 
 def root_stress(gear: _GearName) -> Quantity:
-    """Define the largest stress in the roots of a gear [Pa], of a planet in both its meshes."""
+    """Define the largest stress in the roots of a ``gear`` [Pa], of a planet in both its meshes.
+
+    CaseError: none of "sun", "planet" and "ring" (E-OBJECTIVE).
+    """
     places = {"sun": ((0, 0),), "planet": ((0, 1), (1, 0)), "ring": ((1, 1),)}
     wanted = _chosen(gear, places, "gear")
     compute = partial(_largest_stress, wanted)

@@ -194,6 +194,8 @@ def minimise(
 
     Parameters
     ----------
+    problem : Problem
+        Variables, objective and limits.
     method : {"auto", "minimax", "global", "simplex", "powell"}
         ``"minimax"``: descents with derivatives of the contact problem (see `descend`) from the best of the
         samples; for transmission errors over deviations of the flanks, where ``"auto"`` takes it.

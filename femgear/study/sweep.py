@@ -100,8 +100,12 @@ def sweep(
 
     Parameters
     ----------
+    case : Case
+        From `femgear.read_case`; what is not varied stays.
     over : mapping of str to sequence
         Values of dotted keys, as the case file would hold them; all combinations are computed.
+    quantities : sequence of Quantity
+        What is computed of every case, such as `transmission_error`.
     journal : path-like, optional
         File that keeps every case; an interrupted sweep goes on from it.
     cache, progress

@@ -347,6 +347,18 @@ def side_bands(carrier: int, mesh: int, bands: int) -> np.ndarray:
     Eqs. 2-13; Eur. J. Mech. A/Solids 47, 2014, 45-57). Line 0 is the mean. Lines whose frequencies coincide
     because the mesh frequency is a multiple of the carrier frequency stay distinct: the phases are treated as
     independent.
+
+    Parameters
+    ----------
+    carrier, mesh : int
+        Highest harmonics of the carrier and of the mesh frequency.
+    bands : int
+        Side bands on either side of every mesh harmonic.
+
+    Raises
+    ------
+    CaseError
+        What is no whole number from 0 (E-HARMONICS).
     """
     for name, value in (("carrier harmonics", carrier), ("mesh harmonics", mesh), ("side bands", bands)):
         if int(value) != value or value < 0:

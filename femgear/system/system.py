@@ -189,7 +189,7 @@ class Response:
     method : tuple of str
         ``"fixed point"`` or ``"direct"``, one a speed.
     message : str
-        What the solver has to say, empty where nothing needs saying.
+        Method by number of speeds, and everything that is doubtful.
     periods : int
         Mesh periods in one period of the excitation record: harmonic ``h`` has the frequency
         ``h mesh_frequency / periods``.

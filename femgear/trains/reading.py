@@ -132,6 +132,8 @@ def open_results(
 
     Parameters
     ----------
+    folder : path-like
+        That a run wrote.
     partial : bool
         Accept the results of an interrupted run.
     known : mapping of str to Dataset, optional
@@ -156,6 +158,8 @@ def with_value(case: Case, key: str, value: object) -> Case:
 
     Parameters
     ----------
+    case : Case
+        From `read_case`; it stays as it is.
     key : str
         Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
         ``"sun.modifications[0].amount"``.
@@ -172,6 +176,8 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
 
     Parameters
     ----------
+    case : Case
+        From `read_case`; it stays as it is.
     values : mapping
         Keys and values as of `with_value`, as in
         ``{"operation.input": "carrier", "operation.fixed": "ring"}``.

@@ -178,6 +178,8 @@ def frequency_response_curve(
 
     Parameters
     ----------
+    problem : NonlinearSystem
+        What moves.
     frequency : (first, last)
         [rad/s]; the curve starts at the first one towards the last one, which may be lower. With stability
         both are above zero.
@@ -236,6 +238,13 @@ def parameter_curve(
         [rad/s].
     options
         Fields of `CurveOptions`.
+
+    Raises
+    ------
+    CaseError
+        A range of one value, or base frequencies that are no finite numbers (E-RANGE).
+    ConvergenceError
+        No solution at the start.
     """
     chosen, parameter = CurveOptions(**options), _ends(parameter, "parameter", "")
     if not np.all(np.isfinite(parameter)) or min(parameter) == max(parameter):

@@ -119,6 +119,10 @@ def displacements(
 
     Parameters
     ----------
+    problem : NonlinearSystem
+        What moves.
+    solution : PeriodicSolution
+        One of its solutions, with L lines.
     outputs : (n_outputs, n) array, optional
         ``L``; all degrees of freedom when not given.
     reduction : Reduction, optional

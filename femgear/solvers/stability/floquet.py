@@ -401,7 +401,17 @@ def floquet_verdicts(
 
 
 def floquet_verdict(problem: NonlinearSystem, solution: PeriodicSolution, **options) -> FloquetVerdict:
-    """Judge the stability of one periodic solution; options as for `floquet_verdicts`."""
+    """Judge the stability of one periodic solution by its Floquet multipliers.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+        What moves.
+    solution : PeriodicSolution
+        One of its solutions.
+    options
+        ``tolerance`` [1] and ``modes`` of `floquet_verdicts`, which refuses and raises the same.
+    """
     return floquet_verdicts(problem, [solution], **options)[0]
 
 

@@ -270,7 +270,15 @@ def sweep_response(
 
 
 def sweep_up_and_down(problem, frequencies, **options) -> tuple[SweepResponse, SweepResponse]:
-    """Sweep over ascending frequencies [rad/s] and, from the end, back; as `sweep_response`."""
+    """Sweep over ascending base frequencies and, from the end, back.
+
+    Parameters
+    ----------
+    problem, frequencies
+        As for `sweep_response`; (n_frequencies,) [rad/s], ascending.
+    options
+        Further arguments of `sweep_response`, which refuses and raises the same.
+    """
     given = checked_numbers(frequencies, "frequencies", code="E-RANGE", unit="rad/s")
     frequencies = np.sort(np.atleast_1d(given))
     up = sweep_response(problem, frequencies, **options)

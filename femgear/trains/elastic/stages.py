@@ -184,11 +184,29 @@ def solve_modes(
     """Solve for the modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
     Its loaded state, from which the meshes take stiffness and excitation, is that of the set on its supports
-    and of the ring on its foundation, whatever ``static.members`` shows. ``progress`` is called with (stage,
-    done, total); compliances, loaded states and ring models of other cases are taken from ``steps`` where
-    they are those of this one.
+    and of the ring on its foundation, whatever ``static.members`` shows.
 
-    CaseError: no torque, or the ring, which is the housing of this model, is not the fixed member.
+    Parameters
+    ----------
+    case : Case
+        A planetary set whose ring is its housing.
+    static : StaticResult
+        Of `solve_static`.
+    progress : callable
+        Called with (stage, done, total).
+    steps : Steps, optional
+        Compliances, loaded states and ring models of other cases, taken where they are those of this one.
+
+    Returns
+    -------
+    ModesResult
+        ``modes`` holds natural frequencies [Hz] and mass-normalised shapes, ``excitation`` mesh stiffness [N/m],
+        deflection [m] and force [N].
+
+    Raises
+    ------
+    CaseError
+        No torque, a ring that is not the fixed member, or a static solution of another case (E-OTHER-CASE).
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_dynamic_case(case, static.planetary_set)
@@ -326,7 +344,26 @@ def solve_dynamics(
     The response is compared with that to excitation up to a higher frequency. Where the case sets no limit it
     is doubled once where that changes the level by 1 dB or more.
 
-    CaseError: a carrier that runs around the ring faster than its waves (E-SPEED). ConvergenceError.
+    Parameters
+    ----------
+    case : Case
+        As for `solve_modes`.
+    static, modes : StaticResult, ModesResult
+        Of `solve_static` and `solve_modes` for this case.
+    progress : callable
+        Called with (stage, done, total).
+
+    Returns
+    -------
+    DynamicsResult
+        ``response`` holds complex harmonics of mesh deflection [m] and mesh force [N] at every speed.
+
+    Raises
+    ------
+    CaseError
+        A carrier that runs around the ring faster than its waves (E-SPEED); results of another case.
+    ConvergenceError
+        Equations without a solution, at an undamped resonance.
     """
     return next(dynamics_parts(case, static, modes, progress=progress, memory=math.inf))[1]
 
@@ -489,7 +526,25 @@ def _turning_speeds(case: Case, modes: ModesResult) -> tuple[np.ndarray, np.ndar
 
 @one_blas_thread()
 def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
-    """Compute the carrier orders that a sensor fixed on the ring hears while the carrier turns past it."""
+    """Compute the carrier orders that a sensor fixed on the ring hears while the carrier turns past it.
+
+    Parameters
+    ----------
+    case : Case
+        As for `solve_modes`; its table ``housing`` places the sensor.
+    dynamics : DynamicsResult
+        Of `solve_dynamics` for this case.
+
+    Returns
+    -------
+    HousingResult
+        ``lines`` holds carrier orders and complex displacements [m]; sound is in Pa.
+
+    Raises
+    ------
+    CaseError
+        A response of another case (E-OTHER-CASE), or none (E-TYPE).
+    """
     check_entries(dynamics, DynamicsResult, dynamic_entries(case), "dynamic response")
     place = dynamics.ring_teeth, np.array([s.carrier for s in dynamics.speeds]), case.housing.sensor_angle
     known = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}

@@ -94,7 +94,19 @@ class PlanarModel:
 def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None = None) -> PlanarSet:
     """Make the lumped set of a case: bodies and supports of its entries, radii and angles of its gears.
 
-    Mean stiffnesses of the static solution are taken where the case gives none.
+    Parameters
+    ----------
+    case : PlanarCase
+        Masses [kg], inertias [kg m^2], stiffnesses [N/m].
+    gears : PlanetarySet
+        Of `femgear.planetary_set`.
+    static : StaticResult, optional
+        Whose mean mesh stiffnesses are taken where the case gives none.
+
+    Raises
+    ------
+    CaseError
+        Neither a mesh stiffness nor a static solution, or a support without stiffness (E-KEY-MISSING).
     """
     planar, bodies = case.planar, {}
     for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
