@@ -34,11 +34,11 @@ class Problem:
     Parameters
     ----------
     H : (n, n) array
-        Compliance over its mean diagonal entry.
+        Compliance over its mean diagonal entry [1].
     gap : (n,) array
         Separations over the same [N].
     G : (n, m) array
-        Approach per motion, largest entry of every column one.
+        Approach per motion [1], largest entry of every column one.
     load : (m,) array
         External load over the arm [N].
     compliance : float
@@ -62,8 +62,11 @@ class Step:
     Parameters
     ----------
     active : (n,) bool array
+        Candidates that are taken to touch.
     loads, gaps : (n,) arrays
+        Contact loads, and separations that remain, over the mean compliance [N].
     motions : (m,) array
+        Over the mean compliance as well [N].
     flips : integer array
         Candidates that pull, penetrate or must touch; empty when the problem is solved.
     forced : integer array
@@ -73,7 +76,7 @@ class Step:
     residual : float
         See `femgear.contact.solve.ContactState`.
     tolerance : float
-        Load that counts as rounding.
+        Load that counts as rounding [N].
     """
 
     active: np.ndarray

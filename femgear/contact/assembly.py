@@ -200,7 +200,7 @@ class ContactProblem:
     gap, area : (n,) arrays
         Separations [m], and areas of the pressure cells [m^2].
     G : (n, m) array
-        Approach per unit motion.
+        Approach of the flanks per unit motion [1].
     supports : (meshes, meshes) array
         Compliance of sprung members between the meshes [m/N], part of `compliance`.
     mesh, pair, cell : (n,) int arrays

@@ -49,9 +49,11 @@ class BatchState:
     loads, gaps : (P, W, C) arrays
         [N], [m].
     active : (P, W, C) bool array
+        Cells that carry load.
     motions : (P, m) array
         [m].
     iterations, residual : (P,) arrays
+        Linear solutions, and `ContactState.residual` [1].
     """
 
     loads: np.ndarray

@@ -133,6 +133,7 @@ class Between:
     sun_arc : (E,) array
         [m]
     load_share : (N, E) array
+        Share of every planet in the load of all [1].
     max_pressure, pressed_path, pressed_load : (M, E) arrays
         [Pa], [m], [N]
     looked : (N,) bool array

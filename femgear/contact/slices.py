@@ -46,6 +46,7 @@ class SliceState:
     motions : (P, m) array
         [m].
     mesh : (W,) array
+        Mesh of every window.
     iterations, residual : (P,) arrays
         Linear solutions, and largest violation of the contact conditions over the largest displacement.
     own : tuple of (P, meshes) arrays

@@ -27,11 +27,11 @@ class ContactState:
     Parameters
     ----------
     loads : (n,) array
-        Contact loads ``p``, never negative, exactly zero where not `active`.
+        Contact loads ``p`` [N], never negative, exactly zero where not `active`.
     motions : (m,) array
-        Motions ``q``.
+        Motions ``q`` [m].
     gaps : (n,) array
-        Remaining separations ``w``, never negative, exactly zero where `active`.
+        Remaining separations ``w`` [m], never negative, exactly zero where `active`.
     active : (n,) bool array
         Candidates that carry load.
     iterations : int

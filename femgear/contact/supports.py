@@ -67,7 +67,7 @@ class MovingMembers:
     names : tuple of str
         One a motion, such as ``"sun: x"``.
     approach : (2N, m) or, with back flanks, (4N, m) array
-        Approach of the flanks of every mesh per unit motion.
+        Approach of the flanks of every mesh per unit motion [1].
     stiffness : (m,) array
         [N/m], 0 for free motions.
     """

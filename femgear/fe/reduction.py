@@ -41,11 +41,13 @@ class CyclicModes:
     count : int
         Number of sectors.
     nodal_diameter : (m,) int array
+        Number of nodal diameters of every mode.
     frequency : (m,) array
         [Hz]; the last one of each nodal diameter is a static shape rather than a mode.
     load : (m, n_loads) complex array
         Displacement of each load functional, ``f^T U``.
     output : (m, n_outputs) complex array
+        What the output functionals observe of every mode, as ``load``.
     reduced : (k, m) complex array
         ``U`` in the basis of the sector.
     recovery : (2 n_nodes, k) array

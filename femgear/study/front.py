@@ -53,7 +53,7 @@ class ParetoFront:
     findings : tuple of tuple of Finding
         Doubts and faults of every design, see `Designs.findings`.
     designs, failures : int
-        Designs computed, and designs that could not be computed.
+        Designs asked for, and those of them that cannot be computed.
     complete : bool
         Whether the search was not cut short by ``max_designs``.
     """

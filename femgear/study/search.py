@@ -121,7 +121,7 @@ class Optimum:
     course : tuple of float
         Objective of every design in the order of the search [SI]; NaN outside the limits.
     seconds : float
-        What a design computed now took on average.
+        What a design computed now took on average [s].
     method, message : str
         How it was found, and how the search ended.
     converged : bool

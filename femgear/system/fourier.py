@@ -138,7 +138,7 @@ class FourierSeries:
     Parameters
     ----------
     amplitudes : (n, H + 1) complex array
-        One-sided harmonics of every coefficient.
+        One-sided harmonics of every coefficient, in its unit.
     orders : tuple of int
         Multiples of the base frequencies that make the first harmonic: ``(0, 1)`` repeats with the second.
     """
@@ -182,6 +182,7 @@ class StepSeries:
     Parameters
     ----------
     values : (n, m) array
+        In the unit of the coefficients, one column an interval.
     breaks : (m,) array
         Ascending fractions of the period, the first zero.
     orders : tuple of int

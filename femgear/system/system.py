@@ -48,7 +48,7 @@ class MechanicalSystem:
     M, C, K : (n, n) arrays
         Mass [kg, kg m^2], viscous damping [N s/m, ...] and stiffness [N/m, ...].
     W : (n, n_meshes) array
-        Mesh directions.
+        Mesh directions: deflection of every mesh per unit of each coordinate.
     load : (n,) array
         Constant external load [N, N m].
     dofs : tuple of str
@@ -122,12 +122,14 @@ class Modes:
     frequency : (n_modes,) array
         Undamped natural frequencies [Hz], ascending; zero for rigid-body modes.
     damping_ratio : (n_modes,) array
+        Share of critical damping [1].
     shape : (n_dofs, n_modes) array
-        Mass-normalised mode shapes.
+        Mass-normalised mode shapes [kg^-1/2].
     mesh_stiffness : (n_meshes,) array
         Mean mesh stiffness [N/m] that the modes contain.
     mesh_deflection : (n_meshes, n_modes) array
-        Deflection of the mesh springs, ``W^T shape`` without `MechanicalSystem.flexibility`.
+        Deflection of the mesh springs per unit of a mode, ``W^T shape`` without `MechanicalSystem.flexibility`
+        [kg^-1/2].
     residual : (n_meshes, n_meshes) array
         Static flexibility of what the modes leave out, ``W^T K^+ W - sum r r^T / omega^2`` and
         `MechanicalSystem.flexibility` [m/N].
@@ -140,7 +142,7 @@ class Modes:
     dofs : tuple of str
         Names of the degrees of freedom, as in `MechanicalSystem`; empty where they have none.
     modal_load : (n_modes,) array, optional
-        ``shape^T load``: what the constant external load does on each mode; ``None`` means no load.
+        ``shape^T load`` [N kg^-1/2]: what the constant external load does on each mode; ``None`` means no load.
     """
 
     frequency: np.ndarray
@@ -174,8 +176,9 @@ class Response:
     force : (n_speeds, n_meshes, H + 1) complex array
         Mesh force [N].
     modal : (n_speeds, n_modes, H + 1) complex array
-        Modal coordinates of the modes that were kept (without the residual part).
+        Coordinates of the modes that were kept, without the residual part [m kg^1/2].
     converged : (n_speeds,) bool array
+        Whether the residual is small enough.
     residual : (n_speeds,) array
         Relative residual of the harmonic equations.
     iterations : (n_speeds,) int array

@@ -35,11 +35,15 @@ class HarmonicBlocks:
     Parameters
     ----------
     gears : LeadingMeshes
+        Modes of gears and carrier, and the leading meshes.
     structure : FixedStructure
+        Ring and casing that stand still.
     orders : CarrierOrders
+        Lines and side bands of the blocks.
     place : (G,) array
         Angles of the leaders' forces on the ring [rad].
     speed : float
+        Of the carrier [rad/s].
     compliance : (J, J, B, R) complex array
         T [m/N].
     spring : (G, G, B, R) complex array

@@ -45,7 +45,7 @@ class _Class:
     matrix : (n_modes + waves,) * 2 complex array
         Damping of the modes of the gears and these waves.
     rows : (J, n_modes) array
-        Deflections of the leading meshes by the modes of the gears.
+        Deflections of the leading meshes by the modes of the gears [kg^-1/2].
     number : (waves,) int array
         Orders s n of the waves.
     place : (bands, waves) int array
@@ -76,7 +76,7 @@ class _Sector:
     shape : (modes, waves) complex array
         Waves of the ring in each mode.
     own : (modes, modes) array
-        Damping between the modes at each order alone.
+        Damping between the modes at each order alone [1/s].
     place : (orders, waves) int array
         Place of K + s n of each wave among what classes have of them.
     path : (modes, path_waves) complex array

@@ -50,6 +50,7 @@ class Curve:
     points : (p, n) array
         Unknowns, in order along the curve, in their own units as the parameter.
     parameter : (p,) array
+        In its own unit.
     folds, branch_points : int arrays
         Indices of the points that are limit points and branch points.
     closed : bool
@@ -67,8 +68,9 @@ class Curve:
     error : (p,) array
         Last Newton step relative to ``1 + |z|``.
     scale : (n,) array
+        Typical sizes of the unknowns, in their units.
     unit : float
-        Typical sizes of the unknowns and of a change of the parameter.
+        Typical size of a change of the parameter, in its unit.
     """
 
     points: np.ndarray

@@ -43,6 +43,7 @@ class ModalForces:
     frequency : (G,) array
         [Hz]
     damping_ratio : (G,) array
+        Of each natural frequency [1].
     force : (G, H) array
         Modal force [N/kg^1/2], of several modes of one frequency the root of the sum of squares.
     heard : (G, H) array

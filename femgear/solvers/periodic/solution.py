@@ -37,7 +37,7 @@ class PeriodicSolution:
         Largest violation of the harmonic equations relative to the largest deflection, of which a mean that
         runs away counts up to a million times the static one; one where nothing carries the mean load.
     iterations : int
-        Newton iterations, or those of the fixed point.
+        Newton iterations; of the points of a curve those of its correction.
     factorisations : int
         Matrices factorised on the way.
     tail : float

@@ -229,7 +229,9 @@ class MeshGeometry:
     basic : (n, m) array
         ``U``, among all coordinates or the free ones.
     fixed : (m, n_meshes) array
+        Approach per unit simple motion that does not turn with a carrier [1].
     even, odd : (P, m, n_meshes) arrays
+        The parts that turn with each of P carriers: factors of the cosine and the sine of its angle [1].
     stage : (n_meshes,) int array
         Number of the stage, planetary ones first.
     """

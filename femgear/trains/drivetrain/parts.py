@@ -401,9 +401,9 @@ class Drivetrain:
     Parameters
     ----------
     bodies : tuple of BodySection
-        Rigid bodies, the driving one first.
+        Rigid bodies; the first one gives the speed.
     shafts : tuple of ShaftSection
-        Elastic shafts between bodies.
+        Between two bodies: springs of a joint, or a round section.
     parallel, planetary : tuples of ParallelSection and PlanetarySection
         Gear pairs and planetary sets.
     bearings : tuple of BearingSection
@@ -411,7 +411,7 @@ class Drivetrain:
     gravity : float
         Along -y [m/s^2].
     damping_ratio : float
-        Of all elastic modes with mean mesh stiffnesses.
+        Of all elastic modes with mean mesh stiffnesses [1].
     """
 
     bodies: tuple[BodySection, ...]

@@ -227,13 +227,13 @@ class AveragedSpectrum:
     frequency : (F,) array
         [Hz], or orders.
     amplitude : (..., F) array
-        Peak values: a sine that falls on a line shows its amplitude.
+        Peak values in the unit of the signal: a sine that falls on a line shows its amplitude.
     resolution : float
-        Distance of lines.
+        Distance of lines [Hz], or in orders.
     bandwidth : float
-        Equivalent noise bandwidth.
+        Equivalent noise bandwidth [Hz], or in orders.
     segments : int
-        Averaged.
+        Number of segments that are averaged.
     """
 
     frequency: np.ndarray

@@ -49,6 +49,7 @@ class ElasticSet:
     Parameters
     ----------
     system : MechanicalSystem
+        Equations of motion of gears, carrier and ring.
     rigid_directions : (n, 2N) array
         Mesh directions without the ring's own displacement: ``rigid_directions^T q`` is the dynamic
         transmission error of the gears, ring deflection included.

@@ -59,7 +59,7 @@ class HelicalModesResult(StageResult):
     modes : Modes
         With mean mesh stiffness.
     phasing : tuple of str
-        Of every mode, how its meshes must be phased to excite it.
+        Phasing of the planets in every mode, see `femgear.system.mode_kinds.phasing`.
     flank : {1, -1}
         Sign of `femgear.system.mesh_directions.mesh_directions`.
     section : SectionStiffness, optional

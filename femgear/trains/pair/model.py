@@ -46,7 +46,7 @@ class PairModel:
     system : MechanicalSystem
         The mesh is its only column; ``C`` is zero.
     rotation : (n,) array
-        Row of the approach of the flanks by the rotations alone.
+        Approach of the flanks per unit of each coordinate, by the rotations alone.
     supported : (4, n) array
         Rows of x and y of gear 1 and gear 2; zero of held axes.
     bearing_stiffness : (4,) array
