@@ -264,6 +264,7 @@ def checked_numbers(value, key: str, *, code: str, unit: str, kind: type[float] 
     Parameters
     ----------
     value : number or nested sequence
+        What the caller was given.
     key : str
         What it is, in the words of the caller.
     code : str

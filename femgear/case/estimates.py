@@ -34,8 +34,9 @@ class Estimate:
     Parameters
     ----------
     value : float
-        In SI units.
+        In SI units of the dimension.
     dimension : Dimension
+        Physical quantity, which brings the unit that is written.
     how : str
         What it is made from, in words.
     """

@@ -204,6 +204,7 @@ def settle(G, load, arm, null, gaps, active):
     gaps : (n,) array
         Separations before these motions.
     active : (n,) bool array
+        Candidates that are taken to touch.
 
     Returns
     -------

@@ -387,6 +387,7 @@ def mesh_windows(
         Number of equidistant positions in one mesh period, or the positions themselves [mesh periods]; those
         of S slices of helical teeth have windows one after the other.
     contact : {"profile", "line_of_action"}
+        Where candidates lie: on the profiles, or on the line of action alone.
     cells : int
         Pressure cells in a window.
     both_flanks : bool

@@ -115,6 +115,7 @@ class CondensedWaves:
     sector : Sector
         Its grid may be coarse.
     material : Material
+        Of the gear.
     wave_number : (M,) array
         [1/m], ascending.
     width : float

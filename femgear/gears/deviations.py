@@ -355,6 +355,7 @@ def common_period(deviations: SetDeviations, planetary_set: GearSet, *, limit: i
     Returns
     -------
     periods : int
+        Mesh periods after which all repeats, or that the record spans.
     message : str
         What decided it, in one sentence.
     """

@@ -51,6 +51,7 @@ class MeshPhasing:
     flank : {1, -1}
         Loaded flanks, 1 for those of a sun that drives counter-clockwise.
     convention : {"rotation", "printed"}
+        Which of two conventions the phases follow, see the head of the module.
     lag : float
         Mesh periods from pitch-point contact of a planet with the sun to that with the ring, for a sun that
         drives counter-clockwise; `standard_lag` for unshifted teeth.
@@ -234,6 +235,7 @@ class PhasingTable:
     Parameters
     ----------
     harmonics : (H,) int array
+        Multiples of the mesh frequency.
     kind : tuple of str
         One of `KINDS` for every harmonic, the same for sun and ring meshes.
     cyclic : (H,) int array

@@ -121,6 +121,7 @@ class Drawn:
     Parameters
     ----------
     case : case of the train
+        The case that was run.
     data : mapping of str to Dataset
         Contents of the stages' files by stage, as far as computed.
     results : mapping of str to result

@@ -183,6 +183,7 @@ class Contents:
     Parameters
     ----------
     variables, coords : mapping of str to Entry
+        By name: dimensions, values, unit and meaning of each.
     attrs : mapping
         Of the file.
     """

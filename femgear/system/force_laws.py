@@ -91,6 +91,7 @@ class GearMeshes:
     Parameters
     ----------
     columns : (g,) or (g, 1) int array
+        Columns of ``W`` whose deflections act on the g meshes.
     stiffness : FourierSeries, StepSeries or SummedSeries
         ``k`` of every mesh [N/m].
     deflection : FourierSeries, StepSeries or SummedSeries, optional
@@ -259,6 +260,7 @@ class PolynomialSprings:
     Parameters
     ----------
     columns : (g,) int array
+        Columns of ``W`` whose deflections act on the g springs.
     coefficients : (g, degree) array
         Of x, x^2, x^3, ... [N/m, N/m^2, ...].
     """

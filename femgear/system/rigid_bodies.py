@@ -227,6 +227,7 @@ class PlanarTorque:
     torque : float
         On `member` [N m], positive counter-clockwise.
     member : {"sun", "carrier", "ring"}
+        Member on which the torque acts.
     output : {"sun", "carrier", "ring"}, optional
         Member on which an external torque reacts, by the balance of `torque_shares`; with None the
         torsional supports carry everything.

@@ -126,6 +126,7 @@ class ToothForm:
     shifts : tuple of float
         Of sun and planet, perhaps of the ring (positive outwards), or of both gears.
     centre_distance : str, optional
+        With its unit, as ``"91.5 mm"``; by default it follows from teeth and shifts.
     helix : str, optional
         Helix angle of planetary sets, pairs and helical cases, of these by default 20 deg.
     addendum : float, optional

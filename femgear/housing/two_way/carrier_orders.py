@@ -74,6 +74,7 @@ class CarrierOrders:
     Parameters
     ----------
     paths : MeshPaths
+        Ways of the meshes around the ring.
     lines : int
         Highest line Q of the forces.
     max_diameter : int

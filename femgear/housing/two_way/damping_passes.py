@@ -35,7 +35,9 @@ class DampingPasses:
     Parameters
     ----------
     damping : SetDamping
+        Of the set beyond modal damping.
     blocks : HarmonicBlocks
+        Equations at this speed.
     """
 
     def __init__(self, damping: SetDamping, blocks: HarmonicBlocks):

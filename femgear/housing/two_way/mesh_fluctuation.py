@@ -36,6 +36,7 @@ class MeshFluctuation:
         One-sided harmonics of ``k - k0``, of the J leading meshes if there is one pattern, else of all
         meshes [N/m].
     orders : CarrierOrders
+        Lines and side bands of the forces.
     owner, turn : (n,) int arrays
         Leading mesh of every mesh, and its turns from it.
     """

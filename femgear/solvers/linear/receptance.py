@@ -49,6 +49,7 @@ class MeshErrorResponse:
     mesh_frequency : (F,) array
         [Hz]
     harmonics : (H,) int array
+        Multiples of the mesh frequency.
     deflection : (F, H, n_meshes) complex array
         ``W^T q`` [m]: the dynamic transmission error of every mesh.
     force : (F, H, n_meshes) complex array
@@ -268,6 +269,7 @@ class DirectReduction:
     Parameters
     ----------
     problem : NonlinearSystem
+        What moves.
     reference : (n_columns,) array
         Stiffness of the columns that Z contains [N/m].
     scale : (n,) array

@@ -54,6 +54,7 @@ def solve_harmonic_balance(
     Parameters
     ----------
     problem : NonlinearSystem
+        What moves.
     frequency : float or (n_bases,) array
         Base frequencies [rad/s], not negative.
     start : PeriodicSolution or (n_columns, L) complex array, optional
@@ -64,6 +65,7 @@ def solve_harmonic_balance(
     tolerance : float
         Largest residual relative to the largest deflection.
     max_iterations : int
+        Newton iterations at most.
     stability : bool
         Floquet verdict and spectral radius of the fixed point. With several base frequencies or the frequency
         zero the verdict says "not covered". Loops that need neither are quicker without.

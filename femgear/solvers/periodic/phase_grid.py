@@ -40,6 +40,7 @@ class PhaseGrid:
     Parameters
     ----------
     orders : (L, n_bases) int array
+        Lines as multiples of the base frequencies; line 0 is the mean.
     samples : tuple of int
         Points along every base, more than twice its highest order.
     theta : (N, n_bases) array

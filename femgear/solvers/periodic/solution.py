@@ -153,6 +153,7 @@ def verdict_of(
     Parameters
     ----------
     multipliers : (m,) complex array
+        Eigenvalues of the monodromy matrix.
     period : float
         [s].
     error, tolerance : float

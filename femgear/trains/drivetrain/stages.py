@@ -260,10 +260,11 @@ def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> Averag
     Parameters
     ----------
     signal : (n, ...) array
+        Samples at the angles, in any unit, which the spectrum keeps.
     angle : (n,) array
         Ascending, 4 samples or more [rad].
     resolution : float
-        Distance of orders.
+        Distance of orders [1].
     per_turn : int
         Samples a turn, more than twice the highest order; orders above a half of it alias.
     """

@@ -112,7 +112,9 @@ class HousingModel:
     Parameters
     ----------
     case : Case
+        With a housing that stands still.
     modes : ModesResult
+        Modes of the set on its ring.
     sense : float
         Of the carrier: its sign.
     """
