@@ -366,17 +366,44 @@ def microphone_lines(lines: SensorLines, known: Mapping[str, Any]) -> np.ndarray
 
 
 def whole_turns(speed: float, duration: float, *, rate: float = RATE) -> int:
-    """Count the samples of as many whole turns at a speed [rad/s] as come nearest to a duration [s]."""
+    """Count the samples of as many whole turns as come nearest to a duration.
+
+    Parameters
+    ----------
+    speed : float
+        Of what turns [rad/s], positive.
+    duration : float
+        Wanted length [s]; it is one turn at least.
+    rate : float
+        Samples a second [Hz].
+    """
     turn = 2 * np.pi / speed
     return round(max(round(duration / turn), 1) * turn * rate)
 
 
 def sampled_signal(order, values, speed: float, *, samples: int, rate: float = RATE) -> np.ndarray:
-    """Sample a signal Re sum_k values[k] exp(i order[k] speed t) at a constant rate from t = 0, (samples,).
+    """Sample a signal ``Re sum_k values[k] exp(i order[k] speed t)`` at a constant rate from t = 0, (samples,).
 
-    Of whole carrier orders and complex amplitudes (n_orders,) in the unit of the signal; speed of the carrier
-    in rad/s, positive, rate in Hz. Every line has its own frequency to rounding, whatever the rate; lines at
-    half the rate and above, which no such signal has, are left out. CaseError: as `run_up_signal`.
+    Every line has its own frequency to rounding, whatever the rate; lines at half the rate and above, which no
+    such signal has, are left out.
+
+    Parameters
+    ----------
+    order : (n_orders,) array
+        Carrier orders, whole and not negative.
+    values : (n_orders,) complex array
+        Amplitudes in the unit of the signal.
+    speed : float
+        Of the carrier [rad/s], positive.
+    samples : int
+        Number of samples.
+    rate : float
+        Samples a second [Hz].
+
+    Raises
+    ------
+    CaseError
+        As `run_up_signal`.
     """
     order, values, nodes = _checked_lines(order, np.asarray(values)[None], np.atleast_1d(speed), rate)
     turns = np.arange(samples) * (nodes[0] / (2 * np.pi * rate))

@@ -310,7 +310,22 @@ def _flanks(model: DrivetrainModel, geometry: MeshGeometry, own, stage: int, sep
 
 
 def balanced_torque(model: DrivetrainModel, driver: str, torque: float, output: str) -> dict[str, float]:
-    """Pair a torque on one body with the one on another that holds the spin at its speed [N m]."""
+    """Pair a torque on one body with the one on another that holds the spin at its speed.
+
+    Parameters
+    ----------
+    model : DrivetrainModel
+        Whose speed ratios count.
+    driver, output : str
+        Names of the two bodies.
+    torque : float
+        On the driver [N m].
+
+    Returns
+    -------
+    dict of str to float
+        Torques on both bodies by name [N m].
+    """
     return {driver: torque, output: -torque * model.ratio[driver] / model.ratio[output]}
 
 

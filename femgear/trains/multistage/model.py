@@ -232,6 +232,13 @@ def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
 
     ``z_s (w_s - w_c) = -z_r (w_r - w_c) = -z_p (w_p - w_c)`` in every stage (Willis).
 
+    Parameters
+    ----------
+    data : MultistageSet
+        The train.
+    speed : float
+        Of the input member [rad/s], positive counter-clockwise.
+
     Raises
     ------
     CaseError
@@ -247,10 +254,22 @@ def train_speeds(data: MultistageSet, speed: float) -> TrainSpeeds:
 
 
 def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) -> TrainTorques:
-    """Compute the torques on all members from that on the input [N m], without losses.
+    """Compute the torques on all members from that on the input, without losses.
 
-    With ``radii`` the balance is that of the lumped sets, from base radii and pressure angles
-    (`torque_shares`), instead of tooth numbers. Both agree where the radii close.
+    Parameters
+    ----------
+    data : MultistageSet
+        The train.
+    torque : float
+        On the input member [N m], positive counter-clockwise.
+    radii : bool
+        Take the balance of the lumped sets, from base radii and pressure angles (`torque_shares`), instead of that
+        of tooth numbers. Both agree where the radii close.
+
+    Raises
+    ------
+    CaseError
+        A stage without teeth (E-TEETH), members that are free or held twice (E-MECHANISM).
     """
     weights = _radius_weights(data) if radii else _tooth_weights(data)
     # unknown: lambda of every row, and the torque of the output
@@ -261,7 +280,10 @@ def train_torques(data: MultistageSet, torque: float, *, radii: bool = False) ->
 
 
 def speed_ratio(data: MultistageSet) -> float:
-    """Compute the speed of the input over that of the output; refuses an output that stands (E-MECHANISM)."""
+    """Compute the speed of the input of a train over that of its output [1].
+
+    CaseError: an output that stands (E-MECHANISM), and what `train_speeds` refuses.
+    """
     output = train_speeds(data, 1.0).of(data.output)
     if abs(output) < 1e-12:
         message = f"the output, {data.output}, stands still"

@@ -153,7 +153,13 @@ def error_response(
 
 
 def base_frequencies(data: MultistageSet, speed: float) -> np.ndarray:
-    """Compute base frequencies (n_bases,) [rad/s] at a speed of the input [rad/s]: meshes, then frames."""
+    """Compute the base frequencies (n_bases,) [rad/s] of a train at a ``speed`` of its input [rad/s].
+
+    Those of the meshes of every stage come first, then those of lateral couplings between frames that turn against
+    one another.
+
+    CaseError: what `train_speeds` and `turning_couplings` refuse.
+    """
     mesh = 2.0 * np.pi * train_speeds(data, speed).mesh_frequency
     return np.concatenate([mesh, np.abs(list(turning_couplings(data, speed).values()))])
 
