@@ -10,7 +10,7 @@ from femgear.moved import FormerNames
 if TYPE_CHECKING:
     __version__: str
     from femgear.case.gear_set import planetary_set
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.errors import FemgearError
     from femgear.run import live, solve
     from femgear.stages.static import solve_static, solve_stress
@@ -38,7 +38,7 @@ __all__ = [
 sys.meta_path.insert(0, FormerNames)  # type: ignore[arg-type]
 
 _HOME = {
-    "Case": "case.sections",
+    "Case": "case.planetary",
     "FemgearError": "errors",
     "live": "run",
     "open_results": "trains.reading",

@@ -75,7 +75,7 @@ from femgear.trains.registry import check_case, stages_of, train_of
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
 
 
 def grid_cache() -> Path:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.case.gear_set import set_deviations
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.errors import GeometryError
 from femgear.trains.elastic.checks import MOST_WINDING
 from femgear.trains.reading import parse_case, with_values

@@ -9,7 +9,7 @@ from typing import Any
 
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.gears.planetary import equal_planet_angles
 from femgear.trains.reading import parse_case, with_values
 

@@ -7,7 +7,7 @@ from functools import cache, wraps
 
 import numpy as np
 
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.contact.bodies import RING_STATE
 from femgear.fe.elasticity import Material
 from femgear.gears.kinematics import orientations

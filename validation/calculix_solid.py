@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.fe.elasticity import Material
 from femgear.gears.kinematics import orientations
 from validation import calculix

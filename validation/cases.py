@@ -6,7 +6,7 @@ from functools import cache
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.fe.elasticity import Material
     from femgear.stages.static_results import StaticResult
     from femgear.trains.elastic.results import DynamicsResult, HousingResult, ModesResult

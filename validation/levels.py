@@ -13,7 +13,7 @@ from validation.cases import CASE
 from validation.rows import Row, at_most, information, within
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
 
 REST = "static state of the set on its supports"
 SAME = "the same with excitation up to twice the frequency"

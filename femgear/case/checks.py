@@ -1,7 +1,7 @@
-"""What must hold between the entries of a case file, and of members that float.
+"""What must hold between the entries of a case file of a planetary set.
 
-`cross_check` lists what no entry shows alone. `check_floating` needs the gears of the case: it refuses
-floating members that the planets cannot hold.
+`cross_check` lists what no entry shows alone. Of published lines `check_published` refuses those whose speed or
+harmonic the case does not compute, `without_uncomputed` takes them out.
 """
 
 from __future__ import annotations
@@ -9,25 +9,18 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from itertools import accumulate, pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import numpy as np
+
+from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, SPEED
-from femgear.case.sections import (
-    LARGEST_DEVIATION,
-    ROUNDING,
-    CarrierErrors,
-    Case,
-    GearErrors,
-    check_published,
-    face_width,
-)
-from femgear.errors import CaseError, GeometryError
-from femgear.findings import Finding
-from femgear.gears.kinematics import unheld_members
+from femgear.case.sections import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors, face_width
+from femgear.errors import CaseError
+from femgear.findings import Finding, remark
 
-if TYPE_CHECKING:
-    from femgear.gears.planetary import PlanetarySet
-
+_CODE = "E-PUBLISHED"
+"""Of refusals of published lines."""
 LEAST_TORQUE = 1e-6
 """Smallest torque that is told from none [N m]."""
 VALIDATED_HELIX = math.radians(30.0)
@@ -378,51 +371,50 @@ def _largest(value: float | tuple[float, ...] | None) -> float:
     return max(values, key=abs, default=0.0)
 
 
-def check_floating(case: Case, planetary: PlanetarySet, *, dynamic: bool = False) -> None:
-    """Refuse a sun, carrier or ring without support [N/m] that the forces of the planets cannot hold.
+def check_published(case: Case) -> Iterator[CaseError]:
+    """Refuse published lines that nothing could be compared with."""
+    speeds = np.array(case.operation.speeds)
+    for i, entry in enumerate(case.housing.published):
+        key = f"housing.published[{i}]"
+        if not np.isclose(speeds, entry.speed, rtol=1e-9, atol=0.0).any():
+            yield CaseError(
+                "this speed is not computed",
+                code=_CODE,
+                key=f"{key}.speed",
+                value=SPEED.show(entry.speed),
+                limit=_speeds(case),
+                remedy="add it to operation.speeds, or leave the published lines out",
+            )
+        computed = case.response_harmonics
+        if computed is not None and entry.harmonic > computed:
+            yield CaseError(
+                "this mesh harmonic is not computed",
+                code=_CODE,
+                key=f"{key}.harmonic",
+                value=entry.harmonic,
+                limit=f"1 to {computed}, the harmonics of the response",
+                remedy="raise dynamics.response_harmonics, or leave the published lines out",
+            )
 
-    ``dynamic``: for modes and dynamics, where members move whatever static.members says. GeometryError:
-    E-MECHANISM, with the support stiffness that is zero, or the foundation of a loose ring.
+
+def _speeds(case: Case) -> str:
+    shown = [SPEED.show(speed) for speed in case.operation.speeds[:6]]
+    more = len(case.operation.speeds) - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more else "")
+
+
+def without_uncomputed(data: dict, error: CaseError) -> Finding | None:
+    """Take those published lines out of the tables of a case to which alone the error of its check objects.
+
+    Says what was left out; None where the error is about other things too.
     """
-    if case.static.members == "fixed" and not dynamic:
-        return
-    if case.ring.foundation_tangential == 0.0:
-        _mechanism(
-            case,
-            "ring.foundation_tangential",
-            "nothing keeps the ring from turning under the load of the planets",
-            value="0 N/m^3",
-            remedy='give it a tangential foundation, or write static.members = "fixed"',
-        )
-    names = [name for name in ("sun", "carrier") if getattr(case, name).support_stiffness == 0.0]
-    # the dynamic model has no back flanks
-    both_flanks = case.static.back_flanks and not dynamic
-    loose = list(unheld_members(planetary, names, both_flanks=both_flanks))
-    if not loose:
-        return
-    N = planetary.n_planets
-    message = f"{N} planets cannot hold a floating sun and a floating carrier at once"
-    if len(loose) == 1:
-        angles = ", ".join(f"{math.degrees(angle):.6g}" for angle in planetary.planet_angles[:12])
-        where = f"{N} planet{'s' * (N > 1)} at {angles} deg"
-        message = f"{where} cannot hold a floating {loose[0]}: their forces leave it free to move aside"
-    _mechanism(
-        case,
-        f"{loose[-1]}.support_stiffness",
-        message,
-        value="0 N/m",
-        remedy=f'write support_stiffness = "5e7 N/m" or the like in [{loose[-1]}], or '
-        'run with static.members = "fixed" and --only static; three equally spaced planets hold it',
-    )
-
-
-def _mechanism(case: Case, key: str, message: str, *, value: str, remedy: str):
-    raise GeometryError(
-        message,
-        code="E-MECHANISM",
-        key=key,
-        value=value,
-        limit=f"above {value}",
-        remedy=remedy,
-        file=case.location(key),
+    problems = getattr(error, "problems", ())
+    if not problems or any(problem.code != _CODE for problem in problems):
+        return None
+    numbers = {int(problem.key.split("[")[1].split("]")[0]) for problem in problems}
+    published = data["housing"]["published"]
+    data["housing"]["published"] = [e for i, e in enumerate(published) if i not in numbers]
+    return remark(
+        f"{len(numbers)} of {len(published)} entries housing.published are left out: their speed or harmonic "
+        "is not computed"
     )

@@ -14,12 +14,11 @@ from dataclasses import is_dataclass
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from femgear.case.gear_set import driving_torque
 from femgear.errors import CaseError
 from femgear.remembered import remembered
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
 
 Entries = Mapping[str, object]
 """Values by dotted key."""
@@ -55,7 +54,7 @@ def static_entries(case: Any) -> Entries:
     if case.static.members == "fixed":
         left_out, parts = left_out | _FOUNDATION, parts | _SUPPORTS
     # whatever member the torque is given for: the flanks see that of the sun
-    sun = driving_torque(case)
+    sun = case.torque_on_first_gear()
     kept = _HELIX | ({"helical.hand"} if case.static.slices > 1 else set())
     return {"operation.torque": f"{sun:.9g} N m on the sun", **_entries(case, left_out, parts, kept=kept)}
 

@@ -17,8 +17,9 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from femgear.case import text as case_text
+from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, wrong_length
-from femgear.case.sections import Case, RackSection
+from femgear.case.sections import RackSection
 from femgear.errors import MOST_SHOWN, CaseError, GeometryError
 from femgear.findings import Finding, remark
 

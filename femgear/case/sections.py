@@ -1,18 +1,15 @@
-"""The sections of a case file, and the case that they make up.
+"""The sections of a case file; `femgear.case.planetary` makes the case of a planetary set of them.
 
 Every entry has its type and its plausible window; values are SI numbers, angles radians. What no entry shows
-alone is in `femgear.case.checks`, but for the published lines: `check_published` refuses those whose speed or
-harmonic the case does not compute, `without_uncomputed` takes them out.
+alone is in `femgear.case.checks`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from femgear.case.quantities import (
@@ -39,9 +36,8 @@ from femgear.case.quantities import (
     Values,
     at_most,
 )
-from femgear.case.text import CaseFile, ReadCase, described
+from femgear.case.text import described
 from femgear.errors import CaseError
-from femgear.findings import Finding, remark
 
 LARGEST_DEVIATION = 0.2
 """Largest plausible amount of any modification or error, in modules."""
@@ -53,8 +49,6 @@ FORMAT = 1
 """Newest format of the case file."""
 LARGEST_TORQUE = 1e9
 """Largest plausible torque [N m]."""
-_CODE = "E-PUBLISHED"
-"""Of refusals of published lines."""
 _MANY_TEETH = "every tooth is one frame of the cyclic computation, with some 4000 unknowns"
 
 Deviation = Annotated[float, Quantity(LENGTH, -0.02, 0.02)]
@@ -613,92 +607,6 @@ class HousingSection(Section):
         return bool(self.support) or self.structure is not None
 
 
-class Case(Section, ReadCase):
-    """A planetary gear set, its operation and how to compute it, in SI units.
-
-    The sections carry the names of the case file; masses, inertias and stiffnesses that it leaves out are
-    estimates. ``source`` is the text that gives this case, ``notices`` what was read in a way that deserves
-    to be said.
-    """
-
-    train: ClassVar[str] = "elastic"
-    gear_names: ClassVar[tuple[str, ...]] = ("sun", "planet", "ring")
-    format: Annotated[int, Count(1, FORMAT)] = FORMAT
-    title: Title
-    set: SetSection
-    rack: RackSection = RackSection()
-    material: MaterialSection
-    sun: SunSection
-    planet: PlanetSection
-    ring: RingSection
-    carrier: CarrierSection = Field(default_factory=CarrierSection)
-    motor: MachineSection | None = None
-    brake: MachineSection | None = None
-    operation: OperationSection
-    static: StaticSection = StaticSection()
-    dynamics: DynamicsSection = DynamicsSection()
-    housing: HousingSection = HousingSection()
-    runup: RunupSection = RunupSection()
-
-    @property
-    def module(self) -> float:
-        """Module of all gears, of helical teeth the normal one [m]."""
-        return self.sun.module
-
-    @property
-    def pressure_angle(self) -> float:
-        """Pressure angle of all gears, of helical teeth the normal one [rad]."""
-        return self.sun.pressure_angle
-
-    @property
-    def rigid(self) -> bool:
-        """Whether the ring moves as a rigid body."""
-        return False
-
-    @property
-    def helix_angle(self) -> float | None:
-        """Helix angle at the reference circle [rad], positive of a right-handed sun; None of spur gears."""
-        return self.set.helix_angle or None
-
-    @property
-    def mesh_harmonics(self) -> int | None:
-        """Harmonics of the excitation: as given, 6 of rigid bodies, None where a frequency limits them."""
-        return self.dynamics.mesh_harmonics
-
-    @property
-    def response_harmonics(self) -> int | None:
-        """Harmonics of the response: as given, or three times those of the mesh; None as there."""
-        found = self.mesh_harmonics
-        return self.dynamics.response_harmonics or (None if found is None else 3 * found)
-
-
-FILE = CaseFile(Case)
-
-
-class RigidCase(Case):
-    """A planetary gear set of rigid bodies: the ring needs no foundation."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _without_foundation(cls, data: object) -> object:
-        if isinstance(data, dict) and isinstance(data.get("ring"), dict):
-            loose = {"foundation_radial": "0 N/m^3", "foundation_tangential": "0 N/m^3"}
-            return data | {"ring": loose | data["ring"]}
-        return data
-
-    @property
-    def rigid(self) -> bool:
-        return True
-
-    @property
-    def mesh_harmonics(self) -> int:
-        return self.dynamics.mesh_harmonics or 6
-
-    @property
-    def response_harmonics(self) -> int:
-        return self.dynamics.response_harmonics or 3 * self.mesh_harmonics
-
-
 class MeshStiffnessSection(Section):
     """Constant stiffness of every mesh, in place of the static solution's."""
 
@@ -727,58 +635,3 @@ def gear_material(case: Any, gear: str) -> MaterialSection:
     own = getattr(case, gear).material
     given = {} if own is None else own.model_dump(exclude_none=True)
     return case.material.model_copy(update=given)
-
-
-def output_member(case: Case) -> str:
-    """Find the member that is neither driven nor held."""
-    others = {case.operation.input, case.operation.fixed}
-    return next((name for name in ("carrier", "sun", "ring") if name not in others), "carrier")
-
-
-def check_published(case: Case) -> Iterator[CaseError]:
-    """Refuse published lines that nothing could be compared with."""
-    speeds = np.array(case.operation.speeds)
-    for i, entry in enumerate(case.housing.published):
-        key = f"housing.published[{i}]"
-        if not np.isclose(speeds, entry.speed, rtol=1e-9, atol=0.0).any():
-            yield CaseError(
-                "this speed is not computed",
-                code=_CODE,
-                key=f"{key}.speed",
-                value=SPEED.show(entry.speed),
-                limit=_speeds(case),
-                remedy="add it to operation.speeds, or leave the published lines out",
-            )
-        computed = case.response_harmonics
-        if computed is not None and entry.harmonic > computed:
-            yield CaseError(
-                "this mesh harmonic is not computed",
-                code=_CODE,
-                key=f"{key}.harmonic",
-                value=entry.harmonic,
-                limit=f"1 to {computed}, the harmonics of the response",
-                remedy="raise dynamics.response_harmonics, or leave the published lines out",
-            )
-
-
-def _speeds(case: Case) -> str:
-    shown = [SPEED.show(speed) for speed in case.operation.speeds[:6]]
-    more = len(case.operation.speeds) - len(shown)
-    return ", ".join(shown) + (f" and {more} more" if more else "")
-
-
-def without_uncomputed(data: dict, error: CaseError) -> Finding | None:
-    """Take those published lines out of the tables of a case to which alone the error of its check objects.
-
-    Says what was left out; None where the error is about other things too.
-    """
-    problems = getattr(error, "problems", ())
-    if not problems or any(problem.code != _CODE for problem in problems):
-        return None
-    numbers = {int(problem.key.split("[")[1].split("]")[0]) for problem in problems}
-    published = data["housing"]["published"]
-    data["housing"]["published"] = [e for i, e in enumerate(published) if i not in numbers]
-    return remark(
-        f"{len(numbers)} of {len(published)} entries housing.published are left out: their speed or harmonic "
-        "is not computed"
-    )

@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from femgear.case.gear_set import flank_form
 from femgear.case.quantities import LENGTH
+from femgear.case.teeth import flank_form
 from femgear.exchange.rexs import Component, Model
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import (

@@ -19,6 +19,7 @@ from typing import Any
 
 from femgear.case.estimates import USUAL_STIFFNESS, estimates, usual_rim, usual_torque
 from femgear.case.gear_set import planetary_set, support_stiffness
+from femgear.case.planetary import Case
 from femgear.case.quantities import (
     ANGLE,
     DENSITY,
@@ -31,7 +32,7 @@ from femgear.case.quantities import (
     Dimension,
     to_si,
 )
-from femgear.case.sections import OVER_WIDTH, Case, gear_material
+from femgear.case.sections import OVER_WIDTH, gear_material
 from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
 from femgear.exchange.gear_unit import gears_of, loads_on, power_flow, stage_components, with_values

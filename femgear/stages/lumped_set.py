@@ -17,7 +17,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from femgear.case.gear_set import set_deviations
-from femgear.case.sections import Case, MeshStiffnessSection, RigidCase, output_member
+from femgear.case.planetary import Case, RigidCase, output_member
+from femgear.case.sections import MeshStiffnessSection
 from femgear.errors import CaseError
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds

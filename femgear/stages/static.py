@@ -26,15 +26,15 @@ from femgear.case.dependencies import (
     static_entries,
 )
 from femgear.case.gear_set import (
-    case_overlap,
-    driving_torque,
     material_of,
     materials_of,
     planetary_set,
     set_deviations,
     support_stiffness,
 )
-from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES, Case
+from femgear.case.planetary import Case
+from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES
+from femgear.case.teeth import case_overlap
 from femgear.contact.bodies import (
     Bodies,
     Sector,
@@ -133,7 +133,7 @@ def solve_static(
     gears, deviations, steps = planetary_set(case), set_deviations(case), steps or Steps()
     sectors, bodies = known_compliances(case, gears, steps, cache=cache)
     width = over_width(case, gears, cache=cache, steps=steps)
-    sun_torque = driving_torque(case)
+    sun_torque = case.torque_on_first_gear()
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
     cycle = walk_mesh_cycle(
         gears,
@@ -492,7 +492,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
 
 def relief_kinks(case: Case) -> tuple[bool, ...]:
     """Tell of every kind of mesh whether a relief of its loaded flanks begins with a kink."""
-    given, back = set_deviations(case), driving_torque(case) < 0
+    given, back = set_deviations(case), case.torque_on_first_gear() < 0
     kinds = range(len(planetary_set(case).kinds))
     return tuple(
         any(getattr(law, "power", 2.0) <= 1.0 for form in given.mesh_forms(kind, back) for law in form.profile)

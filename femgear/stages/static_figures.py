@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.gear_set import materials_of, planetary_set, set_deviations
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.contact.bodies import Sector, Sectors, make_sectors
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.tooth_loads import DeformedBody, deformed_set

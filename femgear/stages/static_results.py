@@ -18,9 +18,10 @@ import numpy as np
 
 from femgear.case.checks import steep_helix
 from femgear.case.dependencies import Entries
-from femgear.case.gear_set import case_overlap, planetary_set, set_deviations, shaft_lines
+from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
 from femgear.case.sections import face_width, gear_material
+from femgear.case.teeth import case_overlap
 from femgear.contact.bodies import flank_widths
 from femgear.contact.peaks import FEWEST, peak_doubt
 from femgear.contact.root_stress import BACK, LOADED, NOTCH_REACH, RootCycle
@@ -43,7 +44,7 @@ from femgear.storage.results import coordinates, declared
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.contact.bodies import Bodies, Sectors
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.root_stress import RootRange, RootStresses

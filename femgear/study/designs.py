@@ -28,7 +28,7 @@ import numpy as np
 
 from femgear import __version__
 from femgear.case.dependencies import Steps
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.findings import NOTE, Finding, once, tell
 from femgear.stages.protocol import Progress

@@ -16,8 +16,9 @@ import numpy as np
 from femgear.case.checks import LEAST_TORQUE
 from femgear.case.dependencies import response_entries
 from femgear.case.gear_set import planetary_set
+from femgear.case.planetary import Case
 from femgear.case.quantities import ACCELERATION, FREQUENCY, SPEED, TORQUE, Dimension, to_si
-from femgear.case.sections import LARGEST_TORQUE, Case
+from femgear.case.sections import LARGEST_TORQUE
 from femgear.errors import CaseError
 from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness

@@ -17,8 +17,8 @@ import numpy as np
 
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set
+from femgear.case.planetary import Case
 from femgear.case.quantities import Dimension, to_si
-from femgear.case.sections import Case
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.study.objectives import NUMBER, Quantity, Speeds, named_quantity

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import Steps
-from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.supports import RIGID, Supports
@@ -28,7 +28,7 @@ from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.stages.static import known_compliances, over_width, static_supports
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
 
@@ -149,7 +149,7 @@ def design_basis(
 
 def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> float:
     """Find the torque on the sun under one on the input [N m], by default the case's; E-TORQUE for none."""
-    value = driving_torque(case, torque)
+    value = case.torque_on_first_gear(torque)
     if value == 0:
         message = "without torque no tooth bends"
         raise CaseError(message, code="E-TORQUE", key="operation.torque", remedy="give a torque")

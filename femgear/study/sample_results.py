@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.errors import FemgearError, StorageError
 from femgear.findings import Finding, as_text, findings_in, tell
 from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figure, save_figure

@@ -31,8 +31,9 @@ from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import need_set
 from femgear.case.messages import combine, translate
+from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, Quantity, Section
-from femgear.case.sections import LARGEST_DEVIATION, LARGEST_SLOPE, Amplitude, Case, Deviation, Slope
+from femgear.case.sections import LARGEST_DEVIATION, LARGEST_SLOPE, Amplitude, Deviation, Slope
 from femgear.contact.assembly import (
     MOST_ENLARGEMENTS,
     Candidates,

@@ -26,7 +26,7 @@ import numpy as np
 
 from femgear.case.dependencies import FLANK_ENTRIES
 from femgear.case.gear_set import set_deviations
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
 from femgear.findings import Finding, tell
 from femgear.stages.protocol import Progress, one_blas_thread

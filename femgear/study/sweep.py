@@ -15,7 +15,7 @@ from textwrap import fill
 
 import numpy as np
 
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.errors import CaseError
 from femgear.findings import CATALOGUE, Finding, tell
 from femgear.report.style import label, legend_below, line_style, new_figure, save_figure

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from femgear.case import text as case_text
-from femgear.case.gear_set import flank_form, planetary_set
+from femgear.case.gear_set import planetary_set
+from femgear.case.teeth import flank_form
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.exchange.cylindrical_stage import pair_tables
 from femgear.exchange.gear_unit import PowerFlow, case_flows, plain_ids, stage_components, stage_in_words

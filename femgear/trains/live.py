@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from femgear.case.dependencies import Steps, compliance_entries
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.errors import CaseError
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.reading import read_case, with_values

@@ -17,12 +17,13 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError, create_model
 
 from femgear.case import text as case_text
-from femgear.case.checks import cross_check
+from femgear.case.checks import cross_check, without_uncomputed
 from femgear.case.csv_columns import embed_checksum, embed_profiles
 from femgear.case.estimates import with_estimates
 from femgear.case.gear_set import check_shafts
 from femgear.case.messages import added_material, combine, notices, translate
-from femgear.case.sections import FORMAT, Case, without_uncomputed
+from femgear.case.planetary import Case
+from femgear.case.sections import FORMAT
 from femgear.case.text import described, text_with_points
 from femgear.errors import CaseError
 from femgear.findings import Finding

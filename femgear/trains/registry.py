@@ -46,7 +46,7 @@ TRAINS = tuple(
         ("drivetrain", "model", "drivetrain", "trains.drivetrain.case_file"),
         ("helical", "helical", "helical", "trains.helical.section"),
         ("planar", "planar", "planar", "trains.planar.section"),
-        ("elastic", "", "elastic", "case.sections"),
+        ("elastic", "", "elastic", "case.planetary"),
     )
 )
 

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case.checks import check_floating
 from femgear.case.gear_set import planetary_set
+from femgear.case.planetary import check_floating
 from femgear.cli import main
 from femgear.errors import GeometryError
 from femgear.stages.static import solve_static

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from rexs_stage import MM, NONE, Gearbox
 
-from femgear.case.gear_set import flank_form, planetary_set
+from femgear.case.gear_set import planetary_set
+from femgear.case.teeth import flank_form
 from femgear.exchange.flank_modifications import READ
 from femgear.exchange.planetary_stage import case_tables, stage_model
 from femgear.exchange.rexs import model_text, read_model

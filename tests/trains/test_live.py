@@ -12,7 +12,7 @@ from pydantic import BaseModel
 import femgear
 from femgear.case import dependencies
 from femgear.case.dependencies import Steps
-from femgear.case.sections import Case
+from femgear.case.planetary import Case
 from femgear.errors import CaseError, GeometryError
 from femgear.trains.live import Answer, Live
 from femgear.trains.reading import read_case, with_values

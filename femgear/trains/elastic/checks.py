@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.case.checks import check_floating, runup_range
+from femgear.case.checks import runup_range
 from femgear.case.csv_columns import checksum, checksum_of_all
-from femgear.case.gear_set import driving_torque, planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.case.planetary import Case, check_floating, output_member
 from femgear.case.quantities import RPM
-from femgear.case.sections import Case, SupportSection, output_member
+from femgear.case.sections import SupportSection
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.deviations import common_period
@@ -196,7 +197,7 @@ def imported_casing(
     section, folder = case.housing.structure, Path(case.name).parent
     assert section is not None
     file, nodes = folder / section.file, None if section.nodes is None else folder / section.nodes
-    psi, on_ring = gears.planet_angles[0], mesh_normals(gears, back=driving_torque(case) < 0)[gears.n_planets]
+    psi, on_ring = gears.planet_angles[0], mesh_normals(gears, back=case.torque_on_first_gear() < 0)[gears.n_planets]
     turned = np.array([[np.cos(psi), np.sin(psi)], [-np.sin(psi), np.cos(psi)]])
     try:
         if checksum_of_all(checksum(one) for one in (file, nodes) if one) != section.sha256:

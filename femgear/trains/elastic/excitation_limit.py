@@ -24,7 +24,7 @@ from femgear.trains.elastic.checks import HIGHEST_RESPONSE
 from femgear.trains.elastic.outputs import sensor_lines
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.trains.elastic.results import ModesResult
 
 _LOWEST = 20e3

@@ -46,7 +46,7 @@ from femgear.trains.elastic.results import DynamicsResult, FixedHousing, Housing
 from femgear.trains.elastic.runup import HeardSpeeds, heard_speeds
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.system.system import MeshExcitation, Modes
 
 _JUDGED = 6

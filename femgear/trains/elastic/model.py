@@ -29,7 +29,7 @@ from femgear.stages.static import mesh_backlash
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.contact.bodies import FlankCompliance, Sector
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.fe.grid import Grid

@@ -13,7 +13,7 @@ from femgear.solvers.linear.modal import output_load, output_response, residual_
 from femgear.trains.elastic.model import RADIAL, ring_field
 
 if TYPE_CHECKING:
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.system.system import Response
     from femgear.trains.elastic.results import DynamicsResult, ModesResult
 

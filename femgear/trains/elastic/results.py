@@ -91,7 +91,7 @@ from femgear.trains.elastic.runup import KINDS, LEVEL_CHANGE, largest_factors, l
 if TYPE_CHECKING:
     import xarray as xr
 
-    from femgear.case.sections import Case
+    from femgear.case.planetary import Case
     from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds

@@ -30,8 +30,8 @@ from femgear.case.dependencies import (
     state_entries,
     static_entries,
 )
-from femgear.case.gear_set import driving_torque, material_of, planetary_set, set_deviations
-from femgear.case.sections import Case
+from femgear.case.gear_set import material_of, planetary_set, set_deviations
+from femgear.case.planetary import Case
 from femgear.contact.bodies import Bodies, with_ring
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
@@ -276,7 +276,7 @@ def _sharing_over_bearings(
             walk_mesh_cycle(
                 gears,
                 bodies,
-                sun_torque=driving_torque(case),
+                sun_torque=case.torque_on_first_gear(),
                 positions=gears.equal_positions(_SHARING_POSITIONS),
                 contact=case.static.contact,
                 deviations=None if deviations.ideal else deviations,

@@ -8,15 +8,9 @@ from typing import Annotated, ClassVar, Literal
 from pydantic import Field
 
 from femgear.case.checks import steep_helix
+from femgear.case.planetary import RigidCase
 from femgear.case.quantities import ANGLE, STIFFNESS, TORSION, Count, Quantity, Section
-from femgear.case.sections import (
-    LARGEST_HELIX,
-    LEFT_OUT,
-    Inertia,
-    Mass,
-    MeshStiffnessSection,
-    RigidCase,
-)
+from femgear.case.sections import LARGEST_HELIX, LEFT_OUT, Inertia, Mass, MeshStiffnessSection
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError
 from femgear.findings import Finding

@@ -11,17 +11,6 @@ from pydantic import BeforeValidator, Field
 
 from femgear.case.checks import check_face_widths, check_gear_deviations, check_speeds, check_torque
 from femgear.case.csv_columns import embed_profiles
-from femgear.case.gear_set import (
-    case_overlap,
-    checked_set,
-    driving_torque,
-    flank_form,
-    free_tips,
-    gear_of,
-    made_deviations,
-    pitch_of,
-    runout_of,
-)
 from femgear.case.messages import added_material
 from femgear.case.quantities import ANGLE, LENGTH, TORQUE, Count, Quantity, Section, Title, Values
 from femgear.case.sections import (
@@ -50,7 +39,8 @@ from femgear.case.sections import (
     TipDiameter,
     speed_range,
 )
-from femgear.case.text import CaseFile, ReadCase
+from femgear.case.teeth import GearCase, case_overlap, flank_form, free_tips, gear_of, pitch_of, runout_of
+from femgear.case.text import CaseFile
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.checks import check_meshes
@@ -123,7 +113,7 @@ class OperationSection(Section):
     speeds: Annotated[tuple[Speed, ...], Values(max_length=100_000), BeforeValidator(speed_range)] = ()
 
 
-class PairCase(Section, ReadCase):
+class PairCase(GearCase):
     """Two gears, their load and how to compute them, in SI units.
 
     The fields carry the names of the case file; ``source`` is the text that gives this case.
@@ -161,45 +151,42 @@ class PairCase(Section, ReadCase):
         """Helix angle at the reference circle [rad], positive of a right-handed gear 1; None of spur ones."""
         return self.set.helix_angle or None
 
+    def closed_gears(self) -> GearPair:
+        """Make both gears, closed on their centre distance and checked."""
+        two = self.gear_2
+        pair = close_pair(
+            gear_of(self, self.gear_1, "gear_1", self.gear_1.bore_radius),
+            gear_of(self, two, "gear_2", two.outer_radius or two.bore_radius or 0.0, internal=two.internal),
+            centre_distance=self.set.centre_distance,
+            find=tuple(name for name in self.gear_names if getattr(self, name).profile_shift is None),
+        )
+        settled = settled_tips(pair, free=free_tips(self))
+        check_meshes(settled, overlap=case_overlap(self, settled))
+        return settled
 
-@checked_set.register
-def _(case: PairCase) -> GearPair:
-    two = case.gear_2
-    pair = close_pair(
-        gear_of(case, case.gear_1, "gear_1", case.gear_1.bore_radius),
-        gear_of(case, two, "gear_2", two.outer_radius or two.bore_radius or 0.0, internal=two.internal),
-        centre_distance=case.set.centre_distance,
-        find=tuple(name for name in case.gear_names if getattr(case, name).profile_shift is None),
-    )
-    settled = settled_tips(pair, free=free_tips(case))
-    check_meshes(settled, overlap=case_overlap(case, settled))
-    return settled
+    def made_deviations(self, gears: GearPair) -> SetDeviations:
+        """Make the deviations of both gears from their modifications and errors."""
+        one, two = (getattr(self, name).errors or GearErrors() for name in self.gear_names)
+        form = flank_form(self, gears.gear_2)
+        # a tooth that stands further on brings the flank on that side nearer to the mate
+        pitch = gears.senses[1] * pitch_of(two, gears.gear_2)
+        return replace(
+            no_deviations(gears),
+            sun=flank_form(self, gears.gear_1),
+            planet_sun_side=form,
+            planet_ring_side=form,
+            sun_pitch=-pitch_of(one, gears.gear_1),
+            planet_pitch=[pitch],
+            planet_ring_side_pitch=[-pitch],
+            sun_runout=runout_of(one),
+            planet_runout=(runout_of(two),),
+            sun_thickness=one.thickness_reduction or 0.0,
+            planet_thickness=np.array([two.thickness_reduction or 0.0]),
+        )
 
-
-@made_deviations.register
-def _(case: PairCase, s: GearPair) -> SetDeviations:
-    one, two = (getattr(case, name).errors or GearErrors() for name in case.gear_names)
-    form = flank_form(case, s.gear_2)
-    # a tooth that stands further on brings the flank on that side nearer to the mate
-    pitch = s.senses[1] * pitch_of(two, s.gear_2)
-    return replace(
-        no_deviations(s),
-        sun=flank_form(case, s.gear_1),
-        planet_sun_side=form,
-        planet_ring_side=form,
-        sun_pitch=-pitch_of(one, s.gear_1),
-        planet_pitch=[pitch],
-        planet_ring_side_pitch=[-pitch],
-        sun_runout=runout_of(one),
-        planet_runout=(runout_of(two),),
-        sun_thickness=one.thickness_reduction or 0.0,
-        planet_thickness=np.array([two.thickness_reduction or 0.0]),
-    )
-
-
-@driving_torque.register
-def _(case: PairCase, torque: float | None = None) -> float:
-    return case.operation.torque if torque is None else torque
+    def torque_on_first_gear(self, torque: float | None = None) -> float:
+        """Find the torque on gear 1 [N m], by default the case's."""
+        return self.operation.torque if torque is None else torque
 
 
 def cross_check(case: PairCase) -> Iterator[CaseError]:

@@ -19,8 +19,9 @@ import numpy as np
 
 from femgear.case.checks import runup_range
 from femgear.case.dependencies import check_entries, modal_entries, static_entries
-from femgear.case.gear_set import case_overlap, materials_of, planetary_set, set_deviations
+from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
+from femgear.case.teeth import case_overlap
 from femgear.errors import ConvergenceError, GeometryError
 from femgear.findings import Finding
 from femgear.gears.checks import check_meshes

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.dependencies import check_entries, static_entries
-from femgear.case.gear_set import pin_errors, support_stiffness
+from femgear.case.gear_set import support_stiffness
+from femgear.case.planetary import pin_errors
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.receptance import Reduction, reduce_problem

@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.gear_set import planetary_set, support_text
+from femgear.case.planetary import output_member
 from femgear.case.quantities import RPM
-from femgear.case.sections import output_member
 from femgear.findings import NOTE, Finding, findings_in
 from femgear.gears.kinematics import torques
 from femgear.report.response import harmonics_of

@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
+from femgear.case.planetary import RigidCase, output_member
 from femgear.case.quantities import (
     ACCELERATION,
     ANGLE,
@@ -23,16 +24,7 @@ from femgear.case.quantities import (
     Values,
     printable_line,
 )
-from femgear.case.sections import (
-    LEFT_OUT,
-    DampingRatio,
-    Inertia,
-    Mass,
-    MeshStiffnessSection,
-    RigidCase,
-    Stiffness,
-    output_member,
-)
+from femgear.case.sections import LEFT_OUT, DampingRatio, Inertia, Mass, MeshStiffnessSection, Stiffness
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError
 from femgear.findings import Finding
