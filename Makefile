@@ -24,7 +24,7 @@ help:
 	@echo "make test-browser  open the pages of all trains in Chromium, which must be installed"
 	@echo "make lint      check style and formatting (ruff) and types (basedpyright)"
 	@echo "make docs      build the documentation into out/docs/html"
-	@echo "make validate  recompute docs/validation.md and run the slow verification tests"
+	@echo "make validate  recompute docs/validation.csv with its page, run the slow verification tests"
 	@echo "make soak      fuzz, damage, kill and starve femgear for MINUTES=60, write docs/reliability.md"
 	@echo "make bench     measure time and memory of every stage"
 	@echo "make mutants   change single expressions of the core and see whether a test notices"

@@ -1,6 +1,8 @@
 """Sphinx settings of the documentation; `make docs` builds it into out/docs/html."""
 
 import builtins
+import csv
+import html
 import os
 import re
 import sys
@@ -11,8 +13,10 @@ DOCS = Path(__file__).resolve().parent
 ROOT = DOCS.parent
 sys.path.insert(0, str(ROOT))
 
+import mathjax  # noqa: E402  of the package django-static-mathjax, which needs no Django
 from docutils import nodes  # noqa: E402
 from sphinx import addnodes  # noqa: E402
+from sphinx.util.docutils import SphinxDirective  # noqa: E402
 from sphinx_gallery.scrapers import matplotlib_scraper  # noqa: E402
 
 import femgear  # noqa: E402
@@ -26,6 +30,7 @@ extensions = [
     "myst_parser",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
+    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
     "sphinx_design",
 ]
@@ -36,7 +41,7 @@ highlight_language = "none"
 # options such as --force keep their two hyphens
 smartquotes_action = "qe"
 
-myst_enable_extensions = ["attrs_block", "colon_fence", "deflist"]
+myst_enable_extensions = ["attrs_block", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 # programs may be shown cut short; annotations have short names, and two classes are called Block
 suppress_warnings = ["misc.highlighting_failure", "config.cache", "ref.python"]
@@ -93,8 +98,12 @@ if any(EXAMPLES.glob("*.py")):
 
 html_theme = "furo"
 html_title = "femgear"
-html_static_path = ["_static"]
+# one file that draws formulas without asking a network for fonts
+MATHJAX = Path(mathjax.__file__).parent / "static" / "mathjax" / "es5" / "tex-svg.js"
+mathjax_path = MATHJAX.name
+html_static_path = ["_static", str(MATHJAX)]
 html_css_files = ["site.css"]
+html_js_files = ["validation.js"]
 html_favicon = html_logo = "_static/femgear.svg"
 html_show_sourcelink = False
 html_copy_source = False
@@ -105,30 +114,33 @@ html_theme_options = {
 }
 
 
-def slug(heading: str) -> str:
-    """Anchor of a heading, as GitHub and MyST make it."""
-    return re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-")
+class ValidationRows(SphinxDirective):
+    """Table of docs/validation.csv, with a filter by words, theme and verdict."""
+
+    def run(self) -> list[nodes.Node]:
+        """Make the table as HTML: 1,750 rows of nodes would take minutes."""
+        path = DOCS / "validation.csv"
+        self.env.note_dependency(str(path))
+        with path.open(encoding="utf-8", newline="") as file:
+            names, *rows = csv.reader(file)
+        head = "".join(f"<th>{name}</th>" for name in names)
+        body = "\n".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
+        choices = "".join(_choice(name, [row[names.index(name)] for row in rows]) for name in ("theme", "verdict"))
+        text = (
+            f'<p class="filter"><input id="validation-words" type="search" placeholder="words" aria-label="words">'
+            f'{choices}<output id="validation-count"></output></p>\n<div class="table-wrapper">'
+            f'<table class="docutils" id="validation-rows"><thead><tr>{head}</tr></thead>\n'
+            f"<tbody>{body}</tbody></table></div>"
+        )
+        return [nodes.raw("", text, format="html")]
 
 
-def split_validation() -> tuple[str, dict[str, int]]:
-    """Write one page a theme of docs/validation.md; its introduction, and the rows of every theme."""
-    head, *themes = re.split(r"(?m)^## ", (DOCS / "validation.md").read_text(encoding="utf-8"))
-    folder, rows = DOCS / "_generated" / "validation", {}
-    folder.mkdir(parents=True, exist_ok=True)
-    wanted = {}
-    for theme in themes:
-        title, text = theme.split("\n", 1)
-        rows[title] = len(re.findall(r"(?m)^\| (?!case \|)[^-]", text))
-        wanted[folder / f"{slug(title)}.md"] = f"# {title}\n{text}"
-    for stale in set(folder.glob("*.md")) - set(wanted):
-        stale.unlink()
-    for path, text in wanted.items():
-        if not path.exists() or path.read_text(encoding="utf-8") != text:
-            path.write_text(text, encoding="utf-8")
-    return head, rows
-
-
-VALIDATION, ROWS = split_validation()
+def _choice(name: str, values: list[str]) -> str:
+    """Menu of the different values, in their order."""
+    options = "".join(f"<option>{html.escape(value)}</option>" for value in dict.fromkeys(values))
+    return (
+        f'<select id="validation-{name}" aria-label="{name}"><option value="">every {name}</option>{options}</select>'
+    )
 
 
 def title_of(name: str) -> str:
@@ -137,23 +149,20 @@ def title_of(name: str) -> str:
 
 
 def read_source(app, docname: str, source: list[str]) -> None:
-    """Put the list of themes for docs/validation.md, lead links to its headings to their pages, say titles.
+    """Leave patterns of pages that match none out of the index, and say titles.
 
     A link whose text is the name of a file, as it is read on a disk, gets the title of the page.
     """
-    if docname == "validation":
-        places = {title: f"_generated/validation/{slug(title)}" for title in ROWS}
-        table = "\n".join(f"| [{title}]({places[title]}.md) | {rows} |" for title, rows in ROWS.items())
-        tree = "\n".join(places.values())
-        tree = f"```{{toctree}}\n:hidden:\n\n{tree}\n```\n"
-        source[0] = f"{VALIDATION}\n## Themes\n\n| theme | rows |\n|---|---:|\n{table}\n\n{tree}"
-    elif docname.startswith("_generated/validation/"):
-        source[0] = re.sub(r"\]\((?=[\w./]+\.md)", "](../../", source[0])
-    elif docname == "index":  # pages that there may be
-        found = re.compile(r"(?m)^(\S+\*)\n")
-        source[0] = found.sub(lambda line: line[0] if any(DOCS.glob(line[1] + ".*")) else "", source[0])
+    if docname == "index":
+        pattern = re.compile(r"(?m)^(\S+\*)\n")
+        source[0] = pattern.sub(lambda line: line[0] if any(DOCS.glob(line[1] + ".*")) else "", source[0])
     source[0] = re.sub(r"\[(\w+\.md)\](?=\(\1)", lambda link: f"[{title_of(link[1])}]", source[0])
-    source[0] = re.sub(r"\(validation\.md#([\w-]+)\)", r"(_generated/validation/\1.md)", source[0])
+
+
+def widen(app, pagename: str, templatename: str, context: dict, doctree) -> None:
+    """Give the wide table of the validation the room of the contents beside the text."""
+    if pagename == "validation":
+        context["furo_hide_toc"] = True
 
 
 def read_docstring(app, what: str, name: str, obj, options, lines: list[str]) -> None:
@@ -196,6 +205,8 @@ def tidy(app, doctree) -> None:
 
 def setup(app) -> None:
     """Connect what changes the sources."""
+    app.add_directive("validation-rows", ValidationRows)
+    app.connect("html-page-context", widen, priority=900)
     app.connect("doctree-read", tidy)
     app.connect("source-read", read_source)
     app.connect("autodoc-process-docstring", keep_colons, priority=400)

@@ -131,16 +131,13 @@ def test_publications_of_the_paper_are_cited_by_the_theory():
 @pytest.mark.parametrize(
     ("row", "figure"),
     [
-        (r"NAFEMS LE1, elliptic membrane: stress yy at D \[MPa\] \| 92\.7 .* passes", "92.7 MPa"),
-        (r"27/40, 70 N/mm, pitch point: approach \[um\] .*\+0\.027 %", "0.027 %"),
-        (r"sun-planet, 64 positions: secant stiffness, largest difference \| 0 \| 0\.0064 ", "0.64 %"),
-        (r"sun-planet, 64 positions: tangent stiffness, largest difference \| 0 \| 0\.0078 ", "0.78 %"),
-        (r"ring of 40 teeth, 1 kN on the flank: largest compression in the root .*\+1\.4 %", "1.4 %"),
-        (
-            r"3100 rpm, 5th mesh harmonic: lobes a carrier revolution \| 6 \| 6 \| 0 \| exact",
-            "537/543 with six",
-        ),
+        (r"NAFEMS LE1, elliptic membrane: stress yy at D \[MPa\]\"?,92\.7,.*,passes", "92.7 MPa"),
+        (r"27/40, 70 N/mm, pitch point: approach \[um\]\"?,.*\+0\.027 %", "0.027 %"),
+        (r"sun-planet, 64 positions: secant stiffness, largest difference\"?,0,0\.0064,", "0.64 %"),
+        (r"sun-planet, 64 positions: tangent stiffness, largest difference\"?,0,0\.0078,", "0.78 %"),
+        (r"ring of 40 teeth, 1 kN on the flank: largest compression in the root.*\+1\.4 %", "1.4 %"),
+        (r"3100 rpm, 5th mesh harmonic: lobes a carrier revolution\"?,6,6,0,exact,", "537/543 with six"),
     ],
 )
 def test_figures_of_the_paper_are_those_of_the_validation(row, figure):
-    assert figure in read("paper/paper.md") and re.search(row, read("docs/validation.md"))
+    assert figure in read("paper/paper.md") and re.search(row, read("docs/validation.csv"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from pathlib import Path
 
 FAILED = 3
 
@@ -15,12 +16,12 @@ def validate(
     quick: bool = False,
     progress: Callable[[str, float, float], None] | None = None,
 ) -> int:
-    """Compute the validation tables, write them as Markdown and print which rows fail.
+    """Compute the validation tables, write rows and page, and print which rows fail.
 
     Parameters
     ----------
     output : path or None
-        Markdown file; None writes none.
+        Page, the rows beside it with the ending ``.csv``; None writes none.
     theme : str, optional
         Compute this theme alone and print each of its rows.
     quick : bool
@@ -58,7 +59,7 @@ def validate(
         print("\n".join(row_line(row) for row in validation.rows if row.verdict != "FAILS"))
     print(summary(validation))
     if output is not None:
-        print(f"written: {os.fspath(output)}")
+        print(f"written: {os.fspath(output)}, {os.fspath(Path(output).with_suffix('.csv'))}")
     return FAILED if validation.failures else 0
 
 

@@ -1,4 +1,4 @@
-"""Compute the tables of docs/validation.md: ``python validation [-o FILE] [--theme NAME] ...``."""
+"""Compute the rows of docs/validation.csv and its page: ``python validation [-o FILE] [--theme NAME] ...``."""
 
 import argparse
 import sys
@@ -29,12 +29,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from validation import validate
 
     parser = argparse.ArgumentParser(prog="python validation", description=__doc__)
-    parser.add_argument("-o", "--output", type=Path, help="Markdown file; docs/validation.md without --theme")
+    parser.add_argument(
+        "-o", "--output", type=Path, help="page, rows beside it as .csv; docs/validation.md without --theme"
+    )
     parser.add_argument("--theme", help="compute this theme alone and print each of its rows")
     parser.add_argument("--quick", action="store_true", help="leave out what takes long")
+    parser.add_argument("--page", action="store_true", help="compute nothing: write the page from its rows")
     given = parser.parse_args(arguments)
     if given.output is None and given.theme is None:
         given.output = ROOT / "docs" / "validation.md"
+    if given.page:
+        return _write_page(given.output)
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("")
         try:
@@ -50,6 +55,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except KeyboardInterrupt:
             print("interrupted", file=sys.stderr)
             return 130
+
+
+def _write_page(output: Path) -> int:
+    from validation.page import write_page_of_rows
+    from validation.themes import THEMES
+
+    write_page_of_rows(output, {theme.title: theme.introduction for theme in THEMES})
+    return 0
 
 
 if __name__ == "__main__":

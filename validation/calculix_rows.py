@@ -40,8 +40,8 @@ APPROACH, STIFFNESS, PRESSURE, ROOT_1, ROOT_2 = QUANTITIES = (
 MODES = 8
 GATES = 0.002, 0.002, 0.02, 0.02, 0.02
 CORNER = (
-    "a tip corner carries, with a force normal to the flank of the other gear, {tilt} degrees off the normal "
-    "of its own: CalculiX has that direction, femgear takes the force as normal to both (docs/limits.md)"
+    "a tip corner carries. Its force is normal to the flank of the other gear, {tilt} degrees off the normal "
+    "of its own. CalculiX has that direction, femgear takes the force as normal to both (docs/limits.md)"
 )
 """Reason of differences where a corner carries.
 
@@ -53,8 +53,8 @@ positions, makes the tooth pair 1.4 % too soft at a tilt of 0.8 degrees and 4.9 
 tilt, as a force that pushes along the tooth too would be felt.
 """
 STATES = (
-    "the plane state changes on the tooth base, which ends in the fillet: CalculiX's stress jumps there. "
-    "femgear takes stresses in one plane state, as the row of this pair that is all in plane strain does"
+    "the plane state changes on the tooth base, which ends in the fillet, and CalculiX's stress jumps there. "
+    "femgear takes stresses in one plane state. So does the row of this pair that is all in plane strain"
 )
 TILT = {("24/36", 0.25): 0.8, ("24/36", 0.875): 2.5, ("24/-60", 0.0): 1.4}
 """Angle between the normals of both flanks where a corner carries at a position of a pair [deg]."""

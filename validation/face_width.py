@@ -61,8 +61,8 @@ LINE_LOAD, SLOPE, NARROW = 100e3, 6e-6, 0.010
 SPRING, WIDTH = 11.084e9, 0.025
 EXPECTED = "0.1 to 1.3 % were expected"
 ENDS = (
-    "free ends take more of a misalignment than mirror planes, which hold the slope of the tooth across the "
-    "width: K_Hbeta is smaller, and that between mirror planes on the safe side"
+    "free ends compensate more of a misalignment than mirror planes, which hold the slope of the tooth across the "
+    "width. Their K_Hbeta is smaller; that between mirror planes is on the safe side"
 )
 
 

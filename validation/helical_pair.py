@@ -40,8 +40,9 @@ HEIGHTS = (1, 8)
 SETTLED, STEPS = 1e-10, 50
 SOLID = "twisted three-dimensional elements"
 ENDS = (
-    "mirror planes stand for the ends: free ones yield more, of helical teeth more than of straight ones, "
-    "because thrust bends bodies of finite width, where endless ones carry it by shear between sections"
+    "femgear's ends are mirror planes. Free ends have more compliance, those of helical teeth more than those "
+    "of straight ones: thrust bends bodies of finite width, while endless bodies carry it by shear between "
+    "sections"
 )
 
 

@@ -48,8 +48,8 @@ PITCHES, DEPTHS, WAVES = 3.0, 5.0, 24
 
 
 EXPLAINED = (
-    "virtual gears do not know that pieces of a contact line high on a tooth lean on those low on it: "
-    "slices without coupling are too soft, the more so the shorter the lines"
+    "in virtual gears parts of a contact line high on a tooth are not supported by those low on it. "
+    "Slices without coupling have too much compliance, the more the shorter the lines"
 )
 
 
@@ -60,8 +60,8 @@ def point_load(distance, depth, material):
 
 
 LOW_LOADS = (
-    "the factor is that of the stiffness, of bending: loads low on the flank shear teeth as well, which the "
-    "helix raises less; the largest stresses come from loads higher up"
+    "the factor is that of the stiffness, hence of bending. Loads low on the flank also shear the teeth, and "
+    "the helix raises shear less. The largest stresses come from loads higher up"
 )
 
 

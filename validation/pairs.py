@@ -58,9 +58,10 @@ HELICAL = (
 )
 SLICES = 17
 UNCOUPLED = (
-    "the standard takes cos(beta) times spur teeth of the normal section, which have no neighbours across "
-    "the width: without coupling femgear's slices are 12 % above; with it pieces of a contact line high on "
-    "a tooth lean on those low on it, and the free ends of gears, which yield more, are no mirror planes"
+    "the standard takes cos(beta) times the stiffness of spur teeth of the normal section, whose slices are "
+    "independent. Without coupling femgear's slices are 12 % above it. With coupling, parts of a contact line "
+    "high on a tooth are supported by those low on it. Free ends of gears have more compliance than mirror "
+    "planes"
 )
 LEVELS = (120, 240)
 RIM = 8.0  # modules

@@ -263,7 +263,7 @@ def turning_carrier() -> tuple[Row, ...]:
     shares = ring_wave_shares(basis.model, found.tracked.shape[-1])
     wave = shares.argmax(axis=0) - len(shares) // 2
     heard = last - wave * FASTEST / (2.0 * np.pi)
-    why = "waves that run around the ring; the next row has them as the ring hears them"
+    why = "these waves run around the ring. The next row has their frequency on the ring itself"
     rows = list(_bare_ring_turning(basis))
     first = np.append(True, np.diff(still) > 1e-6 * still[1:])
     for members in np.split(np.arange(len(still)), np.flatnonzero(first)[1:]):

@@ -1,4 +1,4 @@
-"""The tables of docs/validation.md, in their order.
+"""The themes of docs/validation.csv, in their order.
 
 A row is added in a function without arguments that returns rows, named here under the parts of a theme, or
 under its slow parts when it takes more than a few seconds.
@@ -228,7 +228,7 @@ THEMES = (
         "information beside it; what gates the ring with teeth has all its teeth in a grid of its own. Rows "
         "*turning*: the reference set, and its ring alone on the foundation, with the gyroscopic and "
         "convective terms of the carrier frame. In that frame the equations do not change with time, so that "
-        "natural frequencies exist; the ring stands still in the housing.",
+        "natural frequencies exist; the ring is fixed in the housing.",
         (ring.plain_annulus, ring.toothed_ring, ring.other_outline, ring.turning_carrier),
         (ring.whole_ring,),
     ),
@@ -444,7 +444,7 @@ THEMES = (
     ),
     Theme(
         "fixed_housing",
-        "Housing that stands still",
+        "Fixed housing",
         "A ring on supports has no symmetry: forces and motions act both ways in orders of the carrier. The "
         "ring of these rows is thin and inextensional (206 GPa, 7850 kg/m3, radius 100 mm, 25 mm x 10 mm), "
         "the set in it a sun in springs and planets on fixed pins. Routes in time and by samples of a turn "

@@ -1,5 +1,6 @@
 """The documentation as a site: every page is in it, links lead to headings, nothing comes from outside."""
 
+import csv
 import fnmatch
 import re
 import subprocess
@@ -76,5 +77,10 @@ def test_the_site_builds_without_a_warning(tmp_path):
         assert [one for one in loaded if re.match(r"(https?:)?//", one)] == [], page.name
     for sheet in tmp_path.rglob("*.css"):
         assert not re.search(r"url\([\"']?(https?:)?//", sheet.read_text(encoding="utf-8")), sheet.name
+    table = (tmp_path / "validation.html").read_text(encoding="utf-8")
+    with (DOCS / "validation.csv").open(encoding="utf-8", newline="") as file:
+        assert table.count("<tr><td>") == sum(1 for _ in csv.reader(file)) - 1
+    formulas = (tmp_path / "two_way.html").read_text(encoding="utf-8")
+    assert "tex-svg.js" in formulas and (tmp_path / "_static" / "tex-svg.js").exists()
     index = (tmp_path / "searchindex.js").read_text(encoding="utf-8")
     assert '"validation"' in index and "side band" in index

@@ -10,7 +10,7 @@ import pytest
 from femgear.errors import GridError, StorageError
 from validation import themes as validation_themes
 from validation.__main__ import main
-from validation.page import markdown, summary, write_page
+from validation.page import FIELDS, page, read_rows, records, summary, write_page
 from validation.rows import at_most, counted, information, printed, within
 from validation.run import Theme, run_validation
 
@@ -54,18 +54,36 @@ def test_error_is_relative_where_the_row_says_so():
     assert within("x", "s", "q", 2.0, 2.1, 1.0, relative=False).error == pytest.approx(0.1)
 
 
-def test_page_shows_every_row_and_its_verdict():
+def written(result) -> str:
+    """Page of a validation."""
+    introductions = {theme.title: theme.introduction for theme in result.themes}
+    return page(records(result), introductions, quick=result.quick)
+
+
+def test_rows_hold_what_is_computed_and_the_page_says_what_differs():
     differs = within("B|1", "paper", "height [m]", 1.0, 1.5, 0.1, explanation="the paper has a misprint")
-    text = markdown(validation(GOOD, BAD, differs, at_most("C", "s", "rest", 1e-6, 3e-8)))
+    result = validation(GOOD, BAD, differs, at_most("C", "s", "rest", 1e-6, 3e-8))
+    assert [tuple(row.values())[1:] for row in records(result)] == [
+        ("A1", "length [m]", "2", "2.0002", "+0.01 %", "0.1 %", "passes", "Closed form.", ""),
+        ("A2", "width [m]", "2", "2.1", "+5 %", "0.1 %", "FAILS", "Closed form.", ""),
+        ("B|1", "height [m]", "1", "1.5", "+50 %", "10 %", "differs", "Paper.", "The paper has a misprint."),
+        ("C", "rest", "0", "< 1e-06", "", "<= 1e-06", "passes", "s.", ""),
+    ]
+    text = written(result)
     assert "4 rows: 2 passes, 1 FAILS, 1 differs." in text
-    assert "| A1 | length [m] | 2 | 2.0002 | +0.01 % | 0.1 % | passes | Closed form. |" in text
-    assert "| B\\|1 | height [m] | 1 | 1.5 | +50 % | 10 % | differs | Paper. The paper has a misprint. |" in text
-    assert "| C | rest | 0 | < 1e-06 |  | <= 1e-06 | passes | s. |" in text
+    assert "**Sample, B|1.** The paper has a misprint. Reference: Paper." in text
+    assert "* height [m]: 1.5 beside 1 (+50 %, gate 10 %)" in text and "* width [m]: 2.1 beside 2" in text
+
+
+def test_rows_that_differ_for_one_reason_stand_together():
+    rows = [within("x", source, f"q{i}", 1.0, 1.5, 0.1, explanation="why") for i, source in enumerate("aab")]
+    text = written(validation(*rows))
+    assert text.count("Why.") == 1 and "* q2: 1.5 beside 1 (+50 %, gate 10 %). b." in text
 
 
 def test_page_has_no_dates_paths_or_machine():
-    text = markdown(validation(GOOD))
-    assert text == markdown(validation(GOOD))
+    text = written(validation(GOOD))
+    assert text == written(validation(GOOD))
     assert not re.search(r"20\d\d-\d\d-\d\d|/home|/tmp|/work", text)
 
 
@@ -76,8 +94,8 @@ def test_no_time_that_a_machine_took_is_on_the_page():
     modules = [*folder.glob("*.py"), *(folder / "reference").rglob("*.py")]
     assert len(modules) > 30 and clock.search(Path(__file__).with_name("test_three_routes.py").read_text("utf-8"))
     assert [path.name for path in modules if clock.search(path.read_text("utf-8"))] == []
-    page = (folder.parent / "docs" / "validation.md").read_text("utf-8")
-    assert not re.search(r"\d (?:ms|s|min|seconds) (?:of (?:one|a) processor|CPU|wall)", page)
+    text = (folder.parent / "docs" / "validation.csv").read_text("utf-8")
+    assert not re.search(r"\d (?:ms|s|min|seconds) (?:of (?:one|a) processor|CPU|wall)", text)
 
 
 def test_quick_page_says_so_and_leaves_slow_parts_out():
@@ -85,7 +103,7 @@ def test_quick_page_says_so_and_leaves_slow_parts_out():
         raise AssertionError
 
     theme = Theme("sample", "Sample", "", (lambda: (GOOD,),), (never,))
-    assert "Quick validation" in markdown(run_validation((theme,), quick=True))
+    assert "Quick validation" in written(run_validation((theme,), quick=True))
     with pytest.raises(AssertionError):
         run_validation((theme,))
 
@@ -97,7 +115,7 @@ def test_a_refusal_becomes_a_failed_row():
     result = run_validation((Theme("sample", "Sample", "", (no_grid, lambda: (GOOD,))),))
     assert [row.verdict for row in result.rows] == ["FAILS", "passes"]
     assert "no grid could not be computed" in summary(result)
-    assert "E-GRID-EMPTY" in markdown(result)
+    assert "E-GRID-EMPTY" in written(result)
 
 
 def test_progress_counts_the_parts():
@@ -110,9 +128,14 @@ def test_progress_counts_the_parts():
 @pytest.mark.parametrize(("row", "code"), [(GOOD, 0), (BAD, 3)])
 def test_exit_code_and_page_of_the_command(tmp_path, monkeypatch, capsys, row, code):
     monkeypatch.setattr(validation_themes, "THEMES", (Theme("sample", "Sample", "", (lambda: (row,),)),))
-    page = tmp_path / "new" / "validation.md"
-    assert main(["-o", str(page)]) == code
-    assert row.quantity in page.read_text(encoding="utf-8")
+    path = tmp_path / "new" / "validation.md"
+    assert main(["-o", str(path)]) == code
+    assert read_rows(path.with_suffix(".csv"))[0]["quantity"] == row.quantity
+    text = path.read_text(encoding="utf-8")
+    assert "1 rows: 1" in text
+    path.unlink()
+    assert main(["-o", str(path), "--page"]) == 0
+    assert path.read_text(encoding="utf-8") == text
     out = capsys.readouterr().out
     assert ("FAILS A2: width [m]" in out) == (code == 3)
     assert "1 rows" in out
@@ -141,8 +164,8 @@ def test_without_options_the_page_of_the_repository_is_written(tmp_path, monkeyp
     )
     main([])
     main(["--quick"])
-    page = Path(__file__).parents[2] / "docs" / "validation.md"
-    assert written == [(page, None, False), (page, None, True)]
+    path = Path(__file__).parents[2] / "docs" / "validation.md"
+    assert written == [(path, None, False), (path, None, True)]
 
 
 def test_quick_leaves_slow_parts_out_on_the_command_line(tmp_path, monkeypatch, capsys):
@@ -185,10 +208,13 @@ def test_a_page_that_cannot_be_written_leaves_the_old_one(tmp_path, monkeypatch)
     assert blocked.read_text() == "old"
 
 
-def test_the_head_of_the_page_is_that_of_the_command():
-    page = Path(__file__).parents[2] / "docs" / "validation.md"
-    head = markdown(validation(GOOD)).split("1 rows: ")[0]
-    assert page.read_text(encoding="utf-8").startswith(head)
+def test_the_page_in_the_repository_is_that_of_its_rows():
+    path = Path(__file__).parents[2] / "docs" / "validation.md"
+    rows = read_rows(path.with_suffix(".csv"))
+    introductions = {theme.title: theme.introduction for theme in validation_themes.THEMES}
+    assert path.read_text(encoding="utf-8") == page(rows, introductions), "run python validation --page"
+    assert list(dict.fromkeys(row["theme"] for row in rows)) == list(introductions)
+    assert {tuple(row) for row in rows} == {FIELDS}
 
 
 PARTS = [(theme, part) for theme in validation_themes.THEMES for part in theme.parts]
@@ -237,9 +263,3 @@ def test_parts_that_are_left_out_are_checked_elsewhere():
 @pytest.mark.parametrize(("theme", "part"), SLOW, ids=_name)
 def test_slow_rows_pass(theme, part):
     _check(theme, part)
-
-
-def test_the_page_in_the_repository_belongs_to_these_themes():
-    page = Path(__file__).parents[2] / "docs" / "validation.md"
-    titles = re.findall(r"^## (.+)$", page.read_text(encoding="utf-8"), flags=re.MULTILINE)
-    assert titles == [theme.title for theme in validation_themes.THEMES]
