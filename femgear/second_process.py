@@ -19,11 +19,14 @@ _BYTES = 4
 """Of the number of a task in the queue, which a pipe holds as a whole."""
 
 
-def shared(tasks: Sequence[Callable[[], Any]], beside: Callable[[], object] = lambda: None) -> list[Any]:
+def shared(tasks: Sequence[Callable[[], Any]], beside: Callable[[], object] | None = None) -> list[Any]:
     """Values of up to 10,000 tasks; a second process begins with the last one, this one after ``beside()``.
 
-    Values, errors and warnings of the other process come here through pickle.
+    Values, errors and warnings of the other process come here through pickle. A task alone is done here.
     """
+    if len(tasks) + (beside is not None) < 2:
+        return [task() for task in tasks]
+    beside = beside or (lambda: None)
     waiting, numbers = os.pipe()
     os.write(numbers, b"".join(number.to_bytes(_BYTES) for number in reversed(range(len(tasks)))))
     os.close(numbers)

@@ -15,13 +15,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from femgear import second_process
 from femgear.contact.flank_pairs import LEFT, RIGHT, mesh_pairs
 from femgear.contact.local_compliance import TipCorner, depth_displacement, tip_corner
 from femgear.errors import CaseError, GridError
@@ -307,24 +308,38 @@ def make_bodies(
     # roots of sectors of two plane states or widths need a solution of their own, see `root_stress`
     own = [s.gear.face_width for s in sectors.gears]
     widths = flank_widths(own)
-    found = [
-        before
-        or flank_compliance(
-            s.grid,
-            s.gear,
-            one,
-            s.stiffness,
+    found, materials = list(known), material_of_each(material, len(sectors.gears))
+    missing = [number for number, before in enumerate(known) if before is None]
+    tasks = [
+        partial(
+            _of_sector,
+            sectors.gears[number],
+            materials[number],
+            widths[number],
             depth=depth,
-            root_state=None if s.gear.internal or max(teeth) < s.gear.face_width else TEETH_STATE,
-            foundation=ring_foundation if s.gear.internal else None,
-            widths=teeth,
+            foundation=ring_foundation,
         )
-        for s, before, one, teeth in zip(
-            sectors.gears, known, material_of_each(material, len(sectors.gears)), widths, strict=True
-        )
+        for number in missing
     ]
+    for number, compliance in zip(missing, second_process.shared(tasks), strict=True):
+        found[number] = compliance
     ring = found[2] if len(found) > 2 else None
     return Bodies(found[0], found[1], ring, tuple(min(pair) for pair in pairwise(own)))
+
+
+def _of_sector(sector: Sector, material: Material, teeth: tuple[float, float], *, depth, foundation) -> FlankCompliance:
+    """Flank compliance of a gear whose flanks touch over some widths [m]; the foundation is that of a ring."""
+    gear = sector.gear
+    return flank_compliance(
+        sector.grid,
+        gear,
+        material,
+        sector.stiffness,
+        depth=depth,
+        root_state=None if gear.internal or max(teeth) < gear.face_width else TEETH_STATE,
+        foundation=foundation if gear.internal else None,
+        widths=teeth,
+    )
 
 
 def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:

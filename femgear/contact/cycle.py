@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
+from femgear import second_process
 from femgear.contact.assembly import (
     Candidates,
     MeshWindows,
@@ -63,8 +65,10 @@ from femgear.gears.deviations import SetDeviations, mirrored_deviations
 from femgear.gears.pair import EACH
 from femgear.gears.planetary import GearSet, PlanetarySet, mirrored_set
 
-_TOGETHER, _SAME_PLACE = 64, 1e-6
-"""Positions that are solved at once; distance of two that count as one [mesh periods]."""
+_TOGETHER, _ROWS, _SAME_PLACE = 64, 50, 1e-6
+"""Positions that are solved at once, and slices of helical teeth; distance of two that count as one [mesh periods]."""
+_WORTH_SHARING, _MANY_PARTS = 16, 3
+"""Positions in slices, and parts of a walk, from which on two processes share them."""
 
 
 @dataclass(frozen=True)
@@ -612,6 +616,28 @@ def _first_planets(
 
 
 @dataclass(frozen=True)
+class _Solved:
+    """Contact at some positions of a walk.
+
+    Parameters
+    ----------
+    values : dict
+        What `MeshCycle` keeps of them, by the names of its fields.
+    overflow : bool
+        Whether a contact leaves its window.
+    nearest : float
+        What pairs must come within to be listed in windows that hold the contact [m]; zero where these do.
+    candidates : int
+        Most pressure cells at a position that may touch.
+    """
+
+    values: dict[str, Any]
+    overflow: bool
+    nearest: float
+    candidates: int
+
+
+@dataclass(frozen=True)
 class _Walk:
     """A set under a torque that is not negative, and the record without load at the positions to solve.
 
@@ -692,47 +718,58 @@ class _Walk:
         setup = replace(setup, images=self.images)
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
-        found, overflow, unknowns = [], False, 0
-        together = _TOGETHER if each == 1 else max(_TOGETHER // each, 4)
+        sliced, together = self.width is not None, _TOGETHER if each == 1 else max(_ROWS // each, 2)
+        if sliced and each == 1 and P >= _WORTH_SHARING:
+            together = min(together, -(-P // 16) * 8)
         # windows that are too small show at the first position: slices of all others need not wait for it
         starts = range(0, P, together) if each == 1 else [0, *range(1, P, together)]
-        for first, end in pairwise([*starts, P]):
-            some = np.arange(first, end)
-            rows = (some[:, None] * each + np.arange(each)).ravel()
-            candidates = contact_candidates(setup, self.bodies, rows, self.members)
-            if first == 0:
-                # bodies that are no elastic bodies are refused before anything rests on them
-                check_definite(candidates)
-            load = np.zeros(candidates.approach.shape[1])
-            load[setup.driver] = self.sun_torque / self.planetary_set.gears[0].base_radius / self.images
-            state = solve_batch(candidates, load, self.springs)
-            check_residual(candidates, state)
-            found.append({} if empty.helical else self._at_positions(candidates, state))
-            if self.width is None:
-                approach, force = found[-1]["deflection"], state.loads.sum(axis=-1)
-            else:
-                sliced = contact_over_width(
-                    self.width, candidates, state, load, found[-1], self.members, self.deviations
-                )
-                overflow |= sliced.pop("overflow")
-                approach, force = sliced.pop("pair_approach"), sliced.pop("pair_force")
-                found[-1] |= sliced
-            if "held_tangents" in found[-1]:
-                tangents = found[-1].pop("held_tangents")
-                found[-1]["held_compliance"] = _between_meshes(setup, tangents, found[-1]["force"])
-            if empty.contact == "profile":
-                needed = needed_nearest(candidates, approach, force).max()
-                if needed > 0.0:
-                    return None, share, 1.2 * float(needed)
-            unknowns = max(unknowns, self.images * int(candidates.candidate.sum(axis=(1, 2)).max()))
-            overflow |= candidates.touches_window_end(state.active)
-            if options.progress is not None:
-                options.progress(int(some[-1]) + 1, P)
+        parts = [partial(self._solve_positions, setup, first, end, each) for first, end in pairwise([*starts, P])]
+        # many positions are worth another process, but for the first part where it is one of many
+        alone = 1 if len(parts) > _MANY_PARTS else 0 if sliced else len(parts)
+        solved = []
+        for part in parts[:alone]:
+            solved.append(part())
+            if solved[-1].nearest > 0.0:
+                return None, share, solved[-1].nearest
+        solved += second_process.shared(parts[alone:]) if len(parts[alone:]) > 1 else [one() for one in parts[alone:]]
+        for one in solved:
+            if one.nearest > 0.0:
+                return None, share, one.nearest
+        unknowns = self.images * max(one.candidates for one in solved)
+        overflow, found = any(one.overflow for one in solved), [one.values for one in solved]
         record = self._record(found, setup, tau, unknowns)
         if overflow:
             largest = 0.0 if record.slice_load is None else record.slice_load.max()
             share = enlarged(share, max(record.force.max(), record.back_force.max(), largest))
         return record, share, nearest
+
+    def _solve_positions(self, setup: MeshWindows, first: int, end: int, each: int) -> _Solved:
+        """Solve the contact at positions from ``first`` to ``end`` of the windows, each of so many slices."""
+        options, positions = self.options, len(self.empty.position) // self.repeats
+        rows = (np.arange(first, end)[:, None] * each + np.arange(each)).ravel()
+        candidates = contact_candidates(setup, self.bodies, rows, self.members)
+        if first == 0:
+            # bodies that are no elastic bodies are refused before anything rests on them
+            check_definite(candidates)
+        load = np.zeros(candidates.approach.shape[1])
+        load[setup.driver] = self.sun_torque / self.planetary_set.gears[0].base_radius / self.images
+        state = solve_batch(candidates, load, self.springs)
+        check_residual(candidates, state)
+        values = {} if self.empty.helical else self._at_positions(candidates, state)
+        overflow, nearest = candidates.touches_window_end(state.active), 0.0
+        if self.width is None:
+            approach, force = values["deflection"], state.loads.sum(axis=-1)
+        else:
+            values |= contact_over_width(self.width, candidates, state, load, values, self.members, self.deviations)
+            overflow |= values.pop("overflow")
+            approach, force = values.pop("pair_approach"), values.pop("pair_force")
+        if "held_tangents" in values:
+            values["held_compliance"] = _between_meshes(setup, values.pop("held_tangents"), values["force"])
+        if self.empty.contact == "profile":
+            nearest = 1.2 * max(float(needed_nearest(candidates, approach, force).max()), 0.0)
+        if options.progress is not None:
+            options.progress(end, positions)  # to nobody from a second process
+        return _Solved(values, bool(overflow), nearest, int(candidates.candidate.sum(axis=(1, 2)).max()))
 
     def attempt_with_peaks(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
         """Solve all positions, and those between them at which extremes lie, in windows of one size."""

@@ -149,8 +149,9 @@ def loaded_period(
     symmetry, shift = _repetition(planetary_set, sun_torque, deviations, periods)
     parts = (shift / periods).denominator
     first = -(-positions * periods // parts)
-    # the end of the part is there to see jumps before it, and then left out
-    wanted, record, helical = np.arange(first + 1) / (first * parts) * periods, {}, False
+    # the end of the part is there to see jumps before it, and then left out; slices of helical teeth have none
+    looked = first + (options.ahead is None)
+    wanted, record, helical = np.arange(looked) / (first * parts) * periods, {}, False
     while len(wanted):
         for some in np.array_split(wanted, -(-len(wanted) // _WALK)):
             cycle = walk_mesh_cycle(

@@ -182,7 +182,9 @@ def condensed_waves(sector: Sector, material: Material, slices: int, width: floa
     k = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
     parts, powers = wave_stiffness(grid, material), k[:, None] ** np.arange(3)
     waves = condense_sums(grid, parts, powers, loads=loads, observations=observations, **options)
-    return CondensedWaves(sector, material, k, width, uniform, tuple(waves))
+    found = CondensedWaves(sector, material, k, width, uniform, tuple(waves))
+    _ = found.held  # every set needs it, if only beside that on a foundation
+    return found
 
 
 def common_width(gears: Sequence[Gear]) -> tuple[float, ...]:

@@ -17,6 +17,7 @@ from typing import Any
 
 import numpy as np
 
+from femgear import second_process
 from femgear.case.dependencies import (
     Entries,
     Steps,
@@ -388,12 +389,15 @@ def _waves_of_case(case: Case, gears: PlanetarySet, steps: Steps, cache: Path | 
         cache=cache,
         known=[one and one.sector for one in known],
     )
-    condensed = [
-        before or steps.keep(name, entries, condensed_waves(sector, material, case.static.slices, width))
-        for (name, entries), before, sector, material in zip(kept, known, sectors.gears, materials, strict=True)
+    missing = [number for number, before in enumerate(known) if before is None]
+    tasks = [
+        partial(condensed_waves, sectors.gears[number], materials[number], case.static.slices, width)
+        for number in missing
     ]
+    for number, condensed in zip(missing, second_process.shared(tasks), strict=True):
+        known[number] = steps.keep(*kept[number], condensed)
     foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
-    return waves_of_gears(condensed, foundation, _helical(case, gears)[1])
+    return waves_of_gears(known, foundation, _helical(case, gears)[1])
 
 
 def loaded_over_width(case: Case, gears: PlanetarySet, waves: WidthWaves | None, steps: Steps) -> dict[str, Any]:

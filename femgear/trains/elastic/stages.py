@@ -604,18 +604,28 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     alone, n = np.zeros((2, len(resonance))), np.arange(-modes.max_diameter, modes.max_diameter + 1)
     limit = limited(case, frequency, up_to, given=given)
     cuts = np.flatnonzero(np.diff(np.cumsum(limit.response) // _LINES_TOGETHER)) + 1
-    for own in np.split(np.arange(len(speeds)), cuts):
-        options = limit.options(case, own)
-        response = solve_spectral(basis, excitation, frequency[own], radius=False, **options)
+
+    def followed(own: np.ndarray) -> tuple[HeardSpeeds | None, list[np.ndarray]]:
+        """What is kept of some speeds, and the levels of single modes at those of their resonances."""
+        response, heard = (
+            solve_spectral(basis, excitation, frequency[own], radius=False, **limit.options(case, own)),
+            None,
+        )
         if not case.housing.stands_still:
             lines = sensor_lines(case, modes, response, carrier[own])
-            parts.append(heard_speeds(response.force, lines, response.lowest_force))
+            heard = heard_speeds(response.force, lines, response.lowest_force)
         order = np.arange(response.force.shape[-1])[:, None] * case.ring.teeth - np.sign(one.carrier) * n
-        turning = carrier[own][:, None, None] * order
-        for level, at in zip(alone, nearest):
+        turning, levels = carrier[own][:, None, None] * order, []
+        for at in nearest:
             inside = np.where((at >= own[0]) & (at <= own[-1]), at - own[0], -1)
-            level += mode_levels(response, field, alike, met.harmonic, turning, inside)
-        progress("runup", float(own[-1] + 1), float(len(speeds)))
+            levels.append(mode_levels(response, field, alike, met.harmonic, turning, inside))
+        progress("runup", float(own[-1] + 1), float(len(speeds)))  # to nobody from a second process
+        return heard, levels
+
+    tasks = [partial(followed, own) for own in np.split(np.arange(len(speeds)), cuts)]
+    for heard_part, levels in reversed(second_process.shared(tasks[::-1])):
+        parts += [heard_part] if heard_part is not None else []
+        alone += levels
     if case.housing.stands_still:
         parts = _heard_in_housing(case, modes, carrier, limit, progress)
     levels = joined(parts)
