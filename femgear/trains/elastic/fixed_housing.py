@@ -26,7 +26,6 @@ from femgear.housing.two_way.carrier_orders import MeshPaths, mean_excitation
 from femgear.housing.two_way.response import TwoWayResponse, solve_two_way, structure_lines
 from femgear.housing.two_way.set_damping import with_set_damping
 from femgear.housing.two_way.structure import FixedStructure, equal_sectors, supported_ring
-from femgear.housing.two_way.turn_stability import turn_stability
 from femgear.solvers.linear.modal import modal_damping, solve_modes
 from femgear.stages.lumped_set import member_speeds
 from femgear.trains.elastic.checks import (
@@ -42,7 +41,7 @@ from femgear.trains.elastic.excitation_limit import (
 )
 from femgear.trains.elastic.model import gears_alone, mesh_springs, ring_mesh_compliance
 from femgear.trains.elastic.outputs import lines_method
-from femgear.trains.elastic.results import DynamicsResult, FixedHousing, HousingResult, ModesResult
+from femgear.trains.elastic.results import DynamicsResult, FixedHousing, HousingResult, JudgedTurn, ModesResult
 from femgear.trains.elastic.runup import HeardSpeeds, heard_speeds
 
 if TYPE_CHECKING:
@@ -193,20 +192,20 @@ def fixed_housing(
         drag = one_way.drag @ (ring.structure.wave_shape @ housing.structure.wave_shape.conj().T)
     paths = replace(model.lines_paths, symmetry=one_way.paths.symmetry)
     one_way = replace(one_way, paths=paths, drag=drag)
-    two_way, multiplier = housing.solve(carrier, limit, tolerance), np.full(len(carrier), np.nan)
-    if len(judged_at):
-        multiplier[judged_at] = turn_stability(
-            housing.gears,
-            housing.excitation,
-            housing.structure,
-            housing.paths,
-            carrier[judged_at],
-            damping=housing.damping,
-            harmonics=min(int(limit.excitation.min()), _JUDGED),
-        ).modulus
-    multiplier **= 1.0 / two_way.turns
+    two_way = housing.solve(carrier, limit, tolerance)
+    judged = JudgedTurn(
+        housing.gears,
+        housing.excitation,
+        housing.structure,
+        housing.paths,
+        housing.damping,
+        carrier_speed=carrier,
+        at=np.asarray(judged_at, int),
+        turns=two_way.turns,
+        harmonics=min(int(limit.excitation.min()), _JUDGED),
+    )
     named = model.sensors, model.forces, model.missing
-    return FixedHousing(housing.structure, two_way, one_way, *named, multiplier)
+    return FixedHousing(housing.structure, two_way, one_way, *named, judged)
 
 
 def lines_at_sensor(
@@ -303,7 +302,6 @@ def lines_in_housing(case: Case, dynamics: DynamicsResult, found: HousingResult,
     with np.errstate(divide="ignore", invalid="ignore"):  # of a sensor that stands still
         apart = 20.0 * np.log10(order_level(lines) / level)
     told = {
-        "turn_multiplier": fixed.multiplier,
         "one_way_level": level,
         "one_way_difference": apart,
         "two_way_residual": fixed.two_way.residual,
@@ -315,6 +313,7 @@ def lines_in_housing(case: Case, dynamics: DynamicsResult, found: HousingResult,
         found,
         exact=lines,
         supported=told,
+        judged=fixed.judged,
         missing=fixed.missing,
         outputs={kind: one for kind, one in outputs.items() if one[0]},
         sound=sound,

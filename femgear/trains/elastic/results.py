@@ -95,7 +95,7 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
-    from femgear.housing.two_way.response import TwoWayResponse
+    from femgear.housing.two_way.response import MeshPaths, TwoWayResponse
     from femgear.housing.two_way.structure import FixedStructure
     from femgear.solvers.stability.parametric import Stability
     from femgear.storage.results import Results
@@ -256,8 +256,8 @@ class FixedHousing:
         Names of displacements and of forces that it observes.
     missing : str
         As in `HousingResult`.
-    multiplier : (speeds,) array
-        Modulus of the largest Floquet multiplier over a turn of the carrier, nan where none was computed.
+    judged : JudgedTurn, optional
+        What the verdict on its stability is made of.
     """
 
     structure: FixedStructure
@@ -266,7 +266,55 @@ class FixedHousing:
     sensors: tuple[str, ...] = ()
     forces: tuple[str, ...] = ()
     missing: str = ""
-    multiplier: Any = np.nan
+    judged: JudgedTurn | None = None
+
+
+@dataclass(frozen=True)
+class JudgedTurn:
+    """What the Floquet verdict over turns of the carrier is made of, which is found when it is asked for.
+
+    Parameters
+    ----------
+    gears, excitation, structure, paths, damping
+        As for `femgear.housing.two_way.turn_stability.turn_stability`.
+    carrier_speed : (speeds,) array
+        [rad/s]
+    at : (n,) int array
+        Numbers of the speeds that get a verdict.
+    turns : int
+        Turns of the carrier after which all repeats.
+    harmonics : int
+        Mesh harmonics of the stiffness.
+    """
+
+    gears: Modes
+    excitation: MeshExcitation
+    structure: FixedStructure
+    paths: MeshPaths
+    damping: Any
+    carrier_speed: np.ndarray
+    at: np.ndarray
+    turns: int
+    harmonics: int
+
+    @cached_property
+    def multiplier(self) -> np.ndarray:
+        """Modulus of the largest Floquet multiplier over a turn (speeds,), nan where there is no verdict."""
+        from femgear.housing.two_way.turn_stability import turn_stability
+
+        found = np.full(len(self.carrier_speed), np.nan)
+        if len(self.at):
+            with one_blas_thread():
+                found[self.at] = turn_stability(
+                    self.gears,
+                    self.excitation,
+                    self.structure,
+                    self.paths,
+                    self.carrier_speed[self.at],
+                    damping=self.damping,
+                    harmonics=self.harmonics,
+                ).modulus
+        return found ** (1.0 / self.turns)
 
 
 @dataclass(frozen=True)
@@ -429,6 +477,8 @@ class HousingResult(StageResult):
         `equivalent_sound` as the first and the last.
     supported : mapping of (speeds,) arrays
         Numbers of `_SUPPORTED`, of a housing that stands still.
+    judged : JudgedTurn, optional
+        What the verdict on its stability is made of, of a housing that stands still.
     outputs : mapping of (names, (speeds, n_names, n_orders) complex array)
         Lines of each of `_OUTPUTS`.
     missing : str
@@ -446,6 +496,7 @@ class HousingResult(StageResult):
     microphone: Microphone
     sound: tuple[np.ndarray, np.ndarray | None, np.ndarray] | None = None
     supported: Mapping[str, np.ndarray] = field(default_factory=dict)
+    judged: JudgedTurn | None = None
     outputs: Mapping[str, tuple[tuple[str, ...], np.ndarray]] = field(default_factory=dict)
     missing: str = ""
 
@@ -498,7 +549,8 @@ class HousingResult(StageResult):
             words = _EQUIVALENT if sound[1] is not None else f"A-weighted {power}, {_ESTIMATE}"
             levels["equivalent_power_level"] = power_level(sound[2], frequency), words
             variables |= {name: ("speed", one, "dB(A)", said) for name, (one, said) in levels.items()}
-        supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in self.supported.items()}
+        judged = {} if self.judged is None else {"turn_multiplier": self.judged.multiplier}
+        supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in {**judged, **self.supported}.items()}
         names = {kind: (kind, one[0], "1", f"name of the {kind}") for kind, one in self.outputs.items()}
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return Contents(
