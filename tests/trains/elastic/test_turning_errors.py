@@ -231,7 +231,6 @@ def test_orders_on_feet_obey_the_rule(solved):
     amplitude = np.abs(lines.acceleration)
     third = (lines.number % 4 == 0) & (lines.number % 3 != 0)
     assert (amplitude[:, third].max(axis=1) > 1e-3 * amplitude.max(axis=1)).all()
-    told = housing.supported
     assert np.isfinite(dynamics.level_change).all() and np.isfinite(housing.judged.multiplier).all()
     *_, unequal = solved(
         {
