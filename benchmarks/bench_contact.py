@@ -8,11 +8,13 @@ import pytest
 from table import growth
 
 ERRORS = "Errors, floating sun, samples (compliance known)"
-PLANETS = "Contact, 64 positions, over the number of planets (36/24/84)"
+PLANETS = "Contact, 64 positions or as many more as meet all planets alike, over the number of planets (36/24/84)"
 POSITIONS = "Contact over the number of positions (reference set)"
 ELEMENTS = "Compliance and contact, 64 positions, over the elements along a flank (reference set)"
 SLICES = "Static stage in slices over the width, 32 positions (reference set)"
-SLICED_PLANETS = "Contact in 25 slices, 16 positions, over the number of planets (36/24/84)"
+SLICED_PLANETS = (
+    "Contact in 25 slices, 16 positions or as many more as meet all planets alike, over the planets (36/24/84)"
+)
 SAMPLES = 10_000
 
 
@@ -154,9 +156,12 @@ def walk(benchmark, gears, bodies, positions, rounds=3):
 @pytest.mark.benchmark(group=PLANETS, timer=process_time)
 @pytest.mark.parametrize("n_planets", [3, 4, 5, 6])
 def test_growth_over_planets(benchmark, planets, medians, n_planets):
-    cycle = walk(benchmark, planets.gears(n_planets), planets.bodies, 64)
+    gears = planets.gears(n_planets)
+    cycle = walk(benchmark, gears, planets.bodies, gears.equal_positions(64))
     np.testing.assert_allclose(cycle.load_share.mean(axis=1), 1 / n_planets, rtol=1e-2)
-    note = f"{cycle.unknowns} pressure cells" + growth(benchmark, medians, PLANETS, n_planets)
+    note = f"{len(cycle.position)} positions, {cycle.unknowns} pressure cells" + growth(
+        benchmark, medians, PLANETS, n_planets
+    )
     record(benchmark, f"{n_planets} planets, {2 * n_planets} meshes", note)
 
 
@@ -212,13 +217,13 @@ def test_growth_of_slices_over_planets(benchmark, planets, medians, n_planets):
     gears = planets.gears(n_planets)
     sectors = make_sectors(gears, planets.material, flank_elements=6, refine=0.5)
     waves = width_waves(sectors, planets.material, 25)
-    options = {"positions": 16, "options": CycleOptions(waves=waves, slices=25)}
+    options = {"positions": gears.equal_positions(16), "options": CycleOptions(waves=waves, slices=25)}
     cycle = benchmark.pedantic(
         walk_mesh_cycle,
         args=(gears, planets.bodies),
         kwargs={"sun_torque": 100.0} | options,
         rounds=3,
     )
-    note = f"{cycle.slice_load.shape[1]} tooth pairs a mesh"
+    note = f"{len(cycle.position)} positions, {cycle.slice_load.shape[1]} tooth pairs a mesh"
     note += growth(benchmark, medians, SLICED_PLANETS, n_planets)
     record(benchmark, f"{2 * n_planets} meshes", note)
