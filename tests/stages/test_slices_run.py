@@ -233,7 +233,7 @@ def test_gears_are_condensed_for_waves_once(case, members, monkeypatch):
     steps, case = Steps(), with_values(case, {"sun.modifications": [SLOPE], "static.members": members})
     static = solve_static(case, steps=steps)
     modes = solve_modes(case, static)
-    assert condensed == ["sun", "planet", "ring"]
+    assert sorted(condensed) == ["planet", "ring", "sun"]
     other = with_value(case, "ring.outer_radius", "95 mm")
     solve_static(other, steps=steps)
     assert condensed[3:] == ["ring"]

@@ -1,0 +1,32 @@
+"""Walks whose positions two processes share: the numbers of one."""
+
+import numpy as np
+import pytest
+
+from femgear import second_process
+from femgear.stages.static import solve_static
+from femgear.trains.elastic.stages import solve_modes
+from femgear.trains.reading import read_case, with_values
+
+SLOPE = {"kind": "lead slope", "amount": "10 um"}
+FEW = {"static.flank_elements": 6, "static.stresses": False}
+SPUR = {"sun.modifications": [SLOPE], "static.slices": 9, "static.positions": 16}
+HELICAL = {"static.slices": 9, "static.positions": 12}
+
+
+@pytest.mark.parametrize(("name", "entries"), [("planetary_27_40_108", SPUR), ("helical_23_24_73", HELICAL)])
+def test_two_processes_find_the_numbers_of_one(name, entries, monkeypatch):
+    case, shared, found = with_values(read_case(f"cases/{name}.toml"), FEW | entries), [], []
+    tasks = second_process.shared
+    monkeypatch.setattr(second_process, "shared", lambda parts: shared.append(len(parts)) or tasks(parts))
+    for two in (True, False):
+        monkeypatch.setattr(second_process, "second_core", lambda two=two: two)
+        static = solve_static(case)
+        found.append((static.dataset(), solve_modes(case, static).dataset()))
+    # windows of the contact among them, not the three gears alone
+    assert len(shared) > 4 and max(shared) > 1
+    for one, other in zip(*found, strict=True):
+        for variable in ("ste", "mesh_stiffness", "slice_load", "supported_stiffness"):
+            if variable in one:
+                scale = np.abs(other[variable]).max()
+                np.testing.assert_allclose(one[variable], other[variable], rtol=0.0, atol=1e-12 * scale)
