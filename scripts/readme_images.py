@@ -318,7 +318,8 @@ def _section(run: Run, folder: Path, found: list[tuple[str, str]]) -> str:
     lines += [f"`{run.command} -o out/{folder.name}`", ""]
     for stem, link in found:
         words = _sentence(run, stem)
-        lines += [f"![{words.rstrip('.')}]({link})", "", f"*{words}*", ""]
+        # the text of a picture names it; what it shows stands below, for all readers
+        lines += [f"![{run.title}: {stem.replace('_', ' ')}]({link})", "", f"*{words}*", ""]
     if not found:
         lines += ["Its pictures stand above.", ""]
     return "\n".join(lines)

@@ -51,10 +51,12 @@ def test_every_image_is_shown_and_made_by_a_run(gallery):
     assert set.union(*(linked(page.read_text(encoding="utf-8")) for page in pages)) <= images
 
 
-def test_every_image_has_a_sentence():
-    for words, name in re.findall(r"!\[([^\]]*)\]\(images/([\w/.-]+)\)", PAGE):
-        assert len(words.split()) >= 3, name
-        assert f"*{words}.*" in PAGE
+def test_every_image_has_a_name_and_a_sentence():
+    shown = re.findall(r"(?m)^!\[([^\]]*)\]\(images/([\w/.-]+)\)\n\n\*(.+)\.\*$", PAGE)
+    assert len(shown) == len(linked(PAGE))
+    for name, link, words in shown:
+        assert len(words.split()) >= 3 and words not in name, link
+        assert Path(link).stem.replace("_", " ") in name, link
 
 
 def test_the_page_and_its_images_are_made_anew(gallery, tmp_path, capsys):
