@@ -3,10 +3,12 @@
 import builtins
 import csv
 import html
+import inspect
 import os
 import re
 import sys
 from pathlib import Path
+from pkgutil import resolve_name
 
 os.environ.setdefault("MPLBACKEND", "agg")
 DOCS = Path(__file__).resolve().parent
@@ -135,6 +137,22 @@ class ValidationRows(SphinxDirective):
         return [nodes.raw("", text, format="html")]
 
 
+class Fields(SphinxDirective):
+    """Table of the fields of a dataclass: names, shape and meaning, as its docstring has them."""
+
+    required_arguments = 1
+
+    def run(self) -> list[nodes.Node]:
+        """Make the table from the section Parameters of the docstring."""
+        text = inspect.cleandoc(resolve_name(self.arguments[0]).__doc__).split("Parameters\n----------\n")[1]
+        entries = re.findall(r"(?m)^(\w[\w, ]*?) : (.+)\n((?:    .*\n?|\n(?=    ))*)", text)
+        lines = ["| fields | shape | meaning |", "|---|---|---|"]
+        for names, shape, meaning in entries:
+            cells = ", ".join(f"`{name}`" for name in names.split(", ")), shape, meaning
+            lines.append("| " + " | ".join(" ".join(cell.replace("|", "\\|").split()) for cell in cells) + " |")
+        return self.parse_text_to_nodes("\n".join(lines))
+
+
 def _choice(name: str, values: list[str]) -> str:
     """Menu of the different values, in their order."""
     options = "".join(f"<option>{html.escape(value)}</option>" for value in dict.fromkeys(values))
@@ -206,6 +224,7 @@ def tidy(app, doctree) -> None:
 def setup(app) -> None:
     """Connect what changes the sources."""
     app.add_directive("validation-rows", ValidationRows)
+    app.add_directive("fields", Fields)
     app.connect("html-page-context", widen, priority=900)
     app.connect("doctree-read", tidy)
     app.connect("source-read", read_source)

@@ -44,8 +44,9 @@ take nothing from the models that they check; `python validation --theme "lumped
 Printed numbers beside which `tests/validation/test_printed_references.py` is named are computed again by that
 file, which imports nothing of femgear.
 
-`python validation` writes this page and the rows, [validation.csv](validation.csv). `python validation
---page` writes the page alone from the rows that are there.
+`python validation` writes this page and the rows, [validation.csv](validation.csv); `python validation --page`
+writes the page alone from the rows that are there. `--theme NAME` prints one theme with its published tables; a
+name that does not exist lists all. The same rows are tests.
 """
 ALL_ROWS = """## All rows
 

@@ -246,6 +246,8 @@ class MeshCycle:
         smallest separation of its flanks by leads and given misalignments [m].
     member_tilt : (k, P) array, optional
         Slope of the axes of members that tilt, and wind-up of the carrier [rad], named by `tilt_names`.
+    tilt_names : tuple of str
+        Such as ``"sun: x"``, direction in which the end z > 0 moves, and ``"carrier: wind-up"``.
     helical : bool
         Whether the slices are those of helical teeth: the path coordinates are those at mid-width.
     between : Between, optional

@@ -222,7 +222,7 @@ Contact in slices has those over the width and no pressures of cells.
 """
 
 LARGEST_PEAK_DOUBT = 0.03
-"""Share of a peak to peak that may be missing between positions without a word (docs/verified.md)."""
+"""Share of a peak to peak that may be missing between positions without a word (docs/validation.md)."""
 _HARMONICS, _ROWS = 6, 8
 """Harmonics whose phasing is listed, and neighbouring sets."""
 _DISTANCE, _TOLERANCE = 3, 0.02
