@@ -124,7 +124,7 @@ class ValidationRows(SphinxDirective):
         path = DOCS / "validation.csv"
         self.env.note_dependency(str(path))
         with path.open(encoding="utf-8", newline="") as file:
-            names, *rows = csv.reader(file)
+            names, *rows = ([*row[1:], row[0]] for row in csv.reader(file))  # the theme last
         head = "".join(f"<th>{name}</th>" for name in names)
         body = "\n".join(f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
         choices = "".join(_choice(name, [row[names.index(name)] for row in rows]) for name in ("theme", "verdict"))
@@ -210,6 +210,23 @@ def drop_readers(app, domain: str, kind: str, content) -> None:
         content.remove(node)
 
 
+SYMBOL = re.compile(r"(?<![\w/.])([A-Za-zΑ-ω])_([A-Za-z0-9Α-ω]{1,6})(?![\w(])")
+VERBATIM = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block, nodes.raw, addnodes.desc_signature)
+
+
+def set_subscripts(app, doctree) -> None:
+    """Set symbols of the text, such as z_s, with subscripts; names in code stay."""
+    for text in list(doctree.findall(nodes.Text)):
+        parts, node = SYMBOL.split(str(text)), text.parent
+        while node is not None and not isinstance(node, VERBATIM):
+            node = node.parent
+        if len(parts) > 1 and node is None:
+            new = [nodes.Text(parts[0])]
+            for letter, index, rest in zip(parts[1::3], parts[2::3], parts[3::3]):
+                new += [nodes.Text(letter), nodes.subscript("", index), nodes.Text(rest)]
+            text.parent.replace(text, new)
+
+
 def tidy(app, doctree) -> None:
     """Put a dash for the two hyphens of napoleon, where words follow; leave out the values of long tables."""
     for text in list(doctree.findall(nodes.Text)):
@@ -227,6 +244,7 @@ def setup(app) -> None:
     app.add_directive("fields", Fields)
     app.connect("html-page-context", widen, priority=900)
     app.connect("doctree-read", tidy)
+    app.connect("doctree-read", set_subscripts)
     app.connect("source-read", read_source)
     app.connect("autodoc-process-docstring", keep_colons, priority=400)
     app.connect("autodoc-process-signature", name_keys)

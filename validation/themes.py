@@ -141,18 +141,18 @@ THEMES = (
     ),
     Theme(
         "CalculiX",
-        "CalculiX Compared with: where `ccx` is installed (Debian: calculix-ccx): an external and an internal "
-        "pair as whole gears in contact at eight positions, straight teeth as solids under a lead slope, ring on "
-        "feet, the casing example; gates: 0.2 % of transmission error, tangent stiffness and frequencies; 2 % of "
+        "CalculiX",
+        "Another finite-element program, where it is installed (`ccx`; Debian: calculix-ccx). Pairs: whole gears "
+        "in contact at 200 N m, 20 mm wide, positions in mesh periods; the body of an internal gear is in plane "
+        "stress, as in femgear, all else in plane strain. Contact is a penalty of 1 GPa at 10 nm, elements there "
+        "are 15 um long; rows *settings* have ten times the one and half the other. Rows *width*: straight teeth "
+        "as solids between mirror planes, one flank with a slope. The ring is that of the reference set on its "
+        "foundation and on feet of 20 mm, all teeth in a grid. The casing is meshed anew from its geometry. "
+        "Compared with: where `ccx` is installed (Debian: calculix-ccx): an external and an internal pair as "
+        "whole gears in contact at eight positions, straight teeth as solids under a lead slope, ring on feet, "
+        "the casing example; gates: 0.2 % of transmission error, tangent stiffness and frequencies; 2 % of "
         "pressure and root stress; 0.5 % of K_Hβ and of the casing's frequencies; positions where a tip corner "
         "carries differ by up to 0.8 % in transmission error and 1.8 % in stiffness.",
-        "Another finite-element program, where it is installed (`ccx`; Debian: calculix-ccx). Pairs: whole "
-        "gears in contact at 200 N m, 20 mm wide, positions in mesh periods; the body of an internal gear is "
-        "in plane stress, as in femgear, all else in plane strain. Contact is a penalty of 1 GPa at 10 nm, "
-        "elements there are 15 um long; rows *settings* have ten times the one and half the other. Rows "
-        "*width*: straight teeth as solids between mirror planes, one flank with a slope. "
-        "The ring is that of the reference set on its foundation and on feet of 20 mm, all teeth in a grid. "
-        "The casing is meshed anew from its geometry.",
         (),
         (
             calculix_rows.external_pair,

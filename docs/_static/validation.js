@@ -10,8 +10,8 @@ document.addEventListener("DOMContentLoaded", () => {
     const theme = control("theme").value, verdict = control("verdict").value;
     let shown = 0;
     rows.forEach((row, i) => {
-      const kept = (!theme || row.cells[0].textContent === theme)
-        && (!verdict || row.cells[7].textContent === verdict)
+      const kept = (!theme || row.cells[row.cells.length - 1].textContent === theme)
+        && (!verdict || row.cells[6].textContent === verdict)
         && words.every((word) => texts[i].includes(word));
       row.hidden = !kept;
       shown += kept;
