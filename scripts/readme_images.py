@@ -49,6 +49,8 @@ def _script(command: str, title: str, **says: str) -> Run:
 
 RUNS = {
     "planetary_27_40_108": _case("planetary_27_40_108", "Reference set 27/40/108, elastic ring"),
+    "on_six_bolts": _case("on_six_bolts", "Reference set on six bolts, two named sensors"),
+    "in_a_casing": _case("in_a_casing", "Reference set in a casing of a file"),
     "misaligned": Run(
         "femgear run cases/planetary_27_40_108.toml --only stress",
         "Misaligned and crowned sun, 25 slices",

@@ -619,7 +619,8 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         for at in nearest:
             inside = np.where((at >= own[0]) & (at <= own[-1]), at - own[0], -1)
             levels.append(mode_levels(response, field, alike, met.harmonic, turning, inside))
-        progress("runup", float(own[-1] + 1), float(len(speeds)))  # to nobody from a second process
+        if not case.housing.stands_still:  # else the speeds in the housing are told
+            progress("runup", float(own[-1] + 1), float(len(speeds)))  # to nobody from a second process
         return heard, levels
 
     tasks = [partial(followed, own) for own in np.split(np.arange(len(speeds)), cuts)]
