@@ -42,7 +42,7 @@ _OTHER = "Other pictures"
 """Section of those that no stage describes."""
 # what HTML and UTF-8 do not hold, and what reverses the order of the text around it
 _CONTROLS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
-_KINDS = {".png": "image/png", ".gif": "image/gif"}
+_KINDS = {".png": "image/png"}
 _WEB = Path(__file__).parent / "web"
 """Style sheet, scripts, and the libraries that they draw with."""
 _CHARTS = "charts.json"

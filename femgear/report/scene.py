@@ -1,8 +1,7 @@
 """Grids of whole bodies with their displacements, as VTU and as pictures drawn by PyVista without a screen.
 
 `assemble_set` and `ring_modes_grid` make grids with displacement fields, `write_vtu` writes them,
-`deformed_picture` draws one, `animate_operating_deflection` (by Matplotlib) the ring while the carrier turns
-past a fixed sensor. PyVista is loaded late, by `load_pyvista`, and only where it can draw.
+`deformed_picture` draws one. PyVista is loaded late, by `load_pyvista`, and only where it can draw.
 """
 
 from __future__ import annotations
@@ -20,10 +19,6 @@ import numpy as np
 
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.grid import Grid, copy_nodes, rotated_copies
-from femgear.gears.gear import Gear
-from femgear.gears.kinematics import orientations
-from femgear.gears.planetary import PlanetarySet
-from femgear.gears.tooth import half_sector
 from femgear.report.style import PNG_LEVEL, SIZE, WIDTH, label, save_figure
 from femgear.storage.files import write_bytes
 
@@ -50,14 +45,6 @@ _PIXELS, _COLOURS = 900, "YlGnBu"
 """Sides of a rendered view, and its colours: pale where little moves, as paper is."""
 # address space that VTK needs before it has drawn anything [bytes]
 _MEMORY = 1_100_000_000
-_SECONDS = 6.0
-"""Length of an animation."""
-_LARGEST_ANIMATED = 0.09
-"""Largest displacement of an animation as a share of the outer radius."""
-# elements of a flank before the factor that divides all spacing: outlines of some twenty points a tooth
-_FLANK, _COARSE = 10, 0.4
-_TINTS = 31
-_SUN, _PLANET, _MARK, _SENSOR = "#F2BE9C", "#F7DDA3", "#000000", "#009E73"
 
 
 def load_pyvista():
@@ -363,219 +350,4 @@ def write_png(plotter: pv.Plotter, path: str | os.PathLike) -> None:
 
     stream = io.BytesIO()
     Image.fromarray(image).save(stream, "PNG", compress_level=PNG_LEVEL)
-    write_bytes(stream.getvalue(), path)
-
-
-def animate_operating_deflection(
-    path: str | os.PathLike,
-    planetary_set: PlanetarySet,
-    *,
-    radial: np.ndarray,
-    tangential: np.ndarray,
-    sensor_angle: float = 0.0,
-    order: float | None = None,
-    title: str = "",
-    frames: int = 48,
-    size: int = 480,
-) -> int:
-    """Animate one revolution of the carrier as GIF, six seconds; every frame is a true instant of the motion.
-
-    The mean deflection, which turns with the carrier, is left out; the largest displacement takes 9 % of the
-    outer radius. The number of frames, which is returned, is near the wished one and such that the meshes
-    pass slowly through a few cycles, as under a stroboscope (see `strobe_frames`). ``radial`` and
-    ``tangential`` (H + 1, 2 n_max + 1), complex, are components of the outer surface's displacement [m]:
-    ``u(phi, t) = Re sum U[h, n] e^{i n phi} e^{i h omega t}``, phi in the frame of the carrier. ``order`` is
-    that of omega, the teeth of the ring by default, negative where the carrier turns clockwise; the sensor
-    stands at an angle [rad] on the housing, size is in pixels. StorageError.
-    """
-    order = planetary_set.ring.teeth if order is None else order
-    field = _Field(radial, tangential, np.sign(order), abs(order))
-    count = strobe_frames(planetary_set.ring.teeth, frames)
-    carrier = field.turn * 2 * np.pi * np.arange(count) / count
-    images = _draw(planetary_set, field, carrier, sensor_angle, title, size)
-    _write_gif(path, images)
-    return count
-
-
-def strobe_frames(ring_teeth: int, wished: int) -> int:
-    """Choose the number of frames a revolution, near that wished for, that shows the meshes in slow motion.
-
-    With ``F`` frames the mesh passes ``ring_teeth / F`` cycles from one frame to the next, of which the
-    eye sees the fraction: ``ring_teeth mod F`` apparent cycles a revolution, of about twelve frames each.
-    """
-    around = range(max(3 * wished // 4, 2), max(5 * wished // 4, 3) + 1)
-    moving = [count for count in around if ring_teeth % count]
-    if not moving:
-        return wished
-    return min(moving, key=lambda count: (abs(count / (ring_teeth % count) - 12.0), abs(count - wished)))
-
-
-@dataclass(frozen=True)
-class _Field:
-    """Deflection of the ring about its mean in the frame of the carrier, sampled by angle and instant.
-
-    ``radial`` and ``tangential`` (H + 1, 2 n_max + 1) are complex components [m], ``turn`` is the sense of the carrier,
-    1 or -1, and ``teeth`` the order of the first harmonic, the teeth of the ring where errors do not turn.
-    """
-
-    radial: np.ndarray
-    tangential: np.ndarray
-    turn: float
-    teeth: float
-
-    def at(self, angle: np.ndarray, carrier: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute radial and tangential displacement (c, a) [m] at housing angles (a,) and carrier angles."""
-        h, n_max = np.arange(self.radial.shape[0]), self.radial.shape[1] // 2
-        n = np.arange(-n_max, n_max + 1)
-        # the mesh frequency is the ring's number of teeth times the carrier's, whichever way it turns;
-        # with errors that turn the first harmonic is a part of that
-        time = np.exp(1j * np.outer(carrier, h * self.teeth * self.turn)) * (h > 0)
-        back, wave = np.exp(-1j * np.outer(carrier, n)), np.exp(1j * np.outer(n, angle))
-        radial, tangential = (((time @ of) * back @ wave).real for of in (self.radial, self.tangential))
-        return radial, tangential
-
-
-def _draw(planetary_set, field, carrier, sensor_angle, title, size):
-    """Draw the frames, arrays (size, size, 3), one for every angle of the carrier [rad]."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.collections import LineCollection, PolyCollection
-
-    outer, corners = planetary_set.ring.rim_radius, _ring_corners(planetary_set)
-    angle = np.angle(corners[:, 0])
-    displacement = field.at(angle, carrier)
-    largest = float(np.hypot(*displacement).max())
-    colour = 1e6 * float(np.abs(displacement[0]).max()) or 1.0
-    scale = _LARGEST_ANIMATED * outer / largest if largest > 0 else 1.0
-    words = f"{title}: deflection of the ring less its mean,\nmagnified {rounded(scale)} times".lstrip(": ")
-    figure, ax, colours = _stage(size, 1.24 * outer, colour, words)
-    ring = PolyCollection([], antialiased=False)
-    edges, gears = LineCollection([], colors="#404040", linewidths=0.8), PolyCollection([], linewidths=0.0)
-    arms = LineCollection([], colors="#808080", linewidths=1.5)
-    sensor = 1.1 * outer * np.exp(1j * sensor_angle) * np.array([1.0, 1.11 + 0.032j, 1.11 - 0.032j])
-    ax.fill(*_xy(sensor).T, color=_SENSOR)
-    place = 1.155 * outer * np.exp(1j * (sensor_angle + 0.07))
-    ax.text(place.real, place.imag, "sensor", color=_SENSOR, fontsize=size / 52, ha="center", va="bottom")
-    ax.plot(*_xy(outer * np.exp(1j * np.linspace(0.0, 2 * np.pi, 361))).T, color="#808080", linewidth=0.8)
-    for collection in (ring, edges, gears, arms):
-        ax.add_collection(collection, autolim=False)
-    outlines = _outlines(planetary_set)
-    gears.set_facecolor([tint for body in outlines for _, tint in body])
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    background, renderer = canvas.copy_from_bbox(figure.bbox), canvas.get_renderer()
-    images = []
-    for at, radial, tangential in zip(carrier, *displacement, strict=True):
-        moved = corners + (scale * (radial + 1j * tangential) * np.exp(1j * angle))[:, None]
-        bands = _bands(np.asarray(colours.norm(0.5e6 * (radial + np.roll(radial, -1)))))
-        ring.set_verts([_xy(np.append(moved[rows, 0], moved[rows[::-1], -1])) for rows, _ in bands])
-        tints = colours.cmap([tint for _, tint in bands])
-        ring.set(facecolor=tints, edgecolor=tints)
-        edges.set_segments([_xy(np.append(moved[:, k], moved[0, k])) for k in (0, -1)])
-        places = _places(planetary_set, at)
-        gears.set_verts(
-            [
-                _xy(centre + points * np.exp(1j * turn))
-                for (centre, turn), body in zip(places, outlines, strict=True)
-                for points, _ in body
-            ]
-        )
-        arms.set_segments([_xy(np.array([0j, centre])) for centre, _ in places[1:]])
-        canvas.restore_region(background)
-        for collection in (ring, edges, gears, arms):
-            collection.draw(renderer)
-        images.append(np.array(canvas.buffer_rgba())[..., :3])
-    return images
-
-
-def _bands(value: np.ndarray) -> list[tuple[np.ndarray, int]]:
-    """Rows of corners round bands of one colour, and its number, by values (n,) of 0 .. 1 between them."""
-    tint = np.clip(value * _TINTS, 0, _TINTS - 1).astype(int)
-    first = np.flatnonzero(tint != np.roll(tint, 1))
-    first = first if len(first) else np.array([0])
-    last = np.append(first[1:], first[0] + len(tint))
-    return [(np.arange(a, b + 1) % len(tint), tint[a]) for a, b in zip(first, last, strict=True)]
-
-
-def _stage(size: int, reach: float, colour: float, words: str):
-    """Figure of `size` pixels, its square of half width `reach` [m], and colours up to +-`colour` [um]."""
-    from matplotlib import colormaps
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import Normalize
-    from matplotlib.figure import Figure
-    from matplotlib.ticker import MaxNLocator
-
-    figure = Figure(figsize=(size / 100, size / 100), dpi=100)
-    ax = figure.add_axes((0.0, 0.12, 1.0, 0.81))
-    ax.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal")
-    ax.set_axis_off()
-    colours = ScalarMappable(Normalize(-colour, colour), colormaps["RdBu_r"].resampled(_TINTS))
-    text = size / 52.0
-    bar = figure.colorbar(colours, cax=figure.add_axes((0.2, 0.085, 0.6, 0.03)), orientation="horizontal")
-    bar.locator = MaxNLocator(4, steps=[1, 2, 5, 10], symmetric=True)
-    bar.set_label("radial displacement [µm]", fontsize=text)
-    bar.ax.tick_params(labelsize=text)
-    figure.text(0.02, 0.985, words, fontsize=text, verticalalignment="top")
-    return figure, ax, colours
-
-
-def gear_outline(gear: Gear) -> np.ndarray:
-    """Draw the exact outline (n,) of all teeth, complex [m], the first centred on angle 0.
-
-    Counter-clockwise: involutes with their generated fillets, tip and root circles.
-    """
-    half = half_sector(gear, flank_elements=_FLANK, refine=_COARSE)
-    parts = [half.curve(name) for name, _ in half.curves if name in ("tip", "flank", "fillet", "root")]
-    # curves of a sector run round it: those of an internal gear come towards its tooth
-    points = np.concatenate(parts)[:: -1 if gear.internal else 1]
-    points = points[:, 0] + 1j * points[:, 1]
-    points = points[np.append(True, np.abs(np.diff(points)) > 1e-9 * gear.module)]
-    # without the middles of tooth and gap, which belong to both halves
-    tooth = np.concatenate([points[:0:-1].conj(), points[:-1]])
-    return np.concatenate([tooth * np.exp(2j * np.pi * k / gear.teeth) for k in range(gear.teeth)])
-
-
-def _ring_corners(planetary_set):
-    """Place the points of the ring (around, across) from the teeth to the outer circle, complex."""
-    ring = planetary_set.ring
-    inner = gear_outline(ring) * np.exp(1j * orientations(planetary_set).ring)
-    # flanks are not radial, so each inner point has its outer one at its own angle
-    outer = ring.rim_radius * np.exp(1j * np.angle(inner))
-    across = np.linspace(0.0, 1.0, 3)
-    return inner[:, None] * (1 - across) + outer[:, None] * across
-
-
-def _places(planetary_set, carrier_angle):
-    """Find centre and rotation of the sun and of every planet when the carrier has turned, ring held."""
-    s = planetary_set
-    # against the carrier the ring turns back by a tooth in every mesh period
-    at = orientations(s, s.ring.teeth * carrier_angle / (2.0 * np.pi))
-    centres = s.centre_distance * np.exp(1j * (np.asarray(s.planet_angles, float) + carrier_angle))
-    turns = (carrier_angle + angle for angle in at.planets)
-    return [(0j, at.sun + carrier_angle), *zip(centres, turns)]
-
-
-def _outlines(planetary_set):
-    """Outlines with their colours, of sun and planets with a mark on each, in the frame of the body."""
-    sun, planet = planetary_set.sun, planetary_set.planet
-    found = []
-    for gear, colour in ((sun, _SUN), *((planet, _PLANET) for _ in planetary_set.planet_angles)):
-        mark = gear.root_radius * (0.8 + 0.07 * np.exp(2j * np.pi * np.arange(12) / 12))
-        found.append(((gear_outline(gear), colour), (mark, _MARK)))
-    return found
-
-
-def _xy(points) -> np.ndarray:
-    """Coordinates (..., 2) of complex points."""
-    return np.stack([points.real, points.imag], axis=-1)
-
-
-def _write_gif(path, images) -> None:
-    """Write the frames with the colours of the first one, whole or not at all."""
-    from PIL import Image
-
-    frames = [Image.fromarray(image) for image in images]
-    palette = frames[0].quantize(128, method=Image.Quantize.MEDIANCUT)
-    first, *others = (frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames)
-    stream, each = io.BytesIO(), 1000.0 * _SECONDS / len(frames)
-    first.save(stream, "GIF", save_all=True, append_images=others, duration=each, loop=0, optimize=False)
     write_bytes(stream.getvalue(), path)

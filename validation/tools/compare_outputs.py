@@ -67,7 +67,7 @@ OTHERS = {
     "sweep": ((*CLI, "sweep", REFERENCE, "--over", "operation.torque=50 N m,100 N m", "-o", "results"),),
     "validate": (("../tree/validation", "--quick", "-o", "validation.md"),),
 }
-PICTURES, DATA = (".png", ".gif"), (".vtu", ".vtp", ".msh")
+PICTURES, DATA = (".png",), (".vtu", ".vtp", ".msh")
 VERSION_ATTRIBUTES = {"femgear_version"}
 TIMED_OUT = -999
 WORST = 10

@@ -21,7 +21,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.gear_set import material_of, planetary_set
-from femgear.case.quantities import RPM
 from femgear.contact.bodies import active_flank_load
 from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
@@ -40,7 +39,7 @@ from femgear.report.response import (
     shown_speeds,
     transmission_error_period,
 )
-from femgear.report.scene import animate_operating_deflection, deformed_picture, ring_modes_grid, write_vtu
+from femgear.report.scene import deformed_picture, ring_modes_grid, write_vtu
 from femgear.report.style import (
     BLACK,
     BLUE,
@@ -499,21 +498,6 @@ def _on_supports(modes: xr.Dataset | None, static: xr.Dataset | None) -> xr.Data
     return modes[["supported_ste"]].rename(supported_ste="ste", supported_position="position")
 
 
-def _write_animation(drawn: Drawn, folder: Path) -> list[str]:
-    """The ring's operating deflection while the carrier turns, at the last speed."""
-    case, last = drawn.case, drawn.data["dynamics"].isel(speed=-1)
-    animate_operating_deflection(
-        folder / "operating_deflection.gif",
-        planetary_set(case),
-        radial=harmonics_of(last, "ring"),
-        tangential=harmonics_of(last, "ring_tangential"),
-        sensor_angle=case.housing.sensor_angle,
-        order=np.sign(float(last["carrier_speed"])) * case.ring.teeth / last.attrs.get("periods", 1),
-        title=f"{case.operation.input} at {case.operation.speeds[-1] / RPM:.0f} rpm",
-    )
-    return ["operating_deflection.gif"]
-
-
 def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
     """What the page walks through of the run-up."""
     runup, housing = drawn.data["runup"], drawn.data.get("housing")
@@ -561,14 +545,8 @@ FIGURES = STATIC | {
             "ring_static_deflection": (
                 "Mean radial deflection of the ring's outer surface, which turns with the carrier."
             ),
-            "operating_deflection": (
-                "Operating deflection of the ring, without its mean, during one revolution of the carrier. "
-                "Every frame is a true instant; the meshes appear slowed down as under a stroboscope. It "
-                "stands on its foundation: supports and casings of housing.nc are not in it."
-            ),
         },
         draw=_dynamics_figures,
-        write=(_write_animation,),
     ),
     "housing": Figures(
         {
