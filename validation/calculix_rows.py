@@ -11,7 +11,7 @@ from femgear.case.planetary import Case
 from femgear.contact.bodies import RING_STATE
 from femgear.fe.elasticity import Material
 from femgear.gears.kinematics import orientations
-from femgear.gears.planetary import GearSet
+from femgear.gears.pair import GearSet
 from femgear.stages.static_results import StaticResult
 from validation import calculix, fixed_housing
 from validation.cases import reference_case, reference_material, reference_static

@@ -15,7 +15,7 @@ from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, moving_members
 from femgear.gears.deviations import body_separation, no_deviations
 from femgear.gears.gear import Gear
-from femgear.gears.planetary import PlanetarySet, equal_planet_angles, rotation_approach
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from validation import independent
 from validation.rows import Row, within
@@ -68,7 +68,7 @@ def linear_forces(errors, *, total: float, supports: Supports) -> np.ndarray:
     compliance = np.eye(2 * N) / MESH + members.compliance
     load = np.zeros(N + 1 + free.shape[1])
     load[N] = total
-    state = solve_contact(compliance, gap, np.hstack([rotation_approach(N), free]), load)
+    state = solve_contact(compliance, gap, np.hstack([gears.rotation_approach, free]), load)
     return state.loads[:N]
 
 

@@ -12,7 +12,7 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 from femgear.case.messages import in_terms_of_the_case, rack_at
 from femgear.case.planetary import Case
@@ -57,8 +57,16 @@ def _need(kind: type, case: Any) -> None:
         )
 
 
+@overload
+def planetary_set(case: Case) -> PlanetarySet: ...
+
+
+@overload
+def planetary_set(case: GearCase) -> Any: ...
+
+
 @remembered(latest=16)
-def planetary_set(case: Any) -> PlanetarySet:
+def planetary_set(case: Any) -> Any:
     """Make the gears of a case, closed on their centre distance [m] and checked.
 
     Profile shifts, or the centre distance, that the case leaves out are found. Gears of a helical case are
@@ -156,9 +164,9 @@ def set_deviations(case: Any) -> SetDeviations:
     return found
 
 
-def line_play(case: Any) -> float:
+def line_play(case: GearCase) -> float:
     """Compute the play of a pair along the line of action [m] with thickness errors; zero for rounding."""
-    gears: Any = planetary_set(case)
+    gears = planetary_set(case)
     play = gears.backlash + body_separation(set_deviations(case), gears, 0.0, back=True)[0, 0]
     return float(play) if play > _PLAY else 0.0
 

@@ -34,7 +34,7 @@ from femgear.gears.modifications import (
     check_form,
     roll_at,
 )
-from femgear.gears.planetary import GearSet
+from femgear.gears.pair import GearSet
 from femgear.gears.profile import BasicRack, PinionCutter, overlap_ratio, transverse_rack, transverse_tool
 
 if TYPE_CHECKING:

@@ -22,7 +22,6 @@ from femgear.contact.flank_pairs import (
     acting_flanks,
     admissible_arcs,
     flank_side,
-    mesh_count,
     mesh_pairs,
     pair_separations,
     profile_form,
@@ -33,8 +32,7 @@ from femgear.contact.local_compliance import hertz_half_width, surface_displacem
 from femgear.contact.supports import MovingMembers
 from femgear.errors import ContactError
 from femgear.gears.deviations import SetDeviations
-from femgear.gears.pair import EACH
-from femgear.gears.planetary import GearSet
+from femgear.gears.pair import GearSet
 
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
 WIDTH = 3.2
@@ -158,7 +156,7 @@ class MeshWindows(Windows):
     @property
     def meshes(self) -> int:
         """Number of meshes, back sides not counted."""
-        return mesh_count(self.gears)
+        return len(self.gears.meshes)
 
     @property
     def cells(self) -> int:
@@ -168,22 +166,22 @@ class MeshWindows(Windows):
     @property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
         """Mesh with windows that stands for each mesh of the set (M,), and which image of it that is (M,)."""
-        n, N = self.n_planets, self.n_planets * self.images
-        kind, planet = np.divmod(np.arange(self.meshes * self.images), N)
-        image, first = np.divmod(planet, n)
-        return kind * n + first, image
+        rows = [np.arange(self.meshes)[of_kind] for of_kind in self.gears.kind_rows]
+        mesh = [np.tile(of_kind, self.images) for of_kind in rows]
+        image = [np.repeat(np.arange(self.images), len(of_kind)) for of_kind in rows]
+        return np.concatenate(mesh), np.concatenate(image)
 
     def kind(self, mesh: np.ndarray) -> np.ndarray:
         """Kinds of meshes (...)."""
-        return mesh // self.n_planets % len(self.gears.kinds)
+        return self.gears.mesh_kind[mesh % self.meshes]
 
     def with_planet_gaps(self, planet_gaps) -> MeshWindows:
         """Add separations (N,) [m] of the sun-side drive flanks of the planets."""
         gap = self.gap.copy()
-        further = np.asarray(planet_gaps, float)[:, None, None]
-        gap[: self.n_planets] += further[..., None]
+        further, driven = np.asarray(planet_gaps, float)[:, None, None], self.gears.kind_rows[0]
+        gap[driven] += further[..., None]
         listed = self.listed.gap.copy()
-        listed[: self.n_planets] += further
+        listed[driven] += further
         return replace(self, gap=gap, listed=replace(self.listed, gap=listed))
 
 
@@ -394,7 +392,7 @@ def mesh_windows(
         Back flanks as well, as the second half of the meshes.
     """
     tau, turns = _in_periods(cycle_positions(positions))
-    N, pairs = planetary_set.n_planets, mesh_pairs(planetary_set)
+    pairs = mesh_pairs(planetary_set)
     widths = [
         WIDTH * _contact_half_width(pair, share / width, modulus)
         for pair, width, modulus in zip(pairs, bodies.widths, bodies.contact_moduli, strict=True)
@@ -405,8 +403,7 @@ def mesh_windows(
         zeta, tooth = _tooth_pairs(planetary_set, pairs, phase, direction, tau - turns)
         shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
         shift += clearance[:, None, None]
-        for kind, contact_pair in enumerate(pairs):
-            rows = slice(kind * N, (kind + 1) * N)
+        for kind, (contact_pair, rows) in enumerate(zip(pairs, planetary_set.kind_rows, strict=True)):
             options = {
                 "width": widths[kind],
                 "cells": cells,
@@ -600,7 +597,7 @@ def contact_candidates(
         Without them all axes are fixed.
     """
     positions = np.asarray(positions)
-    N, near = setup.n_planets, np.moveaxis(setup.near[:, positions], 1, 0)
+    near = np.moveaxis(setup.near[:, positions], 1, 0)
     meshes, slots = near.shape[1], max(int(near.sum(axis=-1).max(initial=0)), 1)
     pair = np.argsort(~near, axis=-1, kind="stable")[..., :slots].reshape(len(positions), -1)
     mesh = np.repeat(np.arange(meshes), slots)
@@ -620,8 +617,10 @@ def contact_candidates(
     if members is not None:
         if setup.images == 1:
             approach = np.hstack([approach, members.approach[:, members.free]])
-        every = meshes // N, setup.images, N
-        supports = members.compliance.reshape(*every, *every)[:, 0].sum(axis=3).reshape(meshes, meshes)
+        supports = members.compliance
+    if setup.images > 1 and members is not None:
+        image = setup.places[1]
+        supports = np.sum([supports[image == 0][:, image == i] for i in range(setup.images)], axis=0)
     return Candidates(
         setup=setup,
         bodies=bodies,
@@ -655,7 +654,7 @@ def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -
             continue
         j, i = mesh[members], pair[:, members]
         roll = setup.roll[gear, j, positions[:, None], i]
-        sectors = smooth[:1] if number == EACH else smooth
+        sectors = smooth[:1] if setup.gears.repeated[number] else smooth
         _add_body(sectors, body, members, roll, setup.tooth[gear, j, i], side)
     root = np.sqrt(bodies.of_kinds(setup.kind(mesh)))
     return smooth / (root[:, None, None, None] * root[:, None])
@@ -667,9 +666,9 @@ def windows_of_bodies(gears: GearSet, mesh: np.ndarray) -> list[tuple]:
     Number of the gear, windows (w,), which gear of its mesh the body is in each (w,), and the flanks (w,).
     """
     # on the back side every gear carries on its other flank
-    found, (back, front) = [], np.divmod(mesh, mesh_count(gears))
+    found, (back, front) = [], np.divmod(mesh, len(gears.meshes))
     for number, acting in acting_flanks(gears):
-        place, side = np.full((2, mesh_count(gears)), -1)
+        place, side = np.full((2, len(gears.meshes)), -1)
         for one, gear, flank in acting:
             place[one], side[one] = gear, flank
         on = np.flatnonzero(place[front] >= 0)
@@ -736,8 +735,7 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
         of_gears = name in ("roll", "at_edge")
         whole = np.concatenate([getattr(w, name) for w in found], axis=int(of_gears))
         parts[name] = whole if name == "cell" else whole[:, *places] if of_gears else whole[places]
-    of_kind = mesh // gears.n_planets % len(gears.kinds)
-    area = parts["cell"] * cells * np.array(bodies.widths)[of_kind]
+    area = parts["cell"] * cells * np.array(bodies.widths)[gears.mesh_kind[mesh % len(gears.meshes)]]
     listed = ListedPairs(
         near=np.concatenate([w.near for w in found]),
         gap=np.concatenate([w.gap.min(axis=-1) for w in found]),
@@ -804,7 +802,7 @@ def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):
 def _corner_part(setup: MeshWindows, bodies: Bodies, mesh, position, pair, polynomials) -> np.ndarray:
     """What tip corners of both flanks add within each window, shape (windows, cells, cells) [m/N]."""
     total = np.zeros((len(mesh), polynomials.shape[1], polynomials.shape[1]))
-    of_kind = mesh // setup.n_planets % len(setup.gears.kinds)
+    of_kind = setup.kind(mesh)
     for kind, pairing in enumerate(setup.gears.mates):
         rows, flanks = of_kind == kind, [bodies.gears[number] for number in pairing]
         place, values = (mesh[rows], position[rows], pair[rows]), polynomials[rows]

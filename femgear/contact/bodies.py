@@ -46,7 +46,8 @@ from femgear.fe.elasticity import (
 from femgear.fe.grid import Grid, mirror
 from femgear.fe.meshing import mesh_outlines
 from femgear.gears.gear import Gear, tooth_thickness
-from femgear.gears.planetary import GearSet, PlanetarySet
+from femgear.gears.pair import GearSet
+from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tooth import half_sector
 
 # external gears are slender along the axis only; the ring's rim is thin and free at its faces

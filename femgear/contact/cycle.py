@@ -37,7 +37,6 @@ from femgear.contact.batch import (
 )
 from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
-from femgear.contact.flank_pairs import mesh_count
 from femgear.contact.omitted_pairs import needed_nearest
 from femgear.contact.peaks import (
     FEWEST,
@@ -62,8 +61,8 @@ from femgear.contact.supports import (
 )
 from femgear.contact.width_waves import WidthWaves
 from femgear.gears.deviations import SetDeviations, mirrored_deviations
-from femgear.gears.pair import EACH
-from femgear.gears.planetary import GearSet, PlanetarySet, mirrored_set
+from femgear.gears.pair import GearSet
+from femgear.gears.planetary import mirrored_set
 
 _TOGETHER, _ROWS, _SAME_PLACE = 64, 50, 1e-6
 """Positions that are solved at once, and slices of helical teeth; distance of two that count as one [mesh periods]."""
@@ -546,7 +545,7 @@ def cycle_without_load(
     pressures, and in how many cells.
     """
     options, N, P = options or CycleOptions(), gears.n_planets, len(position)
-    size = {"g": 2, "m": mesh_count(gears), "n": N, "s": 1, "c": options.cells, "w": options.slices, "t": P}
+    size = {"g": 2, "m": len(gears.meshes), "n": N, "s": 1, "c": options.cells, "w": options.slices, "t": P}
     kinds = {"tooth": int, "back_tooth": int, "iterations": int, "edge_contact": bool}
     values: dict[str, Any] = {
         name: np.zeros([size[axis] for axis in axes], kinds.get(name, float))
@@ -602,7 +601,7 @@ def _first_planets(
     planetary_set: GearSet, count: int, deviations: SetDeviations | None
 ) -> tuple[GearSet, SetDeviations | None]:
     """Take the first planets of a set, and their deviations."""
-    if not isinstance(planetary_set, PlanetarySet) or count == planetary_set.n_planets:
+    if count == planetary_set.n_planets:
         return planetary_set, deviations
     names = (
         "planet_misalignment",
@@ -614,7 +613,7 @@ def _first_planets(
     )
     if deviations is not None:
         deviations = replace(deviations, **{name: getattr(deviations, name)[:count] for name in names})
-    return replace(planetary_set, planet_angles=planetary_set.planet_angles[:count]), deviations
+    return planetary_set.with_planet_angles(planetary_set.planet_angles[:count]), deviations
 
 
 @dataclass(frozen=True)
@@ -924,8 +923,8 @@ class _Walk:
 
         ``tau`` are all positions, of every slice.
         """
-        N, cells, every = self.planetary_set.n_planets, setup.cells, setup.places[0]
-        meshes = mesh_count(self.planetary_set)
+        cells, every, driven = setup.cells, setup.places[0], self.planetary_set.kind_rows[0]
+        meshes = len(self.planetary_set.meshes)
         drive, back = slice(0, meshes), slice(meshes, 2 * meshes)
         values = {name: np.concatenate([some[name] for some in found], axis=-1) for name in found[0]}
         path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
@@ -934,10 +933,9 @@ class _Walk:
         path = path.reshape(*path.shape[:2], len(self.empty.position), -1).mean(axis=-1)
         if self.images > 1:
             s, turned = self.planetary_set, np.zeros((2, meshes), int)
-            for kind, place, number in ((k, p, pair[p]) for k, pair in enumerate(s.mates) for p in (0, 1)):
-                if number != EACH:
-                    teeth = s.gears[number].teeth // self.images
-                    turned[place, kind * N : (kind + 1) * N] = setup.places[1][:N] * teeth
+            for rows, pair in zip(s.kind_rows, s.mates, strict=True):
+                for place in (place for place in (0, 1) if not s.repeated[pair[place]]):
+                    turned[place, rows] = setup.places[1][rows] * (s.gears[pair[place]].teeth // self.images)
             tooth = tooth[:, every] + turned[..., None]
         values |= {"path": path[drive], "tooth": tooth[:, drive]}
         values |= self._most_pressed(values)
@@ -957,7 +955,7 @@ class _Walk:
             values |= self._repeated(values)
             values = self._with_near_pairs(values)
         record = replace(self.empty, **values)
-        unloaded = record.force[:N] + record.back_force[:N] <= 0.0
+        unloaded = record.force[driven] + record.back_force[driven] <= 0.0
         message = "all positions by the active set"
         if unloaded.any():
             message += "; some planets lose all load"
@@ -1044,7 +1042,7 @@ class _Walk:
         A rotation that maps planets onto one another takes the set, at another position, into itself: planet
         and tooth pairs are then those of the planet that was there.
         """
-        N, kinds, P = self.planetary_set.n_planets, len(self.planetary_set.kinds), len(self.empty.position)
+        N, P = self.planetary_set.n_planets, len(self.empty.position)
         part, phase = P // self.repeats, np.asarray(self.planetary_set.mesh_phases)
         step = N // self.turns
         later = np.arange(self.turns) * (phase[step] - phase[0]) * self.repeats
@@ -1054,7 +1052,7 @@ class _Walk:
             away = np.abs(np.mod(later - number + 0.5 * self.repeats, self.repeats) - 0.5 * self.repeats)
             turns = int(np.argmin(away))
             planet = (np.arange(N) + turns * step) % N
-            mesh = np.concatenate([planet + kind * N for kind in range(kinds)])
+            mesh = self.planetary_set.moved_meshes(planet)
             known = {"m": mesh, "n": planet}
             slots = {back: _same_pairs(values[f"{back}path"], mesh, number * part, pitch) for back in ("", "back_")}
             for axes, names in _AXES.items():
@@ -1145,8 +1143,7 @@ def _both_flanks(tangents: ContactTangents, images, meshes: int) -> np.ndarray:
 def _seen_from_front(cycle: MeshCycle, planetary_set: GearSet, order) -> MeshCycle:
     """Results of the mirror image in the order of planets and positions of the original."""
     planet, angle = np.argsort(order), planetary_set.planet_angles[0]
-    kinds = range(len(planetary_set.kinds))
-    own: dict[str, Any] = {"m": np.concatenate([planet + kind * len(order) for kind in kinds]), "n": planet}
+    own: dict[str, Any] = {"m": planetary_set.moved_meshes(planet), "n": planet}
     own["g"] = np.arange(2)
     own["w"] = slice(None)
     found = {}

@@ -20,7 +20,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from itertools import chain
 
 import numpy as np
 
@@ -33,8 +32,8 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations, pitch_tooth
-from femgear.gears.pair import EACH
-from femgear.gears.planetary import GearSet, mirrored_set
+from femgear.gears.pair import GearSet
+from femgear.gears.planetary import mirrored_set
 
 LEFT, RIGHT = 0, 1
 """Flanks of a tooth."""
@@ -155,23 +154,19 @@ def mesh_pairs(planetary_set: GearSet) -> tuple[FlankPair, ...]:
     )
 
 
-def mesh_count(planetary_set: GearSet) -> int:
-    """Count the meshes of a set: one of every kind at every planet."""
-    return len(planetary_set.kinds) * planetary_set.n_planets
-
-
 def acting_flanks(planetary_set: GearSet) -> list[tuple[int, list[tuple[int, int, int]]]]:
     """List all bodies of a set: number of the gear, and drive flanks (mesh, gear of the pair, side)."""
-    s, N, found = planetary_set, planetary_set.n_planets, []
-    for number, sense in enumerate(s.senses):
+    found = []
+    for number, body in enumerate(planetary_set.bodies):
+        ahead = planetary_set.senses[body.gear] > 0
+        # gear 1 pushes with the flank that goes ahead, gear 2 is pushed on the one behind
         acting = [
-            # gear 1 pushes with the flank that goes ahead, gear 2 is pushed on the one behind
-            [(kind * N + n, place, LEFT if (sense > 0) == (place == 0) else RIGHT) for n in range(N)]
-            for kind, pair in enumerate(s.mates)
-            for place in np.flatnonzero(np.array(pair) == number).tolist()
+            (j, place, LEFT if ahead == (place == 0) else RIGHT)
+            for j, mesh in enumerate(planetary_set.meshes)
+            for place in (0, 1)
+            if mesh.bodies[place] == number
         ]
-        bodies = zip(*acting, strict=True) if number == EACH else [chain(*acting)]
-        found += [(number, list(body)) for body in bodies]
+        found.append((body.gear, acting))
     return found
 
 
@@ -181,14 +176,14 @@ def tooth_numbers(planetary_set: GearSet, index: np.ndarray) -> tuple[np.ndarray
     A pair of mesh j with index i touches at the pitch point when the position is ``-(phase_j + i)``; the
     tooth is then at the planet's angle, less its half thickness, which fixes its place on the body.
     """
-    s, N, at = planetary_set, planetary_set.n_planets, orientations(planetary_set)
-    psi, exact = np.asarray(s.planet_angles), np.zeros((2, *index.shape))
+    s, at = planetary_set, orientations(planetary_set).bodies
+    exact = np.zeros((2, *index.shape))
     turns = np.asarray(s.mesh_phases)[:, None] + index
-    for kind, pair in enumerate(s.mates):
-        rows = slice(kind * N, (kind + 1) * N)
-        for place, number in enumerate(pair):
-            away = psi + sum(pitch_tooth(s, kind, place)) - np.asarray(at.gears[number])
-            exact[place, rows] = away[:, None] / s.gears[number].pitch_angle + s.senses[number] * turns[rows]
+    for j, mesh in enumerate(s.meshes):
+        for place, body in enumerate(mesh.bodies):
+            number = s.bodies[body].gear
+            away = mesh.angle + sum(pitch_tooth(s, mesh.kind, place)) - at[body]
+            exact[place, j] = away / s.gears[number].pitch_angle + s.senses[number] * turns[j]
     whole = np.rint(exact).astype(int)
     if np.abs(exact - whole).max() > 1e-3:
         raise ContactError(
@@ -204,41 +199,35 @@ def flank_side(planetary_set: GearSet, direction: float) -> tuple[np.ndarray, np
 
     The clearance is the separation of that side when the drive flanks just touch: zero, or the backlash.
     """
-    s, N = planetary_set, planetary_set.n_planets
+    s = planetary_set
     if direction > 0:
-        return np.asarray(s.mesh_phases), np.zeros(mesh_count(s))
+        return np.asarray(s.mesh_phases), np.zeros(len(s.meshes))
     mirrored, order = mirrored_set(s)
-    phase = np.empty(mesh_count(s))
-    phase[_mesh_order(s, order)] = mirrored.mesh_phases
+    phase = np.empty(len(s.meshes))
+    phase[s.moved_meshes(order)] = mirrored.mesh_phases
     phase += _mirrored_position(s, mirrored)
-    return phase, np.repeat([kind.backlash for kind in s.kinds], N)
+    return phase, s.of_kinds([kind.backlash for kind in s.kinds])
 
 
 def side_teeth(planetary_set: GearSet, index: np.ndarray, direction: float):
     """Find the teeth (2, meshes, pairs) of the pairs `index` of a side, in the drive side's count."""
     if direction > 0:
         return np.stack(tooth_numbers(planetary_set, index))
-    s, N = planetary_set, planetary_set.n_planets
+    s = planetary_set
     mirrored, order = mirrored_set(s)
-    rows = _mesh_order(s, order)
+    rows = s.moved_meshes(order)
     teeth = np.empty((2, *index.shape), int)
     teeth[:, rows] = -np.stack(tooth_numbers(mirrored, index[rows]))
     # the tooth that the mirror image counts as zero stands here, counted in the original
     here, image = orientations(s), orientations(mirrored, _mirrored_position(s, mirrored))
-    for kind, pair in enumerate(s.mates):
-        for place, number in enumerate(pair):
-            reflected = np.array(image.gears[number])
-            if number == EACH:
-                reflected[order] = image.gears[number]
-            away = 2 * s.planet_angles[0] - reflected - np.array(here.gears[number])
-            offset = np.rint(away / s.gears[number].pitch_angle).astype(int)
-            teeth[place, kind * N : (kind + 1) * N] += offset[:, None]
+    places = np.argsort(order)
+    for j, mesh in enumerate(s.meshes):
+        for place, body in enumerate(mesh.bodies):
+            number, copy = s.bodies[body].gear, s.bodies[body].copy
+            reflected = image.gears[number][places[copy] if s.repeated[number] else copy]
+            away = 2 * s.planet_angles[0] - reflected - here.gears[number][copy]
+            teeth[place, j] += np.rint(away / s.gears[number].pitch_angle).astype(int)
     return teeth
-
-
-def _mesh_order(planetary_set: GearSet, order: np.ndarray) -> np.ndarray:
-    """Meshes (meshes,) of a set in the order of the planets (N,) of its mirror image."""
-    return np.concatenate([order + kind * len(order) for kind in range(len(planetary_set.kinds))])
 
 
 def profile_form(planetary_set: GearSet, deviations: SetDeviations | None, kind: int, back: bool) -> Callable | None:
@@ -265,7 +254,7 @@ def pair_separations(
     back : bool
         Whether it is the back side.
     """
-    meshes = mesh_count(planetary_set)
+    meshes = len(planetary_set.meshes)
     shift = np.zeros((meshes, len(tau), tooth.shape[2]))
     if deviations is None:
         return shift
@@ -281,7 +270,7 @@ def tooth_steps(planetary_set: GearSet, mesh, gear):
 
     The sun's teeth move on by one, -1 in its count; those of planets and ring back, +1.
     """
-    kind = np.asarray(mesh) // planetary_set.n_planets
+    kind = planetary_set.mesh_kind[mesh]
     return -np.array(planetary_set.senses)[np.array(planetary_set.mates)[kind, gear]]
 
 

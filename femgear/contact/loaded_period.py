@@ -30,7 +30,7 @@ from femgear.contact.face_width import over_slices
 from femgear.contact.supports import RIGID, Supports
 from femgear.curves import parabolas
 from femgear.gears.deviations import SetDeviations, common_period, planet_shift, without_turning
-from femgear.gears.planetary import GearSet
+from femgear.gears.pair import GearSet
 
 SHORTEST = 2.0**-13
 """Mesh periods in which a jump is enclosed."""
@@ -262,7 +262,7 @@ def _whole_period(planetary_set: GearSet, record: dict, symmetry: int, shift: Fr
     for part in range(parts):
         moved = (np.arange(N) - ahead * (step * part % parts)) % N
         meshes, own = (
-            np.concatenate([planets + first for first in range(0, len(mean), N)])
+            planetary_set.moved_meshes(planets)
             # planets that are alike at all times are one
             for planets in (moved, moved % (ahead * parts))
         )

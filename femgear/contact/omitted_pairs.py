@@ -12,7 +12,6 @@ import numpy as np
 
 from femgear.contact.assembly import Candidates, windows_of_bodies
 from femgear.contact.bodies import station_weights
-from femgear.gears.pair import EACH
 
 
 def needed_nearest(found: Candidates, approach, force) -> np.ndarray:
@@ -67,7 +66,7 @@ def yielding(found: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarra
         place, share = station_weights(listed.roll[gear_of, mesh[these], at, pair[these]], body.roll)
         place = place + (side_of * len(body.roll))[:, None]
         away = listed.tooth[gear_of, mesh[these], pair[these]][:, None] - setup.tooth[gear, j, i]
-        count, images = len(body.regular), 1 if number == EACH else setup.images
+        count, images = len(body.regular), 1 if setup.gears.repeated[number] else setup.images
         for image in range(images):
             lag = (away - image * count // images) % count
             values = body.regular[lag[..., None, None], place[:, None, :, None], index[:, :, None, :]]

@@ -42,7 +42,7 @@ from femgear.contact.bodies import (
     station_weights,
 )
 from femgear.contact.cycle import MeshCycle
-from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks, mesh_count
+from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks
 from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
 from femgear.contact.width_waves import cosines
 from femgear.curves import not_a_knot
@@ -50,8 +50,7 @@ from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import Material, plane_modulus, stiffness, wave_stiffness
 from femgear.fe.grid import Grid
 from femgear.gears.gear import Gear
-from femgear.gears.pair import EACH
-from femgear.gears.planetary import GearSet
+from femgear.gears.pair import GearSet
 from femgear.gears.tooth import root_notches
 
 LOADED, BACK = 0, 1
@@ -383,7 +382,7 @@ def root_stress_cycle(
         field = body_stress(planetary_set, root, acting, slices, samples, numbers)
         for target, stress in zip(acting, np.split(field, len(acting)), strict=True):
             found[target[:2]] = _root_cycle(s, s.gears[number].name, root, cycle, target, stress)
-    return tuple(found[mesh, gear] for mesh in range(mesh_count(planetary_set)) for gear in (0, 1))
+    return tuple(found[mesh, gear] for mesh in range(len(planetary_set.meshes)) for gear in (0, 1))
 
 
 def root_ranges(
@@ -405,7 +404,7 @@ def root_ranges(
     for number, root, acting in roots.of_bodies(planetary_set):
         for one in _body_ranges(planetary_set, number, root, acting, (slices, *between), closes):
             found[one.mesh, one.gear] = one
-    return tuple(found[mesh, gear] for mesh in range(mesh_count(planetary_set)) for gear in (0, 1))
+    return tuple(found[mesh, gear] for mesh in range(len(planetary_set.meshes)) for gear in (0, 1))
 
 
 def body_stress(
@@ -508,7 +507,7 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, records, clos
         point, piece = divmod(int(widest[tooth]), S)
         # seen from behind the teeth are counted the other way round
         counted = (-1 if teeth.reverse else 1) * np.arange(z) % alike
-        start = acting[0] if number == EACH else target
+        start = acting[0] if planetary_set.repeated[number] else target
         yield RootRange(
             kind=planetary_set.gears[number].name,
             mesh=target[0],

@@ -17,13 +17,12 @@ planetary gears using an extended harmonic balance approach", NREL/CP-5000-55355
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from femgear.errors import ContactError
-from femgear.gears.kinematics import MEMBERS, member_approach, mesh_normals, unheld_members
-from femgear.gears.planetary import GearSet, PlanetarySet
+from femgear.gears.kinematics import across, member_approach, mesh_normals, unheld_members, unit_vectors
+from femgear.gears.pair import BRANCH, GearSet
 
 SPRINGS = 120
 """One-sided springs of a planet bearing with clearance: even, so that they are their own mirror image.
@@ -170,7 +169,7 @@ class TiltingMembers:
     coupling: np.ndarray
 
 
-def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) -> TiltingMembers | None:
+def tilting_members(planetary_set: GearSet, supports: WidthSupports, slices: int) -> TiltingMembers | None:
     """List tilts and twists that the supports allow, with their effect on every slice; None without any.
 
     A member that tilts displaces its section at z like a motion by slope times z; across the flanks of spur
@@ -184,7 +183,7 @@ def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) ->
     """
     if supports == UPRIGHT:
         return None
-    s, N, width = planetary_set, planetary_set.n_planets, planetary_set.mesh_widths[0]
+    s, width = planetary_set, planetary_set.mesh_widths[0]
     along = 2.0 * (np.arange(slices) + 0.5) / slices - 1.0
     tilts = _one_side(s, Supports(supports.sun, supports.carrier, supports.planet), False)
     free = tilts.approach[:, tilts.free]
@@ -201,18 +200,17 @@ def tilting_members(planetary_set: Any, supports: WidthSupports, slices: int) ->
     names, stiffness = list(tilts.names), tilts.stiffness / (0.5 * width) ** 2
     approach, angle = tilts.approach[:, None] * along[:, None], np.full(len(names), 2.0 / width)
     if supports.wind_up is not None:
-        psi, radius = np.tile(s.planet_angles, 2), s.centre_distance
-        tangent = np.stack([-np.sin(psi), np.cos(psi)], axis=1)
+        tangent, radius = across(unit_vectors(s.mesh_angles)), s.centre_distance
         share = 0.5 * (1.0 - supports.wind_up_end * along)
         moved = (member_approach(s)["carrier"] * tangent).sum(axis=1)[:, None] * share
         approach = np.concatenate([approach, moved[..., None]], axis=-1)
         stiffness, angle = np.append(stiffness, supports.wind_up / radius**2), np.append(angle, 1.0 / radius)
         names.append("carrier: wind-up")
-    coupling = np.zeros((2 * N, slices) * 2)
+    coupling, driven = np.zeros((len(s.meshes), slices) * 2), s.kind_rows[0]
     if supports.sun_rigidity is not None:
         reach = 0.5 * width * (1.0 - supports.sun_end * along)
         shorter = np.minimum.outer(reach, reach) - np.eye(slices) * width / (6 * slices)
-        coupling[:N, :, :N] = s.sun.base_radius**2 / (supports.sun_rigidity * slices) * shorter[:, None]
+        coupling[driven, :, driven] = s.gears[0].base_radius ** 2 / (supports.sun_rigidity * slices) * shorter[:, None]
     if not names and not coupling.any():
         return None
     return TiltingMembers(tuple(names), approach, stiffness, angle, coupling)
@@ -226,8 +224,7 @@ def moving_members(planetary_set: GearSet, supports: Supports, *, both_flanks: b
     if supports == RIGID:
         sides = 1 + both_flanks
         return MovingMembers((), np.zeros((sides * len(planetary_set.mesh_names), 0)), np.zeros(0))
-    assert isinstance(planetary_set, PlanetarySet)
-    floating = [name for name in MEMBERS if getattr(supports, name) == 0.0]
+    floating = [name for name in planetary_set.members if getattr(supports, name) == 0.0]
     loose = unheld_members(planetary_set, floating, both_flanks=both_flanks)
     if loose:
         planets = planetary_set.n_planets
@@ -256,7 +253,7 @@ def bearing_springs(planetary_set: GearSet, supports: Supports, members: MovingM
     arms = np.zeros((N, n, len(names)))
     for planet in range(N):
         column = names.index(f"planet {planet + 1}: x")
-        arms[planet, :, column], arms[planet, :, column + 1] = np.cos(angle[planet]), np.sin(angle[planet])
+        arms[planet, :, column : column + 2] = unit_vectors(angle[planet])
     compliance = n / (4.0 * supports.planet)
     return BearingSprings(supports.planet_clearance, compliance, arms.reshape(N * n, -1))
 
@@ -270,26 +267,29 @@ def pin_forces(planetary_set: GearSet, force, back_force) -> np.ndarray:
 
     ``force`` and ``back_force`` (meshes, P) [N] are those on drive and back flanks.
     """
-    N = planetary_set.n_planets
-    result = np.zeros((N, 2, np.shape(force)[1]))
+    s = planetary_set
+    result = np.zeros((s.n_planets, 2, np.shape(force)[1]))
     for back, carried in ((False, force), (True, back_force)):
-        along = mesh_normals(planetary_set, back=back)[:, :, None] * np.asarray(carried)[:, None, :]
-        on_planet = -along[:N]
-        result += on_planet if len(along) == N else along[N:] + on_planet
+        along, pins = mesh_normals(s, back=back)[:, :, None] * np.asarray(carried)[:, None, :], np.zeros(result.shape)
+        for mesh, on_gears in zip(s.meshes, along, strict=True):
+            for body, push in zip(mesh.bodies, (1.0, -1.0), strict=True):
+                if s.bodies[body].gear == BRANCH:
+                    pins[s.bodies[body].copy] += push * on_gears
+        result += pins
     return result
 
 
-def _one_side(planetary_set: PlanetarySet, supports: Supports, back: bool) -> MovingMembers:
+def _one_side(planetary_set: GearSet, supports: Supports, back: bool) -> MovingMembers:
     """Motions and their approach (2N, m) on one side of the teeth."""
-    N, motions = planetary_set.n_planets, member_approach(planetary_set, back=back)
-    moved = [(name, getattr(supports, name), motions[name]) for name in MEMBERS]
+    s, motions = planetary_set, member_approach(planetary_set, back=back)
+    moved = [(name, getattr(supports, name), effect) for name, effect in motions.items()]
     # with clearance the springs of the bearing are candidates of the contact problem instead
     bearing = 0.0 if supports.planet_clearance else supports.planet
-    planet = np.arange(2 * N)[:, None] % N
-    moved += [(f"planet {n + 1}", bearing, np.where(planet == n, motions["carrier"], 0.0)) for n in range(N)]
+    branch = np.array([mesh.copy for mesh in s.meshes])[:, None]
+    moved += [(f"planet {n + 1}", bearing, np.where(branch == n, motions["carrier"], 0.0)) for n in range(s.n_planets)]
     found = [(name, value, effect) for name, value, effect in moved if value is not None]
     return MovingMembers(
         names=tuple(f"{name}: {axis}" for name, _, _ in found for axis in "xy"),
-        approach=np.hstack([np.zeros((2 * N, 0)), *(effect for _, _, effect in found)]),
+        approach=np.hstack([np.zeros((len(s.meshes), 0)), *(effect for _, _, effect in found)]),
         stiffness=np.array([value for _, value, _ in found for _ in "xy"], float),
     )

@@ -16,8 +16,7 @@ from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import acting_flanks, mesh_pairs, tooth_steps
 from femgear.fe.compliance import cyclic_displacement, mirror_nodes, mirrored_columns
 from femgear.gears.kinematics import orientations
-from femgear.gears.pair import EACH
-from femgear.gears.planetary import GearSet, PlanetarySet
+from femgear.gears.pair import GearSet
 
 LOAD_BINS = 20
 
@@ -66,7 +65,7 @@ class LoadedTeeth:
 
     def on_body(self, planetary_set: GearSet, acting) -> Iterator[_ToothLoad]:
         """Tooth pairs that load one body with the drive flanks `acting`, see `acting_flanks`."""
-        pairs, N = mesh_pairs(planetary_set), planetary_set.n_planets
+        pairs, kind = mesh_pairs(planetary_set), planetary_set.mesh_kind
         for mesh, gear, side in acting:
             for flank, loads, paths, numbers in (
                 (side, self.load, self.path, self.tooth),
@@ -75,7 +74,7 @@ class LoadedTeeth:
             ):
                 for load, path, tooth in zip(loads[mesh], paths[mesh], numbers[gear, mesh], strict=True):
                     if load.any():
-                        roll = pairs[mesh // N].roll_on(gear, path)
+                        roll = pairs[kind[mesh]].roll_on(gear, path)
                         step = int(tooth_steps(planetary_set, mesh, gear))
                         yield _ToothLoad(int(tooth), step, flank, roll, load)
 
@@ -155,13 +154,13 @@ def loaded_teeth(cycle: MeshCycle, *, reverse: bool) -> LoadedTeeth:
     )
 
 
-def load_spectrum(teeth: LoadedTeeth, mates=PlanetarySet.mates, *, closes: bool = True) -> LoadSpectrum:
+def load_spectrum(gears: GearSet, teeth: LoadedTeeth, *, closes: bool = True) -> LoadSpectrum:
     """Count the load spectrum of the teeth of every mesh.
 
     Parameters
     ----------
-    mates : tuple
-        Of the set.
+    gears : GearSet
+        Whose teeth they are.
     closes : bool
         Whether the record repeats after its end; otherwise engagements that its ends cut off do not count,
         unless the record is too short to hold another.
@@ -171,11 +170,9 @@ def load_spectrum(teeth: LoadedTeeth, mates=PlanetarySet.mates, *, closes: bool 
     peaks = _engagement_peaks(teeth, closes)
     loaded = (peaks > 0.0).mean(axis=-1)
     cycles = np.empty((meshes, 2))
-    N = meshes // len(mates)
-    for kind, pair in enumerate(mates):
-        rows = slice(kind * N, (kind + 1) * N)
+    for pair, rows in zip(gears.mates, gears.kind_rows, strict=True):
         for place, number in enumerate(pair):
-            cycles[rows, place] = loaded[rows] if number == EACH else loaded[rows].sum()
+            cycles[rows, place] = loaded[rows] if gears.repeated[number] else loaded[rows].sum()
     return LoadSpectrum(
         edges=edges,
         time=_shares(teeth.load.reshape(meshes, -1), edges),
@@ -197,13 +194,11 @@ def deformed_set(
     s, found = planetary_set, []
     at = orientations(s, float(cycle.position[position]))
     teeth, bodies = loaded_teeth(cycle, reverse=False), acting_flanks(s)
-    for number, (gear, sector) in enumerate(zip(s.gears, sectors.gears, strict=True)):
-        own = [acting for one, acting in bodies if one == number]
-        for n, acting in enumerate(own):
-            name = f"{gear.name} {n + 1}" if number == EACH and len(s.kinds) > 1 else gear.name
-            centre, moved = s.centres[number][n], _displacement(teeth, s, sector, acting, position)
-            place = np.array([centre.real, centre.imag])
-            found.append(DeformedBody(name, gear.name, place, float(at.gears[number][n]), moved))
+    for body, (number, acting) in zip(s.bodies, bodies, strict=True):
+        moved = _displacement(teeth, s, sectors.gears[number], acting, position)
+        centre, angle = s.centres[number][body.copy], at.gears[number][body.copy]
+        place = np.array([centre.real, centre.imag])
+        found.append(DeformedBody(body.name, s.gears[number].name, place, float(angle), moved))
     return tuple(found)
 
 

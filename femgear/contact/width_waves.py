@@ -54,7 +54,6 @@ from femgear.curves import not_a_knot
 from femgear.fe.compliance import FreeSector, condense_sector, condense_sums, tooth_compliance
 from femgear.fe.elasticity import Material, material_of_each, stiffness, wave_stiffness
 from femgear.gears.gear import Gear
-from femgear.gears.pair import EACH
 
 _WAVES = 9
 """Wave numbers at which bodies are computed; between them their compliance is interpolated."""
@@ -293,7 +292,7 @@ def _over_bodies(found: Candidates, windows, waves: Sequence[WidthWaves], add, f
         of_waves = [[one.gears[number] for one in of_set.bodies] for of_set in waves]
         if of_waves[0][0] is None:
             continue
-        sectors = slice(1) if number == EACH else slice(None)
+        sectors = slice(1) if setup.gears.repeated[number] else slice(None)
         if all(bodies[0] is of_waves[0][0] for bodies in of_waves):
             add(shared[sectors], of_waves[0], *on_body)
             continue

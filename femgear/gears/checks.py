@@ -8,17 +8,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import fields, replace
+from dataclasses import replace
 from itertools import pairwise
 
 from femgear.errors import GeometryError
 from femgear.findings import DOUBT, Finding
 from femgear.gears.gear import USUAL_LAND, Gear, GeometryWarning, combined_fault, tooth_thickness
-from femgear.gears.pair import EACH, GearPair, zero_backlash_distance, zero_backlash_shift
+from femgear.gears.pair import GearPair, GearSet, zero_backlash_distance, zero_backlash_shift
 from femgear.gears.planetary import (
     BACKLASH_TOLERANCE,
     SIGN_TOLERANCE,
-    GearSet,
     PlanetarySet,
     assembly_positions,
     feasible_angles,
@@ -92,13 +91,9 @@ def _meshes(s: GearSet, overlap: float = 0.0) -> Iterator[GeometryError | Findin
 
 def _free_tips(s: GearSet) -> str:
     """Tip diameters with which all gears run free of each other, of those that would change; or nothing."""
-    names = [field.name for field in fields(s)][: len(s.gears)]
-    opened = {
-        name: replace(gear, tip_diameter=None, tip_shortening=0.0, tip_open=True)
-        for name, gear in zip(names, s.gears, strict=True)
-    }
+    opened = [replace(gear, tip_diameter=None, tip_shortening=0.0, tip_open=True) for gear in s.gears]
     try:
-        freed = settled_tips(replace(s, **opened), free=names)
+        freed = settled_tips(s.with_gears(opened), free=[gear.name for gear in s.gears])
     except GeometryError:
         return ""
     if any(isinstance(one, GeometryError) for one in _meshes(freed)):
@@ -193,7 +188,7 @@ def _backlash(s: GearSet):
     least = min(pair.backlash - _asked_play(pair) for pair in s.kinds)
     for pair, numbers in zip(s.kinds, s.mates, strict=True):
         mesh, value = f"{pair.gear_1.name}-{pair.gear_2.name}", pair.backlash
-        gear = next(gear for gear, number in zip(pair.gears, numbers, strict=True) if number != EACH)
+        gear = next(gear for gear, number in zip(pair.gears, numbers, strict=True) if not s.repeated[number])
         if value < -BACKLASH_TOLERANCE * module:
             yield GeometryError(
                 f"{mesh}: the flanks overlap by {-value * 1e6:.3f} um along the line of action at the centre "

@@ -21,10 +21,9 @@ from fractions import Fraction
 import numpy as np
 
 from femgear.gears.gear import Gear, GeometryWarning
-from femgear.gears.kinematics import member_approach, mesh_normals, orientations
+from femgear.gears.kinematics import across, member_approach, mesh_normals, orientations, unit_vectors
 from femgear.gears.modifications import FlankForm, check_flank, form_deviation, lead_deviation, profile_height
-from femgear.gears.pair import EACH
-from femgear.gears.planetary import GearSet
+from femgear.gears.pair import BRANCH, GearSet
 
 _MISALIGNMENTS = ("sun_misalignment", "carrier_misalignment", "planet_misalignment")
 LONGEST_RECORD = 256
@@ -186,8 +185,8 @@ def no_deviations(planetary_set: GearSet) -> SetDeviations:
         planet_ring_side=FlankForm(),
         ring=FlankForm(),
         sun_pitch=np.zeros(s.gears[0].teeth),
-        planet_pitch=np.zeros((N, s.gears[EACH].teeth)),
-        planet_ring_side_pitch=np.zeros((N, s.gears[EACH].teeth)),
+        planet_pitch=np.zeros((N, s.gears[BRANCH].teeth)),
+        planet_ring_side_pitch=np.zeros((N, s.gears[BRANCH].teeth)),
         ring_pitch=np.zeros(s.gears[-1].teeth),
         planet_runout=(Runout(),) * N,
         pin_errors=np.zeros((N, 2)),
@@ -246,15 +245,14 @@ def lead_separation(
     out.
     """
     d, s, fine = deviations, planetary_set, 16
-    N, gears = s.n_planets, [pair.gears for pair in s.kinds]
-    across = (np.arange(slices * fine) + 0.5) / (slices * fine) - 0.5
+    place_over_width = (np.arange(slices * fine) + 0.5) / (slices * fine) - 0.5
     apart = -misaligned_approach(d, s, back=back)
     found = []
-    for mesh in range(len(apart)):
-        place = s.mesh_widths[mesh // N] * across
+    for mesh, kind in enumerate(s.mesh_kind.tolist()):
+        place = s.mesh_widths[kind] * place_over_width
         removed = apart[mesh] * place
-        for i, form in enumerate(d.mesh_forms(mesh // N, back=back)):
-            gear = gears[mesh // N][i]
+        for i, form in enumerate(d.mesh_forms(kind, back=back)):
+            gear = s.kinds[kind].gears[i]
             height = 0.0 if rolls is None else profile_height(gear, rolls[i][mesh])[..., None]
             removed = removed + lead_deviation(form, gear.face_width, place, height)
         found.append(removed)
@@ -266,11 +264,10 @@ def misaligned_approach(d: SetDeviations, s: GearSet, *, back: bool = False) -> 
     """Compute the approach (2N,) of the flanks of every mesh by axes askew, per place over the width [1]."""
     if not any(np.any(one) for one in (d.planet_misalignment, d.sun_misalignment, d.carrier_misalignment)):
         return np.zeros(len(s.mesh_names))
-    motions, angles = member_approach(s, back=back), np.asarray(s.planet_angles)
-    radial = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    motions, radial = member_approach(s, back=back), unit_vectors(np.asarray(s.planet_angles))
     outwards, along = d.planet_misalignment.T[..., None]
-    planets = outwards * radial + along * (radial[:, ::-1] * [-1.0, 1.0]) + d.carrier_misalignment
-    planets = np.tile(planets, (2, 1))
+    planets = outwards * radial + along * across(radial) + d.carrier_misalignment
+    planets = planets[[mesh.copy for mesh in s.meshes]]
     return motions["sun"] @ d.sun_misalignment + (motions["carrier"] * planets).sum(axis=1)
 
 
@@ -299,11 +296,11 @@ def body_separation(deviations: SetDeviations, planetary_set: GearSet, position,
     d, s = deviations, planetary_set
     moved = _relative_displacements(d, s, np.atleast_1d(np.asarray(position, float)))
     normals = mesh_normals(s, back=back) @ np.array([1.0, 1.0j])
-    kinds = len(s.kinds)
-    thinner = np.tile(0.5 * (d.planet_thickness - d.planet_thickness.min()), kinds)
+    copies = [mesh.copy for mesh in s.meshes]
+    thinner = 0.5 * (d.planet_thickness - d.planet_thickness.min())[copies]
     if back:
-        others = np.repeat([d.sun_thickness, d.ring_thickness][:kinds], s.n_planets)
-        thinner = others + np.tile(d.planet_thickness, kinds) - thinner
+        others = np.array([d.sun_thickness, d.ring_thickness])[s.mesh_kind]
+        thinner = others + d.planet_thickness[copies] - thinner
     return np.real(normals.conj()[:, None] * moved) + thinner[:, None] * math.cos(s.gears[0].pressure_angle)
 
 
@@ -320,7 +317,7 @@ def _relative_displacements(d: SetDeviations, s: GearSet, position: np.ndarray) 
     ]
     # pin errors and the eccentric pin circle
     pins = d.pin_errors @ np.array([1.0, 1.0j]) * np.exp(1j * psi)
-    moved[EACH] = (pins + _turning(d.carrier_runout, 0.0))[:, None] + moved[EACH]
+    moved[BRANCH] = (pins + _turning(d.carrier_runout, 0.0))[:, None] + moved[BRANCH]
     moved[-1] = moved[-1] + _oval(d.ovality, psi, angles[-1][0])
     return np.concatenate([moved[two] - moved[one] for one, two in s.mates])
 
@@ -379,13 +376,13 @@ def common_period(deviations: SetDeviations, planetary_set: GearSet, *, limit: i
 
 def _own_periods(d: SetDeviations, s: GearSet):
     """Name and number of mesh periods after which the deviations of every kind of body repeat."""
-    first, each, last = s.gears[0], s.gears[EACH], s.gears[-1]
+    first, each, last = s.gears[0], s.gears[BRANCH], s.gears[-1]
     yield first.name, math.lcm(_repeat(d.sun_pitch), first.teeth if d.sun_runout.amplitude else 1)
     planets = [
         math.lcm(_repeat(one), _repeat(two), each.teeth if runout.amplitude else 1)
         for one, two, runout in zip(d.planet_pitch, d.planet_ring_side_pitch, d.planet_runout, strict=True)
     ]
-    yield "planets" if len(s.kinds) > 1 else each.name, math.lcm(*planets)
+    yield "planets" if s.repeated[BRANCH] else each.name, math.lcm(*planets)
     oval = last.teeth // math.gcd(last.teeth, d.ovality.nodal_diameter) if d.ovality.amplitude else 1
     yield last.name, math.lcm(_repeat(d.ring_pitch), last.teeth if d.ring_runout.amplitude else 1, oval)
 
@@ -415,8 +412,8 @@ def planet_shift(d: SetDeviations, s: GearSet, symmetry: int, periods: int) -> F
     """
     ahead, N = s.n_planets // symmetry, s.n_planets
     behind, phases = (np.arange(N) - ahead) % N, np.asarray(s.mesh_phases[:N])
-    meshes = np.concatenate([behind + N * kind for kind in range(len(s.kinds))])
-    position, step = np.arange(periods) + 0.25, -s.senses[EACH]
+    meshes = s.moved_meshes(behind)
+    position, step = np.arange(periods) + 0.25, -s.senses[BRANCH]
     there = body_separation(d, s, position)
     close = 1e-9 * np.abs(there).max(initial=0.0)
     first, last = Fraction(s.gears[0].teeth, symmetry), Fraction(s.gears[-1].teeth, symmetry)
@@ -451,10 +448,10 @@ def mirrored_deviations(deviations: SetDeviations, planetary_set: GearSet, mirro
     last = s.gears[-1].pitch_angle
     ring = round((axis - image.gears[-1][0] - found.gears[-1][0]) / last)
     planets = [
-        round((axis - angle - found.planets[n]) / s.gears[EACH].pitch_angle)
+        round((axis - angle - found.planets[n]) / s.gears[BRANCH].pitch_angle)
         for n, angle in zip(order, image.planets, strict=True)
     ]
-    runouts = [_reflected(d.planet_runout[n], k * s.gears[EACH].pitch_angle) for n, k in zip(order, planets)]
+    runouts = [_reflected(d.planet_runout[n], k * s.gears[BRANCH].pitch_angle) for n, k in zip(order, planets)]
     return replace(
         d,
         planet_sun_side=d.planet_ring_side,
@@ -496,9 +493,9 @@ def loaded_flanks(d: SetDeviations, s: GearSet) -> tuple[tuple[str, FlankForm, G
     """Name the kinds of loaded flanks, with their forms and gears: gear 1 and 2 of every kind of mesh."""
     found = []
     for kind, pair in enumerate(s.kinds):
-        for gear, mate, form in zip(pair.gears, pair.gears[::-1], d.mesh_forms(kind, back=False)):
-            several = len(s.kinds) > 1 and gear is s.gears[EACH]
-            found.append((f"{gear.name}, {mate.name} side" if several else gear.name, form, gear))
+        forms = zip(s.mates[kind], pair.gears, pair.gears[::-1], d.mesh_forms(kind, back=False), strict=True)
+        for number, gear, mate, form in forms:
+            found.append((f"{gear.name}, {mate.name} side" if s.repeated[number] else gear.name, form, gear))
     return tuple(found)
 
 
@@ -543,7 +540,7 @@ def least_play(deviations: SetDeviations, planetary_set: GearSet) -> tuple[float
     bodies = [body_separation(d, s, position, back=back) for back in (False, True)]
     drive = bodies[0] + _worst(d, s, back=False)[:, None]
     back = bodies[1] + _worst(d, s, back=True)[:, None]
-    back = back + np.repeat([kind.backlash for kind in s.kinds], N)[:, None]
+    back = back + s.of_kinds([kind.backlash for kind in s.kinds])[:, None]
     single = float((drive + back).min())
     drive, back = (side.reshape(-1, N, len(position)).sum(axis=0) for side in (drive, back))
     whole = float((drive.min(axis=0) + back.min(axis=0)).min())
@@ -552,7 +549,7 @@ def least_play(deviations: SetDeviations, planetary_set: GearSet) -> tuple[float
 
 def _worst(d: SetDeviations, s: GearSet, *, back: bool) -> np.ndarray:
     """Smallest separation (2N,) of any teeth and any points of the flanks of every mesh."""
-    N, side = s.n_planets, -1.0 if back else 1.0
+    side = -1.0 if back else 1.0
     first, second = d.planet_pitch.min(axis=1), d.planet_ring_side_pitch.min(axis=1)
     sun_side, ring_side = (second, first) if back else (first, second)
     pitch = [(side * d.sun_pitch).min() + sun_side, ring_side + (side * d.ring_pitch).min()]
@@ -564,8 +561,8 @@ def _worst(d: SetDeviations, s: GearSet, *, back: bool) -> np.ndarray:
     # of leads the ends of profiles, between which a twist is linear
     corners = [[g.form_roll, g.tip_roll] for g in s.gears]
     ends = [(np.tile(corners[one], 2), np.repeat(corners[two], 2)) for one, two in s.mates]
-    lead = lead_separation(d, s, 64, np.repeat(ends, N, axis=0).swapaxes(0, 1), back=back).min(axis=(1, 2))
-    return np.concatenate(pitch[: len(profile)]) + np.repeat(profile, N) + lead
+    lead = lead_separation(d, s, 64, s.of_kinds(ends).swapaxes(0, 1), back=back).min(axis=(1, 2))
+    return np.concatenate(pitch[: len(profile)]) + s.of_kinds(profile) + lead
 
 
 def _causes(d: SetDeviations) -> list[str]:

@@ -11,13 +11,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any
 
 import numpy as np
 
 from femgear.errors import GeometryError
-from femgear.gears.pair import EACH
-from femgear.gears.planetary import GearSet, PlanetarySet
+from femgear.gears.pair import GearSet
+from femgear.gears.planetary import PlanetarySet
 
 MEMBERS = ("sun", "carrier", "ring")
 TOLERANCE = 1e-9
@@ -31,6 +32,7 @@ class Orientations:
     gears: tuple[tuple[float, ...], ...]
 
     sun = property(lambda self: self.gears[0][0])
+    bodies = property(lambda self: tuple(chain(*self.gears)))
     planets = property(lambda self: self.gears[1])
     ring = property(lambda self: self.gears[2][0])
 
@@ -64,16 +66,15 @@ def orientations(planetary: GearSet, position: float = 0.0) -> Orientations:
     tau is a fraction of one mesh period (may exceed 1): the sun turns by ``+2 pi tau / z_s``, a planet by
     ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``; gears of a pair as their senses say.
     """
-    s, N, psi = planetary, planetary.n_planets, planetary.planet_angles
-    phase, found = s.mesh_phases.tolist(), []
-    for number, (gear, sense) in enumerate(zip(s.gears, s.senses, strict=True)):
+    s, phase = planetary, planetary.mesh_phases.tolist()
+    found: list[list[float]] = [[] for _ in s.gears]
+    for number, body in enumerate(s.bodies):
         # every body by the first mesh in which it takes part
-        kind, place = next((k, pair.index(number)) for k, pair in enumerate(s.mates) if number in pair)
-        start, lean = pitch_tooth(s, kind, place)
-        each = [psi[n] + start + lean for n in range(N if number == EACH else 1)]
-        turned = [(position + phase[kind * N + n]) * gear.pitch_angle for n in range(len(each))]
-        found.append(tuple(angle + sense * turn for angle, turn in zip(each, turned, strict=True)))
-    return Orientations(tuple(found))
+        first, mesh = next((j, mesh) for j, mesh in enumerate(s.meshes) if number in mesh.bodies)
+        start, lean = pitch_tooth(s, mesh.kind, mesh.bodies.index(number))
+        turn = (position + phase[first]) * s.gears[body.gear].pitch_angle
+        found[body.gear].append(mesh.angle + start + lean + s.senses[body.gear] * turn)
+    return Orientations(tuple(map(tuple, found)))
 
 
 def pitch_tooth(gears: GearSet, kind: int, place: int) -> tuple[float, float]:
@@ -145,31 +146,40 @@ def mesh_normals(planetary_set: GearSet, *, back: bool = False) -> np.ndarray:
     Its line of action: sun on planet at ``psi + pi/2 - alpha_w``, planet on ring at ``psi - pi/2 + alpha_w``
     (carrier frame); the back flanks, with `back`, at ``psi - pi/2 + alpha_w`` and ``psi + pi/2 - alpha_w``.
     """
-    s, psi = planetary_set, np.asarray(planetary_set.planet_angles)
+    s = planetary_set
     sides = [-s.senses[one] if back else s.senses[one] for one, _ in s.mates]
-    angle = np.concatenate(
-        [psi + side * (0.5 * np.pi - kind.working_pressure_angle) for side, kind in zip(sides, s.kinds, strict=True)]
-    )
-    return np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    leans = [side * (0.5 * np.pi - kind.working_pressure_angle) for side, kind in zip(sides, s.kinds, strict=True)]
+    return unit_vectors(s.mesh_angles + s.of_kinds(leans))
+
+
+def unit_vectors(angles: np.ndarray) -> np.ndarray:
+    """Compute the unit vectors (..., 2) along x and y in directions (...) [rad]."""
+    return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+
+
+def across(vectors: np.ndarray) -> np.ndarray:
+    """Turn vectors (..., 2) along x and y by a right angle, counter-clockwise."""
+    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 
 def member_approach(planetary_set: GearSet, *, back: bool = False) -> dict[str, np.ndarray]:
-    """Compute the approach (2N, 2) of all flanks per unit motion of sun, carrier and ring along x and y.
+    """Compute the approach (M, 2) of all flanks per unit motion of the members along x and y, by their names.
 
-    A number without unit; `back` is for the back flanks, as in `mesh_normals`.
+    Of a planetary set sun, carrier and ring. A number without unit; `back` is for the back flanks, as in
+    `mesh_normals`.
     """
-    on_planet, on_ring = np.split(mesh_normals(planetary_set, back=back), 2)
-    zero = np.zeros(on_planet.shape)
-    return {
-        "sun": np.vstack([on_planet, zero]),
-        "carrier": np.vstack([-on_planet, on_ring]),
-        "ring": np.vstack([zero, -on_ring]),
-    }
+    s, normals = planetary_set, mesh_normals(planetary_set, back=back)
+    found = {}
+    for name, gears in s.members.items():
+        found[name] = np.zeros(normals.shape)
+        # gear 1 moves along the normal into gear 2, gear 2 away
+        for place, push in enumerate((1.0, -1.0)):
+            rows = np.array([s.bodies[mesh.bodies[place]].gear in gears for mesh in s.meshes])
+            found[name][rows] += push * normals[rows]
+    return found
 
 
-def unheld_members(
-    planetary_set: PlanetarySet, floating: Sequence[str], *, both_flanks: bool = False
-) -> tuple[str, ...]:
+def unheld_members(planetary_set: GearSet, floating: Sequence[str], *, both_flanks: bool = False) -> tuple[str, ...]:
     """Find the members that float without being held by the planets.
 
     Of members without a radial support, any of "sun", "carrier" and "ring": the first one that the planets
@@ -185,7 +195,7 @@ def unheld_members(
     return tuple(floating)
 
 
-def _held(s: PlanetarySet, floating: tuple[str, ...], both_flanks: bool) -> bool:
+def _held(s: GearSet, floating: tuple[str, ...], both_flanks: bool) -> bool:
     """Whether forces of the flanks keep the members in equilibrium, and a single one from sliding."""
     from scipy.optimize import nnls
 
@@ -199,5 +209,5 @@ def _held(s: PlanetarySet, floating: tuple[str, ...], both_flanks: bool) -> bool
     if len(floating) == 1 and slides:
         return False
     load = np.zeros(approach.shape[1])
-    load[s.n_planets] = 1.0  # the torque of the sun, which everything else must pass on
+    load[turns.shape[1] - 1] = 1.0  # the torque of the sun, which everything else must pass on
     return bool(nnls(approach.T, load)[1] < TOLERANCE)

@@ -1,9 +1,8 @@
-"""Two gears on one centre distance: a gear pair, and each kind of mesh of a planetary set.
+"""Bodies and meshes of gears (`GearSet`), and two gears on one centre distance: a pair, and each kind of mesh of a set.
 
-A set tells the contact solution its ``gears``, which of them mesh as gear 1 and gear 2 of each kind
-(``mates``), how they turn while the first one drives (``senses``, +1 counter-clockwise), and how rotations
-close the meshes (``rotation_approach``). Of the gear with the number `EACH` there is one at every one of the
-``planet_angles``, of the others one in all.
+All that walks over teeth walks over the meshes of a set, each of two bodies, and over the bodies, each a gear in its
+place: the contact, phases, errors, root stresses. What a set is beside that, a pair or a planetary set, they need not
+know.
 
 Frame of a pair: gear 1 at the origin, pitch point on the x axis, so that an external gear 2 stands to the
 right and an internal one to the left. Positive torque turns gear 1 counter-clockwise; gear 2 is held.
@@ -12,9 +11,12 @@ right and an internal one to the left. Positive torque turns gear 1 counter-cloc
 from __future__ import annotations
 
 import math
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
+from typing import Any, ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -22,12 +24,185 @@ from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, working_half_angles
 from femgear.gears.profile import arcinv, inv, pressure_angle_at
 
-EACH = 1
-"""Number of the gear of which there is one at every angle: the planet, or gear 2 of a pair."""
+BRANCH = 1
+"""Number of the gear that the driving one meshes with: the planets, among which its torque branches, or gear 2."""
 
 
 @dataclass(frozen=True)
-class GearPair:
+class Body:
+    """A gear in its place.
+
+    Parameters
+    ----------
+    gear : int
+        Number of the gear in the set.
+    copy : int
+        Which of the equal gears of this number, from 0.
+    name : str
+        That of the gear, with the number of the copy from 1 where there are several.
+    """
+
+    gear: int
+    copy: int
+    name: str
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Two bodies whose teeth mesh.
+
+    Parameters
+    ----------
+    kind : int
+        Number of the pair of gears among the kinds of mesh of the set.
+    copy : int
+        Which of the meshes of this kind, from 0: the branch of a planet.
+    bodies : tuple of int
+        Numbers of gear 1, which drives, and gear 2 among the bodies of the set.
+    angle : float
+        Direction in which gear 1 of an external, gear 2 of an internal pair sees the pitch point [rad].
+    """
+
+    kind: int
+    copy: int
+    bodies: tuple[int, int]
+    angle: float
+
+
+class GearSet:
+    """Bodies and meshes of gears, for which the contact of teeth is solved.
+
+    Attributes
+    ----------
+    gears : tuple of Gear
+        The driving one first, the one that is held last, the one numbered `BRANCH` between or held itself.
+    senses : tuple of int
+        How they turn while the first one drives, +1 counter-clockwise.
+    repeated : tuple of bool
+        Whether there is one of the gear at every one of the ``planet_angles``, else one in all.
+    kinds : tuple of GearPair
+        Both gears of every kind of mesh, ``mates`` their numbers; meshes are in the order of their kinds.
+    planet_angles : (N,) tuple of float
+        Directions of the branches [rad], of a pair alone one.
+    centre_distance : float
+        [m]
+    centres : tuple
+        Of the bodies of every gear as x + iy [m].
+    rotations : int
+        Number of rotations that map the branches onto one another.
+    members : dict
+        Names of what may move on supports, with the numbers of the gears that it takes along.
+    mesh_names : tuple of str
+        Of all M meshes.
+    mesh_phases : (M,) array
+        Phases in [0, 1) [mesh periods].
+    """
+
+    gears: tuple[Gear, ...]
+    senses: tuple[int, ...]
+    repeated: tuple[bool, ...]
+    kinds: tuple[GearPair, ...]
+    mates: tuple[tuple[int, int], ...]
+    planet_angles: tuple[float, ...]
+    centre_distance: float
+    centres: tuple[tuple[complex, ...], ...]
+    rotations: int
+    members: ClassVar[dict[str, tuple[int, ...]]]
+    mesh_names: tuple[str, ...]
+    mesh_phases: np.ndarray
+
+    @property
+    def n_planets(self) -> int:
+        """Number N of branches: of planets, or 1 of a pair."""
+        return len(self.planet_angles)
+
+    @cached_property
+    def bodies(self) -> tuple[Body, ...]:
+        """All bodies, in the order of the gears."""
+        found = list[Body]()
+        for number, (gear, repeated) in enumerate(zip(self.gears, self.repeated, strict=True)):
+            copies = range(self.n_planets if repeated else 1)
+            found += [Body(number, copy, f"{gear.name} {copy + 1}" if repeated else gear.name) for copy in copies]
+        return tuple(found)
+
+    @cached_property
+    def meshes(self) -> tuple[Mesh, ...]:
+        """All M meshes, in the order of the kinds and, in each of them, of the branches."""
+        place = {(body.gear, body.copy): number for number, body in enumerate(self.bodies)}
+        return tuple(
+            Mesh(kind, copy, (place[one, copy * self.repeated[one]], place[two, copy * self.repeated[two]]), angle)
+            for kind, (one, two) in enumerate(self.mates)
+            for copy, angle in enumerate(self.planet_angles)
+        )
+
+    @cached_property
+    def mesh_kind(self) -> np.ndarray:
+        """Kind of every mesh (M,)."""
+        return np.array([mesh.kind for mesh in self.meshes])
+
+    @property
+    def kind_rows(self) -> tuple[slice, ...]:
+        """Meshes of every kind, which follow one another."""
+        ends = np.cumsum([0, *np.bincount(self.mesh_kind)]).tolist()
+        return tuple(slice(*ends_of_kind) for ends_of_kind in pairwise(ends))
+
+    @property
+    def mesh_angles(self) -> np.ndarray:
+        """Directions of the pitch points (M,) [rad], see `Mesh`."""
+        return np.array([mesh.angle for mesh in self.meshes])
+
+    @property
+    def rotation_approach(self) -> np.ndarray:
+        """Approach of the drive flanks per base-circle arc of every body that turns, (M, bodies), the driver last.
+
+        Arcs are positive in the direction in which the driver drives; the last gear is held.
+        """
+        turning = [number for number, body in enumerate(self.bodies) if 0 < body.gear < len(self.gears) - 1]
+        turning += [number for number, body in enumerate(self.bodies) if body.gear == 0]
+        found = np.zeros((len(self.meshes), len(turning)))
+        for row, mesh in zip(found, self.meshes, strict=True):
+            for number, push in zip(mesh.bodies, (1.0, -1.0), strict=True):
+                if number in turning:
+                    row[turning.index(number)] = push
+        return found
+
+    def moved_meshes(self, planets: Sequence[int] | np.ndarray) -> np.ndarray:
+        """List the meshes (M,) of planets (N,) that stand in the places of planets 0 to N - 1."""
+        place = {(mesh.kind, mesh.copy): number for number, mesh in enumerate(self.meshes)}
+        return np.array([place[mesh.kind, int(planets[mesh.copy])] for mesh in self.meshes])
+
+    def of_kinds(self, values: Sequence[Any] | np.ndarray) -> np.ndarray:
+        """Give every mesh (M, ...) the value of its kind (kinds, ...)."""
+        return np.asarray(values)[self.mesh_kind]
+
+    @abstractmethod
+    def with_gears(self, gears: Sequence[Gear]) -> Self:
+        """Make the set of other gears, in the same order."""
+
+    @abstractmethod
+    def with_planet_angles(self, angles: tuple[float, ...]) -> Self:
+        """Make the set with branches at other angles [rad]."""
+
+    @abstractmethod
+    def equal_positions(self, wanted: int) -> int:
+        """Find the number of positions of a mesh period, the wanted one or more, that meet all branches alike."""
+
+    @property
+    def base_pitch(self) -> float:
+        """Pitch along the line of action [m], common to all gears."""
+        return self.gears[0].base_pitch
+
+    @property
+    def mesh_widths(self) -> tuple[float, ...]:
+        """Common face width of the gears of every kind of mesh [m]."""
+        return tuple(pair.face_width for pair in self.kinds)
+
+
+AnySet = TypeVar("AnySet", bound=GearSet)
+
+
+@dataclass(frozen=True)
+class GearPair(GearSet):
     """Two gears on one centre distance.
 
     Parameters
@@ -48,9 +223,11 @@ class GearPair:
     gear_2: Gear
     centre_distance: float
 
-    mates = ((0, EACH),)
+    mates = ((0, 1),)
+    repeated = (False, False)
     planet_angles = (0.0,)
-    n_planets = rotations = 1
+    rotations = 1
+    members: ClassVar[dict[str, tuple[int, ...]]] = {}
 
     def __post_init__(self):
         _ = self.working_pressure_angle  # refuses base circles that would overlap
@@ -81,23 +258,21 @@ class GearPair:
         return np.zeros(1)
 
     @property
-    def rotation_approach(self) -> np.ndarray:
-        """Approach of the drive flanks per base-circle arc of gear 1, (1, 1)."""
-        return np.ones((1, 1))
-
-    @property
     def centres(self) -> tuple[tuple[complex, ...], ...]:
         """Centres of gear 1 and gear 2 as x + iy [m]."""
         return (0j,), (complex(-self.centre_distance if self.gear_2.internal else self.centre_distance),)
 
+    def with_gears(self, gears: Sequence[Gear]) -> GearPair:
+        """Make the pair of two other gears."""
+        return replace(self, gear_1=gears[0], gear_2=gears[1])
+
+    def with_planet_angles(self, angles: tuple[float, ...]) -> GearPair:
+        """Give this pair, which has one place alone."""
+        return self
+
     def equal_positions(self, wanted: int) -> int:
         """Give the wanted number of positions: there is one mesh to be met."""
         return wanted
-
-    @property
-    def base_pitch(self) -> float:
-        """Pitch along the line of action [m], common to both gears."""
-        return self.gear_1.base_pitch
 
     @cached_property
     def working_pressure_angle(self) -> float:
@@ -121,11 +296,6 @@ class GearPair:
     def face_width(self) -> float:
         """Face width that both gears have in common [m]: the smaller one, in the middle of the wider."""
         return min(gear.face_width for gear in self.gears)
-
-    @property
-    def mesh_widths(self) -> tuple[float]:
-        """Common face width of the only kind of mesh [m]."""
-        return (self.face_width,)
 
     @property
     def contact_ratio(self) -> float:

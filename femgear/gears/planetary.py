@@ -9,16 +9,18 @@ Meshes j: "sun-planet 1" .. "sun-planet N", "planet 1-ring" .. "planet N-ring".
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import cached_property
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, is_whole, with_room
-from femgear.gears.pair import EACH, GearPair, zero_backlash_distance, zero_backlash_shift
+from femgear.gears.pair import AnySet, GearPair, GearSet, zero_backlash_distance, zero_backlash_shift
 from femgear.gears.profile import BasicRack
 
 BACKLASH_TOLERANCE = 1e-4
@@ -30,7 +32,7 @@ ASSEMBLY_TOLERANCE = 1e-6
 
 
 @dataclass(frozen=True)
-class PlanetarySet:
+class PlanetarySet(GearSet):
     """Sun, equal planets and ring on one centre distance.
 
     Parameters
@@ -55,8 +57,10 @@ class PlanetarySet:
     centre_distance: float
     planet_angles: tuple[float, ...]
 
-    mates = ((0, EACH), (EACH, 2))
+    mates = ((0, 1), (1, 2))
+    repeated = (False, True, False)
     senses = (1, -1, -1)
+    members: ClassVar[dict[str, tuple[int, ...]]] = {"sun": (0,), "carrier": (1,), "ring": (2,)}
 
     def __post_init__(self):
         object.__setattr__(self, "planet_angles", tuple(float(a) for a in self.planet_angles))
@@ -66,11 +70,6 @@ class PlanetarySet:
                 object.__setattr__(self, name, replace(gear, name=name))
         check_angles(self.planet_angles)
         _ = self.kinds  # refuses base circles that would overlap
-
-    @property
-    def n_planets(self) -> int:
-        """Number N of planets."""
-        return len(self.planet_angles)
 
     @property
     def mesh_names(self) -> tuple[str, ...]:
@@ -87,17 +86,6 @@ class PlanetarySet:
         """Sun with planet, and planet with ring."""
         a = self.centre_distance
         return GearPair(self.sun, self.planet, a), GearPair(self.planet, self.ring, a)
-
-    @property
-    def mesh_widths(self) -> tuple[float, float]:
-        """Common face width of the gears of both kinds of mesh [m]."""
-        first, second = self.kinds
-        return first.face_width, second.face_width
-
-    @property
-    def rotation_approach(self) -> np.ndarray:
-        """Approach of the drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
-        return rotation_approach(self.n_planets)
 
     @property
     def centres(self) -> tuple[tuple[complex, ...], ...]:
@@ -124,11 +112,6 @@ class PlanetarySet:
     def contact_ratio_planet_ring(self) -> float:
         """Transverse contact ratio from the tip circles, on the involutes alone, see `GearPair.path`."""
         return self.kinds[1].contact_ratio
-
-    @property
-    def base_pitch(self) -> float:
-        """Pitch along the line of action [m], common to all gears."""
-        return self.sun.base_pitch
 
     @property
     def path_sun_planet(self) -> tuple[float, float]:
@@ -169,6 +152,15 @@ class PlanetarySet:
         planet_ring = sun_planet - _planet_lag(self)
         return _fraction(np.concatenate([sun_planet, planet_ring]))
 
+    def with_gears(self, gears: Sequence[Gear]) -> PlanetarySet:
+        """Make the set of another sun, planet and ring."""
+        sun, planet, ring = gears
+        return replace(self, sun=sun, planet=planet, ring=ring)
+
+    def with_planet_angles(self, angles: tuple[float, ...]) -> PlanetarySet:
+        """Make the set with planets at other angles [rad]."""
+        return replace(self, planet_angles=angles)
+
     def equal_positions(self, wanted: int) -> int:
         """Find the number of equidistant positions of a mesh period that meet all planets alike.
 
@@ -195,12 +187,6 @@ class PlanetarySet:
                 if np.abs(np.mod(away + math.pi, 2.0 * math.pi) - math.pi).max() < 1e-9:
                     return turns
         return 1
-
-
-def rotation_approach(n_planets: int) -> np.ndarray:
-    """Compute the approach of drive flanks per base-circle arc of each planet and the sun, (2N, N + 1)."""
-    N = n_planets
-    return np.block([[-np.eye(N), np.ones((N, 1))], [np.eye(N), np.zeros((N, 1))]])
 
 
 def mesh_names(n_planets: int) -> tuple[str, ...]:
@@ -246,11 +232,7 @@ def close_set(
     return PlanetarySet(sun, planet, ring, centre_distance, planet_angles)
 
 
-GearSet = PlanetarySet | GearPair
-"""What the contact of teeth is solved for."""
-
-
-def mirrored_set(planetary_set):
+def mirrored_set(planetary_set: AnySet) -> tuple[AnySet, np.ndarray]:
     """Mirror a set, as it is seen from behind, and tell the places ``order`` (N,) of its planets.
 
     Planet angles are counted the other way round, ascending from the first planet; mirrored planet ``i`` is
@@ -261,7 +243,7 @@ def mirrored_set(planetary_set):
     angles = np.asarray(planetary_set.planet_angles)
     turned = np.mod(angles[0] - angles, 2 * np.pi)
     order = np.argsort(turned, kind="stable")
-    return replace(planetary_set, planet_angles=tuple(angles[0] + turned[order])), order
+    return planetary_set.with_planet_angles(tuple(angles[0] + turned[order])), order
 
 
 def virtual_teeth(gears: PlanetarySet, helix_angle: float) -> tuple[int, int, int]:

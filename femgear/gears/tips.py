@@ -8,8 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection
-from dataclasses import fields, replace
-from typing import TypeVar
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,11 +21,8 @@ from femgear.gears.gear import (
     tip_radius_at_land,
     working_half_angles,
 )
-from femgear.gears.pair import GearPair
-from femgear.gears.planetary import PlanetarySet
+from femgear.gears.pair import AnySet, GearPair, GearSet
 from femgear.gears.profile import inv, pressure_angle_at
-
-AnySet = TypeVar("AnySet", bound=PlanetarySet | GearPair)
 
 FILLET_TOLERANCE = 0.005
 """Overlap of a tip corner with a root fillet [modules], or the backlash if that is more, that is allowed."""
@@ -155,32 +151,30 @@ def settled_tips(gears: AnySet, *, free: Collection[str] = ()) -> AnySet:
     GeometryError
         A gear that no tip makes whole, see `Gear`.
     """
-    names = [field.name for field in fields(gears)][: len(gears.gears)]
-    shortening = dict.fromkeys(names, 0.0)
+    made, shortening, faults = list(gears.gears), [0.0] * len(gears.gears), []
     for pair, numbers in zip(gears.kinds, gears.mates, strict=True):
         for number in numbers:
-            shortening[names[number]] = max(shortening[names[number]], clearance_shortening(pair))
-    made, faults = {}, []
-    for name, gear in zip(names, gears.gears, strict=True):
+            shortening[number] = max(shortening[number], clearance_shortening(pair))
+    for number, gear in enumerate(gears.gears):
         try:
-            given = gear.tip_open and gear.tip_diameter is not None
-            made[name] = replace(gear, tip_open=False) if given else gear
+            if gear.tip_open and gear.tip_diameter is not None:
+                made[number] = replace(gear, tip_open=False)
         except GeometryError as error:
             faults.append(error)
         if gear.tip_open and gear.tip_diameter is None:
-            made[name] = replace(gear, tip_shortening=shortening[name])
+            made[number] = replace(gear, tip_shortening=shortening[number])
     if faults:
         raise combined_fault(faults)
-    gears = replace(gears, **made)
-    for number in sorted(range(len(names)), key=lambda n: (not gears.gears[n].internal, -n)):
+    gears = gears.with_gears(made)
+    for number in sorted(range(len(made)), key=lambda n: (not gears.gears[n].internal, -n)):
         gear = gears.gears[number]
         if gear.tip_open:
-            settled = _settled(gear, number, gears, run_free=names[number] in free)
-            gears = replace(gears, **{names[number]: settled})
+            made[number] = _settled(gear, number, gears, run_free=gear.name in free)
+            gears = gears.with_gears(made)
     return gears
 
 
-def _settled(gear: Gear, number: int, gears: PlanetarySet | GearPair, *, run_free: bool) -> Gear:
+def _settled(gear: Gear, number: int, gears: GearSet, *, run_free: bool) -> Gear:
     """Gear with its tip settled, and checked."""
     sense = -1.0 if gear.internal else 1.0
     rack_tip, radius = gear.tip_radius, gear.tip_radius

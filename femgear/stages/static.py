@@ -74,6 +74,7 @@ from femgear.gears.iso6336 import (
     overlap_of,
     root_face_width,
 )
+from femgear.gears.pair import GearSet
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
@@ -245,7 +246,7 @@ def flank_compliances(
     return sectors, replace(bodies, helical=softer, base_helix_angle=base)
 
 
-def gear_entries(case: Case, gears: PlanetarySet, number: int) -> Entries:
+def gear_entries(case: Any, gears: GearSet, number: int) -> Entries:
     """List all that decides sector and flanks of a gear of a set, whatever the others are."""
     gear = gears.gears[number]
     return {
@@ -263,7 +264,7 @@ def foundation_entries(case: Case) -> Entries:
     return {"foundation": (ring.foundation_radial, ring.foundation_tangential)}
 
 
-def _helical(case: Case, gears: PlanetarySet) -> tuple[float, tuple[float, ...]]:
+def _helical(case: Any, gears: GearSet) -> tuple[float, tuple[float, ...]]:
     """Base helix angle [rad], and stiffness of the teeth of every kind of mesh over that of straight ones.
 
     Plane contact knows no helix.
@@ -274,7 +275,7 @@ def _helical(case: Case, gears: PlanetarySet) -> tuple[float, tuple[float, ...]]
     return base, tuple(helical_stiffness(base, internal=pair.gear_2.internal) for pair in gears.kinds)
 
 
-def check_slices(case: Case, gears: PlanetarySet) -> None:
+def check_slices(case: Any, gears: GearSet) -> None:
     """Refuse (CaseError, E-SLICES) what slices over the width cannot do, and leads without slices.
 
     Slices together with back flanks or with clearance in the bearings of planets, or thinner than a quarter
@@ -348,8 +349,8 @@ def _check_width_entries(case: Case, needed: int, *, helical: bool) -> None:
 
 
 def over_width(
-    case: Case,
-    gears: PlanetarySet,
+    case: Any,
+    gears: GearSet,
     *,
     waves: WidthWaves | None = None,
     cache: Path | None = None,
@@ -372,7 +373,7 @@ def over_width(
     return found
 
 
-def _waves_of_case(case: Case, gears: PlanetarySet, steps: Steps, cache: Path | None) -> WidthWaves:
+def _waves_of_case(case: Any, gears: GearSet, steps: Steps, cache: Path | None) -> WidthWaves:
     """Condense all gears for waves across the width, and support the ring as the static stage has it."""
     materials, width = materials_of(case), common_width(gears.gears)[0]
     kept: list[tuple[str, Entries]] = []
@@ -421,7 +422,7 @@ def loaded_over_width(case: Case, gears: PlanetarySet, waves: WidthWaves | None,
     return found | dict(zip(("waves", "held_waves"), (other, own) if fixed else (own, other)))
 
 
-def record_positions(case: Case, gears: PlanetarySet) -> int:
+def record_positions(case: Any, gears: GearSet) -> int:
     """Choose the number of equidistant positions of a mesh period, as many as the case asks for at least.
 
     They meet all planets alike. Those of helical teeth meet the slices alike, as nearly as whole numbers
@@ -437,7 +438,7 @@ def record_positions(case: Case, gears: PlanetarySet) -> int:
     return gears.equal_positions(wanted)
 
 
-def _overlap(case: Case, gears: PlanetarySet) -> float:
+def _overlap(case: Any, gears: GearSet) -> float:
     """Overlap ratio, positive where gear 1 is right-handed and upper slices run ahead; zero of spur teeth."""
     return math.copysign(case_overlap(case, gears), case.helix_angle or 1.0)
 
@@ -486,7 +487,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
         first_period=first,
         between=tuple(root_stress_cycle(gears, influences, record, reverse=reverse) for record in between),
         ranges=ranges,
-        spectrum=load_spectrum(teeth, gears.mates, closes=closes),
+        spectrum=load_spectrum(gears, teeth, closes=closes),
         nominal=nominal_stresses(gears, static.sun_torque, materials_of(case)),
         sun_torque=static.sun_torque,
         closes=closes,
@@ -505,7 +506,7 @@ def relief_kinks(case: Case) -> tuple[bool, ...]:
 
 
 def nominal_stresses(
-    planetary_set: PlanetarySet, sun_torque: float, material: Material | Sequence[Material]
+    planetary_set: GearSet, sun_torque: float, material: Material | Sequence[Material]
 ) -> NominalStresses:
     """Compute sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
 
@@ -564,17 +565,17 @@ def case_supports(case: Case) -> Supports:
     )
 
 
-def width_supports(case: Case, gears: PlanetarySet) -> WidthSupports:
+def width_supports(case: Any, gears: GearSet) -> WidthSupports:
     """Make what holds the members of a case against tilting and twisting over the face width.
 
     The sun twists as a tube between its bore and its root circle, or the diameter that the case gives; gears
     of a pair do neither.
     """
-    if not isinstance(gears, PlanetarySet):
+    if not gears.members:
         return UPRIGHT
     sun, carrier, rigidity = case.sun, case.carrier, None
     if sun.torque_end is not None:
-        outer = sun.torsion_diameter or 2.0 * gears.sun.root_radius
+        outer = sun.torsion_diameter or 2.0 * gears.gears[0].root_radius
         shear = material_of(case, "sun").shear_modulus
         rigidity = shear * np.pi / 32 * (outer**4 - (2.0 * sun.bore_radius) ** 4)
         if rigidity <= 0.0:
@@ -598,9 +599,9 @@ def width_supports(case: Case, gears: PlanetarySet) -> WidthSupports:
     )
 
 
-def mesh_backlash(gears: PlanetarySet) -> np.ndarray:
+def mesh_backlash(gears: GearSet) -> np.ndarray:
     """List the normal backlash (2N,) of all meshes [m]."""
-    return np.repeat([pair.backlash for pair in gears.kinds], gears.n_planets)
+    return gears.of_kinds([pair.backlash for pair in gears.kinds])
 
 
 def _influences(case: Case, static: StaticResult, progress: Progress = silent) -> RootStresses:

@@ -25,7 +25,7 @@ from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.gears.deviations import SetDeviations, loaded_flanks
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import form_deviation
-from femgear.gears.planetary import GearSet
+from femgear.gears.pair import GearSet
 from femgear.report.scene import View, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.solid import SOLID, solid
 from femgear.report.style import (
@@ -556,7 +556,7 @@ def pitch_chart(deviations: SetDeviations, planetary_set: GearSet) -> Figure:
         ("planets, ring side", [(f"planet {n + 1}", d.planet_ring_side_pitch[n]) for n in range(N)]),
         ("ring", [("ring", d.ring_pitch)]),
     )
-    if len(planetary_set.kinds) == 1:
+    if not planetary_set.members:
         names = [gear.name.replace("_", " ") for gear in planetary_set.gears]
         rows = tuple((name, [(name, one)]) for name, one in zip(names, (d.sun_pitch, d.planet_pitch[0])))
 
@@ -684,7 +684,7 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     grid = assemble_set(bodies)
     write_vtu(grid, folder / "deformed_set.vtu")
     title = f"{static.sun_torque:.4g} N m on {gears.gears[0].name.replace('_', ' ')}".replace("-", "−")
-    title = f"deflection under {title.replace('on ', 'on the ')}" if len(gears.kinds) > 1 else title
+    title = f"deflection under {title.replace('on ', 'on the ')}" if gears.members else title
     deformed_picture(
         grid,
         folder / "deformed_set.png",
@@ -692,7 +692,7 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         largest=_SHOWN * gears.gears[0].module,
         details=_mesh_views(static.planetary_set),
     )
-    if len(gears.kinds) == 1:
+    if not gears.members:
         return ["deformed_set.vtu", "deformed_set.png"]
     grids = {kind: sector.grid for kind, sector in of_kind.items()}
     look: Any = {"helix_angle": case.helix_angle or 0.0, "backwards": backwards}
@@ -705,10 +705,10 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
 def _mesh_views(gears: GearSet) -> list[View]:
     """Look at the pitch points of all kinds of mesh of the first planet, three pitches to either side."""
     half, along, views = 3.0 * math.pi * gears.gears[0].module, np.exp(1j * gears.planet_angles[0]), []
-    for kind, pair in enumerate(gears.kinds):
+    for kind, (pair, rows) in enumerate(zip(gears.kinds, gears.kind_rows, strict=True)):
         radius = pair.gear_1.base_radius / math.cos(pair.working_pressure_angle)
         at = gears.centres[gears.mates[kind][0]][0] + radius * along
-        views.append(View(f"mesh {gears.mesh_names[kind * gears.n_planets]}", (at.real, at.imag), half))
+        views.append(View(f"mesh {gears.mesh_names[rows.start]}", (at.real, at.imag), half))
     return views
 
 

@@ -32,6 +32,7 @@ from femgear.gears.deviations import check_deviations
 from femgear.gears.gear import Gear, tooth_thickness
 from femgear.gears.iso6336 import bending_face_factor, contact_helix_factor, helix_of, relative_curvature
 from femgear.gears.kinematics import speeds, torques
+from femgear.gears.pair import BRANCH, GearSet
 from femgear.gears.phasing import KINDS, ZERO, neighbouring_teeth, phasing_of_set, phasing_table
 from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.gears.tooth import ROOT_RADIUS_LIMIT, root_notches
@@ -50,7 +51,7 @@ if TYPE_CHECKING:
     from femgear.contact.root_stress import RootRange, RootStresses
     from femgear.contact.tooth_loads import LoadSpectrum
     from femgear.contact.width_waves import WidthWaves
-    from femgear.gears.planetary import GearSet, PlanetarySet
+    from femgear.gears.planetary import PlanetarySet
 
 _COUNTING = (
     "one load cycle an engagement, from zero to the largest load of the tooth (peak counting between "
@@ -250,7 +251,7 @@ class StaticResult(StageResult):
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
+    planetary_set : GearSet
         The set as the case has it.
     sectors : Sectors
         Finite element grids of one tooth of each gear.
@@ -272,7 +273,7 @@ class StaticResult(StageResult):
         What bodies yield across the width, where it is solved in slices.
     """
 
-    planetary_set: PlanetarySet
+    planetary_set: Any
     sectors: Sectors
     bodies: Bodies
     cycle: MeshCycle
@@ -311,7 +312,7 @@ class StaticResult(StageResult):
             # a right-handed gear that turns another counter-clockwise pushes it towards -z
             sense = -math.copysign(math.tan(self.base_helix_angle), self.base_helix_angle * self.sun_torque)
             values["axial_force"] = sense * cycle.force
-            if len(kinds) > 1:
+            if gears.members:
                 values["planet_couple"] = self._planet_couple()
             variables = variables | {name: HELIX_VARIABLES[name] for name in HELIX_VARIABLES if name in values}
         values |= self._peaks()
@@ -381,9 +382,9 @@ class StaticResult(StageResult):
 
     def _planet_couple(self) -> np.ndarray:
         """Couple (N, P) [N m] of the axial forces of sun and ring on every planet, at the working circles."""
-        force = self.cycle.force.reshape(len(self.planetary_set.kinds), -1, len(self.cycle.position))
-        radius = self.planetary_set.gears[1].base_radius
-        arms = [radius / math.cos(pair.working_pressure_angle) for pair in self.planetary_set.kinds]
+        gears = self.planetary_set
+        force = self.cycle.force.reshape(-1, gears.n_planets, len(self.cycle.position))
+        arms = [gears.gears[BRANCH].base_radius / math.cos(pair.working_pressure_angle) for pair in gears.kinds]
         return math.tan(abs(self.base_helix_angle)) * np.einsum("k,knp->np", arms, force)
 
     def _free_ends(self) -> float:
@@ -440,7 +441,7 @@ class StressResult(StageResult):
 
     Parameters
     ----------
-    planetary_set : PlanetarySet
+    planetary_set : GearSet
         The set as the case has it.
     cycle : MeshCycle
         The static solution that it belongs to.
@@ -469,7 +470,7 @@ class StressResult(StageResult):
         Whether flanks of both kinds of mesh have reliefs that begin with a kink; empty for none.
     """
 
-    planetary_set: PlanetarySet
+    planetary_set: Any
     cycle: MeshCycle
     influences: RootStresses
     roots: tuple[RootCycle, ...]
@@ -549,7 +550,7 @@ class StressResult(StageResult):
         names = ("root_worst", *(f"root_worst_{name}" for name in parts), "root_profile")
         found = dict(zip(names, map(_by_gear, zip(*self._largest_of_alike(rows))), strict=True))
         notches = [[root_notches(gear)[1] for gear in pair.gears] for pair in self.planetary_set.kinds]
-        return found | {"root_notch_radius": np.repeat(notches, self.planetary_set.n_planets, axis=0)}
+        return found | {"root_notch_radius": self.planetary_set.of_kinds(notches)}
 
     def _largest_of_alike(self, rows: list[tuple]) -> list[tuple]:
         """Give all planets that go through the same states the row, gear by gear, whose first is largest.
@@ -572,7 +573,7 @@ class StressResult(StageResult):
         """Place, load and curvature of the tooth pair with the largest pressure of every mesh."""
         s = self.planetary_set
         rows, starts = [], []
-        for mesh, pair in enumerate(pair for pair in s.kinds for _ in range(s.n_planets)):
+        for mesh, pair in enumerate(s.kinds[kind] for kind in s.mesh_kind):
             angle, (low, high) = pair.working_pressure_angle, pair.path
             position, place, load = self._most_pressed(mesh)
             at, pitch = (
@@ -594,7 +595,7 @@ class StressResult(StageResult):
         return dict(zip(names, np.array(rows).T, strict=True)) | {
             "largest_pressure": self.cycle.extremes("max_pressure")[1],
             "contact_start": np.array(starts),
-            "relief_kink": np.repeat(np.array(kinks, dtype=int), s.n_planets),
+            "relief_kink": s.of_kinds(np.array(kinks, dtype=int)),
         }
 
     def _most_pressed(self, mesh: int) -> tuple[float, float, float]:
@@ -636,7 +637,7 @@ class StressResult(StageResult):
         s, factor = self.planetary_set, self.cycle.face_load_factor
         assert factor is not None
         heights = [[abs(gear.tip_radius - gear.root_radius) for gear in pair.gears] for pair in s.kinds]
-        highest = np.repeat(np.max(heights, axis=1), s.n_planets)
+        highest = s.of_kinds(np.max(heights, axis=1))
         width = min(s.mesh_widths)
         return {
             "root_over_width": _by_gear([root.history().over_width for root in self.roots]),
@@ -1304,7 +1305,7 @@ def describe_gears(s: GearSet, helix_angle: float | None = None) -> Block:
         f"{transverse}module {first.module * 1e3:.6g} mm, {transverse}pressure angle "
         f"{math.degrees(first.pressure_angle):.6g} deg, {_widths(s)}, "
         f"centre distance {s.centre_distance * 1e3:.6g} mm",
-        *[f"{s.n_planets} planet{'s' * (s.n_planets > 1)} at {angles} deg"][: len(s.kinds) - 1],
+        *[f"{s.n_planets} planet{'s' * (s.n_planets > 1)} at {angles} deg"] * s.repeated[BRANCH],
         *[
             f"profile shift of the {gear.name}: positive moves the flank outwards (the opposite of ISO 21771)"
             for gear in s.gears
@@ -1358,13 +1359,13 @@ def describe_meshes(s: GearSet, helix_angle: float | None = None) -> Block:
         # play along the tooth normal, of which the base helix leaves a part in the transverse section
         angle = math.atan(math.tan(s.gears[0].pressure_angle) * math.cos(helix_angle))
         transverse, normal = "transverse ", math.cos(base_helix_angle(angle, helix_angle))
-    n, phases = s.n_planets, [f"{phase:.4f}" for phase in s.mesh_phases]
-    more = ", ..." if n > 6 else ""
+    phases = [f"{phase:.4f}" for phase in s.mesh_phases]
+    more = ", ..." if s.n_planets > 6 else ""
     clearance = iter(f"{1e3 * value:.3f}" for value in tip_clearances(s).values())
     alone = [
         [f"{1e3 * low:.4f} to {1e3 * high:.4f}" for low, high in pair.single_contact] or ["-"] * 2 for pair in s.kinds
     ]
-    of_kinds = [", ".join(phases[i * n : (i + 1) * n][:6]) + more for i in range(len(s.kinds))]
+    of_kinds = [", ".join(phases[rows][:6]) + more for rows in s.kind_rows]
     names = [f"{pair.gear_1.name}-{pair.gear_2.name}" for pair in s.kinds]
     rows = (
         (
@@ -1376,7 +1377,7 @@ def describe_meshes(s: GearSet, helix_angle: float | None = None) -> Block:
         ("tip clearances [mm]", *(f"{next(clearance)}, {next(clearance)}" for _ in s.kinds)),
         ("single contact, first gear [mm]", *(first for first, _ in alone)),
         ("single contact, second gear [mm]", *(second for _, second in alone)),
-        *[("mesh phases [periods]", *of_kinds)][: len(of_kinds) - 1],
+        *[("mesh phases [periods]", *of_kinds)] * (len(phases) > 1),
     )
     pair = "pair of the transverse section" if transverse else "pair"
     note = f"single contact: diameters between which one tooth {pair} carries, from root to tip of a gear"

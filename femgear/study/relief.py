@@ -268,14 +268,14 @@ def harris_map(
     if not len(torques) or not (np.isfinite(torques).all() and torques.all()):
         message = "every torque of the map must differ from zero"
         raise CaseError(message, code="E-TORQUE", value=torques, remedy="leave zero out")
-    kinds = len(basis.gears.kinds)
-    peaks = np.zeros((len(deviations), kinds, len(torques)))
+    rows = basis.gears.kind_rows
+    peaks = np.zeros((len(deviations), len(rows), len(torques)))
     overall, residual = np.zeros((len(deviations), len(torques))), 0.0
     for v, variant in enumerate(deviations):
         periods = 1 if variant is None else common_period(variant, basis.gears)[0]
         for t, torque in enumerate(torques):
             cycle = replace(basis, deviations=variant).walk(float(torque), periods=periods)
-            peaks[v, :, t] = cycle.peak_to_peak().reshape(kinds, -1).max(axis=1)
+            peaks[v, :, t] = [cycle.peak_to_peak()[of_kind].max() for of_kind in rows]
             overall[v, t] = cycle.peak_to_peak("sun_arc")
             residual = max(residual, float(cycle.residual.max()))
             if progress is not None:

@@ -48,7 +48,6 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
-from femgear.gears.planetary import rotation_approach
 from femgear.stages.protocol import one_blas_thread
 from femgear.study.relief import DesignBasis
 
@@ -218,7 +217,7 @@ def _solve(solved: DesignBasis, load: float, position: np.ndarray, numbers):
             start = None if previous is None else problem.warm_start(*previous)
             state = solve_contact(problem.compliance, problem.gap, problem.G, right, start=start)
             previous = (problem, state.active)
-            answers.append(_answer(problem, state, members))
+            answers.append(_answer(problem, state, setup.gears.rotation_approach, members))
             overflow |= problem.touches_window_end(state.active, setup)
             force = np.zeros((1, len(found.mesh)))
             np.add.at(force[0], found.candidate[0].nonzero()[0], state.loads)
@@ -229,14 +228,14 @@ def _solve(solved: DesignBasis, load: float, position: np.ndarray, numbers):
     return in_windows(attempt, load / N, 3.0 * load / (N * ROUGH_STIFFNESS * min(gears.mesh_widths)))
 
 
-def _answer(problem, state, members) -> dict:
+def _answer(problem, state, turns: np.ndarray, members) -> dict:
     """Solution of one position and its linear answer to separations of the touching cells."""
     N, active = problem.n_planets, np.flatnonzero(state.active)
     of_mesh = problem.mesh[active, None] == np.arange(2 * N)
     lower = factor(problem.compliance[np.ix_(active, active)])
     Z = cho_solve((lower, True), of_mesh.astype(float))
     K = of_mesh.T @ Z
-    B = np.hstack([rotation_approach(N), members.approach[:, members.free]])
+    B = np.hstack([turns, members.approach[:, members.free]])
     # a planet that carries nothing leaves S singular in its own rotation alone
     motion = np.linalg.pinv(B.T @ K @ B, rcond=1e-10, hermitian=True) @ B.T
     force = K @ B @ motion - np.eye(2 * N)

@@ -9,6 +9,11 @@ import pytest
 from femgear.contact.solve import solve_contact
 from femgear.contact.tooth_loads import _engagement_peaks, load_spectrum
 from femgear.errors import ContactError
+from femgear.gears.planetary import PlanetarySet
+
+GEARS: Any = SimpleNamespace(
+    mates=PlanetarySet.mates, repeated=PlanetarySet.repeated, kind_rows=(slice(0, 1), slice(1, 2))
+)
 
 
 def test_a_tooth_is_in_the_next_slot_a_period_later():
@@ -25,7 +30,7 @@ def test_loads_are_counted_in_twenty_classes_up_to_the_largest_one():
     for largest in (0.16, 1600.0):
         load = largest * np.array([[[0.0, 0.0, 0.5]], [[0.92, 0.0, 1.0]]])
         teeth: Any = SimpleNamespace(load=load, turn=np.arange(3), periods=3, each=1)
-        found = load_spectrum(teeth)
+        found = load_spectrum(GEARS, teeth)
         assert found.edges == pytest.approx(largest * np.arange(21) / 20, rel=1e-14)
         for shares in (found.time, found.engagements):
             assert [np.flatnonzero(row).tolist() for row in shares] == [[10], [18, 19]]
@@ -33,7 +38,7 @@ def test_loads_are_counted_in_twenty_classes_up_to_the_largest_one():
         assert found.cycles == pytest.approx(np.array([[1.0, 1.0], [2.0, 2.0]]) / 3)
         assert found.duration == pytest.approx([1 / 3, 2 / 3])
     teeth.load = 0.0 * teeth.load
-    unloaded = load_spectrum(teeth)
+    unloaded = load_spectrum(GEARS, teeth)
     for shares in (unloaded.time, unloaded.engagements):
         assert shares.shape == (2, 20) and not shares.any()
 

@@ -1,9 +1,17 @@
 """Spectra of tooth loads, of records that repeat and of those that do not."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from femgear.contact.tooth_loads import LoadedTeeth, load_spectrum
+from femgear.gears.planetary import PlanetarySet
+
+GEARS: Any = SimpleNamespace(
+    mates=PlanetarySet.mates, repeated=PlanetarySet.repeated, kind_rows=(slice(0, 1), slice(1, 2))
+)
 
 
 def invented(periods, slots=3, each=4):
@@ -21,14 +29,14 @@ def invented(periods, slots=3, each=4):
 
 
 def test_peaks_are_counted_once_an_engagement():
-    whole = load_spectrum(invented(10), closes=True)
+    whole = load_spectrum(GEARS, invented(10), closes=True)
     assert whole.edges[-1] == 10 and len(whole.edges) == 21
     # classes of half a unit, which begin with their lower limit; the last one holds its upper limit too
     expected = np.zeros(20)
     expected[[*range(2, 20, 2), 19]] = 0.1
     assert whole.engagements[0] == pytest.approx(expected)
     # a record that does not repeat shows eight teeth from entry to exit: those with peaks 1 .. 8
-    part = load_spectrum(invented(10), closes=False)
+    part = load_spectrum(GEARS, invented(10), closes=False)
     expected = np.zeros(20)
     expected[2:18:2] = 1 / 8
     assert part.engagements[0] == pytest.approx(expected)

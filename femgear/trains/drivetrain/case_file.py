@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, Any, ClassVar, Literal, cast
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field, StrictBool
@@ -35,11 +35,11 @@ from femgear.case.quantities import (
     Values,
 )
 from femgear.case.sections import FORMAT, DampingRatio, Speed
+from femgear.case.teeth import GearCase
 from femgear.case.text import CaseFile, ReadCase
 from femgear.errors import CaseError, FemgearError
 from femgear.findings import DOUBT, Finding
 from femgear.gears.deviations import common_period
-from femgear.gears.pair import GearPair
 from femgear.trains.drivetrain.parts import (
     BearingSection,
     BodySection,
@@ -526,9 +526,9 @@ def _told(error: FemgearError) -> dict[str, Any]:
     return {name: getattr(error, name) for name in ("code", "key", "value", "limit", "remedy")}
 
 
-def _unlike(pair: Any, stage: ParallelSection, key: str) -> Iterator[CaseError]:
+def _unlike(pair: GearCase, stage: ParallelSection, key: str) -> Iterator[CaseError]:
     """Entries of a stage that are not those of its pair: teeth, helix, pressure angle, base circles."""
-    gears, helix = cast(GearPair, planetary_set(pair)), abs(pair.helix_angle or 0.0)
+    gears, helix = planetary_set(pair), abs(pair.helix_angle or 0.0)
     if gears.gear_2.internal:
         words = "the gears of a parallel stage are external"
         yield CaseError(words, code="E-CHOICE", key="gear_2.outer_radius", remedy="leave it out")

@@ -20,7 +20,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import cast
 
 import numpy as np
 
@@ -28,7 +27,6 @@ from femgear.case.gear_set import line_play
 from femgear.case.text import write
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.shaft import beam_element, disc_matrices
-from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
 from femgear.stages.static import solve_static
 from femgear.system.force_laws import positive_part
@@ -502,7 +500,7 @@ def _computed_mesh(text: str) -> ComputedMesh:
     values = static.cycle.stiffness[0]
     # a negative torque is the drive of gear 2: positions run backwards
     samples = values if pair.operation.torque > 0.0 else values[-np.arange(len(values)) % len(values)]
-    ratio = cast(GearPair, static.planetary_set).contact_ratio + abs(static.overlap_ratio)
+    ratio = static.planetary_set.contact_ratio + abs(static.overlap_ratio)
     known = {"stiffness": float(values.mean()), "contact_ratio": ratio, "backlash": line_play(pair) or None}
     return ComputedMesh.in_si(samples=tuple(samples.tolist()), **known)
 

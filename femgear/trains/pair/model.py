@@ -14,7 +14,6 @@ resolved where tooth pairs begin and cease to carry (`femgear.contact.loaded_per
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, cast
 
 import numpy as np
 
@@ -121,8 +120,8 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
 
 def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
     """Compute mesh stiffness, transmission error and force of the loaded pair over one mesh period."""
-    gears: Any = static.planetary_set
-    deviations, slices = set_deviations(case), over_width(cast(Any, case), gears, waves=static.waves)
+    gears: GearPair = static.planetary_set
+    deviations, slices = set_deviations(case), over_width(case, gears, waves=static.waves)
     if slices:
         slices |= {"held_waves": slices["waves"]}
     state = loaded_period(
@@ -130,7 +129,7 @@ def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
         static.bodies,
         static.bodies,
         sun_torque=static.sun_torque,
-        positions=record_positions(cast(Any, case), gears),
+        positions=record_positions(case, gears),
         contact=case.static.contact,
         deviations=None if deviations.ideal else deviations,
         options=CycleOptions(**slices),

@@ -13,7 +13,7 @@ import math
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -127,7 +127,7 @@ def iso_stiffness(case: PairCase) -> tuple[float, float]:
     `femgear.gears.iso6336.mesh_stiffness_method_b`; the standard takes them in proportion to Young's modulus
     over that of steel, and to the fourth root of loads below 100 N/mm at the reference circle.
     """
-    gears = cast(GearPair, planetary_set(case))
+    gears: GearPair = planetary_set(case)
     load = abs(case.operation.torque) / (gears.gear_1.reference_radius * gears.face_width)
     moduli = (one.youngs_modulus for one in materials_of(case))
     factor = material_factor(*moduli) * min(1.0, load / _FULL_LOAD) ** 0.25
@@ -197,7 +197,7 @@ def solve_pair_modes(case: PairCase, static: StaticResult) -> PairModesResult:
     CaseError: a static solution of another case (E-OTHER-CASE), or none (E-TYPE).
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
-    gears = cast(GearPair, static.planetary_set)
+    gears: GearPair = static.planetary_set
     model, excitation = pair_model(case, gears), pair_excitation(case, static)
     mean, ratio = excitation.stiffness.mean(axis=1), case.dynamics.damping_ratio
     modes = solve_modes(model.system, mean, damping_ratio=ratio)
