@@ -91,7 +91,7 @@ def sliced():
         "ring": {"lead_slope": law},
         "pin_errors": {"radial": law, "tangential": law},
     }
-    basis = design_basis(case, cache=grid_cache(), slices=True)
+    basis = design_basis(case, cache=grid_cache())
     torque = sun_torque(case, basis.gears)
     positions = sample_positions(basis, torque, 16)
     return sample_model(basis, Tolerances.model_validate(tolerances), sun_torque=torque, positions=positions)

@@ -1,4 +1,4 @@
-"""The command line: ``femgear`` new, import, check, run, report, export, rexs, sweep, samples, schema."""
+"""The command line: ``femgear`` new, import, check, run, report, export, rexs, schema and the studies of a case."""
 
 from __future__ import annotations
 
@@ -747,7 +747,8 @@ def sweep(
     case
         TOML case file.
     over
-        As "operation.torque=50 N m,100 N m" or "sun.modifications[0].amount=0 um..12 um/7"; may be repeated.
+        As "operation.torque=50 N m,100 N m" or "sun.modifications[0].amount=0 um..12 um/7"; entries that go
+        together as "sun.teeth,planet.teeth,ring.teeth=27/40/108,30/40/111". May be repeated.
     output
         Folder of sweep.csv, sweep.png and the journal sweep.jsonl.
     of
@@ -802,7 +803,7 @@ def samples(
     tolerances: Path,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
     positions: Whole = 16,
-    method: Literal["spring", "exact"] = "spring",
+    method: Literal["spring", "exact"] | None = None,
     force: bool = False,
     drawn: Drawn | None = None,
     tasks: Tasks | None = None,
@@ -820,7 +821,8 @@ def samples(
     positions
         Equidistant ones of one mesh period; those of the peaks of the set and its end come beside them.
     method
-        Tooth pairs as springs, whose error is stated, or the whole contact problem.
+        Tooth pairs as springs, whose error is stated, or the whole contact problem. Default: springs, but for
+        helical teeth, back flanks and bearings with clearance, which have none.
     force
         Replace the results that the folder holds, once the new ones are computed.
     """
@@ -842,14 +844,242 @@ def samples(
         basis = prepared(data, tolerances, positions=positions, cache=grid_cache())
         progress("curves of tooth pairs", 1.0)
         if index is None:
-            options = {"count": number, "seed": seed, "exact": method == "exact", "force": force}
-            blocks, names = samples_into(data, output, basis, **options, progress=progress, runner=runner)
+            options = {"count": number, "seed": seed, "exact": None if method is None else method == "exact"}
+            blocks, names = samples_into(data, output, basis, force=force, **options, progress=progress, runner=runner)
         else:
             blocks, names = [], [f"sample_{index}.toml"]
             own_files(output, names)
             write_text(to_toml(sample_case(data, basis[0], seed, index)), output / names[0])
     if blocks:
         _print(blocks)
+    _say(f"files in {output}: {', '.join(names)}")
+    return 0
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Search:
+    """How far a search goes.
+
+    Parameters
+    ----------
+    method
+        Of the search; auto takes derivatives where the problem has them.
+    positions
+        Positions over one mesh period in the search; the refinement takes those of the case, the check 128.
+    flank_elements
+        Elements along a flank in the search; the refinement takes those of the case, the check 32.
+    samples
+        Designs before the descents. Default: five a variable.
+    max_designs
+        Designs after which search and refinement end.
+    seed
+        Of the samples.
+    check
+        Run case and optimum anew into the folders before and after.
+    """
+
+    method: Literal["auto", "minimax", "global", "simplex", "powell"] = "auto"
+    positions: Whole = 24
+    flank_elements: Whole = 12
+    samples: Whole | None = None
+    max_designs: Whole | None = None
+    seed: Whole = 0
+    check: bool = True
+
+
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Sought:
+    """What is searched.
+
+    Parameters
+    ----------
+    vary
+        As "sun.modifications[0].amount=0 um..15 um +- 1 um" with its tolerance; may be repeated. Default: a
+        tip relief more on every loaded flank, its amount and its start.
+    shape
+        Of these reliefs; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
+    goal
+        What to minimise: ste (largest of the next three), ste overall, ste sun-planet, ste planet-ring, mesh
+        force, peak mesh force, housing, contact pressure, root stress sun (planet, ring), contact ratio
+        sun-planet (planet-ring), tip thickness sun (planet, ring).
+    limit
+        As in "root stress sun <= 300 MPa"; of the same quantities. May be repeated.
+    of
+        Further quantities to report; may be repeated. Default: transmission errors, mesh forces, housing.
+    second
+        Second goal: the Pareto front of both is searched as well.
+    torque
+        Of the input. Default: that of the case.
+    speeds
+        First and last speed of the input, for mesh forces and the housing.
+    """
+
+    vary: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    shape: Literal["linear", "parabolic"] = "parabolic"
+    goal: str = "ste"
+    limit: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    of: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    second: str | None = None
+    torque: Quantity | None = None
+    speeds: tuple[str, str] = ("1000 rpm", "3500 rpm")
+
+
+@app.command
+def optimise(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    sought: Sought | None = None,
+    search: Search | None = None,
+    tasks: Tasks | None = None,
+) -> int:
+    """Find the best values of some entries, checked by runs; goes on where it was interrupted.
+
+    Search with few positions on a coarse grid, refinement with those of the case, check on a finer one. The
+    optimum is written as a case file.
+
+    Parameters
+    ----------
+    case
+        TOML case file.
+    output
+        Folder of optimum.toml, tables, figures and journals.
+    """
+    from femgear.run import grid_cache
+    from femgear.study.optimise import SearchEffort, SearchRequest, optimise_into
+    from femgear.study.runner import open_runner
+    from femgear.trains.reading import read_case
+
+    request, effort = SearchRequest(**vars(sought or Sought())), SearchEffort(**vars(search or Search()))
+    data = read_case(case)
+    with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
+
+        def tell(blocks) -> None:
+            with progress.aside():
+                _print(blocks)
+                sys.stdout.flush()
+
+        names = optimise_into(
+            data,
+            output,
+            request,
+            effort,
+            lambda changed, folder, stage: _run_into(changed, folder, stage, progress),
+            cache=grid_cache(),
+            progress=progress,
+            runner=runner,
+            tell=tell,
+        )
+    _say(f"files in {output}: {', '.join(names)}")
+    return 0
+
+
+def _run_into(case: Any, folder: Path, only: str, progress: Progress) -> Any:
+    """Run a case into a folder up to a stage, over its former results, and open the new ones."""
+    from femgear.run import run_case
+    from femgear.storage.results import run_folder
+    from femgear.trains.reading import open_results
+
+    with run_folder(folder, force=True) as place:
+        run_case(case, place, only=only, pictures=False, progress=progress)
+    return open_results(folder, partial=False)
+
+
+@app.command
+def relief(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    torque: Quantity | None = None,
+    also: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
+    largest: str | None = None,
+    shape: Literal["linear", "parabolic"] = "parabolic",
+    points: Whole = 7,
+    positions: Whole | None = None,
+) -> int:
+    """Find the tip relief of sun and planets with the least transmission error at one torque.
+
+    Amount and length are searched over a map, which is drawn, and from its best point on. The relief is
+    written as a case file, with the numbers that a run of it finds. Goes on where it was interrupted.
+
+    Parameters
+    ----------
+    case
+        TOML case file; the relief adds to its modifications.
+    output
+        Folder of relief.toml, tip_relief.csv, tip_relief.png and the journal.
+    torque
+        Of the input, to design for. Default: that of the case.
+    also
+        Further torques of maps; may be repeated. Default: half and one and a half times the first.
+    largest
+        Largest amount searched. Default: twice the mean deflection of the sun-planet meshes.
+    shape
+        Of the relief; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
+    points
+        Points of the map along each parameter.
+    positions
+        Positions over one mesh period. Default: those of the case.
+    """
+    from femgear.run import grid_cache
+    from femgear.study.tip_relief import ReliefRequest, relief_into
+    from femgear.trains.reading import read_case
+
+    request = ReliefRequest(torque, also, largest, shape, points, positions)
+    data = read_case(case)
+    with Progress() as progress:
+        blocks, names = relief_into(data, output, request, cache=grid_cache(), progress=progress)
+    _print(blocks)
+    _say(f"files in {output}: {', '.join(names)}")
+    return 0
+
+
+@app.command
+def harris(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))],
+    relief: Annotated[tuple[str, ...], Parameter(negative="")] = ("0 um", "2 um", "4 um", "6 um", "8 um"),
+    length: float = 1.0,
+    shape: Literal["linear", "parabolic"] = "parabolic",
+    torque: Annotated[tuple[str, ...], Parameter(negative="", allow_leading_hyphen=True)] = (),
+    positions: Whole | None = None,
+) -> int:
+    """Compute the transmission error over torque for several tip reliefs (Harris map).
+
+    Goes on where it was interrupted.
+
+    Parameters
+    ----------
+    case
+        TOML case file of a planetary set or a pair; the reliefs add to its modifications.
+    output
+        Folder of harris_map.csv, harris_map.png and the journal.
+    relief
+        Tip relief of sun and planets (sun side), such as "4 um"; may be repeated.
+    length
+        Of the reliefs, in lengths of two-pair contact: 1 starts at the ends of single-pair contact.
+    shape
+        Of the reliefs; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
+    torque
+        Of the input; may be repeated. Default: 11 from a tenth to twice the case's.
+    positions
+        Positions over one mesh period. Default: those of the case.
+    """
+    from femgear.run import grid_cache
+    from femgear.study.harris import HarrisRequest, harris_into
+    from femgear.trains.reading import read_case
+
+    request = HarrisRequest(relief, length, shape, torque, positions)
+    data = read_case(case)
+    with Progress() as progress:
+        blocks, names = harris_into(data, output, request, cache=grid_cache(), progress=progress)
+    _print(blocks)
     _say(f"files in {output}: {', '.join(names)}")
     return 0
 

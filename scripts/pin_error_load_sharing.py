@@ -154,7 +154,7 @@ def _solve(data, basis, kind, torque, place, sigma, samples, seed):
     from femgear.contact.supports import RIGID, Supports
     from femgear.stages.static import case_supports
     from femgear.study.samples import Tolerances, exact_numbers, sample_model, spring_numbers
-    from femgear.study.sensitivity import linearise, pin_sensitivities
+    from femgear.study.sensitivity import linearise, pin_differences, pin_sensitivities
 
     supports = {"fixed": RIGID, "floating": Supports(sun=0.0), "case": case_supports(data)}[kind]
     basis = replace(basis, supports=supports)
@@ -165,20 +165,24 @@ def _solve(data, basis, kind, torque, place, sigma, samples, seed):
     model = sample_model(basis, tolerances, sun_torque=torque, positions=at)
     curves = perf_counter()
     errors = model.draw(seed, 0, samples)
-    sharing = Sharing(spring_numbers(model, errors)["planet_share"])
+    solve = exact_numbers if model.walked else spring_numbers
+    sharing = Sharing(solve(model, errors)["planet_share"])
     solved = perf_counter()
     # a few of the first, the middle and the worst
     order = np.argsort(sharing.factor)
     chosen = np.unique([0, samples // 3, order[samples // 2], order[-1]])
     whole = exact_numbers(model, errors[chosen])["planet_share"]
     difference = np.abs(whole - sharing.share[chosen]).max()
-    linear = linearise(basis, sun_torque=torque, only=[place])
+    if basis.over or model.walked:  # derivatives are those of the plane contact of drive flanks
+        slopes = pin_differences(basis, sun_torque=torque, position=float(at[0]))
+    else:
+        slopes = pin_sensitivities(linearise(basis, sun_torque=torque, only=[place]))[..., 0]
     facts = {
         "curves": curves - begin,
         "samples": solved - curves,
         "difference": difference,
         "checked": len(chosen),
-        "sensitivity": pin_sensitivities(linear)[..., 0],
+        "sensitivity": slopes,
     }
     return np.moveaxis(errors.reshape(samples, 2, -1), 1, 2), sharing, facts
 

@@ -97,15 +97,15 @@ RUNS = {
         load_sharing="Shares of the planets where one of them has a gap, and the load sharing factor.",
         tooth_loads="Load of the tooth pairs of that planet and of its neighbour along the path of contact.",
     ),
-    "harris_map": _script(
-        "harris_map.py",
+    "harris_map": Run(
+        "femgear harris cases/planetary_27_40_108.toml",
         "Harris map",
-        harris_map="Transmission error over torque: every tip relief has a torque at which it is best.",
+        says={"harris_map": "Transmission error over torque: every tip relief has a torque at which it is best."},
     ),
-    "tip_relief_design": _script(
-        "tip_relief_design.py",
+    "tip_relief_design": Run(
+        "femgear relief cases/planetary_27_40_108.toml",
         "Design of the tip relief",
-        tip_relief="Transmission error over amount and length of the relief, the best one marked.",
+        says={"tip_relief": "Transmission error over amount and length of the relief, the best one marked."},
     ),
     "lead_design": _script(
         "lead_design.py",
@@ -117,11 +117,13 @@ RUNS = {
         "Pin errors",
         load_sharing="Distribution of the load sharing factor: a floating sun takes most errors up.",
     ),
-    "optimise": _script(
-        "optimise.py",
+    "optimise": Run(
+        "femgear optimise cases/planetary_27_40_108.toml",
         "Optimised tip relief",
-        optimum="Transmission error and mesh force before and after, and the course of the search.",
-        tolerances="What the tolerances of the entries found do to the objective.",
+        says={
+            "optimum": "Transmission error and mesh force before and after, and the course of the search.",
+            "tolerances": "What the tolerances of the entries found do to the objective.",
+        },
     ),
     "housing_modulation": _script(
         "housing_modulation.py",

@@ -9,6 +9,8 @@ import sys
 import time
 from pathlib import Path
 
+from femgear import cli
+
 SCRIPTS = Path(__file__).resolve().parents[1] / "scripts"
 
 
@@ -50,3 +52,16 @@ def wait_for_lines(journal, lines, program, *, seconds=60.0):
         if ended or time.monotonic() > until:
             raise AssertionError(f"{journal.name} has no {lines} lines: {program.wait()}")
         time.sleep(0.002)
+
+
+def run_femgear(*arguments, folder):
+    """Exit code and output of femgear in this process, run from a folder."""
+    output, errors = io.StringIO(), io.StringIO()
+    words = [*map(str, arguments)]
+    with (
+        contextlib.chdir(folder),
+        contextlib.redirect_stdout(output),
+        contextlib.redirect_stderr(errors),
+    ):
+        code = cli.main(words)
+    return subprocess.CompletedProcess(words, code, output.getvalue(), errors.getvalue())

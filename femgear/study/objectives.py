@@ -396,6 +396,7 @@ def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
             key="objective",
             value=words,
             limit=", ".join((*NAMES, "natural frequency N")),
+            remedy="take one of these names",
         )
     if name not in _OVER_SPEEDS:
         return _WORDS[name]()

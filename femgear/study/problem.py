@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -28,6 +28,8 @@ Vector = Sequence[float] | np.ndarray
 """Values of the design variables in their units, (n,)."""
 Point = tuple[object, ...]
 """Values of the design variables as the case file holds them; empty for the case as it is."""
+Shape = Literal["linear", "parabolic"]
+"""Of a relief."""
 _DEFAULT_TOLERANCE = 0.1
 """Over the range of the variable."""
 _QUANTITY = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
@@ -317,7 +319,7 @@ def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
     match = re.fullmatch(r"\s*(.+?)\s*(<=|>=)\s*(.+?)\s*", text, re.DOTALL)
     if not match:
         example = '"contact ratio sun-planet >= 1.3" or "root stress sun <= 300 MPa"'
-        raise CaseError("not a limit", code="E-OBJECTIVE", key="--limit", value=text, limit=example)
+        raise CaseError("not a limit", code="E-OBJECTIVE", key="--limit", value=text, remedy=f"write it as {example}")
     quantity = named_quantity(match[1], speeds=speeds)
     if quantity.dimension is NUMBER:
         bound = _number(match[3])
@@ -354,13 +356,13 @@ def _number(text: str) -> str | float:
         return text
 
 
-def tip_reliefs(case: Case) -> tuple[Case, tuple[Variable, ...]]:
-    """Add a linear tip relief to every loaded flank of a case; amounts and starts are the variables.
+def tip_reliefs(case: Case, *, shape: Shape = "parabolic") -> tuple[Case, tuple[Variable, ...]]:
+    """Add a tip relief to every loaded flank of a case; amounts and starts are the variables.
 
     Sun and ring have one relief more, the planets two, for the flanks that touch sun and ring. Their amounts
     are zero, so that the case computes as before. The variables are amounts [um], to a hundredth of the
     module, with a tolerance of 1 um, and start diameters [mm], from the pitch circle to near the tip, with
-    one of 0.1 mm.
+    one of 0.1 mm. A linear ``shape`` begins with a kink, under which contact pressure has no limit.
     """
     gears, most = planetary_set(case), 0.01 * case.sun.module
     back = torques(gears, member=case.operation.input, torque=case.operation.torque).sun < 0
@@ -380,7 +382,8 @@ def tip_reliefs(case: Case) -> tuple[Case, tuple[Variable, ...]]:
         given = case_text.parse(case.source, case.name)[gear.name].get("modifications", [])
         first, last = pitch, pitch + _LATEST_START * (gear.tip_radius - pitch)
         low, high = (f"{2e3 * radius:.6g} mm" for radius in sorted((first, last)))
-        table = {"kind": "tip relief", "amount": "0 um", "start_diameter": f"{1e3 * (first + last):.6g} mm"}
+        start = f"{1e3 * (first + last):.6g} mm"
+        table = {"kind": "tip relief", "amount": "0 um", "start_diameter": start, "shape": shape}
         table |= {"flank": side} if side else {}
         case = with_values(case, {f"{gear.name}.modifications": [*given, table]})
         key = f"{gear.name}.modifications[{len(given)}]"

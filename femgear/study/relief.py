@@ -9,6 +9,8 @@ finds the least peak to peak at one torque and says whether it is a minimum. All
 
 from __future__ import annotations
 
+import json
+import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,11 +23,12 @@ from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.supports import RIGID, Supports
-from femgear.errors import CaseError
+from femgear.errors import CaseError, GeometryError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations
 from femgear.gears.modifications import FlankForm, TipRelief
 from femgear.stages.protocol import Progress, one_blas_thread
-from femgear.stages.static import known_compliances, over_width, static_supports
+from femgear.stages.static import known_compliances, over_width, record_positions, static_supports
+from femgear.study.designs import Journal
 
 if TYPE_CHECKING:
     from femgear.case.planetary import Case
@@ -59,6 +62,10 @@ class DesignBasis:
         `contact.cycle.walk_mesh_cycle`.
     over : mapping
         What the contact over the face width takes of `CycleOptions`, by name; empty of the plane contact.
+    both_flanks : bool
+        Whether back flanks may touch.
+    longest_record : int
+        Mesh periods at most of a record with errors that turn.
     """
 
     gears: PlanetarySet
@@ -68,6 +75,8 @@ class DesignBasis:
     positions: int | np.ndarray = 64
     contact: str = "profile"
     over: Mapping[str, Any] = field(default_factory=dict)
+    both_flanks: bool = False
+    longest_record: int = sys.maxsize
 
     def walk(self, sun_torque: float, *, periods: int = 1, options: CycleOptions | None = None) -> MeshCycle:
         """Solve the static problem over some mesh periods under a torque on the sun [N m].
@@ -83,67 +92,61 @@ class DesignBasis:
             deviations=self.deviations,
             supports=self.supports,
             periods=periods,
-            options=replace(options or CycleOptions(peaks=True), **self.over),
+            options=replace(options or CycleOptions(peaks=True), both_flanks=self.both_flanks, **self.over),
         )
 
-    def loaded(self, sun_torque: float) -> tuple[DesignBasis, np.ndarray]:
+    def walk_record(self, sun_torque: float) -> MeshCycle:
+        """Solve the static problem over all mesh periods after which the errors repeat, as ``femgear run`` does.
+
+        ``sun_torque`` is the torque on the sun [N m].
+        """
+        periods = 1
+        if self.deviations is not None:
+            periods = common_period(self.deviations, self.gears, limit=self.longest_record)[0]
+        return self.walk(sun_torque, periods=periods)
+
+    def loaded(self, sun_torque: float, *, clearance: bool = False) -> tuple[DesignBasis, np.ndarray]:
         """Give the set as solved, mirrored under a negative sun torque [N m], and its planets (N,) by number.
 
-        Refuses no torque (E-TORQUE) and bearings with clearance (E-SUPPORT).
+        Refuses no torque (E-TORQUE) and, without ``clearance``, bearings that have one (E-SUPPORT).
         """
         if not (np.isfinite(sun_torque) and sun_torque):
             raise CaseError("without torque nothing touches", code="E-TORQUE", value=sun_torque, limit="not zero")
-        if clearance := self.supports.planet_clearance:
+        if (gap := self.supports.planet_clearance) and not clearance:
             raise CaseError(
-                "derivatives and the load sharing of samples know no clearance of the planet bearings",
+                "derivatives know no clearance of the planet bearings",
                 code="E-SUPPORT",
                 key="planet.bearing_clearance",
-                value=f"{clearance * 1e6:.6g} um",
+                value=f"{gap * 1e6:.6g} um",
                 limit="0 um",
-                remedy='set it to zero, or solve single cases with static.members = "elastic"',
+                remedy="set it to zero, or take differences of mesh cycles: femgear.study.sensitivity.pin_differences",
             )
         gears, order, deviations = loaded_image(self.gears, sun_torque, self.deviations)
         return replace(self, gears=gears, deviations=deviations), order
 
 
 @one_blas_thread()
-def design_basis(
-    case: Case, *, cache: Path | None = None, steps: Steps | None = None, slices: bool = False
-) -> DesignBasis:
+def design_basis(case: Case, *, cache: Path | None = None, steps: Steps | None = None) -> DesignBasis:
     """Collect gears, compliances, deviations, supports and positions of the static problem of a case.
 
-    ``cache`` is the folder of generated grids; flank compliances of other cases are taken from ``steps``
-    where they are those of this one, as in `femgear.stages.static.solve_static`.
+    They are those of `femgear.stages.static.solve_static`: plane contact, or slices of the face width, of
+    spur and of helical teeth. ``cache`` is the folder of generated grids; what other cases have left is taken
+    from ``steps`` where it is that of this one.
 
-    CaseError: E-SLICES: slices over the width, which ``slices`` allows, but for those of helical teeth.
+    CaseError: as `femgear.stages.static.check_slices`.
     """
-    if case.static.slices > 1 and not slices:
-        raise CaseError(
-            "this study solves the plane contact",
-            code="E-SLICES",
-            key="static.slices",
-            file=case.location("static.slices"),
-            remedy="leave static.slices and modifications of leads out",
-        )
-    if case.set.helix_angle:
-        raise CaseError(
-            "this study is one of spur teeth",
-            code="E-SLICES",
-            key="set.helix_angle",
-            file=case.location("set.helix_angle"),
-            remedy="leave set.helix_angle out",
-        )
-    gears, deviations = planetary_set(case), set_deviations(case)
-    bodies = known_compliances(case, gears, steps or Steps(), cache=cache)[1]
-    own = None if deviations.ideal else deviations
+    gears, deviations, steps = planetary_set(case), set_deviations(case), steps or Steps()
+    over = over_width(case, gears, cache=cache, steps=steps)
     return DesignBasis(
         gears,
-        bodies,
+        known_compliances(case, gears, steps, cache=cache)[1],
         static_supports(case),
-        own,
-        case.static.positions,
+        None if deviations.ideal and not case.static.back_flanks else deviations,
+        record_positions(case, gears),
         case.static.contact,
-        over_width(case, gears, cache=cache),
+        over,
+        case.static.back_flanks,
+        case.static.longest_record,
     )
 
 
@@ -162,7 +165,7 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
     Its length is along the path of contact, in lengths ``(epsilon - 1) p_b`` of two-pair contact at either
     end: 1 starts at the ends of single-pair contact.
 
-    CaseError: E-RANGE: a length outside 0.05 to 1.3.
+    CaseError: E-RANGE: a length outside 0.05 to 1.3. GeometryError: a contact ratio of one (E-CONTACT-RATIO).
     """
     if not 0.05 <= length <= _LARGEST_LENGTH:
         raise CaseError(
@@ -170,9 +173,18 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
             code="E-RANGE",
             value=length,
             limit=f"0.05 to {_LARGEST_LENGTH}",
+            remedy="give a length in lengths of two-pair contact, 1 for a long relief",
         )
     pair = mesh_pairs(planetary_set)[0]
     begin, end = pair.path
+    if end - begin <= planetary_set.base_pitch:
+        raise GeometryError(
+            "sun and planet have no two-pair contact, in which reliefs are measured",
+            code="E-CONTACT-RATIO",
+            value=(end - begin) / planetary_set.base_pitch,
+            limit="a transverse contact ratio above 1",
+            remedy="give the reliefs as modifications of the case, with start diameters",
+        )
     along = length * (end - begin - planetary_set.base_pitch)
     return float(pair.pitch_roll_1 + end - along), float(pair.pitch_roll_2 - begin - along)
 
@@ -244,6 +256,8 @@ def harris_map(
     torques,
     deviations: Sequence[SetDeviations | None],
     progress: Progress | None = None,
+    journal: Journal | None = None,
+    names: Sequence[str] = (),
 ) -> HarrisMap:
     """Compute the transmission error peak to peak [m] over torque for a list of deviations.
 
@@ -257,6 +271,10 @@ def harris_map(
         One a curve; the record spans the common period of each.
     progress : callable, optional
         Called with (stage, mesh cycles done, mesh cycles).
+    journal : Journal, optional
+        Keeps every mesh cycle under the name of its deviations and its torque; those it holds are not solved.
+    names : sequence of str
+        Of the deviations, in a journal.
 
     Raises
     ------
@@ -272,15 +290,40 @@ def harris_map(
     peaks = np.zeros((len(deviations), len(rows), len(torques)))
     overall, residual = np.zeros((len(deviations), len(torques))), 0.0
     for v, variant in enumerate(deviations):
-        periods = 1 if variant is None else common_period(variant, basis.gears)[0]
         for t, torque in enumerate(torques):
-            cycle = replace(basis, deviations=variant).walk(float(torque), periods=periods)
-            peaks[v, :, t] = [cycle.peak_to_peak()[of_kind].max() for of_kind in rows]
-            overall[v, t] = cycle.peak_to_peak("sun_arc")
-            residual = max(residual, float(cycle.residual.max()))
+            key = json.dumps([*names[v : v + 1], float(torque)])
+            record = None if journal is None else journal.get(key)
+            if record is None:
+                record = _numbers(replace(basis, deviations=variant), float(torque))
+                if journal is not None:
+                    journal.add(key, record)
+            peaks[v, :, t], overall[v, t] = record["peak_to_peak"], record["overall"]
+            residual = max(residual, record["residual"])
             if progress is not None:
                 progress("contact", v * len(torques) + t + 1, peaks[:, 0].size)
     return HarrisMap(torques, peaks, overall, residual)
+
+
+def _numbers(basis: DesignBasis, sun_torque: float) -> dict[str, Any]:
+    """Solve a mesh cycle: peaks to peaks of the kinds of mesh and from sun to ring [m], residual."""
+    cycle = basis.walk_record(sun_torque)
+    peaks = cycle.peak_to_peak()
+    return {
+        "peak_to_peak": [float(peaks[rows].max()) for rows in basis.gears.kind_rows],
+        "overall": float(cycle.peak_to_peak("sun_arc")),
+        "residual": float(cycle.residual.max()),
+    }
+
+
+def is_cycle(key: str, record: dict) -> bool:
+    """Tell whether a record of a journal has the numbers of a mesh cycle of `harris_map`."""
+    numbers = [*record["peak_to_peak"], record["overall"], record["residual"]]
+    return bool(json.loads(key)) and len(numbers) > 2 and bool(np.isfinite(numbers).all())
+
+
+def relief_name(amount: float, length: float, power: float) -> str:
+    """Name a relief in a journal: amount [m], length in lengths of two-pair contact, and power."""
+    return f"{float(amount)!r} {float(length)!r} {float(power)!r}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -315,22 +358,32 @@ class ReliefGrid:
 
 @one_blas_thread()
 def relief_grid(
-    basis: DesignBasis, *, amounts, lengths, torques, power: float = 1.0, progress: Progress | None = None
+    basis: DesignBasis,
+    *,
+    amounts,
+    lengths,
+    torques,
+    power: float = 1.0,
+    progress: Progress | None = None,
+    journal: Journal | None = None,
 ) -> ReliefGrid:
     """Compute the transmission error [m] of the sun-planet meshes over amount and length of their relief.
 
     The reliefs are added to the deviations of the basis. Amounts (A,), lengths (L,) and torques (T,) of one
-    sign are those of `ReliefGrid`; ``power`` and ``progress`` as for `with_tip_relief` and `harris_map`.
+    sign are those of `ReliefGrid`; ``power``, ``progress`` and ``journal`` as for `with_tip_relief` and
+    `harris_map`.
     """
     amounts, lengths, torques = (np.array(a, float) for a in (amounts, lengths, torques))
     back = loads_back(torques)
+    places = [(float(a), float(length)) for a in amounts for length in lengths]
     variants = [basis.deviations]
     variants += [
         with_tip_relief(basis.deviations, basis.gears, amount=a, length=length, power=power, back=back)
-        for a in amounts
-        for length in lengths
+        for a, length in places
     ]
-    found = harris_map(basis, torques=torques, deviations=variants, progress=progress).peak_to_peak[:, 0]
+    names = [relief_name(0.0, 1.0, power), *(relief_name(*place, power) for place in places)]
+    kept = {"progress": progress, "journal": journal, "names": names}
+    found = harris_map(basis, torques=torques, deviations=variants, **kept).peak_to_peak[:, 0]
     peaks = found[1:].T.reshape(len(torques), len(amounts), len(lengths))
     return ReliefGrid(amounts, lengths, torques, peaks, found[0])
 
@@ -387,7 +440,13 @@ class ReliefOptimum:
 
 @one_blas_thread()
 def optimise_relief(
-    basis: DesignBasis, grid: ReliefGrid, *, torque: float, power: float = 1.0, max_evaluations: int = 240
+    basis: DesignBasis,
+    grid: ReliefGrid,
+    *,
+    torque: float,
+    power: float = 1.0,
+    max_evaluations: int = 240,
+    journal: Journal | None = None,
 ) -> ReliefOptimum:
     """Find the best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
 
@@ -407,6 +466,8 @@ def optimise_relief(
         Over the same set, with `torque` (on the sun [N m]) among its torques.
     max_evaluations : int
         Mesh cycles after which the search is not begun again.
+    journal : Journal, optional
+        As for `harris_map`.
     """
     t = int(np.abs(grid.torques - torque).argmin())
     known: dict[tuple[float, float], float] = {}
@@ -416,7 +477,8 @@ def optimise_relief(
         if place not in known:
             relief = {"amount": place[0] * 1e-6, "length": place[1], "power": power, "back": torque < 0}
             variant = with_tip_relief(basis.deviations, basis.gears, **relief)
-            found = harris_map(basis, torques=[torque], deviations=[variant])
+            names = [relief_name(relief["amount"], relief["length"], power)]
+            found = harris_map(basis, torques=[torque], deviations=[variant], journal=journal, names=names)
             known[place] = float(found.peak_to_peak[0, 0, 0]) * 1e6
         return known[place]
 

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.planetary import Case
-from femgear.errors import FemgearError, StorageError
+from femgear.errors import CaseError, FemgearError, StorageError
 from femgear.findings import Finding, as_text, findings_in, tell
 from femgear.report.style import BLUE, VERMILION, label, legend_below, new_figure, save_figure
 from femgear.report.tables import Block, Marks
@@ -79,7 +79,7 @@ def samples_into(
     *,
     count: int = 1000,
     seed: int = 1,
-    exact: bool = False,
+    exact: bool | None = None,
     force: bool = False,
     progress: Progress = silent,
     runner: Runner | None = None,
@@ -91,10 +91,22 @@ def samples_into(
     Blocks of samples are kept until the end, their numbers in a file beside a journal: an interrupted command
     goes on from them. Complete results are refused (StorageError, E-OUTPUT), or replaced with ``force``.
 
+    Left out, ``exact`` is what the model needs.
+
     Of samples as springs one in a hundred, at most a thousand, drawn at random, is also solved exactly.
     """
     model, text = basis
     checked(count, "--number", 1)
+    if exact is False and model.walked:
+        raise CaseError(
+            "helical teeth, back flanks and bearings with clearance have no springs for their tooth pairs",
+            code="E-CHOICE",
+            key="--method",
+            value="spring",
+            limit="exact",
+            remedy="take --method exact, or leave --method out",
+        )
+    exact = model.walked if exact is None else exact
     again = 0 if exact else min(count // _SHARE_AGAIN, _MOST_AGAIN)
     own_files(folder, FILES)
     if (folder / FILES[0]).exists() and not (force or (folder / _JOURNAL).exists()):
@@ -157,7 +169,9 @@ def _limits(case: Case, model: SampleModel) -> Iterator[str]:
     """Say what the numbers of all samples assume."""
     elastic = '; static.members = "elastic" lets them move on their supports and bearings' * (not case.rigid)
     yield f"stiffness {SERIES}" if case.static.members == "elastic" else f"{HELD}{elastic}"
-    if model.level(*model.windows).tilts is not None:
+    if model.walked:
+        yield "every sample is solved as femgear run solves it: no springs stand for its tooth pairs"
+    elif model.level(*model.windows).tilts is not None:
         yield "profile slopes do not move the windows here (some tenths of a per cent)"
 
 
@@ -167,7 +181,7 @@ class _Tasks:
     def __init__(self, model, seed: int, journal: Journal, columns: Columns, progress, runner: Runner):
         self.model, self.seed, self.columns = model, seed, columns
         self._journal, self._progress, self._runner = journal, progress, runner
-        self._sizes = _SLICED_BLOCKS if model.basis.over else _BLOCKS
+        self._sizes = _SLICED_BLOCKS if model.basis.over or model.walked else _BLOCKS
 
     def compute(self, count: int, method: str) -> None:
         """Compute all samples that are missing, and put them into the columns."""
@@ -244,7 +258,7 @@ def _checked_again(
     seed, columns = more["seed"], tasks.columns
     order = np.argsort(columns.column("transmission_error", count), kind="stable")
     largest, worst = columns.column("largest_share", count).argmax(), int(order[-1])
-    checks = min(_SLICED_CHECKED if model.basis.over else _CHECKED, count)
+    checks = min(_SLICED_CHECKED if model.basis.over or model.walked else _CHECKED, count)
     chosen = np.unique(np.append(order[np.linspace(0, count - 1, checks).astype(int)], largest))
     del order
     exact, (turn, between) = tasks.in_every_way(chosen)

@@ -51,7 +51,7 @@ from femgear.contact.batch import (
     pair_laws,
     solve_batch,
 )
-from femgear.contact.cycle import CycleOptions
+from femgear.contact.cycle import CycleOptions, MeshCycle
 from femgear.contact.face_width import contacts_are_lines, curve_forces, lead_separations
 from femgear.contact.flank_pairs import pair_separations
 from femgear.contact.pair_springs import PairSprings, solve_laws
@@ -72,7 +72,7 @@ from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope, Prof
 from femgear.stages.protocol import one_blas_thread
 from femgear.stages.static_results import SLICES
 from femgear.study.relief import DesignBasis, design_basis, sun_torque
-from femgear.trains.reading import with_values
+from femgear.trains.reading import with_value, with_values
 
 POSITIONS = 16
 """Of a mesh period."""
@@ -377,9 +377,12 @@ class SampleModel:
     position : (P,) array
         In the solved set [mesh periods].
     equidistant : int
-        Number of equidistant positions in a mesh period; the others lie between them.
+        Number of equidistant positions in a mesh period that a run is asked for; the others lie between them.
     windows : (float, float)
         Load share [N] and smallest distance [m] from which the first windows follow.
+    walked : bool
+        Whether no springs stand for the tooth pairs and every sample is a walk through the mesh cycle, as
+        ``femgear run`` solves it: of helical teeth, back flanks and bearings with clearance.
     _levels : dict
         What was prepared for windows of a size, by these two numbers.
     """
@@ -393,6 +396,7 @@ class SampleModel:
     position: np.ndarray
     equidistant: int
     windows: tuple[float, float] = (0.0, 0.0)
+    walked: bool = False
     _levels: dict[tuple[float, float], _Level] = field(default_factory=dict)
 
     @property
@@ -566,11 +570,12 @@ def sample_model(
     number of equidistant ones in one mesh period, more where planets would be met unequally, or the positions
     themselves (P,) [mesh periods].
 
-    CaseError: E-TORQUE: no torque; E-SUPPORT: bearings with clearance; E-SLICES: leads and axes askew
-    without slices. ContactError.
+    CaseError: E-TORQUE: no torque; E-SLICES: leads and axes askew without slices, axes askew of helical teeth.
+    ContactError.
     """
     _check_over_width(basis, tolerances)
-    solved, order = basis.loaded(sun_torque)
+    walked = is_walked(basis)
+    solved, order = basis.loaded(sun_torque, clearance=walked)
     gears, members = solved.gears, moving_members(solved.gears, solved.supports)
     N, errors = gears.n_planets, []
     for key, law in tolerances.laws():
@@ -583,6 +588,8 @@ def sample_model(
     position = cycle_positions(gears.equal_positions(positions) if isinstance(positions, int) else positions)
     position = -position[::-1] if sun_torque < 0 else position
     model = SampleModel(basis, solved, order, tuple(errors), members, load, position, len(position))
+    if walked:
+        return replace(model, basis=replace(basis, positions=positions), walked=True)
 
     def attempt(share: float, nearest: float):
         """Windows that hold the contact of the case, and no pair that some samples miss."""
@@ -603,9 +610,22 @@ def sample_model(
     return replace(model, windows=windows)
 
 
+def is_walked(basis: DesignBasis) -> bool:
+    """Tell whether samples of a set have no springs: helical teeth, back flanks, bearings with clearance."""
+    return "ahead" in basis.over or basis.both_flanks or bool(basis.supports.planet_clearance)
+
+
 def _check_over_width(basis: DesignBasis, tolerances: Tolerances) -> None:
-    """Refuse (CaseError, E-SLICES) tolerances that only slices of the face width can show."""
+    """Refuse (CaseError, E-SLICES) tolerances that only slices of the face width can show, of spur teeth alone."""
     for key, _ in tolerances.laws():
+        if "misalignment" in key and "ahead" in basis.over:
+            raise CaseError(
+                "tilts of axes are those of spur teeth: helical ones press the axes in their direction, too",
+                code="E-SLICES",
+                key=key,
+                limit="lead_slope, lead_crowning and errors of position",
+                remedy="leave the tolerance out, or give a lead_slope",
+            )
         if ("lead" in key or "misalignment" in key) and not basis.over:
             raise CaseError(
                 "leads and axes askew need slices over the width",
@@ -664,7 +684,7 @@ def _in_windows(
     model: SampleModel, errors: np.ndarray, size: tuple[float, float], exact: bool, enlargements: int = 0
 ) -> dict[str, np.ndarray]:
     """Numbers of samples in windows of a size; of those that these do not hold in larger ones, exactly."""
-    if exact and model.solved.over:
+    if model.walked or (exact and model.solved.over):
         return joined([_walked(model, sample) for sample in errors])
     level, (share, nearest) = model.level(*size), size
     together = _EXACT_TOGETHER if exact else _TOGETHER
@@ -785,7 +805,9 @@ def _of_slices(
 
 
 def _walked(model: SampleModel, errors: np.ndarray) -> dict[str, np.ndarray]:
-    """Numbers of a sample (K,) in slices as ``femgear run`` solves it, at the positions of the samples."""
+    """Numbers of a sample (K,) as ``femgear run`` solves it, in slices at the positions of the samples."""
+    if model.walked:
+        return _of_run(replace(model.basis, deviations=model.deviations(errors)).walk(model.sun_torque))
     basis, mirrored = model.basis, model.solved.gears is not model.basis.gears
     position = -model.position[::-1] if mirrored else model.position
     sample = replace(basis, deviations=model.deviations(errors), positions=position)
@@ -794,6 +816,14 @@ def _walked(model: SampleModel, errors: np.ndarray) -> dict[str, np.ndarray]:
         np.moveaxis(values, -1, 0)[..., None] for values in (cycle.sun_arc, cycle.load_share, cycle.stiffness)
     )
     return _numbers(position, arc, share, stiffness)
+
+
+def _of_run(cycle: MeshCycle) -> dict[str, np.ndarray]:
+    """`NUMBERS` of one sample from its mesh cycle, with the positions between."""
+    low, high = cycle.extremes("load_share")
+    stiffness = cycle.mean("stiffness").reshape(2, -1).mean(axis=1)
+    numbers = cycle.peak_to_peak("sun_arc"), high.max(), *stiffness, high, low <= 0.0
+    return {name: np.array([value]) for name, value in zip(NUMBERS, numbers, strict=True)}
 
 
 def _separations(model: SampleModel, level: _Level, by_error: np.ndarray) -> tuple[np.ndarray, Any]:
@@ -897,10 +927,14 @@ def sample_case(case: Case, model: SampleModel, seed: int, index: int) -> Case:
 def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
     """Compute the transmission error [m] and the largest share of a sample over a turn of the carrier.
 
-    Against the ring: as many mesh periods as it has teeth, by the springs of tooth pairs.
+    Against the ring: as many mesh periods as it has teeth, by the springs of tooth pairs where there are any.
 
     ``errors`` (K,) are those of the sample [m].
     """
+    if model.walked:
+        sample = replace(model.basis, deviations=model.deviations(errors))
+        cycle = sample.walk(model.sun_torque, periods=model.basis.gears.ring.teeth)
+        return float(cycle.peak_to_peak("sun_arc")), float(cycle.extremes("load_share")[1].max())
     s, level, P = model.solved, model.level(*model.windows), len(model.position)
     setup, periods = level.found.setup, np.arange(s.gears.ring.teeth)
     turns = np.repeat(-periods if s.gears is not model.basis.gears else periods, P)
@@ -933,7 +967,8 @@ def between_positions(model: SampleModel, errors: np.ndarray) -> tuple[float, fl
     As ``femgear run`` does of the case that `sample_case` makes of it: exactly, at the peaks of the sample.
     ``errors`` (K,) are those of the sample [m].
     """
-    sample = replace(model.basis, deviations=model.deviations(errors), positions=model.equidistant)
+    positions = model.basis.positions if model.walked else model.equidistant
+    sample = replace(model.basis, deviations=model.deviations(errors), positions=positions)
     cycle = sample.walk(model.sun_torque)
     return float(cycle.peak_to_peak("sun_arc")), float(cycle.extremes("load_share")[1].max())
 
@@ -943,23 +978,17 @@ def prepared(
 ) -> tuple[SampleModel, str]:
     """Prepare the samples of a case for a file of tolerances, whose text comes with the model.
 
-    Refused is (CaseError) what `read_tolerances` and `sample_model` refuse, and back flanks (E-SUPPORT).
+    Refused is (CaseError) what `read_tolerances` and `sample_model` refuse.
     """
     need_set(case)
     found, text = read_tolerances(tolerances, case.sun.module)
     checked(positions, "--positions", 8, 4096)
-    if case.static.back_flanks:
-        raise CaseError(
-            "samples are solved on their drive flanks alone",
-            code="E-SUPPORT",
-            key="static.back_flanks",
-            value=True,
-            limit="false",
-            remedy="set it to false, or solve single samples by femgear run",
-            file=case.location("static.back_flanks"),
-        )
-    basis = design_basis(case, cache=cache, steps=steps, slices=True)
+    # of helical teeth more than those asked for, so that slices are met alike
+    basis = design_basis(with_value(case, "static.positions", positions), cache=cache, steps=steps)
     torque = sun_torque(case, basis.gears)
+    if is_walked(basis):
+        model = sample_model(basis, found, sun_torque=torque, positions=basis.positions)
+        return replace(model, equidistant=positions), text
     places = sample_positions(basis, torque, positions)
     model = sample_model(basis, found, sun_torque=torque, positions=places)
     return replace(model, equidistant=basis.gears.equal_positions(positions)), text

@@ -30,7 +30,7 @@ from femgear.case.planetary import Case
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
 from femgear.findings import Finding, tell
 from femgear.stages.protocol import Progress, one_blas_thread
-from femgear.stages.static import static_supports
+from femgear.stages.static import record_positions, static_supports
 from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Tolerance, evaluations, tolerances
 from femgear.study.objectives import under_torque
 from femgear.study.problem import Point, Problem, Variable, Vector, start_point
@@ -258,7 +258,7 @@ def _method(problem: Problem, method: Method) -> Method:
             code="E-CHOICE",
             key="method",
             value=method,
-            limit=", ".join(METHODS) if wrong else "a transmission error over deviations of the drive flanks",
+            limit=", ".join(METHODS) if wrong else "a transmission error over deviations of drive flanks, no slices",
             remedy=None if wrong else 'take "global"',
         )
     if method != "global" and any(variable.integer for variable in problem.variables):
@@ -448,9 +448,13 @@ def infeasible(run: Evaluations, limit: str | None = None) -> ConvergenceError:
 
 
 def has_derivatives(problem: Problem) -> bool:
-    """Tell whether a transmission error is minimised and all variables are deviations of flanks alone."""
+    """Tell whether a transmission error is minimised and all variables are deviations of flanks alone.
+
+    Derivatives are those of the drive flanks in plane contact.
+    """
     case = problem.case
-    sided = problem.objective.signal is not None and not case.static.back_flanks
+    plane = case.static.slices < 2 and not case.static.back_flanks
+    sided = problem.objective.signal is not None and plane
     clear = not (case.static.members == "elastic" and case.planet.bearing_clearance)
     keys = [key for variable in problem.variables for key in variable.keys]
     deviations = all(re.split(r"[.\[]", key.partition(".")[2])[0] in FLANK_ENTRIES for key in keys)
@@ -543,7 +547,7 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
         static.bodies,
         static_supports(case),
         set_deviations(case),
-        case.static.positions,
+        record_positions(case, static.planetary_set),
         case.static.contact,
     )
     peaks = () if static.cycle.between is None else static.cycle.between.position

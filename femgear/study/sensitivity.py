@@ -159,7 +159,8 @@ def linearise(basis: DesignBasis, *, sun_torque: float, periods: int = 1, only=N
             code="E-SLICES",
             key="static.slices",
             value=basis.over["slices"],
-            remedy="leave static.slices and modifications of leads out",
+            limit="1",
+            remedy='take differences of mesh cycles, as pin_differences and searches by method "global" do',
         )
     solved, order = basis.loaded(sun_torque)
     record = np.sort(np.append(cycle_positions(basis.positions, periods=periods), between))
@@ -370,3 +371,19 @@ def pin_sensitivities(linear: LinearContact) -> np.ndarray:
 
         found.append(sensitivity(linear, variant, 0.0, step=1e-6).share)
     return np.moveaxis(np.array(found).reshape(N, 2, N, -1), 2, 0)
+
+
+def pin_differences(basis: DesignBasis, *, sun_torque: float, position: float, step: float = 0.1e-6) -> np.ndarray:
+    """Differentiate all shares by the displacements of the pins, (N shares, N pins, 2) [1/m], by differences.
+
+    As `pin_sensitivities`, at one position [mesh periods], from mesh cycles with pins off by ``step`` [m] either
+    way: of every kind of contact that `femgear.contact.cycle.walk_mesh_cycle` solves.
+    """
+    N, at = basis.gears.n_planets, np.array([position])
+    own = no_deviations(basis.gears) if basis.deviations is None else basis.deviations
+    found = []
+    for unit in np.eye(2 * N).reshape(2 * N, N, 2):
+        moved = (replace(own, pin_errors=own.pin_errors + sign * step * unit) for sign in (1, -1))
+        shares = [replace(basis, deviations=one, positions=at).walk(sun_torque).load_share[:, 0] for one in moved]
+        found.append((shares[0] - shares[1]) / (2.0 * step))
+    return np.moveaxis(np.array(found).reshape(N, 2, N), 2, 0)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from textwrap import fill
+from typing import Any
 
 import numpy as np
 
@@ -23,10 +24,11 @@ from femgear.report.tables import Block
 from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.storage.files import own_files, resumable, write_csv
 from femgear.study.designs import Failure, open_designs
+from femgear.study.faults import all_faults
 from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
 from femgear.study.runner import Runner
-from femgear.trains.reading import with_value
+from femgear.trains.reading import with_values
 
 _LARGEST, _MANY, _TIMED = 100_000, 1000, 3
 """Combinations at most, those from which their time is estimated and said, and those that it is made from."""
@@ -35,6 +37,8 @@ _SHOWN = 12
 _JOURNAL, _TABLE, _FIGURE = "sweep.jsonl", "sweep.csv", "sweep.png"
 """Files of a sweep."""
 _WITHOUT_EFFECT = {"title", "format"}
+Over = Mapping[Any, Sequence[Any]]
+"""Values by key, or tuples of values by tuples of keys that go together."""
 _RANGE = re.compile(r"(.+?)\.\.(.+?)/\s*(\d{1,18})\s*", re.DOTALL)
 
 
@@ -88,7 +92,7 @@ class Sweep:
 @one_blas_thread()
 def sweep(
     case: Case,
-    over: Mapping[str, Sequence[object]],
+    over: Over,
     quantities: Sequence[Quantity],
     *,
     journal: str | Path | None = None,
@@ -102,8 +106,9 @@ def sweep(
     ----------
     case : Case
         From `femgear.read_case`; what is not varied stays.
-    over : mapping of str to sequence
-        Values of dotted keys, as the case file would hold them; all combinations are computed.
+    over : mapping of str or of tuple of str to sequence
+        Values of dotted keys, as the case file would hold them; all combinations are computed. Entries that
+        go together are a tuple of keys, whose values are tuples.
     quantities : sequence of Quantity
         What is computed of every case, such as `transmission_error`.
     journal : path-like, optional
@@ -118,9 +123,10 @@ def sweep(
     CaseError
         E-VARIABLE: nothing to compute, or too much; values that the case file refuses.
     """
-    keys, quantities = tuple(over), tuple(quantities)
-    count = _check_sweep(case, over, quantities)
-    points = tuple(itertools.product(*over.values()))
+    axes, quantities = _axes(over), tuple(quantities)
+    keys = tuple(key for entries in axes for key in entries)
+    count = _check_sweep(case, axes, quantities)
+    points = tuple(tuple(itertools.chain(*point)) for point in itertools.product(*axes.values()))
     table, errors, doubts = np.full((count, len(quantities)), np.nan), list[str](), list[dict]()
     keyed, warned = [(key,) for key in keys], count < _MANY
     with open_designs(case, keyed, journal=journal, cache=cache, runner=runner, telling=True) as designs:
@@ -159,36 +165,79 @@ def _tell_of_doubts(found: Sweep) -> None:
         tell(Finding(code, "", text, remedy="femgear run of such a case says more"), stacklevel=3)
 
 
-def _check_sweep(case: Case, over: Mapping[str, Sequence[object]], quantities: Sequence[Quantity]) -> int:
-    """Number of cases; what `sweep` refuses is refused."""
-    count = math.prod(len(values) for values in over.values()) if over else 0
+def _axes(over: Over) -> dict[tuple[str, ...], list[tuple[object, ...]]]:
+    """Give every axis of a sweep as a tuple of keys with tuples of values, one for each key."""
+    return {
+        (key,) if isinstance(key, str) else tuple(key): [(value,) for value in values]
+        if isinstance(key, str)
+        else [tuple(value) for value in values]  # type: ignore[arg-type]
+        for key, values in over.items()
+    }
+
+
+def _check_sweep(
+    case: Case, axes: Mapping[tuple[str, ...], Sequence[tuple[object, ...]]], quantities: Sequence[Quantity]
+) -> int:
+    """Number of cases; what `sweep` refuses is refused, all at once."""
+    count = math.prod(len(values) for values in axes.values()) if axes else 0
     if not (0 < count <= _LARGEST and quantities):
         raise CaseError(
             f"{count} cases with {len(quantities)} quantities",
             code="E-VARIABLE",
             limit=f"1 to {_LARGEST} cases, at least one quantity",
         )
-    for key, values in over.items():
-        if key.split(".")[0] in _WITHOUT_EFFECT:
-            raise CaseError(
-                f"{key} changes no quantity",
-                code="E-VARIABLE",
-                key="--over",
-                value=key,
-                limit="entries that the computation uses",
-            )
-        for value in values:
-            with_value(case, key, value)
-        if len(set(map(repr, values))) < len(values):  # some are lists
-            raise CaseError(
-                "a value is given twice",
-                code="E-DUPLICATE",
-                key="--over",
-                value=f"{key}={', '.join(map(str, values))}",
-                remedy="give every value once",
-            )
-    _check_stages(case, quantities, over)
+    keys = [key for entries in axes for key in entries]
+    with all_faults() as part:
+        for entries, values in axes.items():
+            for key in entries:
+                with part():
+                    _check_effect(key, keys.count(key))
+            for value in values:
+                with part():
+                    with_values(case, dict(zip(entries, value, strict=True)))
+            with part():
+                _check_different(entries, values)
+        with part():
+            _check_stages(case, quantities, keys)
     return count
+
+
+def _check_effect(key: str, times: int) -> None:
+    """Refuse (E-VARIABLE) an entry that no quantity depends on, or that is varied several times."""
+    if key.split(".")[0] in _WITHOUT_EFFECT:
+        raise CaseError(
+            f"{key} changes no quantity",
+            code="E-VARIABLE",
+            key="--over",
+            value=key,
+            limit="entries that the computation uses",
+            remedy="leave it out",
+        )
+    if times > 1:
+        raise CaseError(
+            "a key is given twice",
+            code="E-VARIABLE",
+            key="--over",
+            value=key,
+            remedy="give all its values in one --over",
+        )
+
+
+def _check_different(entries: Sequence[str], values: Sequence[tuple[object, ...]]) -> None:
+    """Refuse (E-DUPLICATE) values that are given twice."""
+    if len(set(map(repr, values))) < len(values):  # some are lists
+        raise CaseError(
+            "a value is given twice",
+            code="E-DUPLICATE",
+            key="--over",
+            value=f"{','.join(entries)}={', '.join(map(_joined, values))}",
+            remedy="give every value once",
+        )
+
+
+def _joined(values: Sequence[object]) -> str:
+    """Write values of entries that go together."""
+    return "/".join(map(str, values))
 
 
 def _check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str] = ()) -> None:
@@ -218,24 +267,52 @@ def _warn_of_time(left: int, seconds: float, workers: int) -> None:
     tell(finding, stacklevel=3)
 
 
-def parse_over(text: str) -> tuple[str, Sequence[object]]:
-    """Read key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``; E-VARIABLE for others."""
+def parse_over(text: str) -> tuple[str | tuple[str, ...], Sequence[object]]:
+    """Read key and values of ``KEY=V1, V2, V3`` or ``KEY=LOW..HIGH/COUNT``; E-VARIABLE for others.
+
+    Entries that go together are ``KEY1, KEY2=V1/W1, V2/W2``: keys and values are tuples then; in a range all
+    have the same value.
+    """
     key, equals, values = (part.strip() for part in text.partition("="))
-    if not (key and equals and values):
+    keys = tuple(part.strip() for part in key.split(","))
+    if not (all(keys) and equals and values):
         raise _not_over(text)
     if match := _RANGE.fullmatch(values):
-        low, high = (_value(part) for part in match.groups()[:2])
-        count = int(match[3])
-        if not 2 <= count <= _LARGEST:
-            raise _not_over(text)
-        whole = isinstance(low, int) and isinstance(high, int) and (high - low) % (count - 1) == 0
-        variable = Variable(key, low, high, integer=whole)
-        found = [variable.text(float(x)) for x in np.linspace(*variable.bounds, count)]
-        return key, found
+        found = _spread(keys[0], match, text)
+        return (key, found) if len(keys) == 1 else (keys, [(value,) * len(keys) for value in found])
+    if len(keys) > 1:
+        return keys, [_together(part, keys) for part in values.split(",")]
     found = [_value(part) for part in values.split(",")]
     if any(value == "" for value in found):
         raise _not_over(text)
     return key, found
+
+
+def _spread(key: str, match: re.Match[str], text: str) -> list[object]:
+    """Values of an entry that are equally far apart, ``LOW..HIGH/COUNT``."""
+    low, high = (_value(part) for part in match.groups()[:2])
+    count = int(match[3])
+    if not 2 <= count <= _LARGEST:
+        raise _not_over(text)
+    whole = isinstance(low, int) and isinstance(high, int) and (high - low) % (count - 1) == 0
+    variable = Variable(key, low, high, integer=whole)
+    return [variable.text(float(x)) for x in np.linspace(*variable.bounds, count)]
+
+
+def _together(text: str, keys: Sequence[str]) -> tuple[object, ...]:
+    """Read values of entries that go together, ``27/40/108``; units have strokes, too: ``1e8 N/m/2e8 N/m``."""
+    for stroke in (r"/(?=\s*[-+.\d])", r"/"):
+        values = tuple(map(_value, re.split(stroke, text)))
+        if len(values) == len(keys) and "" not in (*values, *keys):
+            return values
+    raise CaseError(
+        f"{len(keys)} entries go together, and each of their values has {len(keys)} parts",
+        code="E-VARIABLE",
+        key="--over",
+        value=text.strip(),
+        limit=f"KEY1,KEY2=V1/W1,V2/W2; here {'/'.join(keys)}",
+        remedy='--over "sun.teeth,planet.teeth,ring.teeth=27/40/108,30/40/111"',
+    )
 
 
 def _value(text: str) -> str | float | bool:
@@ -289,23 +366,26 @@ def sweep_into(
     cache, progress, runner
         As for `sweep`.
     """
-    values = dict(parse_over(text) for text in over)
-    if len(values) < len(over):
-        raise CaseError(
-            "a key is given twice",
-            code="E-VARIABLE",
-            key="--over",
-            value=", ".join(over),
-            remedy="give all its values in one --over",
-        )
-    quantities = [named_quantity(words, speeds=speeds) for words in of]
-    _check_sweep(case, values, quantities)
+    parsed, quantities = list[tuple[Any, Sequence[object]]](), list[Quantity]()
+    with all_faults() as part:
+        for text in over:
+            with part("--over"):
+                parsed.append(parse_over(text))
+        for words in of:
+            with part("--of"):
+                quantities.append(named_quantity(words, speeds=speeds))
+    values = dict(parsed)
+    if len(values) < len(parsed):
+        twice = next(key for key, _ in parsed if [one for one, _ in parsed].count(key) > 1)
+        _check_effect(twice if isinstance(twice, str) else ",".join(twice), 2)
+    axes = _axes(values)
+    _check_sweep(case, axes, quantities)
     own_files(folder, (_TABLE, _FIGURE))
     options = {"journal": folder / _JOURNAL, "cache": cache, "progress": progress, "runner": runner}
     with resumable(folder):
         found = sweep(case, values, quantities, **options)
         write_csv(folder / _TABLE, found.header, found.records())
-        _draw(found, [len(one) for one in values.values()], folder / _FIGURE)
+        _draw(found, axes, folder / _FIGURE)
     return found, [_TABLE, _JOURNAL, _FIGURE]
 
 
@@ -326,27 +406,29 @@ def describe_sweep(found: Sweep) -> Block:
     return Block("Sweep", header, tuple(rows), notes[:_SHOWN])
 
 
-def _draw(found: Sweep, counts: Sequence[int], path: Path) -> None:
-    """Curves over the last key, one panel a quantity, one curve for every combination of the other keys.
+def _draw(found: Sweep, axes_of: Mapping[tuple[str, ...], Sequence[tuple[object, ...]]], path: Path) -> None:
+    """Curves over the last axis, one panel a quantity, one curve for every combination of the others.
 
     Of at most twelve combinations; a case that cannot be computed leaves a gap.
     """
-    last, count = counts[-1], len(found.quantities)
+    keys, along = list(axes_of.items())[-1]
+    last, count = len(along), len(found.quantities)
     scale = np.array([quantity.dimension.scale for quantity in found.quantities])
     curves = (found.values / scale).reshape(-1, last, count)
-    x, unit = _axis([point[-1] for point in found.points[:last]])
+    x, unit = _axis([value[0] if len(keys) == 1 else _joined(value) for value in along])
+    name_of_axis = ", ".join(keys)
     columns = min(count, 3)
     rows = -(-count // columns)
     figure, axes = new_figure(rows=rows, columns=columns, width=4.4 * columns + 0.6, height=3.6 * rows + 0.6)
     for q, quantity in enumerate(found.quantities):
         for k, (point, curve) in enumerate(zip(found.points[::last], curves[:12])):
-            name = ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point[:-1], strict=False))
+            name = ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point[: -len(keys)], strict=False))
             legend = {"label": name} if name else {}
             axes[q].plot(x, curve[:, q], marker="o", markersize=4, **line_style(k), **legend)
         if not np.isfinite(curves[..., q]).any():
             axes[q].text(0.5, 0.5, "no case can be computed", transform=axes[q].transAxes, ha="center")
         title = f"{quantity.name} [{quantity.dimension.shown}]".replace("[um]", "[µm]")
-        label(axes[q], f"{found.keys[-1]} [{unit}]" if unit else found.keys[-1], fill(title, 36))
+        label(axes[q], f"{name_of_axis} [{unit}]" if unit else name_of_axis, fill(title, 36))
     for ax in axes[count:]:
         ax.set_visible(False)
     legend_below(figure)

@@ -18,11 +18,8 @@ SCRIPTS = (
     "mesh_stiffness.py",
     "load_sharing.py",
     "housing_modulation.py",
-    "harris_map.py",
-    "tip_relief_design.py",
     "lead_design.py",
     "pin_error_load_sharing.py",
-    "optimise.py",
     "drivetrain.py",
     "gyroscopic.py",
     "side_bands.py",
@@ -41,10 +38,8 @@ OF_SETS = (
     "load_sharing",
     "pin_error_load_sharing",
     "housing_modulation",
-    "optimise",
     "gyroscopic",
     "lead_design",
-    "tip_relief_design",
 )
 
 
@@ -99,16 +94,8 @@ def test_help(name, tmp_path):
         ("housing_modulation.py", ["--harmonic", "0"], 2, "1 or more"),
         ("housing_modulation.py", ["--speed", "5 Hz"], 2, "not a unit of speed"),
         ("housing_modulation.py", ["-o", "/dev/null/x"], 4, "E-STORAGE"),
-        ("harris_map.py", ["--relief=-1 um"], 2, "not a plausible relief"),
-        ("harris_map.py", ["--torque", "0 N m"], 2, "without torque"),
-        ("harris_map.py", ["--length", "3"], 2, "0.05 to 1.3"),
-        ("tip_relief_design.py", ["--points", "1"], 2, "3 to 100"),
-        ("tip_relief_design.py", ["--largest", "2 mm"], 2, "not a plausible relief"),
-        ("tip_relief_design.py", ["--also=-50 N m"], 2, "both signs"),
         ("pin_error_load_sharing.py", ["--samples", "0"], 2, "1 to 1000000"),
         ("pin_error_load_sharing.py", ["--tangential=-1 um"], 2, "negative"),
-        ("harris_map.py", ["--torque", "-100 N m", "--torque", "50 N m"], 2, "both signs"),
-        ("tip_relief_design.py", ["--torque", "-100 N m", "--also", "50 N m"], 2, "both signs"),
         ("pin_error_load_sharing.py", ["--tolerance", "10 mm"], 2, "allowed: 0 to 300 um"),
         ("pin_error_load_sharing.py", ["--tolerance", "301 um"], 2, "E-RANGE"),
         ("pin_error_load_sharing.py", ["--radial", "101 um"], 2, "allowed: 0 to 100 um"),
@@ -149,21 +136,14 @@ def test_bad_input_ends_in_a_message(name, arguments, code, message, tmp_path):
         ("drivetrain.py", "transient_forces.png"),
         ("gravity_wedging.py", "carrier_orbit.png"),
         ("gyroscopic.py", "gyroscopic.png"),
-        ("harris_map.py", "harris_map.csv"),
         ("housing_modulation.py", "ring_deflection.vtu"),
         ("impacts.py", "spectrum.png"),
         ("load_sharing.py", "tooth_loads.csv"),
         ("mesh_stiffness.py", "mesh_stiffness.png"),
         ("multistage.py", "forces.csv"),
-        ("optimise.py", "optimum.toml"),
-        ("optimise.py", "check.csv"),
-        ("optimise.py", "before/notes.txt"),
-        ("optimise.py", "journal.jsonl"),
-        ("optimise.py", "journal_fine.jsonl"),
         ("pin_error_load_sharing.py", "load_sharing_samples.csv"),
         ("planet_phasing.py", "phases.png"),
         ("side_bands.py", "side_bands.png"),
-        ("tip_relief_design.py", "relief.toml"),
     ],
 )
 def test_files_of_others_are_refused_before_anything_is_computed(name, file, tmp_path):
@@ -288,73 +268,6 @@ def test_housing_modulation(quick_case, tmp_path, monkeypatch):
     assert abs(twist) == pytest.approx(400 / (1e10 * 0.1**2 * 2 * np.pi * 0.1 * 0.025) * 0.1, rel=0.01)
     curve = pv.read(tmp_path / "modulation.vtp")
     assert "envelope [m/s^2]" in curve.point_data
-
-
-def test_harris_map(quick_case, tmp_path):
-    arguments = ("--relief", "0 um", "--relief", "4 um", "--length", "0.9", "--positions", "16")
-    torques = [word for value in (50, 100, 200) for word in ("--torque", f"{value} N m")]
-    done = run("harris_map.py", quick_case, *arguments, *torques, "-o", tmp_path, folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert is_png(tmp_path / "harris_map.png")
-    data = table(tmp_path / "harris_map.csv")
-    curve = data["sun-planet STE peak to peak [m]"].reshape(2, 3)
-    # a relief for 100 N m: less there than at half and at twice the torque, and than without it
-    assert curve[1].argmin() == 1 and np.all(np.diff(curve[0]) > 0)
-    assert curve[1, 1] < 0.35 * curve[0, 1]
-
-
-def test_harris_map_of_one_negative_torque(quick_case, tmp_path):
-    arguments = ("--relief", "0 um", "--relief", "4 um", "--positions", "8")
-    peaks = []
-    for torques in (("-100 N m", "-100 N m"), ("100 N m",)):
-        words = [word for torque in torques for word in ("--torque", torque)]
-        done = run("harris_map.py", quick_case, *arguments, *words, "-o", tmp_path, folder=tmp_path)
-        assert done.returncode == 0, done.stderr
-        (header,) = (line for line in done.stdout.splitlines() if "relief [um]" in line)
-        assert header.count("N m") == 1 and torques[0] in header
-        peaks.append(table(tmp_path / "harris_map.csv")["sun-planet STE peak to peak [m]"])
-    np.testing.assert_allclose(*peaks, rtol=1e-9)
-
-
-@pytest.mark.slow
-def test_the_optimum_of_a_coarse_map_has_no_way_down(quick_case, tmp_path):
-    """The smallest amount of this map is 2.7 um, on which the simplex collapses; the valley is at 3.0 um."""
-    arguments = ("--points", "3", "--positions", "16", "--largest", "8 um", "--also", "150 N m")
-    arguments = (*arguments, "--shape", "linear")
-    done = run("tip_relief_design.py", quick_case, *arguments, "-o", tmp_path, folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    slopes = re.findall(r"([+-][0-9.]+) um per", done.stdout)
-    assert len(slopes) == 4 and min(map(float, slopes)) >= 0
-    assert "NOT A MINIMUM" not in done.stdout
-    # as with four and eight times the positions
-    assert float(re.search(r"([0-9.]+)% of", done.stdout)[1]) == pytest.approx(14.2, abs=0.2)
-
-
-def test_tip_relief_at_the_end_of_its_range_is_no_minimum(quick_case, tmp_path):
-    arguments = ("--points", "3", "--positions", "8", "--largest", "1 um", "--also", "100 N m")
-    done = run("tip_relief_design.py", quick_case, *arguments, "-o", tmp_path, folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "NOT A MINIMUM: amount" in done.stdout and "end of the range searched to more" in done.stdout
-
-
-@pytest.mark.slow
-def test_tip_relief_design(quick_case, tmp_path):
-    arguments = ("--points", "4", "--positions", "16", "--also", "60 N m", "--largest", "6 um")
-    done = run("tip_relief_design.py", quick_case, *arguments, "-o", tmp_path / "o", folder=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert is_png(tmp_path / "o" / "tip_relief.png")
-    data = table(tmp_path / "o" / "tip_relief.csv")
-    assert len(data["relief [m]"]) == 2 * 4 * 4
-    pasted = tmp_path / "relieved.toml"
-    pasted.write_text(quick_case.read_text() + "\n" + (tmp_path / "o" / "relief.toml").read_text())
-    from femgear.stages.static import solve_static
-    from femgear.trains.reading import read_case
-
-    peaks = [1e6 * solve_static(read_case(path)).cycle.peak_to_peak()[0] for path in (pasted, quick_case)]
-    assert peaks[0] < 0.3 * peaks[1]
-    # what is printed is what a run of the proposed case finds
-    printed = re.search(r"there: ([0-9.]+) um, [0-9.]+% of ([0-9.]+) um", done.stdout)
-    assert [float(printed[1]), float(printed[2])] == pytest.approx(peaks, rel=0.01)
 
 
 def test_pin_error_load_sharing(quick_case, tmp_path):

@@ -7,10 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.gear_set import planetary_set
 from femgear.contact.supports import Supports
 from femgear.errors import CaseError
-from femgear.gears.modifications import form_deviation
 from femgear.study.relief import (
     design_basis,
     harris_map,
@@ -84,20 +82,6 @@ def test_the_slopes_of_the_optimum_are_those_of_single_mesh_cycles(basis):
     np.testing.assert_allclose(rises[2:], 0.05e-3 * np.array(best.length_slopes), atol=1e-13)
 
 
-def test_the_optimum_is_marked_under_its_torque_alone():
-    from tip_relief_design import relief_contours
-
-    amounts, lengths = np.array([2e-6, 4e-6, 6e-6]), np.array([0.4, 0.8, 1.2])
-    ratios = np.array([np.full((3, 3), 0.8), [[0.9, 0.6, 0.1], [0.7, 0.5, 0.4], [0.9, 0.8, 0.7]]])
-    figure = relief_contours(amounts, lengths, ratios, [50.0, 100.0], optimum=(3e-6, 1.1), design=100.0)
-    names = [ax.get_legend_handles_labels()[1] for ax in figure.axes[:2]]
-    assert names == [["chosen for 100 N m"], ["25% of unmodified", "optimum at 100 N m"]]
-    (legend,) = figure.legends
-    assert {text.get_text() for text in legend.get_texts()} == {name for one in names for name in one}
-    faces = [ax.lines[-1].get_markerfacecolor() for ax in figure.axes[:2]]
-    assert faces[0] == "white" and faces[1] == figure.axes[1].lines[-1].get_color()
-
-
 def test_a_map_of_negative_torques_is_that_of_positive_ones(basis):
     gears = basis.gears
     peaks = []
@@ -106,26 +90,6 @@ def test_a_map_of_negative_torques_is_that_of_positive_ones(basis):
         found = harris_map(basis, torques=[sign * TORQUE], deviations=[variant])
         peaks.append(found.peak_to_peak)
     np.testing.assert_allclose(peaks[0], peaks[1], rtol=1e-9)
-
-
-def test_the_tables_for_the_case_file_mean_the_same_relief(basis, tmp_path):
-    from tip_relief_design import relief_tables
-
-    from femgear.case.gear_set import set_deviations
-
-    gears = basis.gears
-    text = relief_tables(gears, amount=4e-6, length=0.9, power=2.0, back=False)
-    path = tmp_path / "case.toml"
-    path.write_text(CASE.read_text(encoding="utf-8") + "\n" + text, encoding="utf-8")
-    case = read_case(path)
-    read, made = set_deviations(case), with_tip_relief(None, gears, amount=4e-6, length=0.9, power=2.0)
-    for name, gear in (("sun", gears.sun), ("planet_sun_side", gears.planet)):
-        roll = np.linspace(gear.form_roll, gear.tip_roll, 50)
-        removed = [form_deviation(getattr(d, name), gear, roll) for d in (read, made)]
-        np.testing.assert_allclose(*removed, atol=1e-10)
-        assert removed[0].max() == pytest.approx(4e-6, rel=1e-6)
-    assert not read.planet_ring_side.modifications
-    assert planetary_set(case) == gears
 
 
 def test_supports_are_those_of_the_static_stage():

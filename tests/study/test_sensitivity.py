@@ -14,7 +14,7 @@ from femgear.gears.deviations import no_deviations
 from femgear.gears.modifications import FlankForm, MeasuredProfile
 from femgear.study.relief import design_basis, two_pair_length, with_tip_relief
 from femgear.study.samples import Tolerances, sample_model, spring_numbers
-from femgear.study.sensitivity import linearise, pin_sensitivities, sensitivity
+from femgear.study.sensitivity import linearise, pin_differences, pin_sensitivities, sensitivity
 from femgear.trains.reading import read_case, with_value
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
@@ -280,6 +280,15 @@ def test_length_of_two_pair_contact(basis):
     gears = basis.gears
     # contact ratio of the reference set with its published working angle: 1.5507
     assert two_pair_length(gears) == pytest.approx(0.5507 * gears.sun.base_pitch, rel=1e-4)
+
+
+@pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
+def test_differences_of_shares_are_their_derivatives(basis, torque):
+    few = replace(basis, positions=4)
+    linear = linearise(few, sun_torque=torque, only=[1])
+    exact = pin_sensitivities(linear)[..., 0]
+    found = pin_differences(few, sun_torque=torque, position=0.25)
+    np.testing.assert_allclose(found, exact, atol=2e-3 * np.abs(exact).max())
 
 
 def test_refusals(basis):

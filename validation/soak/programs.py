@@ -212,8 +212,8 @@ _GEARS = (
     *("--over", "planet.profile_shift=0..0.2/20"),
 )
 _OPTIMISE = (
-    *(str(ROOT / "scripts" / "optimise.py"), "CASE", "-o", "OUT", "--method", "simplex", "--no-check"),
-    *("--vary", "planet.profile_shift=-0.05..0.25 +- 0.01", "--objective", "tip thickness planet"),
+    *("optimise", "CASE", "-o", "OUT", "--method", "simplex", "--no-check"),
+    *("--vary", "planet.profile_shift=-0.05..0.25 +- 0.01", "--goal", "tip thickness planet"),
     *("--limit", "tip thickness planet >= 0.72", "--of", "contact ratio sun-planet"),
 )
 COMMANDS = {

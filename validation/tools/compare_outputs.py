@@ -44,6 +44,7 @@ CLI = ("-m", "femgear.cli")
 # "tree" is a link to the checkout, beside the folder in which a case or script runs
 REFERENCE = "../tree/cases/planetary_27_40_108.toml"
 TIP = "planet.tip_diameter=62.2 mm..63.4 mm +- 0.1 mm"
+COARSE = ("--positions", "8", "--flank-elements", "8")
 # arguments of every command of a script; a script that is not listed runs once, without arguments
 SCRIPTS = {
     "drivetrain.py": (("--balanced",), ("../tree/cases/own_chain.toml", "--duration", "0.2 s")),
@@ -53,17 +54,20 @@ SCRIPTS = {
     ),
     "housing_modulation.py": ((), ("--speed", "3100 rpm", "--harmonic", "5")),
     "multistage.py": (("--balance", "5"), ("--published",)),
-    "optimise.py": (
-        ("--of", "ste overall", "--positions", "8", "--flank-elements", "8"),
-        (
-            *("--vary", TIP, "--objective", "contact ratio sun-planet", "--second", "tip thickness planet"),
-            *("--of", "contact ratio planet-ring", "--no-check", "--max-designs", "60"),
-        ),
-    ),
     "readme_images.py": (("docs", "--only", "published_four_stages"),),
 }
 OTHERS = {
     "schema": ((*CLI, "schema"), (*CLI, "schema", "--model", "drivetrain")),
+    "optimise": (
+        (*CLI, "optimise", REFERENCE, *COARSE, "--of", "ste overall", "-o", "results_1"),
+        (
+            *(*CLI, "optimise", REFERENCE, "--vary", TIP, "--goal", "contact ratio sun-planet", "-o", "results_2"),
+            *("--second", "tip thickness planet", "--of", "contact ratio planet-ring", "--no-check"),
+            *("--max-designs", "60"),
+        ),
+    ),
+    "relief": ((*CLI, "relief", REFERENCE, "-o", "results"),),
+    "harris": ((*CLI, "harris", REFERENCE, "-o", "results"),),
     "sweep": ((*CLI, "sweep", REFERENCE, "--over", "operation.torque=50 N m,100 N m", "-o", "results"),),
     "validate": (("../tree/validation", "--quick", "-o", "validation.md"),),
 }

@@ -1,4 +1,4 @@
-"""scripts/optimise.py: what it writes, how it goes on, and what it refuses."""
+"""femgear optimise: what it writes, how it goes on, and what it refuses."""
 
 import csv
 import random
@@ -7,9 +7,10 @@ import signal
 from pathlib import Path
 
 import pytest
-from script_runs import run_script, wait_for_lines
+from script_runs import run_femgear, wait_for_lines
 
-from femgear.stages.static import solve_static, solve_stress
+from femgear.stages.static import relief_kinks, solve_static, solve_stress
+from femgear.study.problem import tip_reliefs
 from femgear.trains.reading import read_case
 from validation.soak import programs
 
@@ -18,7 +19,7 @@ CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 
 
 def run(*arguments, folder):
-    return run_script("optimise.py", *arguments, folder=folder)
+    return run_femgear("optimise", *arguments, folder=folder)
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def gears(tmp_path):
     case.write_text("\n".join(lines), encoding="utf-8")
     return [
         case,
-        *("--vary", "planet.profile_shift=-0.05..0.25 +- 0.01", "--objective", "tip thickness planet"),
+        *("--vary", "planet.profile_shift=-0.05..0.25 +- 0.01", "--goal", "tip thickness planet"),
         *("--limit", "tip thickness planet >= 0.74", "--no-check", "--of", "contact ratio sun-planet"),
     ]
 
@@ -55,7 +56,7 @@ def test_a_search_of_the_gears_and_its_continuation(gears, tmp_path):
 
 def test_a_search_that_is_killed_goes_on_with_the_same_command(gears, tmp_path):
     """By SIGTERM and kill -9 at random lines: the same files, nothing computed twice."""
-    words = [ROOT / "scripts" / "optimise.py", *gears, "--method", "global", "--samples", "20"]
+    words = ["optimise", *gears, "--method", "global", "--samples", "20"]
     words += ["--max-designs", "60", "-o"]
     alone = programs.start([*words, "alone"], tmp_path).wait()
     assert alone.code == 0, alone.err
@@ -95,7 +96,7 @@ def test_the_optimum_that_is_printed_is_that_of_a_run(tmp_path):
         case,
         "--vary",
         "sun.modifications[0].amount=0 um..8 um +- 1 um",
-        "--objective",
+        "--goal",
         "ste sun-planet",
         *(word for name in of for word in ("--of", name)),
         "--samples",
@@ -136,7 +137,7 @@ def test_the_optimum_that_is_printed_is_that_of_a_run(tmp_path):
         (["--vary", "sun.module"], "not a design variable"),
         (["--vary", "sun.modul=1 mm..2 mm"], "sun.modul"),
         (["--vary", "sun.mass=1 mm..2 mm"], "not a unit of mass"),
-        (["--objective", "noise"], "no such quantity"),
+        (["--goal", "noise"], "no such quantity"),
         (["--limit", "root stress sun < 3"], "not a limit"),
         (["--method", "magic"], "magic"),
         (["--speeds", "3500 rpm", "1000 rpm"], "not a range of speeds"),
@@ -147,11 +148,22 @@ def test_the_optimum_that_is_printed_is_that_of_a_run(tmp_path):
     ],
 )
 def test_bad_input_ends_in_a_message(arguments, message, tmp_path):
-    done = run(*arguments, folder=tmp_path)
-    assert done.returncode == 2 and message in done.stderr
+    case = () if str(arguments[0]).endswith(".toml") else (CASE,)
+    done = run(*case, *arguments, "-o", "out", folder=tmp_path)
+    assert done.returncode == 2 and message in done.stderr and "remedy" in done.stderr
     assert list(tmp_path.iterdir()) == []
 
 
-def test_help():
-    done = run("--help", folder=ROOT)
-    assert done.returncode == 0 and "--vary" in done.stdout and "CASE" in done.stdout
+def test_all_faults_are_told_at_once(tmp_path):
+    wrong = ("--goal", "noise", "--of", "smell", "--vary", "sun", "--limit", "3", "--samples", "0", "--positions", "4")
+    done = run(CASE, *wrong, "--torque", "3 um", "-o", "out", folder=tmp_path)
+    assert done.returncode == 2 and "7 problems" in done.stderr
+    for key in ("--goal", "--of", "--vary", "--limit", "--samples", "--positions", "operation.torque"):
+        assert f"{key}: " in done.stderr
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_reliefs_have_the_shape_that_the_verdict_advises(tmp_path):
+    case, _ = tip_reliefs(read_case(CASE))
+    kinked, _ = tip_reliefs(read_case(CASE), shape="linear")
+    assert relief_kinks(case) == (False, False) and relief_kinks(kinked) == (True, True)
