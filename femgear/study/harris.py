@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from femgear.case.gear_set import planetary_set
-from femgear.case.quantities import LENGTH, TORQUE, to_si
 from femgear.case.planetary import Case
+from femgear.case.quantities import LENGTH, TORQUE, to_si
 from femgear.case.sections import LARGEST_DEVIATION
 from femgear.errors import CaseError
 from femgear.report.style import family, save_figure

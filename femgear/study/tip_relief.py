@@ -11,8 +11,8 @@ import numpy as np
 
 from femgear.case import text as case_text
 from femgear.case.gear_set import need_set, planetary_set, set_deviations
-from femgear.case.quantities import TORQUE, to_si
 from femgear.case.planetary import Case
+from femgear.case.quantities import TORQUE, to_si
 from femgear.contact.supports import RIGID
 from femgear.errors import CaseError
 from femgear.gears.planetary import PlanetarySet
