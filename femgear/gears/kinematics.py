@@ -123,14 +123,18 @@ def planet_motion(sun: Any, carrier: Any, sun_teeth: Any, planet_teeth: Any) -> 
     return carrier - relative * sun_teeth / planet_teeth, abs(relative) * sun_teeth / (2.0 * math.pi)
 
 
+def sun_ratio(sun_teeth: Any, ring_teeth: Any) -> Any:
+    """Compute the speed of the sun over that of the carrier with the ring held, ``1 + z_r/z_s``, numbers or arrays."""
+    return 1.0 + ring_teeth / sun_teeth
+
+
 def torque_ratios(sun_teeth: int, ring_teeth: int) -> dict[str, float]:
     """Compute the torques of sun, ring and carrier over that of the sun, the weights of their speeds, too.
 
     Willis: without losses ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``, and
     ``T_s w_s + T_r w_r + T_c w_c = 0``.
     """
-    ratio = ring_teeth / sun_teeth
-    return {"sun": 1.0, "ring": ratio, "carrier": -(1.0 + ratio)}
+    return {"sun": 1.0, "ring": ring_teeth / sun_teeth, "carrier": -sun_ratio(sun_teeth, ring_teeth)}
 
 
 def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:
@@ -162,21 +166,32 @@ def across(vectors: np.ndarray) -> np.ndarray:
     return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
 
 
+def body_approach(gears: GearSet, *, back: bool = False) -> np.ndarray:
+    """Compute the approach (M, B, 3) of the flanks of all meshes per unit motion of every body.
+
+    Per motion along x and y [1] and per counter-clockwise rotation [m/rad], in the frame of the carrier:
+    ``n . (u_1 - u_2)`` with the normal n of `mesh_normals`, and the base radius of a gear that turns as the loaded
+    flanks drive it, minus that of one that turns against it. `back` is for the back flanks.
+    """
+    found, side = np.zeros((len(gears.meshes), len(gears.bodies), 3)), -1.0 if back else 1.0
+    for mesh, normal, effect in zip(gears.meshes, mesh_normals(gears, back=back), found, strict=True):
+        # gear 1 moves along the normal into gear 2, gear 2 away
+        for body, push in zip(mesh.bodies, (1.0, -1.0), strict=True):
+            number = gears.bodies[body].gear
+            effect[body, :2] = push * normal
+            effect[body, 2] = push * side * gears.senses[number] * gears.gears[number].base_radius
+    return found
+
+
 def member_approach(planetary_set: GearSet, *, back: bool = False) -> dict[str, np.ndarray]:
     """Compute the approach (M, 2) of all flanks per unit motion of the members along x and y, by their names.
 
     Of a planetary set sun, carrier and ring. A number without unit; `back` is for the back flanks, as in
     `mesh_normals`.
     """
-    s, normals = planetary_set, mesh_normals(planetary_set, back=back)
-    found = {}
-    for name, gears in s.members.items():
-        found[name] = np.zeros(normals.shape)
-        # gear 1 moves along the normal into gear 2, gear 2 away
-        for place, push in enumerate((1.0, -1.0)):
-            rows = np.array([s.bodies[mesh.bodies[place]].gear in gears for mesh in s.meshes])
-            found[name][rows] += push * normals[rows]
-    return found
+    s, effect = planetary_set, body_approach(planetary_set, back=back)[..., :2]
+    number = np.array([body.gear for body in s.bodies])
+    return {name: effect[:, np.isin(number, gears)].sum(axis=1) for name, gears in s.members.items()}
 
 
 def unheld_members(planetary_set: GearSet, floating: Sequence[str], *, both_flanks: bool = False) -> tuple[str, ...]:

@@ -27,6 +27,7 @@ import numpy as np
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import TEETH_RANGE, is_whole
+from femgear.gears.kinematics import sun_ratio
 from femgear.gears.planetary import PlanetarySet, assembly_positions, check_angles, check_planets
 
 CONVENTIONS = ("rotation", "printed")
@@ -477,8 +478,8 @@ def neighbouring_teeth(
     teeth = np.stack(np.meshgrid(*(z + steps for z in wanted), indexing="ij"), axis=-1).reshape(-1, 3)
     misfit = teeth[:, 2] - teeth[:, 0] - 2 * teeth[:, 1]
     teeth = teeth[(np.abs(misfit) <= closure) & np.all(teeth >= TEETH_RANGE[0], axis=1)]
-    ratio = 1.0 + teeth[:, 2] / teeth[:, 0]
-    change = ratio / (1.0 + ring_teeth / sun_teeth) - 1.0
+    ratio = sun_ratio(teeth[:, 0], teeth[:, 2])
+    change = ratio / sun_ratio(sun_teeth, ring_teeth) - 1.0
     near = np.abs(change) <= ratio_tolerance + 1e-12
     teeth, ratio, change = teeth[near], ratio[near], change[near]
     order = np.lexsort((*teeth.T[::-1], np.abs(teeth - wanted).sum(axis=1), np.round(np.abs(change), 12)))

@@ -9,6 +9,7 @@ from itertools import product
 import numpy as np
 
 from femgear.errors import CaseError, checked_count
+from femgear.gears.kinematics import sun_ratio
 from femgear.housing.sensor import ReadOnlyArrays, SensorLines
 
 _FLOOR = -60.0
@@ -217,7 +218,7 @@ def classify_line(
 def _turns(order: float, teeth, symmetry: int, tolerance: float) -> Iterator[tuple[int, int, str]]:
     """Turns of sun and planet that give an order: how many, carrier orders beside a mesh harmonic, words."""
     ring, sun, planet = teeth
-    parts = (("the sun", sun and 1 + ring / sun, symmetry), ("a planet", planet and ring / planet, 1))
+    parts = (("the sun", sun and sun_ratio(sun, ring), symmetry), ("a planet", planet and ring / planet, 1))
     for (name, rate, step), k in product(parts, [one for n in range(1, _MOST_TURNS + 1) for one in (n, -n)]):
         if not rate:
             continue

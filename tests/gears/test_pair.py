@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.gears.gear import Gear
-from femgear.gears.kinematics import member_approach, mesh_normals
+from femgear.gears.kinematics import body_approach, member_approach, mesh_normals
 from femgear.gears.pair import GearPair, close_pair
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 
@@ -66,3 +66,15 @@ def test_gears_are_exchanged_in_their_order():
     s, two = planetary(3), pair(internal=False)
     assert s.with_gears(s.gears) == s and two.with_gears(two.gears) == two
     assert [gear.name for gear in two.with_gears(two.gears[::-1]).gears] == ["gear_2", "gear_1"]
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_a_rotation_of_all_bodies_as_the_driver_drives_them_leaves_all_flanks_where_they_are(back):
+    """And so does a displacement of the whole set; the driver alone closes its meshes by its base radius."""
+    for s in (planetary(3), pair(internal=False), pair(internal=True)):
+        effect, side = body_approach(s, back=back), -1.0 if back else 1.0
+        turns = np.array([s.senses[body.gear] / s.gears[body.gear].base_radius for body in s.bodies])
+        assert effect[..., 2] @ turns == pytest.approx(np.zeros(len(s.meshes)), abs=1e-15)
+        assert effect[..., :2].sum(axis=1) == pytest.approx(np.zeros((len(s.meshes), 2)), abs=1e-15)
+        driven = [side * s.gears[0].base_radius * (mesh.bodies[0] == 0) for mesh in s.meshes]
+        assert effect[:, 0, 2] == pytest.approx(driven)

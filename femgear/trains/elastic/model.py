@@ -23,7 +23,7 @@ from femgear.errors import ContactError
 from femgear.fe.compliance import cyclic_harmonics, rim_compliance, static_cut_shapes
 from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis, smooth_cut_shapes
 from femgear.gears.gear import half_thickness_angle
-from femgear.gears.kinematics import mesh_normals, torques
+from femgear.gears.kinematics import across, body_approach, torques, unit_vectors
 from femgear.housing.two_way.structure import circumferential
 from femgear.stages.static import mesh_backlash
 from femgear.system.system import MechanicalSystem, MeshExcitation
@@ -165,11 +165,11 @@ def _place_bodies(M, K, place, planetary_set: PlanetarySet, case: Case) -> None:
         M[place[f"{name}: rotation"]] = body.inertia
     a, planet = planetary_set.centre_distance, case.planet
     c = [place[f"carrier: {axis}"] for axis in ("x", "y", "rotation")]
-    for n, psi in enumerate(planetary_set.planet_angles):
+    # the pin moves with the carrier: translation plus rotation about its centre
+    for n, arms in enumerate(a * across(unit_vectors(np.array(planetary_set.planet_angles)))):
         p = [place[f"planet {n + 1}: {axis}"] for axis in ("x", "y", "rotation")]
         M[p] = planet.mass, planet.mass, planet.inertia
-        # the pin moves with the carrier: translation plus rotation about its centre
-        for planet_dof, carrier_dof, arm in ((p[0], c[0], -a * np.sin(psi)), (p[1], c[1], a * np.cos(psi))):
+        for planet_dof, carrier_dof, arm in zip(p[:2], c[:2], arms, strict=True):
             column = np.zeros(len(K))
             column[planet_dof], column[carrier_dof], column[c[2]] = 1.0, -1.0, -arm
             K += planet.bearing_stiffness * np.outer(column, column)
@@ -191,15 +191,11 @@ def _place_shafts(M, K, load, place, planetary_set: PlanetarySet, case: Case, su
 
 def _mesh_directions(W, place, planetary_set: PlanetarySet, sun_torque: float) -> None:
     """Columns whose product with the motions is the approach of the flanks, ring displacement excluded."""
-    s, back = planetary_set, sun_torque < 0.0
-    N, side, normals = s.n_planets, -1.0 if back else 1.0, mesh_normals(s, back=back)
-    for n in range(N):
-        planet = f"planet {n + 1}"
-        for j, body, sign in ((n, "sun", 1.0), (n, planet, -1.0), (N + n, planet, 1.0)):
-            W[[place[f"{body}: x"], place[f"{body}: y"]], j] = sign * normals[j]
-        W[place["sun: rotation"], n] = side * s.sun.base_radius
-        W[place[f"{planet}: rotation"], n] = side * s.planet.base_radius
-        W[place[f"{planet}: rotation"], N + n] = -side * s.planet.base_radius
+    effect = body_approach(planetary_set, back=sun_torque < 0.0)
+    for number, body in enumerate(planetary_set.bodies):
+        # the ring is elastic, with motions of its own
+        if body.name != "ring":
+            W[[place[f"{body.name}: {axis}"] for axis in ("x", "y", "rotation")]] = effect[:, number].T
 
 
 def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun_torque: float) -> float:

@@ -20,7 +20,7 @@ import numpy as np
 from femgear.case.gear_set import line_play, set_deviations
 from femgear.contact.cycle import CycleOptions
 from femgear.contact.loaded_period import loaded_period
-from femgear.gears.kinematics import mesh_normals
+from femgear.gears.kinematics import body_approach
 from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
 from femgear.stages.static import over_width, record_positions
@@ -83,10 +83,8 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     machines = [(name, getattr(case, name)) for name in ("motor", "brake")]
     machines = [(2 + 3 * i, name, one) for i, (name, one) in enumerate(machines) if one is not None]
     sections, size = (case.gear_1, case.gear_2), 6 + len(machines)
-    flank, radii = (-1 if case.operation.torque < 0 else 1), [gear.base_radius for gear in gears.gears]
-    normal = mesh_normals(gears)[0] * [1.0, flank]
-    turning = flank * np.array([radii[0], -gears.senses[1] * radii[1]])
-    mesh = np.concatenate([normal, turning[:1], -normal, turning[1:], np.zeros(len(machines))])
+    radii, effect = [gear.base_radius for gear in gears.gears], body_approach(gears, back=case.operation.torque < 0)[0]
+    mesh, normal = np.concatenate([effect.ravel(), np.zeros(len(machines))]), effect[0, :2]
     mass = np.array(
         [
             *(value for one in sections for value in (one.mass, one.mass, one.inertia)),
