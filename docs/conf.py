@@ -1,5 +1,6 @@
 """Sphinx settings of the documentation; `make docs` builds it into out/docs/html."""
 
+import ast
 import builtins
 import csv
 import html
@@ -153,6 +154,20 @@ class Fields(SphinxDirective):
         return self.parse_text_to_nodes("\n".join(lines))
 
 
+class Folders(SphinxDirective):
+    """Table of the folders of femgear: their modules, and the first line of their docstring."""
+
+    def run(self) -> list[nodes.Node]:
+        """Make the table from the files that there are."""
+        lines = ["| folder | what it holds | modules |", "|---|---|---|"]
+        for path in sorted((ROOT / "femgear").rglob("__init__.py")):
+            modules = ", ".join(f"`{module.stem}`" for module in sorted(path.parent.glob("*.py")) if module != path)
+            words = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))).split("\n")[0]
+            folder = path.parent.relative_to(ROOT).as_posix()
+            lines.append(f"| `{folder}/` | {words.replace('``', '`')} | {modules} |")
+        return self.parse_text_to_nodes("\n".join(lines))
+
+
 def _choice(name: str, values: list[str]) -> str:
     """Menu of the different values, in their order."""
     options = "".join(f"<option>{html.escape(value)}</option>" for value in dict.fromkeys(values))
@@ -210,7 +225,7 @@ def drop_readers(app, domain: str, kind: str, content) -> None:
         content.remove(node)
 
 
-SYMBOL = re.compile(r"(?<![\w/.])([A-Za-zΑ-ω])_([A-Za-z0-9Α-ω]{1,6})(?![\w(])")
+SYMBOL = re.compile(r"(?<![\w/.])([A-Za-zΑ-ω])_([A-Za-z0-9Α-ω]{1,8})(?!\w)")
 VERBATIM = (nodes.literal, nodes.literal_block, nodes.math, nodes.math_block, nodes.raw, addnodes.desc_signature)
 
 
@@ -242,6 +257,7 @@ def setup(app) -> None:
     """Connect what changes the sources."""
     app.add_directive("validation-rows", ValidationRows)
     app.add_directive("fields", Fields)
+    app.add_directive("folders", Folders)
     app.connect("html-page-context", widen, priority=900)
     app.connect("doctree-read", tidy)
     app.connect("doctree-read", set_subscripts)

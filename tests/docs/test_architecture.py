@@ -1,5 +1,6 @@
 """Tables of types: docs/architecture.md has those of the chain, docs/two_way.md what exists in the code."""
 
+import ast
 import dataclasses
 import importlib
 import pkgutil
@@ -43,3 +44,10 @@ def test_the_notation_names_what_the_code_has():
         assert kind in known, name
         fields = {*vars(known[kind]), *getattr(known[kind], "__dataclass_fields__", {})}
         assert not field or field in fields, name
+
+
+def test_every_folder_says_what_it_holds():
+    """The page lists the first lines of the docstrings of all packages."""
+    for path in (DOCS.parent / "femgear").rglob("__init__.py"):
+        words = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+        assert len(words.split("\n")[0].split()) >= 4, path

@@ -14,7 +14,6 @@ ROOT = Path(__file__).resolve().parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = [ROOT / "README.md", ROOT / "meshes" / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 COMMANDS = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
-FOLDERS = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 
 
 def blocks(language: str) -> list[str]:
@@ -80,16 +79,6 @@ def test_pictures_are_small():
     folders = (ROOT / "docs" / name for name in ("images", "front", "_static"))
     sizes = {path: path.stat().st_size for folder in folders for path in folder.rglob("*.*")}
     assert max(sizes.values()) < 300_000 and sum(sizes.values()) < 6e6
-
-
-def test_module_table_names_every_module():
-    """One row a folder, every module once, in the row of its folder; ``__init__`` files go without saying."""
-    rows = re.findall(r"^\| `(femgear/[\w/]*)` \| ([^|]+) \|", FOLDERS, flags=re.MULTILINE)
-    named = [folder + name for folder, names in rows for name in re.findall(r"`(\w+)`", names)]
-    paths = [path for path in (ROOT / "femgear").rglob("*.py") if path.stem != "__init__"]
-    modules = [path.relative_to(ROOT).with_suffix("").as_posix() for path in paths]
-    assert len(rows) == len({folder for folder, _ in rows}) == len({path.parent for path in paths})
-    assert sorted(named) == sorted(modules)
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
