@@ -339,12 +339,21 @@ def _local_columns(data: RigidSet, gear: str, flank: int) -> tuple[np.ndarray, n
     return central, -sign * _point_column(normal, point_p, heights, r_p, turn_p * around)
 
 
+def point_approach(normal: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Compute ``n . (v + phi x c)`` per unit of v and phi of a rigid body (..., 6), ``n`` and ``c x n``.
+
+    That is the motion along a normal (3,) of points (..., 3) [m] of the body, from its centre: per displacement
+    along x, y and z [1], and per rotation about them [m/rad].
+    """
+    return np.concatenate([np.broadcast_to(normal, points.shape), np.cross(points, normal)], axis=-1)
+
+
 def _point_column(normal, point, heights, radius: float, around: float) -> np.ndarray:
-    """``n . (v + phi x c)`` (6, S) for points at all heights; `around` is the factor of u."""
-    column = np.zeros((6, len(heights)))
-    column[:3], column[5] = normal[:, None], around
-    column[3] = (normal[2] * point[1] - normal[1] * heights) / radius
-    column[4] = (normal[0] * heights - normal[2] * point[0]) / radius
+    """Column (6, S) of tilts ``w`` and rotation ``u`` on a radius, for points at all heights; `around` is that of u."""
+    places = np.column_stack([np.broadcast_to(point, (len(heights), 2)), heights])
+    column = point_approach(normal, places).T.copy()
+    column[3:5] /= radius
+    column[5] = around
     return column
 
 

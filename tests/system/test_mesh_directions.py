@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 from published.planetary_sets import lin_parker_set
+from scipy.spatial.transform import Rotation
 
-from femgear.system.mesh_directions import gear_set_system, support_diagonal
+from femgear.system.mesh_directions import gear_set_system, point_approach, support_diagonal
 
 
 def test_supports_that_hold_a_motion_are_no_stiffness():
@@ -18,3 +19,14 @@ def test_supports_that_hold_a_motion_are_no_stiffness():
     assert support_diagonal(held)[2].tolist() == [2e7, 2e7, 0.0]
     assert support_diagonal(held)[1, :2].tolist() == [0.0, 0.0]
     assert len(gear_set_system(held).M) == len(gear_set_system(replace(data, sun=free)).M) - 3
+
+
+def test_a_point_moves_with_its_body_as_far_as_its_place_says():
+    """A small turn by phi moves the point c by ``phi x c``: its part along the normal is that of the turned point."""
+    rng = np.random.default_rng(3)
+    normal, points = rng.normal(size=3), rng.normal(size=(4, 3))
+    effect, step = point_approach(normal, points), 1e-6
+    np.testing.assert_array_equal(effect[:, :3], np.tile(normal, (4, 1)))
+    for axis in range(3):
+        turned = Rotation.from_rotvec(step * np.eye(3)[axis]).apply(points)
+        np.testing.assert_allclose(effect[:, 3 + axis], (turned - points) @ normal / step, rtol=1e-5)

@@ -18,7 +18,7 @@ from scipy import linalg
 
 from femgear.errors import CaseError
 from femgear.fe.shaft import AXES, joint_deflections, joint_springs
-from femgear.system.mesh_directions import mesh_directions, pin_directions
+from femgear.system.mesh_directions import mesh_directions, pin_directions, point_approach
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.trains.drivetrain.parts import Drivetrain, ParallelSection, PlanetarySection, numbered
 
@@ -369,9 +369,9 @@ def _parallel_direction(stage: ParallelSection, place: Coordinates, spin, *, fla
     w = np.zeros(place.count)
     for name, radius, offset, sign in zip(stage.between, stage.pitch_radii, stage.offsets, (1.0, -1.0)):
         arm = np.append(sign * radius * along, offset)
-        moment = np.cross(arm, normal)
         first = place.body[name]
-        w[first : first + 5] += sign * np.array([normal[0], normal[1], *moment])
+        # bodies do not move along z
+        w[first : first + 5] += sign * point_approach(normal, arm)[[0, 1, 3, 4, 5]]
     return w
 
 
