@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from script_runs import run_script as run
 
+from femgear.stages.static import solve_static
+from femgear.trains.reading import read_case
+
 pytestmark = pytest.mark.usefixtures("coarse_states")
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -286,6 +289,46 @@ def test_pin_error_load_sharing(quick_case, tmp_path):
     errors = np.array([data[f"tangential error of pin {n} [m]"] for n in (1, 2, 3)])
     late = errors - errors.mean(axis=0)
     assert np.corrcoef(late.ravel(), fixed.ravel())[0, 1] < -0.9
+
+
+@pytest.fixture(scope="module")
+def helical_case(tmp_path_factory):
+    """A helical set in few slices on a coarse grid."""
+    text = CASE.with_name("helical_23_24_73.toml").read_text(encoding="utf-8")
+    text = text.replace("positions = 64\nslices = 25", "positions = 8\nflank_elements = 6\nslices = 9")
+    path = tmp_path_factory.mktemp("case") / "helical.toml"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def test_load_sharing_of_a_helical_set(helical_case, tmp_path):
+    """Without gap that of a run; a gap takes from its planet what the others get."""
+    done = run("load_sharing.py", helical_case, "--gap", "0 um", "--gap", "2 um", "-o", tmp_path, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    cycle = solve_static(read_case(helical_case)).cycle
+    share = table(tmp_path / "load_sharing.csv")["share [1]"].reshape(2, 3, -1)
+    np.testing.assert_allclose(share[0], cycle.load_share, rtol=1e-8)
+    mean = share[1].mean(axis=1)
+    assert mean[0] < 0.31 < 0.34 < mean[1] and mean.sum() == pytest.approx(1.0)
+
+
+def test_pin_errors_of_a_helical_set(helical_case, tmp_path):
+    arguments = ("--samples", "4", "--support", "fixed", "--tolerance", "6 um", "-o", tmp_path)
+    done = run("pin_error_load_sharing.py", helical_case, *arguments, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    data = table(tmp_path / "load_sharing_samples.csv")
+    shares = np.array([data[f"share of planet {n}, fixed [1]"] for n in (1, 2, 3)])
+    errors = np.array([data[f"tangential error of pin {n} [m]"] for n in (1, 2, 3)])
+    # one pin takes as much from its planet as the two others give: shares follow from linear sensitivities
+    own, other = (float(value) for value in re.search(r"all members fixed +(\S+) +\S+ +(\S+)", _last(done)).groups())
+    assert own == pytest.approx(-2.0 * other, rel=1e-3)
+    linear = 1e-2 * own * 1e6 * (errors - errors.mean(axis=0)) * 1.5
+    np.testing.assert_allclose(shares - 1 / 3, linear, atol=0.15 * np.abs(linear).max())
+
+
+def _last(done) -> str:
+    """What a script printed of its last table."""
+    return done.stdout[done.stdout.rindex("Linear sensitivity") :]
 
 
 def text_table(path):
