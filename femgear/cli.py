@@ -896,8 +896,9 @@ class Sought:
     Parameters
     ----------
     vary
-        As "sun.modifications[0].amount=0 um..15 um +- 1 um" with its tolerance; may be repeated. Default: a
-        tip relief more on every loaded flank, its amount and its start.
+        As "sun.modifications[0].amount=0 um..15 um +- 1 um" with its tolerance, or "KEY1,KEY2=0 um..15 um" of
+        entries with one value; may be repeated. Default: a tip relief more on every loaded flank, its amount
+        and its start.
     shape
         Of these reliefs; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
     goal
@@ -1001,7 +1002,7 @@ def relief(
     points: Whole = 7,
     positions: Whole | None = None,
 ) -> int:
-    """Find the tip relief of sun and planets with the least transmission error at one torque.
+    """Find the tip relief of sun and planets, or of a pair, with the least transmission error at one torque.
 
     Amount and length are searched over a map, which is drawn, and from its best point on. The relief is
     written as a case file, with the numbers that a run of it finds. Goes on where it was interrupted.
@@ -1009,7 +1010,7 @@ def relief(
     Parameters
     ----------
     case
-        TOML case file; the relief adds to its modifications.
+        TOML case file of a planetary set or a pair; the relief adds to its modifications.
     output
         Folder of relief.toml, tip_relief.csv, tip_relief.png and the journal.
     torque

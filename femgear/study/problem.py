@@ -332,20 +332,23 @@ def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
 
 
 def parse_variable(text: str) -> Variable:
-    """Read the variable ``KEY=LOW..HIGH`` or ``KEY=LOW..HIGH +- TOLERANCE``; others: E-VARIABLE, E-UNIT."""
-    match = re.fullmatch(r"\s*([^=\s]+)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*(?:\+-\s*(.+?)\s*)?", text, re.DOTALL)
+    """Read the variable ``KEY=LOW..HIGH`` or ``KEY=LOW..HIGH +- TOLERANCE``; others: E-VARIABLE, E-UNIT.
+
+    Entries that get one value are ``KEY1,KEY2=LOW..HIGH``.
+    """
+    match = re.fullmatch(r"\s*([^=]+?)\s*=\s*(.+?)\s*\.\.\s*(.+?)\s*(?:\+-\s*(.+?)\s*)?", text, re.DOTALL)
     if not match:
         raise CaseError(
             "not a design variable",
             code="E-VARIABLE",
             key="--vary",
             value=text,
-            limit="KEY=LOW..HIGH or KEY=LOW..HIGH +- TOLERANCE",
+            limit="KEY=LOW..HIGH, KEY=LOW..HIGH +- TOLERANCE or KEY1,KEY2=LOW..HIGH",
             remedy='--vary "sun.modifications[0].amount=0 um..15 um +- 1 um"',
         )
     key, low, high, tolerance = match.groups()
-    low, high = (_number(value) for value in (low, high))
-    return Variable(key, low, high, tolerance=_number(tolerance) if tolerance else None)
+    low, high, keys = _number(low), _number(high), tuple(part.strip() for part in key.split(","))
+    return Variable(keys, low, high, tolerance=_number(tolerance) if tolerance else None)
 
 
 def _number(text: str) -> str | float:

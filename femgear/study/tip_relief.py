@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 
 from femgear.case import text as case_text
-from femgear.case.gear_set import need_set, planetary_set, set_deviations
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.planetary import Case
 from femgear.case.quantities import TORQUE, to_si
 from femgear.contact.supports import RIGID
 from femgear.errors import CaseError
 from femgear.gears.planetary import PlanetarySet
-from femgear.report.style import save_figure
+from femgear.report.style import family, save_figure
 from femgear.report.tables import Block
 from femgear.stages.protocol import Progress, one_blas_thread, silent
 from femgear.storage.files import own_files, resumable, write_csv, write_text
@@ -113,14 +113,15 @@ def relief_into(
         )
         save_figure(figure, folder / _FIGURE)
         write_text(to_toml(relieved), folder / _CASE)
-    added = any(gear.modifications for gear in (case.sun, case.planet))
-    blocks = [_described_grid(inputs, grid), _described_optimum(case, best, grid, runs, added=added)]
+    names = list(dict.fromkeys(map(family, basis.gears.mesh_names)))
+    added = any(getattr(case, gear.name).modifications for gear in basis.gears.gears[:2])
+    optimum = _described_optimum(case, best, grid, runs, names, added=added)
+    blocks = [_described_grid(inputs, grid, names[0]), optimum]
     return [*blocks, Block(f"Of {_CASE}", notes=tuple(tables.splitlines()))], [_TABLE, _FIGURE, _CASE, _JOURNAL]
 
 
 def _checked(case: Case, request: ReliefRequest) -> tuple[Case, np.ndarray, np.ndarray, float | None]:
     """Case under the torque and with the positions asked for, torques on input and sun (T,), largest amount."""
-    need_set(case)
     gears, top, others = planetary_set(case), None, list[float]()
     with all_faults() as part:
         with part("--points"):
@@ -190,7 +191,8 @@ def with_relief_tables(
     given, values, lines = case_text.parse(case.source, case.name), dict[str, object](), list[str]()
     flanks = {}, {"flank": "ring side" if back else "sun side"}
     starts = relief_starts(gears, length=length)
-    for gear, start, flank in zip((gears.sun, gears.planet), starts, flanks, strict=True):
+    for gear, start, flank in zip(gears.gears[:2], starts, flanks, strict=True):
+        flank = flank if gear.name == "planet" else {}
         diameter = 2e3 * math.hypot(start, gear.base_radius)
         table = {"kind": "tip relief", **flank, "amount": f"{1e6 * amount:.3f} um"}
         table |= {"start_diameter": f"{diameter:.5f} mm", "shape": shape}
@@ -206,7 +208,7 @@ def _records(inputs: np.ndarray, grid: ReliefGrid) -> Iterator[tuple[float, ...]
         yield (*place, float(peak), float(grid.ratio[t, a, b]))
 
 
-def _described_grid(inputs: np.ndarray, grid: ReliefGrid) -> Block:
+def _described_grid(inputs: np.ndarray, grid: ReliefGrid, mesh: str) -> Block:
     """Tabulate the best point of the grid at every torque."""
     rows = []
     for t, torque in enumerate(inputs):
@@ -215,21 +217,24 @@ def _described_grid(inputs: np.ndarray, grid: ReliefGrid) -> Block:
         place = f"{grid.amounts[a] * 1e6:.2f}", f"{grid.lengths[b]:.3f}"
         rows.append((f"{torque:g}", *place, *(f"{x:.4f}" for x in numbers), f"{grid.ratio[t, a, b]:.1%}"))
     header = ("torque [N m]", "relief [um]", "length [1]", "before, p-p [um]", "STE p-p [um]", "over before")
-    return Block("Best points of the grid, sun-planet meshes", header, tuple(rows))
+    return Block(f"Best points of the grid, {mesh} meshes", header, tuple(rows))
 
 
-def _described_optimum(case: Case, best: ReliefOptimum, grid: ReliefGrid, runs: HarrisMap, *, added: bool) -> Block:
+def _described_optimum(
+    case: Case, best: ReliefOptimum, grid: ReliefGrid, runs: HarrisMap, names: Sequence[str], *, added: bool
+) -> Block:
     """Tabulate the transmission errors of the case and of that with the relief, and say how sure it is."""
-    pairs = [*zip(("sun-planet", "planet-ring"), runs.peak_to_peak[..., 0].T), ("sun to ring", runs.overall[:, 0])]
+    pairs = list(zip(names, runs.peak_to_peak[..., 0].T, strict=True))
+    pairs += [("sun to ring", runs.overall[:, 0])] if len(names) > 1 else []
     rows = tuple(
         (name, f"{1e6 * before:.4f}", f"{1e6 * after:.4f}", f"{after / before:.1%}") for name, (before, after) in pairs
     )
     notes = [
         f"{best.amount * 1e6:.3f} um over {best.length:.3f} lengths of two-pair contact, {best.evaluations} mesh "
-        f"cycles; the search looks at the sun-planet meshes alone"
+        f"cycles{f'; the search looks at the {names[0]} meshes alone' if len(names) > 1 else ''}"
     ]
     if added:
-        notes.append("ADDED TO THE CASE: sun or planets have modifications of their own, to which this relief comes")
+        notes.append("ADDED TO THE CASE: its gears have modifications of their own, to which this relief comes")
     header = ("mesh", "before, p-p [um]", "with relief, p-p [um]", "over before")
     title = f"Optimum at {case.operation.torque:g} N m: transmission errors as femgear run {_CASE} finds them"
     return Block(title, header, rows, (*notes, *_judged(best, grid)))

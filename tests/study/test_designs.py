@@ -204,6 +204,8 @@ def test_words_of_the_command_line():
     variable = parse_variable("sun.modifications[0].start_diameter = 43 mm..44 mm +- 50 um")
     assert variable.bounds == (43.0, 44.0) and variable.tolerance_at(43.5) == pytest.approx(0.05)
     assert parse_variable("sun.profile_shift=-0.1..0.3").bounds == (-0.1, 0.3)
+    together = parse_variable("sun.modifications[0].amount, planet.modifications[0].amount=0 um..5 um")
+    assert together.keys == ("sun.modifications[0].amount", "planet.modifications[0].amount")
 
 
 @pytest.mark.parametrize(

@@ -158,6 +158,13 @@ def test_bad_input_ends_in_a_message(arguments, message, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_pair_is_refused(tmp_path):
-    done = relief(ROOT / "cases" / "spur_pair.toml", "-o", "out", folder=tmp_path)
+def test_a_pair_has_a_relief(tmp_path):
+    words = ("--points", "3", "--positions", "8", "--largest", "30 um", "--also", "100 N m", "-o", "out")
+    done = relief(ROOT / "cases" / "spur_pair.toml", *words, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    written = read_case(tmp_path / "out" / "relief.toml")
+    (row,) = re.findall(r"^ +gear 1-gear 2 +([\d.]+) +([\d.]+)", done.stdout, flags=re.MULTILINE)
+    assert float(row[1]) == pytest.approx(1e6 * solve_static(written).cycle.peak_to_peak()[0], abs=5.1e-5)
+    assert float(row[1]) < 0.5 * float(row[0])
+    done = relief(ROOT / "cases" / "own_chain.toml", *words, folder=tmp_path)
     assert done.returncode == 2 and "E-MODEL" in done.stderr and "remedy" in done.stderr
