@@ -87,7 +87,7 @@ def flank_bodies(*, flank_elements: int = 24, refine: float = 1.0) -> Bodies:
         for gear, grid in zip(gears, map(mirror, grids), strict=True)
     )
     # no ring mesh takes part
-    return Bodies(sun=sun, planet=planet, ring=planet, widths=s.mesh_widths)
+    return Bodies((sun, planet, planet), s.mesh_widths)
 
 
 def femgear_contact(bodies: Bodies, fraction: float, *, cells: int = 36) -> PairContact:

@@ -313,11 +313,11 @@ class Candidates:
 
     def images_of(self, bodies: Bodies) -> np.ndarray:
         """`images` of other bodies with the same flanks: what differs, of which little is computed anew."""
-        parts = {}
-        for name in ("sun", "planet", "ring"):
-            own, other = getattr(self.bodies, name), getattr(bodies, name)
-            parts[name] = None if own is other else replace(other, regular=other.regular - own.regular)
-        differing = replace(bodies, **parts)
+        parts = [
+            None if own is other else replace(other, regular=other.regular - own.regular)
+            for own, other in zip(self.bodies.gears, bodies.gears, strict=True)
+        ]
+        differing = replace(bodies, gears=tuple(parts))
         return self.images + body_compliance(self.setup, differing, self.position, self.mesh, self.pair)
 
     def touches_window_end(self, active: np.ndarray) -> bool:
@@ -444,7 +444,7 @@ def first_windows(planetary_set: GearSet, bodies: Bodies, sun_torque: float) -> 
     share = sun_torque / (s.gears[0].base_radius * s.n_planets) or 1e-6 * ROUGH_STIFFNESS * width
     rough = share / (ROUGH_STIFFNESS * width)
     # a ring on a soft foundation lets flanks come nearer than teeth alone do
-    yields = max(body.regular[0].diagonal().max() for body in bodies.gears if body is not None)
+    yields = max(body.regular[0].diagonal().max() for body in bodies.gears)
     return share, max(3.0 * rough, rough + share * yields)
 
 

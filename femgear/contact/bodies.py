@@ -68,19 +68,13 @@ class Sector:
 
 @dataclass(frozen=True)
 class Sectors:
-    """Sectors of one tooth of the ``sun``, ``planet`` and ``ring``.
+    """Sectors of one tooth of all ``gears`` of a set in its order: ``sun``, ``planet``, ``ring`` of a planetary one."""
 
-    A pair has its gears 1 and 2 for sun and planet, and no ring.
-    """
+    gears: tuple[Sector, ...]
 
-    sun: Sector
-    planet: Sector
-    ring: Any = None
-
-    @property
-    def gears(self) -> tuple[Sector, ...]:
-        """Sectors of all gears of the set in order."""
-        return tuple(one for one in (self.sun, self.planet, self.ring) if one is not None)
+    sun = property(lambda self: self.gears[0])
+    planet = property(lambda self: self.gears[1])
+    ring = property(lambda self: self.gears[2])
 
 
 @dataclass(frozen=True)
@@ -162,14 +156,12 @@ class FlankCompliance:
 
 @dataclass(frozen=True)
 class Bodies:
-    """Flank compliances of the gears of a set or a pair, and what the meshes between them have in common.
+    """Flank compliances of the gears of a set, and what the meshes between them have in common.
 
     Parameters
     ----------
-    sun, planet : FlankCompliance
-        Of a pair its gears 1 and 2.
-    ring : FlankCompliance or None
-        None in a pair.
+    gears : tuple of FlankCompliance
+        In the order of the set; ``sun``, ``planet`` and ``ring`` of a planetary one.
     widths : tuple of float
         Face width that both gears have in common [m], one a kind of mesh.
     helical : tuple of float
@@ -179,12 +171,19 @@ class Bodies:
         Helix angle on the base cylinder [rad]; zero for spur teeth.
     """
 
-    sun: FlankCompliance
-    planet: FlankCompliance
-    ring: Any
+    gears: tuple[Any, ...]
     widths: tuple[float, ...]
     helical: tuple[float, ...] = (1.0, 1.0)
     base_helix_angle: float = 0.0
+
+    sun = property(lambda self: self.gears[0])
+    planet = property(lambda self: self.gears[1])
+    ring = property(lambda self: self.gears[2])
+
+    def with_gear(self, number: int, flanks: FlankCompliance) -> Bodies:
+        """Exchange the flanks of one gear."""
+        number %= len(self.gears)
+        return replace(self, gears=(*self.gears[:number], flanks, *self.gears[number + 1 :]))
 
     def of_kinds(self, kind) -> np.ndarray:
         """Look up `helical` of kinds of mesh (...)."""
@@ -199,14 +198,9 @@ class Bodies:
         return np.sqrt(math.cos(self.base_helix_angle) / self.of_kinds(kind))
 
     @property
-    def gears(self) -> tuple[Any, ...]:
-        """Compliances of the gears in the order of the set."""
-        return self.sun, self.planet, self.ring
-
-    @property
     def mates(self) -> tuple[tuple[FlankCompliance, FlankCompliance], ...]:
         """Both gears of every kind of mesh."""
-        return tuple(pairwise(body for body in self.gears if body is not None))
+        return tuple(pairwise(self.gears))
 
     @property
     def contact_moduli(self) -> np.ndarray:
@@ -271,7 +265,7 @@ def make_sectors(
             thickness = {"tooth": max(teeth), "body": thickness}
         matrix = stiffness(whole, own, state=state, thickness=thickness)
         sectors.append(Sector(gear, whole, matrix))
-    return Sectors(*sectors)
+    return Sectors(tuple(sectors))
 
 
 def flank_widths(widths: Sequence[float]) -> list[tuple[float, float]]:
@@ -324,8 +318,7 @@ def make_bodies(
     ]
     for number, compliance in zip(missing, second_process.shared(tasks), strict=True):
         found[number] = compliance
-    ring = found[2] if len(found) > 2 else None
-    return Bodies(found[0], found[1], ring, tuple(min(pair) for pair in pairwise(own)))
+    return Bodies(tuple(found), tuple(min(pair) for pair in pairwise(own)))
 
 
 def _of_sector(sector: Sector, material: Material, teeth: tuple[float, float], *, depth, foundation) -> FlankCompliance:
@@ -345,10 +338,10 @@ def _of_sector(sector: Sector, material: Material, teeth: tuple[float, float], *
 
 def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:
     """Exchange the ring: held at its outer surface, or on a foundation (2n, 2n) [N/m]."""
-    ring = bodies.ring
+    ring = bodies.gears[-1]
     assert ring.free is not None
     compliance, surface = _seen(ring.free.supported(ring_foundation), len(ring.roll))
-    return replace(bodies, ring=replace(ring, regular=regular_compliance(compliance, ring.local), surface=surface))
+    return bodies.with_gear(-1, replace(ring, regular=regular_compliance(compliance, ring.local), surface=surface))
 
 
 def flank_compliance(

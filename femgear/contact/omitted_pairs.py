@@ -42,7 +42,7 @@ def needed_nearest(found: Candidates, approach, force) -> np.ndarray:
 
 def _largest_closing(found: Candidates) -> float:
     """How far flanks of both gears of a mesh come nearer to one another at most, per load elsewhere [m/N]."""
-    return -2.0 * min(body.least for body in found.bodies.gears if body is not None)
+    return -2.0 * min(body.least for body in found.bodies.gears)
 
 
 def yielding(found: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarray:
@@ -58,7 +58,7 @@ def yielding(found: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarra
         candidates, windows_of_bodies(setup.gears, mesh), strict=True
     ):
         body = found.bodies.gears[number]
-        if body is None or not len(these):
+        if not len(these):
             continue
         j, i, at = found.mesh[own], found.pair[row[these]][:, own], position[these]
         index, weight = station_weights(setup.roll[gear, j, at[:, None], i, 1], body.roll)

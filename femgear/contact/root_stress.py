@@ -96,17 +96,19 @@ class _RootStress:
 
 @dataclass(frozen=True)
 class RootStresses:
-    """Root stress influences of ``sun``, ``planet`` and ``ring``.
+    """Root stress influences of the ``gears`` of a set, in its order; ``sun``, ``planet``, ``ring`` of a planetary one.
 
-    A pair has gears 1 and 2 for sun and planet, and no ring.
+    The last ones may be left out: nothing is computed for them.
     ``ahead`` (slices,) are the places of slices before mid-width [mesh periods], zero for spur teeth, where
     loads differ over the width.
     """
 
-    sun: _RootStress
-    planet: _RootStress
-    ring: _RootStress | None = None
+    gears: tuple[_RootStress, ...]
     ahead: np.ndarray | None = None
+
+    sun = property(lambda self: self.gears[0])
+    planet = property(lambda self: self.gears[1])
+    ring = property(lambda self: self.gears[2])
 
     def loads(self, planetary_set: GearSet, cycle: MeshCycle, *, reverse: bool) -> list[LoadedTeeth]:
         """Take the tooth loads of every slice from a cycle, each at its place on the path of contact."""
@@ -120,9 +122,8 @@ class RootStresses:
 
     def of_bodies(self, planetary_set: GearSet) -> list[tuple[int, _RootStress, list]]:
         """Number of the gear, influence and drive flanks (mesh, gear of the pair, side) of every body."""
-        gears = self.sun, self.planet, self.ring
-        bodies = ((number, gears[number], acting) for number, acting in acting_flanks(planetary_set))
-        return [(number, root, acting) for number, root, acting in bodies if root is not None]
+        bodies = acting_flanks(planetary_set)
+        return [(number, self.gears[number], acting) for number, acting in bodies if number < len(self.gears)]
 
 
 @dataclass(frozen=True)

@@ -215,13 +215,9 @@ def waves_of_gears(gears: Sequence[CondensedWaves], ring_foundation=None, helica
     ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over its face width, which otherwise is held;
     ``helical`` as in `Bodies`.
     """
-    sun, planet, *ring = gears
-    common = common_width([one.sector.gear for one in gears])
-    held: list[Any] = ring[0].held if ring else [None] * len(sun.wave_number)
-    bodies = zip(sun.held, planet.held, held, strict=True)
-    waves = WidthWaves(
-        sun.wave_number, tuple(Bodies(*one, common, helical) for one in bodies), ring[0] if ring else None
-    )
+    common, ring = common_width([one.sector.gear for one in gears]), gears[-1] if len(gears) > 2 else None
+    bodies = zip(*(one.held for one in gears), strict=True)
+    waves = WidthWaves(gears[0].wave_number, tuple(Bodies(one, common, helical) for one in bodies), ring)
     return waves if ring_foundation is None else with_ring_waves(waves, ring_foundation)
 
 
@@ -230,7 +226,7 @@ def with_ring_waves(waves: WidthWaves, foundation=None) -> WidthWaves:
     ring = waves.ring
     assert ring is not None
     rings = ring.held if foundation is None else ring.supported(foundation)
-    bodies = (replace(one, ring=of_wave) for one, of_wave in zip(waves.bodies, rings, strict=True))
+    bodies = (one.with_gear(-1, of_wave) for one, of_wave in zip(waves.bodies, rings, strict=True))
     return replace(waves, bodies=tuple(bodies))
 
 

@@ -416,8 +416,8 @@ def loaded_over_width(case: Case, gears: PlanetarySet, waves: WidthWaves | None,
     rings = steps.kept("waves of the other ring", known)
     if rings is None:
         other = with_ring_waves(own, ring_foundation(case, own.ring.sector) if fixed else None)
-        rings = steps.keep("waves of the other ring", known, [one.ring for one in other.bodies])
-    bodies = (replace(one, ring=ring) for one, ring in zip(own.bodies, rings, strict=True))
+        rings = steps.keep("waves of the other ring", known, [one.gears[-1] for one in other.bodies])
+    bodies = (one.with_gear(-1, ring) for one, ring in zip(own.bodies, rings, strict=True))
     other = replace(own, bodies=tuple(bodies))
     return found | dict(zip(("waves", "held_waves"), (other, own) if fixed else (own, other)))
 
@@ -619,7 +619,6 @@ def _influences(case: Case, static: StaticResult, progress: Progress = silent) -
         gear, support = sector.gear, None
         if gear.internal:
             support = ring_foundation(case, sector) if case.static.members == "elastic" else None
-        assert body is not None
         if body.root is None:
             found.append(root_stress(sector.grid, gear, material, foundation=support))
         else:
@@ -637,7 +636,7 @@ def _influences(case: Case, static: StaticResult, progress: Progress = silent) -
             found[-1] = replace(one, influence=weaker * one.influence, waves=weaker * waves)
     if loads is not None:
         ahead = slices_ahead(static.overlap_ratio, loads.shape[2])
-    return RootStresses(*found, ahead=ahead)
+    return RootStresses(tuple(found), ahead=ahead)
 
 
 def slices_ahead(overlap: float, slices: int) -> np.ndarray:

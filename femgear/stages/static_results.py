@@ -302,7 +302,7 @@ class StaticResult(StageResult):
     def contents(self) -> Contents:
         """Collect the contents of static.nc."""
         cycle, gears = self.cycle, self.planetary_set
-        bodies = [body for body in self.bodies.gears if body is not None]
+        bodies = self.bodies.gears
         kinds = {f"{pair.gear_1.name}_{pair.gear_2.name}": pair for pair in gears.kinds}
         variables, width = STATIC_VARIABLES, min(gears.mesh_widths)
         if cycle.slice_load is not None:

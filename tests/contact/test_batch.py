@@ -268,7 +268,7 @@ def test_planets_in_the_same_state_are_solved_as_one_over_the_width(seed, images
         pin_errors=np.full((N, 2), 0.3 * size),
         planet_misalignment=np.full((N, 2), 0.3 * size / width),
     )
-    softer = replace(bodies, ring=replace(bodies.ring, regular=1.2 * bodies.ring.regular))
+    softer = bodies.with_gear(2, replace(bodies.ring, regular=1.2 * bodies.ring.regular))
     ahead = None if overlap is None else overlap * ((np.arange(slices) + 0.5) / slices - 0.5)
     for sign in (1.0, -1.0):
         kept = CycleOptions(

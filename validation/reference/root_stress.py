@@ -7,4 +7,4 @@ from femgear.fe.elasticity import Material
 
 def set_root_stress(sectors: Sectors, material: Material) -> RootStresses:
     """Influences of sun, planet and ring, each held at its rim as in `bodies.make_bodies`."""
-    return RootStresses(*(root_stress(s.grid, s.gear, material) for s in (sectors.sun, sectors.planet, sectors.ring)))
+    return RootStresses(tuple(root_stress(s.grid, s.gear, material) for s in sectors.gears))

@@ -304,7 +304,7 @@ def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies
         known,
         with_ring(static.bodies, ring_foundation(case, static.sectors.ring) if fixed else None).ring,
     )
-    other = replace(static.bodies, ring=ring)
+    other = static.bodies.with_gear(-1, ring)
     return (other, static.bodies) if fixed else (static.bodies, other)
 
 

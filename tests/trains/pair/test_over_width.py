@@ -82,7 +82,7 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
     def apart(one):
         regular, n = one.planet.regular.copy(), len(one.planet.roll)
         regular[:, :n, n:] = regular[:, n:, :n] = 0.0
-        return replace(one, planet=replace(one.planet, regular=regular))
+        return one.with_gear(1, replace(one.planet, regular=regular))
 
     bodies, waves = apart(bodies), replace(waves, bodies=tuple(map(apart, waves.bodies)))
     lead, force = FlankForm(() if ahead is not None else (LeadSlope(3e-6),)), 30.0 / s.sun.base_radius
@@ -104,7 +104,7 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
     for mesh, (one, two) in enumerate((("sun", "planet"), ("planet", "ring"))):
 
         def of_pair(found, one=one, two=two):
-            return Bodies(getattr(found, one), getattr(found, two), None, (s.sun.face_width,))
+            return Bodies((getattr(found, one), getattr(found, two)), (s.sun.face_width,))
 
         pair = GearPair(getattr(s, one), getattr(s, two), s.centre_distance)
         crosswise = replace(waves, bodies=tuple(map(of_pair, waves.bodies)))

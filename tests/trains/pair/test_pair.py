@@ -51,7 +51,7 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs():
     bodies = make_bodies(make_sectors(s, STEEL, flank_elements=12), STEEL)
     apart, n = bodies.planet.regular.copy(), len(bodies.planet.roll)
     apart[:, :n, n:] = apart[:, n:, :n] = 0.0
-    bodies = replace(bodies, planet=replace(bodies.planet, regular=apart))
+    bodies = bodies.with_gear(1, replace(bodies.planet, regular=apart))
     whole, force = walk_mesh_cycle(s, bodies, sun_torque=30.0, positions=TAU), 30.0 / s.sun.base_radius
     sets = (
         ((s.sun, bodies.sun), (s.planet, bodies.planet)),
@@ -60,7 +60,7 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs():
     for mesh, ((one, body_1), (two, body_2)) in enumerate(sets):
         cycle = walk_mesh_cycle(
             GearPair(one, two, s.centre_distance),
-            Bodies(body_1, body_2, None, (one.face_width,)),
+            Bodies((body_1, body_2), (one.face_width,)),
             sun_torque=force * one.base_radius,
             positions=TAU + s.mesh_phases[mesh],
         )
