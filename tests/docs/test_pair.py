@@ -68,7 +68,7 @@ def test_helical_pair_and_lead_slope():
     case = with_values(read_case(CASE), {"static.slices": 25, "gear_1.modifications": slope})
     cycle = solve_static(case).cycle
     linear = 1.0 + 4e-6 * iso_stiffness(case)[1] * case.set.face_width / (2.0 * cycle.force.max())
-    assert f"K_Hβ = {cycle.face_load_factor[0]:.2f}; linear teeth" in PAGE and f"give {linear:.2f}:" in PAGE
+    assert f"K_Hβ = {cycle.face_load_factor[0]:.2f}. Linear teeth" in PAGE and f"give {linear:.2f}:" in PAGE
 
 
 def test_stiffness_for_ross(tmp_path, monkeypatch):
