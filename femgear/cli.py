@@ -777,7 +777,7 @@ def sweep(
 
 @Parameter(name="*")
 @dataclass(frozen=True)
-class Drawn:
+class DrawnSamples:
     """Samples that a command draws.
 
     Parameters
@@ -805,7 +805,7 @@ def samples(
     positions: Whole = 16,
     method: Literal["spring", "exact"] | None = None,
     force: bool = False,
-    drawn: Drawn | None = None,
+    drawn: DrawnSamples | None = None,
     tasks: Tasks | None = None,
 ) -> int:
     """Compute as-built sets: transmission error, load sharing and mesh stiffness over tolerances.
@@ -833,7 +833,7 @@ def samples(
     from femgear.study.samples import checked, prepared, sample_case
     from femgear.trains.reading import read_case, to_toml
 
-    drawn = drawn or Drawn()
+    drawn = drawn or DrawnSamples()
     number, seed, index = drawn.number, drawn.seed, drawn.index
     checked(number, "--number", 1)
     checked(seed, "--seed", 0, 2**32)

@@ -94,12 +94,12 @@ def read(name: str, values: dict):
 
 def damping_study(folder: Path, harmonics: int) -> None:
     """Amplitude and mean for two damping ratios."""
-    from femgear.trains.impacts.stages import solve_response
+    from femgear.trains.impacts.stages import solve_impact_response
 
     curves, rows = [], []
     for zeta in DAMPING:
         values = {"mesh.damping_ratio": zeta, "response.harmonics": harmonics}
-        data = solve_response(read("gear_pair", values)).dataset()
+        data = solve_impact_response(read("gear_pair", values)).dataset()
         curves.append(curve_of(f"ζ = {zeta}", data))
         folds = ", ".join(f"{r:.4f}" for r in np.sort(data["ratio"].values[data["fold"].values]))
         borders = [", ".join(f"{r:.3f}" for r in data[f"{side}_border"].values) for side in ("drive", "back")]
@@ -112,12 +112,12 @@ def damping_study(folder: Path, harmonics: int) -> None:
 
 def error_study(folder: Path, harmonics: int) -> None:
     """Amplitude and mean for several tooth-frequency errors."""
-    from femgear.trains.impacts.stages import solve_response
+    from femgear.trains.impacts.stages import solve_impact_response
 
     curves = []
     for error in ERRORS:
         values = {"mesh.error": [f"{30 * error:.4g} um"], "response.harmonics": harmonics}
-        curves.append(curve_of(f"error {error}", solve_response(read("gear_pair", values)).dataset()))
+        curves.append(curve_of(f"error {error}", solve_impact_response(read("gear_pair", values)).dataset()))
     draw_curves(folder, "tooth_error", curves, "load 0.9, ζ = 0.09, k(t) 10 %")
 
 
@@ -144,12 +144,12 @@ def state_study(folder: Path, harmonics: int, ratios: int) -> None:
     from femgear.report.style import save_figure
     from femgear.trains.impacts.figures import contact_rows, state_bands
     from femgear.trains.impacts.model import STATE_NAMES, state_regions
-    from femgear.trains.impacts.stages import solve_response, solve_sweep
+    from femgear.trains.impacts.stages import solve_impact_response, solve_sweep
 
     count = max(3, ratios // 2)
     ranges = [{"from": 0.6, "to": 1.0, "count": count}, {"from": 1.05, "to": 3.5, "count": count}]
     case = read("gear_pair", {"response.harmonics": harmonics, "sweep.ranges": ranges})
-    rows = contact_rows(solve_response(case).dataset(), solve_sweep(case).dataset())
+    rows = contact_rows(solve_impact_response(case).dataset(), solve_sweep(case).dataset())
     table = [
         (text, STATE_NAMES[number], f"{min(ends):.3f}", f"{max(ends):.3f}")
         for text, ratio, states in rows

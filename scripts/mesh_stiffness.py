@@ -84,11 +84,11 @@ def _records(torques, results):
 
 
 def _print_summary(torques, results):
-    from femgear.report.style import distinct_lines
+    from femgear.report.style import drawn_lines
 
     rows = []
     for torque, static in zip(torques, results):
-        for name, j in distinct_lines(static["mesh"].values, static["mesh_stiffness"]):
+        for name, j in drawn_lines(static["mesh"].values, static["mesh_stiffness"]):
             k_peak, ste_peak = (static[f"{one}_peak_to_peak"].values[j] for one in ("mesh_stiffness", "ste"))
             k, ste = (
                 factor * float(static[f"{one}_mean"][j]) for one, factor in (("mesh_stiffness", 1e-6), ("ste", 1e6))
@@ -103,7 +103,7 @@ def _print_summary(torques, results):
 def _figure(torques, results):
     """Transmission error above, stiffness below; every kind of mesh in a column."""
     from femgear.report.style import (
-        distinct_lines,
+        drawn_lines,
         family,
         label,
         legend_below,
@@ -117,7 +117,7 @@ def _figure(torques, results):
     for column, kind in enumerate(kinds):
         number = 0
         for torque, static in zip(torques, results):
-            for name, j in distinct_lines(static["mesh"].values, static["mesh_stiffness"]):
+            for name, j in drawn_lines(static["mesh"].values, static["mesh_stiffness"]):
                 if family(name) != kind:
                     continue
                 text = f"{torque:g} N m" if "identical" in name else f"{torque:g} N m, {name}"

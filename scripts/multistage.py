@@ -75,7 +75,7 @@ def main(
         progress("modes")
         modes = stages.solve_multistage_modes(case)
         progress("modes", 1)
-        response = stages.solve_response(case, modes)
+        response = stages.solve_stages_response(case, modes)
         balanced = stages.solve_balance(case, progress=progress).dataset() if balance else None
     save_figure(figures.stage_energy(modes.dataset()), folder / "stage_energy.png")
     save_figure(figures.mesh_orders(modes.dataset(), response.dataset()), folder / "mesh_orders.png")

@@ -78,7 +78,7 @@ def bodies_are_computed_once(folder_of_both_workers):
             (bodies, "stiffness"),
             (bodies, "flank_compliance"),
             (width_waves, "condensed_waves"),
-            (stages, "root_stress"),
+            (stages, "root_stress_influence"),
             (stages, "root_waves"),
         ):
             patch.setattr(module, name, kept(getattr(module, name), folder_of_both_workers))

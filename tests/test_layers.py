@@ -240,3 +240,24 @@ def test_no_module_reads_prose():
             if isinstance(asked, ast.Attribute) and asked.attr in words and of_error:
                 wrong.append(f"{place(path)}:{node.lineno}: {ast.unparse(node)}")
     assert wrong == []
+
+
+TWICE = {
+    "Quantity": "of the case file, with its unit; of a study, what it varies to change",
+    "fingerprint": "of entries of a case; of a text",
+    "main": "the command line; the program of the Gmsh process",
+    "solve_modes": "the modal stage of a set; the eigenproblem of any system: both are called by users",
+    "sweep": "the command; what it calls",
+    "verdict": "of a run; of a search",
+}
+"""Public names that two modules define, and of what."""
+
+
+def test_a_public_name_is_defined_once():
+    """Methods and private names aside; what two modules call alike is listed here with its reason."""
+    places = defaultdict(set)
+    for path in sorted(PACKAGE.rglob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
+                places[node.name].add(path)
+    assert {name for name, found in places.items() if len(found) > 1} == TWICE.keys()

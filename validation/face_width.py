@@ -27,7 +27,7 @@ from femgear.contact.root_stress import (
     _between_slices,
     _station_forces,
     computed_waves,
-    root_stress,
+    root_stress_influence,
     root_waves,
 )
 from femgear.contact.width_waves import cosines, wave_displacement, width_waves
@@ -423,7 +423,7 @@ def root_stresses() -> tuple[Row, ...]:
     where the flank ends, is left out.
     """
     sector, each, rows = make_sectors(reference_set(), STEEL, flank_elements=24).sun, 3, []
-    plane = root_stress(sector.grid, sector.gear, STEEL)
+    plane = root_stress_influence(sector.grid, sector.gear, STEEL)
     waves = root_waves(sector.grid, sector.gear, STEEL, computed_waves(each * SLICES) * np.pi / WIDTH)
     at = _station_forces(np.array([_pitch_roll()]), np.ones(1), plane.roll)[:, 0]
     both = np.array([plane.influence, *waves])[:, 0, 1 : len(plane.arc), : len(at)] @ at

@@ -30,7 +30,7 @@ from femgear.contact.bodies import (
 )
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.local_compliance import depth_displacement, hertz_half_width
-from femgear.contact.root_stress import root_stress
+from femgear.contact.root_stress import root_stress_influence
 from femgear.fe.compliance import condense_sector, tooth_compliance
 from femgear.fe.elasticity import stiffness
 from femgear.fe.grid import boundary_edges
@@ -294,7 +294,7 @@ def root_stresses() -> tuple[Row, ...]:
         angle = base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
         for sector in make_sectors(gears, material, flank_elements=8).gears:
             gear = sector.gear
-            plane = root_stress(sector.grid, gear, material)
+            plane = root_stress_influence(sector.grid, gear, material)
             m, last = len(plane.arc), len(plane.roll) - 1
             for text, place, why in (("high on", 0.9, ""), ("amid", 0.5, LOW_LOADS)):
                 station = round((1 - place if gear.internal else place) * last)

@@ -6,7 +6,7 @@ import numpy as np
 
 from femgear.contact.bodies import flank_stations, make_bodies, make_sectors, station_weights
 from femgear.contact.cycle import walk_mesh_cycle
-from femgear.contact.root_stress import RootStresses, root_stress, root_stress_cycle
+from femgear.contact.root_stress import RootStresses, root_stress_cycle, root_stress_influence
 from femgear.fe.compliance import node_dofs, symmetric_factor
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import copy_nodes, mirror, rotated_copies
@@ -132,7 +132,7 @@ def root_against_whole_gear() -> tuple[Row, ...]:
     rows = []
     for name, gear, sizes in gears:
         grid = mirror(mesh_outline(half_sector(gear)))
-        root = root_stress(grid, gear, STEEL)
+        root = root_stress_influence(grid, gear, STEEL)
         middle = round(PLACE * (len(root.roll) - 1))
         column = ROOT_LOAD * root.influence[0, :, middle]
         reference = whole_gear_roots(gear, root.roll[middle], **sizes)
@@ -154,7 +154,7 @@ def roots_of_high_contact_ratio() -> tuple[Row, ...]:
     pair = close_pair(*gears)
     sectors = make_sectors(pair, STEEL)
     cycle = walk_mesh_cycle(pair, make_bodies(sectors, STEEL), sun_torque=200.0, positions=32)
-    influences = RootStresses(tuple(root_stress(s.grid, s.gear, STEEL) for s in sectors.gears[:2]))
+    influences = RootStresses(tuple(root_stress_influence(s.grid, s.gear, STEEL) for s in sectors.gears[:2]))
     roots = root_stress_cycle(pair, influences, cycle)
     for gear, root in zip(pair.gears, roots, strict=True):
         nominal = nominal_root_stress(gear, contact_ratio=pair.contact_ratio, tangential_force=force)
@@ -169,7 +169,7 @@ def sharp_root_over_grids() -> tuple[Row, ...]:
     gear = sharp_ring()
 
     def largest(**sizes) -> float:
-        root = root_stress(mirror(mesh_outline(half_sector(gear, **sizes))), gear, STEEL)
+        root = root_stress_influence(mirror(mesh_outline(half_sector(gear, **sizes))), gear, STEEL)
         index, weight = station_weights(0.5 * (root.roll[0] + root.roll[-1]), root.roll)
         return ROOT_LOAD * float((root.influence[0, : len(root.arc)][:, index] @ weight).max())
 

@@ -42,7 +42,7 @@ _LEAD_HEADING = "the first line names two columns: place [mm], from the middle o
 
 
 @dataclass(frozen=True)
-class Columns:
+class CsvColumns:
     """Two columns of a file.
 
     Parameters
@@ -69,7 +69,7 @@ class Columns:
 
 def read_columns(
     path: str | os.PathLike, dimensions: Mapping[str, Dimension], *, least: int, most: int, remedy: str
-) -> Columns:
+) -> CsvColumns:
     """Read two columns, divided by comma, semicolon or tab, under a heading with names and units.
 
     With semicolon or tab the numbers may have decimal commas. Empty lines and those that begin with ``#`` are
@@ -106,7 +106,7 @@ def read_columns(
     comma = divider != "," and any("," in cell for _, cells in table for cell in cells)
     rows = [_row(cells, list(factors), divider, comma, partial(_problem, name, i)) for i, cells in table]
     values = {title: [row[k] * factor for row in rows] for k, (title, factor) in enumerate(factors.items())}
-    return Columns(name, values, [i for i, _ in table], first)
+    return CsvColumns(name, values, [i for i, _ in table], first)
 
 
 def _text(path) -> str:
@@ -282,7 +282,7 @@ def embed_checksum(data: dict, name: str) -> dict[str, str]:
         return {}
     names = {key: table[key] for key in ("file", "nodes") if isinstance(table.get(key), str)}
     del housing["structure"]  # a file that cannot be read is refused for that alone
-    found = [embedded(file, name, f"housing.structure.{key}", checksum) for key, file in names.items()]
+    found = [embedded(file, name, f"housing.structure.{key}", input_checksum) for key, file in names.items()]
     housing["structure"] = table | {"sha256": checksum_of_all(found)}
     return {"housing.structure": text.printable(names["file"])}
 
@@ -292,7 +292,7 @@ def checksum_of_all(checksums: Iterable[str]) -> str:
     return hashlib.sha256("".join(checksums).encode()).hexdigest()
 
 
-def checksum(path: str | os.PathLike) -> str:
+def input_checksum(path: str | os.PathLike) -> str:
     """Compute the SHA-256 of a file, as hexadecimal text. CaseError: it cannot be read (E-FILE)."""
     name = os.fsdecode(path)
     try:

@@ -67,7 +67,7 @@ def gear_cylinder(gear: Gear, density: float) -> tuple[float, float, float]:
     return cylinder(inner, outer, gear.face_width, density)
 
 
-def mesh_stiffness(modulus_1: float, modulus_2: float, width: float) -> float:
+def estimated_mesh_stiffness(modulus_1: float, modulus_2: float, width: float) -> float:
     """Estimate the stiffness [N/m] of a mesh of gears of Young's moduli [Pa] over a common face width [m]."""
     return USUAL_STIFFNESS * material_factor(modulus_1, modulus_2) * width
 
@@ -145,7 +145,7 @@ def _support(gears: Any, materials: dict[str, Any], name: str) -> tuple[float, f
     meshes = [*zip(pairwise(materials), pairwise(moduli), gears.mesh_widths, strict=True)]
     name = "planet" if name == "carrier" else name
     own = [(pair, width) for names, pair, width in meshes if name in names]
-    stiffness = SUPPORT_SHARE * sum(mesh_stiffness(*pair, width) for pair, width in own) / len(own)
+    stiffness = SUPPORT_SHARE * sum(estimated_mesh_stiffness(*pair, width) for pair, width in own) / len(own)
     width = sum(width for _, width in own) / len(own)
     line = 1e-9 * stiffness / (SUPPORT_SHARE * width)
     share = f"{SUPPORT_SHARE:g} of a mesh stiffness of {line:.3g} N/(mm um) times the face width"

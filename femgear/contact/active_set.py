@@ -28,7 +28,7 @@ dpotrf, dtrtrs = get_lapack_funcs(("potrf", "trtrs"), dtype=np.float64)
 
 
 @dataclass(frozen=True)
-class Problem:
+class ComplementarityProblem:
     """The contact problem scaled to unit mean compliance and unit largest arm of every motion.
 
     Parameters
@@ -57,7 +57,7 @@ class Problem:
 
 @dataclass(frozen=True)
 class Step:
-    """Solution of the linear conditions of one active set, and what they violate; scaled as `Problem`.
+    """Solution of the linear conditions of one active set, and what they violate; scaled as `ComplementarityProblem`.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def forward(lower, columns):
     return dtrtrs(lower, columns, lower=1)[0]
 
 
-def solve_step(problem: Problem, active: np.ndarray) -> Step:
+def solve_step(problem: ComplementarityProblem, active: np.ndarray) -> Step:
     """Solve the linear conditions of one active set and list the candidates that violate the others.
 
     ``active`` (n,) tells the candidates that carry; pressures are forces [N], motions and gaps [m].
@@ -151,7 +151,7 @@ def solve_step(problem: Problem, active: np.ndarray) -> Step:
     )
 
 
-def _solve_bordered(problem: Problem, index: np.ndarray):
+def _solve_bordered(problem: ComplementarityProblem, index: np.ndarray):
     """Loads, motions and unrestrained motions when exactly the candidates `index` touch.
 
     The second round removes what rounding leaves when the separations are large against the elastic
@@ -178,7 +178,7 @@ def _solve_bordered(problem: Problem, index: np.ndarray):
     return loads, motions, null
 
 
-def _residual(problem: Problem, active, loads, gaps) -> float:
+def _residual(problem: ComplementarityProblem, active, loads, gaps) -> float:
     """Largest relative violation of the conditions; see `ContactState`."""
     elastic, gap = (np.abs(values).max(initial=0.0) for values in (problem.H @ loads, problem.gap))
     # the separations of nearly rigid bodies are differences of far larger numbers
@@ -198,7 +198,7 @@ def settle(G, load, arm, null, gaps, active):
     Parameters
     ----------
     G, load, arm : (n, m), (m,), (m,) arrays
-        Of a `Problem`.
+        Of a `ComplementarityProblem`.
     null : (m, k) array
         Motions that no touching candidate restrains.
     gaps : (n,) array
@@ -256,7 +256,7 @@ def _least_motion(arms, gaps):
     return -rest[:k] / rest[k] * deepest, None
 
 
-def pivot(problem: Problem, active, *, max_steps, single) -> tuple[Step, int]:
+def pivot(problem: ComplementarityProblem, active, *, max_steps, single) -> tuple[Step, int]:
     """Flip all violations while their number falls; then, if `single`, one at a time until it falls again.
 
     From the first active set (n,); gives the last step, solved when its `flips` are empty, and the number of

@@ -390,7 +390,7 @@ def flank_compliance(
 
 def _seen(schur: SectorSchur, stations: int) -> tuple[np.ndarray, SectorSchur]:
     """Compliance between the flanks of all teeth [m/N], and the sector with what else it observes."""
-    return tooth_compliance(schur.observed(slice(stations))), schur.observed(slice(stations, None))
+    return tooth_compliance(schur.observed(slice(stations))), schur.observed(slice(stations, None)).packed()
 
 
 def flank_stations(grid: Grid, gear: Gear) -> _FlankStations:

@@ -254,7 +254,7 @@ class RootRange:
     history: np.ndarray | None
 
 
-def root_stress(
+def root_stress_influence(
     grid: Grid,
     gear: Gear,
     material: Material,
@@ -321,7 +321,7 @@ def root_waves(grid: Grid, gear: Gear, material: Material, wave_number: np.ndarr
     """Compute the root stress influences (K, teeth, 2 m, 2 n) of loads ``cos(kz)`` across the width [Pa/N].
 
     Loads are those over the face width of the gear; see the head of the module. Wave numbers (K,) [1/m];
-    other arguments as in `root_stress`.
+    other arguments as in `root_stress_influence`.
     """
     along, stations = root_functionals(grid, gear, material, state="plane strain"), flank_stations(grid, gear)
     loads, columns = (

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from femgear.contact.active_set import Problem, Step, factor, pivot, solve_step
+from femgear.contact.active_set import ComplementarityProblem, Step, factor, pivot, solve_step
 from femgear.errors import ContactError
 
 
@@ -118,15 +118,15 @@ def _checked(H, gap, G, load):
     return H, gap, G, load
 
 
-def _scaled(H, gap, G, load) -> Problem:
+def _scaled(H, gap, G, load) -> ComplementarityProblem:
     """The problem over its mean compliance and the largest arms of its motions."""
     compliance = float(np.trace(H)) / len(gap) if len(gap) else 1.0
     arm = np.abs(G).max(axis=0, initial=0.0)
     arm[arm == 0] = 1.0
-    return Problem(H / compliance, gap / compliance, G / arm, load / arm, compliance, arm)
+    return ComplementarityProblem(H / compliance, gap / compliance, G / arm, load / arm, compliance, arm)
 
 
-def _search(problem: Problem, start, max_steps) -> tuple[Step, int, str]:
+def _search(problem: ComplementarityProblem, start, max_steps) -> tuple[Step, int, str]:
     """Block steps from the start, then from all candidates, then single pivots, then daqp."""
     everything = np.ones(len(problem.gap), bool)
     starts = [everything]
@@ -152,7 +152,7 @@ def _search(problem: Problem, start, max_steps) -> tuple[Step, int, str]:
     return step, iterations + more, "daqp"
 
 
-def _by_daqp(problem: Problem) -> tuple[Step, int]:
+def _by_daqp(problem: ComplementarityProblem) -> tuple[Step, int]:
     """The general quadratic program gives the active set; the linear conditions then give the digits."""
     import daqp
 
@@ -177,7 +177,7 @@ def _by_daqp(problem: Problem) -> tuple[Step, int]:
     )
 
 
-def _without_idle(problem: Problem, step: Step) -> Step:
+def _without_idle(problem: ComplementarityProblem, step: Step) -> Step:
     """Release touching candidates whose load is rounding, so that only loaded ones count as active.
 
     A planet that carries nothing may touch on one side with a load of rounding size. Small loads that
@@ -193,7 +193,7 @@ def _without_idle(problem: Problem, step: Step) -> Step:
     return step
 
 
-def _state(problem: Problem, step: Step, iterations: int, method: str) -> ContactState:
+def _state(problem: ComplementarityProblem, step: Step, iterations: int, method: str) -> ContactState:
     """Back to the caller's units, with exact complementarity."""
     loads = np.where(step.active & (step.loads > step.tolerance), step.loads, 0.0)
     active = loads > 0

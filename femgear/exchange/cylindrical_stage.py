@@ -19,8 +19,8 @@ from femgear.exchange.planetary_stage import (
     bearings_between,
     gear_tables,
     pair_stage,
-    shown,
     speeds_of_cases,
+    with_unit,
 )
 from femgear.exchange.rexs import Component, Model
 
@@ -100,5 +100,5 @@ def _operation(
         model.remark("operation.torque", "the file does not determine the torque: that of a K factor is taken")
     taken = speeds_of_cases(model, number, torques, speeds, alone=wanted is not None)
     remarks |= {} if taken else {"operation.speeds": "assumed"}
-    texts = dict.fromkeys(shown(one, SPEED) for one in taken or [1000.0 * SPEED.scale])
-    return {"torque": shown(torque, TORQUE), "speeds": [*texts]}
+    texts = dict.fromkeys(with_unit(one, SPEED) for one in taken or [1000.0 * SPEED.scale])
+    return {"torque": with_unit(torque, TORQUE), "speeds": [*texts]}

@@ -105,7 +105,7 @@ def _unit_stage(model: Model, stage: Component) -> UnitStage | None:
     return UnitStage(stage, arms)
 
 
-def with_values(component: Component, given: Mapping[str, Mapping]) -> Component:
+def with_load_case(component: Component, given: Mapping[str, Mapping]) -> Component:
     """Copy a component with the attributes that a load case gives it."""
     return replace(component, attributes={**component.attributes, **given.get(component.id, {})})
 
@@ -115,10 +115,10 @@ def loads_on(model: Model, shaft: Component, given: Mapping[str, Mapping]) -> It
 
     A power gives the torque at the speed of the shaft.
     """
-    speed = model.number(with_values(shaft, given), "rotational_speed", SPEED)
+    speed = model.number(with_load_case(shaft, given), "rotational_speed", SPEED)
     for part in model.related("assembly", "part", assembly=shaft.id):
         if part.type == "external_load":
-            load = with_values(part, given)
+            load = with_load_case(part, given)
             torque = model.number(load, "torque_around_u_axis", TORQUE)
             power = model.number(load, "power", POWER)
             yield power / speed if power is not None and speed and not torque else torque
@@ -197,7 +197,7 @@ def _speeds(model: Model, shafts, table, place: Mapping[str, int], held: list[in
         rows.append(np.eye(table.shape[1])[at])
         values.append(0.0)
     for shaft in shafts:
-        speed = model.number(with_values(shaft, given), "rotational_speed", SPEED)
+        speed = model.number(with_load_case(shaft, given), "rotational_speed", SPEED)
         if speed is not None and place[shaft.id] not in held:
             rows.append(np.eye(table.shape[1])[place[shaft.id]])
             values.append(speed)

@@ -35,7 +35,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import OVER_WIDTH, gear_material
 from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
-from femgear.exchange.gear_unit import gears_of, loads_on, power_flow, stage_components, with_values
+from femgear.exchange.gear_unit import gears_of, loads_on, power_flow, stage_components, with_load_case
 from femgear.exchange.rexs import Component, Model, Relation
 from femgear.findings import NOTE
 from femgear.gears.iso6336 import STEEL
@@ -254,7 +254,7 @@ def pair_stage(model: Model, mesh: Component) -> _Stage:
     return _Stage(model, mesh, [mesh], [], gears, flanks, shafts)
 
 
-def shown(value: float, dimension: Dimension) -> str:
+def with_unit(value: float, dimension: Dimension) -> str:
     return f"{float(f'{value / dimension.scale:.12g}')!r} {dimension.shown}".replace(".0 ", " ")
 
 
@@ -262,12 +262,12 @@ def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     """Section of what the gears share; planet angles where planets are not equally spaced."""
     found: dict[str, Any] = {"planets": len(s.gears["planet"])} if s.sun_meshes else {}
     if (distance := s.common(s.meshes, "center_distance", LENGTH)) is not None:
-        found["centre_distance"] = shown(distance, LENGTH)
+        found["centre_distance"] = with_unit(distance, LENGTH)
     given = [s.common(s.gears[name], "face_width", LENGTH) for name in s.gears]
     given += [s.model.number(mesh, "common_face_width", LENGTH) for mesh in s.meshes]
     widths = [one for one in given if one is not None]
     width = min(widths) if widths else s.needed(s.gears["sun"], "face_width", LENGTH)
-    found["face_width"] = shown(width, LENGTH)
+    found["face_width"] = with_unit(width, LENGTH)
     turned = [s.model.number(mesh, "rotating_angle_around_neg_u_axis", ANGLE) for mesh in s.sun_meshes]
     angles = sorted(one % math.tau for one in turned if one is not None)
     if len(angles) < len(turned):
@@ -275,7 +275,7 @@ def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     elif s.sun_meshes:
         steps = [b - a for a, b in pairwise((*angles, angles[0] + math.tau))]
         if max(steps) - min(steps) > 1e-6:
-            found["planet_angles"] = [shown(one - angles[0], ANGLE) for one in angles]
+            found["planet_angles"] = [with_unit(one - angles[0], ANGLE) for one in angles]
     helix = "helix_angle_reference_diameter"
     sun, *others = (s.common(s.gears[name], helix, ANGLE) or 0.0 for name in s.gears)
     # an internal gear has the hand of its mate
@@ -284,7 +284,7 @@ def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
         limit = "equal ones, that of the sun with the other sign"
         s.model.refuse("helix angles do not match", f"{s.gears['sun'][0]}, {helix}", limit=limit)
     if sun:
-        found["helix_angle"] = shown(sun, ANGLE)
+        found["helix_angle"] = with_unit(sun, ANGLE)
         remarks["set.helix_angle"] = "assumed: a positive one is right-handed"
     return found
 
@@ -294,12 +294,12 @@ def _widths(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
     common, second = to_si(tables["set"]["face_width"], LENGTH), [*s.gears][1]
     widths = {name: s.common(s.gears[name], "face_width", LENGTH) or common for name in s.gears}
     if min(min(pair) for pair in pairwise(widths.values())) > (1.0 + 1e-9) * common:
-        whole, widths[second] = shown(widths[second], LENGTH), common
+        whole, widths[second] = with_unit(widths[second], LENGTH), common
         remarks[f"{second}.face_width"] = f"assumed: what the meshes have in common; the gear has {whole}"
-        tables[second]["face_width"] = shown(common, LENGTH)
+        tables[second]["face_width"] = with_unit(common, LENGTH)
     for name, width in widths.items():
         if abs(width - common) > 1e-9 * common:
-            tables[name]["face_width"] = shown(width, LENGTH)
+            tables[name]["face_width"] = with_unit(width, LENGTH)
 
 
 def _one_width(tables: dict[str, Any], remarks: dict[str, str]) -> None:
@@ -308,9 +308,9 @@ def _one_width(tables: dict[str, Any], remarks: dict[str, str]) -> None:
     widths = [to_si(tables[name].get("face_width", common), LENGTH) for name in _GEARS]
     meshes = [min(pair) for pair in pairwise(widths)]
     if max(meshes) > (1.0 + 1e-9) * min(meshes):
-        tables["planet"]["face_width"] = shown(min(meshes), LENGTH)
+        tables["planet"]["face_width"] = with_unit(min(meshes), LENGTH)
         remarks["planet.face_width"] = (
-            f"assumed: slices take one width for both meshes; planets have {shown(widths[1], LENGTH)}"
+            f"assumed: slices take one width for both meshes; planets have {with_unit(widths[1], LENGTH)}"
         )
 
 
@@ -326,7 +326,7 @@ def _materials(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> No
         values = {name: s.model.number(one, attribute, dimension) for name, ones in made.items() for one in ones[:1]}
         known = {name: value for name, value in values.items() if value is not None}
         value = next(iter(known.values()), usual)
-        tables["material"][key] = shown(value, dimension) if dimension else value
+        tables["material"][key] = with_unit(value, dimension) if dimension else value
         if missing := [name for name in s.gears if name not in known]:
             what = f"of the {' and the '.join(missing)} too" if known else "steel"
             remarks[f"material.{key}"] = f"assumed: {what}"
@@ -337,7 +337,7 @@ def _materials(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> No
         common = None
         if len(known) == len(values):
             common = next(iter(known.values()))
-            tables["material"][f"{key}_stress_limit"] = shown(common, STRESS)
+            tables["material"][f"{key}_stress_limit"] = with_unit(common, STRESS)
         _differing(tables, f"{key}_stress_limit", STRESS, common, known)
 
 
@@ -352,7 +352,7 @@ def _differing(
     for name, value in known.items():
         if common is None or abs(value - common) > 1e-9 * abs(common):
             own = tables[name].setdefault("material", {})
-            own[key] = shown(value, dimension) if dimension else value
+            own[key] = with_unit(value, dimension) if dimension else value
 
 
 def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
@@ -363,9 +363,9 @@ def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
         s.model.refuse(f"{teeth:g} is no number of teeth", f"{gears[0]}, number_of_teeth")
     found: dict[str, Any] = {"teeth": round(teeth)}
     if name == "sun":
-        found["module"] = shown(s.needed(every, "normal_module", LENGTH), LENGTH)
+        found["module"] = with_unit(s.needed(every, "normal_module", LENGTH), LENGTH)
         angle = s.common((one for ones in s.flanks.values() for one in ones), "normal_pressure_angle", ANGLE)
-        found["pressure_angle"] = shown(math.radians(20.0) if angle is None else angle, ANGLE)
+        found["pressure_angle"] = with_unit(math.radians(20.0) if angle is None else angle, ANGLE)
         remarks |= {"sun.pressure_angle": "assumed"} if angle is None else {}
     shift = s.common(s.flanks[name], "addendum_modification_coefficient")
     if shift is not None:
@@ -374,7 +374,7 @@ def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
         found["profile_shift"], remarks["planet.profile_shift"] = 0.0, "assumed"
     for key in ("tip_diameter", "root_diameter"):
         if (diameter := s.common(gears, key, LENGTH, sign=False)) is not None:
-            found[key] = shown(diameter, LENGTH)
+            found[key] = with_unit(diameter, LENGTH)
     return found
 
 
@@ -426,9 +426,9 @@ def _rim(s: _Stage, name: str, tables: dict[str, Any], remarks: dict[str, str]) 
         given = _diameter(s.model, shaft, place)
     radius, key = 0.5 * (given or 0.0), f"{name}.{'outer' if internal else 'bore'}_radius"
     fits = radius > root if internal else 0.0 < radius < root
-    section[key.partition(".")[2]] = shown(radius if fits else usual, LENGTH)
+    section[key.partition(".")[2]] = with_unit(radius if fits else usual, LENGTH)
     if not fits:
-        why = f"; {shown(given, LENGTH)} of its shaft do not fit its root circle" if given else ""
+        why = f"; {with_unit(given, LENGTH)} of its shaft do not fit its root circle" if given else ""
         remarks[key] = f"assumed: a rim of {'four' if internal else 'three'} modules{why}"
 
 
@@ -478,7 +478,7 @@ def add_bearings(
             severity=NOTE,
         )
     elif values:
-        tables[name][key] = shown(sum(values), STIFFNESS)
+        tables[name][key] = with_unit(sum(values), STIFFNESS)
     elif springs:
         text = f"{len(springs)} bearings without radial_stiffness, such as {springs[0]}: it is estimated"
         s.model.remark(f"{name}.{key}", text, remedy="give it in the case")
@@ -547,7 +547,7 @@ def _chamfers(s: _Stage) -> None:
     for name in s.gears:
         sizes = [s.model.number(one, "tooth_tip_chamfer", LENGTH) or 0.0 for one in s.flanks[name]]
         if max(sizes, default=0.0) > 0.0:
-            size = shown(max(sizes), LENGTH)
+            size = with_unit(max(sizes), LENGTH)
             text = f"tooth_tip_chamfer of {size} is not taken: flanks go up to the tip circle"
             remedy = "give the diameter where the chamfer begins as tip_diameter"
             s.model.remark(f"{name}.tip_diameter", text, remedy=remedy)
@@ -606,8 +606,8 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wante
     speeds = speeds_of_cases(s.model, number, torques, speeds, alone=wanted is not None)
     remarks |= {} if turning or loaded else {"operation.input": "assumed"}
     remarks |= {} if speeds else {"operation.speeds": f"assumed{'; that of the file is 0' * stands}"}
-    texts = dict.fromkeys(shown(one, SPEED) for one in speeds or [1000.0 * SPEED.scale])
-    return {"input": member, "fixed": fixed, "torque": shown(torque, TORQUE), "speeds": [*texts]}
+    texts = dict.fromkeys(with_unit(one, SPEED) for one in speeds or [1000.0 * SPEED.scale])
+    return {"input": member, "fixed": fixed, "torque": with_unit(torque, TORQUE), "speeds": [*texts]}
 
 
 def speeds_of_cases(
@@ -653,7 +653,7 @@ def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[st
     """
     model, turns, loads = s.model, {}, {}
     for name, shaft in ((m, one) for m in MEMBERS if m != fixed for one in s.shafts[m]):
-        speed = model.number(with_values(shaft, given), "rotational_speed", SPEED)
+        speed = model.number(with_load_case(shaft, given), "rotational_speed", SPEED)
         turns |= {} if speed is None else {name: turns.get(name) or speed}
         for torque in loads_on(model, shaft, given):
             loads |= {} if torque is None else {name: loads.get(name, 0.0) + torque}

@@ -27,7 +27,7 @@ from femgear.case.quantities import (
     to_si,
 )
 from femgear.exchange.gear_unit import gears_of, plain_ids, power_flow, shaft_of, stage_components, turning
-from femgear.exchange.planetary_stage import bearings_between, is_bearing, shown
+from femgear.exchange.planetary_stage import bearings_between, is_bearing, with_unit
 from femgear.exchange.rexs import Component, Model
 
 _SEAT = 1e-3, 1e-7
@@ -92,8 +92,8 @@ def chain_tables(
     torque = power / abs(flow.speed[first])
     driver, output = _load_seat(names[first]), _load_seat(names[last])
     tables["operation"] = {
-        "speed": shown(abs(flow.speed[first]), SPEED),
-        "torque": [{"body": driver, "torque": shown(torque, TORQUE)}, {"body": output, "share": 1.0}],
+        "speed": with_unit(abs(flow.speed[first]), SPEED),
+        "torque": [{"body": driver, "torque": with_unit(torque, TORQUE)}, {"body": output, "share": 1.0}],
     }
     # the first body gives the speed
     tables["body"].sort(key=lambda one: one["name"] != driver)
@@ -174,15 +174,17 @@ def _shaft(model: Model, shaft: Component, gears, pairs, names, tables, remarks)
         diameter, bore = _section(model, shaft, start, end)
         if diameter is None:
             raise NoChain(f"{shaft} has no sections")
-        table = {"between": [one, two], "length": shown(end - start, LENGTH), "elements": 1}
-        table |= {"outer_diameter": shown(diameter, LENGTH)} | ({"inner_diameter": shown(bore, LENGTH)} if bore else {})
+        table = {"between": [one, two], "length": with_unit(end - start, LENGTH), "elements": 1}
+        table |= {"outer_diameter": with_unit(diameter, LENGTH)} | (
+            {"inner_diameter": with_unit(bore, LENGTH)} if bore else {}
+        )
         for made in model.related("reference", "referenced", origin=shaft.id)[:1]:
             for key, attribute, dimension in (
                 ("youngs_modulus", "elastic_modulus", MODULUS),
                 ("density", "density", DENSITY),
             ):
                 value = model.number(made, attribute, dimension)
-                table |= {} if value is None else {key: shown(value, dimension)}
+                table |= {} if value is None else {key: with_unit(value, dimension)}
         tables["shaft"].append(table)
     return [(name, kind) for _, name, kind in bodies]
 
@@ -225,7 +227,7 @@ def _bearing(model: Model, part: Component, body: str, gears, pairs, tables, rem
         table["radial"] = f"{estimate:.4g} N/m"
         remarks[f"bearing[{len(tables['bearing'])}].radial"] = "assumed: the file has none"
     else:
-        table["radial"] = "rigid" if radial > _SOFT else shown(radial, STIFFNESS)
+        table["radial"] = "rigid" if radial > _SOFT else with_unit(radial, STIFFNESS)
     tables["bearing"].append(table)
 
 
@@ -268,16 +270,16 @@ def _stage(model: Model, stage: Component, pair, file: str, names, tables, speed
     distance = pair["set"].get("centre_distance")
     base = [0.5 * module * z * math.cos(angle) for z in table["teeth"]]
     if helix or distance is None or sum(base) >= to_si(distance, LENGTH):
-        table |= {"module": shown(module, LENGTH), "pressure_angle": shown(angle, ANGLE)}
+        table |= {"module": with_unit(module, LENGTH), "pressure_angle": with_unit(angle, ANGLE)}
     else:
         working = math.acos(sum(base) / to_si(distance, LENGTH))
-        table |= {"base_radii": [shown(one, LENGTH) for one in base], "pressure_angle": shown(working, ANGLE)}
+        table |= {"base_radii": [with_unit(one, LENGTH) for one in base], "pressure_angle": with_unit(working, ANGLE)}
     if helix:
         shaft = shaft_of(model, gears[0])
         # the thrust on a right-handed gear that drives has the sense of its rotation, on its mate the other
         sense = turning(speed[shaft.id] if shaft else 1.0)
-        table["helix_angle"] = shown(-sense * helix, ANGLE)
+        table["helix_angle"] = with_unit(-sense * helix, ANGLE)
     turned = model.number(stage, "rotating_angle_around_neg_u_axis", ANGLE)
     if turned:
-        table["direction"] = shown(-math.remainder(turned, math.tau), ANGLE)
+        table["direction"] = with_unit(-math.remainder(turned, math.tau), ANGLE)
     tables["parallel"].append(table | {"stiffness": file})

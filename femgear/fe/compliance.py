@@ -69,6 +69,18 @@ class SectorSchur:
             observation_cut=self.observation_cut[..., some],
         )
 
+    def packed(self) -> SectorSchur:
+        """Give the same sector with arrays in the order of their axes, as a copy from another process has them.
+
+        Products round by the order in memory: so that they are the same wherever the sector was condensed.
+        """
+        return replace(
+            self,
+            compliance=np.ascontiguousarray(self.compliance),
+            load_cut=np.ascontiguousarray(self.load_cut),
+            observation_cut=np.ascontiguousarray(self.observation_cut),
+        )
+
     def at_distribution(self, weights: np.ndarray, side: float = 1.0) -> SectorSchur:
         """Give one load of the weights (n_loads,), seen where it acts; loads must be their own observations.
 
@@ -423,7 +435,7 @@ def _last_columns(matrix: csc_array, inner: int) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class HalfSector:
+class CondensedHalfSector:
     """Symmetric or antisymmetric fields ``fields @ (interior, cut)`` of a sector, factored with the cut held.
 
     Parameters
@@ -471,13 +483,13 @@ class HalfSector:
         return interior, 0.5 * (schur + schur.T)
 
 
-def half_sectors(grid: Grid, stiffness, held: str | None) -> list[HalfSector]:
+def half_sectors(grid: Grid, stiffness, held: str | None) -> list[CondensedHalfSector]:
     """Split a mirror-symmetric sector into its symmetric and its antisymmetric fields.
 
     ``held`` is the boundary that cannot move, if any.
     """
     return [
-        HalfSector(fields, csc_array(fields.T @ stiffness @ fields), inner)
+        CondensedHalfSector(fields, csc_array(fields.T @ stiffness @ fields), inner)
         for fields, inner in _half_sector_fields(grid, held)
     ]
 
@@ -509,7 +521,7 @@ def static_cut_shapes(schur: SectorSchur, harmonics) -> np.ndarray:
     return np.hstack([np.hstack([shape[0::2], shape[1::2]]) for shape in found])
 
 
-def cyclic_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
+def sector_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
     """Compute the compliance [m/N] of each cyclic harmonic.
 
     It is complex (len(harmonics), 2 n_observations, 2 n_loads): with the images of all observations behind
@@ -553,7 +565,7 @@ def tooth_compliance(schur: SectorSchur) -> np.ndarray:
 
     Entry ``[k]`` is the displacement on tooth ``i`` per unit load on tooth ``i - k``.
     """
-    harmonics = cyclic_harmonics(schur, np.arange(schur.count // 2 + 1))
+    harmonics = sector_harmonics(schur, np.arange(schur.count // 2 + 1))
     return np.fft.irfft(harmonics, n=schur.count, axis=0)
 
 

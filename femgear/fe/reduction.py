@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, eigh
 
-from femgear.fe.compliance import HalfSector, boundary_nodes, check_loads, cut_ties, half_sectors
+from femgear.fe.compliance import CondensedHalfSector, boundary_nodes, check_loads, cut_ties, half_sectors
 from femgear.fe.grid import Grid
 
 _CUT_DEGREE = 8
@@ -168,7 +168,7 @@ def sector_basis(
     return _SectorBasis(count=count, cut=cut[0], stiffness=K, mass=M, vectors=vectors)
 
 
-def _reduced(sector: HalfSector, mass, loads: np.ndarray, shapes: np.ndarray, moving: np.ndarray):
+def _reduced(sector: CondensedHalfSector, mass, loads: np.ndarray, shapes: np.ndarray, moving: np.ndarray):
     """Reduced stiffness and mass of the fields of one kind, their basis, and the number of `shapes`.
 
     ``moving`` (shapes, k) are the motions of the cut with whose inertia the interior moves.

@@ -23,12 +23,12 @@ from femgear.report.style import (
     SMALL,
     VERMILION,
     digits,
-    distinct_lines,
+    drawn_lines,
     family,
     label,
     legend_below,
     line_style,
-    mesh_harmonics,
+    mark_mesh_harmonics,
     new_figure,
     periodic,
     position_words,
@@ -271,14 +271,14 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
     periods = int(dynamics.attrs.get("periods", 1))
     count = periods * min(max(256, 16 * int(h.max())), _POINTS)
     position = periods * np.linspace(0.0, 1.0, count + 1)
-    values = unit * _closed(harmonics_of(dynamics.isel(speed=speeds), name), h, periods, count)
+    values = unit * _closed(stored_harmonics(dynamics.isel(speed=speeds), name), h, periods, count)
     cuts = [_excited_harmonics(dynamics, s) for s in speeds] if static is not None else []
     known = [unit * _cut_series(static, h, cut, periods, count) for cut in cuts]
     # what is one line at one speed need not be one at another: the lines are those of all speeds; equal
     # planets that mesh one after the other have equal spectra
     names = [str(name) for name in dynamics["mesh"].values]
     lines, kinds = _told_apart(names, np.hstack([*values, *known])), list(dict.fromkeys(map(family, names)))
-    size = np.abs(harmonics_of(dynamics.isel(speed=speeds), name))
+    size = np.abs(stored_harmonics(dynamics.isel(speed=speeds), name))
     same = _told_apart(names, np.hstack([*size]))
     shifted = len(lines) > len(kinds) == len(same) and not together
     lines, kinds = same if shifted else lines, [""] if together else kinds
@@ -312,7 +312,7 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
 
 def _told_apart(names, values) -> list[tuple[str, int]]:
     """Choose the meshes whose curves or spectra can be told apart, with their legend texts."""
-    return distinct_lines(names, values, partly=True, within=ALIKE)
+    return drawn_lines(names, values, partly=True, within=ALIKE)
 
 
 def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
@@ -323,7 +323,7 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     the largest of all meshes of a kind is drawn.
     """
     speeds, h = _some_speeds(dynamics.sizes["speed"]), dynamics["harmonic"].values
-    amplitude = np.abs(harmonics_of(dynamics.isel(speed=speeds), "dte"))[:, :, h > 0] * 1e6
+    amplitude = np.abs(stored_harmonics(dynamics.isel(speed=speeds), "dte"))[:, :, h > 0] * 1e6
     names, h, largest = dynamics["mesh"].values, h[h > 0], amplitude.max(initial=0.0)
     # below are rounding and what the iteration leaves: no line is drawn there
     floor = _DECADES * (largest or 1.0)
@@ -354,7 +354,7 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
         else:
             last = h[(amplitude[s] > floor).any(axis=0)].max(initial=1)
             ax.set_xlim(0.0, step * (last + 0.4))
-        mesh_harmonics(ax, step, words=ax in axes[:2])
+        mark_mesh_harmonics(ax, step, words=ax in axes[:2])
         ax.set_title(f"{rpm(dynamics['speed'].values[speeds[s]])}, {kind}", fontsize=SIZE, loc="left", pad=10)
         label(ax, "frequency [kHz]")
     for ax in axes[::2]:
@@ -375,7 +375,7 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     speed = dynamics["speed"].values[order]
     rms = fluctuation_rms(dynamics)[order] * 1e6
     marker = {"marker": "o", "markersize": 4} if len(speed) < 40 else {}
-    lines = distinct_lines(dynamics["mesh"].values, rms.T)
+    lines = drawn_lines(dynamics["mesh"].values, rms.T)
     for i, (text, row) in enumerate(lines):
         top.plot(speed, rms[:, row], label=text, **marker, **line_style(i))
     failed = ~dynamics["converged"].values[order].astype(bool)
@@ -417,10 +417,10 @@ def some_at_a_time(dynamics: xr.Dataset) -> Iterator[xr.Dataset]:
 
 def fluctuation_rms(dynamics: xr.Dataset) -> np.ndarray:
     """Compute the RMS of the transmission errors less their means (speeds, meshes) [m]."""
-    return np.concatenate([fluctuation(harmonics_of(one, "dte")) for one in some_at_a_time(dynamics)])
+    return np.concatenate([fluctuation(stored_harmonics(one, "dte")) for one in some_at_a_time(dynamics)])
 
 
-def harmonics_of(dynamics: xr.Dataset, name: str) -> np.ndarray:
+def stored_harmonics(dynamics: xr.Dataset, name: str) -> np.ndarray:
     """Join real and imaginary part of a variable to a complex array, in its dimensions and unit."""
     return dynamics[f"{name}_real"].values + 1j * dynamics[f"{name}_imag"].values
 

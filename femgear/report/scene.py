@@ -88,7 +88,7 @@ def _refuse_little_memory() -> None:
 
 
 @dataclass(frozen=True)
-class Body:
+class DrawnBody:
     """One body of a scene, such as ``"planet 2"`` by its ``name``, in the frame of the set.
 
     ``points`` (n, 2) [m] and their ``displacement`` (n, 2) [m] or None. ``triangles`` (m, 6) have their corners
@@ -101,7 +101,7 @@ class Body:
     displacement: np.ndarray | None = None
 
 
-def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, displacement=None) -> Body:
+def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, displacement=None) -> DrawnBody:
     """Place a grid in the set: turned about its origin by an angle [rad], then moved to a centre (2,) [m].
 
     The displacement (n, 2) [m] in the frame of the grid is turned along.
@@ -109,10 +109,10 @@ def placed(grid: Grid, *, name: str, centre=(0.0, 0.0), angle: float = 0.0, disp
     c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, s], [-s, c]])
     moved = None if displacement is None else np.asarray(displacement) @ turn
-    return Body(name, grid.points @ turn + np.asarray(centre, float), grid.triangles, moved)
+    return DrawnBody(name, grid.points @ turn + np.asarray(centre, float), grid.triangles, moved)
 
 
-def assemble_set(bodies: Sequence[Body]) -> pv.UnstructuredGrid:
+def assemble_set(bodies: Sequence[DrawnBody]) -> pv.UnstructuredGrid:
     """Assemble all bodies in one grid of VTK quadratic triangles.
 
     It has the point data ``displacement`` [m] (3 components), the cell data ``body`` (number), and the number
@@ -142,7 +142,7 @@ def ring_modes_grid(sector: Grid, modes: CyclicModes, shown: Sequence[int]) -> p
     ``"mode 5, n = 3, 2600 Hz"`` and so on (3 components).
     """
     whole, numbers = rotated_copies(sector, modes.count), copy_nodes(sector, modes.count)
-    grid = assemble_set([Body("ring", whole.points, whole.triangles)])
+    grid = assemble_set([DrawnBody("ring", whole.points, whole.triangles)])
     del grid.point_data["displacement"]
     for mode in shown:
         field = np.zeros((whole.n_nodes, 3), np.float32)

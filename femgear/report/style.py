@@ -200,7 +200,7 @@ def _extremes(y: np.ndarray, start: int, end: int, count: int) -> np.ndarray:
     return np.unique([start, *kept, end - 1])
 
 
-def mesh_harmonics(ax, step: float, *, words: bool = True) -> None:
+def mark_mesh_harmonics(ax, step: float, *, words: bool = True) -> None:
     """Mark the harmonics of the mesh frequency above axes whose abscissa has them every `step`."""
     from matplotlib.ticker import MaxNLocator
 
@@ -262,7 +262,7 @@ def family(name: str) -> str:
     return "planet-ring" if "ring" in name else name if name.startswith("gear 1") else "sun-planet"
 
 
-def distinct_lines(names, values, *, partly: bool = False, within: float = _IDENTICAL) -> list[tuple[str, int]]:
+def drawn_lines(names, values, *, partly: bool = False, within: float = _IDENTICAL) -> list[tuple[str, int]]:
     """Choose the rows of `values` to draw, with their legend texts: one for a family of meshes, else each.
 
     The family is drawn as one where its rows (n, ...) differ by less than a millionth of the largest value,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.findings import CATALOGUE, NOTE, Finding, by_severity, findings_in
-from femgear.report.response import harmonics_of, some_at_a_time
+from femgear.report.response import some_at_a_time, stored_harmonics
 from femgear.report.style import NOTICEABLE
 from femgear.system.fourier import fluctuation, sample
 
@@ -227,14 +227,14 @@ def describe_response(data: xr.Dataset) -> Block:
     """Tabulate transmission error [um], convergence and stability at the speeds [rpm] of dynamics.nc.
 
     The file has ``dte_real`` and ``dte_imag`` (speed, mesh, harmonic) [m] and, for every speed, what
-    `femgear.storage.results.response_entries` lists; of many speeds the first and the last are shown.
+    `femgear.storage.results.response_variables` lists; of many speeds the first and the last are shown.
     """
     largest, marks = np.abs(data.floquet_multiplier.values), Marks(findings_in(data.attrs))
 
     def dte(i: int) -> str:
         one = data.isel(speed=i)
         doubts = response_doubts(one) if marks.raised(*RESPONSE_DOUBTS) else ()
-        return marks(f"{fluctuation(harmonics_of(one, 'dte')).max() * 1e6:.4f}", *doubts, "W-DAMPING")
+        return marks(f"{fluctuation(stored_harmonics(one, 'dte')).max() * 1e6:.4f}", *doubts, "W-DAMPING")
 
     stable = data.stable.values.astype(bool)
     columns = {
@@ -269,7 +269,7 @@ def describe_response(data: xr.Dataset) -> Block:
 
 def response_doubts(data: xr.Dataset) -> tuple[str, ...]:
     """Codes of the findings that concern the response at one speed, of dynamics.nc."""
-    pulling = pulls_of(harmonics_of(data, "mesh_force")[None])[1].any()
+    pulling = pulls_of(stored_harmonics(data, "mesh_force")[None])[1].any()
     doubts = zip(RESPONSE_DOUBTS, (pulling, not data["converged"], not data["stable"]))
     return tuple(code for code, doubtful in doubts if doubtful)
 
@@ -282,7 +282,7 @@ def chosen(count: int) -> Iterator[int]:
 def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """Name the speeds [rpm] of dynamics.nc at which meshes pull, and those not converged or not stable."""
     speed = data["speed"].values
-    pulls = [pulls_of(harmonics_of(one, "mesh_force")) for one in some_at_a_time(data)]
+    pulls = [pulls_of(stored_harmonics(one, "mesh_force")) for one in some_at_a_time(data)]
     yield from pulling_meshes(speed, data["mesh"].values, pulls)
     for code, bad, text in (
         ("W-CONVERGENCE", ~data["converged"].values.astype(bool), "did not converge at"),

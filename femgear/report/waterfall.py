@@ -191,7 +191,7 @@ def waterfall(runup: xr.Dataset) -> Figure:
     return figure
 
 
-def order_cuts(runup: xr.Dataset) -> Figure:
+def draw_order_cuts(runup: xr.Dataset) -> Figure:
     """Draw amplitudes of the strongest orders of runup.nc over the speed, axes for each."""
     order, speed = runup["order"].values, runup["speed"].values
     amplitude = np.hypot(runup["lines_real"].values, runup["lines_imag"].values)
@@ -319,5 +319,5 @@ def runup_figures(runup: xr.Dataset, modes: xr.Dataset) -> dict[str, Figure]:
         "run_up_levels": runup_levels(runup),
         "campbell": campbell_diagram(runup, modes),
         "waterfall": waterfall(runup),
-        "order_cuts": order_cuts(runup),
+        "order_cuts": draw_order_cuts(runup),
     }

@@ -45,7 +45,7 @@ Entry = TypeVar("Entry")
 AnyCase = TypeVar("AnyCase", bound=Any)
 
 
-def listed(names: list[str]) -> str:
+def entries_with_verb(names: list[str]) -> str:
     """Write entries of a case file with their verb, "a, b have"."""
     return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
 

@@ -51,8 +51,8 @@ from femgear.contact.root_stress import (
     computed_waves,
     observed_root_stress,
     root_ranges,
-    root_stress,
     root_stress_cycle,
+    root_stress_influence,
     root_waves,
 )
 from femgear.contact.supports import RIGID, UPRIGHT, Supports, WidthSupports, tilting_members
@@ -620,7 +620,7 @@ def _influences(case: Case, static: StaticResult, progress: Progress = silent) -
         if gear.internal:
             support = ring_foundation(case, sector) if case.static.members == "elastic" else None
         if body.root is None:
-            found.append(root_stress(sector.grid, gear, material, foundation=support))
+            found.append(root_stress_influence(sector.grid, gear, material, foundation=support))
         else:
             found.append(observed_root_stress(gear, body.root))
         narrower = [gear.face_width / root_face_width(gear.face_width, one, case.module) for one in of_flanks]

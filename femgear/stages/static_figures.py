@@ -36,7 +36,7 @@ from femgear.report.style import (
     GREY,
     SIZE,
     VERMILION,
-    distinct_lines,
+    drawn_lines,
     family,
     label,
     legend_below,
@@ -66,7 +66,7 @@ _SHOWN = 0.25
 def static_transmission_error(static: xr.Dataset) -> Figure:
     """Draw the static transmission error of every mesh, and of sun to ring over every planet (static.nc)."""
     figure, (left, right) = new_figure(columns=2, height=3.6, sharex=True)
-    drawn = distinct_lines(static["mesh"].values, static["ste"], partly=True, within=ALIKE)
+    drawn = drawn_lines(static["mesh"].values, static["ste"], partly=True, within=ALIKE)
     position, each = _with_between(static, "ste")
     if len(drawn) == len(_kinds(static)) == 1:
         return _one_error(position, each[0], drawn[0][0])
@@ -113,12 +113,12 @@ def _one_error(position: np.ndarray, error: np.ndarray, title: str) -> Figure:
     return figure
 
 
-def mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Figure:
+def draw_mesh_stiffness(static: xr.Dataset, *, face_width: float | None = None) -> Figure:
     """Draw the tangent and secant stiffness of every mesh (static.nc).
 
     The face width [m] adds an axis with the stiffness per face width in N/(mm µm), as standards print it.
     """
-    lines = distinct_lines(static["mesh"].values, static["mesh_stiffness"], partly=True, within=ALIKE)
+    lines = drawn_lines(static["mesh"].values, static["mesh_stiffness"], partly=True, within=ALIKE)
     # two families of curves that differ from planet to planet would cover one another
     kinds = list(dict.fromkeys(family(text) for text, _ in lines)) if len(lines) > 2 else [""]
     figure, axes = new_figure(rows=len(kinds), height=1.6 + 3.2 * len(kinds), sharex=True)
@@ -279,7 +279,7 @@ def _over_flank(static: xr.Dataset, name: str, scale: float, words: str, title: 
 def _of_planets(static: xr.Dataset, rows) -> list[tuple[str, int]]:
     """Choose the lines to draw of the rows of all planets, with their texts: one of those that are alike."""
     names = [f"planet {planet}" for planet in static["planet"].values]
-    found = distinct_lines(names, rows, partly=True, within=ALIKE)
+    found = drawn_lines(names, rows, partly=True, within=ALIKE)
     return [(text.replace("all sun-planet meshes", "every planet"), row) for text, row in found]
 
 
@@ -364,7 +364,7 @@ def root_stress_over_width(stress: xr.Dataset) -> Figure:
     return figure
 
 
-def contact_pressure(stress: xr.Dataset) -> Figure:
+def draw_contact_pressure(stress: xr.Dataset) -> Figure:
     """Draw the contact pressure of a tooth pair over its path (stress.nc), on the planet with the largest."""
     kinds = _kinds(stress)
     figure, axes = new_figure(rows=2, columns=len(kinds), height=6.0)
@@ -415,7 +415,7 @@ def _along_path(row):
     return path[order] * 1e3, place[:, order] * 1e6, pressure[:, order] * 1e-6
 
 
-def load_spectrum(stress: xr.Dataset) -> Figure:
+def draw_load_spectrum(stress: xr.Dataset) -> Figure:
     """Draw the load spectrum of the teeth in both meshes of the planet with the largest load (stress.nc)."""
     kinds = _kinds(stress)
     figure, axes = new_figure(columns=len(kinds), sharex=True, sharey=True)
@@ -617,7 +617,7 @@ def _static_figures(drawn: Drawn) -> dict[str, Figure]:
     sharing = {"load_sharing": load_sharing(static)} if len(_kinds(static)) > 1 else {}
     return over_width | {
         "static_transmission_error": static_transmission_error(static),
-        "mesh_stiffness": mesh_stiffness(static, face_width=_one_width(planetary_set(drawn.case))),
+        "mesh_stiffness": draw_mesh_stiffness(static, face_width=_one_width(planetary_set(drawn.case))),
         **sharing,
         "tooth_loads": tooth_loads(static),
     }
@@ -635,12 +635,12 @@ def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
     figures = {
         "root_stress": root_stress_history(stress),
         "root_profile": root_stress_profile(stress),
-        "load_spectrum": load_spectrum(stress),
+        "load_spectrum": draw_load_spectrum(stress),
     }
     if "root_over_width" in stress:
         figures["root_over_width"] = root_stress_over_width(stress)
     if "pressure_distribution" in stress:
-        figures["contact_pressure"] = contact_pressure(stress)
+        figures["contact_pressure"] = draw_contact_pressure(stress)
     if "planet_root_stress" in stress:
         figures["planet_bending"] = planet_bending(stress)
     return figures

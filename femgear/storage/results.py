@@ -207,7 +207,7 @@ def shape_entries(shape, mesh_stiffness, mesh_deflection, along: str = "") -> di
     }
 
 
-def response_entries(result: Any) -> dict[str, tuple]:
+def response_variables(result: Any) -> dict[str, tuple]:
     """List what is known of a periodic response, (speed,) each: frequency [Hz], convergence, stability.
 
     Of any result with a response, its stability and, where there is a carrier, the speeds of the members.

@@ -119,12 +119,12 @@ class RigidSet(ABC):
     stiffness_planet_ring: float | np.ndarray
 
     def __post_init__(self):
-        self._keep("planet_angles", np.atleast_1d(numbers("planet_angles", self.planet_angles)))
+        self._keep("planet_angles", np.atleast_1d(checked_array("planet_angles", self.planet_angles)))
         for name in ("stiffness_sun_planet", "stiffness_planet_ring"):
             self._keep(name, self._per_planet(name))
         for name in (*CENTRAL, "planet"):
             _check_body(name, getattr(self, name))
-        check_set(self)
+        check_rigid_set(self)
 
     @property
     def n_planets(self) -> int:
@@ -184,7 +184,7 @@ class RigidSet(ABC):
 
     def _per_planet(self, name: str) -> np.ndarray:
         """Values (N,) from one number or one a planet."""
-        values = numbers(name, getattr(self, name))
+        values = checked_array(name, getattr(self, name))
         values = np.full(self.n_planets, values.item()) if values.size == 1 else values
         if values.shape != (self.n_planets,):
             refuse(name, f"{values.size} values", "", f"one number, or {self.n_planets}")
@@ -383,12 +383,12 @@ def body_masses(data: RigidSet) -> np.ndarray:
     return np.array([body.masses(radius) for body, radius in zip(bodies, data.radii.tolist())])
 
 
-def check_set(data: RigidSet) -> None:
+def check_rigid_set(data: RigidSet) -> None:
     """Refuse radii, pressure angles, mesh stiffnesses and planet angles."""
     for name in ("sun_radius", "ring_radius", "planet_radius", "centre_distance"):
         _check_positive(name, getattr(data, name), "m")
     for name in ("pressure_angle_sun_planet", "pressure_angle_planet_ring"):
-        value = numbers(name, getattr(data, name), 0)
+        value = checked_array(name, getattr(data, name), 0)
         if not 0.0 < value < 0.5 * math.pi:
             refuse(name, value, "rad", "between 0 and pi/2", remedy="give radians")
     limit = "finite, 0 or more" if data.meshes_optional else "finite and above 0"
@@ -417,7 +417,7 @@ def _check_body(name: str, body: PlanarBody | HelicalBody) -> None:
             refuse("planet.support", "a planet", "", "none", remedy=remedy)
         return
     for entry, unit in (("support", "N/m"), ("torsional_support", "N m/rad")):
-        value = numbers(f"{name}.{entry}", getattr(body, entry), 0)
+        value = checked_array(f"{name}.{entry}", getattr(body, entry), 0)
         if not value >= 0.0:
             refuse(f"{name}.{entry}", value, unit, "0 or more, or infinite")
         if name == "planet" and value:
@@ -431,14 +431,14 @@ def check_support(key: str, support: HelicalSupport, *, count: int | None = None
     if not all(hasattr(support, entry) for entry in DIRECTIONS):
         refuse(key, repr(support), "", "a HelicalSupport")
     for entry, unit in DIRECTIONS.items():
-        values = numbers(f"{key}.{entry}", getattr(support, entry))
+        values = checked_array(f"{key}.{entry}", getattr(support, entry))
         if count is not None and values.ndim and values.shape != (count,):
             refuse(f"{key}.{entry}", f"{values.size} values", "", allowed)
         if not np.all(values >= 0.0):
             refuse(f"{key}.{entry}", values.min(), unit, "0 or more, or infinite")
 
 
-def numbers(key: str, values, dimensions: int | None = None) -> np.ndarray:
+def checked_array(key: str, values, dimensions: int | None = None) -> np.ndarray:
     """Check values: an array of floats, of so many dimensions where they are given."""
     try:
         found = np.array(values, float)
@@ -462,6 +462,6 @@ def refuse(key: str, value, unit: str, limit: str, *, remedy: str | None = None)
 
 
 def _check_positive(key: str, value, unit: str) -> None:
-    number = numbers(key, value, 0)
+    number = checked_array(key, value, 0)
     if not (math.isfinite(number) and number > 0.0):
         refuse(key, value, unit, "finite and above 0")

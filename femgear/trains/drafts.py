@@ -16,8 +16,8 @@ from femgear.case import text as case_text
 from femgear.case.estimates import (
     Estimate,
     cylinder,
+    estimated_mesh_stiffness,
     estimates,
-    mesh_stiffness,
     usual_rim,
     usual_torque,
 )
@@ -539,7 +539,7 @@ def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     rotor = cylinder(0.0, gears.gear_2.reference_radius, 4.0 * width, case.material.density)
     rotors = [Estimate(value, one, how) for value, one in zip(rotor, (MASS, INERTIA, INERTIA), strict=True)]
     modulus = case.material.youngs_modulus
-    mesh = mesh_stiffness(modulus, modulus, width)
+    mesh = estimated_mesh_stiffness(modulus, modulus, width)
     stiffness = Estimate(mesh, STIFFNESS, "20 N/(mm um) times the face width")
     tables: dict[str, Any] = {"format": 1, "model": "drivetrain", "title": pair["title"]}
     tables |= {"body": [], "shaft": [], "parallel": [], "bearing": []}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.report.style import BLACK, COLOURS, label, legend_below, line_style, new_figure
-from femgear.trains.planar.figures import STABILITY, pieces
+from femgear.trains.planar.figures import STABILITY, runs_of_one_kind
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,7 +29,7 @@ def response_branches(curves: Sequence[tuple], sweeps: Sequence[tuple] = (), *, 
     figure, (ax,) = new_figure(width=8.5, height=5.0)
     for colour, (text, hertz, size, stable) in zip(COLOURS, curves):
         for wanted, (dash, note) in STABILITY.items():
-            for number, part in enumerate(pieces(stable, wanted)):
+            for number, part in enumerate(runs_of_one_kind(stable, wanted)):
                 ax.plot(
                     hertz[part],
                     1e6 * size[part],

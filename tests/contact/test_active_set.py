@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from femgear.contact.active_set import Problem, _residual, settle, solve_step
+from femgear.contact.active_set import ComplementarityProblem, _residual, settle, solve_step
 from femgear.contact.solve import solve_contact
 from femgear.errors import ContactError
 
@@ -11,7 +11,7 @@ from femgear.errors import ContactError
 def two_springs(gap=(1.0, 1.0), load=4.0):
     """Two springs side by side that yield 2 under their own and 1 under the other's unit load."""
     H = np.array([[2.0, 1.0], [1.0, 2.0]])
-    return Problem(H, np.array(gap), np.ones((2, 1)), np.array([load]), compliance=1.0, arm=np.ones(1))
+    return ComplementarityProblem(H, np.array(gap), np.ones((2, 1)), np.array([load]), compliance=1.0, arm=np.ones(1))
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,8 @@ from femgear.contact.root_stress import (
     computed_waves,
     observed_root_stress,
     root_ranges,
-    root_stress,
     root_stress_cycle,
+    root_stress_influence,
     root_waves,
 )
 from femgear.contact.tooth_loads import deformed_set, loaded_teeth
@@ -48,7 +48,7 @@ def sector(gear, *, flank_elements=24, refine=1.0):
 
 @cache
 def influence(gear, *, flank_elements=24, refine=1.0):
-    return root_stress(sector(gear, flank_elements=flank_elements, refine=refine), gear, STEEL)
+    return root_stress_influence(sector(gear, flank_elements=flank_elements, refine=refine), gear, STEEL)
 
 
 def direct(gear, places, *, flank_elements, refine):
@@ -102,7 +102,7 @@ def test_roots_observed_with_the_flanks_are_those_of_a_solution_of_their_own(wid
     grid = sector(EXTERNAL, flank_elements=24 if wide else 8, refine=1.0 if wide else 0.5)
     matrix = stiffness(grid, STEEL, state="plane strain", thickness=EXTERNAL.face_width)
     body = flank_compliance(grid, EXTERNAL, STEEL, matrix, root_state="plane strain")
-    found, alone = observed_root_stress(EXTERNAL, body.root), root_stress(grid, EXTERNAL, STEEL)
+    found, alone = observed_root_stress(EXTERNAL, body.root), root_stress_influence(grid, EXTERNAL, STEEL)
     for name in ("roll", "arc", "points", "slope", "influence"):
         expected = getattr(alone, name)
         assert np.abs(getattr(found, name) - expected).max() <= 1e-12 * np.abs(expected).max(), name
@@ -196,9 +196,9 @@ def test_roots_are_placed_as_documented():
 def test_elastic_constants_do_not_matter():
     """Michell: plane stresses under given forces are those of any material; a held rim hardly sees it."""
     grid = sector(EXTERNAL, flank_elements=12)
-    strain = root_stress(grid, EXTERNAL, STEEL).influence[0]
-    plane = root_stress(grid, EXTERNAL, STEEL, state="plane stress").influence[0]
-    soft = root_stress(grid, EXTERNAL, Material(1e9, 0.3, 1000.0)).influence[0]
+    strain = root_stress_influence(grid, EXTERNAL, STEEL).influence[0]
+    plane = root_stress_influence(grid, EXTERNAL, STEEL, state="plane stress").influence[0]
+    soft = root_stress_influence(grid, EXTERNAL, Material(1e9, 0.3, 1000.0)).influence[0]
     assert soft == pytest.approx(strain, rel=1e-9, abs=1e-9 * np.abs(strain).max())
     assert plane.max() == pytest.approx(strain.max(), rel=0.01)
 
@@ -206,16 +206,16 @@ def test_elastic_constants_do_not_matter():
 def test_an_elastic_support_bends_the_rim():
     thin = replace(INTERNAL, rim_radius=0.068)
     grid = sector(thin, flank_elements=12)
-    held = root_stress(grid, thin, STEEL).influence
+    held = root_stress_influence(grid, thin, STEEL).influence
     springs = foundation(grid, "rim", 1e12, 1e12, thickness=thin.face_width)
-    rested = root_stress(grid, thin, STEEL, foundation=springs).influence
+    rested = root_stress_influence(grid, thin, STEEL, foundation=springs).influence
     assert rested.max() > 1.01 * held.max()
 
 
 def test_waves_across_the_width():
     """Long ones are the plane load, to the second order; short ones decay along the tooth."""
     grid = sector(EXTERNAL, flank_elements=8, refine=0.7)
-    plane = root_stress(grid, EXTERNAL, STEEL).influence
+    plane = root_stress_influence(grid, EXTERNAL, STEEL).influence
     top, m, number = plane.max(), plane.shape[1] // 2, np.array([1.0, 2.0, 3e3, 6e3])
     one, two, short, shorter = root_waves(grid, EXTERNAL, STEEL, number)
     assert np.abs(one - plane).max() < 1e-4 * top

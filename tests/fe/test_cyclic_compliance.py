@@ -12,12 +12,12 @@ from femgear.errors import GridError
 from femgear.fe import compliance
 from femgear.fe.compliance import (
     condense_sector,
-    cyclic_harmonics,
     half_sectors,
     interpolation,
     mirror_nodes,
     mirrored_columns,
     node_dofs,
+    sector_harmonics,
     static_cut_shapes,
     symmetric_factor,
     tooth_compliance,
@@ -127,7 +127,7 @@ def test_free_body_is_refused(gear, sector):
         tooth_compliance(free)
     # translation is the last harmonic as well as the first
     with pytest.raises(GridError, match="nothing holds it"):
-        cyclic_harmonics(free, [gear.teeth - 1])
+        sector_harmonics(free, [gear.teeth - 1])
 
 
 @pytest.mark.parametrize(("axis", "free"), [(1, (1, 17)), (0, (0,))], ids=["translation", "rotation"])
@@ -146,9 +146,9 @@ def test_a_body_held_against_the_other_motion_only_is_refused(gear, sector, axis
     for harmonic in (0, 1, 2, 16, 17):
         if harmonic in free:
             with pytest.raises(GridError, match="E-GRID-FREE"):
-                cyclic_harmonics(schur, [harmonic])
+                sector_harmonics(schur, [harmonic])
         else:
-            assert np.isfinite(cyclic_harmonics(schur, [harmonic])).all()
+            assert np.isfinite(sector_harmonics(schur, [harmonic])).all()
 
 
 def test_a_solution_that_misses_its_equations_is_refused(gear, sector):
@@ -279,7 +279,7 @@ def test_reduced_ring_is_statically_complete(gear, sector, smooth):
     K = K + foundation(sector, "rim", 1e11, 1e11, thickness=THICKNESS)
     loads = flank_load_columns(sector, flank_stations(sector, gear))[:, 3:4]
     schur = condense_sector(sector, K, count=gear.teeth, rim=None, loads=loads, observations=loads).supported()
-    exact = cyclic_harmonics(schur, np.arange(10))[:, 0, 0].real
+    exact = sector_harmonics(schur, np.arange(10))[:, 0, 0].real
     shapes = smooth_cut_shapes(sector, static_cut_shapes(schur, np.arange(10)))
     whole, basis = (
         sector_basis(sector, K, mass(sector, STEEL, THICKNESS), count=gear.teeth, loads=loads, cut_shapes=chosen)

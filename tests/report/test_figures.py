@@ -18,7 +18,7 @@ from femgear.housing.sensor import fixed_sensor_signal, stored_lines
 from femgear.housing.sound import Cylinder, pressure_transfer
 from femgear.report import response, style, waterfall
 from femgear.report.response import campbell
-from femgear.report.style import COLOURS, WIDTH, _highest, distinct_lines
+from femgear.report.style import COLOURS, WIDTH, _highest, drawn_lines
 from femgear.report.tables import describe_response
 from femgear.stages import static_figures as static_figures
 from femgear.stages.static_results import describe_static
@@ -39,7 +39,7 @@ def all_figures():
     return {
         "ste": static_figures.static_transmission_error(static),
         "ste unequal": static_figures.static_transmission_error(unequal),
-        "stiffness": static_figures.mesh_stiffness(static, face_width=synthetic.FACE_WIDTH),
+        "stiffness": static_figures.draw_mesh_stiffness(static, face_width=synthetic.FACE_WIDTH),
         "sharing": static_figures.load_sharing(static),
         "sharing unequal": static_figures.load_sharing(unequal),
         "teeth": static_figures.tooth_loads(static),
@@ -54,7 +54,7 @@ def all_figures():
         "sweep": response.speed_sweep(synthetic.dynamics(speeds=np.linspace(100, 6000, 60))),
         "deflection": elastic_figures.ring_mean_deflection(dynamics, gears),
         "signal": elastic_figures.housing_signal(housing.isel(speed=[1])),
-        "orders": elastic_figures.order_spectrum(housing.isel(speed=[1])),
+        "orders": elastic_figures.draw_order_spectrum(housing.isel(speed=[1])),
         "modulation": elastic_figures.modulation_polar(housing.isel(speed=[1]), gears.planet_angles),
         "microphone": elastic_figures.microphone_spectrum(housing.isel(speed=[1])),
     }
@@ -158,29 +158,29 @@ def test_order_labels_name_harmonic_and_nodal_diameter(figures):
 def test_identical_meshes_are_drawn_once():
     values = np.ones((6, 8))
     names = synthetic.MESHES
-    assert distinct_lines(names, values) == [
+    assert drawn_lines(names, values) == [
         ("all sun-planet meshes (identical)", 0),
         ("all planet-ring meshes (identical)", 3),
     ]
     values[1, 3] = 1.1
-    assert [text for text, _ in distinct_lines(names, values)] == [
+    assert [text for text, _ in drawn_lines(names, values)] == [
         *synthetic.MESHES[:3],
         "all planet-ring meshes (identical)",
     ]
-    alone = distinct_lines(["sun-planet 1", "planet 1-ring"], values[:2])
+    alone = drawn_lines(["sun-planet 1", "planet 1-ring"], values[:2])
     assert alone == [("sun-planet 1", 0), ("planet 1-ring", 1)]
 
 
 def test_meshes_of_a_family_that_agree_are_drawn_once():
     names = [*(f"sun-planet {n}" for n in (1, 2, 3, 4)), *(f"planet {n}-ring" for n in (1, 2, 3, 4))]
     one, other = np.sin(np.arange(9.0)), np.cos(np.arange(9.0))
-    lines = distinct_lines(names, [one, other, one, other, one, one, one, one], partly=True)
+    lines = drawn_lines(names, [one, other, one, other, one, one, one, one], partly=True)
     assert lines == [
         ("sun-planet 1, sun-planet 3 (identical)", 0),
         ("sun-planet 2, sun-planet 4 (identical)", 1),
         ("all planet-ring meshes (identical)", 4),
     ]
-    lines = distinct_lines(names, np.diag(np.arange(1.0, 9.0)), partly=True)
+    lines = drawn_lines(names, np.diag(np.arange(1.0, 9.0)), partly=True)
     assert lines == [(name, row) for row, name in enumerate(names)]
 
 
@@ -445,7 +445,7 @@ def test_unloaded_set_is_drawn_flat():
         static[name].values[:] = 0.0
     for draw in (
         static_figures.static_transmission_error,
-        static_figures.mesh_stiffness,
+        static_figures.draw_mesh_stiffness,
         static_figures.load_sharing,
         static_figures.tooth_loads,
     ):
@@ -458,7 +458,7 @@ def test_silent_housing_is_drawn():
         housing[name].values[:] = 0.0
     for draw in (
         elastic_figures.housing_signal,
-        elastic_figures.order_spectrum,
+        elastic_figures.draw_order_spectrum,
         elastic_figures.modulation_polar,
         elastic_figures.microphone_spectrum,
     ):
@@ -493,7 +493,7 @@ def test_meshes_that_differ_have_lines_that_differ(planets):
     static = shifted(of_planets(synthetic.static(), planets), ("ste", "mesh_stiffness", "mesh_stiffness_secant"))
     left = static_figures.static_transmission_error(static).axes[0]
     assert len(set(looks(left.get_lines()))) == 2 * planets
-    figure = static_figures.mesh_stiffness(static)
+    figure = static_figures.draw_mesh_stiffness(static)
     assert len(figure.axes) == 2
     drawn = [look for ax in figure.axes for look in looks(ax.get_lines())]
     assert len(set(drawn)) == len(drawn) == 4 * planets
@@ -689,7 +689,7 @@ def test_signals_are_curves_through_their_samples_and_extremes():
 def test_spectra_of_hundreds_of_harmonics_stay_legible():
     """Numbers of mesh harmonics above the order spectrum keep apart."""
     housing = heard({TEETH * h - 3: 1.0 / h for h in range(1, 220)}, top=220 * TEETH)
-    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]))
+    figure = elastic_figures.draw_order_spectrum(housing.isel(speed=[1]))
     renderer = drawn(figure)
     (top,) = figure.axes[0].child_axes
     boxes = [text.get_window_extent(renderer) for text in top.get_xticklabels()]
@@ -713,11 +713,11 @@ def test_order_spectra_draw_the_highest_of_lines_too_close_to_part():
 def test_order_spectrum_says_what_its_lines_are():
     """Exact lines are called so and drawn once; how far the excitation reaches stands above."""
     housing = synthetic.housing()
-    names = [text.get_text() for text in elastic_figures.order_spectrum(housing).legends[0].get_texts()]
+    names = [text.get_text() for text in elastic_figures.draw_order_spectrum(housing).legends[0].get_texts()]
     assert names == ["Heaviside, linear interpolation", "exact circumferential Fourier"]
     housing.attrs["form"] = "exact"
     housing["excitation_limit"] = ("speed", [1080.0, 2500.0])
-    figure = elastic_figures.order_spectrum(housing.isel(speed=[1]))
+    figure = elastic_figures.draw_order_spectrum(housing.isel(speed=[1]))
     assert not figure.legends
     assert [len(ax.get_lines()) for ax in figure.axes] == [1] * len(figure.axes)
     assert "excited up to 2.5 kHz" in figure.get_suptitle()

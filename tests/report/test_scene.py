@@ -30,7 +30,7 @@ def square(name="square", corner=(0.0, 0.0), displacement=None):
     """Unit square of two six-node triangles."""
     points = np.array([(x, y) for y in (0.0, 0.5, 1.0) for x in (0.0, 0.5, 1.0)]) + corner
     triangles = np.array([[0, 2, 8, 1, 5, 4], [0, 8, 6, 4, 7, 3]])
-    return scene.Body(name, points, triangles, displacement)
+    return scene.DrawnBody(name, points, triangles, displacement)
 
 
 def test_set_of_bodies():

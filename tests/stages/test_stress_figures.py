@@ -8,8 +8,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from femgear.contact.root_stress import RootCycle
 from femgear.report.style import png_bytes
 from femgear.stages.static_figures import (
-    contact_pressure,
-    load_spectrum,
+    draw_contact_pressure,
+    draw_load_spectrum,
     planet_bending,
     root_stress_history,
     root_stress_profile,
@@ -154,7 +154,7 @@ def test_nominal_stress_is_drawn_where_it_is_known(whole, stress):
 
 
 def test_pressure_is_drawn_over_the_path_of_one_pair(whole):
-    figure = contact_pressure(whole)
+    figure = draw_contact_pressure(whole)
     for ax, nominal in zip(figure.axes[:2], (700.0, 300.0), strict=True):
         path, pressure = ax.lines[0].get_data()
         assert (np.diff(path) > 0).all() and pressure[0] == pressure[-1] == 0.0
@@ -169,7 +169,7 @@ def test_pressure_is_drawn_over_the_path_of_one_pair(whole):
 
 
 def test_spectrum_and_bending_show_the_numbers(whole):
-    left, right = load_spectrum(whole).axes
+    left, right = draw_load_spectrum(whole).axes
     for ax in (left, right):
         time, cycles = (patch.get_data() for patch in ax.patches)
         assert time.values == pytest.approx(100 * whole.load_time_share.values[0])
@@ -183,7 +183,7 @@ def test_spectrum_and_bending_show_the_numbers(whole):
 
 
 def test_new_figures_hide_nothing(whole):
-    for figure in (contact_pressure(whole), load_spectrum(whole), planet_bending(whole)):
+    for figure in (draw_contact_pressure(whole), draw_load_spectrum(whole), planet_bending(whole)):
         canvas = FigureCanvasAgg(figure)
         canvas.draw()
         legend = figure.legends[0].get_window_extent(canvas.renderer)
@@ -203,25 +203,25 @@ def test_the_planet_that_carries_is_shown_and_named(whole):
     )
     names = (*spans, "root_tension", "root_compression")
     case = whole.assign({name: whole[name] * xr.DataArray(loaded, dims="mesh") for name in names})
-    figure = contact_pressure(case)
+    figure = draw_contact_pressure(case)
     for ax, mesh in zip(figure.axes[:2], ("sun-planet 2", "planet 2-ring"), strict=True):
         assert ax.get_title(loc="left").startswith(mesh)
         assert ax.lines[0].get_ydata().max() == pytest.approx(1e-6 * float(whole.pressure_distribution.max()))
-    for ax, mesh in zip(load_spectrum(case).axes, ("sun-planet 2", "planet 2-ring"), strict=True):
+    for ax, mesh in zip(draw_load_spectrum(case).axes, ("sun-planet 2", "planet 2-ring"), strict=True):
         assert ax.get_title(loc="left").startswith(mesh)
         assert ax.patches[0].get_data().values.max() == 75.0
     for figure in (root_stress_history(case), root_stress_profile(case)):
         assert figure.axes[1].get_title(loc="left").startswith("planet 2")
     higher = xr.DataArray([1.0, 1.0, 1.0, 1.1], dims="mesh")
     more = whole.assign(contact_pressure=whole.contact_pressure * higher)
-    assert contact_pressure(more).axes[0].get_title(loc="left").startswith("sun-planet 2")
+    assert draw_contact_pressure(more).axes[0].get_title(loc="left").startswith("sun-planet 2")
     # the first planet never reaches the highest load class
     often = whole.load_time_share.values.copy()
     often[[0, 2]] = np.eye(BINS)[4]
-    shown = load_spectrum(whole.assign(load_time_share=(("mesh", "load_bin"), often)))
+    shown = draw_load_spectrum(whole.assign(load_time_share=(("mesh", "load_bin"), often)))
     assert shown.axes[0].get_title(loc="left").startswith("sun-planet 2")
 
 
 def test_a_set_without_any_load_shows_the_first_planet(whole):
     case = whole.assign({name: 0.0 * whole[name] for name in ("contact_pressure", "pressure_distribution")})
-    assert contact_pressure(case).axes[0].get_title(loc="left").startswith("sun-planet 1")
+    assert draw_contact_pressure(case).axes[0].get_title(loc="left").startswith("sun-planet 1")

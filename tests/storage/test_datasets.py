@@ -11,7 +11,7 @@ from femgear.housing.orders import order_level
 from femgear.housing.sensor import fixed_sensor_signal, stored_lines
 from femgear.stages.static import solve_static
 from femgear.stages.static_results import HELIX_VARIABLES, SLICE_VARIABLES
-from femgear.storage.results import _attribute, response_entries
+from femgear.storage.results import _attribute, response_variables
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import read_case, with_value
 
@@ -180,4 +180,4 @@ def test_a_multiplier_is_stored_as_its_size():
     """Where a period doubles the multiplier is a negative number."""
     multiplier = np.array([-1.2, 0.3 + 0.4j])
     result = MagicMock(speeds=[], stability=MagicMock(multiplier=multiplier))
-    np.testing.assert_allclose(response_entries(result)["floquet_multiplier"][1], [1.2, 0.5], rtol=1e-15)
+    np.testing.assert_allclose(response_variables(result)["floquet_multiplier"][1], [1.2, 0.5], rtol=1e-15)

@@ -16,7 +16,7 @@ from femgear.solvers.stability.lyapunov import (
     pieces,
 )
 from femgear.solvers.time.adaptive import checked_start, flow, motion_scale, trajectory
-from femgear.solvers.time.stroboscopic import common_period
+from femgear.solvers.time.stroboscopic import strobe_period
 from femgear.system.system import NonlinearSystem
 
 # factor of the tolerance in the run that stands beside for the error of the integration
@@ -45,7 +45,7 @@ class _Adaptive:
     """Periods of the adaptive integrator with the derivatives of the state."""
 
     def __init__(self, problem, frequency, samples, periods, tolerance):
-        self.period = common_period(frequency, periods)
+        self.period = strobe_period(frequency, periods)
         self._flow = flow(problem, frequency, variational=True)
         self._tolerance = tolerance
         self.size = 2 * self._flow.size

@@ -18,7 +18,7 @@ from scipy import linalg
 from femgear.errors import CaseError, checked_count, checked_tolerance
 from femgear.solvers.periodic.solution import PeriodicSolution, of_solution, open_verdict, verdict_of
 from femgear.solvers.time.adaptive import Flow, checked_start, flow, motion_scale, sampled, trajectory
-from femgear.solvers.time.stroboscopic import common_period
+from femgear.solvers.time.stroboscopic import strobe_period
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import harmonics_of, line_tail
 from femgear.system.system import NonlinearSystem, checked_bases, element_forces
@@ -142,7 +142,7 @@ def solve_shooting(
         out of range (tolerances: E-RANGE), a start that does not fit (E-START).
     """
     frequency, chosen = checked_bases(problem, frequency), ShootingOptions(**options)
-    period = common_period(frequency, periods)
+    period = strobe_period(frequency, periods)
     start = checked_start(problem, _settled(problem, frequency, period, settle) if start is None else start)
     moving = flow(problem, frequency, variational=True)
     y = replace(moving, variational=False).state(*start)

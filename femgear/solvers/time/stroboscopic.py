@@ -104,7 +104,7 @@ def stroboscopic_map(
         A fixed-step method of `solve_transient`.
     """
     frequency = np.atleast_1d(checked_numbers(frequency, "frequency", code="E-RANGE", unit="rad/s"))
-    period = common_period(frequency, periods)
+    period = strobe_period(frequency, periods)
     if not 4 <= steps <= _MOST_STEPS:
         raise CaseError(f"{steps} steps in a period", code="E-RANGE", key="steps", limit=f"4 to {_MOST_STEPS}")
     scheme, _ = step_scheme(problem, frequency, method, period / steps, period / steps)
@@ -116,7 +116,7 @@ def stroboscopic_map(
     )
 
 
-def common_period(frequency, periods: int) -> float:
+def strobe_period(frequency, periods: int) -> float:
     """Compute the length [s] of ``periods`` periods of the first base frequency; others must repeat then."""
     periods = checked_count(periods, "periods", code="E-RANGE")
     if not np.all(np.isfinite(frequency)) or not frequency[0] > 0.0:

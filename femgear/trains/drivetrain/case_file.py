@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import Field, StrictBool
 
 from femgear.case import text as case_text
-from femgear.case.csv_columns import Columns, embed_points, embed_profiles, embedded, read_columns
+from femgear.case.csv_columns import CsvColumns, embed_points, embed_profiles, embedded, read_columns
 from femgear.case.gear_set import line_play, planetary_set, set_deviations
 from femgear.case.quantities import (
     ACCELERATION,
@@ -91,7 +91,7 @@ _Torque = Annotated[float, Quantity(TORQUE, -_LARGEST_TORQUE, _LARGEST_TORQUE)]
 _Time = Annotated[float, Quantity(TIME, 0.0, _LATEST)]
 
 
-class GravitySection(Section):
+class DrivetrainGravitySection(Section):
     """Weight of all bodies along -y."""
 
     acceleration: Annotated[float, Quantity(ACCELERATION, 0.0, 1e3)] = 9.80665
@@ -108,7 +108,7 @@ class TorqueSection(Section):
     share: Annotated[float, Number(0.0, 10.0)] | None = None
 
 
-class OperationSection(Section):
+class DrivetrainOperationSection(Section):
     """Speed of the first body at the start, and the torques."""
 
     speed: Speed
@@ -148,8 +148,8 @@ class DrivetrainCase(Section, ReadCase):
     parallel: Annotated[tuple[ParallelSection, ...], Field(max_length=_MOST_PARTS)] = ()
     planetary: Annotated[tuple[PlanetarySection, ...], Field(max_length=20)] = ()
     bearing: Annotated[tuple[BearingSection, ...], Field(max_length=_MOST_PARTS)] = ()
-    gravity: GravitySection | None = None
-    operation: OperationSection
+    gravity: DrivetrainGravitySection | None = None
+    operation: DrivetrainOperationSection
     simulation: SimulationSection
 
 
@@ -499,7 +499,7 @@ def _meshes(case: DrivetrainCase) -> Iterator[CaseError]:
             )
         elif stage.stiffness is not None:
             try:
-                pair = pair_of(case_text.write(stage.stiffness))
+                pair = pair_case_of(case_text.write(stage.stiffness))
                 found = [*_unlike(pair, stage, key), *_unfit(pair, case.simulation.harmonics)]
             except FemgearError as error:
                 found = [CaseError(one.message, **_told(one)) for one in getattr(error, "problems", (error,))]
@@ -510,7 +510,7 @@ def _meshes(case: DrivetrainCase) -> Iterator[CaseError]:
 
 
 @lru_cache(maxsize=8)
-def pair_of(text: str) -> Any:
+def pair_case_of(text: str) -> Any:
     """Read the case of a pair from the text of its file.
 
     CaseError: as `femgear.trains.reading.parse_case`; another kind of case (E-CHOICE).
@@ -721,7 +721,7 @@ def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
     meshes = [(f"{key}.{name}", getattr(stage, name, None)) for key, stage in stages for name in _MESHES]
     bare = [key for key, mesh in meshes if mesh is not None and mesh.backlash is None]
     pairs = [(i, stage.stiffness) for i, stage in enumerate(case.parallel) if stage.stiffness is not None]
-    bare += [f"parallel[{i}].stiffness" for i, one in pairs if not line_play(pair_of(case_text.write(one)))]
+    bare += [f"parallel[{i}].stiffness" for i, one in pairs if not line_play(pair_case_of(case_text.write(one)))]
     if bare:
         yield Finding(
             "W-BACKLASH",
@@ -814,7 +814,7 @@ def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
     return {"times": times, "torques": torques}
 
 
-def _column(found: Columns, key: str) -> list[float]:
+def _column(found: CsvColumns, key: str) -> list[float]:
     """One column as the case will hold it, within the limits of a case file."""
     (low, high), dimension = _LIMITS[key], _DIMENSIONS[key]
     values = [float(f"{value:{_DIGITS}}") for value in found.values[key]]

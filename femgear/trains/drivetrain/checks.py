@@ -80,7 +80,7 @@ class SpeedRange:
         return max(abs(self.lowest), abs(self.highest))
 
 
-def speed_range(
+def reached_speeds(
     model: DrivetrainModel,
     torques: Sequence[TorqueHistory],
     *,
@@ -114,7 +114,7 @@ def speed_range(
 def case_speeds(case: DrivetrainCase, model: DrivetrainModel, *, start: float = 0.0) -> SpeedRange:
     """Compute the speeds of the first body from `start` [s] to the end of a run, without its deviation."""
     torques, duration = torque_histories(case, model.ratio), case.simulation.duration
-    return speed_range(model, torques, duration=duration, speed=case.operation.speed, start=start)
+    return reached_speeds(model, torques, duration=duration, speed=case.operation.speed, start=start)
 
 
 def record_every(case: DrivetrainCase, model: DrivetrainModel) -> int:

@@ -44,7 +44,7 @@ _FEW, _MANY = 8, 64
 
 
 @dataclass(frozen=True)
-class Block:
+class StepBlock:
     """Loads and meshes at the instants (t,) of a block of steps, its start included.
 
     ``loads`` (t, d): one for the weight, then the torques [N m]; ``selection`` (t, m, n_meshes): ``S`` of
@@ -82,7 +82,7 @@ class Spin:
             phase = 2.0 * np.pi * np.arange(_TABLE + 1)[:, None] / _TABLE
             self.table = np.array(FourierSeries(model.stiffness).at(phase))
 
-    def block(self, first: int, count: int) -> Block:
+    def block(self, first: int, count: int) -> StepBlock:
         """Take the next `count` steps, which begin with step `first`; the spin moves on to their end."""
         times = self.step * np.arange(first, first + count + 1)
         values = np.zeros((count + 1, len(self.torques)))
@@ -96,7 +96,7 @@ class Spin:
         self.angle, self.speed = angle[-1], speed[-1]
         loads = np.hstack([np.ones((count + 1, 1)), values])
         effort = np.abs(values) @ np.abs(self.share)
-        return Block(loads, *self._meshes(angle), angle, speed, torque, effort)
+        return StepBlock(loads, *self._meshes(angle), angle, speed, torque, effort)
 
     def _meshes(self, angle):
         model = self.model
@@ -110,7 +110,7 @@ class Spin:
 
 
 @dataclass(frozen=True)
-class Scheme:
+class ChainScheme:
     """One step, mesh forces g on the simple motions at its end left open.
 
     Rows ``z = (q, v without g, g)`` go on by ``(q, v without g, x without g) = z advance + loads``; the state
@@ -129,7 +129,7 @@ class Scheme:
     n: int
 
     @classmethod
-    def of(cls, model: DrivetrainModel, h: float, speed: float, directions) -> Scheme:
+    def of(cls, model: DrivetrainModel, h: float, speed: float, directions) -> ChainScheme:
         """Factorise average acceleration: steps h [s], speed [rad/s], loads along ``directions`` (n, d)."""
         rule, system, U = AVERAGE_ACCELERATION, model.system, model.geometry.basic
         M, K, n = system.M, system.K, len(system.M)
@@ -197,7 +197,7 @@ class MeshBlock:
     closed: np.ndarray
 
     @classmethod
-    def of(cls, scheme: Scheme, block: Block, meshes: int) -> MeshBlock:
+    def of(cls, scheme: ChainScheme, block: StepBlock, meshes: int) -> MeshBlock:
         """Make the matrices of a block whose first `meshes` contacts are drive flanks."""
         selection, stiffness = block.selection[1:], block.stiffness[1:]
         closed = np.empty((len(selection), *scheme.flexibility.shape))
@@ -236,7 +236,7 @@ def _solved_side_by_side(matrix, right) -> np.ndarray:
     return np.ascontiguousarray(solution.transpose(2, 0, 1))
 
 
-def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+def march_closed(scheme: ChainScheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
     """Fill ``rows[i + 1]`` (2, 2 n + m), the motion and the free motion, from ``rows[i]`` for i in `steps`.
 
     All meshes are linear; `loads` (t, 2 n + m) act on the motion alone.
@@ -251,7 +251,7 @@ def march_closed(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -
         drawn[:] = dot(drawn, closed[i])
 
 
-def march_pairs(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+def march_pairs(scheme: ChainScheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
     """Fill rows as `march_closed`, two steps at a time; the free motion is left out between them."""
     even = len(steps) // 2 * 2
     for first in range(0, even, _TOGETHER):
@@ -259,7 +259,7 @@ def march_pairs(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) ->
     march_closed(scheme, meshes, loads, rows, steps[even:])
 
 
-def _march_pairs(scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+def _march_pairs(scheme: ChainScheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
     """Fill rows by pairs of steps, each of which is one linear map.
 
     Its rows ``(q, v, g, g)`` have the mesh forces g at the ends of both steps; those of the first one enter
@@ -355,7 +355,7 @@ class Separating:
         self.least = np.where(closed, 0.0, -np.inf)
         self.most = np.where(closed, np.inf, 0.0)
 
-    def march(self, scheme: Scheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+    def march(self, scheme: ChainScheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
         """Fill rows as `march_closed`, with the contacts that touch."""
         i, stop = steps.start, steps.stop
         while i < stop:

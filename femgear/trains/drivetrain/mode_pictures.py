@@ -138,7 +138,7 @@ def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.nda
     return move, turn
 
 
-def shaft_lines(
+def shaft_centre_lines(
     model: DrivetrainModel, layout: Layout, shape, *, points: int = 8
 ) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
     """Compute the centre lines (k, 3) [m] of the shafts under a motion (n_free,): at rest, and displacements.
@@ -360,5 +360,5 @@ def write_mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset,
         title += f": {hertz[mode]:.2f} Hz, {kinds[mode]}"
         names.append(f"drivetrain_mode_{mode + 1}.png")
         move, turn = layout_motion(model, layout, shape)
-        draw_motion(folder / names[-1], layout, move, turn, shaft_lines(model, layout, shape), title=title)
+        draw_motion(folder / names[-1], layout, move, turn, shaft_centre_lines(model, layout, shape), title=title)
     return names

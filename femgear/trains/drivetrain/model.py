@@ -32,7 +32,7 @@ from femgear.stages.static import solve_static
 from femgear.system.force_laws import positive_part
 from femgear.system.fourier import FourierSeries, orders_of, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
-from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, pair_of, torque_histories
+from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, pair_case_of, torque_histories
 from femgear.trains.drivetrain.kinematics import (
     Coordinates,
     FlankContacts,
@@ -495,7 +495,7 @@ def computed_drivetrain(case: DrivetrainCase) -> Drivetrain:
 @lru_cache(maxsize=8)
 def _computed_mesh(text: str) -> ComputedMesh:
     """Solve the static contact of the pair of a case file for its mesh stiffness."""
-    pair = pair_of(text)
+    pair = pair_case_of(text)
     static = solve_static(pair)
     values = static.cycle.stiffness[0]
     # a negative torque is the drive of gear 2: positions run backwards

@@ -381,7 +381,7 @@ class BearingSection(Part):
 
 
 @dataclass(frozen=True)
-class Mesh:
+class StageMesh:
     """A mesh of a stage: its ``name`` and the number of the ``stage`` and of the ``planet`` on it, both from 0.
 
     ``key`` is its entry in the case file, ``section`` what stands there.
@@ -428,18 +428,18 @@ class Drivetrain:
         return (*self.planetary, *self.parallel)
 
     @property
-    def meshes(self) -> tuple[Mesh, ...]:
+    def meshes(self) -> tuple[StageMesh, ...]:
         """Meshes of the stages in their order; of a planetary one those of the sun before the ring's."""
         found = []
         for i, one in enumerate(self.planetary):
             suns = [f"{one.sun}-planet {p + 1}" for p in range(len(one.angles))]
             rings = [f"planet {p + 1}-ring of {one.carrier}" for p in range(len(one.angles))]
             for names, entry, mesh in ((suns, "sun_mesh", one.sun_mesh), (rings, "ring_mesh", one.ring_mesh)):
-                found += [Mesh(name, i, f"planetary[{i}].{entry}", mesh, p) for p, name in enumerate(names)]
+                found += [StageMesh(name, i, f"planetary[{i}].{entry}", mesh, p) for p, name in enumerate(names)]
         for i, one in enumerate(self.parallel):
             assert one.mesh is not None  # given, or computed by `femgear.trains.drivetrain.model`
             entry = "mesh" if one.stiffness is None else "stiffness"
-            found.append(Mesh(one.name, len(self.planetary) + i, f"parallel[{i}].{entry}", one.mesh))
+            found.append(StageMesh(one.name, len(self.planetary) + i, f"parallel[{i}].{entry}", one.mesh))
         return tuple(found)
 
     def planet_names(self, stage: PlanetarySection) -> list[str]:

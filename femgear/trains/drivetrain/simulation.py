@@ -19,11 +19,11 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.trains.drivetrain.integrator import (
-    Block,
+    ChainScheme,
     MeshBlock,
-    Scheme,
     Separating,
     Spin,
+    StepBlock,
     march_pairs,
     solve_overlaps,
 )
@@ -180,7 +180,7 @@ def march_drivetrain(
     count = max(1, round(duration / step))
     stepped = contact_model(model) if contact_loss else model
     spin = Spin(stepped, torques, step, speed)
-    scheme = Scheme.of(stepped, step, speed, spin.directions)
+    scheme = ChainScheme.of(stepped, step, speed, spin.directions)
     if outputs is None:
         outputs = [name for name in model.system.dofs if name.endswith("rotation")]
     at = np.array([model.index(name) for name in outputs], int)
@@ -213,7 +213,7 @@ def march_drivetrain(
 class _Motion:
     """The motion and the free motion beside it, block by block."""
 
-    def __init__(self, model: DrivetrainModel, scheme: Scheme, spin: Spin, start, count: int, contact_loss):
+    def __init__(self, model: DrivetrainModel, scheme: ChainScheme, spin: Spin, start, count: int, contact_loss):
         self.scheme, self.spin, self.meshes = scheme, spin, len(model.meshes)
         # steps between two sizes of the free motion
         self.piece = max(1, min(PIECE, count // _SIZES))
@@ -240,7 +240,7 @@ class _Motion:
 
 
 def _start_state(
-    model: DrivetrainModel, scheme: Scheme, spin: Spin, start, contacts: FlankContacts | None
+    model: DrivetrainModel, scheme: ChainScheme, spin: Spin, start, contacts: FlankContacts | None
 ) -> np.ndarray:
     """State ``(q, v, g)`` at the first instant; with `contacts` meshes separate."""
     n, U = scheme.n, scheme.basic
@@ -296,7 +296,7 @@ def _static_deviations(model: DrivetrainModel, W, k, load, contacts: FlankContac
 class FreeMotion:
     """Size of the free motion: the root of twice its energy, meshes included and the spin left out."""
 
-    def __init__(self, model: DrivetrainModel, scheme: Scheme):
+    def __init__(self, model: DrivetrainModel, scheme: ChainScheme):
         self.system, self.rigid, self.scheme = model.system, model.rigid, scheme
         self.carried, self.inertia = model.system.M @ model.rigid, model.inertia
         self.times, self.sizes = [0.0], [0.0]
@@ -382,7 +382,7 @@ class EnergyBalance:
 class _Balances:
     """Energy and momentum of the deviations and of the spin."""
 
-    def __init__(self, model: DrivetrainModel, scheme: Scheme, spin: Spin, state):
+    def __init__(self, model: DrivetrainModel, scheme: ChainScheme, spin: Spin, state):
         self.model, self.scheme, self.spin = model, scheme, spin
         self.carried = model.system.M @ model.rigid
         self.loads = self.damping = self.meshes = self.drift = self.impulse = 0.0
@@ -401,7 +401,7 @@ class _Balances:
     def _momentum(self, state, speed: float) -> float:
         return float(self.carried @ state[self.scheme.n : 2 * self.scheme.n]) + self.spin.inertia * speed
 
-    def add(self, states, block: Block) -> None:
+    def add(self, states, block: StepBlock) -> None:
         """Add the works and impulses of a block of steps."""
         n, h, spin = self.scheme.n, self.spin.step, self.spin
         moved = np.diff(states[:, :n], axis=0)
@@ -442,7 +442,7 @@ class _Balances:
         size = max(self.largest, self.effort) or self.swing
         return self.missed / size if self.missed else 0.0
 
-    def check(self, states, block: Block, first: int, *, free: FreeMotion, contact_loss: bool) -> None:
+    def check(self, states, block: StepBlock, first: int, *, free: FreeMotion, contact_loss: bool) -> None:
         """Refuse motions that have outgrown the numbers (E-DIVERGED), states (t, 2 n + m) from `first` on."""
         finite = np.isfinite(states).all(axis=1)
         energy, momentum = self.works().error, self.momentum_error()
@@ -461,7 +461,7 @@ class _Balances:
             remedy=remedy,
         )
 
-    def _mesh(self, state, block: Block, last: int) -> str:
+    def _mesh(self, state, block: StepBlock, last: int) -> str:
         """The mesh with the most strain energy."""
         if not self.model.meshes:
             return ""
@@ -583,7 +583,7 @@ class _Record:
         self.extremes = np.array([np.full(meshes, np.inf), np.full(meshes, -np.inf)])
         self.pulled, self.lost = np.zeros((2, meshes))
 
-    def take(self, first: int, states, block: Block) -> None:
+    def take(self, first: int, states, block: StepBlock) -> None:
         """Rows of the states and the `Block` of some steps; that of their start with the first one alone."""
         begin = min(first, 1)
         approach = np.einsum("tmj,tm->tj", block.selection, states[:, : len(self.basic)] @ self.basic)

@@ -164,7 +164,7 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
     for variant, run in transient.runs.items():
         force, angle = run.force[late], run.spin[late]
         spectra[variant] = averaged_spectrum(force, step, resolution=resolution)
-        found = order_spectrum(force, angle, resolution=distance, per_turn=per_turn)
+        found = angle_spectrum(force, angle, resolution=distance, per_turn=per_turn)
         kept = found.frequency <= _ORDERS * rate * 2.0 * np.pi / run.spin_speed[late].max()
         tracked[variant] = replace(found, frequency=found.frequency[kept], amplitude=found.amplitude[..., kept])
         amplitudes[variant] = line_amplitudes(force, angle, run.spin_speed[late], lines, record_rate=rate)
@@ -251,7 +251,7 @@ def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpec
     return AveragedSpectrum(np.abs(frequency[:kept]), amplitude, 1.0 / (length * step), bandwidth, segments)
 
 
-def order_spectrum(signal, angle, *, resolution: float, per_turn: int) -> AveragedSpectrum:
+def angle_spectrum(signal, angle, *, resolution: float, per_turn: int) -> AveragedSpectrum:
     """Compute the spectrum of a signal over orders of an angle that need not grow evenly.
 
     The signal is taken at equal steps of the angle by cubic splines (K. R. Fyfe and E. D. S. Munck, Mech.

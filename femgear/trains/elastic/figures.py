@@ -32,11 +32,11 @@ from femgear.report.response import (
     MODE_CAPTIONS,
     RESPONSE_CAPTIONS,
     frequency_groups,
-    harmonics_of,
     mesh_force_period,
     mode_shapes,
     response_figures,
     shown_speeds,
+    stored_harmonics,
     transmission_error_period,
 )
 from femgear.report.scene import deformed_picture, ring_modes_grid, write_vtu
@@ -53,7 +53,7 @@ from femgear.report.style import (
     excited_to,
     label,
     legend_below,
-    mesh_harmonics,
+    mark_mesh_harmonics,
     new_figure,
     rpm,
     stems,
@@ -160,7 +160,7 @@ def ring_mean_deflection(dynamics: xr.Dataset, planetary_set: PlanetarySet) -> F
     figure, (ax,) = new_figure(width=6.4, height=6.6, polar=True)
     angle = np.linspace(0.0, 2 * np.pi, 721)
     zero = int(np.flatnonzero(dynamics["harmonic"].values == 0)[0])
-    component = harmonics_of(dynamics, "ring")[zero]
+    component = stored_harmonics(dynamics, "ring")[zero]
     radial = (np.exp(1j * np.outer(angle, dynamics["circumferential"].values)) @ component).real * 1e6
     size = np.abs(radial).max(initial=0.0) or 1.0
     ax.plot(angle, np.zeros_like(angle), color="0.45", linewidth=1.2, label="undeformed")
@@ -237,7 +237,7 @@ def housing_signal(housing: xr.Dataset) -> Figure:
     return figure
 
 
-def order_spectrum(housing: xr.Dataset) -> Figure:
+def draw_order_spectrum(housing: xr.Dataset) -> Figure:
     """Draw the order spectrum of housing.nc at its first speed, mesh harmonics marked.
 
     Below are the strongest bands with their lines labelled: one of harmonic ``h`` and nodal diameter ``n``
@@ -260,7 +260,7 @@ def order_spectrum(housing: xr.Dataset) -> Figure:
     axes[0].set_xlim(0, hertz * (end + 0.5 * ring_teeth))
     axes[0].set_ylim(floor, 2.5 * largest)
     axes[0].minorticks_off()
-    mesh_harmonics(axes[0], hertz * ring_teeth)
+    mark_mesh_harmonics(axes[0], hertz * ring_teeth)
     label(axes[0], "frequency [kHz]")
     for ax, harmonic in zip(axes[1:], bands):
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
@@ -400,7 +400,7 @@ def microphone_spectrum(housing: xr.Dataset) -> Figure:
     stems(axes[0], frequency, level, root, text="_", colour=VERMILION)
     axes[0].set_ylim(root, 1.08 * max(level.max(), root + 40.0))
     axes[0].set_xlim(0.0, 1.02 * frequency[level > root].max(initial=frequency[-1] * 1e-3))
-    mesh_harmonics(axes[0], 1e-3 * lines.z_ring * float(lines.base_speed) / (2.0 * np.pi))
+    mark_mesh_harmonics(axes[0], 1e-3 * lines.z_ring * float(lines.base_speed) / (2.0 * np.pi))
     total, place = float(housing["pressure_level"][0]), housing.attrs["microphone_distance"]
     label(axes[0], "frequency [kHz]", "sound pressure level\n[dB re 20 µPa]")
     for ax, harmonic in zip(axes[1:], bands):
@@ -517,7 +517,7 @@ def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
         model = None if dynamics is None else hanning_spectrum(dynamics, housing, angles, s)
         figures |= {
             f"housing_signal_{speed}": housing_signal(one),
-            f"order_spectrum_{speed}": order_spectrum(one),
+            f"order_spectrum_{speed}": draw_order_spectrum(one),
             f"modulation_{speed}": modulation_polar(one, angles, windowed=model, supports=supports),
         }
         if "pressure_level" in one:

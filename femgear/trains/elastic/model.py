@@ -20,7 +20,7 @@ import numpy as np
 from femgear.case.gear_set import support_stiffness
 from femgear.contact.bodies import active_flank_load, active_flank_weights, flank_stations
 from femgear.errors import ContactError
-from femgear.fe.compliance import cyclic_harmonics, rim_compliance, static_cut_shapes
+from femgear.fe.compliance import rim_compliance, sector_harmonics, static_cut_shapes
 from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis, smooth_cut_shapes
 from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import across, body_approach, torques, unit_vectors
@@ -430,7 +430,7 @@ def ring_model(
         outputs=_outer_surface_outputs(grid),
         max_frequency=max_frequency,
     )
-    compliance = [np.real(cyclic_harmonics(schur, diameters)[:, 0, 0]) for schur in schurs]
+    compliance = [np.real(sector_harmonics(schur, diameters)[:, 0, 0]) for schur in schurs]
     pitch_radius = ring.base_radius / np.cos(planetary_set.working_pressure_angle_planet_ring)
     return RingModel(
         modes=modes,

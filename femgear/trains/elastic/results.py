@@ -47,7 +47,7 @@ from femgear.housing.sound import (
     stored_sound,
     whole_turns,
 )
-from femgear.report.response import harmonics_of
+from femgear.report.response import stored_harmonics
 from femgear.report.tables import (
     MANY,
     Block,
@@ -81,7 +81,7 @@ from femgear.storage.results import (
     complex_entries,
     coordinates,
     mode_entries,
-    response_entries,
+    response_variables,
 )
 from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import checked_speeds, dynamics_warnings, housing_warnings
@@ -432,7 +432,7 @@ class DynamicsResult(StageResult):
         }
         harmonic, periods = np.arange(response.force.shape[-1]), response.periods
         return Contents(
-            response_entries(self) | reach | complex_entries(entries, single=True),
+            response_variables(self) | reach | complex_entries(entries, single=True),
             coords=coordinates(
                 speed=self.input_speed / RPM,
                 mesh=mesh_names(self.dte.shape[1] // 2),
@@ -686,7 +686,7 @@ def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     """
     names, factors, sharing = dynamics["mesh"].values, list[np.ndarray](), np.ones(2)
     for i in chosen(dynamics.sizes["speed"]):
-        force = harmonics_of(dynamics.isel(speed=i), "mesh_force")
+        force = stored_harmonics(dynamics.isel(speed=i), "mesh_force")
         mean, peak = np.real(force[:, 0]), sample(force, 4 * force.shape[-1]).max(axis=-1)
         factors.append(_by_kind(names, peak / mean))
         of_all = [mean[len(mean) // 2 * k :][: len(mean) // 2].mean() for k in range(2)]
@@ -1106,7 +1106,7 @@ def _shown_harmonics(spectrum, teeth: int, given: int | None) -> list[int]:
 def hanning_spectrum(dynamics: xr.Dataset, housing: xr.Dataset, planet_angles, speed: int) -> OrderSpectrum:
     """Compute the order spectrum of the Hanning-window model with the planet-ring forces of dynamics.nc."""
     ring = [str(name).endswith("ring") for name in dynamics["mesh"].values]
-    force = harmonics_of(dynamics.isel(speed=speed), "mesh_force")[ring]
+    force = stored_harmonics(dynamics.isel(speed=speed), "mesh_force")[ring]
     lines = component_lines(
         hanning_model(force, planet_angles),
         int(housing.attrs["ring_teeth"]),

@@ -103,7 +103,7 @@ def heard_speeds(force: np.ndarray, lines: SensorLines, lowest_force=None) -> He
     )
 
 
-def joined(parts: Sequence[HeardSpeeds]) -> HeardSpeeds:
+def joined_speeds(parts: Sequence[HeardSpeeds]) -> HeardSpeeds:
     """Join what is kept of speeds one after the other, without the orders that are silent at all of them."""
     order = np.unique(np.concatenate([one.order for one in parts]))
     lines = np.zeros((sum(len(one.level) for one in parts), len(order)), np.complex64)

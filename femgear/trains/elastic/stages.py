@@ -149,7 +149,7 @@ from femgear.trains.elastic.runup import (
     RunupResult,
     describe_runup,
     heard_speeds,
-    joined,
+    joined_speeds,
     mode_levels,
     resonances,
 )
@@ -629,7 +629,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         alone += levels
     if case.housing.stands_still:
         parts = _heard_in_housing(case, modes, carrier, limit, progress)
-    levels = joined(parts)
+    levels = joined_speeds(parts)
     change, compared_to = _run_up_change(case, modes, speeds, limit, levels.level)
     return RunupResult(
         input_speed=speeds,

@@ -17,8 +17,8 @@ from femgear.errors import CaseError
 from femgear.gears.phasing import MeshPhasing, PhasingTable, phase_factors, phasing_of_set, phasing_table
 from femgear.report.response import (
     RESPONSE_CAPTIONS,
-    harmonics_of,
     response_figures,
+    stored_harmonics,
     transmission_error_period,
 )
 from femgear.report.scene import rounded
@@ -204,7 +204,7 @@ def _mesh_force_spectra(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
     """Amplitudes of the mesh forces of planet 1 over the frequency of every harmonic; modes are marked."""
     order = np.argsort(dynamics["mesh_frequency"].values)
     hertz = dynamics["mesh_frequency"].values[order]
-    lines = harmonics_of(dynamics, "mesh_force")[order]
+    lines = stored_harmonics(dynamics, "mesh_force")[order]
     count = min(_HARMONICS, lines.shape[-1] - 1)
     names, n = [str(name) for name in dynamics["mesh"].values], dynamics.sizes["mesh"] // 2
     figure, axes = new_figure(rows=2, height=7.4, sharex=True)
@@ -244,7 +244,7 @@ def _pin_forces(dynamics: xr.Dataset) -> Figure:
     speed = dynamics["speed"].values[order]
     figure, axes = new_figure(rows=2, height=7.0, sharex=True)
     for ax, name, unit in zip(axes, ("force", "moment"), ("N", "N m")):
-        lines = harmonics_of(dynamics, f"pin_{name}")[order]
+        lines = stored_harmonics(dynamics, f"pin_{name}")[order]
         rms, mean = fluctuation(lines).max(axis=1), np.abs(lines[0, :, :, 0]).max(axis=0)
         # about its own axis the pin does not hold the planet
         held = np.flatnonzero(rms.max(axis=0) > _PAIR * rms.max())
@@ -263,7 +263,7 @@ def _pin_forces(dynamics: xr.Dataset) -> Figure:
 
 def _slice_forces(dynamics: xr.Dataset) -> Figure:
     """Load over face width and mesh period of the meshes of planet 1, at the speed where it changes most."""
-    lines, height = harmonics_of(dynamics, "slice_force"), 1e3 * dynamics["slice"].values
+    lines, height = stored_harmonics(dynamics, "slice_force"), 1e3 * dynamics["slice"].values
     width = 1e3 * float(dynamics.attrs["face_width"]) / len(height)
     speed = int(fluctuation(lines).max(axis=(1, 2)).argmax())
     position = np.linspace(0.0, 1.0, 129)

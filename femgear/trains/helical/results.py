@@ -20,7 +20,7 @@ from femgear.stages.lumped_set import modes_dataset, stiffness_text, torsion_tex
 from femgear.stages.protocol import StageResult
 from femgear.stages.static_results import mean_over_period, peak_to_peak
 from femgear.storage.contents import Contents
-from femgear.storage.results import FOURIER, complex_entries, coordinates, response_entries
+from femgear.storage.results import FOURIER, complex_entries, coordinates, response_variables
 from femgear.system.rigid_bodies import CENTRAL
 from femgear.system.system import MeshExcitation
 from femgear.trains.helical.model import HelicalSet, SectionStiffness
@@ -185,7 +185,7 @@ class HelicalDynamicsResult(StageResult):
             ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
         )
         return Contents(
-            response_entries(self) | complex_entries(entries),
+            response_variables(self) | complex_entries(entries),
             coords=_coordinates(self),
             attrs={
                 "title": "periodic response of the helical set by the spectral method",

@@ -14,7 +14,13 @@ from femgear.case.sections import LARGEST_HELIX, LEFT_OUT, Inertia, Mass, MeshSt
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError
 from femgear.findings import Finding
-from femgear.stages.lumped_set import entries_without_effect, flank_entries, listed, rigid_refusals, unheld_member
+from femgear.stages.lumped_set import (
+    entries_with_verb,
+    entries_without_effect,
+    flank_entries,
+    rigid_refusals,
+    unheld_member,
+)
 
 _MOST_SLICES = 30
 # measured with 8 meshes of 10 to 30 slices: the time of one speed grows with the cube of the columns
@@ -77,7 +83,7 @@ def helical_notices(data: dict, helix_angle: float) -> Iterator[Finding]:
     if data["planet"].get("bearing_clearance"):
         unused.append("planet.bearing_clearance")
     if unused:
-        yield Finding("W-UNUSED", "", f"{listed(unused)} no effect in this helical case")
+        yield Finding("W-UNUSED", "", f"{entries_with_verb(unused)} no effect in this helical case")
     if data["helical"].get("contact_points") == "base_circles":
         yield Finding(
             "W-CONTACT-POINTS",
@@ -95,7 +101,7 @@ def helical_notices(data: dict, helix_angle: float) -> Iterator[Finding]:
             yield Finding(
                 "W-UNUSED",
                 "",
-                f"{listed(given)} no effect while helical.mesh_stiffness is given: it leaves nothing that "
+                f"{entries_with_verb(given)} no effect while helical.mesh_stiffness is given: it leaves nothing that "
                 "excites, and modes are all that is computed",
             )
     else:

@@ -45,7 +45,7 @@ class GearsSection(Section):
     bearing_damping_ratio: DampingRatio = 0.0
 
 
-class MeshSection(Section):
+class ImpactMeshSection(Section):
     """Mesh stiffness, backlash, damping, tooth error; waves are harmonics of the tooth frequency, from 1."""
 
     stiffness: Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
@@ -57,13 +57,13 @@ class MeshSection(Section):
     error_angles: Annotated[tuple[Angle, ...], Values(max_length=_MOST_WAVES)] = ()
 
 
-class OperationSection(Section):
+class ImpactOperationSection(Section):
     """Torque on the driving gear; a positive one presses the drive flanks together."""
 
     torque: Annotated[float, Quantity(TORQUE, -1e9, 1e9)]
 
 
-class ResponseSection(Section):
+class ImpactResponseSection(Section):
     """Periodic motions over the frequency ratio by harmonic balance, from one end to the other."""
 
     start: Ratio = Field(default=3.5, alias="from")
@@ -108,14 +108,14 @@ class GearPairCase(Section, ReadCase):
     model: Literal["gear_pair"]
     title: Title
     gears: GearsSection
-    mesh: MeshSection
-    operation: OperationSection
-    response: ResponseSection = ResponseSection()
+    mesh: ImpactMeshSection
+    operation: ImpactOperationSection
+    response: ImpactResponseSection = ImpactResponseSection()
     sweep: SweepSection | None = None
     chaos: ChaosSection | None = None
 
 
-def cross_check(case: GearPairCase) -> Iterator[CaseError]:
+def check_impact_entries(case: GearPairCase) -> Iterator[CaseError]:
     """Refuse what no entry shows alone."""
     mesh, gears = case.mesh, case.gears
     for wave, angles in (("stiffness_waves", "stiffness_angles"), ("error", "error_angles")):
@@ -217,4 +217,4 @@ def _waves(amplitudes, angles) -> tuple[complex, ...]:
     return tuple(a * cmath.exp(1j * angle) for a, angle in zip(amplitudes, angles or [0.0] * len(amplitudes)))
 
 
-FILE = CaseFile(GearPairCase, cross_check)
+FILE = CaseFile(GearPairCase, check_impact_entries)

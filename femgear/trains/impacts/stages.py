@@ -60,7 +60,7 @@ _LENGTH, _RATE = "in half backlashes", "in natural angular frequencies"
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseResult(StageResult):
+class ImpactResponseResult(StageResult):
     """Periodic motions of the ``case`` along a ``branch`` of p points.
 
     ``lowest`` and ``highest`` (p,) are the extremes of the motion in half backlashes, ``shares`` (p,) those of the time
@@ -249,7 +249,7 @@ def _units(case: GearPairCase, title: str) -> dict[str, Any]:
 
 
 @one_blas_thread()
-def solve_response(case: GearPairCase) -> ResponseResult:
+def solve_impact_response(case: GearPairCase) -> ImpactResponseResult:
     """Follow periodic motions over the frequency ratio past limit points, with stability and contact."""
     pair, given = pair_of(case), case.response
     with blaming_start(case, "response.from"):
@@ -265,7 +265,7 @@ def solve_response(case: GearPairCase) -> ResponseResult:
     phase = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
     x = np.array([solution.at(phase)[:, 0] for solution in branch.solutions])
     borders = {level: np.sort(impact_borders(pair, branch, level)) for level in (DRIVE, BACK)}
-    return ResponseResult(case, branch, x.min(axis=1), x.max(axis=1), contact_shares(x), borders)
+    return ImpactResponseResult(case, branch, x.min(axis=1), x.max(axis=1), contact_shares(x), borders)
 
 
 @one_blas_thread()
@@ -411,11 +411,11 @@ GEAR_PAIR = Train(
         Stage(
             name="response",
             title="Response",
-            solve=solve_response,
+            solve=solve_impact_response,
             verdict=lambda result: {"points": len(result.lowest), "message": result.branch.message},
             describe=lambda results: _describe_response(results.response),
             unavailable=_no_response,
-            warnings=ResponseResult.warnings,
+            warnings=ImpactResponseResult.warnings,
         ),
         Stage(
             name="sweep",

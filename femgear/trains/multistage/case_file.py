@@ -91,7 +91,7 @@ MemberName = Annotated[str, BeforeValidator(_member)]
 Length = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 
 
-class BodySection(Section):
+class StageBodySection(Section):
     """Sun, ring or carrier, and the stiffnesses that hold it in the housing."""
 
     mass: Mass
@@ -100,7 +100,7 @@ class BodySection(Section):
     torsional_stiffness: Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)] = 0.0
 
 
-class PlanetSection(Section):
+class StagePlanetSection(Section):
     """One of the equal planets on its bearing."""
 
     mass: Mass
@@ -108,7 +108,7 @@ class PlanetSection(Section):
     bearing_stiffness: Annotated[float, StiffnessOrRigid(STIFFNESS, 1.0, 1e15)]
 
 
-class GearsSection(Section):
+class StageGearsSection(Section):
     """Gears of a stage: sun, planet, ring; mesh phases, contact ratios and stiffness follow from them."""
 
     teeth: Annotated[tuple[Teeth, ...], TRIPLE]
@@ -135,14 +135,14 @@ class StageSection(Section):
 
     planets: Annotated[int, Count(1, 24)] = 3
     planet_angles: Annotated[tuple[Angle, ...], Values(min_length=1, max_length=24)] | None = None
-    gears: GearsSection | None = None
+    gears: StageGearsSection | None = None
     radii: RadiiSection | None = None
     fixed: Literal["carrier", "ring", "sun", "none"] = "ring"
     angle: Angle = 0.0
-    sun: BodySection
-    planet: PlanetSection
-    ring: BodySection
-    carrier: BodySection
+    sun: StageBodySection
+    planet: StagePlanetSection
+    ring: StageBodySection
+    carrier: StageBodySection
 
     @property
     def angles(self) -> tuple[float, ...]:
@@ -160,7 +160,7 @@ class CouplingSection(Section):
     lateral: Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, _STIFFEST_LATERAL)] | None = None
 
 
-class OperationSection(Section):
+class StagesOperationSection(Section):
     """Speed of and torque on the input, and where input and output are."""
 
     speed: Speed
@@ -169,7 +169,7 @@ class OperationSection(Section):
     output: MemberName | None = None
 
 
-class ResponseSection(Section):
+class StagesResponseSection(Section):
     """Speeds of the input, harmonics of every mesh frequency, and speeds of harmonic balance beside them."""
 
     lowest: Speed
@@ -192,8 +192,8 @@ class MultistageCase(Section, ReadCase):
     title: Title
     stage: Annotated[tuple[StageSection, ...], Field(min_length=1, max_length=20)]
     coupling: Annotated[tuple[CouplingSection, ...], Field(max_length=60)] = ()
-    operation: OperationSection | None = None
-    response: ResponseSection | None = None
+    operation: StagesOperationSection | None = None
+    response: StagesResponseSection | None = None
 
     @property
     def geared(self) -> bool:
@@ -201,7 +201,7 @@ class MultistageCase(Section, ReadCase):
         return all(one.gears is not None for one in self.stage)
 
 
-def cross_check(case: MultistageCase) -> Iterator[CaseError]:
+def check_stages_entries(case: MultistageCase) -> Iterator[CaseError]:
     """Refuse what no entry shows alone."""
     found = list(_entry_problems(case))
     yield from found
@@ -368,7 +368,7 @@ def _stage(stage: StageSection) -> PlanetaryStage:
     if size.mesh_stiffness is not None:
         lumped["stiffness_sun_planet"] = size.mesh_stiffness.sun_planet
         lumped["stiffness_planet_ring"] = size.mesh_stiffness.planet_ring
-    if isinstance(size, GearsSection):
+    if isinstance(size, StageGearsSection):
         gears = stage_gears(stage)
         data = planar_from_set(gears, **_iso_stiffness(gears) | lumped)
         return PlanetaryStage(data=data, teeth=size.teeth, fixed=fixed, phases=gears.mesh_phases, angle=stage.angle)
@@ -394,4 +394,4 @@ def _iso_stiffness(gears: PlanetarySet) -> dict[str, float]:
     }
 
 
-FILE = CaseFile(MultistageCase, cross_check)
+FILE = CaseFile(MultistageCase, check_stages_entries)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.report.response import harmonics_of
+from femgear.report.response import stored_harmonics
 from femgear.report.style import BLACK, COLOURS, SIZE, label, legend_below, line_style, new_figure, rpm
 from femgear.stages.protocol import Drawn, Figures
 
@@ -100,7 +100,7 @@ def _peaks(modes: xr.Dataset, response: xr.Dataset, stage: int, harmonic: int) -
     """Find peaks of the forces that a mesh harmonic of a stage excites: numbers of speed and mode."""
     from scipy.signal import find_peaks
 
-    force = harmonics_of(response.isel(excited_by=stage, harmonic=harmonic), "mesh_force")
+    force = stored_harmonics(response.isel(excited_by=stage, harmonic=harmonic), "mesh_force")
     hertz = response["harmonic"].values[harmonic] * response["mesh_frequency"].values[stage]
     size, found = np.log10(np.maximum(np.abs(force).max(axis=1), 1e-300)), []
     for at in find_peaks(size, prominence=_PROMINENCE)[0].tolist():

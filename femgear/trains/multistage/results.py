@@ -102,7 +102,7 @@ class MultistageModes(StageResult):
 
 
 @dataclass(frozen=True, eq=False)
-class ResponseResult(StageResult):
+class StagesResponseResult(StageResult):
     """Response of all meshes to the transmission errors of every stage.
 
     ``data`` is the train, ``speed`` (F,) that of its input [rad/s], ``answers`` are the responses by the number of the

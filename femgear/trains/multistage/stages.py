@@ -24,8 +24,8 @@ from femgear.system.mode_kinds import class_energies, gear_set_motions, mixture,
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 from femgear.trains.multistage.case_file import (
     MultistageCase,
-    OperationSection,
-    ResponseSection,
+    StagesOperationSection,
+    StagesResponseSection,
     multistage_of,
     stage_gears,
 )
@@ -43,7 +43,7 @@ from femgear.trains.multistage.model import (
 from femgear.trains.multistage.results import (
     BalanceResult,
     MultistageModes,
-    ResponseResult,
+    StagesResponseResult,
     describe_forces,
     describe_multistage,
     describe_stage_modes,
@@ -253,12 +253,12 @@ def solve_multistage_modes(case: MultistageCase) -> MultistageModes:
 
 
 @one_blas_thread()
-def solve_response(case: MultistageCase, modes: MultistageModes) -> ResponseResult:
+def solve_stages_response(case: MultistageCase, modes: MultistageModes) -> StagesResponseResult:
     """Solve for the response to errors that the changing number of tooth pairs makes under the torque."""
     _, given = _asked(case)
     speed = np.linspace(given.lowest, given.highest, given.points)
     errors = loaded_errors(case, modes.data)
-    return ResponseResult(modes.data, speed, error_response(modes.data, speed, errors, modes=modes.modes))
+    return StagesResponseResult(modes.data, speed, error_response(modes.data, speed, errors, modes=modes.modes))
 
 
 @one_blas_thread()
@@ -330,7 +330,7 @@ def _wave_meshes(case: MultistageCase, train: MultistageSet) -> dict[int, GearMe
     return made
 
 
-def _asked(case: MultistageCase) -> tuple[OperationSection, ResponseSection]:
+def _asked(case: MultistageCase) -> tuple[StagesOperationSection, StagesResponseSection]:
     """Operation and response of a case that has both, which `_no_response` sees to."""
     assert case.operation is not None and case.response is not None
     return case.operation, case.response
@@ -360,7 +360,7 @@ MULTISTAGE = Train(
         Stage(
             name="response",
             title="Response",
-            solve=solve_response,
+            solve=solve_stages_response,
             takes=("modes",),
             verdict=lambda result: {"speeds": len(result.speed)},
             describe=lambda results: describe_forces(results.response, "Response"),

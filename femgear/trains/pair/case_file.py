@@ -47,10 +47,10 @@ from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import SetDeviations, no_deviations
 from femgear.gears.pair import GearPair, close_pair
 from femgear.gears.tips import settled_tips
-from femgear.stages.lumped_set import listed, strength_entries
+from femgear.stages.lumped_set import entries_with_verb, strength_entries
 
 
-class SetSection(Section):
+class PairSetSection(Section):
     """What both gears share.
 
     ``centre_distance`` may be left out (the profile shifts give it), and so may, where it is given, one of
@@ -103,7 +103,7 @@ class WheelSection(GearSection):
         return self.outer_radius is not None
 
 
-class OperationSection(Section):
+class PairOperationSection(Section):
     """Torque on gear 1, of either sign, and speeds of gear 1; gear 2 is held while the contact is solved.
 
     Behind couplings the torques act on motor and brake.
@@ -124,12 +124,12 @@ class PairCase(GearCase):
     gear_names: ClassVar[tuple[str, ...]] = ("gear_1", "gear_2")
     model: Literal["pair"]
     title: Title
-    set: SetSection
+    set: PairSetSection
     rack: RackSection = RackSection()
     material: MaterialSection
     gear_1: GearSection
     gear_2: WheelSection
-    operation: OperationSection
+    operation: PairOperationSection
     motor: MachineSection | None = None
     brake: MachineSection | None = None
     static: StaticSection = StaticSection()
@@ -189,7 +189,7 @@ class PairCase(GearCase):
         return self.operation.torque if torque is None else torque
 
 
-def cross_check(case: PairCase) -> Iterator[CaseError]:
+def check_pair_entries(case: PairCase) -> Iterator[CaseError]:
     """Refuse what no entry shows alone."""
     two, shifts = case.gear_2, [getattr(case, name).profile_shift for name in case.gear_names]
     if (two.bore_radius is None) == (two.outer_radius is None):
@@ -232,7 +232,7 @@ def pair_notices(data: dict, case: PairCase) -> Iterator[Finding]:
     """List what a pair gives in a way that deserves to be said, by the tables of its checked file."""
     yield from added_material(case)
     if unused := strength_entries(data):
-        yield Finding("W-UNUSED", "", f"{listed(unused)} no effect on a pair, which has no safeties")
+        yield Finding("W-UNUSED", "", f"{entries_with_verb(unused)} no effect on a pair, which has no safeties")
 
 
-FILE = CaseFile(PairCase, cross_check, notices=pair_notices, embed=embed_profiles)
+FILE = CaseFile(PairCase, check_pair_entries, notices=pair_notices, embed=embed_profiles)

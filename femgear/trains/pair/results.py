@@ -24,7 +24,7 @@ from femgear.storage.results import (
     coordinates,
     declared,
     mode_entries,
-    response_entries,
+    response_variables,
     shape_entries,
 )
 from femgear.system.fourier import fluctuation
@@ -183,8 +183,8 @@ class PairDynamicsResult(StageResult):
 
     @staticmethod
     def warnings(data: xr.Dataset) -> Iterable[Finding]:
-        """List what dynamics.nc says against itself, see `dynamics_warnings`."""
-        return dynamics_warnings(data)
+        """List what dynamics.nc says against itself, see `pair_dynamics_warnings`."""
+        return pair_dynamics_warnings(data)
 
     def contents(self) -> Contents:
         """Collect the contents of dynamics.nc."""
@@ -195,7 +195,7 @@ class PairDynamicsResult(StageResult):
             ("mesh_force", lines, motion.force, "N", "dynamic mesh force"),
         )
         reach = ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation")
-        known = response_entries(self) | {"excitation_limit": reach} | motion.levels("speed")
+        known = response_variables(self) | {"excitation_limit": reach} | motion.levels("speed")
         known["backlash"] = ("mesh", self.backlash, *_PLAY)
         title = {"title": "periodic response of the pair", "message": self.response.message}
         return Contents(
@@ -258,8 +258,8 @@ class PairRunupResult(StageResult):
 
     @staticmethod
     def warnings(data: xr.Dataset) -> Iterable[Finding]:
-        """List what runup.nc says against itself, see `runup_warnings`."""
-        return runup_warnings(data)
+        """List what runup.nc says against itself, see `pair_runup_warnings`."""
+        return pair_runup_warnings(data)
 
     def contents(self) -> Contents:
         """Collect the contents of runup.nc."""
@@ -304,7 +304,7 @@ def _lines(motion: PairMotion) -> tuple[tuple, tuple]:
     return ("dte", *dte), ("bearing_force", *bearing)
 
 
-def signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
+def pair_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
     """Sample acceleration of the transmission error and bearing forces at every speed, and over the run-up.
 
     At one speed they last whole turns of gear 1. The run-up has flanks held together.
@@ -326,7 +326,7 @@ def signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
         tell(Finding("W-PULL", "runup", text, remedy="listen to the speeds"))
 
 
-def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
+def pair_signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
     """Find the extent of the lines of all signals by unit, see `femgear.exchange.formats.line_extent`."""
     stages = ("dynamics", *({"runup"} & {*results.stages}))
     return line_extent((one[1:] for stage in stages for one in _recordings(results, stage)), rate)
@@ -374,7 +374,7 @@ def describe_dynamics(data: xr.Dataset) -> Block:
     return tabulate("Dynamics", (data.isel(speed=i) for i in chosen(data.sizes["speed"])), columns, notes)
 
 
-def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
+def pair_dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """Name the speeds of dynamics.nc that are not stable, and those at which flanks part (W-SEPARATION)."""
     yield from (one for one in response_warnings(data) if one.code != "W-PULL")
     speed, apart, back = data["speed"].values, data["drive_contact"] < 1.0, data["back_contact"] > 0.0
@@ -388,7 +388,7 @@ def dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("W-SEPARATION", "operation.speeds", text, remedy=remedy)
 
 
-def describe_runup(data: xr.Dataset) -> Block:
+def describe_pair_runup(data: xr.Dataset) -> Block:
     """Tabulate the strongest resonances of runup.nc by speed."""
     value = {str(name): one.values for name, one in data.items() if one.dims == ("resonance",)}
     columns = {
@@ -410,7 +410,7 @@ def describe_runup(data: xr.Dataset) -> Block:
     return tabulate("Run-up", strongest, columns, notes)
 
 
-def runup_warnings(data: xr.Dataset) -> Iterator[Finding]:
+def pair_runup_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """Tell of peaks between the speeds of runup.nc (W-STEPS), and of a branch that ended early (W-BRANCH)."""
     if missed := int(data.attrs["unresolved_resonances"]):
         text = f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels may be higher"

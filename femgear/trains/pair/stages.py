@@ -84,9 +84,9 @@ from femgear.trains.pair.results import (
     PairMotion,
     PairRunupResult,
     describe_dynamics,
-    describe_runup,
-    signal_extent,
-    signals,
+    describe_pair_runup,
+    pair_signal_extent,
+    pair_signals,
 )
 
 if TYPE_CHECKING:
@@ -440,7 +440,7 @@ PAIR = Train(
             solve=solve_pair_runup,
             takes=("modes",),
             verdict=lambda result: result.verdict,
-            describe=lambda results: describe_runup(results.runup),
+            describe=lambda results: describe_pair_runup(results.runup),
             wanted=lambda case: case.runup.count > 1,
             unavailable=lambda case: _no_speeds(case) or ("" if case.runup.count > 1 else "runup.count leaves it out"),
             warnings=PairRunupResult.warnings,
@@ -453,5 +453,5 @@ PAIR = Train(
         for name, figures in FIGURES.items()
     }
     | {"dynamics": DYNAMICS, "runup": RUNUP},
-    recorded=Recorded(signals, signal_extent, {"wav": ("dynamics",)}, 3),
+    recorded=Recorded(pair_signals, pair_signal_extent, {"wav": ("dynamics",)}, 3),
 )

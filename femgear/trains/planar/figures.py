@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.gear_set import planetary_set
-from femgear.report.response import MODE_CAPTIONS, harmonics_of, mode_shapes, shown_speeds
+from femgear.report.response import MODE_CAPTIONS, mode_shapes, shown_speeds, stored_harmonics
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, line_style, new_figure, runs
 from femgear.stages.protocol import Drawn, Figures
 from femgear.stages.static_figures import FIGURES as STATIC
@@ -39,7 +39,7 @@ _EQUAL = 5e-3
 _INSTANTS = 20_000
 
 
-def pieces(stable, wanted: int) -> list[slice]:
+def runs_of_one_kind(stable, wanted: int) -> list[slice]:
     """Find runs of segments of a curve of one kind: 1 stable, 0 not stable, -1 not known.
 
     A segment between two of the points (p,) is drawn once: unknown where one of its ends is, otherwise
@@ -159,12 +159,12 @@ def _parts(branch: xr.Dataset) -> list[tuple]:
     if branch.attrs["stability"] == "not computed":
         return [("-", "stability not computed", slice(None))]
     stable = branch["stable"].values
-    return [(*STABILITY[wanted], part) for wanted in STABILITY for part in pieces(stable, wanted)]
+    return [(*STABILITY[wanted], part) for wanted in STABILITY for part in runs_of_one_kind(stable, wanted)]
 
 
 def _weight_orbits(branch: xr.Dataset) -> Figure:
     """Paths of the carrier's centre in the carrier frame during one turn of the weight against it."""
-    lines = harmonics_of(branch, "displacement")
+    lines = stored_harmonics(branch, "displacement")
     curves = []
     for point, words in zip(branch["shown_point"].values, branch["shown_as"].values):
         path = _wave(branch) @ np.swapaxes(lines[point, 0], 0, 1)
@@ -176,7 +176,7 @@ def _weight_orbits(branch: xr.Dataset) -> Figure:
 
 def _weight_bearing_forces(branch: xr.Dataset) -> Figure:
     """Sizes of the planet-bearing forces over one turn of the weight against the carrier."""
-    lines = harmonics_of(branch, "planet_bearing_force")[branch["shown_point"].values[-1]]
+    lines = stored_harmonics(branch, "planet_bearing_force")[branch["shown_point"].values[-1]]
     wave = _wave(branch)
     curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
     return bearing_forces(branch["phase"].values, curves, title=_top(branch))
@@ -213,7 +213,7 @@ def contact_over_branch(branch: xr.Dataset) -> Figure:
 
 def _response_orbit(response: xr.Dataset, speed: int) -> Figure:
     """Paths of carrier, ring and sun in the carrier frame during one carrier turn."""
-    lines = harmonics_of(response, "displacement")[speed]
+    lines = stored_harmonics(response, "displacement")[speed]
     _, wave = _carrier_turn(response, speed)
     figure, axes = new_figure(columns=3, width=11.0, height=4.2)
     for ax, colour, name, one in zip(axes, COLOURS, response["member"].values, lines):
@@ -229,7 +229,7 @@ def _response_orbit(response: xr.Dataset, speed: int) -> Figure:
 
 def _response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
     """Sizes of the planet-bearing forces over one carrier turn."""
-    lines = harmonics_of(response, "planet_bearing_force")[speed]
+    lines = stored_harmonics(response, "planet_bearing_force")[speed]
     turn, wave = _carrier_turn(response, speed)
     curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
     title = f"{float(response['speed'][speed]):.6g} rpm" + _doubt(_tails(response)[speed])
@@ -238,7 +238,7 @@ def _response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
 
 def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
     """Draw mesh forces of planet 1 over one carrier turn, and over the first mesh periods if they vary."""
-    lines = harmonics_of(response, "mesh_force")[speed]
+    lines = stored_harmonics(response, "mesh_force")[speed]
     names = [str(name) for name in response["mesh"].values]
     turn, wave = _carrier_turn(response, speed)
     mesh, carrier = float(response["mesh_frequency"][speed]), _carrier_frequency(response, speed)
@@ -267,8 +267,8 @@ def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
 
 def _response_spectrum(response: xr.Dataset, speed: int) -> Figure:
     """Lines of the first mesh's force and of the sun's displacement, by the mesh harmonic they stand at."""
-    force = harmonics_of(response, "mesh_force")[speed, 0]
-    moved = harmonics_of(response, "displacement")[speed, 0, 0]
+    force = stored_harmonics(response, "mesh_force")[speed, 0]
+    moved = stored_harmonics(response, "displacement")[speed, 0, 0]
     hertz, mesh = np.abs(response["frequency"].values[speed]), response["mesh_order"].values
     figure, axes = new_figure(rows=2, width=8.5, height=6.0, sharex=True)
     quantities = (
@@ -340,7 +340,7 @@ def _response_figures(drawn: Drawn) -> dict[str, Figure]:
     """Figures of the speeds that are shown, and over all speeds where there are several."""
     response, figures = drawn.data["response"], {}
     speed = response["speed"].values
-    force, moving = np.abs(harmonics_of(response, "mesh_force")[:, 0]), response["frequency"].values != 0.0
+    force, moving = np.abs(stored_harmonics(response, "mesh_force")[:, 0]), response["frequency"].values != 0.0
     for s in shown_speeds(response):
         lines = force[s, moving[s]]
         # a few lines need no spectrum

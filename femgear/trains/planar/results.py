@@ -2,7 +2,7 @@
 
 Lines of motions and forces belong to the real signals ``x(t) = Re sum_l x_l exp(i (order_l . theta(t)))``;
 every variable of a file carries its units. The tables say what the case is and what was found;
-`branch_warnings` and `response_warnings` say what speaks against it.
+`branch_warnings` and `planar_response_warnings` say what speaks against it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from femgear.case.planetary import output_member
 from femgear.case.quantities import RPM
 from femgear.findings import NOTE, Finding, findings_in
 from femgear.gears.kinematics import torques
-from femgear.report.response import harmonics_of
+from femgear.report.response import stored_harmonics
 from femgear.report.tables import Block, Marks, chosen, first_speeds, significant, tabulate
 from femgear.stages.lumped_set import modes_dataset, needed, stiffness_text, torsion_text
 from femgear.stages.protocol import StageResult
@@ -222,8 +222,8 @@ class PlanarResponseResult(StageResult):
 
     @staticmethod
     def warnings(data: xr.Dataset) -> Iterable[Finding]:
-        """List what response.nc says against itself, see `response_warnings`."""
-        return response_warnings(data)
+        """List what response.nc says against itself, see `planar_response_warnings`."""
+        return planar_response_warnings(data)
 
     def contents(self) -> Contents:
         """Collect the contents of response.nc."""
@@ -465,7 +465,7 @@ def branch_warnings(data: xr.Dataset) -> Iterator[Finding]:
     yield from tail_warnings(data, "planar.branch.harmonics")
 
 
-def response_warnings(data: xr.Dataset) -> tuple[Finding, ...]:
+def planar_response_warnings(data: xr.Dataset) -> tuple[Finding, ...]:
     """Tell what truncation of the lines does to response.nc."""
     more = ", side_bands or dynamics.response_harmonics" if data.attrs["mesh_lines"] else ""
     return tail_warnings(data, f"planar.response.carrier_harmonics{more}")
@@ -495,9 +495,9 @@ def _verdicts(data: xr.Dataset) -> Iterator[str]:
         yield f"not stable: {span} ({reasons})" if state == 0 else f"not determined: {span} ({reasons})"
 
 
-def describe_response(data: xr.Dataset) -> Block:
+def describe_planar_response(data: xr.Dataset) -> Block:
     """Tabulate displacements [um], mesh forces [kN] and contact of response.nc, a row a speed [rpm]."""
-    varying = fluctuation(harmonics_of(data, "mesh_force")).max(axis=1)
+    varying = fluctuation(stored_harmonics(data, "mesh_force")).max(axis=1)
     marks, doubtful = Marks(findings_in(data.attrs)), _tail_codes(data)
     columns = {
         "speed [rpm]": lambda i: f"{float(data.speed[i]):.4g}",

@@ -30,9 +30,9 @@ from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.stages.lumped_set import (
     Gravity,
+    entries_with_verb,
     entries_without_effect,
     flank_entries,
-    listed,
     rigid_refusals,
     unheld_member,
 )
@@ -160,9 +160,9 @@ def planar_notices(data: dict) -> Iterator[Finding]:
         keys += ["mesh_harmonics", "response_harmonics"]
     dynamics = [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
     if unused := entries_without_effect(data, dynamics):
-        yield Finding("W-UNUSED", "", f"{listed(unused)} no effect in this planar case")
+        yield Finding("W-UNUSED", "", f"{entries_with_verb(unused)} no effect in this planar case")
     if "mesh_stiffness" in planar and (unused := _without_static(data)):
-        yield Finding("W-UNUSED", "", f"{listed(unused)} no effect while planar.mesh_stiffness is given")
+        yield Finding("W-UNUSED", "", f"{entries_with_verb(unused)} no effect while planar.mesh_stiffness is given")
     if "response" in planar and "mesh_stiffness" in planar:
         still = "no weight acts" if "gravity" not in planar else ""
         if data["operation"].get("fixed", "ring") == "carrier":

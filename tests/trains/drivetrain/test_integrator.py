@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
 
-from femgear.trains.drivetrain.integrator import MeshBlock, Scheme, Spin, march_closed, march_pairs
+from femgear.trains.drivetrain.integrator import ChainScheme, MeshBlock, Spin, march_closed, march_pairs
 from femgear.trains.drivetrain.model import drivetrain_model
 from femgear.trains.drivetrain.parts import constant_torques
 
@@ -16,7 +16,7 @@ def steps():
     """Model, scheme, the instants of some hundred steps, and their matrices."""
     model = drivetrain_model(wind_turbine_drivetrain())
     spin = Spin(model, constant_torques(paper_torques(balanced=True)), 5e-5, PRINTED.speed)
-    scheme = Scheme.of(model, 5e-5, PRINTED.speed, spin.directions)
+    scheme = ChainScheme.of(model, 5e-5, PRINTED.speed, spin.directions)
     block = spin.block(0, COUNT)
     return model, scheme, block, MeshBlock.of(scheme, block, len(model.meshes))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from published.wind_turbine_drivetrain import PRINTED, wind_turbine_drivetrain
 
-from femgear.trains.drivetrain.mode_pictures import beam_shape, drivetrain_layout, layout_motion, shaft_lines
+from femgear.trains.drivetrain.mode_pictures import beam_shape, drivetrain_layout, layout_motion, shaft_centre_lines
 from femgear.trains.drivetrain.model import drivetrain_model
 from femgear.trains.drivetrain.parts import BearingSection, BodySection, Drivetrain, ShaftSection
 
@@ -83,7 +83,7 @@ def moved(model, layout, deflection, slope):
             }
             for axis, value in values.items():
                 shape[model.index(f"{name}: {axis}")] = value
-    ((rest, across),) = shaft_lines(model, layout, shape)
+    ((rest, across),) = shaft_centre_lines(model, layout, shape)
     assert not across[:, 2].any() and np.allclose(across[:, 1], -2.0 * across[:, 0])
     return rest[:, 2] - layout.centre[0, 2], across[:, 0]
 
@@ -129,7 +129,7 @@ def test_joints_are_drawn_as_the_beams_that_they_stand_for(options):
         assert len(z) > 8 and x == pytest.approx(0.2 + 3.0 * z)
     # any motion of the ends: slopes along the shaft change little by little
     shape = np.random.default_rng(5).standard_normal(len(model.rigid))
-    ((rest, across),) = shaft_lines(model, layout, shape, points=64)
+    ((rest, across),) = shaft_centre_lines(model, layout, shape, points=64)
     slope = np.diff(across[:, :2], axis=0) / np.diff(rest[:, 2])[:, None]
     assert np.isfinite(slope).all()
     assert np.abs(np.diff(slope, axis=0)).max() < 0.1 * np.abs(slope).max()

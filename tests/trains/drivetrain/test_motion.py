@@ -19,7 +19,7 @@ from femgear.trains.drivetrain.model import (
 )
 from femgear.trains.drivetrain.parts import TorqueHistory, constant_torques
 from femgear.trains.drivetrain.simulation import Records, march_drivetrain
-from femgear.trains.drivetrain.stages import averaged_spectrum, order_spectrum
+from femgear.trains.drivetrain.stages import angle_spectrum, averaged_spectrum
 
 TRAIN = wind_turbine_drivetrain()
 
@@ -148,6 +148,6 @@ def test_order_tracking_through_a_run_up():
     times = np.arange(0.0, 10.0, 1e-3)
     angle = 2 * np.pi * (1.0 * times + 0.2 * times**2)
     signal = np.cos(7.0 * angle)
-    tracked = order_spectrum(signal, angle, resolution=0.25, per_turn=64)
+    tracked = angle_spectrum(signal, angle, resolution=0.25, per_turn=64)
     assert near(tracked, 7.0, 0.01) == pytest.approx(1.0, rel=1e-4)
     assert averaged_spectrum(signal, 1e-3, resolution=0.25).amplitude.max() < 0.5

@@ -11,7 +11,7 @@ from femgear.case.text import write
 from femgear.errors import CaseError
 from femgear.stages.static import solve_static
 from femgear.system.fourier import FourierSeries
-from femgear.trains.drivetrain.case_file import pair_of
+from femgear.trains.drivetrain.case_file import pair_case_of
 from femgear.trains.drivetrain.figures import stiffness_figure
 from femgear.trains.drivetrain.model import case_model
 from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_values
@@ -49,7 +49,7 @@ def static(text):
 
 
 def test_mean_and_harmonics_are_those_of_the_static_solution_of_the_pair(chain):
-    model, pair = case_model(chain), pair_of(write(chain.parallel[0].stiffness))
+    model, pair = case_model(chain), pair_case_of(write(chain.parallel[0].stiffness))
     k = static(to_toml(pair)).mesh_stiffness.values[0]
     position = np.arange(len(k)) / len(k)
     first = 2.0 * np.mean(k * np.exp(-2j * np.pi * position))

@@ -12,8 +12,8 @@ from femgear.trains.drivetrain.checks import (
     frequency_shift,
     highest_mesh,
     mesh_mode,
+    reached_speeds,
     shift_rate,
-    speed_range,
 )
 from femgear.trains.drivetrain.model import case_model
 from femgear.trains.drivetrain.parts import (
@@ -50,7 +50,7 @@ def test_speeds_are_those_of_quadrature(model):
 
     times = np.linspace(0.0, 2.0, 20_001)
     wanted = solve_ivp(rate, (0.0, 2.0), [50.0], t_eval=times, rtol=1e-9, atol=1e-9, max_step=5e-4).y[0]
-    found = speed_range(model, torques, duration=2.0, speed=50.0)
+    found = reached_speeds(model, torques, duration=2.0, speed=50.0)
     # extremes lie up to half a sample beside the samples
     assert (found.first, found.last) == pytest.approx((50.0, wanted[-1]), rel=1e-7)
     assert (found.lowest, found.highest) == pytest.approx((wanted.min(), wanted.max()), rel=1e-6)
@@ -64,22 +64,22 @@ def test_speeds_of_the_late_part(model):
     torques = histories()
     run = march_drivetrain(model, torques, duration=2.0, step=1e-4, speed=50.0)
     late = run.time >= 0.7 - 1e-9
-    found = speed_range(model, torques, duration=2.0, speed=50.0, start=0.7)
+    found = reached_speeds(model, torques, duration=2.0, speed=50.0, start=0.7)
     speed, angle = run.spin_speed[late], run.spin[late]
     wanted = (speed[0], speed[-1], speed.min(), speed.max(), (angle[-1] - angle[0]) / 1.3)
     assert (found.first, found.last, found.lowest, found.highest, found.mean) == pytest.approx(wanted, rel=1e-5)
-    whole = speed_range(model, torques, duration=2.0, speed=50.0)
+    whole = reached_speeds(model, torques, duration=2.0, speed=50.0)
     assert abs(whole.mean - found.mean) > 0.5 and whole.lowest < found.lowest
 
 
 def test_constant_torque_gives_a_ramp(model):
-    found = speed_range(model, constant_torques({"motor": -30.0}), duration=10.0, speed=20.0)
+    found = reached_speeds(model, constant_torques({"motor": -30.0}), duration=10.0, speed=20.0)
     assert found.last == pytest.approx(20.0 - 300.0 / model.inertia) and found.highest == 20.0
     assert found.fastest == pytest.approx(abs(found.last)) and found.last < -100.0
     # instants beyond the end have no part in it
     late = TorqueHistory("motor", [0.0, 5.0, 50.0], [1.0, 1.0, -1e6])
     early = TorqueHistory("motor", [0.0], [1.0])
-    ranges = [speed_range(model, (one,), duration=4.0, speed=20.0) for one in (late, early)]
+    ranges = [reached_speeds(model, (one,), duration=4.0, speed=20.0) for one in (late, early)]
     assert ranges[0].last == pytest.approx(ranges[1].last) and ranges[0].lowest == 20.0
 
 

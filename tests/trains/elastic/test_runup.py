@@ -13,7 +13,7 @@ from femgear.housing.orders import order_level
 from femgear.report.explorer import explorer
 from femgear.report.style import excited_to
 from femgear.report.tables import Marks, describe_response
-from femgear.report.waterfall import campbell_diagram, order_cuts, runup_levels, waterfall
+from femgear.report.waterfall import campbell_diagram, draw_order_cuts, runup_levels, waterfall
 from femgear.solvers.linear.resonances import unresolved
 from femgear.stages.static import solve_static, solve_stress
 from femgear.stages.static_results import describe_stress
@@ -473,7 +473,7 @@ def test_pictures_of_a_run_up_say_where_the_excitation_ends_short(files, short_f
     styles = [{line.get_linestyle() for line in figure.axes[0].get_lines()} for figure in (whole, short)]
     assert ":" not in styles[0] and ":" in styles[1] and "-" not in styles[1]
     assert "W-EXCITATION" in short.axes[0].get_title(loc="left") + short.axes[0].get_title()
-    for draw in (waterfall, order_cuts):
+    for draw in (waterfall, draw_order_cuts):
         assert draw(files["runup"]).get_suptitle() == ""
         assert draw(short_files["runup"]).get_suptitle().endswith("(W-EXCITATION)")
     assert not any(explorer(files["runup"], files["modes"])["short"])

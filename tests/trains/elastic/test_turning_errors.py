@@ -161,7 +161,7 @@ def test_pictures_span_what_repeats(three):
     lobes = figures.modulation_polar(heard, [0.0, 2.1, 4.2])
     angle = lobes.axes[0].get_lines()[0].get_xdata()
     assert np.ptp(angle) == pytest.approx(10 * np.pi) and "lobes/turn" in lobes.axes[0].get_title()
-    figures.order_spectrum(heard), figures.microphone_spectrum(heard)
+    figures.draw_order_spectrum(heard), figures.microphone_spectrum(heard)
     response.transmission_error_spectrum(data), response.mesh_force_period(data)
 
 

@@ -133,5 +133,5 @@ def test_check_tells_units_and_where_flanks_part(case, capsys):
     bare = with_values(case, {"operation.torque": "0 N m", "mesh.error": [], "mesh.stiffness_waves": []})
     assert [warning.code for warning in GEAR_PAIR.warnings(bare)] == ["W-LOAD", "W-EXCITATION"]
     assert cli.main(["schema", "--model", "gear_pair"]) == 0
-    assert "MeshSection" in json.loads(capsys.readouterr().out)["$defs"]
+    assert "ImpactMeshSection" in json.loads(capsys.readouterr().out)["$defs"]
     assert np.isfinite(scales_of(bare).frequency)

@@ -27,7 +27,7 @@ from femgear.trains.impacts.model import ImpactPair
 from femgear.trains.pair import stages
 from femgear.trains.pair.figures import RUNUP
 from femgear.trains.pair.model import pair_model, separating_pair
-from femgear.trains.pair.results import dynamics_warnings, runup_warnings
+from femgear.trains.pair.results import pair_dynamics_warnings, pair_runup_warnings
 from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, solve_pair_runup
 from femgear.trains.reading import read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
@@ -238,7 +238,7 @@ def test_a_branch_that_is_cut_says_so_and_why(points, words, monkeypatch):
     case = pair_case(**{"dynamics.damping_ratio": 0.02})
     result = solve_pair_runup(case, solve_pair_modes(case, solve_static(case)))
     data = result.dataset()
-    (said,) = (one for one in runup_warnings(data) if one.code == "W-BRANCH")
+    (said,) = (one for one in pair_runup_warnings(data) if one.code == "W-BRANCH")
     assert not result.complete and re.search(words, said.text)
     if points == 400:
         end = float(data.branch_speed[-1]) * 24.0 / 60.0
@@ -324,7 +324,7 @@ def test_refusals_name_the_entries(changes, code, key):
 def test_flanks_that_part_without_backlash_are_told_to_have_no_back(play, said):
     case = pair_case(**{"set.backlash": play, "operation.speeds": ["7700 rpm"]})
     data = solve_pair_dynamics(case, solve_pair_modes(case, solve_static(case))).dataset()
-    (found,) = [one for one in dynamics_warnings(data) if one.code == "W-SEPARATION"]
+    (found,) = [one for one in pair_dynamics_warnings(data) if one.code == "W-SEPARATION"]
     assert ("no back flanks" in found.text) == said
 
 
