@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from trains.pair.test_pair import pair_case
+from trains.pair.test_case_file import pair_case
 
 from femgear.case.gear_set import planetary_set
 from femgear.contact import face_width

@@ -10,7 +10,7 @@ import pytest
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, flank_points, half_thickness_angle
 from femgear.gears.profile import BasicRack, PinionCutter
-from femgear.gears.tooth import half_sector, root_notches
+from femgear.gears.tooth import SHORTEST_ROOT, half_sector, root_notches
 
 ALPHA = math.radians(20.0)
 GEARS = {
@@ -265,3 +265,20 @@ def test_a_similar_gear_has_the_similar_outline(name):
     for (kind, points), (_, others) in zip(one.curves + one.interfaces, two.curves + two.interfaces, strict=True):
         assert others == pytest.approx(factor * points, rel=1e-13, abs=1e-13 * gear.module), kind
     assert two.flank_roll == pytest.approx(factor * one.flank_roll, rel=1e-13)
+
+
+# A root arc too short for an edge of its own belongs to the fillet.
+
+
+@pytest.mark.parametrize("rounding", [0.4719, 0.466, 0.462])
+def test_the_fillet_ends_on_the_root_circle_at_the_cut(rounding):
+    """Towards the cut its points turn on, outside the root circle or on it."""
+    gear = Gear(30, 1e-3, math.radians(20.0), 0.1, 1e-2, 5e-3, rack=BasicRack(1.0, 1.25, rounding))
+    corner = float(gear.tool.fillet_point(0.0)[1])
+    assert 0.0 <= (math.pi / gear.teeth - corner) * gear.root_radius < SHORTEST_ROOT * gear.module
+    points = dict(half_sector(gear, flank_elements=8).curves)["fillet"]
+    radius, angle = np.hypot(*points.T), np.arctan2(points[:, 1], points[:, 0])
+    end = np.array([gear.root_radius, math.pi / gear.teeth])
+    assert sorted([(radius[0], angle[0]), (radius[-1], angle[-1])])[0] == pytest.approx(tuple(end), rel=1e-12)
+    assert radius.min() > gear.root_radius * (1 - 1e-6) and angle.max() <= end[1] * (1 + 1e-12)
+    assert np.all(np.diff(angle) > 0) or np.all(np.diff(angle) < 0)

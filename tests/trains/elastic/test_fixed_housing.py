@@ -58,7 +58,7 @@ def before():
 
 @pytest.fixture(autouse=True)
 def uncompared(monkeypatch):
-    """No comparison with more excitation, which takes most of the time: see test_frequency_limit.py."""
+    """No comparison with more excitation, which takes most of the time: see test_excitation_limit.py."""
 
     def end(case, modes, heard, frequency, carrier, level=None):
         return modes.reach, 2 * modes.reach, 0 * frequency

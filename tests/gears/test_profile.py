@@ -1,13 +1,99 @@
-"""Sections of helical teeth: relations of ISO 21771 that the formulas were not written from."""
+"""Involute relations against closed forms and high-precision numbers."""
 
 import math
+from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from femgear.gears.gear import Gear, flank_points
+from femgear.errors import GeometryError
+from femgear.gears import profile as iv
+from femgear.gears.gear import Gear, PinionCutter, flank_points, half_thickness_angle
+from femgear.gears.pair import working_pressure_angle, zero_backlash_distance, zero_backlash_shift
 from femgear.gears.planetary import close_set, virtual_set, virtual_teeth
-from femgear.gears.profile import BasicRack, transverse_rack, transverse_tool
+from femgear.gears.profile import BasicRack, CutterTip, inv, pressure_angle_at, transverse_rack, transverse_tool
+from validation.reference import gear_limits as limits
+
+ALPHA = math.radians(20.0)
+
+
+def test_inv_is_accurate_for_small_angles_too():
+    """tan by its continued fraction in exact rational arithmetic."""
+    for angle in (1e-4, 0.01, 0.0299, 0.1, 0.1499):
+        x, fraction = Fraction(angle), Fraction(0)
+        for k in range(25, 0, -2):
+            fraction = x * x / (k - fraction)
+        assert iv.inv(angle) == pytest.approx(float(fraction / x - x), rel=1e-15)
+
+
+def test_inv_is_continuous_where_the_series_ends():
+    below, above = np.nextafter(0.15, 0.0), 0.15
+    assert iv.inv(below) == pytest.approx(iv.inv(above), rel=1e-13)
+
+
+def test_arcinv_is_the_inverse_to_rounding_on_the_whole_range():
+    angles = np.concatenate([np.geomspace(1e-4, 0.1, 40), np.linspace(0.1, 1.55, 60)])
+    assert np.max(np.abs(iv.arcinv(iv.inv(angles)) / angles - 1.0)) < 2e-14
+    assert iv.arcinv(0.0) == 0.0
+
+
+@pytest.mark.parametrize("value", [-1e-9, math.nan, math.inf, [0.01, math.nan, 0.02], [0.01, -1e-9]])
+def test_arcinv_refuses_what_has_no_angle(value):
+    with pytest.raises(GeometryError) as caught:
+        iv.arcinv(value)
+    assert caught.value.code == "E-GEOMETRY"
+
+
+def pair(teeth, shifts=(0.0, 0.0), *, internal=False):
+    """Gears of module 1.5 mm; the second may be internal."""
+    one, two = (Gear(z, 1.5e-3, ALPHA, x, 0.02, 5e-3) for z, x in zip(teeth, shifts))
+    return one, replace(two, internal=True, rim_radius=0.1) if internal else two
+
+
+def test_centre_distance_and_shift_are_inverse_for_both_kinds_of_mesh():
+    for internal, teeth, shifts in ((False, (17, 34), (0.3, 0.1)), (True, (20, 80), (-0.1, 0.25))):
+        gears = pair(teeth, shifts, internal=internal)
+        wanted = shifts[1] - shifts[0] if internal else sum(shifts)
+        found = zero_backlash_shift(*gears, zero_backlash_distance(*gears))
+        assert found == pytest.approx(wanted, rel=1e-12)
+
+
+def test_positive_shift_of_an_internal_gear_moves_its_flank_outwards():
+    # a wider ring lets the planet run at a larger centre distance, hence a larger working angle
+    gears = pair((20, 80), (0.0, 0.2), internal=True)
+    assert working_pressure_angle(*gears, zero_backlash_distance(*gears)) > ALPHA
+
+
+def test_centre_distance_below_the_base_circles_is_refused_with_the_limit():
+    with pytest.raises(GeometryError) as caught:
+        working_pressure_angle(*pair((27, 40)), 47e-3)
+    assert caught.value.code == "E-CENTRE-DISTANCE"
+    assert "47.2196" in caught.value.limit  # 50.25 cos 20 deg
+    with pytest.raises(GeometryError):
+        working_pressure_angle(*pair((27, 40)), 0.0)
+
+
+def test_largest_root_radius_of_the_iso_rack():
+    assert limits.largest_root_radius(ALPHA, 1.25) == pytest.approx(0.472, abs=5e-4)  # ISO 53, profiles C and D
+
+
+def test_undercut_limits_agree_with_each_other():
+    assert iv.undercut_shift(limits.undercut_teeth(ALPHA), ALPHA) == pytest.approx(0.0, abs=1e-15)
+    assert limits.undercut_teeth(ALPHA, shift=iv.undercut_shift(10, ALPHA)) == pytest.approx(10.0, rel=1e-14)
+
+
+def test_pointed_tip_shift_makes_the_thickness_vanish():
+    shift = limits.pointed_tip_shift(12, ALPHA)
+    tip, base = 6.0 + 1.0 + shift, 6.0 * math.cos(ALPHA)
+    half = math.pi / 24 + 2 * shift * math.tan(ALPHA) / 12 + iv.inv(ALPHA) - iv.inv(math.acos(base / tip))
+    assert half == pytest.approx(0.0, abs=1e-14)
+    with pytest.raises(GeometryError):
+        limits.pointed_tip_shift(200, ALPHA)
+
+
+# Sections of helical teeth: relations of ISO 21771 that the formulas were not written from.
+
 
 NORMAL = BasicRack(addendum=1.0, dedendum=1.25, root_radius=0.2)
 
@@ -134,3 +220,56 @@ def test_the_stretched_tip_touches_the_fillet_and_cuts_no_deeper(teeth, internal
     flank = flank_points(gear, gear.form_roll + module * np.array([0.0, sense]))
     flank = complex(*(flank[1] - flank[0]))
     assert abs(np.angle((fillet[1] - fillet[0]) / flank)) < 1e-4
+
+
+# Tools that cut teeth: what no tool of a catalogue shows.
+
+
+TIP = CutterTip(
+    pitch_radius=0.05,
+    cutter_pitch_radius=0.02,
+    cutter_base_radius=0.0188,
+    centre_distance=0.03,
+    centre_radius=0.0221,
+    centre_angle=0.01,
+    rounding=3e-4,
+    gap_angle=0.02,
+    end_angle=0.4,
+)
+
+
+def test_a_cutter_whose_rounding_lies_within_its_base_circle_has_no_room():
+    assert TIP.room == pytest.approx(0.01)
+    assert replace(TIP, centre_radius=0.0187).room < 0.0
+    assert replace(TIP, centre_radius=0.0188).room < 0.0
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "value"),
+    [
+        ({"tip_diameter": 38e-3}, "E-TIP", 38e-3),
+        ({"profile_shift": 2.5}, "E-POINTED", 2.5),
+        ({"cutter": PinionCutter(teeth=105)}, "E-CUTTER", 105),
+    ],
+)
+def test_a_refusal_shows_the_value_that_it_refuses(change, code, value):
+    gear = Gear(27, 1.5e-3, math.radians(20.0), 0.0, 0.02, 9e-3)
+    if "cutter" in change:
+        gear = Gear(108, 1.5e-3, math.radians(20.0), 0.0, 0.02, 0.1, internal=True)
+    with pytest.raises(GeometryError) as caught:
+        replace(gear, **change)
+    assert caught.value.code == code and caught.value.value == pytest.approx(value)
+
+
+def test_a_cutter_runs_without_play_in_the_gap_that_it_cuts():
+    """On the pitch circles its tooth, from the offset of its rounding, is as wide as the gap of the gear."""
+    for allowance in (0.0, 30e-6):
+        alpha = math.radians(20.0)
+        gear = Gear(60, 1e-3, alpha, 0.2, 1e-2, 0.04, internal=True, thickness_allowance=allowance)
+        tool = gear.tool
+        assert isinstance(tool, CutterTip)
+        base, working = tool.cutter_base_radius, 0.5 * math.pi - tool.end_angle
+        offset = tool.rounding / base + inv(pressure_angle_at(tool.centre_radius, base))
+        tooth = tool.centre_angle + offset - inv(working)
+        gap = math.pi / gear.teeth - half_thickness_angle(gear, tool.pitch_radius)
+        assert tool.cutter_pitch_radius * tooth == pytest.approx(tool.pitch_radius * gap, rel=1e-12)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from femgear.contact.flank_pairs import LEFT, RIGHT
 from femgear.contact.root_stress import LOADED, body_stress, root_stress_cycle
@@ -17,7 +18,7 @@ from femgear.gears.gear import half_thickness_angle
 from femgear.report.tables import unmarked
 from femgear.stages import static as static_stages
 from femgear.stages.static import nominal_stresses, relief_kinks, solve_static, solve_stress
-from femgear.stages.static_results import describe_stress, stress_warnings
+from femgear.stages.static_results import _peak_doubt, describe_set, describe_stress, stress_warnings
 from femgear.trains.reading import read_case, with_value
 from validation.reference.root_stress import set_root_stress
 
@@ -428,3 +429,83 @@ def test_a_corner_of_the_root_is_told_with_the_entry_that_rounds_it(reference):
     end.root_worst_arc[0, 0] = 0.0
     (finding,) = stress_warnings(end)
     assert finding.code == "W-KINK" and "end of the flank" in finding.text and "sun" in finding.text
+
+
+# W-POSITIONS of helical teeth, whose record has no positions between the equidistant ones.
+
+
+def record(count, *, overlap=1.2, **attrs):
+    """A transmission error with a peak of straight lines at 0.37 of the period, and a constant stiffness."""
+    position = np.arange(count) / count
+    error = np.maximum(1.0 - np.abs(position - 0.37) / 0.1, 0.0) * 1e-6 + 1e-5
+    curves = {"ste": error, "mesh_stiffness": np.full(count, 5e8)}
+    variables = {name: (("mesh", "position"), curve[None]) for name, curve in curves.items()}
+    fixed = {"overlap_ratio": overlap, "mesh_periods": 1}
+    return xr.Dataset(variables, coords={"position": position}, attrs={**fixed, **attrs})
+
+
+@pytest.mark.parametrize("count", [8, 16, 32, 64, 128, 256])
+def test_the_doubt_of_few_positions_covers_what_they_miss(count):
+    data = record(count)
+    missed = 1.0 - np.ptp(data.ste.values) / 1e-6
+    # the lines from both sides meet at the peak
+    if count >= 32:
+        assert _peak_doubt(data) == pytest.approx(missed / (1.0 - missed), abs=1e-9)
+    assert _peak_doubt(data) >= 0.5 * missed
+
+
+def test_spur_teeth_have_the_doubt_of_their_search_for_peaks():
+    assert _peak_doubt(record(16, overlap=0.0, peak_doubt=0.004)) == 0.004
+    assert _peak_doubt(record(16, overlap=0.0)) == 0.0
+
+
+# Tables of phasing and of neighbouring teeth for the terminal and the report.
+
+
+CASES = Path(__file__).resolve().parents[2] / "cases"
+
+
+def tables(case):
+    _, _, harmonics, neighbours, _ = describe_set(case)
+    return harmonics, neighbours
+
+
+def test_reference_set_is_in_phase():
+    harmonics, neighbours = tables(read_case(CASES / "planetary_27_40_108.toml"))
+    assert [row[:3] for row in harmonics.rows] == [(str(h), "in-phase", "0") for h in range(1, 7)]
+    assert {row[3:] for row in harmonics.rows} == {("100.0 %", "cancelled", "rotational")}
+    assert "planet and ring 4" in harmonics.notes[-1]
+    teeth = [row[0] for row in neighbours.rows]
+    assert teeth[:3] == ["27/41/108", "28/41/110", "26/40/106"] and "27/40/108" not in teeth
+    assert neighbours.rows[1][4] == "sequential, sequential, in, sequential"
+
+
+@pytest.mark.parametrize("planets", [1, 2])
+def test_few_planets(planets):
+    case = read_case(CASES / "planetary_27_40_108.toml")
+    case = with_value(case, "set.planets", planets)
+    if planets == 2:
+        case = with_value(case, "set.planet_angles", ["0 deg", "181.333333333 deg"])
+    harmonics, neighbours = tables(case)
+    assert len(harmonics.rows) == 6 and neighbours.rows
+    assert harmonics.rows[0][1] == ("in-phase" if planets == 1 else "unequally phased")
+    assert harmonics.rows[0][5] == "rotational-translational"
+
+
+def test_lead_of_the_ring_meshes_is_that_of_the_phases():
+    _, meshes, harmonics, _, _ = describe_set(read_case(CASES / "planetary_27_40_108.toml"))
+    phase = dict((row[0], row[1:]) for row in meshes.rows)["mesh phases [periods]"][1].split(", ")[0]
+    assert phase == "0.4636" and f"a planet's ring mesh is {phase} periods ahead" in harmonics.notes[1]
+
+
+def test_published_gearbox():
+    harmonics, _ = tables(read_case(CASES / "nrel_pgb.toml"))
+    assert len(harmonics.rows) == 6
+    assert {len(row) for row in harmonics.rows} == {len(harmonics.header)}
+
+
+def test_neighbours_with_equal_spacing_come_first():
+    _, neighbours = tables(read_case(CASES / "helical_30_20_70.toml"))
+    assert [row[0] for row in neighbours.rows[:2]] == ["31/21/73", "29/19/67"]
+    spacing = [row[3] for row in neighbours.rows]
+    assert spacing[:2] == ["equal", "equal"] and "equal" not in spacing[2:] and len(spacing) == 8

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from published.planetary_sets import kahraman_set
+from published.planetary_sets import kahraman_set, lin_parker_set
 
 from femgear.errors import CaseError
 from femgear.system.mesh_directions import gear_set_system
@@ -61,3 +61,19 @@ def test_tilting_moments_of_one_planet_are_in_equilibrium_at_the_pitch_point_alo
     moments = (springs * q)[:, 3:5] / radii[:, None]
     remainder = np.linalg.norm(moments.sum(axis=0)) / np.linalg.norm(moments, axis=1).max()
     assert remainder < 1e-9 if left == 0.0 else remainder > left
+
+
+# Angles of planets that no set can have.
+
+
+@pytest.mark.parametrize(
+    "angles", [[0.0, 2.0, 2.0], [0.0, 3.0, 1.0], [0.0, 2.0, 2 * np.pi], [1.0, 2.0, 1.0 + 2 * np.pi]]
+)
+def test_planets_in_the_same_place_or_out_of_order_are_refused(angles):
+    with pytest.raises(CaseError, match="within one turn"):
+        replace(lin_parker_set(3), planet_angles=np.array(angles))
+
+
+def test_planets_over_almost_a_turn_are_taken():
+    angles = np.array([-3.0, 0.0, 3.2])
+    assert np.array_equal(replace(lin_parker_set(3), planet_angles=angles).planet_angles, angles)

@@ -1,21 +1,43 @@
 """Root stresses as dataset and as figures."""
 
+import math
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 import xarray as xr
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
+from femgear.case.gear_set import materials_of
+from femgear.contact.bodies import make_sectors
 from femgear.contact.root_stress import RootCycle
+from femgear.contact.tooth_loads import deformed_set
+from femgear.gears.deviations import no_deviations
+from femgear.gears.gear import Gear
+from femgear.gears.modifications import FlankForm, MeasuredProfile, ProfileSlope, TipRelief
+from femgear.gears.planetary import close_set, equal_planet_angles, mirrored_set
 from femgear.report.style import png_bytes
+from femgear.stages import static_figures as static_figures
+from femgear.stages.protocol import Drawn
+from femgear.stages.static import solve_static
 from femgear.stages.static_figures import (
+    _left_flanks_loaded,
+    _reflected,
+    active_rolls,
     draw_contact_pressure,
+    has_pitches,
+    has_profiles,
     draw_load_spectrum,
+    pitch_chart,
     planet_bending,
+    profile_chart,
     root_stress_history,
     root_stress_profile,
 )
 from femgear.stages.static_results import STRESS_VARIABLES, root_values
 from femgear.storage.results import dataset, declared
+from femgear.trains.reading import read_case, with_values
 
 MESHES = ["sun-planet 1", "sun-planet 2", "planet 1-ring", "planet 2-ring"]
 P = 8
@@ -225,3 +247,178 @@ def test_the_planet_that_carries_is_shown_and_named(whole):
 def test_a_set_without_any_load_shows_the_first_planet(whole):
     case = whole.assign({name: 0.0 * whole[name] for name in ("contact_pressure", "pressure_distribution")})
     assert draw_contact_pressure(case).axes[0].get_title(loc="left").startswith("sun-planet 1")
+
+
+# Charts of deviations: the curves are the deviations with material positive, axes say their units.
+
+
+ALPHA = math.radians(20.0)
+UM = 1e-6
+
+
+@pytest.fixture(scope="module")
+def gears():
+    return close_set(
+        Gear(27, 1.5e-3, ALPHA, 0.0, 0.025, 9e-3),
+        Gear(40, 1.5e-3, ALPHA, 0.0, 0.025, 18e-3),
+        Gear(108, 1.5e-3, ALPHA, 0.0, 0.025, 0.1, internal=True),
+        planet_angles=equal_planet_angles(3),
+        centre_distance=51e-3,
+        find=("sun", "ring"),
+    )
+
+
+@pytest.fixture(scope="module")
+def deviations(gears):
+    middle = 0.5 * (gears.sun.form_roll + gears.sun.tip_roll)
+    d = no_deviations(gears)
+    return replace(
+        d,
+        sun=FlankForm((TipRelief(12 * UM, middle, power=2.0),)),
+        planet_ring_side=FlankForm((ProfileSlope(4 * UM),)),
+        ring=FlankForm((MeasuredProfile((0.025, 0.030), (1 * UM, 5 * UM)),)),
+        sun_pitch=3 * UM * np.sin(2 * np.pi * np.arange(27) / 27),
+    )
+
+
+def line(ax, name):
+    return next(one for one in ax.get_lines() if one.get_label() == name)
+
+
+def test_profiles_are_drawn_with_material_positive(gears, deviations):
+    figure = profile_chart(deviations, gears)
+    sun, _, ring_side, ring = figure.axes
+    angle, height = line(sun, "profile").get_data()
+    tip = math.degrees(gears.sun.tip_roll / gears.sun.base_radius)
+    assert angle.max() == pytest.approx(tip, rel=1e-12)
+    assert height[angle.argmax()] == pytest.approx(-12.0, rel=1e-12) and height[angle.argmin()] == 0.0
+    angle, height = line(ring_side, "profile").get_data()
+    assert [height[0], height[-1]] == pytest.approx([-2.0, 2.0], rel=1e-12)
+    # a measured point is drawn where it was measured, and tip and root of the ring lie the other way round
+    angle, height = line(ring, "profile").get_data()
+    point = math.degrees(0.030 / gears.ring.base_radius)
+    assert height[np.abs(angle - point).argmin()] == pytest.approx(-5.0, rel=1e-12)
+    assert line(ring, "tip circle").get_xdata()[0] < line(ring, "form circle").get_xdata()[0]
+
+
+def test_active_parts_lie_on_the_flanks_and_cover_the_path(gears):
+    rolls = active_rolls(gears)
+    flanks = (gears.sun, gears.planet, gears.planet, gears.ring)
+    for (start, end), gear in zip(rolls, flanks, strict=True):
+        low, high = sorted((gear.form_roll, gear.tip_roll))
+        assert low < start + 1e-9 and start < end and end < high + 1e-9
+    ratios = [(end - start) / gears.base_pitch for start, end in rolls]
+    one, two = gears.contact_ratio_sun_planet, gears.contact_ratio_planet_ring
+    assert ratios == pytest.approx([one, one, two, two], rel=1e-12)
+    # on the line of action roll lengths of both flanks add up to the distance of the tangent points
+    length = gears.centre_distance * math.sin(gears.working_pressure_angle_sun_planet)
+    assert rolls[0][0] + rolls[1][1] == pytest.approx(length, rel=1e-12)
+    length = gears.centre_distance * math.sin(gears.working_pressure_angle_planet_ring)
+    assert rolls[3][0] - rolls[2][0] == pytest.approx(length, rel=1e-12)
+
+
+def test_pitches_are_drawn_with_material_positive(gears, deviations):
+    figure = pitch_chart(deviations, gears)
+    tooth, height = line(figure.axes[0], "sun").get_data()
+    assert height == pytest.approx(-3 * np.sin(2 * np.pi * tooth / 27), abs=1e-12)
+    assert len(figure.axes[1].get_lines()) == 3
+
+
+@pytest.mark.parametrize("chart", [profile_chart, pitch_chart])
+def test_axes_say_their_units_and_nothing_is_drawn_twice(gears, deviations, chart):
+    for d in (deviations, no_deviations(gears)):
+        figure = chart(d, gears)
+        FigureCanvasAgg(figure).draw()
+        assert all("[" in ax.get_xlabel() for ax in figure.axes)
+        assert all("[µm]" in ax.get_ylabel() for ax in figure.axes[::2])
+        assert len(figure.legends) == 1
+        texts = [text.get_text() for text in figure.legends[0].get_texts()]
+        assert len(texts) == len(set(texts))
+    assert png_bytes(chart(deviations, gears))[:4] == b"\x89PNG"
+
+
+def test_charts_are_left_out_where_there_is_nothing_of_their_kind(gears, deviations, monkeypatch):
+    ideal = no_deviations(gears)
+    pins = replace(ideal, pin_errors=np.full((3, 2), 5 * UM))
+    forms = replace(deviations, sun_pitch=np.zeros(27))
+    pitches = replace(pins, ring_pitch=deviations.sun_pitch[0] + UM * np.arange(108))
+    none = replace(ideal, sun=FlankForm((ProfileSlope(0.0),)))
+    both = ["profile_deviations", "pitch_deviations"]
+    for d, names in ((pins, []), (none, []), (forms, both[:1]), (pitches, both[1:]), (deviations, both)):
+        monkeypatch.setattr(static_figures, "planetary_set", lambda _: gears)
+        monkeypatch.setattr(static_figures, "set_deviations", lambda _, d=d: d)
+        assert list(static_figures.FIGURES[""].draw(Drawn(None, {}))) == names
+        assert [has_profiles(d, gears), has_pitches(d)] == [name in names for name in both]
+
+
+# The deformed set of a negative torque is the state that static.nc holds, seen from behind.
+
+
+SLICED = {"static.slices": 8, "sun.modifications": [{"kind": "lead slope", "amount": "12 um"}]}
+HELICAL = {
+    "set.helix_angle": "8 deg",
+    "set.centre_distance": "51.5 mm",
+    "sun.profile_shift": None,
+    "ring.profile_shift": None,
+    "static.slices": 25,  # forces of a record are means while one slice follows another
+}
+CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
+
+
+@pytest.mark.parametrize(
+    ("members", "more"),
+    [("fixed", {}), ("elastic", {}), ("fixed", SLICED), ("fixed", {**SLICED, **HELICAL})],
+    ids=["fixed", "elastic", "slices", "helical"],
+)
+def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members, more):
+    changes = {
+        "operation.torque": "-60 N m",
+        "set.pin_errors": [{"planet": 2, "tangential": "5 um"}],
+        "static.members": members,
+        "static.positions": 8,
+        "static.flank_elements": 6,
+        **more,
+    }
+    case = with_values(read_case(CASE), changes)
+    static = solve_static(case)
+    gears, order, cycle = _left_flanks_loaded(static, case)
+    assert order.tolist() == list(mirrored_set(static.planetary_set)[1])
+    start = int(np.argmin(np.abs(static.cycle.position)))
+    force = static.cycle.force[:, start]
+    assert np.ptp(force[:3]) > 0.05 * force[:3].mean()
+    seen = np.concatenate([force[order], force[3 + order]])
+    # the cells of a walk fit the largest load of all its positions
+    np.testing.assert_allclose(cycle.force[:, 0], seen, rtol=1e-3)
+    name = "slice_load" if "static.slices" in more else "tooth_load"
+    records = ((cycle, 0), (static.cycle, start))
+    image, loads = (getattr(one, name)[..., at].max(axis=1) for one, at in records)
+    seen = loads[[*order, *(3 + order)]]
+    np.testing.assert_allclose(image, seen, rtol=0.0, atol=1e-3 * seen.max())
+    assert gears.planet_angles == mirrored_set(static.planetary_set)[0].planet_angles
+
+
+def test_bodies_of_a_negative_torque_stand_and_bend_as_those_of_the_set():
+    """Every planet at its own pin, most bent where most is carried; teeth of the sun give way to the load."""
+    changes = {
+        "operation.torque": "-60 N m",
+        "static.positions": 8,
+        "static.flank_elements": 6,
+        "set.pin_errors": [{"planet": 2, "tangential": "5 um"}],
+    }
+    case = with_values(read_case(CASE), changes)
+    static = solve_static(case)
+    gears, order, cycle = _left_flanks_loaded(static, case)
+    sectors = make_sectors(gears, materials_of(case), flank_elements=4, refine=0.3)
+    of_kind = {sector.gear.name: sector for sector in sectors.gears}
+    image = deformed_set(gears, sectors, cycle)
+    bodies = {body.name: body for body in (_reflected(one, of_kind[one.kind], order) for one in image)}
+    names = [f"planet {n + 1}" for n in range(3)]
+    pins = static.planetary_set.centre_distance * np.exp(1j * np.array(static.planetary_set.planet_angles))
+    centres = np.array([complex(*bodies[name].centre) for name in names])
+    np.testing.assert_allclose(centres, pins, atol=1e-12)
+    force = static.cycle.force[:3, np.argmin(np.abs(static.cycle.position))]
+    bent = [np.abs(bodies[name].displacement).max() for name in names]
+    assert np.argsort(bent).tolist() == np.argsort(force).tolist()
+    x, y = of_kind["sun"].grid.points.T
+    u, v = np.moveaxis(bodies["sun"].displacement, -1, 0)
+    assert np.mean((x * v - y * u) / np.hypot(x, y)) > 0.0
