@@ -36,6 +36,13 @@ DRAWING = {
 }
 SOLVING = {"scipy.linalg", "scipy.sparse", "femgear.stages.protocol"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
+WITHOUT_TEST_FILE = {
+    "__main__.py": "calls the command line and nothing else: tests/test_cli.py",
+    "fe/_gmsh_worker.py": "a process of its own, which test_meshing.py starts",
+    "report/explorer.py": "data of a page's script, from a whole run-up: tests/trains/elastic/test_runup.py",
+    "trains/elastic/outputs.py": "rows of the models of a whole set: test_stages.py, test_excitation_limit.py",
+    "trains/helical/results.py": "tables of a whole run, which is made once: tests/trains/helical/test_stages.py",
+}
 
 
 def place(path: Path) -> str:
@@ -139,6 +146,17 @@ def test_small_modules_are_few():
             small.append(place(path))
     # the worker is a process of its own: a signal or a crash of Gmsh ends it alone; former names go with a release
     assert small == ["__main__.py", "fe/_gmsh_worker.py", "moved.py"]
+
+
+def test_every_module_has_the_test_file_of_its_name():
+    """`tests/contact/test_cycle.py` tests `femgear/contact/cycle.py`; few exceptions have a reason."""
+    tests = PACKAGE.parent / "tests"
+    without = set()
+    for path in MODULES:
+        own = tests / path.relative_to(PACKAGE).with_name(f"test_{path.name}")
+        if path.stem != "__init__" and not (own.exists() and "\ndef test_" in own.read_text(encoding="utf-8")):
+            without.add(place(path))
+    assert without == WITHOUT_TEST_FILE.keys()
 
 
 def heavy_after(code: str, heavy: set[str] = HEAVY) -> set[str]:

@@ -5,14 +5,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from femgear.case.dependencies import (
-    compliance_entries,
-    dynamic_entries,
-    fingerprint,
-    modal_entries,
-    ring_entries,
-    static_entries,
-)
 from femgear.case.estimates import estimates
 from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.sections import face_width, gear_material
@@ -65,24 +57,6 @@ def test_one_width_of_both_meshes_where_contact_takes_one(case, key):
     assert (refused.value.code, refused.value.key) == ("E-CHOICE", key)
     assert 'planet.face_width = "25 mm"' in refused.value.remedy
     with_values(case, different | {"planet.face_width": "25 mm"})
-
-
-KINDS = (static_entries, compliance_entries, ring_entries, modal_entries, dynamic_entries)
-
-
-@pytest.mark.parametrize(
-    "key, value, changes",
-    [
-        ("ring.material.youngs_modulus", "110 GPa", (True,) * 5),
-        ("planet.material.poisson_ratio", 0.28, (True,) * 5),
-        ("ring.material.density", "7100 kg/m^3", (False, True, True, True, True)),
-        ("sun.face_width", "26 mm", (True,) * 5),
-        ("ring.material.root_stress_limit", "306 MPa", (False,) * 5),
-    ],
-)
-def test_steps_notice_what_they_depend_on(case, key, value, changes):
-    other = with_value(case, key, value)
-    assert tuple(fingerprint(kind(case)) != fingerprint(kind(other)) for kind in KINDS) == changes
 
 
 def test_estimates_follow_density_modulus_and_width(case):

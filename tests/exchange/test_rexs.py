@@ -9,15 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from rexs_stage import DEG, MM, NONE, Gearbox
-from scipy.optimize import brentq
 
 from femgear import cli
 from femgear.case.gear_set import planetary_set
 from femgear.case.sections import face_width, gear_material
-from femgear.errors import CaseError, FemgearError, GeometryError
-from femgear.exchange.planetary_stage import RIGID, case_tables, named, stage_model
+from femgear.errors import CaseError, FemgearError
+from femgear.exchange.planetary_stage import case_tables, named, stage_model
 from femgear.exchange.rexs import MOST_BYTES, model_text, read_model
-from femgear.findings import DOUBT
 from femgear.trains.drafts import draft_text
 from femgear.trains.reading import parse_case, read_case, with_values
 
@@ -41,10 +39,6 @@ def imported(path, stage=None):
     with named(model, stage):
         text = draft_text(*tables, word="assumed")
     return text, parse_case(text)
-
-
-def involute(angle):
-    return math.tan(angle) - angle
 
 
 def check_numbers(case):
@@ -132,29 +126,6 @@ def test_what_is_not_used_is_told(tmp_path):
     assert not any(line.startswith(("cylindrical_gear ", "material ", "shaft_section ")) for line in unused)
 
 
-def test_the_profile_shift_of_the_ring_has_the_sign_of_iso(tmp_path):
-    """Shifts that close by ISO 21771 with the ring's teeth negative."""
-    box, alpha, x = Gearbox(), math.radians(20.0), {"sun": 0.3, "planet": 0.2}
-    wanted = involute(alpha) + 2.0 * math.tan(alpha) * sum(x.values()) / (17 + 22)
-    working = brentq(lambda angle: involute(angle) - wanted, alpha, 0.5, xtol=1e-15)
-    distance = 0.5 * 4.0 * (17 + 22) * math.cos(alpha) / math.cos(working)
-    inner = math.acos(0.5 * 4.0 * (61 - 22) * math.cos(alpha) / distance)
-    ring = (involute(inner) - involute(alpha)) * (22 - 61) / (2.0 * math.tan(alpha)) - x["planet"]
-    assert ring < -0.5
-    for id, shift in ((53, x["sun"]), (58, ring), *((240 + n, x["planet"]) for n in range(3))):
-        for side in (2000, 3000):
-            box = box.set(side + id, addendum_modification_coefficient=(shift, NONE))
-    for mesh in (*range(210, 213), *range(220, 223)):
-        box = box.set(mesh, center_distance=(distance, MM))
-    case = imported(box.write(tmp_path / "stage.rexs"))[1]
-    gears = planetary_set(case)
-    assert gears.ring.profile_shift == -ring and case.ring.profile_shift == -ring
-    assert [gears.backlash_sun_planet, gears.backlash_planet_ring] == pytest.approx([0.0, 0.0], abs=1e-8)
-    # negative teeth are those of an internal gear
-    minus = imported(box.set(58, number_of_teeth=(-61, NONE)).write(tmp_path / "minus.rexs"))[1]
-    assert planetary_set(minus) == gears
-
-
 @pytest.mark.parametrize(
     ("name", "changes"),
     [
@@ -213,22 +184,6 @@ def test_estimates_come_back_as_such(tmp_path, monkeypatch):
     assert all("# assumed" in again[one] for one in kept if one[0] != "title")
 
 
-@pytest.mark.slow
-def test_rigid_bearings_are_rigid_enough():
-    """A stiffness ten times as large moves no natural frequency below the tenth mode by 0.1 %."""
-    from femgear import solve
-
-    coarse = {"static.positions": 12, "static.flank_elements": 8, "runup.count": 0}
-    case = with_values(read_case(CASES / "planetary_27_40_108.toml"), coarse)
-    found = []
-    for factor in (1.0, 10.0):
-        rigid = f"{factor * RIGID * 20e9 * case.set.face_width:.6g} N/m"
-        keys = ("planet.bearing_stiffness", "sun.support_stiffness", "carrier.support_stiffness")
-        modes = solve(with_values(case, dict.fromkeys(keys, rigid)), "modes")["modes"].dataset()
-        found.append(modes["frequency"].values[1:26])
-    assert found[0] == pytest.approx(found[1], rel=1e-3)
-
-
 def test_other_endings_are_not_written(tmp_path, capsys):
     for name in ("back.rexsj", "back.rexsz", "back"):
         assert cli.main(["rexs", str(CASES / "planetary_27_40_108.toml"), "-o", str(tmp_path / name)]) == 2
@@ -266,61 +221,6 @@ def test_refusals_of_the_case_name_file_component_and_attribute(tmp_path, change
     assert caught.value.code == code and caught.value.file == str(path)
     assert [one.key for one in caught.value.problems][: len(keys)] == keys
     assert {one.file for one in caught.value.problems} == {str(path)}
-
-
-def test_torque_and_speed_of_other_members_and_powers(tmp_path):
-    box = Gearbox().set(34, rotational_speed=(-1500.0, "1 / min"))
-    assert imported(box.write(tmp_path / "a.rexs"))[1].operation.torque == pytest.approx(-1591.5494309)
-    box = Gearbox().set(38, torque_around_u_axis=None, power=(100.0, "kW"))
-    assert imported(box.write(tmp_path / "b.rexs"))[1].operation.torque == pytest.approx(636.6197724)
-    # the load acts on the carrier: the sun takes z_s / (z_s + z_r) of it, against it
-    box = Gearbox()
-    box.relations = [one for one in box.relations if one != ("assembly", {"assembly": 34, "part": 38})]
-    box.relate("assembly", assembly=4, part=38)
-    operation = imported(box.write(tmp_path / "c.rexs"))[1].operation
-    assert operation.input == "sun"
-    assert operation.torque == pytest.approx(-1591.5494309 * 17 / (17 + 61))
-    box = Gearbox()
-    box.add(39, "external_load", torque_around_u_axis=(100.0, "N m"))
-    box.relate("assembly", assembly=34, part=39)
-    assert imported(box.write(tmp_path / "sum.rexs"))[1].operation.torque == pytest.approx(1691.5494309)
-    for nothing in ({"torque_around_u_axis": (0.0, "N m")}, {"power": (0.0, "kW")}):
-        box = Gearbox().set(38, **{"torque_around_u_axis": None} | nothing)
-        text = imported(box.write(tmp_path / "idle.rexs"))[0]
-        assert "# assumed: K factor of 1 N/mm^2; that of the file is 0" in text
-    still = Gearbox().set(34, rotational_speed=(0.0, "1 / min")).write(tmp_path / "still.rexs")
-    assert 'speeds = ["1000 rpm"]  # assumed; that of the file is 0' in imported(still)[0]
-    bare = Gearbox().set(38, torque_around_u_axis=None).set(34, rotational_speed=None)
-    text = imported(bare.write(tmp_path / "d.rexs"))[0]
-    assert all(
-        any(f"{key} = " in line and "# assumed" in line for line in text.splitlines())
-        for key in ("input", "torque", "speeds")
-    )
-
-
-SPECTRUM = """<load_spectrum id="1">{}</load_spectrum></model>"""
-LOAD_CASE = """<load_case id="{0}"><component id="1">
-<attribute id="load_duration_fraction" unit="%">{1}</attribute></component><component id="34">
-<attribute id="rotational_speed" unit="1 / min">{2}</attribute></component><component id="38">
-<attribute id="torque_around_u_axis" unit="N m">{3}</attribute></component></load_case>"""
-
-
-def test_each_load_case_has_its_own_torque(tmp_path):
-    cases = "".join(LOAD_CASE.format(*one) for one in ((1, 20, 543, 30), (2, 70, 3456, 90), (3, 10, 800, 30)))
-    path = tmp_path / "stage.rexs"
-    path.write_text(Gearbox().xml().replace("</model>", SPECTRUM.format(cases)), encoding="utf-8")
-    for number, torque, speeds in ((None, 30.0, [543, 800]), (1, 30.0, [543]), (2, 90.0, [3456])):
-        model = read_model(path)
-        operation = case_tables(model, load_case=number)[0]["operation"]
-        assert operation["torque"] == f"{torque:g} N m"
-        assert operation["speeds"] == [f"{one} rpm" for one in speeds]
-        (told,) = [one for one in model.findings if one.key == "operation"]
-        assert told.severity == DOUBT and model.findings[0] == told  # doubts come first
-        assert ("2: 3456 rpm, 90 N m, 70 %" in str(told)) == (number != 2)
-        assert ("3: 800 rpm, 30 N m, 10 %" in str(told)) == (number is not None)
-    for number in (0, 4):
-        with pytest.raises(CaseError, match="no such load case"):
-            case_tables(read_model(path), load_case=number)
 
 
 def two_stages():
@@ -583,8 +483,3 @@ def test_zips(tmp_path):
         path.write_bytes(broken)
         with pytest.raises(CaseError, match="cannot be unpacked"):
             read_model(path)
-
-
-def test_gears_that_make_no_set_are_refused(tmp_path):
-    with pytest.raises(GeometryError, match="E-ASSEMBLY"):
-        imported(Gearbox(planets=4).write(tmp_path / "stage.rexs"))

@@ -6,26 +6,21 @@ import numpy as np
 import pytest
 
 from femgear.case.dependencies import Steps, compliance_entries, fingerprint, ring_entries
-from femgear.case.gear_set import planetary_set
-from femgear.case.quantities import FREQUENCY, SPEED
+from femgear.case.quantities import SPEED
 from femgear.errors import CaseError
 from femgear.stages.static import solve_static
 from femgear.study.objectives import (
-    Quantity,
     at_speeds,
     contact_pressure,
-    contact_ratio,
     forces_over_time,
     housing_level,
     mesh_force,
-    named_quantity,
     natural_frequency,
     response_at,
     root_stress,
-    tip_thickness,
     transmission_error,
 )
-from femgear.study.problem import parse_limit, parse_variable, tip_reliefs
+from femgear.study.problem import tip_reliefs
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case, with_values
@@ -140,27 +135,6 @@ def test_shared_steps_change_no_number(coarse, grids, steps, changes):
     np.testing.assert_allclose(force, expected, rtol=0, atol=1e-11 * np.abs(expected).max())
 
 
-def test_quantities_of_the_gears(coarse):
-    variant = Answer(coarse, Steps())
-    gears = planetary_set(coarse)
-    assert contact_ratio("sun-planet").compute(variant) == gears.contact_ratio_sun_planet
-    # tooth thickness at the tip after ISO 21771: d_a (s/d + inv a - inv a_a)
-    alpha, x, z = np.radians(20), 0.52681, 27
-    tip = gears.sun.tip_radius / gears.sun.module
-    at_tip = np.arccos(0.5 * z * np.cos(alpha) / tip)
-    half = np.pi / (2 * z) + 2 * x * np.tan(alpha) / z + np.tan(alpha) - alpha
-    expected = 2 * tip * (half - np.tan(at_tip) + at_tip)
-    assert tip_thickness("sun").compute(variant) == pytest.approx(expected, rel=1e-9)
-
-
-def test_dynamic_part_and_peak_of_a_force():
-    force = np.zeros((1, 2, 4), complex)
-    force[0, 0] = 100.0, 0.0, 8.0, 0.0
-    force[0, 1] = 50.0, 0.0, 0.0, -3.0j
-    np.testing.assert_allclose(forces_over_time(force, dynamic=True), [[8.0, 3.0]], rtol=2e-2)
-    np.testing.assert_allclose(forces_over_time(force, dynamic=False), [[108.0, 53.0]], rtol=2e-2)
-
-
 def test_other_geometry_gets_grids_and_models_of_its_own(coarse):
     def keys(**changes):
         case = with_values(coarse, {k.replace("__", "."): v for k, v in changes.items()})
@@ -180,63 +154,6 @@ def test_other_geometry_gets_grids_and_models_of_its_own(coarse):
     assert keys(dynamics__damping_ratio=0.03) == (True, True)
     assert keys(static__positions=32, set__backlash="0.1 mm")[0] is False
     assert keys(sun__errors={"thickness_reduction": "1 um"}) == (True, True)
-
-
-def test_reliefs_are_on_the_loaded_flanks(coarse):
-    case, variables = tip_reliefs(coarse)
-    assert len(case.sun.modifications) == 2 and len(case.planet.modifications) == 4
-    assert [v.name for v in variables][:2] == [
-        "sun.modifications[1].amount",
-        "sun.modifications[1].start_diameter",
-    ]
-    assert variables[0].bounds == (0.0, pytest.approx(1e4 * case.sun.module))
-    reverse, _ = tip_reliefs(with_values(read_case(CASE), {"operation.torque": "-100 N m"}))
-    assert [one.flank for one in reverse.planet.modifications] == ["ring side", "sun side"]
-
-
-def test_words_of_the_command_line():
-    assert named_quantity("STE  sun-planet").name == transmission_error("sun-planet").name
-    assert transmission_error(torque="50 N m").torque == 50.0
-    assert named_quantity("natural frequency  11").name == natural_frequency(11).name
-    limit = parse_limit("root stress sun <= 300 MPa")
-    assert limit.high == 300e6 and limit.violation(330e6) == pytest.approx(0.1)
-    assert parse_limit("contact ratio planet-ring >= 1.3").low == 1.3
-    variable = parse_variable("sun.modifications[0].start_diameter = 43 mm..44 mm +- 50 um")
-    assert variable.bounds == (43.0, 44.0) and variable.tolerance_at(43.5) == pytest.approx(0.05)
-    assert parse_variable("sun.profile_shift=-0.1..0.3").bounds == (-0.1, 0.3)
-    together = parse_variable("sun.modifications[0].amount, planet.modifications[0].amount=0 um..5 um")
-    assert together.keys == ("sun.modifications[0].amount", "planet.modifications[0].amount")
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda: named_quantity("noise"), "no such quantity"),
-        (lambda: named_quantity("natural frequency 0"), "no mode"),
-        (lambda: Quantity("mine", FREQUENCY, "fe", float), "no such stage"),
-        (lambda: named_quantity("mesh force"), "range of speeds"),
-        (lambda: transmission_error(torque="0 N m"), "no tooth bends"),
-        (lambda: transmission_error(torque="5 mm"), "not a unit of torque"),
-        (lambda: mesh_force("3500 rpm", "1000 rpm"), "not a range of speeds"),
-        (lambda: mesh_force(*SPEEDS, part="mean"), "no such part"),
-        (lambda: transmission_error("ring"), "no such mesh"),
-        (lambda: root_stress("carrier"), "no such gear"),
-        (lambda: parse_limit("root stress sun = 3 MPa"), "not a limit"),
-        (lambda: parse_limit("root stress sun <= 3 um"), "not a unit of stress"),
-        (lambda: parse_limit("contact ratio sun-planet >= much"), "not a number"),
-        (lambda: parse_variable("sun.profile_shift"), "not a design variable"),
-        (lambda: parse_variable("sun.profile_shift=1..0"), "wrong order"),
-    ],
-)
-def test_refusals(call, message):
-    with pytest.raises(CaseError, match=message):
-        call()
-
-
-def test_a_planar_case_has_no_ring_to_shake():
-    case = read_case(CASE.with_name("nrel_pgb.toml"))
-    with pytest.raises(CaseError, match="elastic ring"):
-        at_speeds(case, RANGE)
 
 
 @pytest.mark.slow

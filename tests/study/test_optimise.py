@@ -154,15 +154,6 @@ def test_bad_input_ends_in_a_message(arguments, message, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_all_faults_are_told_at_once(tmp_path):
-    wrong = ("--goal", "noise", "--of", "smell", "--vary", "sun", "--limit", "3", "--samples", "0", "--positions", "4")
-    done = run(CASE, *wrong, "--torque", "3 um", "-o", "out", folder=tmp_path)
-    assert done.returncode == 2 and "7 problems" in done.stderr
-    for key in ("--goal", "--of", "--vary", "--limit", "--samples", "--positions", "operation.torque"):
-        assert f"{key}: " in done.stderr
-    assert list(tmp_path.iterdir()) == []
-
-
 def test_reliefs_have_the_shape_that_the_verdict_advises(tmp_path):
     case, _ = tip_reliefs(read_case(CASE))
     kinked, _ = tip_reliefs(read_case(CASE), shape="linear")

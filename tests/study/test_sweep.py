@@ -79,15 +79,3 @@ def test_the_command_writes_a_column_for_every_entry(free, tmp_path):
     assert [[row[key] for key in TEETH] for row in rows] == [["27", "39", "105"], ["30", "39", "108"]]
     assert all(float(row["contact ratio, sun-planet [1]"]) > 1.5 for row in rows)
     assert (tmp_path / "out" / "sweep.png").stat().st_size > 5000
-
-
-def test_all_faults_of_a_sweep_are_told_at_once(tmp_path):
-    words = ("--over", "sun.teeth,planet.teeth=27,30", "--over", "sun.mass", "--of", "noise", "-o", "out")
-    done = run_femgear("sweep", CASE, *words, folder=tmp_path)
-    assert done.returncode == 2 and "3 problems" in done.stderr and done.stderr.count("remedy") == 3
-    words = ("--over", "sun.teeth,sun.module=27/1 mm,30/1 kg", "--over", "sun.teeth=27,27", "-o", "out")
-    done = run_femgear("sweep", CASE, *words, folder=tmp_path)
-    assert done.returncode == 2
-    for part in ("a key is given twice", "not a unit of length", "a value is given twice"):
-        assert part in done.stderr
-    assert list(tmp_path.iterdir()) == []

@@ -11,7 +11,7 @@ from femgear.housing.two_way.response import MeshPaths, planet_groups, solve_two
 from femgear.housing.two_way.structure import FixedStructure, Support, from_arrays, supported_ring
 from femgear.solvers.linear.modal import solve_modes
 from validation import fixed_housing
-from validation.fixed_housing import DIRECTION, EQUAL, FEET, PAIR, WIDTH, R, feet, gears, solved, thin_ring
+from validation.fixed_housing import DIRECTION, EQUAL, FEET, PAIR, WIDTH, R, feet, gears, thin_ring
 
 KNOWN: Any = {"max_diameter": 4, "max_frequency": 6e3, "damping_ratio": 0.03}
 
@@ -150,12 +150,3 @@ def test_refused_sets(paths, speeds, code):
 def test_groups_of_planets():
     leaders, group, turn = planet_groups(PAIR.planet_angles, 2)
     assert (leaders.tolist(), group.tolist(), turn.tolist()) == ([0, 1], [0, 1, 0, 1], [0, 0, 1, 1])
-
-
-def test_speeds_do_not_depend_on_one_another():
-    paths, speeds = MeshPaths(97, EQUAL, 0.1, 3), np.array([10.0, 25.0, 40.0])
-    together = solved(paths, feet(4), speeds, tolerance=1e-13)
-    assert together.residual.max() < 1e-12
-    for i, speed in enumerate(speeds):
-        alone = solved(paths, feet(4), speeds[i : i + 1], tolerance=1e-13).force[0]
-        np.testing.assert_allclose(together.force[i], alone, atol=1e-11 * abs(alone).max(), err_msg=str(speed))

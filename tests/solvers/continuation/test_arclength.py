@@ -205,13 +205,6 @@ def test_long_largest_steps_leave_short_ones_checked(gap, aims):
     assert len(found.parameter) == 80 and np.abs(away).max() < 1e-6 * gap
 
 
-@pytest.mark.parametrize(("name", "value"), [("angle", 1.5), ("contraction", 0.5), ("angle", np.nan)])
-def test_options_that_the_acceptance_test_cannot_stand_are_refused(name, value):
-    with pytest.raises(CaseError, match="E-RANGE") as caught:
-        StepOptions(**{name: value})
-    assert caught.value.key == name and caught.value.remedy
-
-
 def test_detour_between_two_points_is_not_passed_over():
     """A rise much narrower than the step; the prediction beyond it is exactly on another curve."""
     height = np.tanh(8.0)
@@ -227,15 +220,6 @@ def test_detour_between_two_points_is_not_passed_over():
     found = continue_curve(rising, [-height], 0.0, limits=(0.0, 2.0), options=options)
     assert found.complete
     np.testing.assert_allclose(found.points[:, 0], np.tanh(8.0 * (found.parameter - 1.0)), atol=1e-9)
-
-
-def test_corner_of_a_piecewise_linear_curve_is_passed():
-    def bent(u, p):
-        return u - 0.06 * abs(p), np.eye(1), np.array([-0.06 * np.sign(p)])
-
-    found = continue_curve(bent, [0.045], -0.75, limits=(-0.75, 1.0), unit=2.0)
-    assert found.complete and not len(found.folds)
-    np.testing.assert_allclose(found.points[:, 0], 0.06 * np.abs(found.parameter), atol=1e-12)
 
 
 @pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6])

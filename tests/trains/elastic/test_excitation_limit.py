@@ -12,7 +12,7 @@ from femgear.housing.sensor import fixed_sensor_lines
 from femgear.report.tables import pulling_meshes, pulls_of
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.stages.static import solve_static
-from femgear.trains.elastic.checks import dynamics_warnings, missing_level
+from femgear.trains.elastic.checks import dynamics_warnings
 from femgear.trains.elastic.excitation_limit import HARMONICS, highest_excitation, limited
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 from femgear.trains.elastic.stages import (
@@ -138,13 +138,6 @@ def test_the_reach_follows_meshes_speeds_and_the_case(case):
     # the basis reaches the default all the same, for the comparison
     assert highest_excitation(with_value(case, "dynamics.up_to", "3 kHz"), 16e3, 100.0) == 22.5e3
     assert highest_excitation(with_value(case, "dynamics.up_to", "30 kHz"), 16e3, 100.0) == 30e3
-
-
-def test_only_a_noticeable_change_is_told():
-    rpm, limit = np.array([100.0, 200.0, 300.0]), np.array([1e3, 2e3, 3e3])
-    assert missing_level(rpm, np.array([0.9, -0.99, np.nan]), limit, 2e4) == ()
-    (text,) = map(str, missing_level(rpm, np.array([0.9, -3.0, np.nan]), limit, 2e4))
-    assert "at 200 rpm" in text and "-3.0 dB" in text and "1 of the 2 speeds" in text
 
 
 def test_results_of_another_case_are_refused_with_the_entries_that_differ(case, static, modes, reference, steps):

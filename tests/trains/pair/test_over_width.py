@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import xarray as xr
-from trains.pair.test_case_file import CASE, INTERNAL, STEEL, TAU, pair_case
+from stages.test_static_pair import STEEL, TAU
+from trains.pair.test_case_file import CASE, INTERNAL, pair_case
 
 from femgear.case.gear_set import planetary_set
 from femgear.contact.bodies import Bodies, make_bodies, make_sectors

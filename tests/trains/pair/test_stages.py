@@ -1,6 +1,5 @@
 """Vibration of a pair: closed forms, the pair of the impacts, integration in time, energy, units."""
 
-import math
 import re
 from dataclasses import replace
 from functools import cache
@@ -14,20 +13,8 @@ from scipy.io import wavfile
 
 from femgear import cli, open_results
 from femgear.errors import CaseError, ConvergenceError
-from femgear.report.charts import chart
-from femgear.solvers.linear.modal import solve_modes
-from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.solvers.periodic.spectral import solve_spectral
-from femgear.solvers.stability.parametric import stability
-from femgear.solvers.time.transient import solve_transient
-from femgear.stages.protocol import Drawn
 from femgear.stages.static import solve_static
-from femgear.system.system import MeshExcitation
-from femgear.trains.impacts.model import ImpactPair
 from femgear.trains.pair import stages
-from femgear.trains.pair.figures import RUNUP
-from femgear.trains.pair.model import pair_model, separating_pair
-from femgear.trains.pair.results import pair_dynamics_warnings, pair_runup_warnings
 from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, solve_pair_runup
 from femgear.trains.reading import read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
@@ -41,7 +28,6 @@ PLAIN = {
     "runup.count": 60,
 }
 BEARINGS = {"gear_1.bearing_stiffness": "8e8 N/m", "gear_2.bearing_stiffness": "1e9 N/m"}
-STIFFNESS, TAU = 4e8, np.arange(512) / 512
 
 
 def pair_case(**changes):
@@ -63,84 +49,6 @@ def run_up():
 @cache
 def gears():
     return solved()[1].gears
-
-
-def one_mass(wave, load=200.0, play=0.0):
-    """Torsional pair, its equivalent mass [kg], modes and an excitation whose unloaded flanks are ideal."""
-    case = pair_case(**{"operation.torque": f"{load} N m"})
-    model, radii = pair_model(case, gears()), [gear.base_radius for gear in gears().gears]
-    mass = 1.0 / sum(r * r / one.inertia for r, one in zip(radii, (case.gear_1, case.gear_2)))
-    k = STIFFNESS * (1.0 + wave * np.cos(2.0 * np.pi * TAU))[None]
-    force = np.full_like(k, load / radii[0])
-    excitation = MeshExcitation(k, force / k, force, backlash=np.array([play]))
-    return model, mass, solve_modes(model.system, [STIFFNESS], damping_ratio=0.05), excitation
-
-
-def test_natural_frequency_in_closed_form():
-    _, mass, modes, _ = one_mass(0.0)
-    assert modes.frequency[0] == 0.0
-    assert modes.frequency[1] == pytest.approx(math.sqrt(STIFFNESS / mass) / (2.0 * math.pi), rel=1e-9)
-
-
-def test_bearings_that_hardly_give_way_leave_the_torsional_mode():
-    stiff = {key: "1e14 N/m" for key in BEARINGS}
-    found = [
-        solve_modes(pair_model(c, gears()).system, [STIFFNESS], damping_ratio=0.05)
-        for c in (pair_case(), pair_case(**stiff))
-    ]
-    assert found[1].frequency[1] == pytest.approx(found[0].frequency[1], rel=1e-4)
-
-
-def test_one_degree_of_freedom_under_a_small_error():
-    """``m x'' + 2 zeta sqrt(k m) x' + k (x - e) = F``: the transfer function in closed form."""
-    _, _, modes, excitation = one_mass(0.0)
-    error = 1e-9 * np.cos(2.0 * np.pi * TAU)
-    excitation = replace(excitation, deflection=excitation.deflection + error)
-    hertz = modes.frequency[1] * np.array([0.3, 0.95, 1.0, 2.0])
-    response = solve_spectral(modes, excitation, hertz, excitation_harmonics=2, response_harmonics=4)
-    ratio = hertz / modes.frequency[1]
-    expected = 1e-9 / (1.0 - ratio**2 + 0.1j * ratio)
-    np.testing.assert_allclose(response.deflection[:, 0, 1], expected, rtol=1e-9)
-
-
-@pytest.mark.parametrize("ratio", [0.5, 0.95, 1.1])
-def test_flanks_that_part_as_in_the_dimensionless_pair(ratio):
-    """Stiffness waves alone: both models damp the same velocity."""
-    model, _, modes, excitation = one_mass(0.15, play=60e-6)
-    problem = separating_pair(model, modes, excitation, 60)
-    options = {"harmonics": 20, "samples": 1024, "stability": False}
-    unit = 30e-6 * STIFFNESS
-    there = ImpactPair(damping_ratio=0.05, load=excitation.force[0, 0] / unit, stiffness=(0.15,))
-    known = solve_harmonic_balance(there.problem(ratio), 1.0, **options)
-    # a length of zero is the end of the play here, its middle there
-    start = known.deflection * 30e-6
-    start = start - 30e-6 * np.eye(1, start.shape[1])
-    omega = ratio * 2.0 * math.pi * modes.frequency[1]
-    found = solve_harmonic_balance(problem, omega, start=start, **options)
-    assert found.converged and known.converged
-    np.testing.assert_allclose(found.force / unit, known.force, atol=1e-6 * abs(known.force).max())
-    np.testing.assert_allclose(found.deflection, start, atol=1e-6 * abs(start).max())
-    assert (known.at(2 * np.pi * TAU).min() < 1.0) == (ratio == 0.95)
-
-
-def test_contact_loss_against_integration_in_time():
-    _, modes, dynamics = solved()
-    s = 2
-    assert dynamics.response.method[s] == "harmonic balance" and 0.5 < dynamics.motion.drive[s] < 0.9
-    count = 8
-    problem = separating_pair(modes.model, modes.modes, modes.excitation, count)
-    hertz = float(dynamics.response.mesh_frequency[s])
-    start = np.zeros((1, 61), complex)
-    start[:, :21] = dynamics.motion.deflection[s, :, :21]
-    found = solve_harmonic_balance(problem, 2 * np.pi * hertz, harmonics=60, start=start)
-    times = np.arange(0, 40 * 64 + 1) / (64 * hertz)
-    q = np.zeros((2, 2))
-    q[0] = modes.model.system.W[:, 0] * found.at(0.0)[0] / (modes.model.system.W[:, 0] ** 2).sum()
-    motion = solve_transient(problem, 2 * np.pi * hertz, times, start=(q[0], q[1]), method="DOP853")
-    x = motion.displacement[-65:] @ modes.model.system.W[:, 0]
-    expected = found.at(times[-65:])[:, 0]
-    assert found.stable
-    np.testing.assert_allclose(x, expected, atol=2e-3 * np.ptp(expected))
 
 
 @pytest.mark.parametrize("changes", [(), tuple(BEARINGS.items())], ids=["held", "bearings"])
@@ -229,40 +137,6 @@ def test_twice_the_harmonics_and_half_the_steps_leave_the_largest_amplitude(fine
     np.testing.assert_allclose(found, known, rtol=0.01)
 
 
-@pytest.mark.parametrize(
-    ("points", "words"), [(400, "nothing bounds motions"), (40, "after 4. points: raise max_points")]
-)
-def test_a_branch_that_is_cut_says_so_and_why(points, words, monkeypatch):
-    """At little damping it grows without bound towards speeds at which the linear motion is not stable."""
-    monkeypatch.setattr(stages, "_STEPS", replace(stages._STEPS, max_points=points))
-    case = pair_case(**{"dynamics.damping_ratio": 0.02})
-    result = solve_pair_runup(case, solve_pair_modes(case, solve_static(case)))
-    data = result.dataset()
-    (said,) = (one for one in pair_runup_warnings(data) if one.code == "W-BRANCH")
-    assert not result.complete and re.search(words, said.text)
-    if points == 400:
-        end = float(data.branch_speed[-1]) * 24.0 / 60.0
-        modes = solve_pair_modes(case, solve_static(case))
-        hertz = end * np.array([0.995, 1.01])
-        below, above = stability(modes.modes, modes.excitation, hertz, excitation_harmonics=16).multiplier
-        assert abs(below) < 1.0 < abs(above)
-        travel = np.abs(result.branch[1].deflection[-1]).sum()
-        assert 0.45 * 3e-3 < travel <= 0.5 * 3e-3
-        assert f"{1e3 * float(data.branch_dte_rms[-1]):.3g} mm" in said.text
-
-
-@pytest.mark.parametrize(("speeds", "crossings"), [(("1500 rpm", "1900 rpm"), True), (("20 rpm",), False)])
-def test_campbell_diagram_shows_the_mode_and_the_harmonics_that_meet_it(speeds, crossings):
-    case, modes, _ = solved(("operation.speeds", speeds))
-    runup = solve_pair_runup(case, modes).dataset()
-    figure = RUNUP.draw(Drawn(case, {"runup": runup, "modes": modes.dataset()}))["campbell"]
-    (ax,) = figure.axes
-    labels = [line.get_label() for line in ax.get_lines()]
-    met = len(ax.collections[0].get_offsets())
-    assert (met > 3) == ("torsional mode" in labels) == crossings
-    assert chart(figure) is not None
-
-
 def test_sound_of_a_pair_is_that_of_its_lines(tmp_path):
     changes = {"operation.speeds": ["1500 rpm"], "runup.count": 4, "dynamics.up_to": "4 kHz"}
     folder = tmp_path / "case.toml"
@@ -318,14 +192,6 @@ def test_refusals_name_the_entries(changes, code, key):
         pair_case(**changes)
     problems = getattr(found.value, "problems", ()) or (found.value,)
     assert (code, key) in [(one.code, one.key) for one in problems]
-
-
-@pytest.mark.parametrize(("play", "said"), [("0.1 mm", False), ("0 mm", True)])
-def test_flanks_that_part_without_backlash_are_told_to_have_no_back(play, said):
-    case = pair_case(**{"set.backlash": play, "operation.speeds": ["7700 rpm"]})
-    data = solve_pair_dynamics(case, solve_pair_modes(case, solve_static(case))).dataset()
-    (found,) = [one for one in pair_dynamics_warnings(data) if one.code == "W-SEPARATION"]
-    assert ("no back flanks" in found.text) == said
 
 
 @pytest.mark.parametrize(("ratio", "key"), [(0.0, "dynamics.damping_ratio"), (0.01, "operation.speeds")])

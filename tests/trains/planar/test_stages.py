@@ -24,7 +24,6 @@ from femgear.trains.planar.figures import (
     branch_figures,
     contact_over_branch,
     response_mesh_forces,
-    weight_response,
 )
 from femgear.trains.planar.model import (
     TAIL_LIMIT,
@@ -34,7 +33,7 @@ from femgear.trains.planar.model import (
     planar_model,
     shown_points,
 )
-from femgear.trains.planar.results import branch_warnings, comparisons, describe_branch, doubts, tail_warnings
+from femgear.trains.planar.results import branch_warnings, doubts, tail_warnings
 from femgear.trains.planar.stages import PLANAR, solve_branch, solve_planar_modes, solve_planar_response
 from femgear.trains.reading import open_results, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
@@ -440,25 +439,6 @@ def test_a_response_that_does_not_converge_is_a_numerical_failure(pgb, monkeypat
         assert "response" not in open_results(out).stages
 
 
-def test_open_verdicts_are_not_verdicts(pgb):
-    found = solve_branch(pgb)
-    why = "not determined: too many steps"
-    solutions = list(found.branch.solutions)
-    for i in (1, 2):
-        solutions[i] = replace(solutions[i], verdict=open_verdict(why))
-    data = replace(found, branch=replace(found.branch, solutions=tuple(solutions))).dataset()
-    stable = data["stable"].values
-    assert set(stable) == {1, 0, -1} and np.flatnonzero(stable == -1).tolist() == [1, 2]
-    assert data["stable"].attrs["flag_meanings"] == "stable not_stable not_known"
-    notes = describe_branch(data).notes
-    hertz = data["weight_frequency"].values
-    assert f"not determined: {hertz[1]:.3f} to {hertz[2]:.3f} Hz along the branch ({why})" in notes
-    assert not any(note.startswith(f"not stable: {hertz[1]:.3f}") for note in notes)
-    lines = weight_response(data).axes[0].get_lines()
-    dotted = [line.get_xdata() for line in lines if line.get_linestyle() == ":"]
-    assert len(dotted) == 1 and dotted[0].tolist() == hertz[:4].tolist()
-
-
 def test_truncation_is_said(results):
     """Three harmonics do not carry the forces of teeth that wedge."""
     data = results.branch
@@ -489,19 +469,6 @@ def test_forces_in_time_are_those_of_one_sided_contact(results, pgb):
         wave = np.fft.rfft(data[time].values[-1, :, :-1], axis=1)[:, :4] / 720 * [1, 2, 2, 2]
         known = (data[f"{lines}_real"] + 1j * data[f"{lines}_imag"]).values[point]
         np.testing.assert_allclose(wave, known, atol=2e-3 * np.abs(known).max())
-
-
-def test_captions_say_what_this_case_shows(pgb):
-    stable = " ".join(comparisons(pgb, "weight_response"))
-    assert "dotted: not known" in stable
-    plain = changed(pgb, planar__branch__stability=False)
-    assert "Stability was not computed" in " ".join(comparisons(plain, "tooth_contact"))
-    assert "at no mesh frequency" in " ".join(comparisons(pgb, "response_spectrum_30_rpm"))
-    data = solve_branch(plain).dataset()
-    assert data["stable"].values.tolist() == [-1] * data.sizes["point"]
-    assert data["shown_as"].values[-1] == "largest response"
-    assert {line.get_linestyle() for line in weight_response(data).axes[0].get_lines()} <= {"-", "None"}
-    assert "stability was not computed" in describe_branch(data).notes
 
 
 def test_figures_mark_what_too_few_harmonics_make_doubtful(results):
@@ -538,18 +505,6 @@ def test_captions_say_that_lines_are_too_few(results):
         assert "W-TAIL" in " ".join(doubts(results, stem))
     for stem in ("weight_response", "carrier_orbit", "mode_shapes"):
         assert not list(doubts(results, stem))
-
-
-def test_a_branch_that_ran_out_of_points_says_which_entry_to_raise(pgb):
-    found = solve_branch(
-        changed(
-            pgb,
-            planar__branch={"from": "25 Hz", "to": "45 Hz", "harmonics": 1, "stability": False, "points": 10},
-        )
-    )
-    assert found.ending.startswith("NOT COMPLETE") and "raise planar.branch.points" in found.ending
-    assert "before 45 Hz" in describe_branch(found.dataset()).notes[0]
-    assert any("planar.branch.points" in finding.text for finding in branch_warnings(found.dataset()))
 
 
 def test_equal_forces_are_drawn_once(results):
