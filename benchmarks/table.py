@@ -10,14 +10,15 @@ BASELINE = "baseline"
 
 HEAD = """# Benchmarks
 
-Time and peak memory of every stage of the reference case (`cases/planetary_27_40_108.toml`), in one
-process with one BLAS thread. Times are medians. Seconds depend on the machine and on what else it does; the
-column *ratio* divides them by the time of a fixed piece of work measured in the same run: factor a Laplacian
-of 160 x 160 points with SciPy's `splu` and solve for 8 right-hand sides ({baseline:.1f} ms here). *Peak* is
-the resident memory of a fresh process at its highest during the stage, *added* how much of it came with the
-stage; both contain the libraries that the stage loads. *Limit* is the time that the project promises.
-*Growth* is the exponent of the time over the size, fitted to the rows up to that one. The groups on the
-18-dof set are those of `benchmarks/planet_train.py`.
+Time and peak memory of every stage of the reference case (`cases/planetary_27_40_108.toml`), with one BLAS
+thread. Times are medians. Where there is a second core, stages and run-ups share contact in slices, compliances
+and speeds between two processes; rows that count the processor's time have one process. Seconds depend on the
+machine and on what else it does; the column *ratio* divides them by the time of a fixed piece of work measured
+in the same run: factor a Laplacian of 160 x 160 points with SciPy's `splu` and solve for 8 right-hand sides
+({baseline:.1f} ms here). *Peak* is the resident memory of a fresh process at its highest during the stage,
+*added* how much of it came with the stage; both contain the libraries that the stage loads. *Limit* is the time
+that the project promises. *Growth* is the exponent of the time over the size, fitted to the rows up to that one.
+The groups on the 18-dof set are those of `benchmarks/planet_train.py`.
 
 This page is written by `make bench ARGS="--page docs/benchmarks.md"`; rows of ROSS need `pip install
 "femgear[bench]"`.
