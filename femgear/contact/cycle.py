@@ -66,8 +66,8 @@ from femgear.gears.planetary import mirrored_set
 
 _TOGETHER, _ROWS, _SAME_PLACE = 64, 50, 1e-6
 """Positions that are solved at once, and slices of helical teeth; distance of two that count as one [mesh periods]."""
-_WORTH_SHARING, _MANY_PARTS = 16, 3
-"""Positions in slices, and parts of a walk, from which on two processes share them."""
+_MANY_PARTS = 3
+"""Parts of a walk above which two processes share them."""
 
 
 @dataclass(frozen=True)
@@ -719,20 +719,18 @@ class _Walk:
         setup = replace(setup, images=self.images)
         if options.planet_gaps is not None:
             setup = setup.with_planet_gaps(options.planet_gaps)
-        sliced, together = self.width is not None, _TOGETHER if each == 1 else max(_ROWS // each, 2)
-        if sliced and each == 1 and P >= _WORTH_SHARING:
-            together = min(together, -(-P // 16) * 8)
+        together = _TOGETHER if each == 1 else max(_ROWS // each, 2)
         # windows that are too small show at the first position: slices of all others need not wait for it
         starts = range(0, P, together) if each == 1 else [0, *range(1, P, together)]
         parts = [partial(self._solve_positions, setup, first, end, each) for first, end in pairwise([*starts, P])]
-        # many positions are worth another process, but for the first part where it is one of many
-        alone = 1 if len(parts) > _MANY_PARTS else 0 if sliced else len(parts)
+        # many parts are worth another process, but for the first one, which shows whether windows hold the contact
+        alone = 1 if len(parts) > _MANY_PARTS else len(parts)
         solved = []
         for part in parts[:alone]:
             solved.append(part())
             if solved[-1].nearest > 0.0:
                 return None, share, solved[-1].nearest
-        solved += second_process.shared(parts[alone:]) if len(parts[alone:]) > 1 else [one() for one in parts[alone:]]
+        solved += second_process.shared(parts[alone:])
         for one in solved:
             if one.nearest > 0.0:
                 return None, share, one.nearest
