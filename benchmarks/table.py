@@ -27,24 +27,25 @@ This page is written by `make bench ARGS="--page docs/benchmarks.md"`; rows of R
 
 MISSED = """## What misses its limit, and what was tried
 
-* **Static and modal stage in 25 slices**: waves across the width condensed once for both stages and gear by gear for
-  variants (half the time); panels of SuperLU from 1 to 20 columns, 3 to 16 positions at once (no gain); positions
-  shared by two processes (3.06 s in either way: 281 positions come in six walks, each as short as a copy of the process).
+* **Static and modal stage in 25 slices**: waves across the width condensed once for both stages and gear by gear
+  for variants (half the time); panel sizes of SuperLU, 3 to 16 positions at once (no gain); positions shared by two
+  processes (3.06 s in either way: 281 positions come in six walks, each as short as a copy of the process).
 * **Helical teeth out of phase**: compliance between slices by tables (less than half the time); blocks of 25 to 400
-  tooth pairs (3.06 to 3.55 s for the static stage, 400 stays); two processes (0.75 of the time, two positions a task).
-* **Whole computation**: fewer modules and solutions shared between stages; threads for the three gears (0.25 to 0.19 s);
-  a second process for them (0.18 s, taken: 0.77 for 0.84 s in alternate runs).
-* **Run without pictures, first line, script**: without xarray and pandas (4.8 to 3.2 s), without the garbage collector
-  (no gain), with byte code on disk; a run-up in two processes. A quarter of the time is left to imports.
-* **Answers after a change**: stability of a turn only when it is asked for (five speeds on bolts 5.1 to 1.8 s); two
-  processes (no gain); positions of the answer before as a start (left: the answer would depend on what came before). All
-  positions of a loaded period, some 280, take more than 0.1 s however they are found.
+  tooth pairs (3.06 to 3.55 s for the static stage, 400 stays); two processes (0.75 of the time, two positions a
+  task).
+* **Whole computation**: fewer modules and solutions shared between stages; threads for the three gears (0.25 to
+  0.19 s); a second process for them (0.18 s, taken: 0.77 for 0.84 s in alternate runs).
+* **Run without pictures, first line, script**: without xarray and pandas (4.8 to 3.2 s), without the garbage
+  collector (no gain), with byte code on disk; a run-up in two processes. A quarter of the time is left to imports.
+* **Answers after a change**: stability of a turn only when it is asked for (five speeds on bolts 5.1 to 1.8 s); one
+  cache for all steps of a case; positions of the answer before as a start (left: the answer would depend on what
+  came before). All positions of a loaded period, some 280, take more than 0.1 s however they are found.
 * **Run with pictures**: page before pictures, two processes, no animation. Layout of the axes is a quarter of it.
-* **Drivetrain, 60 s at 20 kHz**: steps of one linear map between contact changes; mesh matrices differ at every instant,
-  and their product with two rows of 96 is what is left.
+* **Drivetrain, 60 s at 20 kHz**: steps of one linear map between contact changes; mesh matrices differ at every
+  instant, and their product with two rows of 96 is what is left.
 
-A million as-built sets of `cases/tolerances/3um.toml` took 400 s in two processes with 0.47 GB, 10,000 sets in 25 slices 71 s
-with 0.73 GB, by the command, while the fixed piece of work took 86 ms; the aims are 240 s and 60 s.
+A million as-built sets of `cases/tolerances/3um.toml` took 400 s in two processes with 0.47 GB, 10,000 sets in 25
+slices 71 s with 0.73 GB, by the command, while the fixed piece of work took 86 ms; the aims are 240 s and 60 s.
 """
 
 
