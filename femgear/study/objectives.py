@@ -23,6 +23,7 @@ from femgear.errors import CaseError
 from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness
 from femgear.stages.static_results import LARGE
+from femgear.system.fourier import sample
 from femgear.trains.elastic import stages as elastic_stages
 from femgear.trains.elastic.checks import case_warnings, response_findings
 from femgear.trains.live import Answer
@@ -225,12 +226,7 @@ def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
     Of the harmonics ``force`` (speeds, meshes, H + 1), ``F(t) = Re sum_h F_h exp(i h omega t)``, from sixteen
     samples a period of the highest one: within 2 % of its amplitude.
     """
-    harmonics = force.shape[-1]
-    padded = np.zeros((*force.shape[:2], 8 * harmonics + 1), complex)
-    padded[..., :harmonics] = force
-    padded[..., 0] = 2.0 * np.real(force[..., 0])
-    samples = 16 * harmonics
-    history = np.fft.irfft(padded, samples, axis=-1) * (0.5 * samples)
+    history = sample(force, 16 * force.shape[-1])
     if not dynamic:
         return history.max(axis=-1)
     return np.abs(history - np.real(force[..., :1])).max(axis=-1)

@@ -13,6 +13,7 @@ from femgear.case.gear_set import need_set
 from femgear.case.planetary import Case
 from femgear.errors import CaseError
 from femgear.housing.sensor import stored_lines
+from femgear.report.response import stored_harmonics
 from femgear.report.style import save_figure
 from femgear.report.tables import Block
 from femgear.stages.protocol import Progress, one_blas_thread, silent
@@ -22,7 +23,7 @@ from femgear.study.designs import open_designs
 from femgear.study.faults import all_faults
 from femgear.study.figures import before_and_after, front_figure, tolerance_bars
 from femgear.study.front import ParetoFront, check_second, pareto_front
-from femgear.study.objectives import Quantity, named_quantity
+from femgear.study.objectives import Quantity, forces_over_time, named_quantity
 from femgear.study.problem import Problem, Shape, Variable, parse_limit, parse_variable, tip_reliefs
 from femgear.study.runner import Runner
 from femgear.study.search import Method, Optimum, SearchOptions, comparison_rows, minimise, tolerance_rows, verdict
@@ -358,7 +359,7 @@ def _check(found: Optimum, data: Case, folder: Path, speeds: Any, rough: Optimum
     dynamic, notes = dict[str, Any](), []
     if speeds is not None:
         dynamic["speed"] = runs[0].dynamics["speed"].values
-        dynamic["forces"] = [_dynamic_force(results.dynamics) for results in runs]
+        dynamic["forces"] = [_forces(results.dynamics) for results in runs]
         for name, results in zip(("before", "optimum"), runs, strict=True):
             unstable = int((~results.dynamics["stable"].values).sum())
             notes.append(f"{name}: unstable at {unstable} of {len(dynamic['speed'])} speeds")
@@ -379,22 +380,13 @@ def _numbers(results: Any, only: str) -> dict[str, tuple[float, str]]:
         found[f"STE peak to peak, {kind}"] = (1e6 * static["ste_peak_to_peak"].values[rows].max(), "um")
     if only == "housing":
         dynamics = results.dynamics
-        found["dynamic mesh force"] = (_dynamic_force(dynamics).max(), "N")
-        found["peak mesh force"] = (_history(dynamics).max(), "N")
+        found["dynamic mesh force"] = (_forces(dynamics).max(), "N")
+        found["peak mesh force"] = (_forces(dynamics, dynamic=False).max(), "N")
         lines = stored_lines(results.housing, form="exact")
         found["housing level"] = (np.abs(lines.acceleration).max(), "m/s^2")
     return found
 
 
-def _history(dynamics: xr.Dataset) -> np.ndarray:
-    """Mesh forces over a period, (speed, mesh, time) [N], from ``Re sum F_h exp(i h omega t)``."""
-    lines = dynamics["mesh_force_real"].values + 1j * dynamics["mesh_force_imag"].values
-    harmonic = np.arange(lines.shape[-1])
-    turn = np.exp(2j * np.pi * np.outer(harmonic, np.arange(360) / 360))
-    return np.real(lines @ turn)
-
-
-def _dynamic_force(dynamics: xr.Dataset) -> np.ndarray:
-    """Largest deviation of any mesh force from its mean at every speed [N]."""
-    history = _history(dynamics)
-    return np.abs(history - history.mean(axis=-1, keepdims=True)).max(axis=(1, 2))
+def _forces(dynamics: xr.Dataset, *, dynamic: bool = True) -> np.ndarray:
+    """Largest deviation of any mesh force from its mean, or largest force, at every speed [N]."""
+    return forces_over_time(stored_harmonics(dynamics, "mesh_force"), dynamic=dynamic).max(axis=1)

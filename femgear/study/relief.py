@@ -35,10 +35,12 @@ if TYPE_CHECKING:
     from femgear.contact.bodies import Bodies
     from femgear.gears.planetary import PlanetarySet
 
-_LARGEST_LENGTH = 1.3
-"""Longest relief in lengths of two-pair contact; longer ones reach the pitch point of common sets."""
+_SHORTEST = 0.05
+"""Shortest relief in lengths of two-pair contact."""
 AMOUNT_STEP, LENGTH_STEP = 0.1e-6, 0.05e-3
 """Steps [m] of the points around the optimum, of amount and of length along the path of contact."""
+_VALLEYS = 3
+"""Points of a grid lower than all around them from which a search begins, at most."""
 _SMALLEST_GAIN = 1e-4
 """Gain [um] under which a neighbour counts as no better."""
 
@@ -159,24 +161,13 @@ def sun_torque(case: Case, gears: PlanetarySet, torque: float | None = None) -> 
     return value
 
 
-def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
-    """Find the roll lengths on sun and planet where a tip relief of their mesh starts [m].
+def longest_relief(planetary_set: PlanetarySet) -> float:
+    """Find the length of a relief over the whole path of contact, in lengths of two-pair contact [1].
 
-    Its length is along the path of contact, in lengths ``(epsilon - 1) p_b`` of two-pair contact at either
-    end: 1 starts at the ends of single-pair contact.
-
-    CaseError: E-RANGE: a length outside 0.05 to 1.3. GeometryError: a contact ratio of one (E-CONTACT-RATIO).
+    Reliefs of both gears meet in the middle of the path at half of it. GeometryError: a contact ratio of one
+    (E-CONTACT-RATIO).
     """
-    if not 0.05 <= length <= _LARGEST_LENGTH:
-        raise CaseError(
-            f"a relief of {length} lengths of two-pair contact is not plausible",
-            code="E-RANGE",
-            value=length,
-            limit=f"0.05 to {_LARGEST_LENGTH}",
-            remedy="give a length in lengths of two-pair contact, 1 for a long relief",
-        )
-    pair = mesh_pairs(planetary_set)[0]
-    begin, end = pair.path
+    begin, end = mesh_pairs(planetary_set)[0].path
     if end - begin <= planetary_set.base_pitch:
         raise GeometryError(
             "sun and planet have no two-pair contact, in which reliefs are measured",
@@ -184,6 +175,28 @@ def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[
             value=(end - begin) / planetary_set.base_pitch,
             limit="a transverse contact ratio above 1",
             remedy="give the reliefs as modifications of the case, with start diameters",
+        )
+    return (end - begin) / (end - begin - planetary_set.base_pitch)
+
+
+def relief_starts(planetary_set: PlanetarySet, *, length: float = 1.0) -> tuple[float, float]:
+    """Find the roll lengths on sun and planet where a tip relief of their mesh starts [m].
+
+    Its length is along the path of contact, in lengths ``(epsilon - 1) p_b`` of two-pair contact at either
+    end: 1 starts at the ends of single-pair contact.
+
+    CaseError: E-RANGE: longer than the path of contact, or shorter than 0.05. GeometryError: as `longest_relief`.
+    """
+    pair = mesh_pairs(planetary_set)[0]
+    begin, end = pair.path
+    longest = longest_relief(planetary_set)
+    if not _SHORTEST <= length <= longest:
+        raise CaseError(
+            f"a relief of {length} lengths of two-pair contact is longer than the path of contact, or hardly one",
+            code="E-RANGE",
+            value=length,
+            limit=f"{_SHORTEST} to {longest:.3f}",
+            remedy="give a length in lengths of two-pair contact, 1 for a long relief",
         )
     along = length * (end - begin - planetary_set.base_pitch)
     return float(pair.pitch_roll_1 + end - along), float(pair.pitch_roll_2 - begin - along)
@@ -448,7 +461,7 @@ def optimise_relief(
     max_evaluations: int = 240,
     journal: Journal | None = None,
 ) -> ReliefOptimum:
-    """Find the best relief at one torque, by Nelder and Mead's simplex from the best point of the grid.
+    """Find the best relief at one torque, by Nelder and Mead's simplex from the deepest valleys of the grid.
 
     The peak to peak has kinks where another position becomes the extreme one, so no gradient is used. The
     simplex may collapse where the function still falls (K. I. M. McKinnon, SIAM J. Optim. 9, 1998, 148-158),
@@ -484,7 +497,14 @@ def optimise_relief(
 
     unit = two_pair_length(basis.gears)
     step = np.array([AMOUNT_STEP * 1e6, LENGTH_STEP / unit])
-    point, value, around = _descend(peak, *_frame(grid, t), step, lambda: max_evaluations - len(known))
+    (first, *others), bounds, sizes = _frame(grid, t)
+
+    def left() -> int:
+        return max_evaluations - len(known)
+
+    ends = [_descend(peak, first, bounds, sizes, step, left)]
+    ends += [_descend(peak, start, bounds, sizes, step, left) for start in others if left() > 0]
+    point, value, around = min(ends, key=lambda end: end[1])
     slopes = _slopes(point, value, around)
     return ReliefOptimum(
         torque=float(torque),
@@ -500,13 +520,17 @@ def optimise_relief(
 
 
 def _frame(grid: ReliefGrid, t: int):
-    """Best point of the grid in micrometres and lengths, the bounds of the search, sizes of the simplex."""
-    a, b = np.unravel_index(grid.peak_to_peak[t].argmin(), grid.peak_to_peak[t].shape)
-    start = np.array([grid.amounts[a] * 1e6, grid.lengths[b]])
+    """Deepest valleys of the grid in micrometres and lengths, the bounds of the search, sizes of the simplex."""
+    peaks, starts = grid.peak_to_peak[t], list[np.ndarray]()
+    around = np.pad(peaks, 1, constant_values=np.inf)
+    for flat in peaks.ravel().argsort():
+        a, b = divmod(int(flat), peaks.shape[1])
+        if peaks[a, b] <= around[a : a + 3, b : b + 3].min() and len(starts) < _VALLEYS:
+            starts.append(np.array([grid.amounts[a] * 1e6, grid.lengths[b]]))
     low = np.array([grid.amounts.min() * 1e4, grid.lengths.min()])
     high = np.array([grid.amounts.max() * 1e6, grid.lengths.max()])
     cells = np.maximum([len(grid.amounts) - 1, len(grid.lengths) - 1], 1)
-    return start, (low, high), 0.4 * np.array([np.ptp(grid.amounts) * 1e6, np.ptp(grid.lengths)]) / cells
+    return starts, (low, high), 0.4 * np.array([np.ptp(grid.amounts) * 1e6, np.ptp(grid.lengths)]) / cells
 
 
 def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]):

@@ -36,6 +36,7 @@ from femgear.study.relief import (
     harris_map,
     is_cycle,
     loads_back,
+    longest_relief,
     optimise_relief,
     relief_grid,
     relief_starts,
@@ -44,7 +45,7 @@ from femgear.study.relief import (
 from femgear.trains.reading import to_toml, with_value, with_values
 
 _SHORTEST, _LONGEST = 0.4, 1.2
-"""Range of lengths searched, in lengths of two-pair contact."""
+"""Range of lengths searched, in lengths of two-pair contact; parabolas, which begin gently, reach half the path."""
 _TABLE, _FIGURE, _CASE, _JOURNAL = "tip_relief.csv", "tip_relief.png", "relief.toml", "relief.jsonl"
 _HEADER = ("torque [N m]", "relief [m]", "length [two-pair contact]", "STE peak to peak [m]", "over unmodified [1]")
 
@@ -96,7 +97,7 @@ def relief_into(
         progress("compliance", 1, 1)
         top = 2.0 * _mean_deflection(basis, target) if top is None else top
         amounts = top * np.arange(1, request.points + 1) / request.points
-        grid, best = _searched(basis, amounts, on_sun, target, POWERS[request.shape], progress, journal)
+        grid, best = _searched(basis, amounts, on_sun, target, request.shape, progress, journal)
         relief = {"amount": best.amount, "length": best.length, "shape": request.shape, "back": target < 0}
         relieved, tables = with_relief_tables(case, basis.gears, **relief)
         of_cases = [basis.deviations, set_deviations(relieved)]
@@ -168,12 +169,14 @@ def _searched(
     amounts: np.ndarray,
     on_sun: np.ndarray,
     target: float,
-    power: float,
+    shape: Shape,
     progress: Progress,
     journal: Journal,
 ) -> tuple[ReliefGrid, ReliefOptimum]:
     """The grid, and the optimum at the target torque."""
-    lengths = np.linspace(_SHORTEST, _LONGEST, len(amounts))
+    power = POWERS[shape]
+    half = 0.5 * longest_relief(basis.gears)
+    lengths = np.linspace(_SHORTEST, max(half, _LONGEST) if shape == "parabolic" else _LONGEST, len(amounts))
     grid = relief_grid(
         basis, amounts=amounts, lengths=lengths, torques=on_sun, power=power, progress=progress, journal=journal
     )

@@ -114,7 +114,7 @@ def test_pairs_have_maps(tmp_path):
         (["--relief=-1 um"], "not a plausible relief"),
         (["--relief", "1 um", "--relief", "0.001 mm"], "given twice"),
         (["--torque", "0 N m"], "without torque"),
-        (["--length", "3"], "0.05 to 1.3"),
+        (["--length", "3"], "0.05 to 2.816"),
         (["--torque", "-100 N m", "--torque", "50 N m"], "both signs"),
         (["--positions", "2"], "--positions"),
         (["--relief", "4", "--length", "3", "--torque", "3 um", "--positions", "2"], "4 problems"),

@@ -10,6 +10,8 @@ import pytest
 from femgear.contact.supports import Supports
 from femgear.errors import CaseError
 from femgear.study.relief import (
+    ReliefGrid,
+    _frame,
     design_basis,
     harris_map,
     optimise_relief,
@@ -106,7 +108,18 @@ def test_refusals(basis):
         harris_map(basis, torques=[10.0, 0.0], deviations=[None])
     with pytest.raises(CaseError, match="both signs"):
         relief_grid(basis, amounts=[1e-6], lengths=[1.0], torques=[1.0, -1.0])
-    with pytest.raises(CaseError, match="not plausible"):
-        relief_starts(gears, length=2.0)
+    with pytest.raises(CaseError, match="path of contact"):
+        relief_starts(gears, length=3.0)
     with pytest.raises(CaseError, match="no tooth bends"):
         sun_torque(read_case(CASE), gears, 0.0)
+
+
+def test_valleys_of_the_grid_are_all_tried():
+    """The deepest one first; a plain slope has one, at its end."""
+    amounts, lengths = np.array([1e-6, 2e-6, 3e-6]), np.array([0.4, 0.8, 1.2])
+    peaks = np.array([[[3.0, 5.0, 1.0], [5.0, 5.0, 5.0], [2.0, 5.0, 4.0]]])
+    starts, *_ = _frame(ReliefGrid(amounts, lengths, np.ones(1), peaks, np.ones(1)), 0)
+    np.testing.assert_allclose(starts, [[1.0, 1.2], [3.0, 0.4], [1.0, 0.4]])
+    slope = np.arange(9.0).reshape(1, 3, 3)
+    starts, *_ = _frame(ReliefGrid(amounts, lengths, np.ones(1), slope, np.ones(1)), 0)
+    np.testing.assert_allclose(starts, [[1.0, 0.4]])
