@@ -359,9 +359,10 @@ class _SliceNewton:
 
         Those ``across`` (P, n, n) times a factor, and those ``between`` the windows of a slice (P, N, W, W).
         """
-        P, c = carrying.at.shape
+        c = carrying.at.shape[1]
         block = system[:, :c, :c]
-        np.multiply(across.ravel()[carrying.entries].reshape(P, c, c), factor, out=block)
+        for part, whole, at in zip(block, across, carrying.at, strict=True):
+            np.multiply(whole.take(at, axis=0).take(at, axis=1), factor, out=part)
         if not carrying.on.all():
             block *= carrying.on[:, :, None] & carrying.on[:, None]
         p, i, j, own, window, w = carrying.beside
@@ -444,13 +445,11 @@ class _Carrying:
     """Those slices of windows that carry, as many places c at each of P positions.
 
     ``on`` (P, c) tells whether a place is taken, ``at`` (P, c) which of all n slices of windows stands there.
-    ``entries`` (P c c,) are the places of their pairs in a matrix (P, n, n), ``beside`` position, row and
-    column of pairs in the same slice, with slice and both windows.
+    ``beside`` are position, row and column of pairs in the same slice, with slice and both windows.
     """
 
     on: np.ndarray
     at: np.ndarray
-    entries: np.ndarray
     beside: tuple[np.ndarray, ...]
 
     @classmethod
@@ -459,12 +458,11 @@ class _Carrying:
         on, at = _first(carries)
         (P, n), c = carries.shape, at.shape[1]
         p, i = np.arange(P)[:, None], np.arange(c)
-        entries = (((p * n + at) * n)[:, :, None] + at[:, None]).ravel()
         place = np.full((P, n), -1)
         place[p, at] = np.where(on, i, -1)
         beside = place.reshape(P, -1, windows)[p, at // windows]
         p, i, w = np.nonzero((beside >= 0) & on[..., None])
-        return cls(on, at, entries, (p, i, beside[p, i, w], *np.divmod(at[p, i], windows), w))
+        return cls(on, at, (p, i, beside[p, i, w], *np.divmod(at[p, i], windows), w))
 
 
 def _first(on: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
