@@ -226,6 +226,22 @@ class CaseError(FemgearError, ValueError):
     default_code = "E-CASE"
 
 
+def several(problems: Sequence[CaseError], count: int = 0) -> CaseError:
+    """Make one error that lists all problems (at least one) and has them in its ``problems``.
+
+    ``count`` is how many there are where some were left out.
+    """
+    if len(problems) == 1:
+        combined = problems[0]
+    else:
+        count = max(count, len(problems))
+        first = f", the first {MOST_SHOWN} of them" if count > MOST_SHOWN else ""
+        combined = CaseError(f"{count} problems{first}")
+        combined.code = problems[0].code if len({problem.code for problem in problems}) == 1 else "E-CASE"
+    combined.problems = tuple(problems)
+    return combined
+
+
 class GeometryError(FemgearError):
     """The gears of the case cannot be made, assembled or run."""
 

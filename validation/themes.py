@@ -36,6 +36,7 @@ from validation import (
     parametric_routes,
     planar,
     planetary,
+    power_flow,
     rims,
     ring,
     routes,
@@ -74,6 +75,14 @@ THEMES = (
         "Compared with: published gear report of the NREL 5 MW gearbox; 27/40/108: 22.1995°, 20.0000°, 1.5507, "
         "1.9301; gates: printed digits.",
         (planetary.reference_geometry, planetary.nrel_report, planetary.assembly),
+    ),
+    Theme(
+        "power_flow",
+        "Power flow",
+        "Graphs of shafts, pairs and planetary sets without losses; speeds, torques and power are compared in "
+        "fractions. Compared with: Willis' table, closed forms of Simpson, Ravigneaux, Lepelletier and Wolfrom sets, "
+        "printed ratios of transmissions, power and torque balance; gates: exact; 1e-15; printed digits.",
+        (power_flow.ratios, power_flow.refusals, power_flow.frequencies),
     ),
     Theme(
         "ISO 6336",

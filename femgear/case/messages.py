@@ -20,7 +20,7 @@ from femgear.case import text as case_text
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, wrong_length
 from femgear.case.sections import RackSection
-from femgear.errors import MOST_SHOWN, CaseError, GeometryError
+from femgear.errors import CaseError, GeometryError, several
 from femgear.findings import Finding, remark
 
 _DIMENSIONS = {
@@ -158,14 +158,9 @@ def combine(problems: list[CaseError], text: str, name: str, count: int = 0) -> 
         line = case_text.line_of(text, problem.key) if problem.key and name else None
         if problem.file in (None, name):  # or that of another file
             problem.file = f"{name}:{line}" if line else name
-    if len(problems) == 1:
-        combined = problems[0]
-    else:
-        count = count if count > _MOST else len(problems)
-        first = f", the first {MOST_SHOWN} of them" if count > MOST_SHOWN else ""
-        combined = CaseError(f"{count} problems{first}", file=name)
-        combined.code = problems[0].code if len({p.code for p in problems}) == 1 else "E-CASE"
-    combined.problems = tuple(problems)
+    combined = several(problems, count if count > _MOST else 0)
+    if len(problems) > 1:
+        combined.file = name
     return combined
 
 

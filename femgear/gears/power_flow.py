@@ -1,0 +1,644 @@
+"""Speeds and torques of any graph of shafts and gear stages, without losses.
+
+A stage ties the speeds of its shafts: the sum of weight times speed is zero, ``z_1 w_1 + z_2 w_2 = 0`` of two
+external gears, Willis' equation of planetary ones (R. Willis, Principles of Mechanism, 1841; J. Müller,
+Die Umlaufgetriebe, 1998). The torques that a stage puts on its shafts do no work on such motions, so that they are
+the same weights times one unknown, and every shaft is in balance.
+
+Tooth numbers are whole. What the graph determines, leaves free, locks or contradicts is found in fractions
+(`solve_exactly`), never by rounding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from itertools import pairwise
+from numbers import Rational, Real
+
+from femgear.errors import CaseError, GeometryError, several
+from femgear.gears.exact_linear import ExactSolution, Row, reduce_rows, solve_exactly
+
+AGREEMENT = 1e-9
+"""Given speeds and torques contradict where they miss a ratio by more than this, relative to the largest term."""
+EXTERNAL, INTERNAL = -1, 1
+"""Sense of rotation of gear 2 over that of gear 1, seen from the carrier."""
+Ratios = Mapping[str, Mapping[str, Fraction]]
+
+
+@dataclass(frozen=True)
+class StageGears:
+    """Gears of a stage and their meshes, by what they are: "sun", "planet", "ring", "gear 1".
+
+    Parameters
+    ----------
+    teeth : mapping
+        Numbers of teeth, as far as the ratios need them.
+    shafts : mapping
+        Shaft of every central gear, and of the "carrier" of planets; None is the casing.
+    meshes : tuple of (str, str, int)
+        Gear 1, gear 2 and `EXTERNAL` or `INTERNAL`; the first one of a chain is central.
+    bodies : tuple of (str, str)
+        Planet gears that are one body.
+    """
+
+    teeth: Mapping[str, int]
+    shafts: Mapping[str, str | None]
+    meshes: tuple[tuple[str, str, int], ...]
+    bodies: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True)
+class SpeedCondition:
+    """A tie between speeds: the sum of weight times speed over shafts is zero.
+
+    Parameters
+    ----------
+    name : str
+        Of the stage, in messages and results.
+    weights : mapping
+        Weight [1] by shaft. Times one unknown [N m] they are the torques that the stage puts on the shafts.
+    gears : StageGears, optional
+        For `femgear.gears.stage_frequencies`.
+    """
+
+    name: str
+    weights: Mapping[str, Fraction]
+    gears: StageGears | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True)
+class PowerFlow:
+    """Speeds and torques of a graph of shafts.
+
+    Parameters
+    ----------
+    speed : mapping
+        By shaft [rad/s].
+    torque : mapping
+        External torque by shaft [N m], reactions of held shafts and torques of outputs among them.
+    stage_torque : mapping
+        By stage and shaft: the torque that the stage puts on the shaft [N m].
+    speed_ratio : mapping
+        By shaft: exact share of every given speed in its speed [1].
+    torque_ratio : mapping
+        By shaft: exact share of every given torque in its external torque [1].
+    """
+
+    speed: Mapping[str, float]
+    torque: Mapping[str, float]
+    stage_torque: Mapping[str, Mapping[str, float]]
+    speed_ratio: Ratios
+    torque_ratio: Ratios
+
+    @property
+    def power(self) -> dict[str, float]:
+        """External power by shaft [W], positive where it flows in; without losses the sum is zero."""
+        return {shaft: torque * self.speed[shaft] for shaft, torque in self.torque.items()}
+
+
+@dataclass(frozen=True, eq=False)
+class ShaftGraph:
+    """Shafts, the ``conditions`` on their speeds, those that are ``held`` and those that couplings join rigidly.
+
+    Joined ``shafts`` are one group; groups and stages have numbers, which are the columns of the equations.
+    ``joined`` are groups of names, which may overlap.
+    """
+
+    shafts: tuple[str, ...]
+    conditions: tuple[SpeedCondition, ...]
+    held: tuple[str, ...] = ()
+    joined: tuple[tuple[str, ...], ...] = ()
+
+    @cached_property
+    def group(self) -> dict[str, int]:
+        """Number of the group of every shaft."""
+        merged = connected_sets([*((shaft,) for shaft in self.shafts), *self.joined])
+        return {shaft: number for number, shafts in enumerate(merged) for shaft in self.shafts if shaft in shafts}
+
+    @cached_property
+    def rows(self) -> list[Row]:
+        """Weights of every stage by groups, zeros left out."""
+        rows: list[Row] = []
+        for condition in self.conditions:
+            row: Row = {}
+            for shaft, weight in condition.weights.items():
+                row[self.group[shaft]] = row.get(self.group[shaft], Fraction(0)) + weight
+            rows.append({group: weight for group, weight in row.items() if weight})
+        return rows
+
+    @cached_property
+    def standing(self) -> frozenset[int]:
+        """Groups with a shaft that is held."""
+        return frozenset(self.group[shaft] for shaft in self.held)
+
+    @cached_property
+    def count(self) -> int:
+        """Number of groups."""
+        return len(set(self.group.values()))
+
+    @cached_property
+    def parts(self) -> list[tuple[int, ...]]:
+        """Numbers of the stages of every part of the graph: stages that hang together by groups."""
+        marked = [{("stage", number), *row} for number, row in enumerate(self.rows)]
+        return sorted(
+            tuple(sorted(one[1] for one in part if isinstance(one, tuple))) for part in connected_sets(marked)
+        )
+
+    def names(self, groups: Collection[int]) -> list[str]:
+        """List the shafts of groups."""
+        return [shaft for shaft in self.shafts if self.group[shaft] in groups]
+
+    def speeds(self, given: Sequence[str] = ()) -> ExactSolution:
+        """Solve for the speeds of all groups in terms of those of shafts whose speed is given."""
+        columns = [group for group in dict.fromkeys(self.group[one] for one in given) if group not in self.standing]
+        unknown = [group for group in range(self.count) if group not in self.standing and group not in columns]
+        return solve_exactly(self.rows, unknown, columns)
+
+    def torques(
+        self, given: Sequence[str], unknown: Sequence[str], stages: Sequence[int] | None = None
+    ) -> ExactSolution:
+        """Solve the balance of all groups for the stages and for unknown torques, in terms of given ones.
+
+        Columns are the numbers of the stages, then places of `unknown` and of `given`, both shafts on which
+        external torques act. Of some ``stages`` the balance is that of their groups alone.
+        """
+        count, groups = len(self.conditions), range(self.count)
+        stages = range(count) if stages is None else stages
+        if len(stages) < count:
+            groups = sorted({group for stage in stages for group in self.rows[stage]})
+        balance: dict[int, Row] = {group: {} for group in groups}
+        for stage in stages:
+            for group, weight in self.rows[stage].items():
+                balance[group][stage] = weight
+        outside = {count + place: shaft for place, shaft in enumerate((*unknown, *given))}
+        for column, shaft in outside.items():
+            if self.group[shaft] in balance:
+                balance[self.group[shaft]][column] = Fraction(1)
+        inside = [column for column, shaft in outside.items() if self.group[shaft] in balance]
+        first_given = count + len(unknown)
+        wanted = [*stages, *(column for column in inside if column < first_given)]
+        return solve_exactly([*balance.values()], wanted, [column for column in inside if column >= first_given])
+
+
+def connected_sets(sets: Iterable[Iterable]) -> list[set]:
+    """Unite sets that share elements, in the order of their first ones."""
+    merged: list[set] = []
+    for elements in map(set, sets):
+        touched = [one for one in merged if one & elements]
+        if touched:
+            touched[0].update(elements, *touched[1:])
+            merged = [one for one in merged if not any(one is other for other in touched[1:])]
+        else:
+            merged.append(elements)
+    return merged
+
+
+def disagree(terms: Iterable[float], tolerance: float = AGREEMENT) -> bool:
+    """Tell whether terms miss a sum of zero by more than a share of the largest."""
+    sizes = [*terms]
+    return abs(math.fsum(sizes)) > tolerance * max(map(abs, sizes))
+
+
+def pair_condition(
+    name: str, first: str | None, second: str | None, teeth_1: int, teeth_2: int, internal: bool = False
+) -> SpeedCondition:
+    """Tie the speeds of two shafts by a pair of gears: ``z_1 w_1 + z_2 w_2 = 0``, or minus if one is internal.
+
+    A shaft that is None is the casing. GeometryError: tooth numbers that are not positive whole numbers (E-TEETH).
+    """
+    _check_teeth(name, {"teeth_1": teeth_1, "teeth_2": teeth_2})
+    sense = INTERNAL if internal else EXTERNAL
+    gears = StageGears(
+        {"gear 1": teeth_1, "gear 2": teeth_2},
+        {"gear 1": first, "gear 2": second},
+        (("gear 1", "gear 2", sense),),
+    )
+    return _condition(name, ((first, teeth_1), (second, -sense * teeth_2)), gears)
+
+
+def planetary_condition(
+    name: str,
+    sun: str | None,
+    carrier: str | None,
+    ring: str | None,
+    sun_teeth: int,
+    ring_teeth: int,
+    double: bool = False,
+) -> SpeedCondition:
+    """Tie the speeds of a planetary set (Willis): ``z_s (w_s - w_c) +- z_r (w_r - w_c) = 0``.
+
+    Plus with single planets, minus with ``double`` ones, two in mesh with each other between sun and ring. A shaft
+    that is None is the casing.
+
+    GeometryError: tooth numbers that are not positive whole numbers, or a ring inside its sun (E-TEETH).
+    """
+    _check_teeth(name, {"sun_teeth": sun_teeth, "ring_teeth": ring_teeth})
+    _check_ring(name, sun_teeth, ring_teeth)
+    sign = -1 if double else 1
+    return _condition(
+        name,
+        ((sun, sun_teeth), (ring, sign * ring_teeth), (carrier, -sun_teeth - sign * ring_teeth)),
+        StageGears(
+            {"sun": sun_teeth, "ring": ring_teeth},
+            {"sun": sun, "carrier": carrier, "ring": ring},
+            _planet_meshes(*(("sun", "inner planet", "outer planet", "ring") if double else ("sun", "planet", "ring"))),
+        ),
+    )
+
+
+def stepped_condition(
+    name: str,
+    sun: str | None,
+    carrier: str | None,
+    ring: str | None,
+    sun_teeth: int,
+    first_planet_teeth: int,
+    second_planet_teeth: int,
+    ring_teeth: int,
+) -> SpeedCondition:
+    """Tie the speeds of a planetary set with stepped planets.
+
+    The sun meshes with the first gear of the planets, the ring with the second:
+    ``z_s z_p2 (w_s - w_c) + z_p1 z_r (w_r - w_c) = 0``. A shaft that is None is the casing.
+
+    GeometryError: tooth numbers that are not positive whole numbers (E-TEETH).
+    """
+    teeth = {"sun": sun_teeth, "first planet": first_planet_teeth, "second planet": second_planet_teeth}
+    teeth["ring"] = ring_teeth
+    _check_teeth(name, {f"{gear.replace(' ', '_')}_teeth": count for gear, count in teeth.items()})
+    on_sun, on_ring = sun_teeth * second_planet_teeth, first_planet_teeth * ring_teeth
+    return _condition(
+        name,
+        ((sun, on_sun), (ring, on_ring), (carrier, -on_sun - on_ring)),
+        StageGears(
+            teeth,
+            {"sun": sun, "carrier": carrier, "ring": ring},
+            (("sun", "first planet", EXTERNAL), ("second planet", "ring", INTERNAL)),
+            (("first planet", "second planet"),),
+        ),
+    )
+
+
+def ravigneaux_conditions(
+    name: str,
+    small_sun: str | None,
+    large_sun: str | None,
+    carrier: str | None,
+    ring: str | None,
+    small_sun_teeth: int,
+    large_sun_teeth: int,
+    ring_teeth: int,
+) -> tuple[SpeedCondition, SpeedCondition]:
+    """Tie the speeds of a Ravigneaux set, which has two suns, one carrier and one ring.
+
+    The small sun drives the ring through short and long planets, the large sun through the long ones alone. The two
+    conditions are named after the set and its suns. GeometryError as of `planetary_condition`.
+    """
+    small = planetary_condition(f"{name} small sun", small_sun, carrier, ring, small_sun_teeth, ring_teeth, double=True)
+    large = planetary_condition(f"{name} large sun", large_sun, carrier, ring, large_sun_teeth, ring_teeth)
+    return small, large
+
+
+def power_flow(
+    shafts: Sequence[str],
+    conditions: Sequence[SpeedCondition],
+    *,
+    speeds: Mapping[str, float],
+    torques: Mapping[str, float],
+    held: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    joined: Sequence[Sequence[str]] = (),
+) -> PowerFlow:
+    """Compute the speeds and torques of all shafts.
+
+    Parameters
+    ----------
+    shafts : sequence of str
+        Their names.
+    conditions : sequence of SpeedCondition
+        Stages between them.
+    speeds : mapping
+        Given speeds by shaft [rad/s].
+    torques : mapping
+        Given external torques by shaft [N m]; on shafts that stand nowhere here no torque acts.
+    held : sequence of str
+        Shafts that stand still and take what torque they must.
+    outputs : sequence of str
+        Shafts whose external torque is found.
+    joined : sequence of sequences of str
+        Shafts that couplings join rigidly.
+
+    Raises
+    ------
+    CaseError
+        All that is wrong at once (``problems``): names that no shaft has (E-CHOICE) or that stand twice
+        (E-DUPLICATE), values that are no finite numbers (E-FINITE); shafts that are free, stages that lock
+        (E-MECHANISM); speeds that contradict (E-SPEED); torques that do not balance (E-LOAD-BALANCE) or that the
+        graph does not determine (E-TORQUE).
+    """
+    problems = _wrong_entries(shafts, conditions, speeds, torques, held, outputs, joined)
+    if problems:
+        raise several(problems)
+    graph = ShaftGraph(tuple(shafts), tuple(conditions), tuple(held), tuple(map(tuple, joined)))
+    locks, locked = _locks(graph)
+    turning = graph.speeds([*speeds])
+    given, unknown = [*torques], [*held, *outputs]
+    balance = graph.torques(given, unknown)
+    problems = [
+        *locks,
+        *_free(graph, turning),
+        *_contradictions(graph, turning, speeds, locked),
+        *_undetermined(graph, balance, held, outputs, locked),
+        *_unbalanced(graph, balance, torques, len(unknown), locked),
+    ]
+    if problems:
+        raise several(problems)
+    return _flow(graph, turning, balance, speeds, torques, unknown)
+
+
+def _flow(
+    graph: ShaftGraph,
+    turning: ExactSolution,
+    balance: ExactSolution,
+    speeds: Mapping[str, float],
+    torques: Mapping[str, float],
+    unknown: Sequence[str],
+) -> PowerFlow:
+    """Values of a graph that determines everything."""
+    giver = {graph.group[shaft]: shaft for shaft in reversed([*speeds])}
+    shares = {
+        group: {giver[other]: share for other, share in turning.ratio[group].items()} for group in turning.ratio
+    } | {group: {shaft: Fraction(1)} for group, shaft in giver.items()}
+    shares |= {group: {} for group in graph.standing}
+    speed_ratio = {shaft: shares[graph.group[shaft]] for shaft in graph.shafts}
+    given, first_given = [*torques], len(graph.conditions) + len(unknown)
+
+    def named(column: int) -> dict[str, Fraction]:
+        return {given[other - first_given]: share for other, share in balance.ratio[column].items()}
+
+    torque_ratio: dict[str, dict[str, Fraction]] = {shaft: {} for shaft in graph.shafts}
+    for shaft in given:
+        torque_ratio[shaft][shaft] = Fraction(1)
+    for place, shaft in enumerate(unknown, len(graph.conditions)):
+        for other, share in named(place).items():
+            torque_ratio[shaft][other] = torque_ratio[shaft].get(other, Fraction(0)) + share
+    stage_torque = {}
+    for number, condition in enumerate(graph.conditions):
+        scale = _total(named(number), torques)
+        stage_torque[condition.name] = {shaft: float(weight * scale) for shaft, weight in condition.weights.items()}
+    return PowerFlow(
+        {shaft: float(_total(ratios, speeds)) for shaft, ratios in speed_ratio.items()},
+        {shaft: float(_total(ratios, torques)) for shaft, ratios in torque_ratio.items()},
+        stage_torque,
+        speed_ratio,
+        torque_ratio,
+    )
+
+
+def _total(ratios: Mapping[str, Fraction], values: Mapping[str, float]) -> Fraction:
+    """Sum of shares of given values; floats are fractions, too."""
+    return sum((share * _exact(values[shaft]) for shaft, share in ratios.items()), Fraction(0))
+
+
+def _exact(value: float) -> Fraction:
+    return Fraction(value) if isinstance(value, Rational) else Fraction(float(value))
+
+
+def _condition(name: str, terms: Iterable[tuple[str | None, int]], gears: StageGears) -> SpeedCondition:
+    weights: dict[str, Fraction] = {}
+    for shaft, weight in terms:
+        if shaft is not None:
+            weights[shaft] = weights.get(shaft, Fraction(0)) + weight
+    return SpeedCondition(name, weights, gears)
+
+
+def _planet_meshes(*gears: str) -> tuple[tuple[str, str, int], ...]:
+    """Meshes of a chain of gears from the sun to the ring, the last one internal."""
+    pairs = [*pairwise(gears)]
+    return tuple((*pair, INTERNAL if pair is pairs[-1] else EXTERNAL) for pair in pairs)
+
+
+def _check_teeth(name: str, teeth: Mapping[str, int]) -> None:
+    for key, count in teeth.items():
+        if not isinstance(count, Real) or not float(count).is_integer() or count < 1:
+            raise GeometryError(
+                f"stage {name!r}: a gear with {count} teeth",
+                code="E-TEETH",
+                key=key,
+                value=count,
+                limit="whole numbers from 1 on, also of internal gears",
+                remedy="give the number of teeth without a sign",
+            )
+
+
+def _check_ring(name: str, sun_teeth: int, ring_teeth: int) -> None:
+    if ring_teeth <= sun_teeth:
+        raise GeometryError(
+            f"stage {name!r}: a ring with {ring_teeth} teeth around a sun with {sun_teeth}",
+            code="E-TEETH",
+            key="ring_teeth",
+            value=ring_teeth,
+            limit=f"more than {sun_teeth}",
+            remedy="check which gear is the ring",
+        )
+
+
+def _wrong_entries(shafts, conditions, speeds, torques, held, outputs, joined) -> list[CaseError]:
+    """Names that do not exist or stand twice, and values that are no finite numbers."""
+    problems = []
+    uses = {
+        "speeds": [*speeds],
+        "torques": [*torques],
+        "held": [*held],
+        "outputs": [*outputs],
+        "joined": [shaft for group in joined for shaft in group],
+    }
+    uses |= {f"stage {one.name!r}": [*one.weights] for one in conditions}
+    for place, names in uses.items():
+        for shaft in dict.fromkeys(names):
+            if shaft not in shafts:
+                remedy = f"one of {', '.join(map(repr, shafts))}" if shafts else "name the shafts"
+                text = f"{place}: there is no shaft {shaft!r}"
+                problems.append(CaseError(text, code="E-CHOICE", value=shaft, remedy=remedy))
+    stages = [one.name for one in conditions]
+    lists = {"shaft": [*shafts], "stage": stages, "held shaft": [*held], "output": [*outputs]}
+    lists |= {"shaft both held and output": [*{*held}, *{*outputs}]}
+    lists |= {"shaft with a given torque that is an output": [*torques, *{*outputs}]}
+    for what, names in lists.items():
+        for name in dict.fromkeys(one for one in names if names.count(one) > 1):
+            text = f"{what} {name!r} stands twice" if " " not in what or what == "held shaft" else f"{what}: {name!r}"
+            problems.append(CaseError(text, code="E-DUPLICATE", value=name, remedy="leave one of them out"))
+    for what, values, unit in (("speed", speeds, "rad/s"), ("torque", torques, "N m")):
+        for shaft, value in values.items():
+            if not isinstance(value, Real) or isinstance(value, bool) or not math.isfinite(value):
+                text = f"the {what} of shaft {shaft!r} is no finite number"
+                problems.append(CaseError(text, code="E-FINITE", value=value, limit=f"a finite number in {unit}"))
+    return problems
+
+
+def _locks(graph: ShaftGraph) -> tuple[list[CaseError], set[int]]:
+    """Stages that lock each other, parts in which nothing turns for what is held, and the groups in both."""
+    problems, locked = [], set()
+    loops = {group: stages for group, (stages, held) in _stopped(graph, set()).items() if not held}
+    for cluster in connected_sets(loops.values()):
+        loop = min((one for one in loops.values() if one & cluster), key=len)
+        groups = {group for group, stages in loops.items() if stages & cluster}
+        locked |= groups | {group for stage in cluster for group in graph.rows[stage]}
+        text = f"{_stages(graph, loop)} lock{'s' * (len(loop) == 1)}: {_shafts(graph.names(groups))} cannot turn"
+        problems.append(
+            CaseError(
+                text,
+                code="E-MECHANISM",
+                limit="stages whose ratios around every loop multiply to one",
+                remedy="leave out a stage of the loop or a coupling, or give teeth whose ratios fit",
+            )
+        )
+    stopped = _stopped(graph, graph.standing)
+    for part in graph.parts:
+        groups = {group for stage in part for group in graph.rows[stage]}
+        turnable = groups - graph.standing
+        if not turnable or not turnable <= stopped.keys() or groups & locked:
+            continue
+        locked |= groups
+        holds = sorted({shaft for group in turnable for shaft in graph.names(stopped[group][1])} & {*graph.held})
+        text = f"{_stages(graph, part)} cannot turn with {_shafts(holds)} held"
+        problems.append(CaseError(text, code="E-MECHANISM", remedy="hold one shaft less"))
+    return problems, locked
+
+
+def _stopped(graph: ShaftGraph, standing: Collection[int]) -> dict[int, tuple[frozenset[int], frozenset[int]]]:
+    """Groups that stand whatever the others do: the numbers of the stages and the held groups that stop each."""
+    # the columns behind those of the groups tell of which stages an equation is made
+    marked = [{**row, graph.count + number: Fraction(1)} for number, row in enumerate(graph.rows)]
+    pivots, _ = reduce_rows(marked, [group for group in range(graph.count) if group not in standing])
+    found = {}
+    for group, row in pivots.items():
+        others = {column for column in row if column < graph.count and column != group}
+        if others <= {*standing}:
+            stages = frozenset(column - graph.count for column in row if column >= graph.count)
+            found[group] = (stages, frozenset(others))
+    return found
+
+
+def _free(graph: ShaftGraph, turning: ExactSolution) -> list[CaseError]:
+    """Shafts whose speed nothing decides."""
+    problems = []
+    for cluster in connected_sets([{group, *others} for group, others in turning.open.items()]):
+        shafts = graph.names(cluster)
+        free = [graph.names([group])[0] for group in turning.parameters if group in cluster]
+        more = "a speed is" if len(free) == 1 else f"{len(free)} speeds are"
+        problems.append(
+            CaseError(
+                f"{_shafts(shafts)} turn{'s' * (len(shafts) == 1)} freely: {more} missing",
+                code="E-MECHANISM",
+                remedy=(f"give the speed of {_listed(free)}", f"hold {_listed(free)}"),
+            )
+        )
+    return problems
+
+
+def _contradictions(
+    graph: ShaftGraph, turning: ExactSolution, speeds: Mapping[str, float], locked: Collection[int]
+) -> list[CaseError]:
+    """Given speeds that do not go with each other, or with what is held."""
+    problems, giver = [], {}
+    for shaft, speed in speeds.items():
+        group = graph.group[shaft]
+        first = giver.setdefault(group, shaft)
+        if group in graph.standing and speed:
+            holder = next(one for one in graph.held if graph.group[one] == group)
+            problems.append(_speed_problem(shaft, speed, 0.0, f"that of {holder!r}, which is held"))
+        elif abs(speed - speeds[first]) > AGREEMENT * abs(speeds[first]):
+            problems.append(_speed_problem(shaft, speed, speeds[first], f"that of {first!r}, which is joined with it"))
+    for relation in turning.relations:
+        terms = {group: float(share) * speeds[giver[group]] for group, share in relation.items()}
+        if {*relation} & {*locked} or not disagree(terms.values()):
+            continue
+        last = max(relation, key=[*giver].index)
+        fits = float(-_total({giver[one]: share for one, share in relation.items() if one != last}, speeds))
+        others = [giver[one] for one in giver if one in relation and one != last]
+        against = f"{'those' if len(others) > 1 else 'that'} of {_shafts(others)}" if others else "what is held"
+        problems.append(_speed_problem(giver[last], speeds[giver[last]], fits, against))
+    return problems
+
+
+def _speed_problem(shaft: str, speed: float, fits: float, against: str) -> CaseError:
+    return CaseError(
+        f"the speed of shaft {shaft!r} does not fit {against}",
+        code="E-SPEED",
+        value=float(speed),
+        limit=f"{fits:.9g} rad/s",
+        remedy=f"leave the speed of {shaft!r} out",
+    )
+
+
+def _undetermined(
+    graph: ShaftGraph, balance: ExactSolution, held: Sequence[str], outputs: Sequence[str], locked: Collection[int]
+) -> list[CaseError]:
+    """Torques that the balance leaves open."""
+    problems, count = [], len(graph.conditions)
+    for cluster in connected_sets([{column, *others} for column, others in balance.open.items()]):
+        stages = [number for number in sorted(cluster) if number < count]
+        outside = [([*held, *outputs])[column - count] for column in sorted(cluster) if column >= count]
+        groups = {group for stage in stages for group in graph.rows[stage]} | {graph.group[one] for one in outside}
+        if groups & {*locked}:
+            continue
+        free = [shaft for shaft in outside if shaft in outputs]
+        if free:
+            text = f"the torques of {_shafts(outside)} do not follow from the given ones"
+            remedy = f"give the torque of {_listed(free[-1:])}, which is then no output"
+        elif outside:
+            text, remedy = f"{_shafts(outside)} are held against the same motion", "hold one shaft less"
+        else:
+            text = f"{_stages(graph, stages)} carry torque that tooth numbers do not share out"
+            remedy = "leave out one of the stages, or the coupling that closes the loop"
+        problems.append(CaseError(text, code="E-TORQUE", remedy=remedy))
+    return problems
+
+
+def _unbalanced(
+    graph: ShaftGraph, balance: ExactSolution, torques: Mapping[str, float], unknown: int, locked: Collection[int]
+) -> list[CaseError]:
+    """Given torques that drive a motion which no output brakes."""
+    problems, first_given, given = [], len(graph.conditions) + unknown, [*torques]
+    for relation in balance.relations:
+        shares = {given[column - first_given]: share for column, share in relation.items()}
+        groups = {graph.group[shaft] for shaft in shares}
+        if groups & {*locked} or not disagree(float(share) * torques[shaft] for shaft, share in shares.items()):
+            continue
+        last = max(shares, key=given.index)
+        fits = float(-_total({shaft: share for shaft, share in shares.items() if shaft != last}, torques))
+        alone = len(shares) == 1
+        names = sorted(shares, key=given.index)
+        text = f"nothing takes the torque on shaft {last!r}"
+        text = text if alone else f"the torques on {_shafts(names)} do not balance"
+        problems.append(
+            CaseError(
+                text,
+                code="E-LOAD-BALANCE",
+                value=float(torques[last]),
+                limit=f"{fits:.9g} N m",
+                remedy="name the shaft that takes the power as an output"
+                if alone
+                else f"make {last!r} an output, whose torque is found",
+            )
+        )
+    return problems
+
+
+def _listed(names: Sequence[str]) -> str:
+    quoted = [repr(name) for name in names]
+    return " and ".join([", ".join(quoted[:-1]), quoted[-1]] if len(quoted) > 1 else quoted)
+
+
+def _shafts(names: Sequence[str]) -> str:
+    return f"shaft{'s' * (len(names) != 1)} {_listed(names)}"
+
+
+def _stages(graph: ShaftGraph, numbers: Iterable[int]) -> str:
+    names = [graph.conditions[number].name for number in sorted(numbers)]
+    return f"stage{'s' * (len(names) != 1)} {_listed(names)}"

@@ -1,0 +1,186 @@
+"""Speeds and torques of graphs of shafts against closed forms in fractions, and what is refused."""
+
+import math
+from fractions import Fraction
+from random import Random
+
+import numpy as np
+import pytest
+
+from femgear.errors import CaseError, GeometryError
+from femgear.gears.kinematics import torque_ratios
+from femgear.gears.power_flow import (
+    ShaftGraph,
+    SpeedCondition,
+    connected_sets,
+    pair_condition,
+    planetary_condition,
+    power_flow,
+    stepped_condition,
+)
+from validation.power_flow import (
+    all_graphs,
+    missed_shares,
+    power_of_shares,
+    refused_graphs,
+    unbalanced_shafts,
+)
+
+GRAPHS = all_graphs()
+REFUSED = refused_graphs()
+
+
+@pytest.mark.parametrize("graph", GRAPHS, ids=lambda graph: graph.name)
+def test_a_graph_has_the_ratios_of_its_closed_form(graph):
+    flow = graph.solve()
+    assert missed_shares(graph, flow) == []
+    assert power_of_shares(flow) == {0}
+    assert unbalanced_shafts(graph, flow) < 1e-14
+    assert math.fsum(flow.power.values()) == pytest.approx(0.0, abs=1e-12 * max(map(abs, flow.power.values())))
+    if graph.printed:
+        digits = len(graph.printed.partition(".")[2])
+        assert flow.speed["in"] / flow.speed["out"] == pytest.approx(float(graph.printed), abs=0.501 * 10**-digits)
+
+
+@pytest.mark.parametrize("graph", GRAPHS, ids=lambda graph: graph.name)
+def test_stages_do_no_work_and_planetary_sets_pass_no_torque_to_the_casing(graph):
+    flow = graph.solve()
+    for stage in graph.conditions:
+        torque = flow.stage_torque[stage.name]
+        largest = max(map(abs, torque.values()))
+        work = [value * flow.speed[shaft] for shaft, value in torque.items()]
+        assert math.fsum(work) == pytest.approx(0.0, abs=1e-12 * (1.0 + max(map(abs, work))))
+        if "carrier" in stage.gears.shafts and None not in stage.gears.shafts.values():
+            assert math.fsum(torque.values()) == pytest.approx(0.0, abs=1e-12 * (1.0 + largest))
+
+
+@pytest.mark.parametrize("graph", GRAPHS, ids=lambda graph: graph.name)
+def test_the_speeds_satisfy_every_stage_in_fractions(graph):
+    flow = graph.solve()
+    for stage in graph.conditions:
+        for given in graph.speeds:
+            terms = (weight * flow.speed_ratio[shaft].get(given, 0) for shaft, weight in stage.weights.items())
+            assert sum(terms) == 0
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_order_and_names_do_not_matter(seed):
+    random = Random(seed)
+    graph = GRAPHS[random.randrange(len(GRAPHS))]
+    shafts = graph.shafts.split()
+    new = dict(zip(shafts, random.sample([f"shaft {n}" for n in range(99)], len(shafts)), strict=True))
+    stages = [SpeedCondition(one.name, {new[s]: w for s, w in one.weights.items()}) for one in graph.conditions]
+    flow, before = (
+        power_flow(
+            random.sample([*new.values()], len(new)),
+            random.sample(stages, len(stages)),
+            speeds={new[shaft]: value for shaft, value in graph.speeds.items()},
+            torques={new[shaft]: value for shaft, value in graph.torques.items()},
+            held=[new[shaft] for shaft in graph.held],
+            outputs=[new[shaft] for shaft in graph.outputs],
+            joined=[[new[shaft] for shaft in group] for group in graph.joined],
+        ),
+        graph.solve(),
+    )
+    assert {shaft: flow.speed[new[shaft]] for shaft in shafts} == before.speed
+    assert {shaft: flow.torque[new[shaft]] for shaft in shafts} == before.torque
+
+
+@pytest.mark.parametrize("wrong", REFUSED, ids=lambda wrong: wrong.words[0])
+def test_what_the_graph_does_not_determine_is_refused_by_name(wrong):
+    with pytest.raises(CaseError) as caught:
+        wrong.graph.solve()
+    problems = caught.value.problems
+    assert tuple(problem.code for problem in problems) == wrong.codes
+    assert all(word in problems[0].message for word in wrong.words)
+    if wrong.limit is not None:
+        assert problems[0].limit.startswith(wrong.limit)
+
+
+def test_a_loop_is_recognised_exactly():
+    """Ratios that differ by 1e-12 lock, equal ones share their torque in a way that nothing tells."""
+    big = 10**6
+    for teeth, code in (
+        ((big, big + 1, big - 1, big), "E-MECHANISM"),
+        ((big, big + 1, 2 * big, 2 * big + 2), "E-TORQUE"),
+    ):
+        stages = (pair_condition("1", "a", "b", *teeth[:2]), pair_condition("2", "a", "b", *teeth[2:]))
+        with pytest.raises(CaseError) as caught:
+            power_flow("ab", stages, speeds={"a": 1.0}, torques={"a": 1.0}, outputs="b")
+        assert caught.value.code == code
+
+
+def test_a_stage_beside_a_held_shaft_may_stand():
+    """A braked motor stops its pair; the rest of the train turns."""
+    stages = (pair_condition("motor", "motor", "sun", 20, 40), planetary_condition("set", "sun", "out", "in", 30, 70))
+    flow = power_flow(
+        ["motor", "sun", "in", "out"], stages, speeds={"in": 10.0}, torques={"in": 7.0}, held=["motor"], outputs=["out"]
+    )
+    assert flow.speed == {"motor": 0.0, "sun": 0.0, "in": 10.0, "out": 7.0}
+    assert flow.torque["out"] == -10.0
+    # 3 N m at the sun, half of it and turned round at the motor
+    assert flow.torque["motor"] == pytest.approx(-1.5)
+
+
+def test_a_coupling_alone_passes_torque():
+    flow = power_flow("ab", (), speeds={"a": 3.0}, torques={"a": 2.0}, outputs="b", joined=["ab"])
+    assert flow.speed == {"a": 3.0, "b": 3.0} and flow.torque == {"a": 2.0, "b": -2.0}
+    assert flow.power == {"a": 6.0, "b": -6.0}
+
+
+def test_torque_on_a_held_shaft_adds_to_its_reaction():
+    stage = planetary_condition("set", "s", "c", "r", 20, 60)
+    flow = power_flow("scr", (stage,), speeds={"s": 4.0}, torques={"s": 1.0, "r": 5.0}, held="r", outputs="c")
+    assert flow.torque == {"s": 1.0, "c": -4.0, "r": 3.0}
+
+
+def test_redundant_speeds_that_agree_are_taken():
+    stage = pair_condition("pair", "a", "b", 3, 7)
+    flow = power_flow("ab", (stage,), speeds={"a": 1.0, "b": -3.0 / 7.0}, torques={}, outputs="b")
+    assert flow.speed["b"] == pytest.approx(-3.0 / 7.0, rel=1e-15)
+    assert set(flow.torque.values()) == {0.0}
+
+
+def test_numbers_of_numpy_are_numbers():
+    stage = pair_condition("pair", "a", "b", 1, 2)
+    flow = power_flow("ab", (stage,), speeds={"a": np.float32(2.0)}, torques={"a": np.int64(3)}, outputs=["b"])
+    assert flow.speed["b"] == -1.0 and flow.torque["b"] == 6.0
+
+
+@pytest.mark.parametrize(
+    "make",
+    (
+        lambda: pair_condition("x", "a", "b", 0, 3),
+        lambda: pair_condition("x", "a", "b", 20, -30, internal=True),
+        lambda: pair_condition("x", "a", "b", 20, 30.5),
+        lambda: planetary_condition("x", "a", "b", "c", 40, 40),
+        lambda: stepped_condition("x", "a", "b", "c", 20, 30, 0, 70),
+    ),
+)
+def test_teeth_that_no_gear_has_are_refused(make):
+    with pytest.raises(GeometryError) as caught:
+        make()
+    assert caught.value.code == "E-TEETH" and "'x'" in caught.value.message
+
+
+def test_weights_are_those_of_the_torques_of_a_set():
+    weights = planetary_condition("set", "sun", "carrier", "ring", 27, 108).weights
+    shares = torque_ratios(27, 108)
+    assert {shaft: float(weight / weights["sun"]) for shaft, weight in weights.items()} == shares
+
+
+def test_shafts_of_one_body_add_their_weights():
+    assert planetary_condition("set", "a", "a", None, 20, 60).weights == {"a": Fraction(-60)}
+
+
+def test_stepped_planets_of_equal_gears_are_single_ones():
+    stepped = stepped_condition("set", "s", "c", "r", 20, 30, 30, 80)
+    single = planetary_condition("set", "s", "c", "r", 20, 80)
+    assert {shaft: weight / 30 for shaft, weight in stepped.weights.items()} == single.weights
+
+
+def test_parts_of_a_graph_hang_together_by_shafts():
+    stages = tuple(pair_condition(f"{a}{b}", a, b, 2, 3) for a, b in ("ab", "cd", "bc", "ef"))
+    assert ShaftGraph(tuple("abcdef"), stages).parts == [(0, 1, 2), (3,)]
+    assert ShaftGraph(tuple("abcdef"), stages, joined=(("d", "e"),)).parts == [(0, 1, 2, 3)]
+    assert connected_sets([{1}, {2}, {3, 1}, {3, 2}]) == [{1, 2, 3}]
