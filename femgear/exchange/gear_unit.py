@@ -1,7 +1,6 @@
 """Stages of a gear unit in a REXS file, and the power that flows through them.
 
-Speeds follow from the ratios of all stages (Willis' equation for planetary ones), torques from the balance of
-every shaft without losses: ``sum T = 0``, and ``T_1/z_1 = T_2/z_2`` of two external gears. Shafts that a
+Speeds and torques are those of `femgear.gears.power_flow`, as far as the file determines them. Shafts that a
 coupling joins turn as one; those that one joins with the ``gear_casing`` stand still.
 """
 
@@ -11,17 +10,17 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from fractions import Fraction
 from typing import Any
 
-import numpy as np
-
 from femgear.case.quantities import SPEED, TORQUE, Dimension
+from femgear.errors import GeometryError
 from femgear.exchange.rexs import Component, Model
-from femgear.gears.kinematics import torque_ratios
+from femgear.gears.power_flow import ShaftGraph, SpeedCondition, disagree, pair_condition, planetary_condition
 
 POWER = Dimension("a power", "W", "kW", 1e3)
-_NOTHING = 1e-9
-"""Share of a motion or torque that counts as none."""
+TORQUE_ROUNDING = 1e-6
+"""Torques of a file balance where they miss by less than this, relative to the largest term."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class UnitStage:
     """
 
     component: Component
-    arms: Mapping[str, float]
+    arms: Mapping[str, Fraction]
 
 
 @dataclass(frozen=True)
@@ -85,24 +84,26 @@ def _unit_stage(model: Model, stage: Component) -> UnitStage | None:
         carriers = model.related("planet_carrier_shaft", "shaft", planetary_stage=stage.id)
         if ring is None or sun is None or not carriers:
             return None
-        teeth = [abs(model.number(one, "number_of_teeth") or 0.0) for one in (sun, ring)]
-        shafts = [shaft_of(model, sun), shaft_of(model, ring), carriers[0]]
-        weights = list(torque_ratios(*teeth).values()) if all(teeth) else []  # type: ignore[arg-type]
+        central, shafts = [sun, ring], [shaft_of(model, sun), carriers[0], shaft_of(model, ring)]
     elif stage.type == "cylindrical_stage":
-        gears = gears_of(model, stage)
-        teeth = [abs(model.number(one, "number_of_teeth") or 0.0) for one in gears]
-        shafts = [shaft_of(model, one) for one in gears]
-        sense = -1.0 if any(one.type == "ring_gear" for one in gears) else 1.0
-        weights = [1.0, sense * teeth[1] / teeth[0]] if len(gears) == 2 and all(teeth) else []
+        central = gears_of(model, stage)
+        shafts = [shaft_of(model, one) for one in central]
     else:
         return None
-    known = [one.id for one in shafts if one is not None]
-    if not weights or len(known) < len(weights):
+    ids = [one.id for one in shafts if one is not None]
+    teeth = [abs(model.number(one, "number_of_teeth") or 0.0) for one in central]
+    if len(central) != 2 or len(ids) < len(shafts) or not all(map(float.is_integer, teeth)):
         return None
-    arms: dict[str, float] = {}
-    for id, weight in zip(known, weights, strict=True):
-        arms[id] = arms.get(id, 0.0) + weight
-    return UnitStage(stage, arms)
+    first, second = map(int, teeth)
+    try:
+        if stage.type == "planetary_stage":
+            condition = planetary_condition(stage.id, ids[0], ids[1], ids[2], first, second)
+        else:
+            internal = any(one.type == "ring_gear" for one in central)
+            condition = pair_condition(stage.id, ids[0], ids[1], first, second, internal)
+    except GeometryError:  # teeth that no stage has
+        return None
+    return UnitStage(stage, {id: weight / first for id, weight in condition.weights.items()})
 
 
 def with_load_case(component: Component, given: Mapping[str, Mapping]) -> Component:
@@ -127,32 +128,17 @@ def loads_on(model: Model, shaft: Component, given: Mapping[str, Mapping]) -> It
 def power_flow(model: Model, given: Mapping[str, Mapping]) -> PowerFlow:
     """Compute speeds and torques of all stages in a load case, as far as the file determines them."""
     stages = unit_stages(model)
-    group, held = _groups(model)
-    names = sorted({group[id] for stage in stages for id in stage.arms})
-    place = {name: i for i, name in enumerate(names)}
-    table = np.zeros((len(stages), len(names)))
-    for row, stage in zip(table, stages, strict=True):
-        for id, weight in stage.arms.items():
-            row[place[group[id]]] += weight
-    shafts = [one for one in model.components.values() if one.type == "shaft" and group[one.id] in place]
-    speeds = _speeds(
-        model,
-        shafts,
-        table,
-        {id: place[group[id]] for id in group if group[id] in place},
-        [place[one] for one in held if one in place],
-        given,
-    )
+    graph = _graph(model, stages)
+    inside = {graph.group[id] for stage in stages for id in stage.arms}
+    shafts = [one for one in model.components.values() if one.type == "shaft" and graph.group[one.id] in inside]
     loads: dict[int, list[float | None]] = {}
     for shaft in shafts:
-        loads.setdefault(place[group[shaft.id]], []).extend(loads_on(model, shaft, given))
-    standing, of_stage = [place[one] for one in held if one in place], {}
-    joined = {stages[i].component.id for rows in _connected(table) if len(rows) > 1 for i in rows}
-    for rows in _connected(table):
-        torques = _torques(table[rows], loads, standing)
-        of_stage |= {stages[i].component.id: t for i, t in zip(rows, torques, strict=True) if t is not None}
-    by_shaft = {one.id: speeds[place[group[one.id]]] for one in shafts}
-    return PowerFlow({id: one for id, one in by_shaft.items() if one is not None}, of_stage, frozenset(joined))
+        loads.setdefault(graph.group[shaft.id], []).extend(loads_on(model, shaft, given))
+    of_stage: dict[str, float] = {}
+    for part in graph.parts:
+        of_stage |= {stages[i].component.id: torque for i, torque in _stage_torques(graph, part, loads).items()}
+    joined = frozenset(stages[i].component.id for part in graph.parts if len(part) > 1 for i in part)
+    return PowerFlow(_speeds(model, graph, shafts, given), of_stage, joined)
 
 
 def case_flows(model: Model, load_case: int | None) -> list[PowerFlow]:
@@ -174,73 +160,60 @@ def plain_ids(ids: Iterable[str]) -> dict[str, str]:
     return found
 
 
-def _groups(model: Model) -> tuple[dict[str, str], set[str]]:
-    """Id of the first of the shafts that couplings join, by the id of each, and those that stand still."""
-    group = {one.id: one.id for one in model.components.values() if one.type == "shaft"}
-    held: set[str] = set()
+def _graph(model: Model, stages: Iterable[UnitStage]) -> ShaftGraph:
+    """Shafts of a unit with its stages and couplings."""
+    shafts = tuple(one.id for one in model.components.values() if one.type == "shaft")
+    held: list[str] = []
+    joined: list[tuple[str, ...]] = []
     for joint in [one for one in model.components.values() if one.type.endswith("coupling")]:
         sides = (model.related("side", role, assembly=joint.id) for role in ("inner_part", "outer_part"))
         ends = [one for side in sides for one in side]
-        shafts = [group[one.id] for one in ends if one.id in group]
-        if len(shafts) == 2:
-            group = {id: shafts[0] if one == shafts[1] else one for id, one in group.items()}
-            held = {shafts[0] if one == shafts[1] else one for one in held}
-        elif len(shafts) == 1 and any(one.type == "gear_casing" for one in ends):
-            held.add(shafts[0])
-    return group, held
+        ids = tuple(one.id for one in ends if one.id in shafts)
+        if len(ids) == 2:
+            joined.append(ids)
+        elif len(ids) == 1 and any(one.type == "gear_casing" for one in ends):
+            held.append(ids[0])
+    conditions = tuple(SpeedCondition(one.component.id, one.arms) for one in stages)
+    return ShaftGraph(shafts, conditions, tuple(held), tuple(joined))
 
 
-def _speeds(model: Model, shafts, table, place: Mapping[str, int], held: list[int], given) -> list[float | None]:
-    """Speeds of groups of shafts [rad/s], None of those that nothing determines."""
-    rows, values = [*table], [0.0] * len(table)
-    for at in held:
-        rows.append(np.eye(table.shape[1])[at])
-        values.append(0.0)
+def _speeds(model: Model, graph: ShaftGraph, shafts: Iterable[Component], given) -> dict[str, float]:
+    """Speeds of shafts [rad/s] without those that nothing determines; of speeds that contradict the first counts."""
+    value: dict[int, float] = {group: 0.0 for group in graph.standing}
+    told = []
     for shaft in shafts:
         speed = model.number(with_load_case(shaft, given), "rotational_speed", SPEED)
-        if speed is not None and place[shaft.id] not in held:
-            rows.append(np.eye(table.shape[1])[place[shaft.id]])
-            values.append(speed)
-    if not rows:
-        return [None] * table.shape[1]
-    system = np.array(rows)
-    found, _, rank, _ = np.linalg.lstsq(system, np.array(values), rcond=_NOTHING)
-    free = np.linalg.svd(system)[2][rank:]
-    loose = np.abs(free).max(axis=0, initial=0.0) > _NOTHING
-    # what members turn with each other is determined, what they turn at is not, unless a speed is given
-    rounding = _NOTHING * np.abs(found).max(initial=0.0)
-    return [None if loose[i] else float(one) * (abs(one) > rounding) for i, one in enumerate(found)]
+        if speed is not None and graph.group[shaft.id] not in value:
+            value[graph.group[shaft.id]] = speed
+            told.append(shaft.id)
+    for group, ratio in graph.speeds(told).ratio.items():
+        value[group] = sum(float(share) * value[other] for other, share in ratio.items())
+    return {one.id: value[graph.group[one.id]] for one in shafts if graph.group[one.id] in value}
 
 
-def _connected(table) -> list[list[int]]:
-    """Rows of stages that hang together by their shafts."""
-    found: list[list[int]] = []
-    for row in range(len(table)):
-        joined = [rows for rows in found if np.any((table[row] != 0.0) & np.any(table[rows] != 0.0, axis=0))]
-        found = [rows for rows in found if rows not in joined] + [sorted(sum(joined, [row]))]
-    return sorted(found)
-
-
-def _torques(table, loads: Mapping[int, list[float | None]], held: list[int]) -> list[float | None]:
-    """Torques by the meshes on the first shaft of every stage [N m], None where nothing determines them."""
-    count, groups = table.shape
-    known, inside = np.zeros(groups), np.any(table != 0.0, axis=0)
-    loads, held = {at: one for at, one in loads.items() if inside[at]}, [at for at in held if inside[at]]
-    for at, values in loads.items():
-        known[at] += sum(one for one in values if one is not None)
-    if not known.any():
-        return [None] * count
-    ends = [i for i in range(groups) if np.count_nonzero(table[:, i]) == 1 and not known[i] and i not in held]
-    said = [i for i, values in loads.items() if any(not one for one in values) and not known[i]]
+def _stage_torques(
+    graph: ShaftGraph, part: tuple[int, ...], loads: Mapping[int, list[float | None]]
+) -> dict[int, float]:
+    """Torques by the meshes on the first shaft of every stage of a part [N m]; none where nothing determines them."""
+    stages_on = [group for stage in part for group in graph.rows[stage]]
+    groups = sorted(set(stages_on))
+    loaded = {group: values for group, values in loads.items() if group in groups}
+    known = {group: sum(one for one in values if one is not None) for group, values in loaded.items()}
+    known = {group: torque for group, torque in known.items() if torque}
+    if not known:
+        return {}
+    ends = [one for one in groups if stages_on.count(one) == 1 and one not in known and one not in graph.standing]
+    silent = [one for one, values in loaded.items() if any(not torque for torque in values) and one not in known]
     # the load takes the rest: one that says no torque, or the only end of the unit without one
-    output = said if len(said) == 1 else ends if len(ends) == 1 else []
-    free = np.eye(groups)[[*held, *output]].reshape(-1, groups)
-    system = np.vstack([table, free]).T
-    found, _, rank, _ = np.linalg.lstsq(system, -known, rcond=_NOTHING)
-    rest = np.abs(system @ found + known).max(initial=0.0)
-    if rank < system.shape[1] or rest > 1e-6 * np.abs(known).max():
-        return [None] * count
-    return [float(one) for one in found[:count]]
+    output = silent if len(silent) == 1 else ends if len(ends) == 1 else []
+    unknown = [group for group in groups if group in graph.standing or group in output]
+    first = {group: graph.names([group])[0] for group in groups}
+    balance = graph.torques([first[one] for one in known], [first[one] for one in unknown], part)
+    torque = dict(enumerate(known.values(), len(graph.conditions) + len(unknown)))
+    sums = [[float(share) * torque[one] for one, share in relation.items()] for relation in balance.relations]
+    if balance.open or any(disagree(terms, TORQUE_ROUNDING) for terms in sums):
+        return {}
+    return {stage: sum(float(share) * torque[one] for one, share in balance.ratio[stage].items()) for stage in part}
 
 
 def stage_in_words(model: Model, stage: Component) -> str:
