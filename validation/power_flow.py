@@ -400,12 +400,13 @@ def refused_graphs() -> tuple[Refused, ...]:
     balance, share = ("E-LOAD-BALANCE",), ("E-TORQUE",)
     a_set = planetary_condition("set", "in", "out", "ring", 27, 108)
 
-    def pair(name: str, first: str, second: str, *teeth: int) -> SpeedCondition:
-        return pair_condition(name, first, second, *teeth)
-
-    one, other = pair("one", "in", "out", 20, 30), pair("other", "in", "out", 20, 31)
-    equal = pair("other", "in", "out", 40, 60)
-    triangle = (pair("1", "in", "b", 20, 30), pair("2", "b", "out", 30, 40), pair("3", "out", "in", 40, 20))
+    one, other = pair_condition("one", "in", "out", 20, 30), pair_condition("other", "in", "out", 20, 31)
+    equal = pair_condition("other", "in", "out", 40, 60)
+    triangle = (
+        pair_condition("1", "in", "b", 20, 30),
+        pair_condition("2", "b", "out", 30, 40),
+        pair_condition("3", "out", "in", 40, 20),
+    )
 
     def graph(shafts: str, *conditions: SpeedCondition, **more) -> Graph:
         return Graph("refused", "", shafts, conditions, **more)
@@ -418,7 +419,11 @@ def refused_graphs() -> tuple[Refused, ...]:
         Refused(graph("in out", one, other), lock, ("'one' and 'other' lock", "'in' and 'out' cannot turn")),
         Refused(graph("in b out", *triangle), lock, ("'1', '2' and '3' lock",)),
         Refused(graph("in out", one, joined=(("in", "out"),)), lock, ("'one' locks",)),
-        Refused(graph("in out more", one, other, pair("tail", "out", "more", 9, 9)), lock, ("'one' and 'other' lock",)),
+        Refused(
+            graph("in out more", one, other, pair_condition("tail", "out", "more", 9, 9)),
+            lock,
+            ("'one' and 'other' lock",),
+        ),
         Refused(graph("in out ring", a_set, held=("ring", "in"), speeds={}), lock, ("'in' and 'ring' held",)),
         Refused(graph("in out", one, speeds={"in": 30.0, "out": 20.0}), speed, ("'out' does not fit that of",), "-20 "),
         Refused(graph("in out", one, speeds={"in": 3.0, "out": -2.0 - 1e-8}), speed, ("'out' does not fit",), "-2 "),

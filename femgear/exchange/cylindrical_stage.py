@@ -12,7 +12,7 @@ from typing import Any
 
 from femgear.case.estimates import usual_torque
 from femgear.case.quantities import LENGTH, SPEED, TORQUE, to_si
-from femgear.exchange.gear_unit import PowerFlow, shaft_of, turning
+from femgear.exchange.gear_unit import UnitFlow, shaft_of, turning
 from femgear.exchange.planetary_stage import (
     add_bearings,
     add_modifications,
@@ -28,7 +28,7 @@ _NAMES = {"sun": "gear_1", "planet": "gear_2", "ring": "gear_2"}
 
 
 def pair_tables(
-    model: Model, mesh: Component, load_case: int | None, flows: Sequence[PowerFlow]
+    model: Model, mesh: Component, load_case: int | None, flows: Sequence[UnitFlow]
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Read two gears as tables of a pair case, with remarks by key on what is assumed.
 
@@ -79,7 +79,7 @@ def _operation(
     read: dict[str, Any],
     remarks: dict[str, str],
     wanted: int | None,
-    flows: Sequence[PowerFlow],
+    flows: Sequence[UnitFlow],
 ) -> dict[str, Any]:
     """Torque on gear 1, positive where it drives in its sense of rotation, and its speeds."""
     number, _ = model.chosen_case(wanted)

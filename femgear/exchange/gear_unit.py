@@ -16,7 +16,8 @@ from typing import Any
 from femgear.case.quantities import SPEED, TORQUE, Dimension
 from femgear.errors import GeometryError
 from femgear.exchange.rexs import Component, Model
-from femgear.gears.power_flow import ShaftGraph, SpeedCondition, disagree, pair_condition, planetary_condition
+from femgear.gears.power_flow import disagree, pair_condition, planetary_condition
+from femgear.gears.shaft_graph import ShaftGraph, SpeedCondition
 
 POWER = Dimension("a power", "W", "kW", 1e3)
 TORQUE_ROUNDING = 1e-6
@@ -36,7 +37,7 @@ class UnitStage:
 
 
 @dataclass(frozen=True)
-class PowerFlow:
+class UnitFlow:
     """Speeds and torques of a gear unit, as far as the file tells them; what it leaves open is missing.
 
     ``speed`` holds the speeds of shafts [rad/s] by their ids, ``torque`` that which the meshes of a stage put on its
@@ -125,7 +126,7 @@ def loads_on(model: Model, shaft: Component, given: Mapping[str, Mapping]) -> It
             yield power / speed if power is not None and speed and not torque else torque
 
 
-def power_flow(model: Model, given: Mapping[str, Mapping]) -> PowerFlow:
+def unit_flow(model: Model, given: Mapping[str, Mapping]) -> UnitFlow:
     """Compute speeds and torques of all stages in a load case, as far as the file determines them."""
     stages = unit_stages(model)
     graph = _graph(model, stages)
@@ -138,16 +139,16 @@ def power_flow(model: Model, given: Mapping[str, Mapping]) -> PowerFlow:
     for part in graph.parts:
         of_stage |= {stages[i].component.id: torque for i, torque in _stage_torques(graph, part, loads).items()}
     joined = frozenset(stages[i].component.id for part in graph.parts if len(part) > 1 for i in part)
-    return PowerFlow(_speeds(model, graph, shafts, given), of_stage, joined)
+    return UnitFlow(_speeds(model, graph, shafts, given), of_stage, joined)
 
 
-def case_flows(model: Model, load_case: int | None) -> list[PowerFlow]:
+def case_flows(model: Model, load_case: int | None) -> list[UnitFlow]:
     """Compute the power flow of the load case of a number, by default the first, then those of all.
 
     CaseError: no such load case (E-CHOICE).
     """
     _, given = model.chosen_case(load_case)
-    return [power_flow(model, one) for one in (given, *model.load_cases)]
+    return [unit_flow(model, one) for one in (given, *model.load_cases)]
 
 
 def plain_ids(ids: Iterable[str]) -> dict[str, str]:

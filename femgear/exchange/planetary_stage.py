@@ -35,7 +35,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import OVER_WIDTH, gear_material
 from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
-from femgear.exchange.gear_unit import gears_of, loads_on, power_flow, stage_components, with_load_case
+from femgear.exchange.gear_unit import gears_of, loads_on, stage_components, unit_flow, with_load_case
 from femgear.exchange.rexs import Component, Model, Relation
 from femgear.findings import NOTE
 from femgear.gears.iso6336 import STEEL
@@ -658,7 +658,7 @@ def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[st
         for torque in loads_on(model, shaft, given):
             loads |= {} if torque is None else {name: loads.get(name, 0.0) + torque}
     if len(stage_components(model)) > 1:
-        flow = power_flow(model, given)
+        flow = unit_flow(model, given)
         if not turns:
             members = ((name, one.id) for name in MEMBERS if name != fixed for one in s.shafts[name][:1])
             turns = {name: flow.speed[id] for name, id in members if id in flow.speed}

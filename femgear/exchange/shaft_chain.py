@@ -26,7 +26,7 @@ from femgear.case.quantities import (
     TORQUE,
     to_si,
 )
-from femgear.exchange.gear_unit import gears_of, plain_ids, power_flow, shaft_of, stage_components, turning
+from femgear.exchange.gear_unit import gears_of, plain_ids, shaft_of, stage_components, turning, unit_flow
 from femgear.exchange.planetary_stage import bearings_between, is_bearing, with_unit
 from femgear.exchange.rexs import Component, Model
 
@@ -62,7 +62,7 @@ def chain_tables(
     if len(pairs) != len(stages) or any(one.type != "cylindrical_stage" for one in stages):
         raise NoChain("a drivetrain is written of units whose stages are all pairs that became cases")
     _, given = model.chosen_case(load_case)
-    flow = power_flow(model, given)
+    flow = unit_flow(model, given)
     gears = {gear.id: (gear, stage) for stage in stages for gear in gears_of(model, stage)}
     shafts = {one.id: one for gear, _ in gears.values() if (one := shaft_of(model, gear)) is not None}
     if len(gears) != 2 * len(stages) or not set(shafts) <= flow.speed.keys():

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from femgear.errors import CaseError
-from femgear.gears.power_flow import SpeedCondition, StageGears
+from femgear.gears.shaft_graph import SpeedCondition, StageGears
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.teeth import flank_form
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.exchange.cylindrical_stage import pair_tables
-from femgear.exchange.gear_unit import PowerFlow, case_flows, plain_ids, stage_components, stage_in_words
+from femgear.exchange.gear_unit import UnitFlow, case_flows, plain_ids, stage_components, stage_in_words
 from femgear.exchange.planetary_stage import case_tables, named
 from femgear.exchange.rexs import Component, Model
 from femgear.exchange.shaft_chain import NoChain, chain_tables
@@ -107,7 +107,7 @@ def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case:
 
 
 def _stage_tables(
-    model: Model, stage: Component, load_case: int | None, flows: Sequence[PowerFlow]
+    model: Model, stage: Component, load_case: int | None, flows: Sequence[UnitFlow]
 ) -> tuple[dict, dict]:
     if stage.type == "planetary_stage":
         return case_tables(model, stage.id, load_case)

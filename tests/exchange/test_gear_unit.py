@@ -5,7 +5,7 @@ import math
 import pytest
 from rexs_stage import NONE, Gearbox, ParallelUnit, both_units
 
-from femgear.exchange.gear_unit import power_flow, stage_components, stage_in_words, unit_stages
+from femgear.exchange.gear_unit import stage_components, stage_in_words, unit_flow, unit_stages
 from femgear.exchange.rexs import read_model
 
 RPM = math.pi / 30.0
@@ -13,7 +13,7 @@ RPM = math.pi / 30.0
 
 def flow_of(box, tmp_path, given=None):
     model = read_model(box.write(tmp_path / "unit.rexs"))
-    flow = power_flow(model, given or {})
+    flow = unit_flow(model, given or {})
     return {int(id): one / RPM for id, one in flow.speed.items()}, {int(id): one for id, one in flow.torque.items()}
 
 

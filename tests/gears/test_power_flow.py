@@ -3,6 +3,7 @@
 import math
 from fractions import Fraction
 from random import Random
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,9 +11,7 @@ import pytest
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.kinematics import torque_ratios
 from femgear.gears.power_flow import (
-    ShaftGraph,
     SpeedCondition,
-    connected_sets,
     pair_condition,
     planetary_condition,
     power_flow,
@@ -94,7 +93,7 @@ def test_what_the_graph_does_not_determine_is_refused_by_name(wrong):
     assert tuple(problem.code for problem in problems) == wrong.codes
     assert all(word in problems[0].message for word in wrong.words)
     if wrong.limit is not None:
-        assert problems[0].limit.startswith(wrong.limit)
+        assert str(problems[0].limit).startswith(wrong.limit)
 
 
 def test_a_loop_is_recognised_exactly():
@@ -143,7 +142,8 @@ def test_redundant_speeds_that_agree_are_taken():
 
 def test_numbers_of_numpy_are_numbers():
     stage = pair_condition("pair", "a", "b", 1, 2)
-    flow = power_flow("ab", (stage,), speeds={"a": np.float32(2.0)}, torques={"a": np.int64(3)}, outputs=["b"])
+    numbers: Any = {"a": np.float32(2.0)}, {"a": np.int64(3)}
+    flow = power_flow("ab", (stage,), speeds=numbers[0], torques=numbers[1], outputs=["b"])
     assert flow.speed["b"] == -1.0 and flow.torque["b"] == 6.0
 
 
@@ -152,7 +152,7 @@ def test_numbers_of_numpy_are_numbers():
     (
         lambda: pair_condition("x", "a", "b", 0, 3),
         lambda: pair_condition("x", "a", "b", 20, -30, internal=True),
-        lambda: pair_condition("x", "a", "b", 20, 30.5),
+        lambda: pair_condition("x", "a", "b", 20, 30.5),  # type: ignore[arg-type]
         lambda: planetary_condition("x", "a", "b", "c", 40, 40),
         lambda: stepped_condition("x", "a", "b", "c", 20, 30, 0, 70),
     ),
@@ -177,10 +177,3 @@ def test_stepped_planets_of_equal_gears_are_single_ones():
     stepped = stepped_condition("set", "s", "c", "r", 20, 30, 30, 80)
     single = planetary_condition("set", "s", "c", "r", 20, 80)
     assert {shaft: weight / 30 for shaft, weight in stepped.weights.items()} == single.weights
-
-
-def test_parts_of_a_graph_hang_together_by_shafts():
-    stages = tuple(pair_condition(f"{a}{b}", a, b, 2, 3) for a, b in ("ab", "cd", "bc", "ef"))
-    assert ShaftGraph(tuple("abcdef"), stages).parts == [(0, 1, 2), (3,)]
-    assert ShaftGraph(tuple("abcdef"), stages, joined=(("d", "e"),)).parts == [(0, 1, 2, 3)]
-    assert connected_sets([{1}, {2}, {3, 1}, {3, 2}]) == [{1, 2, 3}]
