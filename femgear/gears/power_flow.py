@@ -16,7 +16,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from itertools import pairwise
-from numbers import Rational, Real
+from numbers import Integral, Rational, Real
 
 from femgear.errors import CaseError, GeometryError, several
 from femgear.gears.exact_linear import ExactSolution, reduce_rows
@@ -272,7 +272,7 @@ def _condition(name: str, terms: Iterable[tuple[str | None, int]], gears: StageG
     weights: dict[str, Fraction] = {}
     for shaft, weight in terms:
         if shaft is not None:
-            weights[shaft] = weights.get(shaft, Fraction(0)) + weight
+            weights[shaft] = weights.get(shaft, Fraction(0)) + int(weight)
     return SpeedCondition(name, weights, gears)
 
 
@@ -284,7 +284,7 @@ def _planet_meshes(*gears: str) -> tuple[tuple[str, str, int], ...]:
 
 def _check_teeth(name: str, teeth: Mapping[str, int]) -> None:
     for key, count in teeth.items():
-        if not isinstance(count, Real) or not float(count).is_integer() or count < 1:
+        if not isinstance(count, Integral) or count < 1:
             raise GeometryError(
                 f"stage {name!r}: a gear with {count} teeth",
                 code="E-TEETH",

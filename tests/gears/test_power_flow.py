@@ -1,5 +1,6 @@
 """Speeds and torques of graphs of shafts against closed forms in fractions, and what is refused."""
 
+import itertools
 import math
 from fractions import Fraction
 from random import Random
@@ -107,6 +108,92 @@ def test_a_loop_is_recognised_exactly():
         with pytest.raises(CaseError) as caught:
             power_flow("ab", stages, speeds={"a": 1.0}, torques={"a": 1.0}, outputs="b")
         assert caught.value.code == code
+
+
+def random_graph(random):
+    """Shafts, stages, held ones, outputs, given speeds and torques: many free or locked, some right."""
+    shafts = [*"abcdef"[: random.randint(2, 6)]]
+    stages = []
+    for number in range(random.randint(1, len(shafts) - 1)):
+        a, b, c = random.sample((*shafts, *shafts, None), 3)
+        few, many = random.choice((20, 30, 40)), random.choice((60, 90))
+        if random.random() < 0.5:
+            stages.append(pair_condition(str(number), a, b, few, many, random.random() < 0.3))
+        else:
+            stages.append(planetary_condition(str(number), a, b, c, few, many, random.random() < 0.3))
+    order = random.sample(shafts, len(shafts))
+    held, outputs = order[: random.choice((0, 0, 1))], order[1:][: random.randint(1, 2)]
+    rest = [shaft for shaft in shafts if shaft not in held and shaft not in outputs]
+    speeds = {shaft: random.uniform(-9.0, 9.0) for shaft in random.sample(shafts, random.randint(0, 2))}
+    return shafts, stages, held, outputs, speeds, {shaft: random.uniform(-9.0, 9.0) for shaft in rest[:2]}
+
+
+def codes_by_ranks(shafts, stages, held, outputs, speeds, torques):
+    """What is wrong with a graph by ranks of matrices of floats, the locks without their remaining mistakes."""
+    unit = dict(zip(shafts, np.eye(len(shafts)), strict=True))
+    table = np.array(
+        [sum((float(w) * unit[s] for s, w in one.weights.items()), np.zeros(len(shafts))) for one in stages]
+    )
+
+    def rank(*rows):
+        rows = np.array([one / (np.linalg.norm(one) or 1.0) for one in rows]).reshape(-1, len(shafts))
+        return np.linalg.matrix_rank(rows, tol=1e-9) if len(rows) else 0
+
+    fixed = [unit[shaft] for shaft in held]
+    if any(rank(*table, unit[shaft]) == rank(*table) for shaft in shafts):
+        return {"lock"}
+    found = set()
+    if rank(*table, *fixed, *(unit[shaft] for shaft in speeds)) < len(shafts):
+        found.add("E-MECHANISM")
+    given = np.array([*speeds.values()])
+    rows = np.array([*table, *fixed, *(unit[shaft] for shaft in speeds)])
+    right = np.concatenate([np.zeros(len(rows) - len(given)), given])
+    if np.abs(rows @ np.linalg.lstsq(rows, right, rcond=1e-12)[0] - right).max() > 1e-8:
+        found.add("E-SPEED")
+    columns = [*table, *fixed, *(unit[shaft] for shaft in outputs)]
+    if rank(*columns) < len(columns):
+        found.add("E-TORQUE")
+    load = sum((value * unit[shaft] for shaft, value in torques.items()), np.zeros(len(shafts)))
+    if np.abs(np.array(columns).T @ np.linalg.lstsq(np.array(columns).T, load, rcond=1e-12)[0] - load).max() > 1e-8:
+        found.add("E-LOAD-BALANCE")
+    return found
+
+
+def test_thousand_random_graphs_are_judged_as_by_ranks_of_matrices():
+    random, solved, judged = Random(7), 0, set()
+    for _ in range(1000):
+        shafts, stages, held, outputs, speeds, torques = graph = random_graph(random)
+        expected = codes_by_ranks(*graph)
+        try:
+            flow = power_flow(shafts, stages, speeds=speeds, torques=torques, held=held, outputs=outputs)
+        except CaseError as error:
+            messages = [problem.message for problem in error.problems]
+            codes = {problem.code for problem in error.problems}
+            if any("cannot turn with" in message for message in messages):
+                continue  # a part that stands for what is held: its other mistakes are not told
+            if expected == {"lock"}:
+                assert any(" lock" in message for message in messages)
+            else:
+                assert codes == expected
+            judged |= codes
+            continue
+        assert expected == set()
+        solved += 1
+        largest = max(map(abs, flow.torque.values())) or 1.0
+        for shaft in shafts:
+            balance = flow.torque[shaft] + sum(stage.get(shaft, 0.0) for stage in flow.stage_torque.values())
+            assert balance == pytest.approx(0.0, abs=1e-12 * largest)
+        for stage in stages:
+            terms = [float(weight) * flow.speed[shaft] for shaft, weight in stage.weights.items()]
+            assert math.fsum(terms) == pytest.approx(0.0, abs=1e-12 * (1.0 + max(map(abs, terms), default=0.0)))
+    assert solved > 30 and judged == {"E-MECHANISM", "E-SPEED", "E-TORQUE", "E-LOAD-BALANCE"}
+
+
+def test_a_long_chain_keeps_its_ratio():
+    names = [f"shaft {number}" for number in range(101)]
+    stages = [pair_condition(f"{a}-{b}", a, b, 19, 31) for a, b in itertools.pairwise(names)]
+    flow = power_flow(names, stages, speeds={names[0]: 1.0}, torques={names[0]: 1.0}, outputs=names[-1:])
+    assert flow.speed_ratio[names[-1]] == {names[0]: Fraction(19, 31) ** 100}
 
 
 def test_a_stage_beside_a_held_shaft_may_stand():
