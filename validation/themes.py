@@ -7,6 +7,7 @@ under its slow parts when it takes more than a few seconds.
 from __future__ import annotations
 
 from validation import (
+    bearings,
     calculix_casing,
     calculix_rows,
     calculix_solid,
@@ -350,6 +351,23 @@ THEMES = (
             drivetrain.contact_loss,
         ),
         (drivetrain.minute,),
+    ),
+    Theme(
+        "bearings",
+        "Rolling bearings",
+        "Balls and laminae of rollers by ISO/TS 16281, lives by ISO 281 and ISO/TS 16281. The ball bearing has 7 "
+        "balls of 11.5 mm on 43.5 mm, grooves of 0.52 and 0.53, 210 GPa, C 23.4 kN, its first ball under the radial "
+        "load; the roller bearing 18 rollers of 20 mm, without profile in closed forms. Compared with: another "
+        "program, Sjövall's integrals, central differences, symmetry, published factors and orders; gates: 0.05 %; "
+        "1e-6; 1e-10; printed digits. Formulas of books are information.",
+        (
+            bearings.another_program,
+            bearings.rollers,
+            bearings.invariances,
+            bearings.books,
+            bearings.lives,
+            bearings.orders,
+        ),
     ),
     Theme(
         "wind turbine sets",
