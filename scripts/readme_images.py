@@ -175,6 +175,11 @@ RUNS = {
         ring_resonance="Resonance of the ring: its peak moves down with the clearance.",
         tooth_contact="Contact of both flanks over frequency and clearance: above the line teeth wedge.",
     ),
+    "bearing_stiffness": _script(
+        "bearing_stiffness.py",
+        "Stiffness of rolling bearings",
+        bearing_stiffness="Clearance moves the shaft; preload stiffens two rows once all balls carry.",
+    ),
     "impacts": _script(
         "impacts.py",
         "Impacts and chaos",

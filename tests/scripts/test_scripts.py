@@ -32,6 +32,7 @@ SET_SCRIPTS = (
     "campbell.py",
     "gravity_wedging.py",
     "bearing_clearance.py",
+    "bearing_stiffness.py",
     "planet_phasing.py",
     "multistage.py",
 )
@@ -113,6 +114,7 @@ def test_help(name, tmp_path):
         ("gravity_wedging.py", ["--lowest", "90", "--highest", "30"], 2, "lowest < highest"),
         ("bearing_clearance.py", ["--clearance=-1 um"], 2, "clearances of 0 or more"),
         ("bearing_clearance.py", ["--points", "1"], 2, "two frequencies"),
+        ("bearing_stiffness.py", ["--load", "0"], 2, "above 0 N"),
         ("multistage.py", ["--points", "1"], 2, "2 to 20000"),
         ("multistage.py", ["--damping", "2"], 2, "above 0 to below 1"),
         ("planet_phasing.py", ["--points", "1"], 2, "2 frequencies"),
