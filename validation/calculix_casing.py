@@ -26,13 +26,17 @@ FREQUENCY_GATE, COMPLIANCE_GATE = 0.005, 0.01
 
 
 def grid_of(casing, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mesh the geometry of a casing by Gmsh: points (n, 3) [m], tetrahedra (e, 10), triangles (t, 6)."""
+    """Mesh the geometry of a casing: see `meshed_solid`."""
     from casing import GEOMETRY, HOUSED
 
     names = {"bottom": -casing.width / 2, **vars(casing), "size": size}
-    text = GEOMETRY.format(parts=HOUSED.format(**names), **names) + "Mesh.ElementOrder = 2;\n"
+    return meshed_solid(GEOMETRY.format(parts=HOUSED.format(**names), **names) + "Mesh.ElementOrder = 2;\n")
+
+
+def meshed_solid(text: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mesh a geometry of Gmsh, elements of second order: points (n, 3) [m], tetrahedra (e, 10), triangles (t, 6)."""
     with TemporaryDirectory() as folder:
-        source, grid = Path(folder) / "casing.geo", Path(folder) / "casing.msh"
+        source, grid = Path(folder) / "solid.geo", Path(folder) / "solid.msh"
         source.write_text(text, encoding="utf-8")
         run = "import sys, gmsh; gmsh.initialize(sys.argv, run=True)"
         words = [sys.executable, "-c", run, "-3", "-v", "1", "-format", "msh22", source, "-o", grid]
@@ -50,6 +54,19 @@ def grid_of(casing, size: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     triangles, solids = (row[np.array(elements[kind], int)] for kind in ("9", "11"))
     # Gmsh and CalculiX number the last two edges of a tetrahedron the other way round
     return nodes[:, 1:], solids[:, [0, 1, 2, 3, 4, 5, 6, 7, 9, 8]], triangles
+
+
+def solid_input(points: np.ndarray, solids: np.ndarray, *, young: float, poisson: float, density: float) -> list[str]:
+    """Write the nodes that elements use, tetrahedra of ten nodes, and their material [Pa], [1], [kg/m^3]."""
+    lines = ["*NODE, NSET=ALL"]
+    lines += [f"{i + 1}," + ",".join(f"{x:.14g}" for x in MILLIMETRE * points[i]) for i in np.unique(solids)]
+    lines.append("*ELEMENT, TYPE=C3D10, ELSET=SOLID")
+    lines += [f"{i + 1}," + ",".join(map(str, nodes + 1)) for i, nodes in enumerate(solids)]
+    return [
+        *lines,
+        f"*MATERIAL, NAME=STEEL\n*ELASTIC\n{1e-6 * young:.12g},{poisson:.12g}\n*DENSITY\n{1e-12 * density:.9g}",
+        "*SOLID SECTION, ELSET=SOLID, MATERIAL=STEEL",
+    ]
 
 
 def hats(angle: np.ndarray, points: int) -> np.ndarray:
@@ -100,13 +117,8 @@ def clamped_casing(casing, size: float = SIZE) -> tuple[np.ndarray, np.ndarray]:
     feet = used[points[used, 1] < 1e-6 - casing.base] + 1
     bore = used[np.hypot(*points[used, :2].T) < casing.bore + 1e-6] + 1
     loads = [bore_load(points, triangles, np.radians(place), casing.points, casing.bore) for place in ANGLES]
-    lines = ["*NODE, NSET=ALL"]
-    lines += [f"{i + 1}," + ",".join(f"{x:.14g}" for x in MILLIMETRE * points[i]) for i in used]
-    lines.append("*ELEMENT, TYPE=C3D10, ELSET=SOLID")
-    lines += [f"{i + 1}," + ",".join(map(str, nodes + 1)) for i, nodes in enumerate(solids)]
+    lines = solid_input(points, solids, young=E, poisson=NU, density=RHO)
     lines += [
-        f"*MATERIAL, NAME=STEEL\n*ELASTIC\n{1e-6 * E:.12g},{NU:.12g}\n*DENSITY\n{1e-12 * RHO:.9g}",
-        "*SOLID SECTION, ELSET=SOLID, MATERIAL=STEEL",
         *("*NSET, NSET=FEET", *map(str, feet), "*NSET, NSET=BORE", *map(str, bore)),
         "*BOUNDARY\nFEET,1,3",
     ]

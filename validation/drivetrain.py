@@ -1,4 +1,4 @@
-"""Drivetrains: shafts against closed forms, reductions of the chain, balances, printed numbers."""
+"""Drivetrains: reductions of the chain, balances, printed numbers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from published.wind_turbine_drivetrain import (
     wind_turbine_drivetrain,
 )
 
-from femgear.fe.shaft import RoundSection
 from femgear.solvers.linear.modal import solve_modes
 from femgear.system.mesh_directions import gear_set_system
 from femgear.trains.drivetrain.kinematics import coordinates_of, planar_of, rigid_rotation
@@ -37,61 +36,10 @@ from femgear.trains.drivetrain.parts import (
 )
 from femgear.trains.drivetrain.simulation import Records, march_drivetrain
 from validation.rows import Row, at_most, information, printed, within
-from validation.timoshenko import Disc, Support, free_bending, shaft_system, simply_supported
 
 PAPER = "Dynamic analysis of the wind turbine drivetrain considering shaft bending effect"
-TRANSFER = "zeros of the exact transfer matrix"
-LIBRARY = "ross-rotordynamics 2.3.0, the same 24 elements"
-SECTION, LENGTH, COUNT = RoundSection(0.1, 0.02), 1.0, 24
-DISCS = (Disc(6, 20.0, 0.18, 0.10), Disc(16, 35.0, 0.50, 0.30))
 # two wheels and one mesh: mean stiffness [N/m], teeth
 STIFFNESS, TEETH = 2e8, 20
-# bending modes by that library [Hz]: free, free with discs, with discs in bearings of 5e7 and 8e7 N/m
-FREE = ("452.333793", "1189.288296", "2195.991369")
-WITH_DISCS = ("377.474134", "835.190445", "1324.163334")
-IN_BEARINGS = ("106.033701", "275.141073", "575.650784")
-
-
-def _shaft(count=COUNT, **options):
-    system = shaft_system([SECTION] * count, [LENGTH / count] * count, **options)
-    system = replace(system, gyroscopic=None)
-    return solve_modes(replace(system, W=np.zeros((len(system.M), 0))), np.zeros(0)).frequency
-
-
-def shafts() -> tuple[Row, ...]:
-    """Timoshenko shafts."""
-    rows = []
-    ours = _shaft(96, supports=(Support(0, math.inf), Support(96, math.inf)))
-    for number in (1, 2, 3):
-        wanted = simply_supported(SECTION, LENGTH, number)
-        text = f"simply supported Timoshenko shaft, 96 elements, mode {number} [Hz]"
-        rows.append(within("shaft", "closed form", text, wanted, _nearest(ours, wanted), 1e-3))
-    for words, discs, top in (("", (), 2500.0), (" with two discs", DISCS, 1400.0)):
-        stations = tuple(replace(disc, station=4 * disc.station) for disc in discs)
-        places = [(disc.station / COUNT * LENGTH, disc) for disc in discs]
-        ours = _shaft(4 * COUNT, discs=stations)
-        for number, wanted in enumerate(free_bending(SECTION, LENGTH, 100.0, top, discs=places), 1):
-            name = f"free-free shaft{words}, 96 elements, bending {number} [Hz]"
-            rows.append(within("shaft", TRANSFER, name, wanted, _nearest(ours, wanted), 1e-3))
-    cases = (
-        ("free-free shaft", {}, FREE),
-        ("free-free shaft with two discs", {"discs": DISCS}, WITH_DISCS),
-        (
-            "two discs in bearings",
-            {"discs": DISCS, "supports": (Support(0, 5e7), Support(COUNT, 8e7))},
-            IN_BEARINGS,
-        ),
-    )
-    for text, options, values in cases:
-        ours = _shaft(**options)
-        for number, value in enumerate(values, 1):
-            near = _nearest(ours, float(value))
-            rows.append(within("shaft", LIBRARY, f"{text}, bending {number} [Hz]", float(value), near, 1e-5))
-    return tuple(rows)
-
-
-def _nearest(values, wanted: float) -> float:
-    return float(values[np.argmin(np.abs(values - wanted))])
 
 
 def kinematics() -> tuple[Row, ...]:
@@ -144,19 +92,8 @@ def shifted_planets() -> tuple[Row, ...]:
 
 
 def shaft_joints() -> tuple[Row, ...]:
-    """Energy of a beam under an end load, and the joint of two rigid links that stores the same."""
-    s, load = SECTION, 1000.0
-    shear = 1.0 / s.shear_coefficient
-    wanted = load**2 * LENGTH**3 / (6.0 * s.young * s.second_moment)
-    wanted += shear * load**2 * LENGTH / (2.0 * s.shear_modulus * s.area)
-    held = Support(0, math.inf, math.inf)
-    beam = shaft_system([s] * COUNT, [LENGTH / COUNT] * COUNT, supports=(held,))
-    # bending in one plane alone: the shaft still turns about its axis
-    plane = [i for i, name in enumerate(beam.dofs) if name.endswith((": x", ": tilt y"))]
-    force = np.array([load * (beam.dofs[i] == f"station {COUNT + 1}: x") for i in plane])
-    energy = 0.5 * force @ np.linalg.solve(beam.K[np.ix_(plane, plane)], force)
-    formula = "F^2 L^3 / 6 E I + chi F^2 L / 2 G A"
-    rows = [within("shaft", formula, "cantilever of 24 elements under an end load, energy [J]", wanted, energy, 1e-9)]
+    """Printed stiffnesses of shafts beside the joint of two rigid links that stores the energy of a beam."""
+    rows = []
     springs = (PRINTED.low_speed, PRINTED.intermediate, PRINTED.high_speed)
     for name, (bending, torsion) in zip(("low-speed", "intermediate", "high-speed"), springs):
         for words, halves in (("both halves of the joint", 2), ("one joint", 1)):

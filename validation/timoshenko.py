@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.fe.shaft import AXES, RoundSection, beam_element, disc_matrices
+from femgear.fe.beam import AXES, BeamShaft, RoundSection, body_matrices
 from femgear.system.system import MechanicalSystem
 
 
@@ -25,11 +25,13 @@ class Disc:
 
 @dataclass(frozen=True)
 class Support:
-    """Bearing on a station: stiffness across the axis [N/m] and against tilt [N m/rad]."""
+    """Bearing on a station: stiffness across and along the axis [N/m], against tilt and rotation [N m/rad]."""
 
     station: int
     radial: float
     tilt: float = 0.0
+    axial: float = 0.0
+    twist: float = 0.0
 
 
 def simply_supported(section: RoundSection, length: float, number: int) -> float:
@@ -43,6 +45,21 @@ def simply_supported(section: RoundSection, length: float, number: int) -> float
     b = s.density * (s.area + s.second_moment * (1.0 + s.young / slide) * k**2)
     square = (b - math.sqrt(b * b - 4.0 * a * s.young * s.second_moment * k**4)) / (2.0 * a)
     return math.sqrt(square) / (2.0 * math.pi)
+
+
+def hinged_whirl(section: RoundSection, length: float, number: int, speed: float) -> float:
+    """Whirl frequency [Hz] of a turning shaft on two hinges, by the number of its half waves.
+
+    The speed of rotation [rad/s] is positive for whirl in its sense. With ``x + i y = W sin(k z) exp(i w t)`` and
+    tilts as ``cos(k z)``: ``(kappa G A k^2 - rho A w^2) (E I k^2 + kappa G A + 2 rho I Omega w - rho I w^2) =
+    (kappa G A k)^2``, the lowest positive root (Timoshenko's beam with the angular momentum of its sections).
+    """
+    s, k = section, number * math.pi / length
+    shear, rotary = s.shear_coefficient * s.shear_modulus * s.area, s.density * s.second_moment
+    across = np.poly1d([-s.density * s.area, 0.0, shear * k**2])
+    tilt = np.poly1d([-rotary, 2.0 * rotary * speed, s.young * s.second_moment * k**2 + shear])
+    roots = np.roots((across * tilt - (shear * k) ** 2).coeffs).real
+    return float(roots[roots > 0.0].min()) / (2.0 * math.pi)
 
 
 def free_bending(
@@ -99,19 +116,12 @@ def free_bending(
     return [brentq(residue, a, b) for a, b, u, v in zip(grid, grid[1:], values, values[1:]) if u * v < 0.0]
 
 
-def shaft_system(
-    sections: Sequence[RoundSection],
-    lengths: Sequence[float],
-    *,
-    discs: Sequence[Disc] = (),
-    supports: Sequence[Support] = (),
-) -> MechanicalSystem:
-    """One shaft of any number of elements with discs and bearings.
+def shaft_system(shaft: BeamShaft, *, discs: Sequence[Disc] = (), supports: Sequence[Support] = ()) -> MechanicalSystem:
+    """One shaft with discs and bearings.
 
     Parameters
     ----------
-    sections, lengths : (n,) sequences
-        Of the elements, from the first station to the last.
+    shaft : BeamShaft
     discs, supports : sequences
         An infinite stiffness holds the coordinate, which is then left out.
 
@@ -120,27 +130,17 @@ def shaft_system(
     MechanicalSystem
         ``W`` has no columns; ``gyroscopic`` multiplies the speed of the shaft.
     """
-    count = len(lengths) + 1
-    if len(sections) != len(lengths) or count < 2:
-        raise CaseError(
-            f"{len(sections)} sections and {len(lengths)} lengths",
-            code="E-SHAPE",
-            limit="one of each an element, one element or more",
-        )
-    M, K, G = (np.zeros((5 * count, 5 * count)) for _ in range(3))
-    for number, (section, length) in enumerate(zip(sections, lengths)):
-        place = slice(5 * number, 5 * number + 10)
-        for total, part in zip((M, K, G), beam_element(section, length)):
-            total[place, place] += part
+    count = len(shaft.stations)
+    M, K, G = shaft.mass.copy(), shaft.stiffness.copy(), shaft.gyroscopic.copy()
     for disc in discs:
-        own = disc_matrices(disc.mass, disc.polar, disc.transverse)
         place = _place(disc.station, count)
-        M[place, place] += own[0]
-        G[place, place] += own[1]
-    held = np.zeros(5 * count, bool)
+        mass, gyroscopic = body_matrices(disc.mass, disc.polar, disc.transverse)
+        M[place, place] += mass
+        G[place, place] += gyroscopic
+    held = np.zeros(6 * count, bool)
     for support in supports:
         place = _place(support.station, count)
-        stiffness = np.array([support.radial, support.radial, support.tilt, support.tilt, 0.0])
+        stiffness = np.array([support.radial] * 2 + [support.axial] + [support.tilt] * 2 + [support.twist])
         held[place] |= np.isinf(stiffness)
         K[place, place] += np.diag(np.where(np.isinf(stiffness), 0.0, stiffness))
     free = np.flatnonzero(~held)
@@ -160,4 +160,39 @@ def shaft_system(
 def _place(station: int, count: int) -> slice:
     if not 0 <= station < count:
         raise CaseError(f"station {station} of {count}", code="E-SHAFT", limit=f"0 to {count - 1}")
-    return slice(5 * station, 5 * station + 5)
+    return slice(6 * station, 6 * station + 6)
+
+
+def natural_frequencies(system: MechanicalSystem, *, axes: Sequence[str] = AXES) -> np.ndarray:
+    """Compute the frequencies (n,) [Hz] of a shaft at rest, ascending, by its motions of these names alone."""
+    from scipy.linalg import eigh
+
+    kept = [i for i, name in enumerate(system.dofs) if name.split(": ")[1] in axes]
+    cut = np.ix_(kept, kept)
+    return np.sqrt(np.abs(eigh(system.K[cut], system.M[cut], eigvals_only=True))) / (2.0 * math.pi)
+
+
+def whirl_frequencies(system: MechanicalSystem, speed: float) -> np.ndarray:
+    """Compute frequency [Hz] and sense (n, 2) of all modes of a shaft that turns at a speed [rad/s], ascending.
+
+    Sense 1 whirls with the rotation about z, -1 against it, 0 is torsion or stretch.
+    """
+    from scipy.linalg import eig
+
+    M, n = system.M, len(system.M)
+    zero, one = np.zeros((n, n)), np.eye(n)
+    assert system.gyroscopic is not None
+    state = np.block([[zero, one], [-system.K, -speed * system.gyroscopic]])
+    poles, states = eig(state, np.block([[one, zero], [zero, M]]))  # type: ignore[misc]
+    axes = np.array([name.split(": ")[1] for name in system.dofs])
+    lateral = ~np.isin(axes, ("z", "rotation"))
+    result = []
+    for pole, shape in zip(poles, states[:n].T):
+        if pole.imag <= 0.0:
+            continue
+        weight = (shape.conj() * (M @ shape)).real
+        tilts = shape[axes == "tilt x"].conj() @ shape[axes == "tilt y"]
+        # y follows x by a quarter of a turn where the shaft whirls about z
+        sense = np.sign(tilts.imag) * -1.0 if weight[lateral].sum() > 0.5 * weight.sum() else 0.0
+        result.append((pole.imag / (2.0 * math.pi), sense))
+    return np.array(sorted(result))

@@ -1,193 +1,123 @@
-"""Timoshenko shafts against closed forms, an exact transfer matrix and a rotor-dynamics library."""
-
-import math
+"""K = F/X against the annulus with a rigid core, rubber bushes and beams."""
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh, eigvals
 
-from femgear.errors import CaseError
-from femgear.fe.shaft import RoundSection, beam_element, joint_deflections
-from validation.timoshenko import Disc, Support, free_bending, shaft_system, simply_supported
-
-SECTION = RoundSection(0.1, 0.02)
-LENGTH, COUNT = 1.0, 24
-DISCS = (Disc(6, 20.0, 0.18, 0.10), Disc(16, 35.0, 0.50, 0.30))
-
-
-def shaft(count=COUNT, **options):
-    return shaft_system([SECTION] * count, [LENGTH / count] * count, **options)
-
-
-def natural(system):
-    """[Hz], ascending."""
-    return np.sqrt(np.abs(eigh(system.K, system.M, eigvals_only=True))) / (2.0 * np.pi)
-
-
-def test_rigid_motions_have_the_exact_mass():
-    M, K, G = beam_element(SECTION, LENGTH)
-    mass = SECTION.density * SECTION.area * LENGTH
-    move, turn = np.zeros(10), np.zeros(10)
-    move[[0, 5]] = 1.0
-    turn[[3, 8]], turn[0], turn[5] = 1.0, -0.5 * LENGTH, 0.5 * LENGTH
-    inertia = mass * LENGTH**2 / 12.0 + SECTION.density * SECTION.second_moment * LENGTH
-    assert move @ M @ move == pytest.approx(mass, rel=1e-13)
-    assert turn @ M @ turn == pytest.approx(inertia, rel=1e-13)
-    assert np.abs(K @ np.stack([move, turn], axis=1)).max() < 1e-6
-    about_x = np.zeros(10)
-    about_x[[2, 7]], about_x[1], about_x[6] = 1.0, 0.5 * LENGTH, -0.5 * LENGTH
-    # a rigid shaft has the angular momentum of a disc
-    polar = 2.0 * SECTION.density * SECTION.second_moment * LENGTH
-    assert about_x @ G @ turn == pytest.approx(polar, rel=1e-13)
-    assert np.array_equal(G, -G.T)
-
-
-@pytest.mark.parametrize(("discs", "top"), [((), 2500.0), (DISCS, 2150.0)])
-def test_free_shaft_against_the_characteristic_equation(discs, top):
-    places = [(d.station / COUNT * LENGTH, d) for d in discs]
-    wanted = np.array(free_bending(SECTION, LENGTH, 100.0, top, discs=places))
-    assert len(wanted) >= 3
-    errors = []
-    for factor in (2, 4):
-        stations = tuple(Disc(d.station * factor, d.mass, d.polar, d.transverse) for d in discs)
-        ours = natural(shaft(COUNT * factor, discs=stations))
-        errors.append([np.min(np.abs(ours / one - 1.0)) for one in wanted])
-    errors = np.array(errors)
-    assert np.all(errors[1] < 1e-3)
-    # second order in the length of the elements
-    np.testing.assert_allclose(errors[0] / errors[1], 4.0, rtol=0.1)
-
-
-def test_simply_supported_shaft_against_its_closed_form():
-    count = 96
-    ours = natural(shaft(count, supports=(Support(0, math.inf), Support(count, math.inf))))
-    for number in (1, 2, 3):
-        wanted = simply_supported(SECTION, LENGTH, number)
-        assert np.min(np.abs(ours / wanted - 1.0)) < 2e-4
-
-
-def test_torsion_of_a_free_shaft():
-    """``f_n = n / (2 l) sqrt(G / rho)``."""
-    ours = natural(shaft(96))
-    wanted = math.sqrt(SECTION.shear_modulus / SECTION.density) / (2.0 * LENGTH)
-    assert np.min(np.abs(ours / wanted - 1.0)) < 1e-4
-
-
-# damped natural frequencies [Hz] by ross-rotordynamics 2.3.0 (Petrobras, UFRJ): the same 24 elements, steel
-# of 206 GPa, 0.3 and 7850 kg/m^3, discs as above; bearings of 5e7 and 8e7 N/m at the ends; 0 and 1000 rad/s.
-# Its axial modes, which femgear leaves out, are not in the lists.
-ROSS_FREE = (452.333793, 1189.288296, 1589.615652, 2195.991369, 3186.042934, 3393.854392)
-ROSS_DISCS = (377.474134, 562.711177, 835.190445, 1324.163334, 2108.046811)
-ROSS_BEARINGS = (106.033701, 275.141073, 562.711176, 575.650784, 947.624003, 1380.710501)
-ROSS_TURNING = (
-    104.871976,
-    107.138874,
-    269.019913,
-    280.980129,
-    539.582438,
-    562.711177,
-    611.726325,
-    931.268824,
-    963.704651,
+from femgear.errors import GeometryError, GridError
+from femgear.fe.elasticity import Material, foundation, stiffness
+from femgear.fe.shaft import (
+    RoundSection,
+    ShaftStep,
+    shaft_flexibility,
+    shaft_support_stiffness,
+    timoshenko_flexibility,
 )
-BEARINGS = (Support(0, 5e7), Support(COUNT, 8e7))
-
-
-@pytest.mark.parametrize(
-    ("options", "wanted"),
-    [
-        ({}, ROSS_FREE),
-        ({"discs": DISCS}, ROSS_DISCS),
-        ({"discs": DISCS, "supports": BEARINGS}, ROSS_BEARINGS),
-    ],
+from validation.mapped import mapped_grid, ring_mapping
+from validation.reference.support_stiffness import (
+    annulus_support_stiffness,
+    centre_node_stiffness,
+    cyclic_support_stiffness,
 )
-def test_against_the_rotor_dynamics_library(options, wanted):
-    ours = natural(shaft(**options))
-    assert max(np.min(np.abs(ours / one - 1.0)) for one in wanted) < 2e-6
+from validation.support_stiffness import annulus_sector
+
+STEEL = Material(206e9, 0.3, 7850.0)
+STATES = ("plane stress", "plane strain")
 
 
-def test_whirl_against_the_rotor_dynamics_library():
-    system = shaft(discs=DISCS, supports=BEARINGS)
-    n = len(system.M)
-    damping = 1000.0 * system.gyroscopic
-    zero, one = np.zeros((n, n)), np.eye(n)
-    poles = eigvals(np.block([[zero, one], [-system.K, -damping]]), np.block([[one, zero], [zero, system.M]]))
-    ours = np.abs(poles.imag) / (2.0 * np.pi)
-    assert max(np.min(np.abs(ours / wanted - 1.0)) for wanted in ROSS_TURNING) < 2e-6
+def test_closed_form_is_the_long_bush_when_incompressible():
+    soft = Material(3e6, 0.4999999, 1000.0)
+    inner, outer = 0.01, 0.02
+    ratio = (outer**2 - inner**2) / (outer**2 + inner**2)
+    bush = 4 * np.pi * soft.shear_modulus / (np.log(outer / inner) - ratio)
+    ours = annulus_support_stiffness(inner, outer, soft, state="plane strain", thickness=1.0)
+    assert ours == pytest.approx(bush, rel=1e-5)
 
 
-def test_two_links_are_the_static_beam():
-    """Tip of a cantilever under a force and a moment, and a simple span: Timoshenko's deflections."""
-    length = 0.4
-    K = beam_element(SECTION, length)[1][5:, 5:]
-    bend, phi = SECTION.young * SECTION.second_moment, SECTION.shear_ratio(length)
-    tip = np.linalg.solve(K, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
-    assert tip[0] == pytest.approx(length**3 / (3.0 * bend) * (1.0 + 0.25 * phi), rel=1e-12)
-    assert tip[3] == pytest.approx(length**2 / (2.0 * bend), rel=1e-12)
-    moment = np.linalg.solve(K, np.array([0.0, 0.0, 0.0, 1.0, 0.0]))
-    assert moment[3] == pytest.approx(length / bend, rel=1e-12)
+@pytest.mark.parametrize("state", STATES)
+def test_annulus_with_a_rigid_core(state):
+    inner, outer, width = 0.04, 0.06, 0.01
+    grid = mapped_grid(ring_mapping(inner, outer), 6, 40, closed=True)
+    K = centre_node_stiffness(grid, stiffness(grid, STEEL, state=state, thickness=width), ("u=0",), ("u=1",))
+    exact = annulus_support_stiffness(inner, outer, STEEL, state=state, thickness=width)
+    np.testing.assert_allclose(np.diag(K)[:2], exact, rtol=1e-4)
+    twist = 4 * np.pi * STEEL.shear_modulus * width / (1 / inner**2 - 1 / outer**2)
+    assert K[2, 2] == pytest.approx(twist, rel=1e-4)
+    assert np.abs(K - np.diag(np.diag(K))).max() < 1e-9 * exact
 
 
-def test_joint_does_not_see_rigid_motions():
-    rows = joint_deflections(0.7)
-    turn = np.zeros(10)
-    turn[[3, 8]], turn[5] = 1.0, 0.7
-    assert np.abs(rows @ turn).max() < 1e-15
-    assert np.linalg.matrix_rank(rows) == 5
+@pytest.mark.parametrize("held", [("rim",), ()])
+def test_one_sector_as_the_whole_body(held):
+    count, inner, outer = 9, 0.04, 0.06
+    sector = annulus_sector(inner, outer, count, across=4, along=4)
+    whole = mapped_grid(ring_mapping(inner, outer), 4, 4 * count, closed=True)
+    springs = (1e11, 3e10)
+    results = []
+    for grid, rim in ((sector, "rim"), (whole, "u=1")):
+        K = stiffness(grid, STEEL, thickness=1.0)
+        results.append(K if held else K + foundation(grid, rim, *springs, thickness=1.0))
+    one = cyclic_support_stiffness(sector, results[0], count, ("bore",), held)
+    other = centre_node_stiffness(whole, results[1], ("u=0",), ("u=1",) if held else ())[0, 0]
+    assert one == pytest.approx(other, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: RoundSection(0.0),
-        lambda: RoundSection(0.1, 0.1),
-        lambda: RoundSection(math.nan),
-        lambda: shaft(discs=(Disc(25, 1.0, 1.0, 1.0),)),
-    ],
-)
-def test_shafts_that_cannot_be_are_refused(make):
-    with pytest.raises(CaseError, match="E-SHAFT"):
-        make()
+def test_bodies_that_nothing_holds_and_wrong_boundaries_are_refused():
+    sector = annulus_sector(0.04, 0.06, 9, across=2, along=2)
+    K = stiffness(sector, STEEL, thickness=1.0)
+    with pytest.raises(GridError) as error:
+        cyclic_support_stiffness(sector, K, 9, ("bore",))
+    assert error.value.code == "E-GRID-FREE"
+    with pytest.raises(GridError) as error:
+        centre_node_stiffness(sector, K, ("bore",))
+    assert error.value.code == "E-GRID-FREE"
+    with pytest.raises(GridError) as error:
+        cyclic_support_stiffness(sector, K, 9, ("bore",), ("bore",))
+    assert error.value.code == "E-GRID"
+    with pytest.raises(GeometryError):
+        annulus_support_stiffness(0.06, 0.04, STEEL, state=STATES[0], thickness=1.0)
 
 
-def test_joint_of_two_halves_stores_the_energy_of_the_beam_under_an_end_load():
-    """2 (F L / 2)^2 / (2 k) with k = (3 E I / 2 L) / (1 + Phi / 4), against 24 elements."""
-    system = shaft(supports=(Support(0, math.inf, math.inf),))
-    plane = [i for i, name in enumerate(system.dofs) if name.endswith((": x", ": tilt y"))]
-    force = np.array([float(system.dofs[i] == f"station {COUNT + 1}: x") for i in plane])
-    energy = 0.5 * force @ np.linalg.solve(system.K[np.ix_(plane, plane)], force)
-    s, bending = SECTION, SECTION.young * SECTION.second_moment
-    phi = 12.0 * bending / (s.shear_coefficient * s.shear_modulus * s.area * LENGTH**2)
-    spring = 1.5 * bending / LENGTH / (1.0 + phi / 4.0)
-    assert 2.0 * (LENGTH / 2.0) ** 2 / (2.0 * spring) == pytest.approx(energy, rel=1e-9)
+def test_pure_bending_without_poissons_ratio_is_the_beam():
+    material = Material(206e9, 0.0, 7850.0)
+    steps = (ShaftStep(0.06, 0.02, 0.008),)
+    ours, beam = shaft_flexibility(steps, material, refine=0.5), timoshenko_flexibility(steps, material)
+    # plane sections stay plane: tilt and deflection under a moment are exact
+    np.testing.assert_allclose(ours[:, 1], beam[:, 1], rtol=1e-7)
+    assert ours[0, 0] == pytest.approx(beam[0, 0], rel=2e-3)
 
 
-def test_shafts_of_the_printed_springs_are_those_of_the_page():
-    """docs/drivetrain.md: diameter over length by reading of Eqs. 10 and 11, sizes of the first one."""
-    import re
-    from pathlib import Path
+def test_slender_steel_shaft():
+    steps = (ShaftStep(0.15, 0.02),)
+    beam = 1 / timoshenko_flexibility(steps, STEEL)[0, 0]
+    assert shaft_support_stiffness(steps, STEEL, refine=0.5) == pytest.approx(beam, rel=0.012)
 
-    from published.wind_turbine_drivetrain import PRINTED
 
-    page = (Path(__file__).parents[2] / "docs" / "drivetrain.md").read_text(encoding="utf-8")
-    springs = (PRINTED.low_speed, PRINTED.intermediate, PRINTED.high_speed)
-    round_shaft = RoundSection(0.1)
-    shear = 12.0 * 2.6 / 16.0 / round_shaft.shear_coefficient
-    assert shear == pytest.approx(2.20, abs=5e-3)
-    readings = {"energy for each half": (1.5, 4), "beams of half": (6.0, 1), "joint in the middle": (3.0, 1)}
-    for name, (factor, part) in readings.items():
-        row = next(line for line in page.splitlines() if re.match(rf"\| \**{name}", line))
-        cells = [float(cell) for cell in row.strip("|").split("|")[2:]]
-        assert cells[0] == pytest.approx(1.3 * factor)
-        for (bending, torsion), shown in zip(springs, cells[1:], strict=True):
-            slender = math.sqrt(part * (1.3 * factor * torsion / bending - 1.0) / shear)
-            assert f"{slender:.2f}" == f"{shown:.2f}"
-    assert all(0.75 * 1.3 < bending / torsion for bending, torsion in springs)
-    sizes = []
-    for bending, torsion in springs:
-        slender = math.sqrt(4.0 * (1.95 * torsion / bending - 1.0) / shear)
-        cubed = torsion / round_shaft.shear_modulus * 32.0 / math.pi / slender
-        sizes.append((cubed ** (1 / 3), cubed ** (1 / 3) / slender))
-    words = "{}, {} and {} mm diameter and {}, {} and {} m length"
-    found = [f"{1e3 * d:.0f}" for d, _ in sizes] + [f"{length:.2f}" for _, length in sizes]
-    assert words.format(*found) in " ".join(page.split())
+def test_beam_of_two_parts_against_integration():
+    steps = (ShaftStep(0.05, 0.03), ShaftStep(0.08, 0.02, 0.01))
+    found = timoshenko_flexibility(steps, STEEL)
+    z, weight = np.polynomial.legendre.leggauss(8)
+    total, start = np.zeros((2, 2)), 0.0
+    for step in steps:
+        arm = 0.13 - (start + 0.5 * step.length * (1 + z))
+        w = 0.5 * step.length * weight
+        bending = 206e9 * np.pi / 64 * (step.outer_diameter**4 - step.inner_diameter**4)
+        moments = np.stack([arm, np.ones_like(arm)])
+        total += (moments * w) @ moments.T / bending
+        section = RoundSection(step.outer_diameter, step.inner_diameter, poisson=0.3)
+        shear = STEEL.shear_modulus * section.shear_coefficient * section.area
+        total[0, 0] += step.length / shear
+        start += step.length
+    np.testing.assert_allclose(found, total, rtol=1e-12)
+
+
+@pytest.mark.parametrize("numbers", [(0.0, 0.02, 0.0), (0.1, 0.02, 0.02), (0.1, 0.02, -1.0), (np.nan, 0.02, 0)])
+def test_impossible_parts_are_refused(numbers):
+    with pytest.raises(GeometryError) as error:
+        ShaftStep(*numbers)
+    assert error.value.code == "E-SHAFT"
+
+
+def test_parts_that_do_not_touch_are_refused():
+    with pytest.raises(GeometryError):
+        shaft_flexibility((ShaftStep(0.1, 0.02), ShaftStep(0.1, 0.05, 0.03)), STEEL)
+    with pytest.raises(GeometryError):
+        shaft_flexibility((), STEEL)

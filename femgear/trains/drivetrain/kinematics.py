@@ -17,11 +17,15 @@ import numpy as np
 from scipy import linalg
 
 from femgear.errors import CaseError
-from femgear.fe.shaft import AXES, joint_deflections, joint_springs
+from femgear.fe.beam import AXES, joint_deflections, joint_springs
 from femgear.system.mesh_directions import mesh_directions, pin_directions, point_approach
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.trains.drivetrain.parts import Drivetrain, ParallelSection, PlanetarySection, numbered
 
+# Motions of a station that the chain has, among those of `femgear.fe.beam`: all but the axial one; of two stations.
+MOTIONS = np.array([0, 1, 3, 4, 5])
+ENDS = np.append(MOTIONS, MOTIONS + len(AXES))
+_NAMES = tuple(AXES[i] for i in MOTIONS)
 # Row of a kinematic condition, relative to the largest, that counts as none.
 _RANK = 1e-12
 # Radial part of a normal, over the whole, that the held coordinates leave nothing of.
@@ -52,7 +56,7 @@ def coordinates_of(train: Drivetrain) -> Coordinates:
     names, body, planets, stations = [], {}, {}, []
     for one in train.bodies:
         body[one.name] = len(names)
-        names += [f"{one.name}: {axis}" for axis in AXES]
+        names += [f"{one.name}: {axis}" for axis in _NAMES]
         for number, stage in enumerate(train.planetary):
             if stage.carrier == one.name:
                 planets[number] = len(names) + np.arange(3 * len(stage.angles)).reshape(-1, 3)
@@ -62,7 +66,7 @@ def coordinates_of(train: Drivetrain) -> Coordinates:
         first, last = (body[name] for name in shaft.between)
         inner = range(1, max(shaft.elements, 1))
         stations.append((first, *(len(names) + 5 * (i - 1) for i in inner), last))
-        names += [f"shaft {'-'.join(shaft.between)} {i}: {axis}" for i in inner for axis in AXES]
+        names += [f"shaft {'-'.join(shaft.between)} {i}: {axis}" for i in inner for axis in _NAMES]
     return Coordinates(tuple(names), body, tuple(planets[n] for n in range(len(planets))), tuple(stations))
 
 
@@ -94,7 +98,7 @@ def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
         stiffness = np.array([s.shear, s.shear, s.bending, s.bending, s.torsion])
         for one, two in pairwise(stations[shaft.between]):
             places = np.r_[one : one + 5, two : two + 5]
-            found.append(Springs(places, joint_deflections(length), stiffness, turns))
+            found.append(Springs(places, joint_deflections(length)[np.ix_(MOTIONS, ENDS)], stiffness, turns))
     for bearing in train.bearings:
         rows = np.eye(4)
         rows[0, 3], rows[1, 2] = bearing.offset, -bearing.offset
@@ -371,7 +375,7 @@ def _parallel_direction(stage: ParallelSection, place: Coordinates, spin, *, fla
         arm = np.append(sign * radius * along, offset)
         first = place.body[name]
         # bodies do not move along z
-        w[first : first + 5] += sign * point_approach(normal, arm)[[0, 1, 3, 4, 5]]
+        w[first : first + 5] += sign * point_approach(normal, arm)[MOTIONS]
     return w
 
 

@@ -176,7 +176,7 @@ def _beam_line(shaft, stations, points: int) -> tuple[np.ndarray, np.ndarray]:
 def _joint_shear_ratio(shaft) -> float:
     """Phi of the Timoshenko shaft whose static stiffness is that of a joint's springs.
 
-    Bending ``E I / l`` and shear ``12 E I / ((1 + Phi) l^3)``, `femgear.fe.shaft.joint_springs`. Under a
+    Bending ``E I / l`` and shear ``12 E I / ((1 + Phi) l^3)``, `femgear.fe.beam.joint_springs`. Under a
     spherical joint no force crosses the shaft, which then bends to a parabola whatever Phi is.
     """
     springs = shaft.springs
@@ -189,8 +189,8 @@ def beam_shape(xi, length: float, shear_ratio: float) -> np.ndarray:
     """Compute the deflection (k, 4) of a Timoshenko element per (w, slope) at its ends [m], [rad].
 
     Exact for an element of a length [m] without load, with the ``shear_ratio`` Phi of
-    `femgear.fe.shaft.RoundSection`; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
-    These are the functions behind the consistent mass of `femgear.fe.shaft.beam_element`
+    `femgear.fe.beam.RoundSection`; ``xi`` (k,) runs from 0 to 1, ``slope`` is the turn of the section.
+    These are the functions behind the consistent mass of `femgear.fe.beam.beam_element`
     (J. S. Przemieniecki, Theory of Matrix Structural Analysis, 1968, section 11.3; Z. Friedman and
     J. B. Kosmatka, Comput. Struct. 47, 1993, 473-481).
     """

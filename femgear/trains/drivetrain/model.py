@@ -26,7 +26,7 @@ import numpy as np
 from femgear.case.gear_set import line_play
 from femgear.case.text import write
 from femgear.errors import CaseError, FemgearError
-from femgear.fe.shaft import beam_element, disc_matrices
+from femgear.fe.beam import beam_element, body_matrices
 from femgear.solvers.linear.modal import modal_damping
 from femgear.stages.static import solve_static
 from femgear.system.force_laws import positive_part
@@ -34,6 +34,8 @@ from femgear.system.fourier import FourierSeries, orders_of, phase_of
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, pair_case_of, torque_histories
 from femgear.trains.drivetrain.kinematics import (
+    ENDS,
+    MOTIONS,
     Coordinates,
     FlankContacts,
     MeshGeometry,
@@ -344,18 +346,19 @@ def _check_turning(train: Drivetrain) -> None:
 def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
     """Mass and stiffness (n, n) without meshes, and gyroscopic matrix per unit speed of the first body."""
     M, K, G = np.zeros((3, place.count, place.count))
+    without_axial = np.ix_(MOTIONS, MOTIONS)
     for body in train.bodies:
         first = place.body[body.name]
-        mass, gyroscopic = disc_matrices(body.mass, body.inertia, body.transverse_inertia)
-        M[first : first + 5, first : first + 5] += mass
-        G[first : first + 5, first : first + 5] += gyroscopic * spin[first + 4]
+        mass, gyroscopic = body_matrices(body.mass, body.inertia, body.transverse_inertia)
+        M[first : first + 5, first : first + 5] += mass[without_axial]
+        G[first : first + 5, first : first + 5] += gyroscopic[without_axial] * spin[first + 4]
     for shaft, stations in zip(train.shafts, place.stations):
         if shaft.elements:
             mass, _, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
             for one, two in itertools.pairwise(stations):
                 at = np.r_[one : one + 5, two : two + 5]
-                M[np.ix_(at, at)] += mass
-                G[np.ix_(at, at)] += gyroscopic * spin[stations[0] + 4]
+                M[np.ix_(at, at)] += mass[np.ix_(ENDS, ENDS)]
+                G[np.ix_(at, at)] += gyroscopic[np.ix_(ENDS, ENDS)] * spin[stations[0] + 4]
     for group in springs_of(train, place):
         finite = np.where(np.isinf(group.stiffness), 0.0, group.stiffness)
         K[np.ix_(group.places, group.places)] += (group.rows.T * finite) @ group.rows
@@ -370,7 +373,7 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
         M[carrier + 3, carrier + 3] += tilt
         momentum = n * stage.planet_mass * a**2 * spin[carrier + 4]
         momentum += n * stage.planet_inertia * spin[place.planets[number][0, 2]]
-        G[carrier : carrier + 5, carrier : carrier + 5] += disc_matrices(0.0, momentum, 0.0)[1]
+        G[carrier : carrier + 5, carrier : carrier + 5] += body_matrices(0.0, momentum, 0.0)[1][without_axial]
     return M, K, G
 
 

@@ -37,7 +37,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import Angle, PressureAngle, Teeth
 from femgear.case.text import described
 from femgear.errors import CaseError
-from femgear.fe import shaft as shafts
+from femgear.fe import beam
 from femgear.gears.planetary import equal_planet_angles
 
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ -]{0,39}")
@@ -153,22 +153,22 @@ class ShaftSection(Part):
     """Timoshenko elements of the section; 0 takes two rigid links and a joint of springs, without mass."""
 
     @property
-    def section(self) -> shafts.RoundSection:
+    def section(self) -> beam.RoundSection:
         """Round section of a shaft that has one."""
         assert self.outer_diameter is not None
-        return shafts.RoundSection(
+        return beam.RoundSection(
             self.outer_diameter, self.inner_diameter, self.youngs_modulus, self.poisson_ratio, self.density
         )
 
     @property
-    def springs(self) -> shafts.JointSprings:
+    def springs(self) -> beam.JointSprings:
         """Springs of the joint [N m/rad], [N/m]."""
         if self.bending is None or self.torsion is None:
-            return shafts.joint_springs(self.section, self.length)
+            return beam.joint_springs(self.section, self.length)
         shear = self.shear
         if shear is None:
             shear = 12.0 * self.bending / ((1.0 + self.shear_ratio) * self.length**2)
-        return shafts.JointSprings(self.bending, self.torsion, shear)
+        return beam.JointSprings(self.bending, self.torsion, shear)
 
 
 class MeshSection(Part):

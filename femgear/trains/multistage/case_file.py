@@ -41,7 +41,7 @@ from femgear.case.sections import (
 )
 from femgear.case.text import CaseFile, ReadCase, described
 from femgear.errors import CaseError, FemgearError
-from femgear.fe.shaft import RoundSection, joint_springs
+from femgear.fe.beam import RoundSection, joint_springs
 from femgear.findings import Finding
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear

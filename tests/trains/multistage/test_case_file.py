@@ -8,7 +8,7 @@ from published.multistage_example import CASES, four_stage_case, published_case
 
 from femgear import cli
 from femgear.errors import CaseError
-from femgear.fe.shaft import RoundSection, joint_springs
+from femgear.fe.beam import RoundSection, joint_springs
 from femgear.trains import registry
 from femgear.trains.multistage.case_file import multistage_of, stage_gears
 from femgear.trains.multistage.model import Member, in_series, train_speeds
