@@ -334,7 +334,7 @@ class GearMaterialSection(Section):
     contact_stress_limit: _StressLimit | None = None
 
 
-class ShaftPart(Section):
+class ShaftPartSection(Section):
     """One part of a stepped shaft of the material of its member."""
 
     length: Annotated[float, Quantity(LENGTH, 1e-4, 10.0)]
@@ -342,7 +342,7 @@ class ShaftPart(Section):
     inner_diameter: Annotated[float, Quantity(LENGTH, 0.0, 5.0)] = 0.0
 
 
-_Shaft = Annotated[tuple[ShaftPart, ...], Field(max_length=50)]
+_Shaft = Annotated[tuple[ShaftPartSection, ...], Field(max_length=50)]
 
 
 class SunSection(Section):
