@@ -161,7 +161,8 @@ def _check_housing_supports(case: Case) -> None:
     for i, j in zip(around, around[1:] + around[:1]):
         room = (angles[j] - angles[i]) % (2 * math.pi) / (2 * math.pi) * circle or circle
         wide = 0.5 * (found[i].width + found[j].width)
-        if wide > room * (1 + 1e-9):
+        # angles are compared in nine digits
+        if wide > room * (1 + 1e-6):
             message = "supports overlap" if i != j else "a support is longer than the ring is around"
             raise CaseError(
                 message,
@@ -411,7 +412,7 @@ def housing_warnings(data: xr.Dataset) -> Iterator[Finding]:
             text = (
                 f"at {speeds[worst]:.6g} rpm the level is {apart[worst]:+.1f} dB from that by the mesh "
                 f"forces of the ring without supports or casing, at {(size > _FAR).sum()} of {len(speeds)} "
-                f"speeds more than {_FAR:g} dB away: load factors and dynamics.nc are without them"
+                f"speeds more than {_FAR:g} dB away: K_gamma and dynamics.nc are without them"
             )
             yield Finding("W-ONE-WAY", "", text)
     if "turn_multiplier" in data and (bad := data["turn_multiplier"].values > 1.0 + CIRCLE).any():

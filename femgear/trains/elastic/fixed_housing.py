@@ -42,7 +42,7 @@ from femgear.trains.elastic.excitation_limit import (
 from femgear.trains.elastic.model import gears_alone, mesh_springs, ring_mesh_compliance
 from femgear.trains.elastic.outputs import lines_method
 from femgear.trains.elastic.results import DynamicsResult, FixedHousing, HousingResult, JudgedTurn, ModesResult
-from femgear.trains.elastic.runup import HeardSpeeds, heard_speeds
+from femgear.trains.elastic.runup import HeardSpeeds, heard_speeds, mesh_factors
 
 if TYPE_CHECKING:
     from femgear.case.planetary import Case
@@ -308,6 +308,7 @@ def lines_in_housing(case: Case, dynamics: DynamicsResult, found: HousingResult,
         "order_tail": fixed.two_way.tail,
         "two_way_radius": fixed.two_way.spectral_radius,
         "two_way_products": fixed.two_way.products,
+        "dynamic_factor": two_way_factors(fixed.two_way),
     }
     return replace(
         found,
@@ -344,10 +345,22 @@ def heard_in_housing(
     case, housing = model.case, model.housing
     two_way = housing.solve(carrier, limit, _ACCURACY * case.dynamics.tolerance, workers=workers)
     lines = _first_lines(case, model.modes, model, housing.structure, two_way)
-    orders, some = two_way.order, two_way.force
-    force = np.zeros((*some.shape[:2], orders[-1] + 1), complex)
-    force[..., orders] = some
-    return heard_speeds(force, lines)
+    return heard_speeds(_forces_of_orders(two_way), lines)
+
+
+def _forces_of_orders(two_way: TwoWayResponse) -> np.ndarray:
+    """Mesh forces (n_speeds, n, K + 1) at all orders from 0 up [N], whole turns of the carrier for one order."""
+    places = np.rint(two_way.order * two_way.turns).astype(int)
+    force = np.zeros((*two_way.force.shape[:2], places[-1] + 1), complex)
+    force[..., places] = two_way.force
+    return force
+
+
+def two_way_factors(two_way: TwoWayResponse) -> np.ndarray:
+    """Compute K_v (n_speeds, 2) of sun-planet and planet-ring meshes, largest force over mean, speed by speed."""
+    speeds = np.arange(len(two_way.force))
+    parts = (_forces_of_orders(two_way.at(slice(i, i + 1))) for i in speeds)
+    return np.concatenate([mesh_factors(force) for force in parts]) if len(speeds) else np.zeros((0, 2))
 
 
 def _sound_around(

@@ -128,6 +128,7 @@ _SUPPORTED = {
     "two_way_radius": ("1", "spectral radius of the iteration for the two-way response"),
     "two_way_products": ("1", "products with the fluctuating stiffness that its solution took"),
     "order_tail": ("1", "share of the mesh forces in the outer half of the side bands"),
+    "dynamic_factor": ("1", "largest mesh force over its mean on the supports, K_v"),
 }
 _ONE_WAY = "that by the mesh forces of the ring on its foundation, without supports or casing"
 _OUTPUTS = {
@@ -475,7 +476,7 @@ class HousingResult(StageResult):
     sound : tuple of three (speeds, n_orders) arrays, optional
         Of a housing that stands still the results of `surface_sound`; of a casing whose areas are known those of
         `equivalent_sound` as the first and the last.
-    supported : mapping of (speeds,) arrays
+    supported : mapping of (speeds,) arrays, K_v (speeds, 2)
         Numbers of `_SUPPORTED`, of a housing that stands still.
     judged : JudgedTurn, optional
         What the verdict on its stability is made of, of a housing that stands still.
@@ -550,12 +551,16 @@ class HousingResult(StageResult):
             levels["equivalent_power_level"] = power_level(sound[2], frequency), words
             variables |= {name: ("speed", one, "dB(A)", said) for name, (one, said) in levels.items()}
         judged = {} if self.judged is None else {"turn_multiplier": self.judged.multiplier}
-        supported = {name: ("speed", value, *_SUPPORTED[name]) for name, value in {**judged, **self.supported}.items()}
+        supported = {
+            name: ("speed" if value.ndim == 1 else "speed mesh_kind", value, *_SUPPORTED[name])
+            for name, value in {**judged, **self.supported}.items()
+        }
+        kinds = {"mesh_kind": ("mesh_kind", list(KINDS), "1", "kind of mesh")} if self.supported else {}
         names = {kind: (kind, one[0], "1", f"name of the {kind}") for kind, one in self.outputs.items()}
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return Contents(
             variables | supported,
-            coords=coordinates(speed=self.input_speed / RPM) | order | names,
+            coords=coordinates(speed=self.input_speed / RPM) | order | names | kinds,
             attrs=({"missing_compliance": self.missing} if self.missing else {})
             | ({"turns": exact.turns} if exact.turns > 1 else {})
             | {
@@ -591,6 +596,9 @@ def verdict(results: Results) -> Iterator[Block]:
     factors, known, doubts = np.ones((1, 2)), dict[str, np.ndarray](), dict[int, tuple[str, ...]]()
     if "dynamics" in stages:
         factors, sharing = _load_factors(results.dynamics)
+        if "housing" in stages and "dynamic_factor" in results.housing:
+            factors = results.housing["dynamic_factor"].values[[*chosen(results.dynamics.sizes["speed"])]]
+            notes.append("K_v: of the set in the housing that stands still")
         doubts = level_doubts(results)
         rows.append(("planet load factor K_gamma", _kinds("{:.3f}", sharing)))
         rows += _unequal(results, sharing, notes)

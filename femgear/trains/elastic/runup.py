@@ -86,21 +86,28 @@ def heard_speeds(force: np.ndarray, lines: SensorLines, lowest_force=None) -> He
     Harmonics (s, 2N, H + 1) of sun-planet, then planet-ring forces [N]; the lowest of all meshes (s,) [N]
     where it is known better than by samples.
     """
-    N, sampled = force.shape[1] // 2, sample(force, 4 * force.shape[-1])
+    sampled = sample(force, 4 * force.shape[-1])
     peak = sampled.max(axis=-1)
-
-    def largest(values: np.ndarray) -> np.ndarray:
-        return np.stack([values[:, :N].max(axis=1), values[:, N:].max(axis=1)], axis=1)
-
     return HeardSpeeds(
         level=order_level(lines),
-        force_rms=largest(fluctuation(force)),
-        force_peak=largest(peak),
-        dynamic_factor=largest(peak / np.real(force[..., 0])),
+        force_rms=_largest_of_kinds(fluctuation(force)),
+        force_peak=_largest_of_kinds(peak),
+        dynamic_factor=_largest_of_kinds(peak / np.real(force[..., 0])),
         lowest_force=sampled.min(axis=(1, 2)) if lowest_force is None else lowest_force,
         order=lines.order,
         lines=lines.acceleration.astype(np.complex64),
     )
+
+
+def _largest_of_kinds(values: np.ndarray) -> np.ndarray:
+    """Largest values (s, 2) of the sun-planet and of the planet-ring meshes, of those of all meshes (s, 2N)."""
+    N = values.shape[1] // 2
+    return np.stack([values[:, :N].max(axis=1), values[:, N:].max(axis=1)], axis=1)
+
+
+def mesh_factors(force: np.ndarray) -> np.ndarray:
+    """Compute K_v (s, 2) of sun-planet and planet-ring meshes from harmonics (s, 2N, H + 1) of their forces [N]."""
+    return _largest_of_kinds(sample(force, 4 * force.shape[-1]).max(axis=-1) / np.real(force[..., 0]))
 
 
 def joined_speeds(parts: Sequence[HeardSpeeds]) -> HeardSpeeds:
@@ -283,11 +290,17 @@ def meeting_columns(value: Mapping[str, np.ndarray]) -> dict[str, Callable[[int]
 
 
 def loudest(data: xr.Dataset, marks: Marks) -> str:
-    """Write the largest level of runup.nc, its speed, and whether the level may rise beyond that."""
+    """Write the largest level of runup.nc, its speed, and whether the level may rise beyond that.
+
+    More excitation may also lift another speed above it.
+    """
     speed, level = data["speed"].values, data["level"].values
     worst = int(level.argmax())
     end = ", the end of its range" if worst in (0, len(speed) - 1) else ""
-    change = float(level_change_at(data, speed[worst]))
+    changes = level_change_at(data, speed)
+    with np.errstate(divide="ignore"):
+        raised = 20.0 * np.log10(level / level[worst]) + changes
+    change = float(changes[worst] if np.isnan(raised).any() else max(raised.max(), changes[worst]))
     text = shown_level(level[worst], change, marks, "W-STEPS", *_RUN_UP_DOUBTS, of=("runup",))
     return f"{text} m/s² at {speed[worst]:.6g} rpm{end}"
 

@@ -43,3 +43,16 @@ def test_named_sensors_and_bolts_are_in_the_lines(name, heard, forces):
     for kind in ["sensor", "force"][: 2 if forces else 1]:
         assert (np.abs(data[f"{kind}_lines_real"]).max("order") > 0.0).all()
     assert float(data["one_way_level"][0]) > 0.0 and np.isfinite(data["turn_multiplier"].values).all()
+
+
+def test_factors_in_the_fixed_housing_are_those_of_its_run_up():
+    few = FEW | {"operation.speeds": ["2900 rpm", "3100 rpm"], "runup.count": 2}
+    few |= {"runup.from": "2900 rpm", "runup.to": "3100 rpm"}
+    results = solve(with_values(read_case(CASES / "on_six_bolts.toml"), few))
+    runup, housing = results["runup"].dataset(), results["housing"].dataset()
+    assert housing["dynamic_factor"].dims == ("speed", "mesh_kind")
+    at = [int(np.abs(runup["speed"].values - speed).argmin()) for speed in housing["speed"].values]
+    assert housing["dynamic_factor"].values == pytest.approx(runup["dynamic_factor"].values[at], rel=1e-6)
+    # the foundation alone has others
+    force = results["dynamics"].dataset()
+    assert "dynamic_factor" not in force
