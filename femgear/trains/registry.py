@@ -44,6 +44,7 @@ TRAINS = tuple(
         ("gear_pair", "model", "impacts", "trains.impacts.case_file"),
         ("pair", "model", "pair", "trains.pair.case_file"),
         ("drivetrain", "model", "drivetrain", "trains.drivetrain.case_file"),
+        ("gearbox", "model", "gearbox", "trains.gearbox.checks"),
         ("helical", "helical", "helical", "trains.helical.section"),
         ("planar", "planar", "planar", "trains.planar.section"),
         ("elastic", "", "elastic", "case.planetary"),

@@ -1,0 +1,458 @@
+"""The case file with ``model = "gearbox"``: shafts, bearings, stages, loads, and what it refuses.
+
+All axes are parallel to z. Positions on a shaft count from its left end, the one with the smaller z. Teeth of a
+stage are the tables of a pair or of a planetary set, in this file or in one that it names; their loads and speeds
+are those of the gearbox. What no entry shows alone is in `femgear.trains.gearbox.checks`.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from functools import lru_cache
+from typing import Annotated, Any, ClassVar, Literal
+
+from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
+
+from femgear.case import text as case_text
+from femgear.case.csv_columns import embed_profiles, embedded
+from femgear.case.quantities import (
+    ACCELERATION,
+    ANGLE,
+    DENSITY,
+    FREQUENCY,
+    INERTIA,
+    LENGTH,
+    MASS,
+    MODULUS,
+    PAIR,
+    SPEED,
+    STIFFNESS,
+    TORQUE,
+    TORSION,
+    TRIPLE,
+    Count,
+    Dimension,
+    Number,
+    Quantity,
+    Section,
+    StiffnessOrRigid,
+    Title,
+    Values,
+)
+from femgear.case.sections import FORMAT, Angle, DampingRatio, PressureAngle, Radius, Teeth
+from femgear.case.text import ReadCase, described
+from femgear.errors import CaseError
+from femgear.trains.reading import parse_case
+
+FORCE = Dimension("a force", "N", "N", 1.0)
+CASING = "casing"
+"""In place of a shaft: what stands still."""
+MOST_PARTS = 200
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .-]{0,39}")
+_LARGEST_TORQUE, _LARGEST_FORCE = 1e9, 1e9
+
+
+def _name(value: object) -> str:
+    if not isinstance(value, str):
+        message = f"a name is needed, not {described(value)}"
+        raise CaseError(message, code="E-TYPE", value=value, remedy="write it in quotation marks")
+    if not _NAME.fullmatch(value) or value != value.strip():
+        limit = "40 letters, digits, blanks, dots, - or _"
+        raise CaseError("not a name for a part", code="E-CHOICE", value=value, limit=limit)
+    return value
+
+
+def _tables(value: object) -> object:
+    if not isinstance(value, dict):
+        what = f"the tables of a case are needed, not {described(value)}"
+        raise CaseError(what, code="E-TYPE", value=value, remedy='name its file, as in "stage.toml"')
+    return value
+
+
+Name = Annotated[str, BeforeValidator(_name)]
+Along = Annotated[float, Quantity(LENGTH, -100.0, 100.0)]
+"""A coordinate."""
+Length = Annotated[float, Quantity(LENGTH, 1e-6, 100.0)]
+Outer = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
+Inner = Annotated[float, Quantity(LENGTH, 0.0, 20.0)]
+PartMass = Annotated[float, Quantity(MASS, 1e-9, 1e8)]
+PartInertia = Annotated[float, Quantity(INERTIA, 1e-15, 1e11)]
+Transverse = Annotated[float, Quantity(INERTIA, 0.0, 1e11)]
+Lateral = Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, 1e15)]
+Turning = Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)]
+MeshStiffness = Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
+Torque = Annotated[float, Quantity(TORQUE, -_LARGEST_TORQUE, _LARGEST_TORQUE)]
+Force = Annotated[float, Quantity(FORCE, -_LARGEST_FORCE, _LARGEST_FORCE)]
+ShaftSpeed = Annotated[float, Quantity(SPEED, -1e6 * SPEED.scale, 1e6 * SPEED.scale)]
+StageTables = Annotated[dict[str, Any], BeforeValidator(_tables), WithJsonSchema({"type": ["string", "object"]})]
+"""Tables of a pair or of a planetary set, or of the name of a file, in whose place they stand when it was read."""
+
+
+class ShaftMaterialSection(Section):
+    """Material of shafts, by default steel."""
+
+    youngs_modulus: Annotated[float, Quantity(MODULUS, 1e6, 1e12)] = 2.06e11
+    poisson_ratio: Annotated[float, Number(0.0, 0.5, open_high=True)] = 0.3
+    density: Annotated[float, Quantity(DENSITY, 0.0, 25000.0)] = 7850.0
+
+
+class ShaftPartSection(Section):
+    """A cylindrical or conical part of a shaft, from left to right.
+
+    The end diameters are those at its right end, where they are others than at its left one.
+    """
+
+    length: Length
+    outer_diameter: Outer
+    inner_diameter: Inner = 0.0
+    end_outer_diameter: Outer | None = None
+    end_inner_diameter: Inner | None = None
+
+
+class ShaftSection(Section):
+    """A shaft: an axis, and parts from its left end on; without parts it is one rigid body.
+
+    ``axis`` are x and y of its axis, ``start`` is z of its left end, of a body that of its centre.
+    """
+
+    name: Name
+    axis: Annotated[tuple[Along, ...], PAIR] = (0.0, 0.0)
+    start: Along = 0.0
+    part: Annotated[tuple[ShaftPartSection, ...], Field(max_length=MOST_PARTS)] = ()
+    material: ShaftMaterialSection | None = None
+
+    @property
+    def length(self) -> float:
+        """Length of all parts [m]; zero of a rigid body."""
+        return sum(part.length for part in self.part)
+
+    @property
+    def places(self) -> tuple[float, ...]:
+        """Ends of the parts from the left end [m]."""
+        found = [0.0]
+        for part in self.part:
+            found.append(found[-1] + part.length)
+        return tuple(found)
+
+
+class SeatSection(Section):
+    """A place on a shaft: ``position`` from its left end; none on a shaft that is one rigid body."""
+
+    shaft: Name
+    position: Along | None = None
+
+
+class MassSection(SeatSection):
+    """A rigid mass on a shaft, such as a coupling half, a motor or a gear of given inertia.
+
+    ``transverse_inertia`` is that about a diameter; without it half of ``inertia``, that of a flat disc.
+    """
+
+    name: Name | None = None
+    mass: PartMass
+    inertia: PartInertia
+    transverse_inertia: Transverse | None = None
+
+    @property
+    def about_diameter(self) -> float:
+        """Inertia about a diameter [kg m^2]: as given, or that of a flat disc."""
+        return 0.5 * self.inertia if self.transverse_inertia is None else self.transverse_inertia
+
+
+class BearingSection(SeatSection):
+    """A bearing of a shaft in the casing, or in another shaft: by its stiffnesses, or by its geometry.
+
+    Stiffnesses may be ``"rigid"``; those left out are zero. A bearing of a ``kind`` has rolling elements, whose
+    stiffness follows the load; ``contact_angle`` above zero takes thrust on the shaft towards +z, below zero
+    towards -z. ``clearance`` is the radial play, ``preload`` the axial approach of the rings. The ratings are those
+    of the catalogue.
+    """
+
+    name: Name | None = None
+    outer_shaft: Name | None = None
+    outer_position: Along | None = None
+    radial: Lateral | None = None
+    axial: Lateral | None = None
+    tilt: Turning | None = None
+    torsional: Turning | None = None
+    kind: Literal["ball", "cylindrical", "needle", "tapered", "spherical"] | None = None
+    rolling_elements: Annotated[int, Count(3, 500)] | None = None
+    element_diameter: Outer | None = None
+    pitch_diameter: Outer | None = None
+    effective_length: Length | None = None
+    contact_angle: Annotated[float, Quantity(ANGLE, -math.radians(89), math.radians(89))] = 0.0
+    clearance: Annotated[float, Quantity(LENGTH, -1e-3, 1e-2)] = 0.0
+    preload: Annotated[float, Quantity(LENGTH, -1e-2, 1e-2)] = 0.0
+    inner_osculation: Annotated[float, Number(0.5, 1.0, open_low=True)] = 0.52
+    outer_osculation: Annotated[float, Number(0.5, 1.0, open_low=True)] = 0.53
+    rows: Annotated[int, Count(1, 2)] = 1
+    row_distance: Annotated[float, Quantity(LENGTH, -10.0, 10.0)] = 0.0
+    dynamic_rating: Annotated[float, Quantity(FORCE, 1.0, _LARGEST_FORCE)] | None = None
+    static_rating: Annotated[float, Quantity(FORCE, 1.0, _LARGEST_FORCE)] | None = None
+    fatigue_limit: Annotated[float, Quantity(FORCE, 1e-3, _LARGEST_FORCE)] | None = None
+    viscosity_ratio: Annotated[float, Number(0.05, 100.0)] | None = None
+    contamination: Annotated[float, Number(0.0, 1.0)] | None = None
+
+    @property
+    def stiffness(self) -> tuple[float, ...]:
+        """Given stiffnesses along x, y, z [N/m], against both tilts and rotation [N m/rad]; zero if left out."""
+        radial, axial, tilt, turn = (v or 0.0 for v in (self.radial, self.axial, self.tilt, self.torsional))
+        return radial, radial, axial, tilt, tilt, turn
+
+
+class CouplingSection(Section):
+    """What joins two shafts: springs between two places, by default stiff in nothing but torsion.
+
+    Between places apart along z a rigid link on either side leads to the ``joint``, the share of the way from the
+    first to the second place at which the springs sit.
+    """
+
+    between: Annotated[tuple[Name, ...], PAIR]
+    positions: Annotated[tuple[Along, ...], PAIR] | None = None
+    name: Name | None = None
+    torsion: Turning = math.inf
+    bending: Turning = 0.0
+    radial: Lateral = 0.0
+    axial: Lateral = 0.0
+    joint: Annotated[float, Number(0.0, 1.0)] = 0.5
+    transmits: StrictBool = True
+    """Whether both shafts turn at one speed; without it the coupling is a spring of its own, as of a brake."""
+
+
+class MeshSection(Section):
+    """Stiffness of a mesh along its normal where no teeth are given, and its tooth pairs in contact."""
+
+    stiffness: MeshStiffness
+    contact_ratio: Annotated[float, Number(1.0, 20.0)] | None = None
+
+
+class PairGearsSection(Section):
+    """Sizes of two gears whose teeth are not computed: by the transverse module, pitch radii or base radii.
+
+    ``pressure_angle`` is the working one in the transverse section; ``helix_angle`` is positive for a right-handed
+    gear 1.
+    """
+
+    teeth: Annotated[tuple[Teeth, ...], PAIR]
+    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.5)] | None = None
+    radii: Annotated[tuple[Radius, ...], PAIR] | None = None
+    base_radii: Annotated[tuple[Radius, ...], PAIR] | None = None
+    internal: StrictBool = False
+    pressure_angle: PressureAngle = math.radians(20.0)
+    helix_angle: Annotated[float, Quantity(ANGLE, -math.radians(60), math.radians(60))] = 0.0
+    face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)] | None = None
+
+
+class PairSection(Section):
+    """Two gears on two shafts: ``positions`` are those of the middles of their face widths.
+
+    ``casing`` in place of a shaft holds the gear. The teeth are the tables of a pair (``teeth``), or sizes and a
+    stiffness (``gears`` with ``mesh``).
+    """
+
+    name: Name
+    shafts: Annotated[tuple[Name, ...], PAIR]
+    positions: Annotated[tuple[Along, ...], PAIR] | None = None
+    teeth: StageTables | None = None
+    gears: PairGearsSection | None = None
+    mesh: MeshSection | None = None
+
+
+class SetGearsSection(Section):
+    """Sizes of a planetary set whose teeth are not computed: by the transverse module, or base radii.
+
+    ``teeth`` are those of sun, planet and ring; ``pressure_angles`` the working ones of sun-planet and planet-ring.
+    """
+
+    teeth: Annotated[tuple[Teeth, ...], TRIPLE]
+    planets: Annotated[int, Count(1, 24)] = 3
+    planet_angles: Annotated[tuple[Angle, ...], Values(min_length=1, max_length=24)] | None = None
+    module: Annotated[float, Quantity(LENGTH, 5e-5, 0.5)] | None = None
+    base_radii: Annotated[tuple[Radius, ...], TRIPLE] | None = None
+    centre_distance: Radius | None = None
+    pressure_angles: Annotated[tuple[PressureAngle, ...], PAIR] | None = None
+    helix_angle: Annotated[float, Quantity(ANGLE, -math.radians(60), math.radians(60))] = 0.0
+    face_width: Annotated[float, Quantity(LENGTH, 1e-4, 5.0)] | None = None
+
+
+class PlanetBearingSection(Section):
+    """Stiffnesses of the bearing between a planet and its pin; those left out are rigid."""
+
+    radial: Lateral = math.inf
+    axial: Lateral = math.inf
+    tilt: Turning = math.inf
+
+
+class StagePlanetSection(Section):
+    """One of the equal planets: mass, inertias and bearing; what is left out follows from the teeth."""
+
+    mass: PartMass | None = None
+    inertia: PartInertia | None = None
+    transverse_inertia: Transverse | None = None
+    bearing: PlanetBearingSection | None = None
+
+
+class PinSection(Section):
+    """Pins of the planets and wind-up of the carrier, by closed forms.
+
+    Each pin is a round bar of a ``length`` from the cheek of the carrier to the middle of the planet; held in
+    ``cheeks`` 2 it is held at both ends of twice that length. ``wind_up_stiffness`` turns the far cheek against
+    that on the shaft.
+    """
+
+    diameter: Outer
+    length: Length
+    bore: Inner = 0.0
+    cheeks: Literal[1, 2] = 2
+    wind_up_stiffness: Annotated[float, Quantity(TORSION, 1.0, 1e15)] | None = None
+
+
+class PlanetarySection(Section):
+    """Sun and carrier on shafts, the ring on a shaft or in the casing.
+
+    The positions are those of the middles of the face widths on the shafts.
+    """
+
+    name: Name
+    sun: Name
+    carrier: Name
+    ring: Name = CASING
+    sun_position: Along | None = None
+    carrier_position: Along | None = None
+    ring_position: Along | None = None
+    angle: Angle = 0.0
+    """Of planet 1 from x; the carrier stands still at it in statics and modes."""
+    teeth: StageTables | None = None
+    gears: SetGearsSection | None = None
+    sun_mesh: MeshSection | None = None
+    ring_mesh: MeshSection | None = None
+    planet: StagePlanetSection = StagePlanetSection()
+    pins: PinSection | None = None
+
+
+class LoadSection(SeatSection):
+    """A place where torque enters or leaves a shaft, with forces that act there whatever the load case."""
+
+    name: Name
+    force: Annotated[tuple[Force, ...], TRIPLE] = (0.0, 0.0, 0.0)
+    tilting_moment: Annotated[tuple[Torque, ...], PAIR] = (0.0, 0.0)
+
+
+class BoxGravitySection(Section):
+    """Weight of all parts, in a direction across the axes or along them."""
+
+    acceleration: Annotated[float, Quantity(ACCELERATION, 0.0, 1e3)] = 9.80665
+    direction: Annotated[tuple[Annotated[float, Number(-1.0, 1.0)], ...], TRIPLE] = (0.0, -1.0, 0.0)
+
+
+class LoadCaseSection(Section):
+    """Torques at loads and speeds of shafts of one load case, and its share of the time."""
+
+    name: Name = "nominal"
+    torque: dict[Name, Torque]
+    speed: dict[Name, ShaftSpeed]
+    share: Annotated[float, Number(0.0, 1.0, open_low=True)] = 1.0
+
+
+class BoxOperationSection(Section):
+    """Load cases; ``output`` are the loads whose torques balance the others, ``fixed`` the shafts that stand still."""
+
+    load_case: Annotated[tuple[LoadCaseSection, ...], Field(min_length=1, max_length=1000)]
+    output: tuple[Name, ...] = ()
+    fixed: tuple[Name, ...] = ()
+    first: Annotated[int, Count(1, 1000)] = 1
+    """Number of the load case that contact, modes and pictures are of."""
+
+
+class DeflectionSection(Section):
+    """How system deflection is solved: slices over the width, passes, and where they have settled."""
+
+    slices: Annotated[int, Count(1, 101)] = 15
+    passes: Annotated[int, Count(1, 50)] = 12
+    tolerance: Annotated[float, Number(1e-10, 1e-1)] = 1e-4
+    contact: StrictBool = True
+    """Compute load distributions of teeth that are given; without it meshes are linear springs."""
+
+
+class BoxModesSection(Section):
+    """Modes: their highest frequency, damping, speeds of the Campbell diagram."""
+
+    up_to: Annotated[float, Quantity(FREQUENCY, 1.0, 1e6)] | None = None
+    damping_ratio: DampingRatio = 0.03
+    speeds: Annotated[int, Count(2, 201)] = 21
+    highest_speed: Annotated[float, Number(0.1, 100.0)] = 1.5
+    """Of the Campbell diagram, over the speed of the load case."""
+
+
+class GearboxCase(Section, ReadCase):
+    """A gearbox, its load cases and how to compute it, in SI units.
+
+    The fields carry the names of the case file; ``source`` is the text that gives this case. ``motions`` restricts
+    all bodies: ``"space"`` has six, ``"plane"`` x, y and rotation, ``"rotation"`` the rotation alone.
+    """
+
+    format: Annotated[int, Count(1, FORMAT)] = FORMAT
+    train: ClassVar[str] = "gearbox"
+    model: Literal["gearbox"]
+    title: Title
+    motions: Literal["space", "plane", "rotation"] = "space"
+    material: ShaftMaterialSection = ShaftMaterialSection()
+    shaft: Annotated[tuple[ShaftSection, ...], Field(min_length=1, max_length=MOST_PARTS)]
+    mass: Annotated[tuple[MassSection, ...], Field(max_length=MOST_PARTS)] = ()
+    bearing: Annotated[tuple[BearingSection, ...], Field(max_length=MOST_PARTS)] = ()
+    coupling: Annotated[tuple[CouplingSection, ...], Field(max_length=MOST_PARTS)] = ()
+    pair: Annotated[tuple[PairSection, ...], Field(max_length=20)] = ()
+    planetary: Annotated[tuple[PlanetarySection, ...], Field(max_length=20)] = ()
+    load: Annotated[tuple[LoadSection, ...], Field(max_length=MOST_PARTS)] = ()
+    gravity: BoxGravitySection | None = None
+    operation: BoxOperationSection
+    deflection: DeflectionSection = DeflectionSection()
+    modes: BoxModesSection = BoxModesSection()
+
+    @property
+    def load_case(self) -> LoadCaseSection:
+        """The load case that contact, modes and pictures are of."""
+        return self.operation.load_case[self.operation.first - 1]
+
+    def shaft_named(self, name: str) -> ShaftSection:
+        """Find the shaft of that name."""
+        return next(shaft for shaft in self.shaft if shaft.name == name)
+
+    def material_of(self, shaft: ShaftSection) -> ShaftMaterialSection:
+        """Find the material of a shaft."""
+        return shaft.material or self.material
+
+
+@lru_cache(maxsize=64)
+def stage_case_of(text: str) -> Any:
+    """Read the case of the teeth of a stage from the text of its tables.
+
+    CaseError: as `femgear.trains.reading.parse_case`.
+    """
+    return parse_case(text, numbered=False)
+
+
+def teeth_of(stage: PairSection | PlanetarySection) -> Any:
+    """Read the case of the teeth of a stage; None of one that gives sizes and stiffnesses."""
+    return None if stage.teeth is None else stage_case_of(case_text.write(stage.teeth))
+
+
+def embed_stages(data: dict, name: str) -> dict[str, str]:
+    """Put the tables of stages in the place of the files that they name."""
+    found: dict[str, str] = {}
+    for kind in ("pair", "planetary"):
+        stages = data.get(kind)
+        for i, table in enumerate(stages if isinstance(stages, list) else ()):
+            if isinstance(table, dict) and isinstance(table.get("teeth"), str):
+                key, file = f"{kind}[{i}].teeth", table.pop("teeth")
+                table["teeth"] = embedded(file, name, key, _stage_tables)
+                found[key] = case_text.printable(file)
+    return found
+
+
+def _stage_tables(path: str) -> dict:
+    """Read the tables of the case file of a stage, with the points of its measured profiles."""
+    data = case_text.parse(case_text.read_text(path), path)
+    embed_profiles(data, path)
+    return data

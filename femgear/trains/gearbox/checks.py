@@ -1,0 +1,431 @@
+"""What a gearbox case is refused for before anything is computed: names, seats, sizes, loads."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Iterable, Iterator
+
+from femgear.case.quantities import LENGTH
+from femgear.case.text import CaseFile
+from femgear.errors import CaseError, FemgearError
+from femgear.trains.gearbox.case_file import (
+    CASING,
+    BearingSection,
+    GearboxCase,
+    PairSection,
+    PlanetarySection,
+    embed_stages,
+    teeth_of,
+)
+from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, StageSizes, pair_sizes, set_sizes
+
+_ROLLER = ("rolling_elements", "element_diameter", "pitch_diameter")
+_SPRINGS = ("radial", "axial", "tilt", "torsional")
+# Positions on a shaft that are off it by less are on it [m].
+_EDGE = 1e-9
+
+
+def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
+    """List what no entry of a gearbox case shows alone; sizes and loads once all names are known."""
+    named = [*_names(case), *_references(case)]
+    if named:
+        return named
+    seats = [*_seats(case), *_bearings(case), *_shaft_parts(case)]
+    return [*seats, *_stages(case), *_loads(case)]
+
+
+def _names(case: GearboxCase) -> Iterator[CaseError]:
+    """One name, one part: of shafts, of loads and bearings, of stages."""
+    kinds = {
+        "shaft": [(f"shaft[{i}].name", one.name) for i, one in enumerate(case.shaft)],
+        "seat": [
+            (f"{kind}[{i}].name", one.name)
+            for kind in ("load", "bearing", "mass")
+            for i, one in enumerate(getattr(case, kind))
+            if one.name is not None
+        ],
+        "stage": [
+            (f"{kind}[{i}].name", one.name)
+            for kind in ("pair", "planetary")
+            for i, one in enumerate(getattr(case, kind))
+        ],
+        "load case": [(f"operation.load_case[{i}].name", one.name) for i, one in enumerate(case.operation.load_case)],
+    }
+    for kind, entries in kinds.items():
+        known: dict[str, str] = {CASING: ""} if kind == "shaft" else {}
+        for key, name in entries:
+            if name in known:
+                first = f"that of {known[name]}" if known[name] else "the name of what stands still"
+                yield CaseError(
+                    f"the name is {first} already",
+                    code="E-DUPLICATE",
+                    key=key,
+                    value=name,
+                    remedy=f"give every {kind} a name of its own",
+                )
+            known.setdefault(name, key)
+
+
+def _references(case: GearboxCase) -> Iterator[CaseError]:
+    """Names of shafts and loads that there are."""
+    shafts = [shaft.name for shaft in case.shaft]
+    used: list[tuple[str, str]] = []
+    for kind in ("mass", "bearing", "load"):
+        used += [(f"{kind}[{i}].shaft", one.shaft) for i, one in enumerate(getattr(case, kind))]
+    for i, bearing in enumerate(case.bearing):
+        used += [(f"bearing[{i}].outer_shaft", bearing.outer_shaft)] if bearing.outer_shaft is not None else []
+    used += [(f"coupling[{i}].between", name) for i, one in enumerate(case.coupling) for name in one.between]
+    used += [(f"pair[{i}].shafts", name) for i, one in enumerate(case.pair) for name in one.shafts]
+    for i, stage in enumerate(case.planetary):
+        used += [(f"planetary[{i}].{member}", getattr(stage, member)) for member in ("sun", "carrier", "ring")]
+    used += [("operation.fixed", name) for name in case.operation.fixed]
+    casing_allowed = ("pair", "planetary", "coupling")
+    for key, name in used:
+        if name == CASING and key.startswith(casing_allowed):
+            continue
+        yield from _unknown(key, name, shafts, "a [[shaft]]")
+    ports = [*port_names(case)]
+    for key, name in [("operation.output", name) for name in case.operation.output]:
+        yield from _unknown(key, name, ports, "a [[load]], or a shaft that is one rigid body")
+    for i, load_case in enumerate(case.operation.load_case):
+        for name in load_case.torque:
+            yield from _unknown(
+                f"operation.load_case[{i}].torque", name, ports, "a [[load]], or a shaft that is one rigid body"
+            )
+        for name in load_case.speed:
+            yield from _unknown(f"operation.load_case[{i}].speed", name, shafts, "a [[shaft]]")
+
+
+def port_names(case: GearboxCase) -> list[str]:
+    """List what torques may act on: loads, and shafts that are one rigid body."""
+    return [load.name for load in case.load] + [shaft.name for shaft in case.shaft if not shaft.part]
+
+
+def _unknown(key: str, name: str, known: list[str], what: str) -> Iterator[CaseError]:
+    if name not in known:
+        near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
+        yield CaseError(
+            "there is no such part",
+            code="E-CHOICE",
+            key=key,
+            value=name,
+            limit=", ".join(known[:20]) or f"none: the case has no {what.split()[-1]}",
+            remedy=f"did you mean {near[0]}?" if near else f"name {what}",
+        )
+
+
+def _seats(case: GearboxCase) -> Iterator[CaseError]:
+    """Positions that lie on their shafts, given where the shaft is more than one rigid body."""
+    for key, shaft, position in _all_seats(case):
+        if shaft == CASING:
+            continue
+        section = case.shaft_named(shaft)
+        if position is None and section.part:
+            yield CaseError(
+                f"the place on the shaft {shaft} is needed",
+                code="E-KEY-MISSING",
+                key=key,
+                limit=f"0 mm to {LENGTH.show(section.length)} from its left end",
+            )
+        elif position is not None and section.part and not -_EDGE <= position <= section.length + _EDGE:
+            yield CaseError(
+                f"the place is off the shaft {shaft}",
+                code="E-RANGE",
+                key=key,
+                value=LENGTH.show(position),
+                limit=f"0 mm to {LENGTH.show(section.length)} from its left end",
+                remedy="correct the position, or lengthen the shaft",
+            )
+
+
+def _all_seats(case: GearboxCase) -> Iterator[tuple[str, str, float | None]]:
+    """Key, shaft and position of every place on a shaft."""
+    for kind in ("mass", "bearing", "load"):
+        for i, one in enumerate(getattr(case, kind)):
+            yield f"{kind}[{i}].position", one.shaft, one.position
+    for i, bearing in enumerate(case.bearing):
+        if bearing.outer_shaft is not None:
+            yield f"bearing[{i}].outer_position", bearing.outer_shaft, bearing.outer_position
+    for kind, shafts in (("coupling", "between"), ("pair", "shafts")):
+        for i, one in enumerate(getattr(case, kind)):
+            for shaft, position in zip(getattr(one, shafts), one.positions or (None, None), strict=True):
+                yield f"{kind}[{i}].positions", shaft, position
+    for i, stage in enumerate(case.planetary):
+        for member in ("sun", "carrier", "ring"):
+            yield f"planetary[{i}].{member}_position", getattr(stage, member), getattr(stage, f"{member}_position")
+
+
+def _bearings(case: GearboxCase) -> Iterator[CaseError]:
+    """Stiffnesses or geometry, one of them and whole; rings at one place."""
+    for i, bearing in enumerate(case.bearing):
+        key = f"bearing[{i}]"
+        springs = bearing.given(*_SPRINGS)
+        if bearing.kind is None and not any(bearing.stiffness):
+            yield CaseError(
+                "the bearing holds nothing",
+                code="E-KEY-MISSING",
+                key=f"{key}.{springs[0] if springs else 'radial'}",
+                limit="one of radial, axial, tilt above 0, or a kind with its geometry",
+                remedy='give radial = "2e8 N/m" (see the page on bearing stiffness), or kind = "ball"',
+            )
+        elif bearing.kind is not None and springs:
+            yield CaseError(
+                "the stiffness of the bearing is given twice",
+                code="E-CHOICE",
+                key=f"{key}.{springs[0]}",
+                limit="stiffnesses, or kind with the geometry",
+                remedy=f"leave {', '.join(springs)} or kind out",
+            )
+        elif bearing.kind is not None:
+            yield from _geometry(bearing, key)
+        if bearing.outer_shaft is not None:
+            yield from _ring_places(case, bearing, key)
+
+
+def _geometry(bearing: BearingSection, key: str) -> Iterator[CaseError]:
+    needed = (*_ROLLER, *(() if bearing.kind == "ball" else ("effective_length",)))
+    for name in needed:
+        if getattr(bearing, name) is None:
+            yield CaseError(
+                f"a {bearing.kind} bearing needs it",
+                code="E-KEY-MISSING",
+                key=f"{key}.{name}",
+                limit=", ".join(needed),
+                remedy="give it from the catalogue, or stiffnesses in place of kind",
+            )
+    d, D = bearing.element_diameter, bearing.pitch_diameter
+    if d is not None and D is not None and bearing.rolling_elements is not None:
+        most = math.pi / math.asin(min(1.0, d / D)) if d < D else 0.0
+        if bearing.rolling_elements > most + 1e-9:
+            yield CaseError(
+                "so many rolling elements do not fit on the pitch circle",
+                code="E-RANGE",
+                key=f"{key}.rolling_elements",
+                value=bearing.rolling_elements,
+                limit=f"at most {math.floor(most)} of {LENGTH.show(d)} on {LENGTH.show(D)}",
+            )
+
+
+def _ring_places(case: GearboxCase, bearing: BearingSection, key: str) -> Iterator[CaseError]:
+    if bearing.outer_shaft == bearing.shaft:
+        yield CaseError(
+            "both rings sit on one shaft",
+            code="E-CHOICE",
+            key=f"{key}.outer_shaft",
+            value=bearing.shaft,
+            limit="another shaft, or none for the casing",
+        )
+        return
+    first, second = case.shaft_named(bearing.shaft), case.shaft_named(bearing.outer_shaft or "")
+    places = (first.start + (bearing.position or 0.0), second.start + (bearing.outer_position or 0.0))
+    if math.dist(first.axis, second.axis) > DISTANCE_TOLERANCE or abs(places[0] - places[1]) > DISTANCE_TOLERANCE:
+        yield CaseError(
+            "inner and outer ring of the bearing lie at two places",
+            code="E-RANGE",
+            key=f"{key}.outer_position",
+            value=f"z = {LENGTH.show(places[0])} and {LENGTH.show(places[1])}, axes "
+            f"{LENGTH.show(math.dist(first.axis, second.axis))} apart",
+            limit="one place on one axis",
+            remedy=f"give outer_position = \"{LENGTH.show(places[0] - second.start)}\"",
+        )
+
+
+def _shaft_parts(case: GearboxCase) -> Iterator[CaseError]:
+    """Bores below outer diameters; neighbours that touch."""
+    for i, shaft in enumerate(case.shaft):
+        for j, part in enumerate(shaft.part):
+            ends = (
+                (part.outer_diameter, part.inner_diameter, "inner_diameter"),
+                (
+                    part.end_outer_diameter or part.outer_diameter,
+                    part.inner_diameter if part.end_inner_diameter is None else part.end_inner_diameter,
+                    "end_inner_diameter",
+                ),
+            )
+            for outer, inner, name in ends:
+                if not inner < outer:
+                    yield CaseError(
+                        "the bore is as large as the shaft",
+                        code="E-RANGE",
+                        key=f"shaft[{i}].part[{j}].{name}",
+                        value=LENGTH.show(inner),
+                        limit=f"below {LENGTH.show(outer)}",
+                    )
+                    break
+
+
+def _stages(case: GearboxCase) -> Iterator[CaseError]:
+    for kind, sizes in (("pair", _pair), ("planetary", _planetary)):
+        for i, stage in enumerate(getattr(case, kind)):
+            key = f"{kind}[{i}]"
+            if problem := _given_once(stage, key):
+                yield problem
+                continue
+            try:
+                yield from sizes(case, stage, key)
+            except FemgearError as error:
+                for one in getattr(error, "problems", None) or (error,):
+                    told = {name: getattr(one, name) for name in ("code", "value", "limit", "remedy")}
+                    where = f"{key}.{'teeth' if stage.teeth is not None else 'gears'}"
+                    yield CaseError(one.message, key=f"{where}.{one.key}" if one.key else where, **told)
+
+
+def _given_once(stage: PairSection | PlanetarySection, key: str) -> CaseError | None:
+    """Teeth, or sizes with stiffnesses."""
+    meshes = ("mesh",) if isinstance(stage, PairSection) else ("sun_mesh", "ring_mesh")
+    given = stage.given("gears", *meshes)
+    if stage.teeth is None and given != ["gears", *meshes]:
+        missing = next(name for name in ("gears", *meshes) if name not in given)
+        return CaseError(
+            "the teeth of the stage are missing",
+            code="E-KEY-MISSING",
+            key=f"{key}.{missing if given else 'teeth'}",
+            limit=f"teeth, or gears with {' and '.join(meshes)}",
+            remedy='teeth = "stage.toml" names the case of a pair or a planetary set',
+        )
+    if stage.teeth is not None and given:
+        return CaseError(
+            "the teeth of the stage are given twice",
+            code="E-CHOICE",
+            key=f"{key}.{given[0]}",
+            limit=f"teeth, or gears with {' and '.join(meshes)}",
+            remedy=f"leave teeth or {', '.join(given)} out",
+        )
+    return None
+
+
+def _pair(case: GearboxCase, stage: PairSection, key: str) -> Iterator[CaseError]:
+    teeth = teeth_of(stage)
+    if teeth is not None and teeth.train != "pair":
+        yield _wrong_train(teeth, key, "pair")
+        return
+    if stage.shafts[0] == stage.shafts[1]:
+        yield CaseError("a gear meshes with one of its own shaft", code="E-CHOICE", key=f"{key}.shafts")
+        return
+    sizes = pair_sizes(stage)
+    shafts = [None if name == CASING else case.shaft_named(name) for name in stage.shafts]
+    if None in shafts:
+        only = next(shaft for shaft in shafts if shaft is not None)
+        axes = (only.axis, only.axis) if sizes.internal else None
+        yield CaseError(
+            "a gear of a pair sits on a shaft",
+            code="E-CHOICE",
+            key=f"{key}.shafts",
+            value=CASING,
+            limit="two shafts",
+            remedy="give the standing gear a [[shaft]] and name it in operation.fixed",
+        ) if axes is None else CaseError(
+            "a ring in the casing belongs to a planetary stage", code="E-CHOICE", key=f"{key}.shafts", value=CASING
+        )
+        return
+    distance = math.dist(shafts[0].axis, shafts[1].axis)  # type: ignore[union-attr]
+    yield from _distance(distance, sizes, f"{key}.shafts", "the axes of the two shafts")
+    places = [s.start + (p or 0.0) for s, p in zip(shafts, stage.positions or (0.0, 0.0), strict=True)]  # type: ignore[union-attr]
+    yield from _mid_planes(places, sizes, f"{key}.positions")
+
+
+def _planetary(case: GearboxCase, stage: PlanetarySection, key: str) -> Iterator[CaseError]:
+    teeth = teeth_of(stage)
+    if teeth is not None and teeth.train not in ("elastic", "planar", "helical"):
+        yield _wrong_train(teeth, key, "planetary set")
+        return
+    members = [getattr(stage, name) for name in ("sun", "carrier", "ring")]
+    if len(set(members)) < 3:
+        twice = next(name for name in members if members.count(name) > 1)
+        yield CaseError("two members of a set on one shaft lock it", code="E-CHOICE", key=f"{key}.sun", value=twice)
+        return
+    sizes = set_sizes(stage)
+    shafts = [(name, case.shaft_named(getattr(stage, name))) for name in ("sun", "carrier", "ring")
+              if getattr(stage, name) != CASING]
+    for name, shaft in shafts[1:]:
+        if math.dist(shaft.axis, shafts[0][1].axis) > DISTANCE_TOLERANCE:
+            yield CaseError(
+                f"sun and {name} have two axes",
+                code="E-CENTRE-DISTANCE",
+                key=f"{key}.{name}",
+                value=f"{LENGTH.show(math.dist(shaft.axis, shafts[0][1].axis))} apart",
+                limit="one axis of sun, carrier and ring",
+            )
+    places = [shaft.start + (getattr(stage, f"{name}_position") or 0.0) for name, shaft in shafts]
+    for place in places[1:]:
+        yield from _mid_planes([places[0], place], sizes, f"{key}.sun_position")
+
+
+def _wrong_train(teeth, key: str, wanted: str) -> CaseError:
+    return CaseError(
+        f"the teeth are those of another kind of case than a {wanted}",
+        code="E-CHOICE",
+        key=f"{key}.teeth",
+        value=f"a case of the train {teeth.train}",
+        limit=f"the case of a {wanted}",
+    )
+
+
+def _distance(distance: float, sizes: StageSizes, key: str, what: str) -> Iterator[CaseError]:
+    wanted = sizes.centre_distance
+    if abs(distance - wanted) > DISTANCE_TOLERANCE * max(1.0, wanted / 1e-1):
+        yield CaseError(
+            f"the gears do not reach each other: {what} lie elsewhere",
+            code="E-CENTRE-DISTANCE",
+            key=key,
+            value=f"{LENGTH.show(distance)} apart",
+            limit=LENGTH.show(wanted),
+            remedy="correct the axes of the shafts, or the centre distance of the teeth",
+        )
+
+
+def _mid_planes(places: Iterable[float], sizes: StageSizes, key: str) -> Iterator[CaseError]:
+    first, second = places
+    reach = 0.5 * sum(sizes.face_widths) if all(sizes.face_widths) else DISTANCE_TOLERANCE
+    if abs(first - second) >= max(reach, DISTANCE_TOLERANCE):
+        yield CaseError(
+            "the gears do not face each other along their axes",
+            code="E-RANGE",
+            key=key,
+            value=f"middles at z = {LENGTH.show(first)} and {LENGTH.show(second)}",
+            limit=f"less than {LENGTH.show(reach)} apart",
+            remedy="correct the positions on the shafts, or shaft.start",
+        )
+
+
+def _loads(case: GearboxCase) -> Iterator[CaseError]:
+    """Load cases that say something, outputs without a torque of their own."""
+    outputs = case.operation.output
+    for i, load_case in enumerate(case.operation.load_case):
+        key = f"operation.load_case[{i}]"
+        for name in set(load_case.torque) & set(outputs):
+            yield CaseError(
+                "the torque of an output follows from the others",
+                code="E-CHOICE",
+                key=f"{key}.torque",
+                value=name,
+                limit="loads that are no operation.output",
+                remedy="leave it out, here or in operation.output",
+            )
+    if case.operation.first > len(case.operation.load_case):
+        yield CaseError(
+            "there is no such load case",
+            code="E-RANGE",
+            key="operation.first",
+            value=case.operation.first,
+            limit=f"1 to {len(case.operation.load_case)}",
+        )
+    share = sum(one.share for one in case.operation.load_case)
+    if len(case.operation.load_case) > 1 and share > 1.0 + 1e-6:
+        yield CaseError(
+            "the shares of the load cases are more than the whole time",
+            code="E-RANGE",
+            key="operation.load_case[0].share",
+            value=f"{share:.6g} in all",
+            limit="at most 1 in all",
+            remedy="give every load case its share of the time",
+        )
+
+
+FILE = CaseFile(
+    GearboxCase,
+    check_gearbox_entries,
+    claims=lambda tables: "bearings on shafts" if isinstance(tables.get("shaft"), list) and "body" not in tables else "",
+    embed=embed_stages,
+)
