@@ -1,0 +1,294 @@
+"""One assembler of stations with six motions: inertias, beams, springs, rigid joints and gear meshes -> M, C, G, K, W.
+
+A station has the motions `MOTIONS` along and about x, y, z; tilts and rotation are right-handed and small. Springs
+of infinite stiffness are conditions, which are eliminated: all motions follow from the free ones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from scipy import linalg
+
+from femgear.system.mesh_directions import assemble, point_approach, stiffness_matrix
+from femgear.system.system import MechanicalSystem, freeze
+
+MOTIONS = ("x", "y", "z", "tilt x", "tilt y", "rotation")
+ROTATION = 5
+GROUND = -1
+"""In place of a station: what stands still."""
+# Row of a condition, relative to the largest, that counts as none.
+_RANK = 1e-12
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Mass and gyroscopic matrix of a body, or of a beam, on its stations.
+
+    Parameters
+    ----------
+    stations : tuple of int
+        Numbers of the k stations.
+    mass, gyroscopic : (6k, 6k) arrays
+        [kg, kg m, kg m^2]; the latter multiplies the speed that the gyroscopic matrix of the system multiplies.
+    """
+
+    stations: tuple[int, ...]
+    mass: np.ndarray
+    gyroscopic: np.ndarray
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Stiffness matrix (6k, 6k) [N/m, N m/rad] between k stations."""
+
+    stations: tuple[int, ...]
+    stiffness: np.ndarray
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Springs between stations, such as a bearing, a coupling or a rigid joint.
+
+    Parameters
+    ----------
+    name : str
+        For messages and results.
+    stations : tuple of int
+        Numbers of the k stations, `GROUND` among them.
+    rows : (r, 6k) array
+        Deflection of every spring per unit of the motions [1, m].
+    stiffness : (r,) array
+        [N/m], of springs against rotation [N m/rad]; infinite for a condition.
+    """
+
+    name: str
+    stations: tuple[int, ...]
+    rows: np.ndarray
+    stiffness: np.ndarray
+
+
+@dataclass(frozen=True)
+class Contact:
+    """A gear mesh on its common normal, of S slices over the width.
+
+    Parameters
+    ----------
+    name : str
+        Of the mesh.
+    stations : (2,) tuple of int
+        Of gear 1 and gear 2, `GROUND` for a gear that stands still.
+    normal : (3,) array
+        Unit normal of the flanks, into gear 2.
+    points : (2, S, 3) array
+        Contact point of every slice, from either station [m].
+    heights : (S,) array
+        Of the slices above the middle of the common width [m].
+    stiffness : (S,) array
+        Mean stiffness of every slice along the normal [N/m].
+    """
+
+    name: str
+    stations: tuple[int, int]
+    normal: np.ndarray
+    points: np.ndarray
+    heights: np.ndarray
+    stiffness: np.ndarray
+
+    @property
+    def approach(self) -> np.ndarray:
+        """Approach of the flanks (2, S, 6) per unit of the motions of either station [1, m/rad]."""
+        first, second = (point_approach(self.normal, points) for points in self.points)
+        return np.stack([first, -second])
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """Stations and what acts between them.
+
+    Parameters
+    ----------
+    names : tuple of str
+        Of the n stations.
+    places : (n, 3) array
+        [m]
+    held : (6n,) bool array
+        Motions that do not take place.
+    inertias, beams, springs, contacts : tuples
+        Of `Inertia`, `Beam`, `Springs` and `Contact`.
+    """
+
+    names: tuple[str, ...]
+    places: np.ndarray
+    held: np.ndarray
+    inertias: tuple[Inertia, ...] = ()
+    beams: tuple[Beam, ...] = ()
+    springs: tuple[Springs, ...] = ()
+    contacts: tuple[Contact, ...] = field(default=())
+
+    def __post_init__(self):
+        freeze(self)
+
+    @property
+    def count(self) -> int:
+        """Number 6n of all motions."""
+        return 6 * len(self.names)
+
+    @cached_property
+    def motion_names(self) -> tuple[str, ...]:
+        """Names (6n,) of all motions."""
+        return tuple(f"{name}: {motion}" for name in self.names for motion in MOTIONS)
+
+    @cached_property
+    def mass(self) -> np.ndarray:
+        """Mass matrix (6n, 6n) of all motions [kg, kg m^2]."""
+        return self._sum((one.stations, one.mass) for one in self.inertias)
+
+    @cached_property
+    def gyroscopic(self) -> np.ndarray:
+        """Gyroscopic matrix (6n, 6n) of all motions [kg m^2]."""
+        return self._sum((one.stations, one.gyroscopic) for one in self.inertias)
+
+    @cached_property
+    def stiffness(self) -> np.ndarray:
+        """Stiffness (6n, 6n) of beams and springs, without meshes and without what is rigid [N/m, N m/rad]."""
+        matrices = [(one.stations, one.stiffness) for one in self.beams]
+        matrices += [(one.stations, stiffness_matrix(one.rows.T, one.stiffness)) for one in self.springs]
+        return self._sum(matrices)
+
+    @cached_property
+    def columns(self) -> np.ndarray:
+        """Approach (6n, g) of the flanks of all slices of all meshes, in their order, per unit of all motions."""
+        found = [np.zeros((self.count, 0))]
+        for contact in self.contacts:
+            columns = np.zeros((self.count, len(contact.heights)))
+            for station, approach in zip(contact.stations, contact.approach):
+                if station != GROUND:
+                    columns[6 * station : 6 * station + 6] += approach.T
+            found.append(columns)
+        return np.hstack(found)
+
+    @cached_property
+    def slices(self) -> tuple[slice, ...]:
+        """Columns of every mesh."""
+        ends = np.cumsum([0, *(len(contact.heights) for contact in self.contacts)]).tolist()
+        return tuple(slice(a, b) for a, b in zip(ends[:-1], ends[1:]))
+
+    @cached_property
+    def slice_stiffness(self) -> np.ndarray:
+        """Stiffness (g,) of all slices [N/m]."""
+        return np.concatenate([np.zeros(0), *(contact.stiffness for contact in self.contacts)])
+
+    @cached_property
+    def motions(self) -> np.ndarray:
+        """All motions (6n, m) per unit of the free ones."""
+        rows = [np.zeros((0, self.count))]
+        for group in self.springs:
+            rigid = group.rows[np.isinf(group.stiffness)]
+            rows.append(np.zeros((len(rigid), self.count)))
+            for at, station in enumerate(group.stations):
+                if station != GROUND:
+                    rows[-1][:, 6 * station : 6 * station + 6] += rigid[:, 6 * at : 6 * at + 6]
+        return free_motions(np.vstack(rows), self.held)
+
+    @cached_property
+    def free_names(self) -> tuple[str, ...]:
+        """Names (m,) of the free motions."""
+        unit = (np.abs(self.motions) > 0.0).sum(axis=1) == 1
+        own = unit & (np.abs(self.motions).max(axis=1) == 1.0)
+        first = [int(np.flatnonzero(own & (column == 1.0))[0]) for column in self.motions.T]
+        return tuple(self.motion_names[i] for i in first)
+
+    def system(self, load: np.ndarray | None = None) -> MechanicalSystem:
+        """Make the matrices of the free motions; ``C`` is zero, meshes are columns of ``W`` and not in ``K``.
+
+        ``load`` (6n,) acts on all motions [N, N m].
+        """
+        return assemble(
+            self.mass,
+            self.stiffness,
+            self.columns,
+            np.zeros(self.count) if load is None else load,
+            motions=self.motions,
+            dofs=self.free_names,
+            gyroscopic=self.gyroscopic,
+        )
+
+    def _sum(self, matrices) -> np.ndarray:
+        """Add matrices of stations into one of all motions; rows of the ground are left out."""
+        total = np.zeros((self.count, self.count))
+        for stations, matrix in matrices:
+            at = np.concatenate([6 * s + np.arange(6) for s in stations])
+            kept = np.repeat(np.array(stations) != GROUND, 6)
+            at, inner = at[kept], matrix[np.ix_(kept, kept)]
+            np.add.at(total, np.ix_(at, at), inner)
+        return total
+
+
+def free_motions(rows: np.ndarray, held: np.ndarray) -> np.ndarray:
+    """Solve the conditions ``rows q = 0`` (c, n): all motions (n, m) per unit of the free ones.
+
+    ``held`` (n,) do not take place. Of the motions of a condition the last ones follow the first ones.
+    """
+    count = len(held)
+    free = np.flatnonzero(~held)
+    backwards = free[::-1]
+    size = np.abs(rows).max(initial=0.0)
+    table = rows[:, backwards]
+    table = table[np.abs(table).max(axis=1, initial=0.0) > _RANK * size]
+    if not len(table):
+        return np.eye(count)[:, free]
+    _, triangle, order = linalg.qr(table, mode="economic", pivoting=True)  # type: ignore[misc]
+    diagonal = np.abs(np.diag(triangle))
+    rank = int(np.count_nonzero(diagonal > _RANK * diagonal[0]))
+    bound, rest = backwards[order[:rank]], np.sort(backwards[order[rank:]])
+    column = {int(c): i for i, c in enumerate(backwards[order])}
+    tied = -linalg.solve_triangular(triangle[:rank, :rank], triangle[:rank, [column[int(c)] for c in rest]])
+    found = np.zeros((count, len(rest)))
+    found[rest, np.arange(len(rest))] = 1.0
+    found[bound] = tied
+    return found
+
+
+def rigid_link(offset: Sequence[float] | np.ndarray) -> np.ndarray:
+    """Motions (6, 6) of a point at an offset (3,) [m] from a station, per unit of the motions of the station.
+
+    A point at c of a rigid body moves by ``v + phi x c`` and turns with the body.
+    """
+    x, y, z = np.asarray(offset, float)
+    link = np.eye(6)
+    link[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    return link
+
+
+def joint(
+    name: str,
+    stations: tuple[int, int],
+    offsets: tuple[Sequence[float] | np.ndarray, Sequence[float] | np.ndarray],
+    stiffness: Sequence[float] | np.ndarray,
+    *,
+    axes: np.ndarray | None = None,
+) -> Springs:
+    """Make the springs of a joint between two stations: deflections are second less first, where they meet.
+
+    Parameters
+    ----------
+    name : str
+        For messages and results.
+    stations : (2,) tuple of int
+        `GROUND` for what stands still.
+    offsets : two (3,) arrays
+        From either station to the joint [m].
+    stiffness : (6,) array
+        Along three axes [N/m] and about them [N m/rad]; those of zero are left out, infinite ones are conditions.
+    axes : (3, 3) array, optional
+        Rows are the axes of the joint; x, y, z where not given.
+    """
+    turned = np.eye(6) if axes is None else np.kron(np.eye(2), np.asarray(axes, float))
+    rows = turned @ np.hstack([-rigid_link(offsets[0]), rigid_link(offsets[1])])
+    stiffness = np.asarray(stiffness, float)
+    used = stiffness > 0.0
+    return Springs(name, stations, rows[used], stiffness[used])

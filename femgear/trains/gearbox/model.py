@@ -1,0 +1,556 @@
+"""A gearbox as stations, beams, springs and meshes: shafts, bearings, stages, loads.
+
+Planets stand at one angle of their carrier. Every planet is a station of its own, joined by its bearing to its
+pin, a point of the carrier; a ring in the casing stands still. Meshes are springs along the tooth normals, of
+slices over the common width, which take up tilts as teeth do.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from femgear.case.estimates import gear_cylinder
+from femgear.case.gear_set import planetary_set
+from femgear.case.sections import gear_material
+from femgear.errors import CaseError
+from femgear.fe.beam import BeamShaft, RoundSection, ShaftPart, beam_shaft, body_matrices
+from femgear.gears.iso6336 import pair_mesh_stiffness
+from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, Springs, joint, rigid_link
+from femgear.trains.gearbox.case_file import (
+    CASING,
+    BearingSection,
+    GearboxCase,
+    LoadCaseSection,
+    PairSection,
+    PlanetarySection,
+    teeth_of,
+)
+from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, set_sizes
+from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
+
+HELD = {"space": (), "plane": (2, 3, 4), "rotation": (0, 1, 2, 3, 4)}
+"""Motions that do not take place, by ``motions`` of the case."""
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A place on a shaft: number of its station, and the way from there to the axis at the place (3,) [m]."""
+
+    station: int
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class StageModel:
+    """A stage in the model.
+
+    Parameters
+    ----------
+    section : PairSection or PlanetarySection
+        Its entries.
+    sizes : StageSizes
+        Of its gears.
+    meshes : tuple of int
+        Numbers of its contacts: of a pair one; of a set those of the sun, then of the ring, planet by planet.
+    flank : int
+        1 where gear 1, or the sun, pushes counter-clockwise on its mate, else -1.
+    members : tuple of int
+        Stations of both gears, or of sun, carrier and ring (`GROUND` in the casing).
+    planets : tuple of int
+        Stations of the planets.
+    angles : tuple of float
+        Of the planets at the standing carrier [rad].
+    width : float
+        Common face width of the (narrowest) mesh [m]; zero where not given.
+    """
+
+    section: PairSection | PlanetarySection
+    sizes: StageSizes
+    meshes: tuple[int, ...]
+    flank: int
+    members: tuple[int, ...]
+    planets: tuple[int, ...] = ()
+    angles: tuple[float, ...] = ()
+    width: float = 0.0
+
+    @property
+    def name(self) -> str:
+        """Name of the stage."""
+        return self.section.name
+
+
+@dataclass(frozen=True)
+class GearboxModel:
+    """A gearbox ready for statics and modes.
+
+    Parameters
+    ----------
+    case : GearboxCase
+        What it was made of.
+    flow : BoxFlow
+        Speeds and torques of the load case.
+    assembly : Assembly
+        Stations, inertias, beams, springs and meshes; bearings of a kind are not among the springs.
+    beams : mapping of str to BeamShaft
+        By shaft; none of shafts that are one rigid body.
+    first : mapping of str to int
+        First station of every shaft.
+    stages : tuple of StageModel
+        Pairs, then planetary sets.
+    bearings : tuple of Springs
+        Of all bearings in their order: six rows of the inner ring's motion less that of the outer one.
+    ports : mapping of str to Seat
+        Where torques act.
+    load : (6n,) array
+        Torques, forces and weight on all motions [N, N m].
+    turns : (k,) int array
+        Motions whose speed is given, one for every way in which the gearbox turns.
+    """
+
+    case: GearboxCase
+    flow: BoxFlow
+    assembly: Assembly
+    beams: Mapping[str, BeamShaft]
+    first: Mapping[str, int]
+    stages: tuple[StageModel, ...]
+    bearings: tuple[Springs, ...]
+    ports: Mapping[str, Seat]
+    load: np.ndarray
+    turns: np.ndarray
+
+    @cached_property
+    def bearing_names(self) -> tuple[str, ...]:
+        """Names of the bearings: as given, or by their shafts."""
+        return tuple(bearing.name for bearing in self.bearings)
+
+    def seat(self, shaft: str, position: float | None) -> Seat:
+        """Find the place of a shaft at a position from its left end [m]; that of a rigid body where None."""
+        return _seat(self.case, self.beams, self.first, shaft, position)
+
+
+def _seat(case: GearboxCase, beams, first, shaft: str, position: float | None) -> Seat:
+    if shaft == CASING:
+        return Seat(GROUND)
+    if shaft not in beams:
+        return Seat(first[shaft], (0.0, 0.0, position or 0.0))
+    return Seat(first[shaft] + beams[shaft].index_of(position or 0.0))
+
+
+def gearbox_model(
+    case: GearboxCase,
+    load_case: LoadCaseSection | None = None,
+    *,
+    mesh_stiffness: Mapping[str, Sequence[float]] | None = None,
+) -> GearboxModel:
+    """Assemble shafts, bearings, stages and loads of a gearbox.
+
+    Parameters
+    ----------
+    case : GearboxCase
+        From `femgear.read_case`.
+    load_case : LoadCaseSection, optional
+        Its torques and speeds; by default that which the case names first.
+    mesh_stiffness : mapping of str to sequence, optional
+        Mean stiffnesses of the meshes of stages by their names: of a pair one, of a set sun-planet and
+        planet-ring [N/m]. Without it teeth have those of ISO 6336-1, method B.
+
+    Raises
+    ------
+    CaseError
+        Shafts whose speed or torque nothing determines, loops that lock: see `gearbox_flow`.
+    """
+    load_case = load_case or case.load_case
+    flow = gearbox_flow(case, load_case)
+    build = _Builder(case, flow, dict(mesh_stiffness or {}))
+    return build.model(load_case)
+
+
+class _Builder:
+    """Collects stations and parts of a gearbox, one kind after the other."""
+
+    def __init__(self, case: GearboxCase, flow: BoxFlow, stiffness: Mapping[str, Sequence[float]]):
+        self.case, self.flow, self.stiffness = case, flow, stiffness
+        self.names: list[str] = []
+        self.places: list[tuple[float, float, float]] = []
+        self.inertias: list[Inertia] = []
+        self.stiff_beams: list[Beam] = []
+        self.springs: list[Springs] = []
+        self.contacts: list[Contact] = []
+        self.beams: dict[str, BeamShaft] = {}
+        self.first: dict[str, int] = {}
+        self.held: list[int] = []
+
+    def model(self, load_case: LoadCaseSection) -> GearboxModel:
+        case = self.case
+        for shaft in case.shaft:
+            self._shaft(shaft)
+        for mass in case.mass:
+            at, speed = self.seat(mass.shaft, mass.position), self.flow.speed[mass.shaft]
+            self._body(at, mass.mass, mass.inertia, mass.about_diameter, speed)
+        for number, coupling in enumerate(case.coupling):
+            self._coupling(coupling, number)
+        bearings = tuple(self._bearing(bearing, i) for i, bearing in enumerate(case.bearing))
+        self.springs += [
+            replace_stiffness(springs, section.stiffness)
+            for springs, section in zip(bearings, case.bearing)
+            if section.kind is None
+        ]
+        stages = [self._pair(stage) for stage in case.pair] + [self._planetary(stage) for stage in case.planetary]
+        held = np.zeros((len(self.names), 6), bool)
+        held[:, list(HELD[case.motions])] = True
+        for name in case.operation.fixed:
+            held[self.first[name], 5] = True
+        assembly = Assembly(
+            tuple(self.names),
+            np.array(self.places),
+            held.ravel(),
+            tuple(self.inertias),
+            tuple(self.stiff_beams),
+            tuple(self.springs),
+            tuple(self.contacts),
+        )
+        ports = {one.name: self.seat(one.shaft, one.position) for one in case.load}
+        ports |= {shaft.name: Seat(self.first[shaft.name]) for shaft in case.shaft if not shaft.part}
+        turns = [6 * self.first[name] + 5 for name in self.flow.independent]
+        load = self._loads(assembly, ports)
+        return GearboxModel(
+            case,
+            self.flow,
+            assembly,
+            self.beams,
+            self.first,
+            tuple(stages),
+            bearings,
+            ports,
+            load,
+            np.array(turns, int),
+        )
+
+    def seat(self, shaft: str, position: float | None) -> Seat:
+        return _seat(self.case, self.beams, self.first, shaft, position)
+
+    def _station(self, name: str, place: tuple[float, float, float]) -> int:
+        self.names.append(name)
+        self.places.append(place)
+        return len(self.names) - 1
+
+    def _shaft(self, shaft) -> None:
+        x, y = shaft.axis
+        self.first[shaft.name] = len(self.names)
+        if not shaft.part:
+            self._station(shaft.name, (x, y, shaft.start))
+            return
+        material = self.case.material_of(shaft)
+        parts = [
+            ShaftPart(
+                part.length,
+                part.outer_diameter,
+                part.inner_diameter,
+                part.end_outer_diameter,
+                part.end_inner_diameter,
+                material.youngs_modulus,
+                material.poisson_ratio,
+                material.density,
+            )
+            for part in shaft.part
+        ]
+        beam = self.beams[shaft.name] = beam_shaft(parts, sorted(seats_on(self.case, shaft.name)))
+        stations = tuple(
+            self._station(f"{shaft.name} {i + 1}", (x, y, shaft.start + float(z))) for i, z in enumerate(beam.stations)
+        )
+        self.stiff_beams.append(Beam(stations, beam.stiffness))
+        self.inertias.append(Inertia(stations, beam.mass, beam.gyroscopic * self.flow.speed[shaft.name]))
+
+    def _body(self, seat: Seat, mass: float, polar: float, transverse: float, speed: float) -> None:
+        if seat.station == GROUND:
+            return
+        at = body_matrices(mass, polar, transverse, offset=seat.offset[2])
+        self.inertias.append(Inertia((seat.station,), at[0], at[1] * speed))
+
+    def _coupling(self, coupling, number: int) -> None:
+        positions = coupling.positions or (None, None)
+        seats = [self.seat(shaft, place) for shaft, place in zip(coupling.between, positions, strict=True)]
+        ends = [self._place(shaft, place) for shaft, place in zip(coupling.between, positions, strict=True)]
+        ends = [end if end is not None else ends[1 - i] for i, end in enumerate(ends)]
+        way = ends[1] - ends[0]
+        offsets = [
+            np.asarray(seat.offset) + share * way
+            for seat, share in zip(seats, (coupling.joint, coupling.joint - 1.0), strict=True)
+        ]
+        radial, axial, bend, turn = coupling.radial, coupling.axial, coupling.bending, coupling.torsion
+        stiffness = np.array([radial, radial, axial, bend, bend, turn])
+        name = coupling.name or f"{'-'.join(coupling.between)}"
+        self.springs.append(joint(name, (seats[0].station, seats[1].station), (offsets[0], offsets[1]), stiffness))
+
+    def _place(self, shaft: str, position: float | None) -> np.ndarray | None:
+        """Point (3,) of the axis of a shaft; None of the casing."""
+        if shaft == CASING:
+            return None
+        section = self.case.shaft_named(shaft)
+        return np.array([*section.axis, section.start + (position or 0.0)])
+
+    def _bearing(self, bearing: BearingSection, number: int) -> Springs:
+        inner, outer = self.seat(bearing.shaft, bearing.position), Seat(GROUND)
+        if bearing.outer_shaft is not None:
+            outer = self.seat(bearing.outer_shaft, bearing.outer_position)
+        name = bearing.name or f"bearing {number + 1} of {bearing.shaft}"
+        return joint(name, (outer.station, inner.station), (outer.offset, inner.offset), np.ones(6))
+
+    def _pair(self, stage: PairSection) -> StageModel:
+        sizes, positions = pair_sizes(stage), stage.positions or (None, None)
+        seats = [self.seat(shaft, place) for shaft, place in zip(stage.shafts, positions, strict=True)]
+        middles = [self._place(shaft, place) for shaft, place in zip(stage.shafts, positions, strict=True)]
+        flank = -1 if self.flow.stage_torque[stage.name][stage.shafts[0]] > 0.0 else 1
+        teeth = teeth_of(stage)
+        if teeth is not None:
+            for key, seat, shaft in zip(teeth.gear_names, seats, stage.shafts, strict=True):
+                self._body(seat, *self._gear_body(teeth, key), self.flow.speed[shaft])
+        centres, width, middle = _common([np.asarray(m) for m in middles], sizes.face_widths)
+        r1, r2 = sizes.base_radii
+        towards = (centres[1] - centres[0])[:2] / sizes.centre_distance
+        if sizes.internal:
+            # the pinion touches the ring on its far side from the ring's axis
+            towards, reach = -towards, sizes.centre_distance * r1 / (r2 - r1)
+        else:
+            reach = sizes.centre_distance * r1 / (r1 + r2)
+        pitch = np.append(centres[0][:2] + reach * towards, middle)
+        stiffness = self._mesh_stiffness(stage, 0)
+        number = self._contact(
+            stage.name,
+            (seats[0], seats[1]),
+            pitch,
+            mesh_normal(towards, sizes.pressure_angles[0], sizes.base_helix, flank, internal=sizes.internal),
+            width,
+            stiffness,
+        )
+        return StageModel(stage, sizes, (number,), flank, (seats[0].station, seats[1].station), width=width)
+
+    def _planetary(self, stage: PlanetarySection) -> StageModel:
+        sizes, flow = set_sizes(stage), self.flow
+        members = {name: getattr(stage, name) for name in ("sun", "carrier", "ring")}
+        seats = {name: self.seat(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
+        places = {name: self._place(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
+        ring = places["carrier"] if places["ring"] is None else places["ring"]
+        flank = -1 if flow.stage_torque[stage.name].get(members["sun"], 0.0) > 0.0 else 1
+        centres, width, middle = _common([places["sun"], ring], (sizes.face_widths[0], sizes.face_widths[-1]))
+        width = min([w for w in sizes.face_widths if w] or [0.0])
+        axis, angles = centres[0][:2], tuple(stage.angle + psi for psi in _from_first(sizes.planet_angles))
+        teeth = teeth_of(stage)
+        if teeth is not None:
+            for name in ("sun", "carrier", "ring"):
+                if seats[name].station != GROUND:
+                    body = self._gear_body(teeth, name)
+                    self._body(seats[name], *body, flow.speed[members[name]])
+        planets = [
+            self._planet(stage, sizes, teeth, n, psi, axis, middle, seats["carrier"], places["carrier"])
+            for n, psi in enumerate(angles)
+        ]
+        contacts = []
+        for ring_mesh in (False, True):
+            for n, (psi, planet) in enumerate(zip(angles, planets, strict=True)):
+                contacts.append(
+                    self._set_mesh(stage, sizes, seats, n, psi, planet, axis, middle, flank, width, ring_mesh)
+                )
+        stations = tuple(seats[name].station for name in ("sun", "carrier", "ring"))
+        return StageModel(stage, sizes, tuple(contacts), flank, stations, tuple(planets), angles, width)
+
+    def _planet(self, stage, sizes, teeth, n, psi, axis, middle, carrier: Seat, place) -> int:
+        """Add a planet on its pin; the number of its station."""
+        out, across = np.array([math.cos(psi), math.sin(psi), 0.0]), np.array([-math.sin(psi), math.cos(psi), 0.0])
+        centre = np.append(axis, middle) + sizes.centre_distance * out
+        station = self._station(f"{stage.name} planet {n + 1}", tuple(centre))
+        mass, polar, transverse = self._planet_body(stage, teeth)
+        self._body(Seat(station), mass, polar, transverse, self.flow.planet_speed[stage.name])
+        given, radial = stage.planet.bearing, math.inf
+        if given is None and teeth is not None and getattr(teeth.planet, "bearing_stiffness", None) is not None:
+            radial = teeth.planet.bearing_stiffness
+        radial, axial, tilt = (given.radial, given.axial, given.tilt) if given else (radial, math.inf, math.inf)
+        offset = np.asarray(carrier.offset) + (centre - place)
+        stiffness = np.array([radial, radial, axial, tilt, tilt, 0.0])
+        if stage.pins is not None:
+            with np.errstate(divide="ignore"):
+                stiffness = 1.0 / (1.0 / stiffness + np.append(pin_flexibility(stage, self.case), 0.0))
+        axes = np.array([out, across, [0.0, 0.0, 1.0]])
+        name = f"{stage.name} pin {n + 1}"
+        self.springs.append(joint(name, (carrier.station, station), (offset, np.zeros(3)), stiffness, axes=axes))
+        return station
+
+    def _set_mesh(self, stage, sizes, seats, n, psi, planet, axis, middle, flank, width, ring_mesh: bool) -> int:
+        out = np.array([math.cos(psi), math.sin(psi)])
+        sun, planet_radius, ring = sizes.base_radii
+        if ring_mesh:
+            reach = sizes.centre_distance * ring / (ring - planet_radius)
+            pair, name = (Seat(planet), seats["ring"]), f"{stage.name} planet {n + 1}-ring"
+        else:
+            reach = sizes.centre_distance * sun / (sun + planet_radius)
+            pair, name = (seats["sun"], Seat(planet)), f"{stage.name} sun-planet {n + 1}"
+        # planets turn against the sun, and have the other hand
+        sense = -1 if ring_mesh else 1
+        normal = mesh_normal(
+            out,
+            sizes.pressure_angles[1 if ring_mesh else 0],
+            sense * sizes.base_helix,
+            sense * flank,
+            internal=ring_mesh,
+        )
+        pitch = np.append(axis + reach * out, middle)
+        return self._contact(name, pair, pitch, normal, width, self._mesh_stiffness(stage, int(ring_mesh)))
+
+    def _contact(self, name: str, seats: tuple[Seat, Seat], pitch, normal, width: float, stiffness: float) -> int:
+        slices = self.case.deflection.slices if width and self.case.motions == "space" else 1
+        heights = (np.arange(slices) + 0.5) * width / slices - 0.5 * width if slices > 1 else np.zeros(1)
+        points = np.tile(pitch, (slices, 1))
+        points[:, 2] += heights
+        own = [points - np.asarray(self.places[s.station] if s.station != GROUND else (0, 0, 0)) for s in seats]
+        stations = (seats[0].station, seats[1].station)
+        spread = np.full(slices, stiffness / slices)
+        self.contacts.append(Contact(name, stations, np.asarray(normal), np.stack(own), heights, spread))
+        return len(self.contacts) - 1
+
+    def _mesh_stiffness(self, stage: PairSection | PlanetarySection, mesh: int) -> float:
+        if stage.name in self.stiffness:
+            return float(self.stiffness[stage.name][mesh])
+        section = stage.mesh if isinstance(stage, PairSection) else (stage.sun_mesh, stage.ring_mesh)[mesh]
+        if section is not None:
+            return section.stiffness
+        gears = planetary_set(teeth_of(stage))
+        pair = gears if isinstance(stage, PairSection) else gears.kinds[mesh]
+        width = min(gear.face_width for gear in pair.gears)
+        return width * pair_mesh_stiffness(pair)[1]
+
+    def _gear_body(self, teeth, key: str) -> tuple[float, float, float]:
+        """Mass, polar and transverse inertia of a gear or the carrier: as the tables of the teeth say."""
+        section = getattr(teeth, key)
+        mass, inertia = getattr(section, "mass", math.nan), getattr(section, "inertia", math.nan)
+        gears = {gear.name: gear for gear in planetary_set(teeth).gears}
+        diametral = math.nan
+        if hasattr(teeth, "helical"):
+            space = getattr(teeth.helical, key)
+            diametral = space.diametral_inertia
+            mass = space.mass if key == "ring" else mass
+            inertia = space.inertia if key == "ring" else inertia
+        if key in gears:
+            body = gear_cylinder(gears[key], gear_material(teeth, key).density)
+            found = [value if math.isfinite(value) else guess for value, guess in zip((mass, inertia, diametral), body)]
+            if math.isfinite(inertia) and not math.isfinite(diametral):
+                found[2] = 0.5 * inertia + found[0] * gears[key].face_width ** 2 / 12.0
+            return found[0], found[1], found[2]
+        return mass, inertia, diametral if math.isfinite(diametral) else 0.5 * inertia
+
+    def _planet_body(self, stage: PlanetarySection, teeth) -> tuple[float, float, float]:
+        given = stage.planet
+        mass, polar, transverse = given.mass, given.inertia, given.transverse_inertia
+        if teeth is not None:
+            body = self._gear_body(teeth, "planet")
+            mass, polar = (value if value is not None else own for value, own in zip((mass, polar), body))
+            transverse = body[2] if transverse is None else transverse
+        if mass is None or polar is None:
+            raise CaseError(
+                f"the planets of {stage.name} have no {'mass' if mass is None else 'inertia'}",
+                code="E-KEY-MISSING",
+                key=f"planetary[{self.case.planetary.index(stage)}].planet.{'mass' if mass is None else 'inertia'}",
+                remedy="give mass and inertia of one planet",
+            )
+        return mass, polar, 0.5 * polar if transverse is None else transverse
+
+    def _loads(self, assembly: Assembly, ports: Mapping[str, Seat]) -> np.ndarray:
+        load = np.zeros(assembly.count)
+
+        def add(seat: Seat, wrench) -> None:
+            load[6 * seat.station : 6 * seat.station + 6] += rigid_link(seat.offset).T @ np.asarray(wrench, float)
+
+        for name, torque in self.flow.port_torque.items():
+            add(ports[name], [0.0, 0.0, 0.0, 0.0, 0.0, torque])
+        for one in self.case.load:
+            add(ports[one.name], [*one.force, *one.tilting_moment, 0.0])
+        if self.case.gravity is not None:
+            along = np.asarray(self.case.gravity.direction)
+            field = np.zeros((len(assembly.names), 6))
+            field[:, :3] = self.case.gravity.acceleration * along / np.linalg.norm(along)
+            load += assembly.mass @ field.ravel()
+        return load
+
+
+def mesh_normal(towards, pressure_angle: float, base_helix: float, flank: int, *, internal: bool) -> np.ndarray:
+    """Compute the unit normal (3,) of a mesh, into gear 2, from its pressure angle in the transverse section.
+
+    ``towards`` (2,) is the radial direction at the pitch point, away from the axis of gear 1. Gear 1 pushes
+    counter-clockwise for ``flank`` 1: ``n = (sin(alpha) e_r + flank cos(alpha) e_t) cos(beta_b) - flank
+    sin(beta_b) e_z``, with the helix positive of a right-handed gear 1 (ISO 21771). In an internal mesh the flank
+    of the pinion faces outwards all the same.
+    """
+    radial, around = np.append(towards, 0.0), np.array([-towards[1], towards[0], 0.0])
+    plane = math.sin(pressure_angle) * radial + flank * math.cos(pressure_angle) * around
+    return math.cos(base_helix) * plane - flank * math.sin(base_helix) * np.array([0.0, 0.0, 1.0])
+
+
+def _common(places, widths) -> tuple[list[np.ndarray], float, float]:
+    """Places of both gears, and width [m] and middle [m along z] of their common face width."""
+    low = max(place[2] - 0.5 * width for place, width in zip(places, widths, strict=True))
+    high = min(place[2] + 0.5 * width for place, width in zip(places, widths, strict=True))
+    if not all(widths):
+        return list(places), 0.0, float(np.mean([place[2] for place in places]))
+    return list(places), float(high - low), float(0.5 * (low + high))
+
+
+def _from_first(angles: Sequence[float]) -> list[float]:
+    return [psi - angles[0] for psi in angles]
+
+
+def pin_flexibility(stage: PlanetarySection, case: GearboxCase) -> np.ndarray:
+    """Compute what a pin and the wind-up of the carrier give way by, (5,) radially, around, along, two tilts.
+
+    A bar held at one end bends by ``L^3/(3 E I) + L/(kappa G A)`` and tilts by ``L/(E I)`` [m/N, rad/(N m)]; held at
+    both ends of ``2L`` by ``L^3/(24 E I) + L/(2 kappa G A)`` and ``L/(2 E I) / 4`` at its middle (S. Timoshenko,
+    Strength of Materials, part I). Wind-up of a stiffness K_c adds ``a^2 N / K_c`` around the axis, N planets
+    alike.
+    """
+    pins = stage.pins
+    assert pins is not None
+    material = case.material
+    section = RoundSection(pins.diameter, pins.bore, material.youngs_modulus, material.poisson_ratio)
+    bending = section.young * section.second_moment
+    shear = section.shear_coefficient * section.shear_modulus * section.area
+    length = pins.length
+    if pins.cheeks == 1:
+        bend, tilt = length**3 / (3.0 * bending) + length / shear, length / bending
+    else:
+        # clamped at both ends: P l^3/(192 E I) with l = 2 L, and half of each end's moment for a tilt
+        bend, tilt = length**3 / (24.0 * bending) + 0.5 * length / shear, length / (8.0 * bending)
+    sizes = set_sizes(stage)
+    wind = 0.0
+    if pins.wind_up_stiffness is not None:
+        wind = sizes.centre_distance**2 * len(sizes.planet_angles) / pins.wind_up_stiffness
+    return np.array([bend, bend + wind, 0.0, tilt, tilt])
+
+
+def seats_on(case: GearboxCase, shaft: str) -> set[float]:
+    """Collect the positions on a shaft at which something sits [m]."""
+    found: set[float] = set()
+    for one in (*case.mass, *case.bearing, *case.load):
+        if one.shaft == shaft and one.position is not None:
+            found.add(one.position)
+    for bearing in case.bearing:
+        if bearing.outer_shaft == shaft and bearing.outer_position is not None:
+            found.add(bearing.outer_position)
+    for names, positions in [(one.between, one.positions) for one in case.coupling] + [
+        (one.shafts, one.positions) for one in case.pair
+    ]:
+        found |= {p for name, p in zip(names, positions or (), strict=False) if name == shaft and p is not None}
+    for stage in case.planetary:
+        for member in ("sun", "carrier", "ring"):
+            place = getattr(stage, f"{member}_position")
+            if getattr(stage, member) == shaft and place is not None:
+                found.add(place)
+    return found
+
+
+def replace_stiffness(springs: Springs, stiffness: Sequence[float]) -> Springs:
+    """Copy six springs with these stiffnesses (6,), those of zero left out."""
+    values = np.asarray(stiffness, float)
+    return replace(springs, rows=springs.rows[values > 0.0], stiffness=values[values > 0.0])
