@@ -57,6 +57,7 @@ CATALOGUE = {
     "W-PLUGIN": (NOTE, "A package has a train of a name that is taken."),
     "W-POINTS": (DOUBT, "Points on the ring do not resolve its waves."),
     "W-POSITIONS": (DOUBT, "Peaks between positions may be higher."),
+    "W-PASSES": (DOUBT, "Shafts and teeth have not settled within the passes that are allowed."),
     "W-PRESSURE": (FAULT, "The contact pressure exceeds what any steel carries."),
     "W-PROFILE": (NOTE, "A profile has proportions that are unusual."),
     "W-PULL": (DOUBT, "Meshes pull where real teeth would part."),

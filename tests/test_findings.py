@@ -323,6 +323,11 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
             drive_contact=("speed", [1.0, 0.9]), back_contact=("speed", [0.0, 0.0]), backlash=("x", [1e-5])
         ),
     ),
+    "W-PASSES": lambda: of_stage(
+        "gearbox",
+        "deflection",
+        xr.Dataset({"settled": ("load_case", [False])}, coords={"load_case": ["nominal"]}),
+    ),
     "W-SETTLED": lambda: of_stage("gear_pair", "sweep", xr.Dataset({"settled": ("ratio", [1, 0])})),
     "W-STEPS": lambda: of_stage("elastic", "runup", runup(missed=3)),
     "W-TAIL": lambda: of_stage("planar", "response", tail(0.3)),

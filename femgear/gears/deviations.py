@@ -21,7 +21,7 @@ from fractions import Fraction
 import numpy as np
 
 from femgear.gears.gear import Gear, GeometryWarning
-from femgear.gears.kinematics import across, member_approach, mesh_normals, orientations, unit_vectors
+from femgear.gears.kinematics import across, body_approach, mesh_normals, orientations, unit_vectors
 from femgear.gears.modifications import FlankForm, check_flank, form_deviation, lead_deviation, profile_height
 from femgear.gears.pair import BRANCH, GearSet
 
@@ -264,11 +264,13 @@ def misaligned_approach(d: SetDeviations, s: GearSet, *, back: bool = False) -> 
     """Compute the approach (2N,) of the flanks of every mesh by axes askew, per place over the width [1]."""
     if not any(np.any(one) for one in (d.planet_misalignment, d.sun_misalignment, d.carrier_misalignment)):
         return np.zeros(len(s.mesh_names))
-    motions, radial = member_approach(s, back=back), unit_vectors(np.asarray(s.planet_angles))
+    effect, radial = body_approach(s, back=back)[..., :2], unit_vectors(np.asarray(s.planet_angles))
+    number = np.array([body.gear for body in s.bodies])
+    sun, branch = (effect[:, number == gear].sum(axis=1) for gear in (0, BRANCH))
     outwards, along = d.planet_misalignment.T[..., None]
     planets = outwards * radial + along * across(radial) + d.carrier_misalignment
     planets = planets[[mesh.copy for mesh in s.meshes]]
-    return motions["sun"] @ d.sun_misalignment + (motions["carrier"] * planets).sum(axis=1)
+    return sun @ d.sun_misalignment + (branch * planets).sum(axis=1)
 
 
 def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, back: bool = False):

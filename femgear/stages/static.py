@@ -66,7 +66,7 @@ from femgear.contact.width_waves import (
 )
 from femgear.errors import CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import Material, foundation, material_of_each
-from femgear.gears.deviations import common_period
+from femgear.gears.deviations import SetDeviations, common_period
 from femgear.gears.iso6336 import (
     contact_ratio_factor,
     nominal_contact_stress,
@@ -100,7 +100,12 @@ LARGEST_MOTION, LARGEST_APPROACH = 2.0, 0.5
 
 @one_blas_thread()
 def solve_static(
-    case: Case, *, cache: Path | None = None, progress: Progress = silent, steps: Steps | None = None
+    case: Case,
+    *,
+    cache: Path | None = None,
+    progress: Progress = silent,
+    steps: Steps | None = None,
+    deviations: SetDeviations | None = None,
 ) -> StaticResult:
     """Solve for static transmission error, load sharing and mesh stiffness over one mesh period.
 
@@ -116,6 +121,8 @@ def solve_static(
         Called with (stage, done, total).
     steps : Steps, optional
         Flank compliances of other cases, taken where they are those of this one.
+    deviations : SetDeviations, optional
+        In place of those of the case, as of a gearbox that misaligns the teeth.
 
     Returns
     -------
@@ -132,7 +139,8 @@ def solve_static(
     ContactError
         A load that the contact cannot carry.
     """
-    gears, deviations, steps = planetary_set(case), set_deviations(case), steps or Steps()
+    gears, steps = planetary_set(case), steps or Steps()
+    deviations = set_deviations(case) if deviations is None else deviations
     sectors, bodies = known_compliances(case, gears, steps, cache=cache)
     width = over_width(case, gears, cache=cache, steps=steps)
     sun_torque = case.torque_on_first_gear()

@@ -1,7 +1,7 @@
 """One assembler of stations with six motions: inertias, beams, springs, rigid joints and gear meshes -> M, C, G, K, W.
 
-A station has the motions `MOTIONS` along and about x, y, z; tilts and rotation are right-handed and small. Springs
-of infinite stiffness are conditions, which are eliminated: all motions follow from the free ones.
+A station has the motions `MOTIONS` along and about x, y, z; tilts and rotation are right-handed and small. Springs of
+infinite stiffness are conditions, which are eliminated: all motions follow from the free ones.
 """
 
 from __future__ import annotations
@@ -9,10 +9,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy import linalg
 
+from femgear.fe.beam import rigid_link
 from femgear.system.mesh_directions import assemble, point_approach, stiffness_matrix
 from femgear.system.system import MechanicalSystem, freeze
 
@@ -43,14 +45,14 @@ class Inertia:
 
 @dataclass(frozen=True)
 class Beam:
-    """Stiffness matrix (6k, 6k) [N/m, N m/rad] between k stations."""
+    """Stiffness matrix ``stiffness`` (6k, 6k) [N/m, N m/rad] between k ``stations``."""
 
     stations: tuple[int, ...]
     stiffness: np.ndarray
 
 
 @dataclass(frozen=True)
-class Springs:
+class StationSprings:
     """Springs between stations, such as a bearing, a coupling or a rigid joint.
 
     Parameters
@@ -118,7 +120,7 @@ class Assembly:
     held : (6n,) bool array
         Motions that do not take place.
     inertias, beams, springs, contacts : tuples
-        Of `Inertia`, `Beam`, `Springs` and `Contact`.
+        Of `Inertia`, `Beam`, `StationSprings` and `Contact`.
     """
 
     names: tuple[str, ...]
@@ -126,7 +128,7 @@ class Assembly:
     held: np.ndarray
     inertias: tuple[Inertia, ...] = ()
     beams: tuple[Beam, ...] = ()
-    springs: tuple[Springs, ...] = ()
+    springs: tuple[StationSprings, ...] = ()
     contacts: tuple[Contact, ...] = field(default=())
 
     def __post_init__(self):
@@ -175,7 +177,7 @@ class Assembly:
     def slices(self) -> tuple[slice, ...]:
         """Columns of every mesh."""
         ends = np.cumsum([0, *(len(contact.heights) for contact in self.contacts)]).tolist()
-        return tuple(slice(a, b) for a, b in zip(ends[:-1], ends[1:]))
+        return tuple(slice(a, b) for a, b in pairwise(ends))
 
     @cached_property
     def slice_stiffness(self) -> np.ndarray:
@@ -183,8 +185,8 @@ class Assembly:
         return np.concatenate([np.zeros(0), *(contact.stiffness for contact in self.contacts)])
 
     @cached_property
-    def motions(self) -> np.ndarray:
-        """All motions (6n, m) per unit of the free ones."""
+    def _solved(self) -> tuple[np.ndarray, np.ndarray]:
+        """All motions per unit of the free ones, and the places of these."""
         rows = [np.zeros((0, self.count))]
         for group in self.springs:
             rigid = group.rows[np.isinf(group.stiffness)]
@@ -192,15 +194,17 @@ class Assembly:
             for at, station in enumerate(group.stations):
                 if station != GROUND:
                     rows[-1][:, 6 * station : 6 * station + 6] += rigid[:, 6 * at : 6 * at + 6]
-        return free_motions(np.vstack(rows), self.held)
+        return solved_conditions(np.vstack(rows), self.held)
 
-    @cached_property
+    @property
+    def motions(self) -> np.ndarray:
+        """All motions (6n, m) per unit of the free ones."""
+        return self._solved[0]
+
+    @property
     def free_names(self) -> tuple[str, ...]:
         """Names (m,) of the free motions."""
-        unit = (np.abs(self.motions) > 0.0).sum(axis=1) == 1
-        own = unit & (np.abs(self.motions).max(axis=1) == 1.0)
-        first = [int(np.flatnonzero(own & (column == 1.0))[0]) for column in self.motions.T]
-        return tuple(self.motion_names[i] for i in first)
+        return tuple(self.motion_names[i] for i in self._solved[1])
 
     def system(self, load: np.ndarray | None = None) -> MechanicalSystem:
         """Make the matrices of the free motions; ``C`` is zero, meshes are columns of ``W`` and not in ``K``.
@@ -228,10 +232,11 @@ class Assembly:
         return total
 
 
-def free_motions(rows: np.ndarray, held: np.ndarray) -> np.ndarray:
-    """Solve the conditions ``rows q = 0`` (c, n): all motions (n, m) per unit of the free ones.
+def solved_conditions(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Solve the conditions ``rows q = 0`` (c, n) for all motions (n, m) per unit of free ones.
 
-    ``held`` (n,) do not take place. Of the motions of a condition the last ones follow the first ones.
+    The places (m,) of these come with them. ``held`` (n,) do not take place. Of the motions of a condition the last
+    ones follow the first ones.
     """
     count = len(held)
     free = np.flatnonzero(~held)
@@ -240,7 +245,7 @@ def free_motions(rows: np.ndarray, held: np.ndarray) -> np.ndarray:
     table = rows[:, backwards]
     table = table[np.abs(table).max(axis=1, initial=0.0) > _RANK * size]
     if not len(table):
-        return np.eye(count)[:, free]
+        return np.eye(count)[:, free], free
     _, triangle, order = linalg.qr(table, mode="economic", pivoting=True)  # type: ignore[misc]
     diagonal = np.abs(np.diag(triangle))
     rank = int(np.count_nonzero(diagonal > _RANK * diagonal[0]))
@@ -250,18 +255,7 @@ def free_motions(rows: np.ndarray, held: np.ndarray) -> np.ndarray:
     found = np.zeros((count, len(rest)))
     found[rest, np.arange(len(rest))] = 1.0
     found[bound] = tied
-    return found
-
-
-def rigid_link(offset: Sequence[float] | np.ndarray) -> np.ndarray:
-    """Motions (6, 6) of a point at an offset (3,) [m] from a station, per unit of the motions of the station.
-
-    A point at c of a rigid body moves by ``v + phi x c`` and turns with the body.
-    """
-    x, y, z = np.asarray(offset, float)
-    link = np.eye(6)
-    link[:3, 3:] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
-    return link
+    return found, rest
 
 
 def joint(
@@ -271,7 +265,7 @@ def joint(
     stiffness: Sequence[float] | np.ndarray,
     *,
     axes: np.ndarray | None = None,
-) -> Springs:
+) -> StationSprings:
     """Make the springs of a joint between two stations: deflections are second less first, where they meet.
 
     Parameters
@@ -291,4 +285,4 @@ def joint(
     rows = turned @ np.hstack([-rigid_link(offsets[0]), rigid_link(offsets[1])])
     stiffness = np.asarray(stiffness, float)
     used = stiffness > 0.0
-    return Springs(name, stations, rows[used], stiffness[used])
+    return StationSprings(name, stations, rows[used], stiffness[used])

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import linalg
 
 from femgear.errors import CaseError
 from femgear.fe.beam import AXES, joint_deflections, joint_springs
+from femgear.system.assembly import solved_conditions
 from femgear.system.mesh_directions import mesh_directions, pin_directions, point_approach
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.trains.drivetrain.parts import Drivetrain, ParallelSection, PlanetarySection, numbered
@@ -26,8 +26,6 @@ from femgear.trains.drivetrain.parts import Drivetrain, ParallelSection, Planeta
 MOTIONS = np.array([0, 1, 3, 4, 5])
 ENDS = np.append(MOTIONS, MOTIONS + len(AXES))
 _NAMES = tuple(AXES[i] for i in MOTIONS)
-# Row of a kinematic condition, relative to the largest, that counts as none.
-_RANK = 1e-12
 # Radial part of a normal, over the whole, that the held coordinates leave nothing of.
 _NOTHING = 1e-12
 
@@ -137,27 +135,8 @@ def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray,
     rows = np.vstack(groups)
     single = np.count_nonzero(rows, axis=1) == 1
     held |= np.any(rows[single] != 0.0, axis=0)
-    return _eliminated(rows[~single], np.flatnonzero(~held), place)
-
-
-def _eliminated(rows, free, place):
-    """Solve the conditions ``rows q = 0`` for as many of the free coordinates, the last ones first."""
-    backwards = free[::-1]
-    size = np.abs(rows).max(initial=0.0)
-    table = rows[:, backwards]
-    table = table[np.abs(table).max(axis=1, initial=0.0) > _RANK * size]
-    if not len(table):
-        return np.eye(place.count)[:, free], tuple(place.names[i] for i in free)
-    _, triangle, order = linalg.qr(table, mode="economic", pivoting=True)  # type: ignore[misc]
-    diagonal = np.abs(np.diag(triangle))
-    rank = int(np.count_nonzero(diagonal > _RANK * diagonal[0]))
-    bound, rest = backwards[order[:rank]], np.sort(backwards[order[rank:]])
-    column = {int(c): i for i, c in enumerate(backwards[order])}
-    tied = -linalg.solve_triangular(triangle[:rank, :rank], triangle[:rank, [column[int(c)] for c in rest]])
-    T = np.zeros((place.count, len(rest)))
-    T[rest, np.arange(len(rest))] = 1.0
-    T[bound] = tied
-    return T, tuple(place.names[i] for i in rest)
+    motions, free = solved_conditions(rows[~single], held)
+    return motions, tuple(place.names[i] for i in free)
 
 
 def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:

@@ -97,7 +97,7 @@ class ShaftMaterialSection(Section):
     density: Annotated[float, Quantity(DENSITY, 0.0, 25000.0)] = 7850.0
 
 
-class ShaftPartSection(Section):
+class BoxShaftPartSection(Section):
     """A cylindrical or conical part of a shaft, from left to right.
 
     The end diameters are those at its right end, where they are others than at its left one.
@@ -109,8 +109,13 @@ class ShaftPartSection(Section):
     end_outer_diameter: Outer | None = None
     end_inner_diameter: Inner | None = None
 
+    @property
+    def bore_at_end(self) -> float:
+        """Inner diameter at the right end [m]."""
+        return self.inner_diameter if self.end_inner_diameter is None else self.end_inner_diameter
 
-class ShaftSection(Section):
+
+class BoxShaftSection(Section):
     """A shaft: an axis, and parts from its left end on; without parts it is one rigid body.
 
     ``axis`` are x and y of its axis, ``start`` is z of its left end, of a body that of its centre.
@@ -119,7 +124,7 @@ class ShaftSection(Section):
     name: Name
     axis: Annotated[tuple[Along, ...], PAIR] = (0.0, 0.0)
     start: Along = 0.0
-    part: Annotated[tuple[ShaftPartSection, ...], Field(max_length=MOST_PARTS)] = ()
+    part: Annotated[tuple[BoxShaftPartSection, ...], Field(max_length=MOST_PARTS)] = ()
     material: ShaftMaterialSection | None = None
 
     @property
@@ -160,7 +165,7 @@ class MassSection(SeatSection):
         return 0.5 * self.inertia if self.transverse_inertia is None else self.transverse_inertia
 
 
-class BearingSection(SeatSection):
+class BoxBearingSection(SeatSection):
     """A bearing of a shaft in the casing, or in another shaft: by its stiffnesses, or by its geometry.
 
     Stiffnesses may be ``"rigid"``; those left out are zero. A bearing of a ``kind`` has rolling elements, whose
@@ -201,7 +206,7 @@ class BearingSection(SeatSection):
         return radial, radial, axial, tilt, tilt, turn
 
 
-class CouplingSection(Section):
+class BoxCouplingSection(Section):
     """What joins two shafts: springs between two places, by default stiff in nothing but torsion.
 
     Between places apart along z a rigid link on either side leads to the ``joint``, the share of the way from the
@@ -220,7 +225,7 @@ class CouplingSection(Section):
     """Whether both shafts turn at one speed; without it the coupling is a spring of its own, as of a brake."""
 
 
-class MeshSection(Section):
+class BoxMeshSection(Section):
     """Stiffness of a mesh along its normal where no teeth are given, and its tooth pairs in contact."""
 
     stiffness: MeshStiffness
@@ -256,7 +261,7 @@ class PairSection(Section):
     positions: Annotated[tuple[Along, ...], PAIR] | None = None
     teeth: StageTables | None = None
     gears: PairGearsSection | None = None
-    mesh: MeshSection | None = None
+    mesh: BoxMeshSection | None = None
 
 
 class SetGearsSection(Section):
@@ -284,7 +289,7 @@ class PlanetBearingSection(Section):
     tilt: Turning = math.inf
 
 
-class StagePlanetSection(Section):
+class BoxPlanetSection(Section):
     """One of the equal planets: mass, inertias and bearing; what is left out follows from the teeth."""
 
     mass: PartMass | None = None
@@ -308,7 +313,7 @@ class PinSection(Section):
     wind_up_stiffness: Annotated[float, Quantity(TORSION, 1.0, 1e15)] | None = None
 
 
-class PlanetarySection(Section):
+class BoxPlanetarySection(Section):
     """Sun and carrier on shafts, the ring on a shaft or in the casing.
 
     The positions are those of the middles of the face widths on the shafts.
@@ -325,9 +330,9 @@ class PlanetarySection(Section):
     """Of planet 1 from x; the carrier stands still at it in statics and modes."""
     teeth: StageTables | None = None
     gears: SetGearsSection | None = None
-    sun_mesh: MeshSection | None = None
-    ring_mesh: MeshSection | None = None
-    planet: StagePlanetSection = StagePlanetSection()
+    sun_mesh: BoxMeshSection | None = None
+    ring_mesh: BoxMeshSection | None = None
+    planet: BoxPlanetSection = BoxPlanetSection()
     pins: PinSection | None = None
 
 
@@ -398,12 +403,12 @@ class GearboxCase(Section, ReadCase):
     title: Title
     motions: Literal["space", "plane", "rotation"] = "space"
     material: ShaftMaterialSection = ShaftMaterialSection()
-    shaft: Annotated[tuple[ShaftSection, ...], Field(min_length=1, max_length=MOST_PARTS)]
+    shaft: Annotated[tuple[BoxShaftSection, ...], Field(min_length=1, max_length=MOST_PARTS)]
     mass: Annotated[tuple[MassSection, ...], Field(max_length=MOST_PARTS)] = ()
-    bearing: Annotated[tuple[BearingSection, ...], Field(max_length=MOST_PARTS)] = ()
-    coupling: Annotated[tuple[CouplingSection, ...], Field(max_length=MOST_PARTS)] = ()
+    bearing: Annotated[tuple[BoxBearingSection, ...], Field(max_length=MOST_PARTS)] = ()
+    coupling: Annotated[tuple[BoxCouplingSection, ...], Field(max_length=MOST_PARTS)] = ()
     pair: Annotated[tuple[PairSection, ...], Field(max_length=20)] = ()
-    planetary: Annotated[tuple[PlanetarySection, ...], Field(max_length=20)] = ()
+    planetary: Annotated[tuple[BoxPlanetarySection, ...], Field(max_length=20)] = ()
     load: Annotated[tuple[LoadSection, ...], Field(max_length=MOST_PARTS)] = ()
     gravity: BoxGravitySection | None = None
     operation: BoxOperationSection
@@ -415,11 +420,11 @@ class GearboxCase(Section, ReadCase):
         """The load case that contact, modes and pictures are of."""
         return self.operation.load_case[self.operation.first - 1]
 
-    def shaft_named(self, name: str) -> ShaftSection:
+    def shaft_named(self, name: str) -> BoxShaftSection:
         """Find the shaft of that name."""
         return next(shaft for shaft in self.shaft if shaft.name == name)
 
-    def material_of(self, shaft: ShaftSection) -> ShaftMaterialSection:
+    def material_of(self, shaft: BoxShaftSection) -> ShaftMaterialSection:
         """Find the material of a shaft."""
         return shaft.material or self.material
 
@@ -433,7 +438,7 @@ def stage_case_of(text: str) -> Any:
     return parse_case(text, numbered=False)
 
 
-def teeth_of(stage: PairSection | PlanetarySection) -> Any:
+def teeth_of(stage: PairSection | BoxPlanetarySection) -> Any:
     """Read the case of the teeth of a stage; None of one that gives sizes and stiffnesses."""
     return None if stage.teeth is None else stage_case_of(case_text.write(stage.teeth))
 

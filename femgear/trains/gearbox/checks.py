@@ -11,10 +11,10 @@ from femgear.case.text import CaseFile
 from femgear.errors import CaseError, FemgearError
 from femgear.trains.gearbox.case_file import (
     CASING,
-    BearingSection,
+    BoxBearingSection,
+    BoxPlanetarySection,
     GearboxCase,
     PairSection,
-    PlanetarySection,
     embed_stages,
     teeth_of,
 )
@@ -183,7 +183,7 @@ def _bearings(case: GearboxCase) -> Iterator[CaseError]:
             yield from _ring_places(case, bearing, key)
 
 
-def _geometry(bearing: BearingSection, key: str) -> Iterator[CaseError]:
+def _geometry(bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
     needed = (*_ROLLER, *(() if bearing.kind == "ball" else ("effective_length",)))
     for name in needed:
         if getattr(bearing, name) is None:
@@ -207,7 +207,7 @@ def _geometry(bearing: BearingSection, key: str) -> Iterator[CaseError]:
             )
 
 
-def _ring_places(case: GearboxCase, bearing: BearingSection, key: str) -> Iterator[CaseError]:
+def _ring_places(case: GearboxCase, bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
     if bearing.outer_shaft == bearing.shaft:
         yield CaseError(
             "both rings sit on one shaft",
@@ -227,7 +227,7 @@ def _ring_places(case: GearboxCase, bearing: BearingSection, key: str) -> Iterat
             value=f"z = {LENGTH.show(places[0])} and {LENGTH.show(places[1])}, axes "
             f"{LENGTH.show(math.dist(first.axis, second.axis))} apart",
             limit="one place on one axis",
-            remedy=f"give outer_position = \"{LENGTH.show(places[0] - second.start)}\"",
+            remedy=f'give outer_position = "{LENGTH.show(places[0] - second.start)}"',
         )
 
 
@@ -239,7 +239,7 @@ def _shaft_parts(case: GearboxCase) -> Iterator[CaseError]:
                 (part.outer_diameter, part.inner_diameter, "inner_diameter"),
                 (
                     part.end_outer_diameter or part.outer_diameter,
-                    part.inner_diameter if part.end_inner_diameter is None else part.end_inner_diameter,
+                    part.bore_at_end,
                     "end_inner_diameter",
                 ),
             )
@@ -253,6 +253,17 @@ def _shaft_parts(case: GearboxCase) -> Iterator[CaseError]:
                         limit=f"below {LENGTH.show(outer)}",
                     )
                     break
+        for j in range(1, len(shaft.part)):
+            before, part = shaft.part[j - 1], shaft.part[j]
+            bore = max(before.bore_at_end, part.inner_diameter)
+            if not bore < min(before.end_outer_diameter or before.outer_diameter, part.outer_diameter):
+                yield CaseError(
+                    "the part does not touch the one before it",
+                    code="E-SHAFT",
+                    key=f"shaft[{i}].part[{j}].outer_diameter",
+                    value=LENGTH.show(part.outer_diameter),
+                    limit=f"above {LENGTH.show(bore)}, the larger bore of both",
+                )
 
 
 def _stages(case: GearboxCase) -> Iterator[CaseError]:
@@ -271,7 +282,7 @@ def _stages(case: GearboxCase) -> Iterator[CaseError]:
                     yield CaseError(one.message, key=f"{where}.{one.key}" if one.key else where, **told)
 
 
-def _given_once(stage: PairSection | PlanetarySection, key: str) -> CaseError | None:
+def _given_once(stage: PairSection | BoxPlanetarySection, key: str) -> CaseError | None:
     """Teeth, or sizes with stiffnesses."""
     meshes = ("mesh",) if isinstance(stage, PairSection) else ("sun_mesh", "ring_mesh")
     given = stage.given("gears", *meshes)
@@ -308,15 +319,19 @@ def _pair(case: GearboxCase, stage: PairSection, key: str) -> Iterator[CaseError
     if None in shafts:
         only = next(shaft for shaft in shafts if shaft is not None)
         axes = (only.axis, only.axis) if sizes.internal else None
-        yield CaseError(
-            "a gear of a pair sits on a shaft",
-            code="E-CHOICE",
-            key=f"{key}.shafts",
-            value=CASING,
-            limit="two shafts",
-            remedy="give the standing gear a [[shaft]] and name it in operation.fixed",
-        ) if axes is None else CaseError(
-            "a ring in the casing belongs to a planetary stage", code="E-CHOICE", key=f"{key}.shafts", value=CASING
+        yield (
+            CaseError(
+                "a gear of a pair sits on a shaft",
+                code="E-CHOICE",
+                key=f"{key}.shafts",
+                value=CASING,
+                limit="two shafts",
+                remedy="give the standing gear a [[shaft]] and name it in operation.fixed",
+            )
+            if axes is None
+            else CaseError(
+                "a ring in the casing belongs to a planetary stage", code="E-CHOICE", key=f"{key}.shafts", value=CASING
+            )
         )
         return
     distance = math.dist(shafts[0].axis, shafts[1].axis)  # type: ignore[union-attr]
@@ -325,7 +340,7 @@ def _pair(case: GearboxCase, stage: PairSection, key: str) -> Iterator[CaseError
     yield from _mid_planes(places, sizes, f"{key}.positions")
 
 
-def _planetary(case: GearboxCase, stage: PlanetarySection, key: str) -> Iterator[CaseError]:
+def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Iterator[CaseError]:
     teeth = teeth_of(stage)
     if teeth is not None and teeth.train not in ("elastic", "planar", "helical"):
         yield _wrong_train(teeth, key, "planetary set")
@@ -336,8 +351,11 @@ def _planetary(case: GearboxCase, stage: PlanetarySection, key: str) -> Iterator
         yield CaseError("two members of a set on one shaft lock it", code="E-CHOICE", key=f"{key}.sun", value=twice)
         return
     sizes = set_sizes(stage)
-    shafts = [(name, case.shaft_named(getattr(stage, name))) for name in ("sun", "carrier", "ring")
-              if getattr(stage, name) != CASING]
+    shafts = [
+        (name, case.shaft_named(getattr(stage, name)))
+        for name in ("sun", "carrier", "ring")
+        if getattr(stage, name) != CASING
+    ]
     for name, shaft in shafts[1:]:
         if math.dist(shaft.axis, shafts[0][1].axis) > DISTANCE_TOLERANCE:
             yield CaseError(
@@ -426,6 +444,8 @@ def _loads(case: GearboxCase) -> Iterator[CaseError]:
 FILE = CaseFile(
     GearboxCase,
     check_gearbox_entries,
-    claims=lambda tables: "bearings on shafts" if isinstance(tables.get("shaft"), list) and "body" not in tables else "",
+    claims=lambda tables: (
+        "bearings on shafts" if isinstance(tables.get("shaft"), list) and "body" not in tables else ""
+    ),
     embed=embed_stages,
 )

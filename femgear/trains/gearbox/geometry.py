@@ -10,12 +10,18 @@ from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.planetary import equal_planet_angles
 from femgear.gears.profile import base_helix_angle
-from femgear.trains.gearbox.case_file import PairGearsSection, PairSection, PlanetarySection, SetGearsSection, teeth_of
+from femgear.trains.gearbox.case_file import (
+    BoxPlanetarySection,
+    PairGearsSection,
+    PairSection,
+    SetGearsSection,
+    teeth_of,
+)
 
 DISTANCE_TOLERANCE = 1e-5
 """Distance by which places that should be one may differ [m]."""
 # Ratios of radii and teeth that differ by more belong to no gears.
-_RATIO_TOLERANCE = 1e-3
+_RATIO_TOLERANCE = 0.01
 
 
 @dataclass(frozen=True)
@@ -99,7 +105,7 @@ def _base_radii(given: PairGearsSection) -> tuple[float, float]:
     return first, second
 
 
-def set_sizes(stage: PlanetarySection) -> StageSizes:
+def set_sizes(stage: BoxPlanetarySection) -> StageSizes:
     """Compute the sizes of sun, planets and ring of a stage.
 
     FemgearError: as `pair_sizes`; radii and distance that leave no working pressure angle (E-CENTRE-DISTANCE).

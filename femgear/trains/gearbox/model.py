@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -18,16 +19,16 @@ from femgear.case.estimates import gear_cylinder
 from femgear.case.gear_set import planetary_set
 from femgear.case.sections import gear_material
 from femgear.errors import CaseError
-from femgear.fe.beam import BeamShaft, RoundSection, ShaftPart, beam_shaft, body_matrices
+from femgear.fe.beam import BeamShaft, RoundSection, ShaftPart, beam_shaft, body_matrices, rigid_link
 from femgear.gears.iso6336 import pair_mesh_stiffness
-from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, Springs, joint, rigid_link
+from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, StationSprings, joint
 from femgear.trains.gearbox.case_file import (
     CASING,
-    BearingSection,
+    BoxBearingSection,
+    BoxPlanetarySection,
     GearboxCase,
     LoadCaseSection,
     PairSection,
-    PlanetarySection,
     teeth_of,
 )
 from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, set_sizes
@@ -39,7 +40,7 @@ HELD = {"space": (), "plane": (2, 3, 4), "rotation": (0, 1, 2, 3, 4)}
 
 @dataclass(frozen=True)
 class Seat:
-    """A place on a shaft: number of its station, and the way from there to the axis at the place (3,) [m]."""
+    """A place on a shaft: number of its ``station``, and the ``offset`` (3,) from there to the place [m]."""
 
     station: int
     offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -51,7 +52,7 @@ class StageModel:
 
     Parameters
     ----------
-    section : PairSection or PlanetarySection
+    section : PairSection or BoxPlanetarySection
         Its entries.
     sizes : StageSizes
         Of its gears.
@@ -69,7 +70,7 @@ class StageModel:
         Common face width of the (narrowest) mesh [m]; zero where not given.
     """
 
-    section: PairSection | PlanetarySection
+    section: PairSection | BoxPlanetarySection
     sizes: StageSizes
     meshes: tuple[int, ...]
     flank: int
@@ -102,7 +103,7 @@ class GearboxModel:
         First station of every shaft.
     stages : tuple of StageModel
         Pairs, then planetary sets.
-    bearings : tuple of Springs
+    bearings : tuple of StationSprings
         Of all bearings in their order: six rows of the inner ring's motion less that of the outer one.
     ports : mapping of str to Seat
         Where torques act.
@@ -118,7 +119,7 @@ class GearboxModel:
     beams: Mapping[str, BeamShaft]
     first: Mapping[str, int]
     stages: tuple[StageModel, ...]
-    bearings: tuple[Springs, ...]
+    bearings: tuple[StationSprings, ...]
     ports: Mapping[str, Seat]
     load: np.ndarray
     turns: np.ndarray
@@ -145,7 +146,7 @@ def gearbox_model(
     case: GearboxCase,
     load_case: LoadCaseSection | None = None,
     *,
-    mesh_stiffness: Mapping[str, Sequence[float]] | None = None,
+    mesh_stiffness: Mapping[str, Any] | None = None,
 ) -> GearboxModel:
     """Assemble shafts, bearings, stages and loads of a gearbox.
 
@@ -156,8 +157,8 @@ def gearbox_model(
     load_case : LoadCaseSection, optional
         Its torques and speeds; by default that which the case names first.
     mesh_stiffness : mapping of str to sequence, optional
-        Mean stiffnesses of the meshes of stages by their names: of a pair one, of a set sun-planet and
-        planet-ring [N/m]. Without it teeth have those of ISO 6336-1, method B.
+        Mean stiffnesses of all meshes of stages by their names [N/m]. Without it teeth have those of ISO 6336-1,
+        method B.
 
     Raises
     ------
@@ -173,13 +174,13 @@ def gearbox_model(
 class _Builder:
     """Collects stations and parts of a gearbox, one kind after the other."""
 
-    def __init__(self, case: GearboxCase, flow: BoxFlow, stiffness: Mapping[str, Sequence[float]]):
+    def __init__(self, case: GearboxCase, flow: BoxFlow, stiffness: Mapping[str, Any]):
         self.case, self.flow, self.stiffness = case, flow, stiffness
         self.names: list[str] = []
         self.places: list[tuple[float, float, float]] = []
         self.inertias: list[Inertia] = []
         self.stiff_beams: list[Beam] = []
-        self.springs: list[Springs] = []
+        self.springs: list[StationSprings] = []
         self.contacts: list[Contact] = []
         self.beams: dict[str, BeamShaft] = {}
         self.first: dict[str, int] = {}
@@ -276,8 +277,8 @@ class _Builder:
         positions = coupling.positions or (None, None)
         seats = [self.seat(shaft, place) for shaft, place in zip(coupling.between, positions, strict=True)]
         ends = [self._place(shaft, place) for shaft, place in zip(coupling.between, positions, strict=True)]
-        ends = [end if end is not None else ends[1 - i] for i, end in enumerate(ends)]
-        way = ends[1] - ends[0]
+        known = [end for end in ends if end is not None]
+        way = known[-1] - known[0]
         offsets = [
             np.asarray(seat.offset) + share * way
             for seat, share in zip(seats, (coupling.joint, coupling.joint - 1.0), strict=True)
@@ -294,7 +295,7 @@ class _Builder:
         section = self.case.shaft_named(shaft)
         return np.array([*section.axis, section.start + (position or 0.0)])
 
-    def _bearing(self, bearing: BearingSection, number: int) -> Springs:
+    def _bearing(self, bearing: BoxBearingSection, number: int) -> StationSprings:
         inner, outer = self.seat(bearing.shaft, bearing.position), Seat(GROUND)
         if bearing.outer_shaft is not None:
             outer = self.seat(bearing.outer_shaft, bearing.outer_position)
@@ -305,38 +306,42 @@ class _Builder:
         sizes, positions = pair_sizes(stage), stage.positions or (None, None)
         seats = [self.seat(shaft, place) for shaft, place in zip(stage.shafts, positions, strict=True)]
         middles = [self._place(shaft, place) for shaft, place in zip(stage.shafts, positions, strict=True)]
-        flank = -1 if self.flow.stage_torque[stage.name][stage.shafts[0]] > 0.0 else 1
+        flank = -1 if self.flow.first_torque(stage) > 0.0 else 1
         teeth = teeth_of(stage)
         if teeth is not None:
             for key, seat, shaft in zip(teeth.gear_names, seats, stage.shafts, strict=True):
                 self._body(seat, *self._gear_body(teeth, key), self.flow.speed[shaft])
         centres, width, middle = _common([np.asarray(m) for m in middles], sizes.face_widths)
         r1, r2 = sizes.base_radii
-        towards = (centres[1] - centres[0])[:2] / sizes.centre_distance
+        towards = (centres[1] - centres[0])[:2]
+        towards = towards / np.linalg.norm(towards)
         if sizes.internal:
             # the pinion touches the ring on its far side from the ring's axis
-            towards, reach = -towards, sizes.centre_distance * r1 / (r2 - r1)
+            towards, reach = -towards, sizes.centre_distance / (r2 - r1)
+            radii = reach * r1, reach * r2
         else:
-            reach = sizes.centre_distance * r1 / (r1 + r2)
-        pitch = np.append(centres[0][:2] + reach * towards, middle)
-        stiffness = self._mesh_stiffness(stage, 0)
+            reach = sizes.centre_distance / (r1 + r2)
+            radii = reach * r1, -reach * r2
+        # each gear is touched on its own pitch circle: axes may miss their distance by rounding
+        pitch = np.array([np.append(c[:2] + radius * towards, middle) for c, radius in zip(centres, radii)])
+        stiffness = self._mesh_stiffness(stage, 0, 0)
         number = self._contact(
             stage.name,
             (seats[0], seats[1]),
             pitch,
-            mesh_normal(towards, sizes.pressure_angles[0], sizes.base_helix, flank, internal=sizes.internal),
+            mesh_normal(towards, sizes.pressure_angles[0], sizes.base_helix, flank),
             width,
             stiffness,
         )
         return StageModel(stage, sizes, (number,), flank, (seats[0].station, seats[1].station), width=width)
 
-    def _planetary(self, stage: PlanetarySection) -> StageModel:
+    def _planetary(self, stage: BoxPlanetarySection) -> StageModel:
         sizes, flow = set_sizes(stage), self.flow
         members = {name: getattr(stage, name) for name in ("sun", "carrier", "ring")}
         seats = {name: self.seat(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
         places = {name: self._place(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
         ring = places["carrier"] if places["ring"] is None else places["ring"]
-        flank = -1 if flow.stage_torque[stage.name].get(members["sun"], 0.0) > 0.0 else 1
+        flank = -1 if flow.first_torque(stage) > 0.0 else 1
         centres, width, middle = _common([places["sun"], ring], (sizes.face_widths[0], sizes.face_widths[-1]))
         width = min([w for w in sizes.face_widths if w] or [0.0])
         axis, angles = centres[0][:2], tuple(stage.angle + psi for psi in _from_first(sizes.planet_angles))
@@ -351,11 +356,15 @@ class _Builder:
             for n, psi in enumerate(angles)
         ]
         contacts = []
+        place = np.append(axis, middle)
         for ring_mesh in (False, True):
             for n, (psi, planet) in enumerate(zip(angles, planets, strict=True)):
-                contacts.append(
-                    self._set_mesh(stage, sizes, seats, n, psi, planet, axis, middle, flank, width, ring_mesh)
-                )
+                pair = (Seat(planet), seats["ring"]) if ring_mesh else (seats["sun"], Seat(planet))
+                name = f"{stage.name} planet {n + 1}-ring" if ring_mesh else f"{stage.name} sun-planet {n + 1}"
+                normal, pitch = _set_mesh(sizes, psi, place, flank, ring_mesh=ring_mesh)
+                number = len(angles) * int(ring_mesh) + n
+                stiffness = self._mesh_stiffness(stage, int(ring_mesh), number)
+                contacts.append(self._contact(name, pair, pitch, normal, width, stiffness))
         stations = tuple(seats[name].station for name in ("sun", "carrier", "ring"))
         return StageModel(stage, sizes, tuple(contacts), flank, stations, tuple(planets), angles, width)
 
@@ -380,46 +389,28 @@ class _Builder:
         self.springs.append(joint(name, (carrier.station, station), (offset, np.zeros(3)), stiffness, axes=axes))
         return station
 
-    def _set_mesh(self, stage, sizes, seats, n, psi, planet, axis, middle, flank, width, ring_mesh: bool) -> int:
-        out = np.array([math.cos(psi), math.sin(psi)])
-        sun, planet_radius, ring = sizes.base_radii
-        if ring_mesh:
-            reach = sizes.centre_distance * ring / (ring - planet_radius)
-            pair, name = (Seat(planet), seats["ring"]), f"{stage.name} planet {n + 1}-ring"
-        else:
-            reach = sizes.centre_distance * sun / (sun + planet_radius)
-            pair, name = (seats["sun"], Seat(planet)), f"{stage.name} sun-planet {n + 1}"
-        # planets turn against the sun, and have the other hand
-        sense = -1 if ring_mesh else 1
-        normal = mesh_normal(
-            out,
-            sizes.pressure_angles[1 if ring_mesh else 0],
-            sense * sizes.base_helix,
-            sense * flank,
-            internal=ring_mesh,
-        )
-        pitch = np.append(axis + reach * out, middle)
-        return self._contact(name, pair, pitch, normal, width, self._mesh_stiffness(stage, int(ring_mesh)))
-
     def _contact(self, name: str, seats: tuple[Seat, Seat], pitch, normal, width: float, stiffness: float) -> int:
         slices = self.case.deflection.slices if width and self.case.motions == "space" else 1
         heights = (np.arange(slices) + 0.5) * width / slices - 0.5 * width if slices > 1 else np.zeros(1)
-        points = np.tile(pitch, (slices, 1))
-        points[:, 2] += heights
-        own = [points - np.asarray(self.places[s.station] if s.station != GROUND else (0, 0, 0)) for s in seats]
+        own = []
+        for seat, point in zip(seats, np.broadcast_to(pitch, (2, 3)), strict=True):
+            points = np.tile(point, (slices, 1))
+            points[:, 2] += heights
+            own.append(points - np.asarray(self.places[seat.station] if seat.station != GROUND else (0.0, 0.0, 0.0)))
         stations = (seats[0].station, seats[1].station)
         spread = np.full(slices, stiffness / slices)
         self.contacts.append(Contact(name, stations, np.asarray(normal), np.stack(own), heights, spread))
         return len(self.contacts) - 1
 
-    def _mesh_stiffness(self, stage: PairSection | PlanetarySection, mesh: int) -> float:
+    def _mesh_stiffness(self, stage: PairSection | BoxPlanetarySection, kind: int, mesh: int) -> float:
+        """Stiffness of a mesh [N/m]: as computed, as given, or of ISO 6336-1."""
         if stage.name in self.stiffness:
             return float(self.stiffness[stage.name][mesh])
-        section = stage.mesh if isinstance(stage, PairSection) else (stage.sun_mesh, stage.ring_mesh)[mesh]
+        section = stage.mesh if isinstance(stage, PairSection) else (stage.sun_mesh, stage.ring_mesh)[kind]
         if section is not None:
             return section.stiffness
-        gears = planetary_set(teeth_of(stage))
-        pair = gears if isinstance(stage, PairSection) else gears.kinds[mesh]
+        gears: Any = planetary_set(teeth_of(stage))
+        pair = gears if isinstance(stage, PairSection) else gears.kinds[kind]
         width = min(gear.face_width for gear in pair.gears)
         return width * pair_mesh_stiffness(pair)[1]
 
@@ -442,7 +433,7 @@ class _Builder:
             return found[0], found[1], found[2]
         return mass, inertia, diametral if math.isfinite(diametral) else 0.5 * inertia
 
-    def _planet_body(self, stage: PlanetarySection, teeth) -> tuple[float, float, float]:
+    def _planet_body(self, stage: BoxPlanetarySection, teeth) -> tuple[float, float, float]:
         given = stage.planet
         mass, polar, transverse = given.mass, given.inertia, given.transverse_inertia
         if teeth is not None:
@@ -476,7 +467,7 @@ class _Builder:
         return load
 
 
-def mesh_normal(towards, pressure_angle: float, base_helix: float, flank: int, *, internal: bool) -> np.ndarray:
+def mesh_normal(towards, pressure_angle: float, base_helix: float, flank: int) -> np.ndarray:
     """Compute the unit normal (3,) of a mesh, into gear 2, from its pressure angle in the transverse section.
 
     ``towards`` (2,) is the radial direction at the pitch point, away from the axis of gear 1. Gear 1 pushes
@@ -487,6 +478,18 @@ def mesh_normal(towards, pressure_angle: float, base_helix: float, flank: int, *
     radial, around = np.append(towards, 0.0), np.array([-towards[1], towards[0], 0.0])
     plane = math.sin(pressure_angle) * radial + flank * math.cos(pressure_angle) * around
     return math.cos(base_helix) * plane - flank * math.sin(base_helix) * np.array([0.0, 0.0, 1.0])
+
+
+def _set_mesh(sizes: StageSizes, psi: float, centre, flank: int, *, ring_mesh: bool) -> tuple[np.ndarray, np.ndarray]:
+    """Normal and pitch point (3,) of a mesh of a set with the planet at an angle; centre (3,) of the set [m]."""
+    out = np.array([math.cos(psi), math.sin(psi), 0.0])
+    sun, planet, ring = sizes.base_radii
+    reach = sizes.centre_distance * (ring / (ring - planet) if ring_mesh else sun / (sun + planet))
+    # planets turn against the sun, and have the other hand
+    sense = -1 if ring_mesh else 1
+    angle = sizes.pressure_angles[1 if ring_mesh else 0]
+    normal = mesh_normal(out[:2], angle, sense * sizes.base_helix, sense * flank)
+    return normal, centre + reach * out
 
 
 def _common(places, widths) -> tuple[list[np.ndarray], float, float]:
@@ -502,7 +505,7 @@ def _from_first(angles: Sequence[float]) -> list[float]:
     return [psi - angles[0] for psi in angles]
 
 
-def pin_flexibility(stage: PlanetarySection, case: GearboxCase) -> np.ndarray:
+def pin_flexibility(stage: BoxPlanetarySection, case: GearboxCase) -> np.ndarray:
     """Compute what a pin and the wind-up of the carrier give way by, (5,) radially, around, along, two tilts.
 
     A bar held at one end bends by ``L^3/(3 E I) + L/(kappa G A)`` and tilts by ``L/(E I)`` [m/N, rad/(N m)]; held at
@@ -550,7 +553,25 @@ def seats_on(case: GearboxCase, shaft: str) -> set[float]:
     return found
 
 
-def replace_stiffness(springs: Springs, stiffness: Sequence[float]) -> Springs:
+def replace_stiffness(springs: StationSprings, stiffness: Sequence[float]) -> StationSprings:
     """Copy six springs with these stiffnesses (6,), those of zero left out."""
     values = np.asarray(stiffness, float)
     return replace(springs, rows=springs.rows[values > 0.0], stiffness=values[values > 0.0])
+
+
+def bearing_places(model: GearboxModel) -> np.ndarray:
+    """Find the places (b, 3) of all bearings [m]."""
+    found = np.zeros((len(model.case.bearing), 3))
+    for number, bearing in enumerate(model.case.bearing):
+        shaft = model.case.shaft_named(bearing.shaft)
+        found[number] = *shaft.axis, shaft.start + (bearing.position or 0.0)
+    return found
+
+
+def bearing_motions(model: GearboxModel, motion: np.ndarray) -> np.ndarray:
+    """Compute the displacements (b, 3) of the shafts at all bearings [m] from the motions (6n,)."""
+    found = np.zeros((len(model.case.bearing), 3))
+    for number, bearing in enumerate(model.case.bearing):
+        seat = model.seat(bearing.shaft, bearing.position)
+        found[number] = (rigid_link(seat.offset) @ motion[6 * seat.station : 6 * seat.station + 6])[:3]
+    return found

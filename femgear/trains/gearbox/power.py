@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from femgear.gears.power_flow import PowerFlow, SpeedCondition, pair_condition, planetary_condition, power_flow
-from femgear.trains.gearbox.case_file import CASING, GearboxCase, LoadCaseSection
+from femgear.errors import CaseError, FemgearError
+from femgear.gears.power_flow import pair_condition, planetary_condition, power_flow
+from femgear.gears.shaft_graph import SpeedCondition
+from femgear.gears.stage_frequencies import StageFrequencies, stage_frequencies
+from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, GearboxCase, LoadCaseSection, PairSection
 from femgear.trains.gearbox.geometry import pair_sizes, set_sizes
+
+# Where the refusals of the graph stand in the case file.
+_KEYS = {
+    "E-SPEED": "operation.load_case[{}].speed",
+    "E-MECHANISM": "operation.load_case[{}].speed",
+    "E-LOAD-BALANCE": "operation.output",
+    "E-TORQUE": "operation.output",
+}
 
 
 @dataclass(frozen=True)
@@ -17,95 +27,125 @@ class BoxFlow:
 
     Parameters
     ----------
-    graph : PowerFlow
-        Of shafts and stages.
-    speed : mapping of str to float
-        Speeds of all shafts [rad/s]; that of the casing is zero.
     stage_torque : mapping of str to mapping
         Torques that the meshes of every stage put on its shafts [N m].
+    speed : mapping of str to float
+        Speeds of all shafts [rad/s]; that of the casing is zero.
     port_torque : mapping of str to float
         Torques from outside at every load and on every rigid body that has one [N m], reactions of outputs too.
     independent : tuple of str
         Shafts whose speeds are given, one for every way in which the gearbox turns.
-    planet_speed : mapping of str to float
-        Speed of the planets of every planetary stage [rad/s], against the casing.
-    mesh_frequency : mapping of str to float
-        Of every stage [Hz].
+    frequencies : mapping of str to StageFrequencies
+        Of every stage.
     """
 
-    graph: PowerFlow
-    speed: Mapping[str, float]
     stage_torque: Mapping[str, Mapping[str, float]]
+    speed: Mapping[str, float]
     port_torque: Mapping[str, float]
     independent: tuple[str, ...]
-    planet_speed: Mapping[str, float]
-    mesh_frequency: Mapping[str, float]
+    frequencies: Mapping[str, StageFrequencies]
+
+    def first_torque(self, stage: PairSection | BoxPlanetarySection) -> float:
+        """Torque that the meshes of a stage put on its gear 1, or on its sun, which may stand in the casing [N m]."""
+        torques = self.stage_torque[stage.name]
+        if isinstance(stage, PairSection):
+            return torques[stage.shafts[0]]
+        sun, _, ring = set_sizes(stage).teeth
+        if stage.sun != CASING:
+            return torques[stage.sun]
+        # the torques of the members are as z_s, z_r and -(z_s + z_r) (Willis)
+        return -torques[stage.carrier] * sun / (sun + ring)
+
+    @property
+    def mesh_frequency(self) -> dict[str, float]:
+        """Mesh frequency of every stage [Hz]."""
+        return {name: next(iter(one.mesh_frequency.values())) for name, one in self.frequencies.items()}
+
+    @property
+    def planet_speed(self) -> dict[str, float]:
+        """Speed of the planets of every planetary stage [rad/s], against the casing."""
+        return {
+            name: next(iter(one.planet_speed.values())) for name, one in self.frequencies.items() if one.planet_speed
+        }
 
 
 def stage_conditions(case: GearboxCase) -> list[SpeedCondition]:
     """List the kinematic conditions of all stages, pairs first."""
     found = []
     for stage in case.pair:
-        sizes = pair_sizes(stage)
-        found.append(pair_condition(stage.name, *stage.shafts, *sizes.teeth, internal=sizes.internal))
+        sizes, (first, second) = pair_sizes(stage), stage.shafts
+        found.append(pair_condition(stage.name, first, second, *sizes.teeth[:2], internal=sizes.internal))
     for stage in case.planetary:
         sun, _, ring = set_sizes(stage).teeth
         members = [None if name == CASING else name for name in (stage.sun, stage.carrier, stage.ring)]
-        found.append(planetary_condition(stage.name, *members, sun, ring))
+        found.append(planetary_condition(stage.name, members[0], members[1], members[2], sun, ring))
     return found
 
 
 def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) -> BoxFlow:
-    """Compute speeds and torques of all shafts of a gearbox in a load case.
+    """Compute speeds and torques of all shafts of a gearbox in a load case, without losses.
 
     CaseError: shafts that are free, loops that lock, speeds that contradict one another, torques that do not
     balance; the entries that it names are those of the case file.
     """
     load_case = load_case or case.load_case
-    shaft_of = {one.name: one.shaft for one in case.load}
-    shaft_of |= {one.name: one.name for one in case.shaft if not one.part}
-    joined = [tuple(one.between) for one in case.coupling if one.transmits and one.torsion > 0.0]
+    shaft_of = port_shafts(case)
+    joined = [one.between for one in case.coupling if one.transmits and one.torsion > 0.0]
     held = {*case.operation.fixed, *(name for pair in joined if CASING in pair for name in pair if name != CASING)}
     torques: dict[str, float] = {}
     for port, torque in load_case.torque.items():
         torques[shaft_of[port]] = torques.get(shaft_of[port], 0.0) + torque
     outputs = [shaft_of[port] for port in case.operation.output]
-    graph = power_flow(
-        [shaft.name for shaft in case.shaft],
-        stage_conditions(case),
-        speeds=load_case.speed,
-        torques=torques,
-        held=sorted(held),
-        outputs=outputs,
-        joined=[pair for pair in joined if CASING not in pair],
-    )
+    conditions = stage_conditions(case)
+    try:
+        graph = power_flow(
+            [shaft.name for shaft in case.shaft],
+            conditions,
+            speeds=load_case.speed,
+            torques={shaft: torque for shaft, torque in torques.items() if shaft not in outputs},
+            held=sorted(held),
+            outputs=outputs,
+            joined=[pair for pair in joined if CASING not in pair],
+        )
+    except FemgearError as error:
+        _locate(error, case, load_case)
+        raise
     ports = dict(load_case.torque)
     for port in case.operation.output:
-        ports[port] = graph.torque[shaft_of[port]] - torques.get(shaft_of[port], 0.0)
-    return BoxFlow(
-        graph,
-        {**graph.speed, CASING: 0.0},
-        graph.stage_torque,
-        ports,
-        tuple(load_case.speed),
-        {stage.name: _planet_speed(stage, graph.speed) for stage in case.planetary},
-        mesh_frequencies(case, graph.speed),
-    )
+        others = sum(value for name, value in load_case.torque.items() if shaft_of[name] == shaft_of[port])
+        ports[port] = graph.torque[shaft_of[port]] - others
+    planets = {stage.name: set_sizes(stage) for stage in case.planetary}
+    frequencies = {
+        one.name: stage_frequencies(
+            one,
+            graph.speed,
+            planet_teeth={"planet": planets[one.name].teeth[1]} if one.name in planets else None,
+            planets=len(planets[one.name].planet_angles) if one.name in planets else 0,
+        )
+        for one in conditions
+    }
+    independent = tuple(name for name in load_case.speed if {*graph.speed_ratio[name]} == {name})
+    return BoxFlow(dict(graph.stage_torque), {**graph.speed, CASING: 0.0}, ports, independent, frequencies)
 
 
-def _planet_speed(stage, speed: Mapping[str, float]) -> float:
-    """Speed of a planet on its carrier plus that of the carrier [rad/s] (Willis)."""
-    sun, planet, _ = set_sizes(stage).teeth
-    carrier = speed.get(stage.carrier, 0.0)
-    return carrier - (speed.get(stage.sun, 0.0) - carrier) * sun / planet
+def port_shafts(case: GearboxCase) -> dict[str, str]:
+    """List the shafts of loads, and of shafts that are one rigid body, by the names of these."""
+    found = {shaft.name: shaft.name for shaft in case.shaft if not shaft.part}
+    return found | {load.name: load.shaft for load in case.load}
 
 
-def mesh_frequencies(case: GearboxCase, speed: Mapping[str, float]) -> dict[str, float]:
-    """Compute the mesh frequency of every stage [Hz]: teeth times the turns of a gear against its carrier."""
-    found = {}
-    for stage in case.pair:
-        found[stage.name] = pair_sizes(stage).teeth[0] * abs(speed.get(stage.shafts[0], 0.0)) / (2.0 * math.pi)
-    for stage in case.planetary:
-        turning = abs(speed.get(stage.sun, 0.0) - speed.get(stage.carrier, 0.0))
-        found[stage.name] = set_sizes(stage).teeth[0] * turning / (2.0 * math.pi)
-    return found
+def _locate(error: FemgearError, case: GearboxCase, load_case: LoadCaseSection) -> None:
+    """Let refusals of the graph name the entries of the case file."""
+    number = case.operation.load_case.index(load_case)
+    for problem in (error, *getattr(error, "problems", ())):
+        if isinstance(problem, CaseError) and not problem.key:
+            problem.key = _KEYS.get(problem.code, "operation.load_case[{}].speed").format(number)
+
+
+def turns_in_words(frequencies: StageFrequencies) -> str:
+    """Say after how many turns the same teeth of the first mesh of a stage meet again, and in what time."""
+    mesh = next(iter(frequencies.hunting_turns), None)
+    if mesh is None:
+        return "-"
+    first, second = frequencies.hunting_turns[mesh]
+    return f"{first} and {second} turns, {frequencies.hunting_time[mesh]:.4g} s"

@@ -1,0 +1,416 @@
+"""System deflection: shafts, bearings, casing and teeth together under a load, and the teeth that it misaligns.
+
+Newton's method on ``K q + B f(B^T q) + W p(W^T q) = load``: beams and linear springs in K, forces f of rolling
+bearings by their geometry, slices p of the meshes as springs that only press. The distribution of the load over the
+width comes from the contact of the teeth with the slopes that the system gives them; it shifts the slices, and the
+system is solved again until the slopes have settled.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.errors import CaseError, ConvergenceError
+from femgear.system.assembly import GROUND, MOTIONS, Assembly, StationSprings
+from femgear.system.bearing_life import basic_rating_life, reference_rating_life
+from femgear.system.rolling_bearings import BallBearing, Bearing, BearingState, RollerBearing, bearing_state
+from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
+from femgear.trains.gearbox.contact import StageContact, stage_contact
+from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
+
+_STEPS = 200
+_SETTLED = 1e-11  # residual force over the largest one
+_BALANCED = 1e-6
+# Stiffness that holds what hangs in clearances while bearings find their place, over that of a bearing.
+_GUESS = 1e8
+
+
+@dataclass(frozen=True)
+class Deflection:
+    """Loaded state of a gearbox.
+
+    Parameters
+    ----------
+    model : GearboxModel
+        The gearbox, with the mesh stiffnesses of the last contact.
+    motion : (6n,) array
+        Of all stations [m, rad].
+    slice_force : (g,) array
+        Force of every slice of every mesh [N].
+    bearing_force : (b, 6) array
+        Of every bearing on the shaft that it holds: along x, y, z [N] and about them [N m].
+    bearing_stiffness : (b, 6, 6) array
+        Tangents of all bearings at the loaded state [N/m, N, N m/rad].
+    states : tuple of BearingState or None
+        Of bearings by their geometry.
+    residual : float
+        Largest force out of balance over the largest force.
+    iterations : int
+        Newton steps of the last pass.
+    contacts : mapping of str to StageContact
+        Load distributions of the stages with teeth, by name.
+    slopes : tuple of array
+        Slopes of the meshes of every pass [rad]: of the approach of the flanks along the width.
+    settled : bool
+        Whether the slopes of the last two passes agree.
+    """
+
+    model: GearboxModel
+    motion: np.ndarray
+    slice_force: np.ndarray
+    bearing_force: np.ndarray
+    bearing_stiffness: np.ndarray
+    states: tuple[BearingState | None, ...]
+    residual: float
+    iterations: int
+    contacts: Mapping[str, StageContact]
+    slopes: tuple[np.ndarray, ...] = ()
+    settled: bool = True
+
+    @property
+    def mesh_force(self) -> np.ndarray:
+        """Force of every mesh along its normal [N]."""
+        return np.array([self.slice_force[part].sum() for part in self.model.assembly.slices])
+
+    @property
+    def mesh_slope(self) -> np.ndarray:
+        """Slope of the approach of the flanks of every mesh along its width [rad], closer at z > 0 positive."""
+        return mesh_slopes(self.model.assembly, self.motion)
+
+
+def rolling_bearing(section: BoxBearingSection) -> Bearing:
+    """Make the rolling bearing of a section that has a kind.
+
+    CaseError: numbers that no bearing can have (E-BEARING).
+    """
+    count, size = section.rolling_elements, section.element_diameter
+    assert count is not None and size is not None and section.pitch_diameter is not None
+    common = {
+        "contact_angle": section.contact_angle,
+        "clearance": section.clearance,
+        "axial_preload": section.preload,
+        "rows": section.rows,
+        "row_distance": section.row_distance,
+    }
+    if section.kind == "ball":
+        return BallBearing(
+            count,
+            size,
+            section.pitch_diameter,
+            inner_osculation=section.inner_osculation,
+            outer_osculation=section.outer_osculation,
+            **common,
+        )
+    assert section.kind is not None and section.effective_length is not None
+    return RollerBearing(section.kind, count, section.effective_length, section.pitch_diameter, size, **common)
+
+
+def mesh_slopes(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
+    """Compute the slopes of the approach of all meshes along their widths [rad] from the motions (6n,)."""
+    approach = assembly.columns.T @ motion
+    found = np.zeros(len(assembly.contacts))
+    for number, (contact, part) in enumerate(zip(assembly.contacts, assembly.slices, strict=True)):
+        if len(contact.heights) > 1:
+            found[number] = contact.heights @ approach[part] / (contact.heights @ contact.heights)
+    return found
+
+
+def solve_deflection(
+    case: GearboxCase, load_case: LoadCaseSection | None = None, *, slopes: Sequence[float] | None = None, steps=None
+) -> Deflection:
+    """Solve for the loaded state of a gearbox, teeth and system in turn until the slopes of the meshes settle.
+
+    Parameters
+    ----------
+    case : GearboxCase
+        From `femgear.read_case`.
+    load_case : LoadCaseSection, optional
+        By default that which the case names first.
+    slopes : (meshes,) floats, optional
+        Slopes from which the first contact starts [rad]; by default those of the system with linear meshes.
+    steps : Steps, optional
+        What other computations have left of compliances.
+
+    Raises
+    ------
+    CaseError
+        See `gearbox_model`; motions that nothing holds (E-MECHANISM).
+    ConvergenceError
+        No balance, as of a bearing whose clearance swallows the load (E-CONVERGENCE).
+    """
+    model = gearbox_model(case, load_case)
+    gap = np.zeros(len(model.assembly.slice_stiffness))
+    found = solve_state(model, gap)
+    staged = [stage for stage in model.stages if stage.section.teeth is not None]
+    if not (staged and case.deflection.contact and case.motions == "space"):
+        return replace(found, slopes=(found.mesh_slope,))
+    history = [np.asarray(slopes, float) if slopes is not None else found.mesh_slope]
+    contacts: dict[str, StageContact] = {}
+    settled = False
+    for _ in range(case.deflection.passes):
+        contacts = {stage.name: _contact(model, stage, history[-1], steps) for stage in staged}
+        stiffness = {name: contact.stiffness for name, contact in contacts.items()}
+        model = gearbox_model(case, load_case, mesh_stiffness=stiffness)
+        gap = _gaps(model, staged, contacts, history[-1])
+        found = solve_state(model, gap, start=found)
+        history.append(found.mesh_slope)
+        if _agree(model, history[-1], history[-2], case.deflection.tolerance):
+            settled = True
+            break
+    return replace(found, contacts=contacts, slopes=tuple(history), settled=settled)
+
+
+def _contact(model: GearboxModel, stage: StageModel, slopes: np.ndarray, steps) -> StageContact:
+    """Contact of the teeth of a stage with the slopes of its meshes."""
+    torque, own = -model.flow.first_torque(stage.section), slopes[list(stage.meshes)]
+    return stage_contact(stage.section, torque, own, slices=model.case.deflection.slices, steps=steps)
+
+
+def _gaps(model, staged, contacts, slopes) -> np.ndarray:
+    """Gaps (g,) of the slices with which springs have the loads of the contact at the slopes that it had [m]."""
+    assembly = model.assembly
+    gap = np.zeros(len(assembly.slice_stiffness))
+    for stage in staged:
+        contact = contacts[stage.name]
+        for place, mesh in enumerate(stage.meshes):
+            one, part = assembly.contacts[mesh], assembly.slices[mesh]
+            force = contact.shares_at(place, len(one.heights)) * contact.normal_force[place]
+            # an even approach is that of the whole mesh; the slope is that with which the contact was solved
+            gap[part] = slopes[mesh] * one.heights + force.sum() / one.stiffness.sum() - force / one.stiffness
+    return gap
+
+
+def _agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: float) -> bool:
+    """Whether slopes agree: their difference over the width against the approach of the mesh."""
+    for stage in model.stages:
+        for mesh in stage.meshes:
+            contact = model.assembly.contacts[mesh]
+            width = stage.width
+            size = max(abs(new[mesh]) * width, 1e-7)
+            if abs(new[mesh] - old[mesh]) * width > max(tolerance * size, 1e-12) and len(contact.heights) > 1:
+                return False
+    return True
+
+
+def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | None = None) -> Deflection:
+    """Solve for the balance of all forces with given gaps (g,) of the slices [m].
+
+    Raises
+    ------
+    CaseError
+        Motions that nothing holds (E-MECHANISM).
+    ConvergenceError
+        No balance (E-CONVERGENCE).
+    """
+    assembly, case = model.assembly, model.case
+    held = assembly.held.copy()
+    held[model.turns] = True
+    fixed = replace(assembly, held=held)
+    T, K, W, k = fixed.motions, assembly.stiffness, assembly.columns, assembly.slice_stiffness
+    rolling = [
+        (number, rolling_bearing(section), springs)
+        for number, (section, springs) in enumerate(zip(case.bearing, model.bearings, strict=True))
+        if section.kind is not None
+    ]
+    _check_held(fixed, T, K, W, k, rolling)
+    scale = max(np.abs(model.load).max(initial=0.0), 1e-9)
+    y = np.zeros(T.shape[1]) if start is None else np.linalg.lstsq(T, start.motion, rcond=None)[0]
+    if start is None and rolling:
+        y = _guess(T, K, W, k, gap, rolling, model.load, assembly)
+
+    def forces(y):
+        q = T @ y
+        press = np.maximum(W.T @ q - gap, 0.0)
+        inner = K @ q + W @ (k * press)
+        tangent = K + (W * (k * (press > 0.0))) @ W.T
+        for _, bearing, springs in rolling:
+            rows = _spread(springs, assembly)
+            state = bearing_state(bearing, rows @ q)
+            inner = inner + rows.T @ state.force
+            tangent = tangent + rows.T @ state.stiffness @ rows
+        return T.T @ (model.load - inner), T.T @ tangent @ T
+
+    y, residual, iterations = _newton(forces, y, scale)
+    q = T @ y
+    return _state(model, q, gap, rolling, residual, iterations)
+
+
+def _newton(forces, y: np.ndarray, scale: float) -> tuple[np.ndarray, float, int]:
+    """Newton's method with a shorter step where the residual does not fall."""
+    residual, tangent = forces(y)
+    size = np.abs(residual).max(initial=0.0)
+    for iteration in range(_STEPS):
+        if size <= _SETTLED * scale:
+            return y, size / scale, iteration
+        step = _solved(tangent, residual)
+        share = 1.0
+        while True:
+            trial = y + share * step
+            new, new_tangent = forces(trial)
+            new_size = np.abs(new).max(initial=0.0)
+            if new_size < size * (1.0 - 1e-4 * share) or share < 1e-3:
+                break
+            share *= 0.5
+        if share < 1e-3 and not new_size < size:
+            # rounding of stiff springs leaves the last digits open
+            if size <= 1e-7 * scale:
+                return y, size / scale, iteration
+            trial = y + step
+            new, new_tangent = forces(trial)
+            new_size = np.abs(new).max(initial=0.0)
+        y, residual, tangent, size = trial, new, new_tangent, new_size
+    if size <= 1e-7 * scale:
+        return y, size / scale, _STEPS
+    raise ConvergenceError(
+        f"the loads of the gearbox find no balance: {size:.3g} N are left",
+        code="E-CONVERGENCE",
+        key="bearing",
+        limit=f"{_SETTLED:g} of the largest load",
+        remedy="check bearings whose clearance swallows the load, and what takes the thrust",
+    )
+
+
+def _solved(tangent: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Newton step; motions without stiffness, as in clearances, are held softly."""
+    size = np.sqrt(np.abs(np.diag(tangent)))
+    size[size == 0.0] = size[size > 0.0].min(initial=1.0)
+    scaled = tangent / np.outer(size, size)
+    return np.linalg.solve(scaled + 1e-10 * np.eye(len(size)), residual / size) / size
+
+
+def _guess(T, K, W, k, gap, rolling, load, assembly) -> np.ndarray:
+    """Motions with a linear spring in the place of every rolling bearing."""
+    tangent = K + (W * k) @ W.T
+    for _, bearing, springs in rolling:
+        rows = _spread(springs, assembly)
+        # a tapered or angular bearing holds against thrust of one sense only: the start has both
+        lever = 0.25 * bearing.pitch_diameter
+        tangent = tangent + (rows.T * (_GUESS * np.array([1, 1, 1, lever**2, lever**2, 0.0]))) @ rows
+    return _solved(T.T @ tangent @ T, T.T @ (load + W @ (k * gap)))
+
+
+def _spread(springs: StationSprings, assembly: Assembly) -> np.ndarray:
+    """Rows (r, 6n) of springs among all motions."""
+    found = np.zeros((len(springs.rows), assembly.count))
+    for at, station in enumerate(springs.stations):
+        if station != GROUND:
+            found[:, 6 * station : 6 * station + 6] += springs.rows[:, 6 * at : 6 * at + 6]
+    return found
+
+
+def _check_held(fixed: Assembly, T, K, W, k, rolling) -> None:
+    """Refuse motions that neither springs nor bearings nor meshes hold."""
+    tangent = K + (W * k) @ W.T
+    for _, bearing, springs in rolling:
+        rows, lever = _spread(springs, fixed), 0.25 * bearing.pitch_diameter
+        held = np.array([1.0, 1.0, float(_thrust(bearing)), lever**2, lever**2, 0.0])
+        if getattr(bearing, "kind", "") == "spherical":
+            held[3:5] = 0.0
+        tangent = tangent + (rows.T * (_GUESS * held)) @ rows
+    reduced = T.T @ tangent @ T
+    size = np.sqrt(np.abs(np.diag(reduced)))
+    size[size == 0.0] = 1.0
+    values, vectors = np.linalg.eigh(reduced / np.outer(size, size))
+    loose = values < 1e-11 * values[-1] if len(values) else np.zeros(0, bool)
+    if not loose.any():
+        return
+    motion = T @ (vectors[:, loose] / size[:, None])
+    names = []
+    for column in motion.T:
+        weight = np.abs(column) * np.tile([1, 1, 1, 0.05, 0.05, 0.05], len(fixed.names))
+        station, way = divmod(int(weight.argmax()), 6)
+        names.append(f"{fixed.names[station]} ({'along z' if way == 2 else MOTIONS[way]})")
+    raise CaseError(
+        f"nothing holds {len(names)} motion{'s' * (len(names) > 1)}: {', '.join(dict.fromkeys(names))}",
+        code="E-MECHANISM",
+        key="bearing",
+        limit="bearings that hold every shaft across, along and against tilting",
+        remedy='give every shaft two bearings across and one along its axis (axial = "rigid" or a stiffness), '
+        "and take the thrust of helical teeth",
+    )
+
+
+def _thrust(bearing: Bearing) -> bool:
+    """Whether a bearing holds along the axis."""
+    return isinstance(bearing, BallBearing) or bearing.kind in ("tapered", "spherical")
+
+
+def _state(model, q, gap, rolling, residual, iterations) -> Deflection:
+    """Forces and tangents of all bearings and slices at the motions."""
+    assembly, case = model.assembly, model.case
+    press = np.maximum(assembly.columns.T @ q - gap, 0.0)
+    force, stiffness = np.zeros((len(case.bearing), 6)), np.zeros((len(case.bearing), 6, 6))
+    states: list[BearingState | None] = [None] * len(case.bearing)
+    for number, bearing, springs in rolling:
+        state = bearing_state(bearing, _spread(springs, assembly) @ q)
+        states[number], force[number], stiffness[number] = state, -state.force, state.stiffness
+    _linear_bearings(model, q, press, rolling, force, stiffness)
+    return Deflection(
+        model, q, assembly.slice_stiffness * press, force, stiffness, tuple(states), residual, iterations, {}
+    )
+
+
+def _linear_bearings(model, q, press, rolling, force, stiffness) -> None:
+    """Forces of bearings of given stiffness; those of rigid ones balance their stations."""
+    assembly, case = model.assembly, model.case
+    geared = {number for number, *_ in rolling}
+    rigid: list[tuple[int, int]] = []
+    for number, (section, springs) in enumerate(zip(case.bearing, model.bearings, strict=True)):
+        if number in geared:
+            continue
+        values = np.array(section.stiffness)
+        finite = np.where(np.isfinite(values), values, 0.0)
+        stiffness[number] = np.diag(values)
+        force[number] = -finite * (_spread(springs, assembly) @ q)
+        rigid += [(number, int(way)) for way in np.flatnonzero(np.isinf(values))]
+    if not rigid:
+        return
+    # what is out of balance at all stations is what rigid bearings, joints and held motions carry
+    left = model.load - assembly.stiffness @ q - assembly.columns @ (assembly.slice_stiffness * press)
+    for number, springs in enumerate(model.bearings):
+        finite = np.isfinite(force[number]) & ~np.isin(np.arange(6), [w for n, w in rigid if n == number])
+        rows = _spread(springs, assembly)
+        if number in geared:
+            left = left + rows.T @ force[number]
+    rows = np.array([_spread(model.bearings[number], assembly)[way] for number, way in rigid])
+    others = _conditions(assembly, model)
+    found = np.linalg.lstsq(np.vstack([rows, others]).T, left, rcond=None)[0]
+    for (number, way), value in zip(rigid, found[: len(rigid)], strict=True):
+        force[number, way] = -value
+
+
+def _conditions(assembly: Assembly, model: GearboxModel) -> np.ndarray:
+    """Rows of what is rigid or held but no bearing: joints, pins, held motions, given turns."""
+    own = {springs.name for springs in model.bearings}
+    rows = [np.zeros((0, assembly.count))]
+    for springs in assembly.springs:
+        if springs.name not in own and np.isinf(springs.stiffness).any():
+            rows.append(_spread(springs, assembly)[np.isinf(springs.stiffness)])
+    held = np.flatnonzero(assembly.held)
+    both = np.unique(np.concatenate([held, model.turns]))
+    rows.append(np.eye(assembly.count)[both])
+    return np.vstack(rows)
+
+
+def bearing_lives(found: Deflection) -> np.ndarray:
+    """Compute the lives (b, 2) of all bearings in hours: L10 of ISO 281, L10r of ISO/TS 16281.
+
+    NaN without geometry and dynamic rating; infinite without load or at rest.
+    """
+    lives = np.full((len(found.states), 2), np.nan)
+    speed = found.model.flow.speed
+    for number, (section, state) in enumerate(zip(found.model.case.bearing, found.states, strict=True)):
+        if state is None or section.dynamic_rating is None:
+            continue
+        force = found.bearing_force[number]
+        turning = abs(speed[section.shaft] - speed[section.outer_shaft or CASING])
+        hours = 1e6 * 2.0 * math.pi / 3600.0 / turning if turning else math.inf
+        basic = basic_rating_life(
+            state.bearing, math.hypot(force[0], force[1]), abs(float(force[2])), section.dynamic_rating
+        )
+        lives[number] = basic * hours, reference_rating_life(state, section.dynamic_rating) * hours
+    return lives

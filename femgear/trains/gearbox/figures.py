@@ -1,0 +1,183 @@
+"""Pictures of a gearbox: deflected shafts with bearing forces and load patterns, modes, Campbell diagram."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.report.response import campbell
+from femgear.report.style import BLACK, COLOURS, GREY, SIZE, VERMILION, label, legend_below, new_figure
+from femgear.stages.protocol import Drawn, Figures
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+_ARROW = 46.0  # length of the longest arrow [points]
+_MOST_MODES = 24
+_DASHES = ("-", "--", "-.", ":")
+_PLANES = ((0, "x"), (1, "y"))
+
+
+def deflected_shafts(deflection: xr.Dataset) -> Figure:
+    """Draw the deflection of all shafts along their axes in both planes, with the forces of the bearings.
+
+    Of deflection.nc at its chosen load case.
+    """
+    one = deflection.isel(load_case=int(deflection.attrs["load_case"]))
+    place, moved = one["place"].values, one["displacement"].values[:, :3]
+    member, shafts = one["member"].values, one["shaft"].values
+    figure, axes = new_figure(columns=2, width=12.0, height=5.4)
+    for ax, (way, axis) in zip(axes, _PLANES, strict=True):
+        for number, shaft in enumerate(shafts):
+            own = np.flatnonzero(member == shaft)
+            own = own[np.argsort(place[own, 2])]
+            style = {"color": COLOURS[number % len(COLOURS)], "marker": "o" if len(own) == 1 else "."}
+            ax.plot(1e3 * place[own, 2], 1e6 * moved[own, way], linewidth=2.2, label=str(shaft), **style)
+        ax.axhline(0.0, color=GREY, linewidth=0.8)
+        ax.margins(0.08, 0.34)
+        _arrows(ax, one, way)
+        label(ax, "z [mm]", f"deflection along {axis} [µm]")
+    legend_below(figure, axes[0], columns=6)
+    return figure
+
+
+def _arrows(ax, one: xr.Dataset, way: int) -> None:
+    """Draw the forces of the bearings on their shafts, the longest one `_ARROW` points long."""
+    force, place, moved = (one[name].values for name in ("bearing_force", "bearing_place", "bearing_displacement"))
+    largest = float(np.abs(force[:, :2]).max(initial=0.0))
+    for name, vector, at, motion in zip(one["bearing"].values, force, place, moved, strict=True):
+        if not largest or abs(vector[way]) < 1e-3 * largest:
+            continue
+        length = _ARROW * vector[way] / largest
+        tip = (1e3 * at[2], 1e6 * motion[way])
+        style = {"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
+        ax.annotate("", tip, (0.0, -length), textcoords="offset points", arrowprops=style)
+        ax.annotate(
+            f"{name}\n{abs(vector[way]):.3g} N",
+            tip,
+            (0.0, -length - np.sign(length) * 3.0),
+            textcoords="offset points",
+            ha="center",
+            va="top" if length > 0.0 else "bottom",
+            fontsize=SIZE - 3,
+        )
+
+
+def load_patterns(deflection: xr.Dataset) -> Figure | None:
+    """Draw the load of every mesh over its width, of deflection.nc at its chosen load case."""
+    if "line_load" not in deflection:
+        return None
+    load, height = deflection["line_load"].values, deflection["slice_height"].values
+    shown = [i for i in range(len(load)) if np.isfinite(load[i]).any()]
+    figure, (ax,) = new_figure(width=8.0, height=4.6)
+    drawn: dict[bytes, list[str]] = {}
+    for i in shown:
+        drawn.setdefault(np.round(load[i], 1).tobytes() + np.round(height[i], 9).tobytes(), []).append(
+            str(deflection["mesh"].values[i])
+        )
+    for number, names in enumerate(drawn.values()):
+        i = list(deflection["mesh"].values).index(names[0])
+        text = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} alike"
+        factor = float(deflection["face_load_factor"].values[int(deflection.attrs["load_case"]), i])
+        text += "" if np.isnan(factor) else f", K_Hβ {factor:.3f}"
+        style = {
+            "color": COLOURS[number % len(COLOURS)],
+            "linestyle": ("-", "--", "-.", ":")[number // len(COLOURS) % 4],
+        }
+        ax.plot(1e3 * height[i], 1e-3 * load[i], linewidth=2.0, label=text, **style)
+    ax.set_ylim(bottom=0.0)
+    label(ax, "place on the width, from its middle [mm]", "load per width [N/mm]")
+    legend_below(figure, ax, columns=2)
+    return figure
+
+
+def mode_energy(modes: xr.Dataset) -> Figure:
+    """Draw which part holds the strain energy of the elastic modes of modes.nc."""
+    hertz = modes["frequency"].values
+    chosen = np.flatnonzero(hertz > 0.0)[:_MOST_MODES]
+    strain, parts = modes["strain"].values[:, chosen], modes["part"].values
+    figure, (ax,) = new_figure(width=10.0, height=5.0)
+    order = np.argsort(-strain.sum(axis=1))
+    bottom, place = np.zeros(len(chosen)), np.arange(len(chosen))
+    kept = order[: len(COLOURS) - 1]
+    for number, part in enumerate(kept):
+        ax.bar(place, strain[part], 0.8, bottom=bottom, color=COLOURS[number], label=str(parts[part]))
+        bottom += strain[part]
+    if len(order) > len(kept):
+        rest = strain[order[len(kept) :]].sum(axis=0)
+        ax.bar(place, rest, 0.8, bottom=bottom, color=GREY, label="all others")
+    names = [f"{hertz[i]:.0f} Hz\n{modes['kind'].values[i]}" for i in chosen]
+    ax.set_xticks(place, names, rotation=90, fontsize=SIZE - 2)
+    ax.set_ylim(0.0, 1.0)
+    ax.grid(False, axis="x")
+    label(ax, "", "share of the strain energy [1]")
+    legend_below(figure, ax, columns=3)
+    return figure
+
+
+def gearbox_campbell(modes: xr.Dataset) -> Figure:
+    """Draw natural frequencies over the speed with turns and mesh lines of all stages, from modes.nc."""
+    speed = modes["campbell_speed"].values
+    frequency = modes["campbell_frequency"].values
+    lines = modes["order"].values / 60.0
+    kept = [
+        i
+        for i, slope in enumerate(lines)
+        if slope * speed.max() >= np.nanmin(frequency[frequency > 0.0], initial=np.inf)
+    ]
+    figure = campbell(
+        speed,
+        frequency,
+        orders=lines[kept],
+        order_names=modes["line"].values[kept],
+        critical=np.column_stack([modes["critical_speed"].values, modes["critical_frequency"].values]),
+        speed_unit=f"rpm of {modes.attrs['reference']}",
+    )
+    ax, at = figure.axes[0], float(modes.attrs["speed"])
+    if 0.0 < at < speed.max():
+        ax.axvline(at, color=VERMILION, linewidth=1.4)
+        ax.annotate(
+            "operation",
+            (at, 1.0),
+            (4, -4),
+            xycoords=ax.get_xaxis_transform(),
+            textcoords="offset points",
+            va="top",
+            color=VERMILION,
+            fontsize=SIZE - 2,
+        )
+    return figure
+
+
+def _draw_deflection(drawn: Drawn) -> dict[str, Figure]:
+    data = drawn.data["deflection"]
+    found = {"deflected_shafts": deflected_shafts(data)}
+    pattern = load_patterns(data)
+    return found if pattern is None else found | {"load_patterns": pattern}
+
+
+def _draw_modes(drawn: Drawn) -> dict[str, Figure]:
+    data = drawn.data["modes"]
+    found = {"campbell": gearbox_campbell(data)}
+    return found | ({"mode_energy": mode_energy(data)} if np.any(data["frequency"].values > 0.0) else {})
+
+
+FIGURES = {
+    "deflection": Figures(
+        {
+            "deflected_shafts": "Deflection of the shafts in both planes along their axes; arrows are the forces of "
+            "the bearings on the shafts.",
+            "load_patterns": "Load per width of the meshes under the misalignment that shafts and bearings give them.",
+        },
+        _draw_deflection,
+    ),
+    "modes": Figures(
+        {
+            "campbell": "Natural frequencies over the speed, with turns of the shafts and mesh lines of the stages.",
+            "mode_energy": "Where the strain energy of every mode lies.",
+        },
+        _draw_modes,
+    ),
+}

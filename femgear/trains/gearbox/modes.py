@@ -1,0 +1,212 @@
+"""Modes of a whole gearbox about its loaded state, where their energy lies, and the Campbell diagram."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.tracking import CampbellData, campbell_data
+from femgear.system.assembly import Assembly, Beam
+from femgear.system.system import MechanicalSystem, Modes
+from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.model import GearboxModel
+
+# Share of the kinetic energy from which a mode is of one kind.
+_PURE = 0.8
+# Modes of the Campbell diagram at most.
+_MOST_BRANCHES = 40
+# Modes that are kept at least.
+_LEAST = 20
+# Reach of the Campbell diagram and of the modes that are kept, over the highest mesh frequency.
+_HARMONICS = 3.0
+KINDS = ("torsional", "bending", "axial")
+"""Of modes by their kinetic energy: rotation about the axes; motions across them and tilts; motions along them."""
+_MOTIONS = ((5,), (0, 1, 3, 4), (2,))
+
+
+@dataclass(frozen=True)
+class GearboxModes:
+    """Modes at rest with the stiffnesses of the loaded state, and over the speed.
+
+    Parameters
+    ----------
+    deflection : Deflection
+        The loaded state that gives bearings and meshes their stiffness.
+    modes : Modes
+        ``kind`` is that of `KINDS` with 80 % of the kinetic energy, ``"mixed"``, or ``"rigid"``.
+    motion : (6n, m) array
+        Mode shapes in all motions of all stations [kg^-1/2], rotations in kg^-1/2 m^-1.
+    members : tuple of str
+        Shafts, and planets of the stages.
+    kinetic : (members, m) array
+        Share of every member in the kinetic energy.
+    parts : tuple of str
+        Shafts, bearings, couplings and pins, meshes of the stages.
+    strain : (parts, m) array
+        Share of every part in the strain energy; zero of rigid motions.
+    campbell : CampbellData
+        Modes and critical speeds over the speed of ``reference``.
+    reference : str
+        Shaft whose speed counts: the first one that is given.
+    orders : mapping of str to float
+        Lines of excitation by name, over the turn of the reference shaft.
+    """
+
+    deflection: Deflection
+    modes: Modes
+    motion: np.ndarray
+    members: tuple[str, ...]
+    kinetic: np.ndarray
+    parts: tuple[str, ...]
+    strain: np.ndarray
+    campbell: CampbellData
+    reference: str
+    orders: dict[str, float]
+
+
+def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
+    """Linearise a gearbox about its loaded state: assembly with bearings, system, stiffness of all slices [N/m].
+
+    Slices that carry nothing have no stiffness.
+    """
+    model = found.model
+    rolling = [
+        Beam(springs.stations, springs.rows.T @ found.bearing_stiffness[number] @ springs.rows)
+        for number, (section, springs) in enumerate(zip(model.case.bearing, model.bearings, strict=True))
+        if section.kind is not None
+    ]
+    assembly = replace(model.assembly, beams=(*model.assembly.beams, *rolling))
+    return assembly, assembly.system(), _pressed_stiffness(found)
+
+
+def _pressed_stiffness(found: Deflection) -> np.ndarray:
+    """Stiffness (g,) of the slices: those that carry share that of their mesh [N/m]."""
+    stiffness = found.model.assembly.slice_stiffness.copy()
+    if not np.any(found.model.load):
+        return stiffness
+    for part in found.model.assembly.slices:
+        carrying = found.slice_force[part] > 0.0
+        if carrying.any() and not carrying.all():
+            total = stiffness[part].sum()
+            stiffness[part] = np.where(carrying, total / carrying.sum(), 0.0)
+    return stiffness
+
+
+def solve_gearbox_modes(found: Deflection) -> GearboxModes:
+    """Solve for the modes of a gearbox about its loaded state, and follow them over the speed."""
+    model, case = found.model, found.model.case
+    assembly, system, stiffness = linear_system(found)
+    still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
+    frequencies = [hertz for hertz in model.flow.mesh_frequency.values() if hertz]
+    top = case.modes.up_to or (_HARMONICS * max(frequencies) if frequencies else None)
+    modes = solve_modes(still, stiffness, damping_ratio=case.modes.damping_ratio, count=_kept(still, stiffness, top))
+    motion = assembly.motions @ modes.shape
+    members, kinetic, kinds = _kinetic(model, assembly, motion, modes)
+    parts, strain = _strain(found, assembly, motion, stiffness, modes)
+    reference = model.flow.independent[0] if model.flow.independent else case.shaft[0].name
+    speed = abs(model.flow.speed[reference])
+    orders = excitation_orders(model, reference)
+    turning = replace(still, gyroscopic=np.asarray(system.gyroscopic) / speed if speed else None)
+    speeds = np.linspace(0.0, case.modes.highest_speed * max(speed, 1.0), case.modes.speeds)
+    count = int(np.clip(np.count_nonzero(modes.frequency > 0.0), 1, _MOST_BRANCHES))
+    followed = campbell_data(lambda _: turning, speeds, stiffness, orders=tuple(orders.values()), count=count)
+    return GearboxModes(
+        found, replace(modes, kind=kinds), motion, members, kinetic, parts, strain, followed, reference, orders
+    )
+
+
+def _kept(system: MechanicalSystem, stiffness: np.ndarray, top: float | None) -> int:
+    """Number of modes up to a frequency [Hz], `_LEAST` or more; all without one."""
+    if top is None:
+        return len(system.dofs)
+    whole = solve_modes(system, stiffness, damping_ratio=0.0)
+    return int(np.clip(np.count_nonzero(whole.frequency <= top), min(_LEAST, len(system.dofs)), len(system.dofs)))
+
+
+def excitation_orders(model: GearboxModel, reference: str) -> dict[str, float]:
+    """List turns of shafts and mesh lines of stages over the turn of a shaft, equal ones once."""
+    speed = abs(model.flow.speed[reference])
+    found: dict[str, float] = {}
+    if not speed:
+        return found
+    lines = [(f"{name} turn", abs(value) / speed) for name, value in model.flow.speed.items()]
+    for name, hertz in model.flow.mesh_frequency.items():
+        order = 2.0 * np.pi * hertz / speed
+        lines += [(f"{name} mesh" if h == 1 else f"{h} x {name} mesh", h * order) for h in (1, 2, 3)]
+    for name, order in lines:
+        if order > 0.0 and all(abs(order - other) > 1e-9 * order for other in found.values()):
+            found[name] = order
+    return found
+
+
+def _kinetic(model, assembly: Assembly, motion, modes: Modes) -> tuple[tuple[str, ...], np.ndarray, tuple[str, ...]]:
+    """Shares of members in the kinetic energy, and the kind of every mode."""
+    moved = assembly.mass @ motion
+    per_motion = (motion * moved).reshape(len(assembly.names), 6, -1)
+    owner = member_of_stations(model)
+    members = tuple(dict.fromkeys(owner))
+    place = np.array([members.index(name) for name in owner])
+    kinetic = np.zeros((len(members), motion.shape[1]))
+    np.add.at(kinetic, place, per_motion.sum(axis=1))
+    total = np.maximum(kinetic.sum(axis=0), 1e-300)
+    by_kind = np.array([per_motion[:, list(ways)].sum(axis=(0, 1)) for ways in _MOTIONS]) / total
+    kinds = [
+        "rigid" if hertz == 0.0 else KINDS[int(share.argmax())] if share.max() >= _PURE else "mixed"
+        for hertz, share in zip(modes.frequency, by_kind.T, strict=True)
+    ]
+    return members, kinetic / total, tuple(kinds)
+
+
+def member_of_stations(model: GearboxModel) -> list[str]:
+    """Name the shaft, or the planets, that every station belongs to."""
+    owner = [""] * len(model.assembly.names)
+    for shaft in model.case.shaft:
+        count = len(model.beams[shaft.name].stations) if shaft.name in model.beams else 1
+        first = model.first[shaft.name]
+        owner[first : first + count] = [shaft.name] * count
+    for stage in model.stages:
+        for planet in stage.planets:
+            owner[planet] = f"planets of {stage.name}"
+    return owner
+
+
+def _strain(
+    found: Deflection, assembly: Assembly, motion, stiffness, modes: Modes
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Shares of shafts, bearings, joints and meshes in the strain energy; none of rigid motions."""
+    model = found.model
+    energies: dict[str, np.ndarray] = {}
+
+    def add(name: str, stations: Sequence[int], matrix: np.ndarray) -> None:
+        kept = np.repeat(np.array(stations) >= 0, 6)
+        at = np.concatenate([6 * s + np.arange(6) for s in stations])[kept]
+        moved = motion[at]
+        energy = np.einsum("im,ij,jm->m", moved, matrix[np.ix_(kept, kept)], moved)
+        energies[name] = energies.get(name, 0.0) + energy
+
+    for shaft, beam in zip(model.beams, model.assembly.beams, strict=True):
+        add(f"shaft {shaft}", beam.stations, beam.stiffness)
+    for number, springs in enumerate(model.bearings):
+        finite = np.where(np.isfinite(found.bearing_stiffness[number]), found.bearing_stiffness[number], 0.0)
+        add(f"bearing {springs.name}", springs.stations, springs.rows.T @ finite @ springs.rows)
+    own = set(model.bearing_names)
+    for springs in assembly.springs:
+        if springs.name not in own:
+            finite = np.where(np.isfinite(springs.stiffness), springs.stiffness, 0.0)
+            name = springs.name.rsplit(" pin ", 1)
+            label = f"pins of {name[0]}" if len(name) > 1 else f"coupling {springs.name}"
+            add(label, springs.stations, (springs.rows.T * finite) @ springs.rows)
+    approach = assembly.columns.T @ motion
+    for stage in model.stages:
+        for mesh in stage.meshes:
+            part = assembly.slices[mesh]
+            name = f"meshes of {stage.name}"
+            energy = stiffness[part] @ approach[part] ** 2
+            energies[name] = energies.get(name, 0.0) + energy
+    table = np.array(list(energies.values())).reshape(len(energies), -1)
+    total = table.sum(axis=0)
+    elastic = modes.frequency > 0.0
+    return tuple(energies), np.where(elastic, table / np.where(elastic, total, 1.0), 0.0)

@@ -1,0 +1,356 @@
+"""Results of a gearbox case: deflection.nc and modes.nc, and the tables of case and numbers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.quantities import RPM
+from femgear.findings import Finding
+from femgear.report.tables import Block, describe_modes, tabulate
+from femgear.stages.protocol import StageResult
+from femgear.storage.contents import Contents
+from femgear.storage.results import coordinates, mode_entries
+from femgear.system.assembly import MOTIONS
+from femgear.trains.gearbox.case_file import GearboxCase
+from femgear.trains.gearbox.deflection import Deflection, bearing_lives
+from femgear.trains.gearbox.model import bearing_motions, bearing_places
+from femgear.trains.gearbox.modes import GearboxModes, member_of_stations
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True, eq=False)
+class DeflectionResult(StageResult):
+    """Loaded states of all load cases.
+
+    ``states`` stand in the order of the ``case``, ``chosen`` is the number of the one that modes start from.
+    """
+
+    case: GearboxCase
+    states: tuple[Deflection, ...]
+    chosen: int
+
+    @property
+    def state(self) -> Deflection:
+        """The state that modes start from."""
+        return self.states[self.chosen]
+
+    @property
+    def converged(self) -> bool:
+        """Whether forces balance and slopes have settled in all load cases."""
+        return all(state.settled for state in self.states)
+
+    @property
+    def residual(self) -> float:
+        """Largest force out of balance over the largest force of its load case."""
+        return max(state.residual for state in self.states)
+
+    @property
+    def message(self) -> str:
+        """How the states were found."""
+        passes = max(len(state.slopes) for state in self.states) - 1
+        words = f"teeth and system in turn, {passes} passes" if passes else "meshes as linear springs"
+        return f"Newton's method on all bearings; {words}"
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what deflection.nc says against itself, see `deflection_warnings`."""
+        return deflection_warnings(data)
+
+    def contents(self) -> Contents:
+        """Collect the contents of deflection.nc."""
+        case, state, every = self.case, self.state, self.states
+        assembly, load_case, mesh = state.model.assembly, "load_case", "load_case mesh"
+        slopes = np.array([one.mesh_slope for one in every])
+        widths = _mesh_widths(state)
+        face = np.array([_face_factors(one) for one in every])
+        variables = {
+            "speed": ("load_case shaft", _speeds(every, case) / RPM, "rpm", "speed of the shaft"),
+            "torque": ("load_case port", _torques(every), "N m", "torque from outside, reactions of outputs too"),
+            "mesh_frequency": ("load_case stage", _of_stages(every, "mesh_frequency"), "Hz", "mesh frequency"),
+            "share": (load_case, [one.share for one in case.operation.load_case], "1", "share of the time"),
+            "mesh_force": (mesh, [one.mesh_force for one in every], "N", "force along the normal of the flanks"),
+            "mesh_slope": (mesh, slopes, "rad", "slope of the approach along the width, closer at z > 0 positive"),
+            "mesh_misalignment": (
+                mesh,
+                slopes * widths,
+                "m",
+                "misalignment over the common width, closer at z > 0 positive",
+            ),
+            "face_load_factor": (mesh, face, "1", "K_Hbeta of the contact; NaN where teeth are not given"),
+            "mesh_stiffness": (mesh, _mesh_stiffness(every), "N/m", "mean mesh stiffness along the normal"),
+            "transmission_error": (mesh, _errors(every), "m", "peak to peak of the static transmission error"),
+            "displacement": (
+                "load_case station motion",
+                np.array([one.motion.reshape(-1, 6) for one in every]),
+                "m",
+                "motion of the station: x, y, z (m), tilts and rotation (rad)",
+            ),
+            "place": ("station axis", assembly.places, "m", "place of the station"),
+            "passes": (load_case, [len(one.slopes) - 1 for one in every], "1", "passes of contact and system"),
+            "settled": (load_case, [one.settled for one in every], "1", "whether the slopes have settled"),
+            "out_of_balance": (load_case, [one.residual for one in every], "1", "force out of balance, relative"),
+        }
+        variables |= _of_bearings(every, state) | _distribution(state)
+        coords = {
+            "load_case": _names("load_case", [one.name for one in case.operation.load_case], "load case"),
+            "shaft": _names("shaft", [one.name for one in case.shaft], "shaft"),
+            "port": _names("port", [*state.model.flow.port_torque], "load"),
+            "stage": _names("stage", [one.name for one in state.model.stages], "stage"),
+            "mesh": _names("mesh", [one.name for one in assembly.contacts], "gear mesh"),
+            "bearing": _names("bearing", state.model.bearing_names, "bearing"),
+            "motion": _names("motion", MOTIONS, "motion"),
+            "other_motion": _names("other_motion", MOTIONS, "motion"),
+            "axis": _names("axis", "xyz", "coordinate"),
+            "station": _names("station", assembly.names, "station of a shaft, or planet"),
+            "member": ("station", member_of_stations(state.model), "1", "shaft or planets of the station"),
+        }
+        return Contents(variables, coords, {"title": "system deflection", "load_case": self.chosen})
+
+
+def _names(dim: str, names: Iterable[str], words: str) -> tuple:
+    return ((dim,), list(names), "1", words)
+
+
+def _speeds(states, case: GearboxCase) -> np.ndarray:
+    return np.array([[one.model.flow.speed[shaft.name] for shaft in case.shaft] for one in states])
+
+
+def _torques(states) -> np.ndarray:
+    ports = [*states[0].model.flow.port_torque]
+    return np.array([[one.model.flow.port_torque.get(port, 0.0) for port in ports] for one in states])
+
+
+def _of_stages(states, name: str) -> np.ndarray:
+    return np.array(
+        [[getattr(one.model.flow, name)[stage.name] for stage in one.model.stages] for one in states]
+    ).reshape(len(states), -1)
+
+
+def _mesh_stiffness(states) -> np.ndarray:
+    return np.array([[contact.stiffness.sum() for contact in one.model.assembly.contacts] for one in states])
+
+
+def _mesh_widths(state: Deflection) -> np.ndarray:
+    widths = np.zeros(len(state.model.assembly.contacts))
+    for stage in state.model.stages:
+        widths[list(stage.meshes)] = stage.width
+    return widths
+
+
+def _per_mesh(state: Deflection, value) -> np.ndarray:
+    """Values of every mesh (M,); NaN where teeth are not computed."""
+    found = np.full(len(state.model.assembly.contacts), np.nan)
+    for stage in state.model.stages:
+        if stage.name in state.contacts:
+            found[list(stage.meshes)] = value(state.contacts[stage.name])
+    return found
+
+
+def _face_factors(state: Deflection) -> np.ndarray:
+    return _per_mesh(state, lambda contact: contact.face_load_factor)
+
+
+def _errors(states) -> np.ndarray:
+    """Peak to peak of the static transmission error of every mesh of all load cases [m]."""
+
+    def spread(contact):
+        return np.ptp(contact.result.cycle.deflection, axis=1)
+
+    return np.array([_per_mesh(state, spread) for state in states])
+
+
+def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tuple]:
+    """Forces, motions, stiffness and lives of all bearings in all load cases."""
+    bearing, count = "load_case bearing", len(state.model.case.bearing)
+    forces = np.array([one.bearing_force for one in every]).reshape(len(every), count, 6)
+    lives = np.array([bearing_lives(one) for one in every]).reshape(len(every), count, 2)
+    return {
+        "bearing_force": (f"{bearing} motion", forces, "N", "force on the shaft (N), moments about x, y, z (N m)"),
+        "radial_force": (bearing, np.hypot(forces[..., 0], forces[..., 1]), "N", "radial bearing force"),
+        "axial_force": (bearing, forces[..., 2], "N", "force of the bearing on the shaft along z"),
+        "bearing_stiffness": (
+            "bearing motion other_motion",
+            np.where(np.isfinite(state.bearing_stiffness), state.bearing_stiffness, np.inf),
+            "N/m",
+            "tangent of the bearing at the load, also in N and N m/rad; infinite of rigid ones",
+        ),
+        "bearing_displacement": (
+            "load_case bearing axis",
+            np.array([bearing_motions(one.model, one.motion) for one in every]),
+            "m",
+            "motion of the shaft in the bearing",
+        ),
+        "bearing_place": ("bearing axis", bearing_places(state.model), "m", "place of the bearing"),
+        "rating_life": (bearing, lives[..., 0], "h", "L10 of ISO 281 at the speed of the load case"),
+        "reference_life": (bearing, lives[..., 1], "h", "L10r of ISO/TS 16281"),
+    }
+
+
+def _distribution(state: Deflection) -> dict[str, tuple]:
+    """Load of the slices of all meshes over the width, the largest number of slices for all."""
+    assembly = state.model.assembly
+    most = max([len(contact.heights) for contact in assembly.contacts], default=0)
+    if most < 2:
+        return {}
+    heights, load = np.full((2, len(assembly.contacts), most), np.nan)
+    widths = _mesh_widths(state)
+    for number, (contact, part) in enumerate(zip(assembly.contacts, assembly.slices, strict=True)):
+        count = len(contact.heights)
+        if count > 1:
+            heights[number, :count] = contact.heights
+            load[number, :count] = state.slice_force[part] * count / widths[number]
+    return {
+        "slice_height": ("mesh slice", heights, "m", "place of the slice above the middle of the width"),
+        "line_load": ("mesh slice", load, "N/m", "load per width of the mesh, mean over a mesh period"),
+    }
+
+
+@dataclass(frozen=True, eq=False)
+class GearboxModesResult(StageResult):
+    """Modes of the whole gearbox, ``found``, about the loaded state of one load case."""
+
+    found: GearboxModes
+
+    @property
+    def modes(self):
+        """The modes themselves."""
+        return self.found.modes
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return "modes about the loaded state"
+
+    def contents(self) -> Contents:
+        """Collect the contents of modes.nc."""
+        found = self.found
+        modes, model, campbell = found.modes, found.deflection.model, found.campbell
+        critical = campbell.critical
+        variables = mode_entries(modes) | {
+            "energy": ("member mode", found.kinetic, "1", "share of the member in the kinetic energy"),
+            "strain": ("part mode", found.strain, "1", "share of the part in the strain energy"),
+            "main_member": ("mode", _largest(found.members, found.kinetic), "1", "member with most kinetic energy"),
+            "main_part": ("mode", _largest(found.parts, found.strain), "1", "part with most strain energy"),
+            "motion": (
+                "station way mode",
+                found.motion.reshape(len(model.assembly.names), 6, -1),
+                "kg^-1/2",
+                "mode shape of unit mass; tilts and rotations in kg^-1/2 m^-1",
+            ),
+            "place": ("station axis", model.assembly.places, "m", "place of the station"),
+            "order": ("line", list(found.orders.values()), "1", f"over the turn of {found.reference}"),
+            "campbell_frequency": (
+                "campbell_speed branch",
+                campbell.frequency,
+                "Hz",
+                "natural frequency over the speed",
+            ),
+            "critical_speed": ("crossing", [one.speed / RPM for one in critical], "rpm", "speed of a line on a branch"),
+            "critical_frequency": ("crossing", [one.frequency for one in critical], "Hz", "frequency there"),
+        }
+        coords = {
+            **coordinates(mode=np.arange(1, len(modes.frequency) + 1)),
+            "member": _names("member", found.members, "shaft, or planets of a stage"),
+            "part": _names("part", found.parts, "part that is strained"),
+            "station": _names("station", model.assembly.names, "station of a shaft, or planet"),
+            "way": _names("way", MOTIONS, "motion"),
+            "axis": _names("axis", "xyz", "coordinate"),
+            "line": _names("line", found.orders, "excitation"),
+            "campbell_speed": (("campbell_speed",), campbell.speed / RPM, "rpm", f"speed of {found.reference}"),
+        }
+        speed = abs(model.flow.speed[found.reference]) / RPM
+        attrs = {"title": "modes of the gearbox", "reference": found.reference, "speed": speed}
+        return Contents(variables, coords, attrs)
+
+
+def _largest(names, shares: np.ndarray) -> list[str]:
+    return [names[int(column.argmax())] if column.any() else "" for column in shares.T]
+
+
+def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
+    """Tabulate meshes and bearings of deflection.nc at the chosen load case."""
+    at = int(data.attrs["load_case"])
+    one = data.isel(load_case=at)
+    count = data.sizes["load_case"]
+    name = f" in load case {data['load_case'].values[at]}" if count > 1 else ""
+    meshes = {
+        "mesh": lambda i: str(data["mesh"].values[i]),
+        "force [N]": lambda i: f"{float(one['mesh_force'].values[i]):.5g}",
+        "misaligned [um]": lambda i: f"{1e6 * float(one['mesh_misalignment'].values[i]):+.3f}",
+        "K_Hbeta": lambda i: _number(one["face_load_factor"].values[i], ".3f"),
+        "k [N/um]": lambda i: f"{1e-6 * float(one['mesh_stiffness'].values[i]):.4g}",
+        "STE p-p [um]": lambda i: _number(1e6 * one["transmission_error"].values[i], ".3f"),
+    }
+    bearings = {
+        "bearing": lambda i: str(data["bearing"].values[i]),
+        "radial [N]": lambda i: f"{float(one['radial_force'].values[i]):.5g}",
+        "axial [N]": lambda i: f"{float(one['axial_force'].values[i]):+.5g}",
+        "L10 [h]": lambda i: _number(one["rating_life"].values[i], ".4g"),
+        "L10r [h]": lambda i: _number(one["reference_life"].values[i], ".4g"),
+    }
+    passes = int(one["passes"])
+    note = f"forces balance to {float(one['out_of_balance']):.1g}" + (f", settled in {passes} passes" if passes else "")
+    return (
+        tabulate(f"Meshes{name}", range(data.sizes["mesh"]), meshes, (note,)),
+        tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
+    )
+
+
+def _number(value, how: str) -> str:
+    value = float(value)
+    return "-" if math.isnan(value) else "no load" if math.isinf(value) else format(value, how)
+
+
+def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """List what deflection.nc says against itself: states that have not settled, edges that carry nothing."""
+    names = [str(name) for name in data["load_case"].values]
+    open_cases = [name for name, settled in zip(names, data["settled"].values, strict=True) if not settled]
+    if open_cases:
+        text = f"the misalignment of the meshes has not settled in load case {', '.join(open_cases[:5])}"
+        yield Finding("W-PASSES", "deflection.passes", text, remedy="allow more passes")
+    if "line_load" in data:
+        load = data["line_load"].values
+        idle = np.nansum(load <= 0.0, axis=1) / np.maximum(np.sum(np.isfinite(load), axis=1), 1)
+        if idle.max(initial=0.0) > 0.0:
+            worst = int(idle.argmax())
+            text = f"{data['mesh'].values[worst]} carries on {1.0 - idle[worst]:.0%} of its width alone"
+            yield Finding("W-FACE-LOAD", "", text, remedy="stiffer shafts or bearings, or a lead modification")
+
+
+def describe_gearbox_modes(data: xr.Dataset) -> Block:
+    """Tabulate the first modes of modes.nc with the parts that hold most of their energy."""
+    columns = {
+        "moves most": lambda mode: f"{mode.main_member.item()} ({100.0 * float(mode.energy.max()):.0f} %)",
+        "strained most": lambda mode: (
+            f"{mode.main_part.item()} ({100.0 * float(mode.strain.max()):.0f} %)" if mode.main_part.item() else "-"
+        ),
+    }
+    return describe_modes(data, columns, note="; with most of the kinetic and of the strain energy")
+
+
+def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
+    """List what of a gearbox case deserves a look: entries of teeth that have no effect, missing weight."""
+    for kind in ("pair", "planetary"):
+        for i, stage in enumerate(getattr(case, kind)):
+            given = _without_effect(stage.teeth or {})
+            if given:
+                text = f"{', '.join(given)} of these teeth have no effect: shafts and bearings of the gearbox hold them"
+                yield Finding("W-UNUSED", f"{kind}[{i}].teeth", text)
+
+
+_HOLDS = ("support_stiffness", "bearing_stiffness", "tilt_stiffness", "foundation_radial", "foundation_tangential")
+
+
+def _without_effect(tables: dict) -> list[str]:
+    found = []
+    for gear in ("gear_1", "gear_2", "sun", "ring", "carrier"):
+        section = tables.get(gear)
+        found += [f"{gear}.{key}" for key in _HOLDS if isinstance(section, dict) and key in section]
+    return found

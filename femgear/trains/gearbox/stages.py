@@ -1,0 +1,108 @@
+"""The pipeline of a gearbox case: deflection -> modes; its power flow stands before it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from femgear.case.dependencies import Steps
+from femgear.case.quantities import RPM
+from femgear.report.tables import Block, tabulate
+from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
+from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.modes import solve_gearbox_modes
+from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
+from femgear.trains.gearbox.results import (
+    DeflectionResult,
+    GearboxModesResult,
+    deflection_warnings,
+    describe_deflection,
+    describe_gearbox_modes,
+    gearbox_warnings,
+)
+
+
+@one_blas_thread()
+def solve_deflections(
+    case: GearboxCase, *, progress: Progress = silent, steps: Steps | None = None
+) -> DeflectionResult:
+    """Solve for the loaded states of all load cases: shafts, bearings and teeth together."""
+    steps, states = steps or Steps(), []
+    cases = case.operation.load_case
+    for number, load_case in enumerate(cases):
+        progress("deflection", number, len(cases))
+        states.append(solve_deflection(case, load_case, steps=steps))
+    return DeflectionResult(case, tuple(states), case.operation.first - 1)
+
+
+@one_blas_thread()
+def solve_box_modes(case: GearboxCase, deflection: DeflectionResult) -> GearboxModesResult:
+    """Solve for the modes of the gearbox about the loaded state of its first load case."""
+    return GearboxModesResult(solve_gearbox_modes(deflection.state))
+
+
+def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
+    """Tabulate the power flow of all load cases: speeds, torques, stages."""
+    blocks = []
+    for load_case in case.operation.load_case[:12]:
+        blocks += list(_flow_blocks(case, load_case))
+    return tuple(blocks)
+
+
+def _flow_blocks(case: GearboxCase, load_case: LoadCaseSection) -> Iterator[Block]:
+    flow = gearbox_flow(case, load_case)
+    many = len(case.operation.load_case) > 1
+    title = f"Power flow, {load_case.name}" if many else "Power flow"
+    power = {name: torque * flow.speed[port_shafts(case)[name]] for name, torque in flow.port_torque.items()}
+    rows = [
+        (shaft.name, f"{flow.speed[shaft.name] / RPM:.6g}", *_port_texts(case, flow, power, shaft.name))
+        for shaft in case.shaft
+    ]
+    yield Block(title, ("shaft", "speed [rpm]", "torque from outside [N m]", "power [kW]"), tuple(rows))
+    columns = {
+        "stage": lambda name: name,
+        "torques of the meshes on the shafts [N m]": lambda name: ", ".join(
+            f"{shaft} {torque:.6g}" for shaft, torque in flow.stage_torque[name].items()
+        ),
+        "mesh [Hz]": lambda name: f"{flow.mesh_frequency[name]:.6g}",
+        "planets [rpm]": lambda name: f"{flow.planet_speed[name] / RPM:.6g}" if name in flow.planet_speed else "-",
+        "same teeth meet after": lambda name: turns_in_words(flow.frequencies[name]),
+    }
+    yield tabulate(f"Stages, {load_case.name}" if many else "Stages", flow.stage_torque, columns)
+
+
+def _port_texts(case, flow, power, shaft: str) -> tuple[str, str]:
+    ports = [name for name in flow.port_torque if port_shafts(case)[name] == shaft]
+    if not ports:
+        return "-", "-"
+    torque = sum(flow.port_torque[name] for name in ports)
+    return f"{torque:.6g} ({', '.join(ports)})", f"{1e-3 * sum(power[name] for name in ports):.6g}"
+
+
+GEARBOX = Train(
+    name="gearbox",
+    words="a gearbox case",
+    stages=(
+        Stage(
+            name="deflection",
+            title="System deflection",
+            solve=solve_deflections,
+            options=("progress", "steps"),
+            verdict=lambda result: {"load_cases": len(result.states)},
+            describe=lambda results: describe_deflection(results.deflection)[0],
+            tables=lambda results: describe_deflection(results.deflection)[1:],
+            warnings=deflection_warnings,
+        ),
+        Stage(
+            name="modes",
+            title="Modes",
+            solve=solve_box_modes,
+            takes=("deflection",),
+            verdict=modes_verdict,
+            describe=lambda results: describe_gearbox_modes(results.modes),
+        ),
+    ),
+    describe=describe_gearbox,
+    warnings=gearbox_warnings,
+    figures=FiguresOf("femgear.trains.gearbox.figures:FIGURES"),
+)

@@ -1,0 +1,61 @@
+"""A gearbox of one pair on two shafts of two bearings each, as tables."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+_TABLES: dict[str, Any] = {
+    "model": "gearbox",
+    "title": "a pair on two shafts",
+    "shaft": [
+        {"name": "input", "part": [{"length": "90 mm", "outer_diameter": "30 mm"}]},
+        {"name": "output", "axis": ["90 mm", "0 mm"], "part": [{"length": "90 mm", "outer_diameter": "40 mm"}]},
+    ],
+    "bearing": [
+        {"name": "A", "shaft": "input", "position": "5 mm", "radial": "2e8 N/m", "axial": "1e8 N/m"},
+        {"name": "B", "shaft": "input", "position": "85 mm", "radial": "2e8 N/m"},
+        {"name": "C", "shaft": "output", "position": "5 mm", "radial": "2e8 N/m", "axial": "1e8 N/m"},
+        {"name": "D", "shaft": "output", "position": "85 mm", "radial": "2e8 N/m"},
+    ],
+    "pair": [
+        {
+            "name": "stage",
+            "shafts": ["input", "output"],
+            "positions": ["30 mm", "30 mm"],
+            "gears": {"teeth": [24, 36], "module": "3 mm", "face_width": "20 mm"},
+            "mesh": {"stiffness": "4e8 N/m", "contact_ratio": 1.6},
+        }
+    ],
+    "load": [
+        {"name": "motor", "shaft": "input", "position": "0 mm"},
+        {"name": "brake", "shaft": "output", "position": "90 mm"},
+    ],
+    "operation": {
+        "output": ["brake"],
+        "load_case": [{"torque": {"motor": "100 N m"}, "speed": {"input": "1000 rpm"}}],
+    },
+}
+
+TEETH: dict[str, Any] = {
+    "model": "pair",
+    "title": "24/36",
+    "set": {"module": "3 mm", "pressure_angle": "20 deg", "face_width": "20 mm"},
+    "material": {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"},
+    "gear_1": {"teeth": 24, "profile_shift": 0.0, "bore_radius": "15 mm"},
+    "gear_2": {"teeth": 36, "profile_shift": 0.0, "bore_radius": "20 mm"},
+    "operation": {"torque": "100 N m"},
+    "static": {"positions": 16},
+}
+
+
+def pair_tables(*, teeth: bool = False, helix: str = "0 deg") -> dict[str, Any]:
+    """Tables of the gearbox, with the teeth of the pair or with its sizes and stiffness."""
+    tables = copy.deepcopy(_TABLES)
+    stage = tables["pair"][0]
+    if teeth:
+        del stage["gears"], stage["mesh"]
+        stage["teeth"] = copy.deepcopy(TEETH)
+    else:
+        stage["gears"]["helix_angle"] = helix
+    return tables

@@ -1,0 +1,71 @@
+"""Stations, springs, conditions and meshes: against closed forms and matrices written by hand."""
+
+import numpy as np
+import pytest
+
+from femgear.fe.beam import body_matrices, rigid_link
+from femgear.system.assembly import GROUND, Assembly, Contact, Inertia, joint, solved_conditions
+
+
+def two_bodies(**parts) -> Assembly:
+    inertias = tuple(Inertia((i,), *body_matrices(2.0, 0.03, 0.02)) for i in range(2))
+    places = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0]])
+    return Assembly(("first", "second"), places, np.zeros(12, bool), inertias, **parts)
+
+
+def test_a_joint_carries_what_two_springs_at_its_place_would():
+    k = np.array([1e8, 2e8, 3e8, 1e4, 2e4, 3e4])
+    offsets = np.array([0.0, 0.0, 0.05]), np.array([0.0, 0.02, -0.03])
+    springs = joint("bearing", (0, 1), offsets, k)
+    assembly = two_bodies(springs=(springs,))
+    moved = np.arange(12.0) * 1e-6
+    apart = rigid_link(offsets[1]) @ moved[6:] - rigid_link(offsets[0]) @ moved[:6]
+    force = k * apart
+    expected = np.concatenate([-rigid_link(offsets[0]).T @ force, rigid_link(offsets[1]).T @ force])
+    assert assembly.stiffness @ moved == pytest.approx(expected, rel=1e-12, abs=1e-9)
+
+
+def test_rigid_springs_are_the_limit_of_stiff_ones():
+    def frequencies(stiff):
+        k = np.array([stiff, stiff, stiff, stiff, stiff, 0.0])
+        tie = joint("tie", (0, 1), (np.array([0.05, 0.0, 0.0]), np.array([-0.05, 0.0, 0.0])), k)
+        hold = joint("hold", (GROUND, 0), (np.zeros(3), np.zeros(3)), np.array([1e6, 2e6, 3e6, 4e3, 5e3, 6e3]))
+        turn = joint("turn", (GROUND, 1), (np.zeros(3), np.zeros(3)), np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1e3]))
+        system = two_bodies(springs=(tie, hold, turn)).system()
+        values = np.linalg.eigvals(np.linalg.solve(system.M, system.K)).real
+        return np.sort(values)[:7]
+
+    assert frequencies(1e13) == pytest.approx(frequencies(np.inf), rel=1e-5)
+
+
+def test_conditions_are_met_by_all_free_motions():
+    rng = np.random.default_rng(3)
+    rows, held = rng.normal(size=(4, 10)), np.zeros(10, bool)
+    held[7] = True
+    T, free = solved_conditions(rows, held)
+    assert np.array_equal(T[free], np.eye(5))
+    assert T.shape == (10, 5)
+    assert np.abs(rows @ T).max() < 1e-12
+    assert not T[7].any()
+    assert np.linalg.matrix_rank(T) == 5
+
+
+def test_a_mesh_approaches_by_the_difference_of_both_points_along_its_normal():
+    normal = np.array([0.6, 0.7, 0.3])
+    normal /= np.linalg.norm(normal)
+    points = np.array([[[0.04, 0.0, 0.01]], [[-0.06, 0.0, 0.01]]])
+    mesh = Contact("mesh", (0, 1), normal, points, np.zeros(1), np.array([4e8]))
+    moved = np.arange(1.0, 13.0) * 1e-6
+    first = moved[:3] + np.cross(moved[3:6], points[0, 0])
+    second = moved[6:9] + np.cross(moved[9:], points[1, 0])
+    assembly = two_bodies(contacts=(mesh,))
+    assert assembly.columns.T @ moved == pytest.approx([normal @ (first - second)], rel=1e-12)
+    standing = Contact("mesh", (GROUND, 1), normal, points, np.zeros(1), np.array([4e8]))
+    assert two_bodies(contacts=(standing,)).columns.T @ moved == pytest.approx([-normal @ second], rel=1e-12)
+
+
+def test_free_motions_are_named_after_their_stations():
+    tie = joint("tie", (0, 1), (np.zeros(3), np.zeros(3)), np.full(6, np.inf))
+    assert two_bodies(springs=(tie,)).free_names == tuple(
+        f"first: {way}" for way in ("x", "y", "z", "tilt x", "tilt y", "rotation")
+    )

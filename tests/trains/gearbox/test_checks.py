@@ -1,0 +1,118 @@
+"""What a gearbox is refused for: every fault with its key, all at once."""
+
+import pytest
+from small_gearbox import pair_tables
+
+from femgear.errors import CaseError
+from femgear.trains.reading import read_case
+
+BALL = {"kind": "ball", "rolling_elements": 9, "element_diameter": "9.5 mm", "pitch_diameter": "46 mm"}
+
+
+def problems(tables) -> dict[str, CaseError]:
+    """Refusals of a case by their keys."""
+    with pytest.raises(CaseError) as error:
+        read_case(tables)
+    found = error.value.problems or (error.value,)
+    return {one.key: one for one in found}
+
+
+def _replaced(number: int, **entries):
+    """Change of a case: another bearing in the place of one."""
+
+    def change(tables):
+        old = tables["bearing"][number]
+        tables["bearing"][number] = {"shaft": old["shaft"], "position": old["position"]} | entries
+
+    return change
+
+
+CHANGES = {
+    "shaft[1].name": (lambda t: t["shaft"][1].update(name="input"), "E-DUPLICATE"),
+    "bearing[1].name": (lambda t: t["bearing"][1].update(name="A"), "E-DUPLICATE"),
+    "bearing[0].shaft": (lambda t: t["bearing"][0].update(shaft="inptu"), "E-CHOICE"),
+    "bearing[0].position": (lambda t: t["bearing"][0].pop("position"), "E-KEY-MISSING"),
+    "bearing[1].position": (lambda t: t["bearing"][1].update(position="95 mm"), "E-RANGE"),
+    "bearing[2].radial": (lambda t: (t["bearing"][2].pop("radial"), t["bearing"][2].pop("axial")), "E-KEY-MISSING"),
+    "bearing[0].radial": (lambda t: t["bearing"][0].update(BALL), "E-CHOICE"),
+    "bearing[3].pitch_diameter": (
+        _replaced(3, kind="ball", rolling_elements=9, element_diameter="9 mm"),
+        "E-KEY-MISSING",
+    ),
+    "bearing[1].rolling_elements": (_replaced(1, **BALL | {"rolling_elements": 40}), "E-RANGE"),
+    "bearing[1].outer_position": (
+        lambda t: t["bearing"][1].update(outer_shaft="output", outer_position="85 mm"),
+        "E-RANGE",
+    ),
+    "bearing[1].outer_shaft": (
+        lambda t: t["bearing"][1].update(outer_shaft="input", outer_position="5 mm"),
+        "E-CHOICE",
+    ),
+    "shaft[0].part[0].inner_diameter": (
+        lambda t: t["shaft"][0]["part"][0].update(inner_diameter="30 mm"),
+        "E-RANGE",
+    ),
+    "shaft[0].part[1].outer_diameter": (
+        lambda t: t["shaft"][0].update(
+            part=[
+                {"length": "45 mm", "outer_diameter": "30 mm", "inner_diameter": "20 mm"},
+                {"length": "45 mm", "outer_diameter": "18 mm"},
+            ]
+        ),
+        "E-SHAFT",
+    ),
+    "pair[0].shafts": (lambda t: t["shaft"][1].update(axis=["91 mm", "0 mm"]), "E-CENTRE-DISTANCE"),
+    "pair[0].positions": (lambda t: t["pair"][0].update(positions=["30 mm", "60 mm"]), "E-RANGE"),
+    "pair[0].teeth": (lambda t: [t["pair"][0].pop(key) for key in ("gears", "mesh")], "E-KEY-MISSING"),
+    "pair[0].mesh": (lambda t: t["pair"][0].pop("mesh"), "E-KEY-MISSING"),
+    "pair[0].gears.module": (lambda t: t["pair"][0]["gears"].update(radii=["36 mm", "54 mm"]), "E-CHOICE"),
+    "operation.output": (lambda t: t["operation"].update(output=["brakes"]), "E-CHOICE"),
+    "operation.load_case[0].torque": (
+        lambda t: t["operation"]["load_case"][0]["torque"].update(brake="1 N m"),
+        "E-CHOICE",
+    ),
+    "operation.load_case[0].speed": (
+        lambda t: t["operation"]["load_case"][0].update(speed={"inputs": "10 rpm"}),
+        "E-CHOICE",
+    ),
+    "operation.first": (lambda t: t["operation"].update(first=2), "E-RANGE"),
+}
+
+
+@pytest.mark.parametrize("key", CHANGES)
+def test_every_fault_names_its_entry(key):
+    tables = pair_tables()
+    change, code = CHANGES[key]
+    change(tables)
+    found = problems(tables)
+    assert key in found
+    assert found[key].code == code
+
+
+def test_all_faults_come_at_once():
+    tables = pair_tables()
+    for key in ("bearing[1].position", "pair[0].shafts", "shaft[0].part[0].inner_diameter"):
+        CHANGES[key][0](tables)
+    assert {"bearing[1].position", "pair[0].shafts", "shaft[0].part[0].inner_diameter"} <= problems(tables).keys()
+
+
+def test_near_names_are_offered():
+    tables = pair_tables()
+    tables["load"][0]["shaft"] = "imput"
+    assert "did you mean input?" in str(problems(tables)["load[0].shaft"])
+
+
+def test_the_right_outer_position_is_offered():
+    tables = pair_tables()
+    tables["shaft"].append(
+        {"name": "hollow", "start": "20 mm", "part": [{"length": "80 mm", "outer_diameter": "90 mm"}]}
+    )
+    tables["bearing"][1] |= {"outer_shaft": "hollow", "outer_position": "10 mm"}
+    assert '"65 mm"' in str(problems(tables)["bearing[1].outer_position"])
+
+
+def test_shares_of_the_time_are_at_most_the_whole():
+    tables = pair_tables()
+    one = tables["operation"]["load_case"][0]
+    tables["operation"]["load_case"] = [one | {"name": "a", "share": 0.7}, one | {"name": "b", "share": 0.4}]
+    assert "operation.load_case[0].share" in problems(tables)

@@ -1,0 +1,161 @@
+"""Loaded states: closed forms, equilibrium, rolling bearings, the passes of contact and system."""
+
+import math
+import re
+
+import numpy as np
+import pytest
+from small_gearbox import pair_tables
+
+from femgear.errors import CaseError, FemgearError
+from femgear.fe.beam import RoundSection
+from femgear.system.rolling_bearings import bearing_state
+from femgear.trains.gearbox.deflection import mesh_slopes, rolling_bearing, solve_deflection
+from femgear.trains.reading import read_case
+
+BALL = {
+    "kind": "ball",
+    "rolling_elements": 9,
+    "element_diameter": "9.5 mm",
+    "pitch_diameter": "46 mm",
+    "dynamic_rating": "19.5 kN",
+}
+
+
+def test_bearing_forces_are_those_of_the_lever_rule():
+    tables = pair_tables()
+    # the load stays in the middle of the width
+    tables["deflection"] = {"slices": 1}
+    found = solve_deflection(read_case(tables))
+    force = 100.0 / (0.036 * math.cos(math.radians(20.0)))
+    assert found.mesh_force == pytest.approx([force], rel=1e-9)
+    size = np.hypot(*found.bearing_force[:, :2].T)
+    # bearings at 5 and 85 mm, gears at 30 mm
+    assert size == pytest.approx(force * np.array([55.0, 25.0, 55.0, 25.0]) / 80.0, rel=1e-9)
+    assert found.residual < 1e-10
+
+
+def test_the_slope_of_a_gear_off_mid_is_that_of_its_shaft():
+    tables = pair_tables()
+    for bearing in tables["bearing"]:
+        bearing["radial"] = "rigid"
+    tables["shaft"][1]["part"][0]["outer_diameter"] = "400 mm"  # hardly bends
+    tables["shaft"][0]["material"] = {"poisson_ratio": 0.0, "density": "0 kg/m^3"}
+    # one slice: a mesh without stiffness against tilt
+    tables["deflection"] = {"slices": 1}
+    found = solve_deflection(read_case(tables))
+    E, I, a, b, length = 2.06e11, RoundSection(0.03).second_moment, 0.025, 0.055, 0.08
+    force = found.mesh_force[0]
+    station = found.model.seat("input", 0.03).station
+    tilt = found.motion[6 * station + 3 : 6 * station + 5]
+    # F a b (b - a) / (3 E I L), shear adds no slope of the section at the load of both sides' mean
+    bent = force * a * b * (b - a) / (3.0 * E * I * length)
+    assert np.hypot(*tilt) == pytest.approx(bent, rel=0.05)
+
+
+def test_rigid_bearings_carry_what_stiff_ones_do():
+    def forces(radial, axial):
+        tables = pair_tables(helix="15 deg")
+        for bearing in tables["bearing"]:
+            bearing["radial"] = radial
+            bearing |= {"axial": axial} if "axial" in bearing else {}
+        return solve_deflection(read_case(tables)).bearing_force
+
+    stiff, rigid = forces("1e14 N/m", "1e14 N/m"), forces("rigid", "rigid")
+    assert rigid[:, :3] == pytest.approx(stiff[:, :3], rel=1e-4, abs=0.05)
+
+
+def test_rolling_bearings_balance_at_their_own_motion():
+    tables = pair_tables(helix="15 deg")
+    for bearing in tables["bearing"]:
+        for entry in ("radial", "axial"):
+            bearing.pop(entry, None)
+        bearing |= BALL | {"clearance": "10 um"}
+    case = read_case(tables)
+    found = solve_deflection(case)
+    assert found.residual < 1e-8
+    total = found.bearing_force[:2].sum(axis=0)
+    assert np.hypot(*total[:2]) == pytest.approx(100.0 / 0.036 / math.cos(math.radians(20.0)), rel=1e-6)
+    for section, state, force in zip(case.bearing, found.states, found.bearing_force, strict=True):
+        again = bearing_state(rolling_bearing(section), state.motion)
+        assert -again.force[:3] == pytest.approx(force[:3], rel=1e-9, abs=1e-9)
+    # both balls of a shaft share the thrust
+    assert abs(total[2]) == pytest.approx(100.0 / 0.036 * math.tan(math.radians(15.0)), rel=1e-6)
+
+
+def test_weight_hangs_in_the_bearings():
+    tables = pair_tables()
+    tables["gravity"] = {}
+    tables["operation"]["load_case"][0]["torque"]["motor"] = "1e-9 N m"
+    found = solve_deflection(read_case(tables))
+    mass = [7850.0 * math.pi / 4.0 * d**2 * 0.09 for d in (0.03, 0.04)]
+    up = found.bearing_force[:, 1].reshape(2, 2).sum(axis=1)
+    assert up == pytest.approx(9.80665 * np.array(mass), rel=1e-6)
+
+
+@pytest.mark.parametrize("torque", ["100 N m", "-100 N m"])
+def test_contact_and_system_settle_whatever_they_start_from(torque):
+    tables = pair_tables(teeth=True)
+    tables["operation"]["load_case"][0]["torque"]["motor"] = torque
+    case = read_case(tables)
+    found = solve_deflection(case)
+    assert found.settled
+    assert len(found.slopes) - 1 <= 5
+    far = solve_deflection(case, slopes=[3e-4])
+    assert far.settled
+    width = 0.02
+    assert far.mesh_slope == pytest.approx(found.mesh_slope, abs=2e-4 * np.abs(found.mesh_slope).max())
+    contact = found.contacts["stage"]
+    # the contact sees the slope that the system has
+    rise = contact.result.cycle.mesh_misalignment.mean()
+    assert rise == pytest.approx(found.mesh_slope[0] * width, rel=1e-3)
+    # more load where the flanks are closer
+    tilt = np.polyfit(np.arange(len(contact.shares[0])), contact.shares[0], 1)[0]
+    assert np.sign(tilt) == np.sign(found.mesh_slope[0])
+    assert contact.face_load_factor[0] > 1.0
+
+
+def test_the_slope_of_a_mesh_is_the_line_through_its_slices():
+    found = solve_deflection(read_case(pair_tables()))
+    assembly = found.model.assembly
+    approach = assembly.columns.T @ found.motion
+    line = np.polyfit(assembly.contacts[0].heights, approach, 1)[0]
+    assert mesh_slopes(assembly, found.motion) == pytest.approx([line], rel=1e-9)
+
+
+def refused(tables) -> str:
+    with pytest.raises(FemgearError) as error:
+        solve_deflection(read_case(tables))
+    return str(error.value)
+
+
+def test_a_shaft_that_floats_along_its_axis_is_named():
+    tables = pair_tables()
+    del tables["bearing"][0]["axial"]
+    text = refused(tables)
+    assert "E-MECHANISM" in text
+    assert re.search(r"input \d+ \(along z\)", text)
+
+
+def test_thrust_that_cylindrical_bearings_do_not_take_is_refused():
+    tables = pair_tables(helix="15 deg")
+    roller = BALL | {"kind": "cylindrical", "effective_length": "9 mm"}
+    for bearing in tables["bearing"][:2]:
+        bearing.pop("radial")
+        bearing.pop("axial", None)
+        bearing |= roller
+    assert "along z" in refused(tables)
+
+
+def test_a_bearing_on_one_seat_alone_leaves_the_shaft_to_tilt():
+    tables = pair_tables()
+    del tables["bearing"][3]
+    text = refused(tables)
+    assert "E-MECHANISM" in text
+
+
+def test_a_negative_number_of_rolling_elements_is_refused_where_it_stands():
+    tables = pair_tables()
+    tables["bearing"][1] = {"shaft": "input", "position": "85 mm"} | BALL | {"rolling_elements": 2}
+    with pytest.raises(CaseError, match=r"bearing\[1\]\.rolling_elements"):
+        read_case(tables)

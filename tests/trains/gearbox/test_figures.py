@@ -1,0 +1,50 @@
+"""Pictures of a gearbox show its curves, arrows and names."""
+
+import numpy as np
+import pytest
+from small_gearbox import pair_tables
+
+from femgear.trains.gearbox.figures import deflected_shafts, gearbox_campbell, load_patterns, mode_energy
+from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
+from femgear.trains.reading import read_case
+
+
+@pytest.fixture(scope="module")
+def data():
+    case = read_case(pair_tables())
+    deflection = solve_deflections(case)
+    return deflection.dataset(), solve_box_modes(case, deflection).dataset()
+
+
+def test_every_shaft_has_a_curve_in_both_planes_and_bearings_their_forces(data):
+    figure = deflected_shafts(data[0])
+    assert [ax.get_ylabel() for ax in figure.axes] == ["deflection along x [µm]", "deflection along y [µm]"]
+    for way, ax in enumerate(figure.axes):
+        drawn = {line.get_label(): line.get_ydata() for line in ax.lines}
+        assert {"input", "output"} <= drawn.keys()
+        own = data[0]["member"].values == "input"
+        moved = data[0]["displacement"].values[0, own, way]
+        assert np.abs(drawn["input"]).max() == pytest.approx(1e6 * np.abs(moved).max(), rel=1e-9)
+        assert {text.get_text().split("\n")[0] for text in ax.texts if text.get_text()} == {"A", "B", "C", "D"}
+
+
+def test_loads_over_the_width_integrate_to_the_force(data):
+    (ax,) = load_patterns(data[0]).axes
+    line = ax.lines[0]
+    step = line.get_xdata()[1] - line.get_xdata()[0]
+    force = float(data[0]["mesh_force"].values[0, 0])
+    assert line.get_ydata().sum() * step == pytest.approx(force, rel=1e-9)
+
+
+def test_energies_fill_their_bars(data):
+    (ax,) = mode_energy(data[1]).axes
+    tops = {}
+    for bar in ax.patches:
+        tops[round(bar.get_x(), 3)] = max(tops.get(round(bar.get_x(), 3), 0.0), bar.get_y() + bar.get_height())
+    assert list(tops.values()) == pytest.approx([1.0] * len(tops))
+
+
+def test_the_campbell_diagram_has_the_speed_of_operation(data):
+    ax = gearbox_campbell(data[1]).axes[0]
+    assert "operation" in {text.get_text() for text in ax.texts}
+    assert ax.get_xlabel() == "speed [rpm of input]"

@@ -1,0 +1,51 @@
+"""Speeds, torques and frequencies of a case, and where its refusals stand."""
+
+import math
+
+import pytest
+from small_gearbox import pair_tables
+
+from femgear.errors import FemgearError
+from femgear.trains.gearbox.power import gearbox_flow, turns_in_words
+from femgear.trains.reading import read_case
+
+RPM = math.pi / 30.0
+
+
+def test_a_pair_turns_and_carries_by_its_teeth():
+    flow = gearbox_flow(read_case(pair_tables()))
+    assert flow.speed["output"] == pytest.approx(-1000.0 * RPM * 24 / 36, rel=1e-15)
+    assert flow.port_torque == pytest.approx({"motor": 100.0, "brake": 150.0}, rel=1e-15)
+    assert flow.mesh_frequency == pytest.approx({"stage": 400.0}, rel=1e-12)
+    assert turns_in_words(flow.frequencies["stage"]) == "3 and 2 turns, 0.18 s"
+
+
+def test_the_electric_axle():
+    flow = gearbox_flow(read_case("cases/e_axle.toml"))
+    ratio = 72 / 25 * (1 + 73 / 23)
+    assert flow.speed["output"] == pytest.approx(-9000.0 * RPM / ratio, rel=1e-12)
+    assert flow.port_torque["wheels"] == pytest.approx(35.0 * ratio, rel=1e-12)
+    sun, carrier = flow.speed["intermediate"], flow.speed["output"]
+    assert flow.planet_speed["second stage"] == pytest.approx(carrier - (sun - carrier) * 23 / 24, rel=1e-12)
+    assert flow.first_torque(read_case("cases/e_axle.toml").planetary[0]) == pytest.approx(35.0 * 72 / 25, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "key"),
+    [
+        (lambda o: o.update(output=[]), "E-LOAD-BALANCE", "operation.output"),
+        (lambda o: o["load_case"][0].update(speed={}), "E-MECHANISM", "operation.load_case[0].speed"),
+        (
+            lambda o: o["load_case"][0]["speed"].update(output="5 rpm"),
+            "E-SPEED",
+            "operation.load_case[0].speed",
+        ),
+    ],
+)
+def test_refusals_name_entries_of_the_case(change, code, key):
+    tables = pair_tables()
+    change(tables["operation"])
+    with pytest.raises(FemgearError) as error:
+        gearbox_flow(read_case(tables))
+    found = error.value.problems or (error.value,)
+    assert [(one.code, one.key) for one in found] == [(code, key)]

@@ -1,0 +1,63 @@
+"""Contents of the files of a gearbox, and what they say against themselves."""
+
+import numpy as np
+import pytest
+from small_gearbox import pair_tables
+
+from femgear.findings import Finding
+from femgear.trains.gearbox.results import deflection_warnings, gearbox_warnings
+from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
+from femgear.trains.reading import read_case
+
+BALL = {"kind": "ball", "rolling_elements": 9, "element_diameter": "9.5 mm", "pitch_diameter": "46 mm"}
+
+
+def codes(findings) -> list[str]:
+    return [one.code for one in findings]
+
+
+def test_lives_are_those_of_bearings_with_a_rating():
+    tables = pair_tables()
+    tables["bearing"][0] = {"name": "A", "shaft": "input", "position": "5 mm", "dynamic_rating": "19.5 kN"} | BALL
+    data = solve_deflections(read_case(tables)).contents()
+    lives = data["rating_life"].values[0]
+    radial = data["radial_force"].values[0, 0]
+    # L10 = (C/P)^3 million turns
+    assert lives[0] == pytest.approx((19500.0 / radial) ** 3 * 1e6 / (1000.0 * 60.0), rel=1e-6)
+    assert np.isnan(lives[1:]).all()
+
+
+def test_a_mesh_that_carries_on_a_part_of_its_width_is_told():
+    tables = pair_tables()
+    tables["shaft"][0]["part"][0]["outer_diameter"] = "12 mm"
+    tables["pair"][0]["positions"] = ["12 mm", "12 mm"]
+    tables["load"][0]["force"] = ["0 N", "900 N", "0 N"]  # a belt that bends the shaft
+    tables["operation"]["load_case"][0]["torque"]["motor"] = "5 N m"
+    result = solve_deflections(read_case(tables))
+    found = list(deflection_warnings(result.contents()))
+    assert codes(found) == ["W-FACE-LOAD"]
+
+
+def test_passes_that_do_not_suffice_are_told():
+    tables = pair_tables(teeth=True)
+    tables["deflection"] = {"passes": 1, "tolerance": 1e-9}
+    result = solve_deflections(read_case(tables))
+    assert not result.converged
+    assert "W-PASSES" in codes(deflection_warnings(result.contents()))
+
+
+def test_supports_of_the_teeth_have_no_effect():
+    tables = pair_tables(teeth=True)
+    tables["pair"][0]["teeth"]["gear_1"]["bearing_stiffness"] = "1e8 N/m"
+    (finding,) = gearbox_warnings(read_case(tables))
+    assert isinstance(finding, Finding)
+    assert finding.code == "W-UNUSED"
+    assert "gear_1.bearing_stiffness" in finding.text
+
+
+def test_modes_and_their_parts_are_in_the_file():
+    case = read_case(pair_tables())
+    data = solve_box_modes(case, solve_deflections(case)).contents()
+    assert data["strain"].dims == ("part", "mode")
+    assert data.attrs["reference"] == "input"
+    assert data["order"].values[list(data["line"].values).index("stage mesh")] == pytest.approx(24.0)

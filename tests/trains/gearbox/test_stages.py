@@ -1,0 +1,59 @@
+"""A whole run of a gearbox: files, tables, pictures, findings."""
+
+import numpy as np
+import pytest
+from small_gearbox import pair_tables
+
+from femgear.run import run_case
+from femgear.storage.results import run_folder
+from femgear.trains.gearbox.results import describe_deflection, describe_gearbox_modes
+from femgear.trains.gearbox.stages import describe_gearbox
+from femgear.trains.reading import open_results, read_case
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory):
+    tables = pair_tables(teeth=True)
+    first = tables["operation"]["load_case"][0]
+    tables["operation"]["load_case"] = [
+        first | {"name": "full", "share": 0.3},
+        first | {"name": "back", "share": 0.7, "torque": {"motor": "-60 N m"}},
+    ]
+    folder = tmp_path_factory.mktemp("box") / "run"
+    with run_folder(folder) as place:
+        run_case(read_case(tables), place)
+    return open_results(folder)
+
+
+def test_both_load_cases_are_in_the_file(results):
+    data = results.deflection
+    assert data["load_case"].values.tolist() == ["full", "back"]
+    assert data["mesh_force"].values[:, 0] == pytest.approx(
+        np.array([100.0, 60.0]) / (0.036 * np.cos(np.radians(20.0))), rel=1e-9
+    )
+    assert (data["face_load_factor"].values > 1.0).all()
+    assert data["settled"].values.all()
+    assert data["speed"].values[0] == pytest.approx([1000.0, -2000.0 / 3.0])
+    # reversed load, reversed bearing forces across
+    force = data["bearing_force"].values
+    assert np.sign(force[0, :, 1]) == pytest.approx(-np.sign(force[1, :, 1]))
+
+
+def test_tables_tell_meshes_bearings_and_modes(results):
+    meshes, bearings = describe_deflection(results.deflection)
+    assert [row[0] for row in meshes.rows] == ["stage"]
+    assert [row[0] for row in bearings.rows] == ["A", "B", "C", "D"]
+    assert "settled in" in meshes.notes[0]
+    assert len(describe_gearbox_modes(results.modes).rows) > 5
+    case = read_case(results.case.source)
+    assert [block.title for block in describe_gearbox(case)] == [
+        "Power flow, full",
+        "Stages, full",
+        "Power flow, back",
+        "Stages, back",
+    ]
+
+
+def test_pictures_are_there(results):
+    names = {path.name for path in results.folder.iterdir()}
+    assert {"deflected_shafts.png", "load_patterns.png", "campbell.png", "mode_energy.png", "report.html"} <= names
