@@ -311,32 +311,21 @@ def _pair(case: GearboxCase, stage: PairSection, key: str) -> Iterator[CaseError
     if teeth is not None and teeth.train != "pair":
         yield _wrong_train(teeth, key, "pair")
         return
-    if stage.shafts[0] == stage.shafts[1]:
-        yield CaseError("a gear meshes with one of its own shaft", code="E-CHOICE", key=f"{key}.shafts")
-        return
-    sizes = pair_sizes(stage)
-    shafts = [None if name == CASING else case.shaft_named(name) for name in stage.shafts]
-    if None in shafts:
-        only = next(shaft for shaft in shafts if shaft is not None)
-        axes = (only.axis, only.axis) if sizes.internal else None
-        yield (
-            CaseError(
-                "a gear of a pair sits on a shaft",
-                code="E-CHOICE",
-                key=f"{key}.shafts",
-                value=CASING,
-                limit="two shafts",
-                remedy="give the standing gear a [[shaft]] and name it in operation.fixed",
-            )
-            if axes is None
-            else CaseError(
-                "a ring in the casing belongs to a planetary stage", code="E-CHOICE", key=f"{key}.shafts", value=CASING
-            )
+    if stage.shafts[0] == stage.shafts[1] or CASING in stage.shafts:
+        yield CaseError(
+            "the gears of a pair sit on two shafts",
+            code="E-CHOICE",
+            key=f"{key}.shafts",
+            value=" and ".join(stage.shafts),
+            limit="two shafts",
+            remedy="give a gear that stands still a [[shaft]], and name that in operation.fixed",
         )
         return
-    distance = math.dist(shafts[0].axis, shafts[1].axis)  # type: ignore[union-attr]
+    sizes, (first, second) = pair_sizes(stage), (case.shaft_named(name) for name in stage.shafts)
+    distance = math.dist(first.axis, second.axis)
     yield from _distance(distance, sizes, f"{key}.shafts", "the axes of the two shafts")
-    places = [s.start + (p or 0.0) for s, p in zip(shafts, stage.positions or (0.0, 0.0), strict=True)]  # type: ignore[union-attr]
+    positions = stage.positions or (0.0, 0.0)
+    places = [shaft.start + position for shaft, position in zip((first, second), positions, strict=True)]
     yield from _mid_planes(places, sizes, f"{key}.positions")
 
 
@@ -348,7 +337,13 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
     members = [getattr(stage, name) for name in ("sun", "carrier", "ring")]
     if len(set(members)) < 3:
         twice = next(name for name in members if members.count(name) > 1)
-        yield CaseError("two members of a set on one shaft lock it", code="E-CHOICE", key=f"{key}.sun", value=twice)
+        yield CaseError(
+            "two members of a set on one shaft lock it",
+            code="E-CHOICE",
+            key=f"{key}.sun",
+            value=twice,
+            limit="three shafts, or two and the casing",
+        )
         return
     sizes = set_sizes(stage)
     shafts = [
