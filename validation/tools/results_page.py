@@ -70,6 +70,7 @@ RUNS = {
             "runup": {"from": "14000 rpm", "to": "16000 rpm", "count": 3},
         },
     ),
+    "gearbox": ("e_axle", {"deflection.contact": False}),
     "multistage": ("four_stage_reducer", {"response.points": 3, "response.balance_points": 1}),
     "gear_pair": (
         "gear_pair",

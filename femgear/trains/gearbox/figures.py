@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.report.response import campbell
-from femgear.report.style import BLACK, COLOURS, GREY, SIZE, VERMILION, label, legend_below, new_figure
+from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
 from femgear.stages.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
@@ -15,7 +14,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ARROW = 46.0  # length of the longest arrow [points]
+_LEAST = 0.04  # force that is drawn, over the largest
 _MOST_MODES = 24
+_KIND_COLOURS = dict(zip(("torsional", "bending", "axial", "mixed"), COLOURS, strict=False))
 _DASHES = ("-", "--", "-.", ":")
 _PLANES = ((0, "x"), (1, "y"))
 
@@ -48,14 +49,14 @@ def _arrows(ax, one: xr.Dataset, way: int) -> None:
     force, place, moved = (one[name].values for name in ("bearing_force", "bearing_place", "bearing_displacement"))
     largest = float(np.abs(force[:, :2]).max(initial=0.0))
     for name, vector, at, motion in zip(one["bearing"].values, force, place, moved, strict=True):
-        if not largest or abs(vector[way]) < 1e-3 * largest:
+        if not largest or abs(vector[way]) < _LEAST * largest:
             continue
         length = _ARROW * vector[way] / largest
         tip = (1e3 * at[2], 1e6 * motion[way])
         style = {"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
         ax.annotate("", tip, (0.0, -length), textcoords="offset points", arrowprops=style)
         ax.annotate(
-            f"{name}\n{abs(vector[way]):.3g} N",
+            f"{name}\n{abs(vector[way]):.0f} N",
             tip,
             (0.0, -length - np.sign(length) * 3.0),
             textcoords="offset points",
@@ -118,37 +119,59 @@ def mode_energy(modes: xr.Dataset) -> Figure:
 
 
 def gearbox_campbell(modes: xr.Dataset) -> Figure:
-    """Draw natural frequencies over the speed with turns and mesh lines of all stages, from modes.nc."""
-    speed = modes["campbell_speed"].values
-    frequency = modes["campbell_frequency"].values
-    lines = modes["order"].values / 60.0
-    kept = [
-        i
-        for i, slope in enumerate(lines)
-        if slope * speed.max() >= np.nanmin(frequency[frequency > 0.0], initial=np.inf)
-    ]
-    figure = campbell(
-        speed,
-        frequency,
-        orders=lines[kept],
-        order_names=modes["line"].values[kept],
-        critical=np.column_stack([modes["critical_speed"].values, modes["critical_frequency"].values]),
-        speed_unit=f"rpm of {modes.attrs['reference']}",
+    """Draw natural frequencies over the speed with turns and mesh lines of all stages, from modes.nc.
+
+    Branches have the colour of the kind of their mode at rest; lines of excitation have their names at their ends.
+    """
+    speed, frequency = modes["campbell_speed"].values, modes["campbell_frequency"].values
+    kinds, hertz = modes["kind"].values, modes["frequency"].values
+    figure, (ax,) = new_figure(width=9.5, height=6.0)
+    top = 1.05 * float(np.nanmax(frequency, initial=1.0))
+    for branch in frequency.T:
+        start = branch[np.isfinite(branch)][:1]
+        if not len(start) or start[0] <= 0.0:
+            continue
+        kind = str(kinds[np.abs(hertz - start[0]).argmin()])
+        ax.plot(speed, branch, linewidth=1.5, color=_KIND_COLOURS.get(kind, BLACK), label=kind)
+    for name, order in zip(modes["line"].values, modes["order"].values, strict=True):
+        _excitation_line(ax, str(name), order / 60.0, float(speed.max()), top)
+    ax.plot(
+        modes["critical_speed"].values,
+        modes["critical_frequency"].values,
+        "o",
+        color=BLACK,
+        markerfacecolor="white",
+        markersize=4,
+        label="critical speed",
     )
-    ax, at = figure.axes[0], float(modes.attrs["speed"])
+    at = float(modes.attrs["speed"])
     if 0.0 < at < speed.max():
-        ax.axvline(at, color=VERMILION, linewidth=1.4)
-        ax.annotate(
-            "operation",
-            (at, 1.0),
-            (4, -4),
-            xycoords=ax.get_xaxis_transform(),
-            textcoords="offset points",
-            va="top",
-            color=VERMILION,
-            fontsize=SIZE - 2,
-        )
+        ax.axvline(at, color=BLACK, linewidth=1.4, linestyle=":", label="speed of operation")
+    ax.set_xlim(0.0, float(speed.max()))
+    ax.set_ylim(0.0, top)
+    label(ax, f"speed of {modes.attrs['reference']} [rpm]", "natural frequency [Hz]")
+    legend_below(figure, ax, columns=4)
     return figure
+
+
+def _excitation_line(ax, name: str, slope: float, fastest: float, top: float) -> None:
+    """Draw a line of excitation [Hz per rpm] with its name where it leaves the picture; flat ones are left out."""
+    if slope * fastest < 0.02 * top:
+        return
+    end = min(fastest, top / slope)
+    ax.plot([0.0, end], [0.0, slope * end], color=GREY, linewidth=1.0, linestyle="--", zorder=1.0)
+    inside = end < fastest
+    ax.annotate(
+        name,
+        (end, slope * end),
+        (0, 4) if inside else (4, 0),
+        textcoords="offset points",
+        rotation=45 if inside else 0,
+        ha="left",
+        va="bottom" if inside else "center",
+        fontsize=SIZE - 3,
+        annotation_clip=False,
+    )
 
 
 def _draw_deflection(drawn: Drawn) -> dict[str, Figure]:

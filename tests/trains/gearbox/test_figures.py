@@ -44,7 +44,11 @@ def test_energies_fill_their_bars(data):
     assert list(tops.values()) == pytest.approx([1.0] * len(tops))
 
 
-def test_the_campbell_diagram_has_the_speed_of_operation(data):
+def test_the_campbell_diagram_has_modes_by_kind_lines_by_name_and_the_speed_of_operation(data):
     ax = gearbox_campbell(data[1]).axes[0]
-    assert "operation" in {text.get_text() for text in ax.texts}
-    assert ax.get_xlabel() == "speed [rpm of input]"
+    names = {line.get_label() for line in ax.lines}
+    assert {"bending", "axial", "critical speed", "speed of operation"} <= names
+    assert {"2 x stage mesh", "3 x stage mesh"} <= {text.get_text() for text in ax.texts}
+    operation = next(line for line in ax.lines if line.get_label() == "speed of operation")
+    assert operation.get_xdata() == pytest.approx([1000.0, 1000.0])
+    assert ax.get_xlabel() == "speed of input [rpm]"

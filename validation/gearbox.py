@@ -1,0 +1,136 @@
+"""Whole gearboxes: the modes of other trains, lever rules, thrust, settling of teeth and system, symmetry."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from gearbox_equivalents import drivetrain_tables, multistage_tables, set_tables
+from published.planetary_sets import kahraman_set, lin_parker_set
+from small_gearbox import pair_tables
+
+from femgear.solvers.linear.modal import solve_modes
+from femgear.stages.lumped_set import gear_set_modes
+from femgear.trains.drivetrain.stages import solve_drivetrain_modes
+from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.multistage.case_file import multistage_of
+from femgear.trains.multistage.stages import multistage_modes
+from femgear.trains.reading import read_case
+from validation.rows import Row, at_most, counted, within
+
+CLOSED = "closed form"
+SELF = "the same gearbox"
+LARGEST = 1e-9
+
+
+def frequencies(tables: dict[str, Any]) -> np.ndarray:
+    """Natural frequencies of a gearbox [Hz], ascending, with all slices of its meshes in touch."""
+    assembly, system, _ = linear_system(solve_deflection(read_case(tables)))
+    still = type(system)(system.M, system.C, system.K, system.W, 0.0 * system.load, system.dofs)
+    return np.sort(solve_modes(still, assembly.slice_stiffness, damping_ratio=0.0).frequency)
+
+
+def _alike(name: str, source: str, tables: dict[str, Any], expected) -> list[Row]:
+    """Number of modes, and the largest difference of their frequencies."""
+    found, expected = frequencies(tables), np.sort(expected)
+    rows = [counted(name, source, "modes", len(expected), len(found))]
+    elastic = expected > 1e-3
+    apart = np.abs(found - expected)[elastic] / expected[elastic] if len(found) == len(expected) else [math.inf]
+    rows.append(at_most(name, source, "largest difference of natural frequencies, relative", LARGEST, np.max(apart)))
+    return rows
+
+
+def other_trains() -> tuple[Row, ...]:
+    """Sets, stages in series and a drivetrain written as gearboxes."""
+    helical, planar = kahraman_set(contact_points="pitch_point"), lin_parker_set()
+    radii = np.array([planar.sun_radius, planar.planet_radius, planar.ring_radius])
+    teeth = np.rint(1000 * radii / radii[0]).astype(int).tolist()
+    rows = _alike(
+        "helical set of Kahraman",
+        "femgear, helical",
+        set_tables(helical, (30, 20, 70)),
+        gear_set_modes(helical).frequency,
+    )
+    rows += _alike(
+        "spur set of Lin and Parker", "femgear, planar", set_tables(planar, teeth), gear_set_modes(planar).frequency
+    )
+    for case in ("published_four_stages", "four_stage_reducer"):
+        data = multistage_of(read_case(f"cases/{case}.toml"))
+        rows += _alike(case, "femgear, multistage", multistage_tables(data), multistage_modes(data).modes.frequency)
+    drivetrain = read_case("cases/wind_turbine_drivetrain.toml")
+    modes = solve_drivetrain_modes(drivetrain).modes
+    rows += _alike("36 coordinates", "femgear, drivetrain", drivetrain_tables(drivetrain), modes.frequency)
+    return tuple(rows)
+
+
+def statics() -> tuple[Row, ...]:
+    """Bearing forces by the lever rule, and thrust of helical teeth by textbooks."""
+    tables = pair_tables(helix="15 deg")
+    tables["deflection"] = {"slices": 1}
+    found = solve_deflection(read_case(tables))
+    alpha, beta, tangential = math.radians(20.0), math.radians(15.0), 100.0 / 0.036
+    on_input = found.bearing_force[:2]
+    rows = [
+        within(
+            "pair, 15 deg",
+            CLOSED,
+            "radial force on the input shaft [N]",
+            tangential * math.tan(alpha),
+            on_input[:, 0].sum(),
+            1e-9,
+        ),
+        within("pair, 15 deg", CLOSED, "tangential force [N]", tangential, on_input[:, 1].sum(), 1e-9),
+        within("pair, 15 deg", CLOSED, "thrust [N]", tangential * math.tan(beta), -on_input[:, 2].sum(), 1e-9),
+    ]
+    # in the plane of the tangential force: levers of 25 and 55 mm; the thrust tilts in the other plane
+    rows.append(
+        within(
+            "pair, 15 deg", CLOSED, "tangential force of bearing A [N]", tangential * 55.0 / 80.0, on_input[0, 1], 1e-9
+        )
+    )
+    moment = tangential * math.tan(beta) * 0.036
+    # moments about bearing B: thrust along +z at the tooth on the side of the wheel turns the shaft against the load
+    lever = tangential * math.tan(alpha) * 55.0 / 80.0
+    rows.append(
+        within(
+            "pair, 15 deg",
+            CLOSED,
+            "radial force of bearing A [N], with the couple of the thrust",
+            lever - moment / 0.08,
+            on_input[0, 0],
+            1e-9,
+        )
+    )
+    return tuple(rows)
+
+
+def passes() -> tuple[Row, ...]:
+    """Teeth and system settle within five passes, and where they start does not matter."""
+    rows = []
+    for torque in ("100 N m", "-100 N m"):
+        tables = pair_tables(teeth=True)
+        tables["operation"]["load_case"][0]["torque"]["motor"] = torque
+        case = read_case(tables)
+        found, far = solve_deflection(case), solve_deflection(case, slopes=[3e-4])
+        rows.append(at_most(f"pair, {torque}", SELF, "passes until slopes agree to 1e-4", 5, len(found.slopes) - 1))
+        apart = np.abs(far.mesh_slope / found.mesh_slope - 1.0).max()
+        rows.append(at_most(f"pair, {torque}", SELF, "slope from a start of 0.3 mrad, relative", 2e-4, apart))
+        rows.append(_seen(found, f"pair, {torque}"))
+    axle = solve_deflection(read_case("cases/e_axle.toml"))
+    rows.append(at_most("electric axle", SELF, "passes until slopes agree to 1e-4", 5, len(axle.slopes) - 1))
+    rows.append(at_most("electric axle", "equilibrium", "force out of balance over the largest", 1e-9, axle.residual))
+    rows.append(_seen(axle, "electric axle"))
+    return tuple(rows)
+
+
+def _seen(found: Deflection, name: str) -> Row:
+    """Largest difference of the misalignment that contact and system have, over the load's own approach."""
+    worst = 0.0
+    for stage in found.model.stages:
+        if stage.name in found.contacts:
+            rise = found.contacts[stage.name].result.cycle.mesh_misalignment.mean(axis=1)
+            slope = found.slopes[-2][list(stage.meshes)] * stage.width / math.cos(stage.sizes.base_helix)
+            worst = max(worst, float(np.abs(rise - slope).max() / max(np.abs(slope).max(), 1e-9)))
+    return at_most(name, SELF, "misalignment of contact and of system, relative", 1e-3, worst)
