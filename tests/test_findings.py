@@ -323,6 +323,17 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
             drive_contact=("speed", [1.0, 0.9]), back_contact=("speed", [0.0, 0.0]), backlash=("x", [1e-5])
         ),
     ),
+    "W-STIFFNESS": lambda: of_stage(
+        "gearbox",
+        "deflection",
+        xr.Dataset(
+            {
+                "settled": ("load_case", [True]),
+                "estimate_face_load_factor": (("estimate", "mesh"), [[1.1], [1.3]]),
+            },
+            coords={"load_case": ["nominal"], "mesh": ["stage"]},
+        ),
+    ),
     "W-PASSES": lambda: of_stage(
         "gearbox",
         "deflection",

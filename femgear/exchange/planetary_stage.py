@@ -373,8 +373,15 @@ def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
     elif name == "planet":
         found["profile_shift"], remarks["planet.profile_shift"] = 0.0, "assumed"
     for key in ("tip_diameter", "root_diameter"):
-        if (diameter := s.common(gears, key, LENGTH, sign=False)) is not None:
-            found[key] = with_unit(diameter, LENGTH)
+        if (diameter := s.common(gears, key, LENGTH, sign=False)) is None:
+            continue
+        module = s.common(every, "normal_module", LENGTH)
+        # no gear has tips this deep inside its reference circle
+        if key == "tip_diameter" and name != "ring" and module and diameter < module * (found["teeth"] - 3.0):
+            text = f"the tip diameter {1e3 * diameter:.4g} mm of {gears[0]} lies inside its teeth: it is left out"
+            s.model.remark(f"{name}.tip_diameter", text, remedy="correct it in the file, or give it in the case")
+            continue
+        found[key] = with_unit(diameter, LENGTH)
     return found
 
 

@@ -1,11 +1,10 @@
-"""Case files of what a REXS file holds: of every stage, and of the chain that parallel stages make."""
+"""Case files of what a REXS file holds: the gearbox of all stages, or every stage by itself."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set
@@ -13,12 +12,13 @@ from femgear.case.teeth import flank_form
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.exchange.cylindrical_stage import pair_tables
 from femgear.exchange.gear_unit import UnitFlow, case_flows, plain_ids, stage_components, stage_in_words
+from femgear.exchange.gearbox_unit import NoGearbox, gearbox_tables
 from femgear.exchange.planetary_stage import case_tables, named
 from femgear.exchange.rexs import Component, Model
-from femgear.exchange.shaft_chain import NoChain, chain_tables
 from femgear.findings import DOUBT, NOTE
 from femgear.trains.drafts import draft_text
 from femgear.trains.reading import parse_case
+from femgear.trains.registry import train_of
 
 _READ = ("planetary_stage", "cylindrical_stage")
 MOST_STAGES = 40
@@ -41,9 +41,8 @@ class CaseDraft:
 def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case: int | None = None) -> list[CaseDraft]:
     """Write the cases of the stages of a REXS file; `Model.findings` holds what they have not.
 
-    Of one stage there is one case. Of several each has its own, called by its id; the one without is the
-    drivetrain of parallel stages, whose meshes have the stiffness of these, or the planetary stage where
-    there is one.
+    Of one stage there is one case. Several cylindrical stages on shafts are one gearbox; of other units each stage
+    has its own case, called by its id, and the one without is the planetary stage where there is one.
 
     Parameters
     ----------
@@ -103,7 +102,7 @@ def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case:
             model.remark(one.id, text, remedy=error.remedy or "", first=True)
     if not texts:
         raise refusals[0]
-    return list(_drafts(model, Path(name), stages, found, texts, load_case))
+    return list(_drafts(model, stages, found, texts, load_case))
 
 
 def _stage_tables(
@@ -152,19 +151,21 @@ def _shortened(tables: dict, key: str) -> str:
     return f"the {parts[number]['kind']} is taken to the end of the flank"
 
 
-def _drafts(model: Model, name: Path, stages, found, texts, load_case: int | None) -> Iterator[CaseDraft]:
+def _drafts(model: Model, stages, found, texts, load_case: int | None) -> Iterator[CaseDraft]:
     """The case without an id in its name, then those of the stages."""
     if len(stages) == 1:
         yield CaseDraft("", texts[stages[0].id], stage_in_words(model, stages[0]))
         return
     planetary = [one for one in stages if one.type == "planetary_stage" and one.id in texts]
     suffixes = {id: f"_{plain}" for id, plain in plain_ids(texts).items()}
+    before = list(model.findings)
     try:
-        files = {id: f"{name.stem}{suffix}{name.suffix}" for id, suffix in suffixes.items()}
         pairs = {id: tables for id, (tables, _) in found.items() if tables.get("model") == "pair"}
-        yield CaseDraft("", _chain_text(model, pairs, files, load_case), "drivetrain of all stages")
-    except NoChain as error:
-        whole = f"no drivetrain of all stages is written: {error}"
+        yield CaseDraft("", _gearbox_text(model, pairs, load_case), "gearbox of all stages")
+        return
+    except NoGearbox as error:
+        model.findings[:] = before
+        whole = f"no gearbox of all stages is written: {error}"
         severity = DOUBT if planetary else NOTE
         model.remark("", f"{whole}; each stage is a case of its own", severity=severity)
         if len(planetary) == 1:
@@ -174,15 +175,16 @@ def _drafts(model: Model, name: Path, stages, found, texts, load_case: int | Non
             yield CaseDraft(suffixes[one.id], texts[one.id], stage_in_words(model, one))
 
 
-def _chain_text(model: Model, pairs: dict[str, dict], files: dict[str, str], load_case: int | None) -> str:
-    """Text of the drivetrain; NoChain where it makes no case."""
-    tables, remarks = chain_tables(model, pairs, files, load_case)
-    cases = {file: pairs[id] for id, file in files.items()}
-    whole = [one | {"stiffness": cases[one["stiffness"]]} for one in tables["parallel"]]
+def _gearbox_text(model: Model, pairs: dict[str, dict], load_case: int | None) -> str:
+    """Text of the gearbox; NoGearbox where it makes no case."""
+    # supports of single stages and their load cases are those of the gearbox
+    model.findings[:] = [one for one in model.findings if not re.search(r"bearing_stiffness|: operation", one.key)]
+    tables, remarks = gearbox_tables(model, pairs, load_case)
     try:
-        parse_case(case_text.write(tables | {"parallel": whole}))
+        case = parse_case(case_text.write(tables))
+        train_of(case).describe_case(case)
     except FemgearError as error:
-        raise NoChain(f"{error.key}: {error.message}") from error
+        raise NoGearbox(f"{error.key}: {error.message}") from error
     head = f"# Written by femgear import (REXS {model.version}). What is assumed says so."
     return "\n".join([head, case_text.write(tables, remarks)])
 

@@ -179,6 +179,7 @@ class BoxBearingSection(SeatSection):
     outer_position: Along | None = None
     radial: Lateral | None = None
     axial: Lateral | None = None
+    axial_sense: Literal["positive", "negative"] | None = None
     tilt: Turning | None = None
     torsional: Turning | None = None
     kind: Literal["ball", "cylindrical", "needle", "tapered", "spherical"] | None = None
@@ -198,11 +199,21 @@ class BoxBearingSection(SeatSection):
     fatigue_limit: Annotated[float, Quantity(FORCE, 1e-3, _LARGEST_FORCE)] | None = None
     viscosity_ratio: Annotated[float, Number(0.05, 100.0)] | None = None
     contamination: Annotated[float, Number(0.0, 1.0)] | None = None
+    estimated: StrictBool = False
+
+    @property
+    def nonlinear(self) -> bool:
+        """Whether its force is no linear function of its motion: of a kind, or of one axial sense."""
+        return self.kind is not None or self.axial_sense is not None
 
     @property
     def stiffness(self) -> tuple[float, ...]:
-        """Given stiffnesses along x, y, z [N/m], against both tilts and rotation [N m/rad]; zero if left out."""
-        radial, axial, tilt, turn = (v or 0.0 for v in (self.radial, self.axial, self.tilt, self.torsional))
+        """Given stiffnesses along x, y, z [N/m], against both tilts and rotation [N m/rad].
+
+        Zero where left out, and along z where the axial one has one sense alone.
+        """
+        given = self.radial, None if self.axial_sense else self.axial, self.tilt, self.torsional
+        radial, axial, tilt, turn = (value or 0.0 for value in given)
         return radial, radial, axial, tilt, tilt, turn
 
 
@@ -352,11 +363,16 @@ class BoxGravitySection(Section):
 
 
 class LoadCaseSection(Section):
-    """Torques at loads and speeds of shafts of one load case, and its share of the time."""
+    """Torques at loads and speeds of shafts of one load case, and its share of the time.
+
+    ``force`` (along x, y, z) and ``tilting_moment`` (about x and y) act at loads beside what these have always.
+    """
 
     name: Name = "nominal"
     torque: dict[Name, Torque]
     speed: dict[Name, ShaftSpeed]
+    force: dict[Name, Annotated[tuple[Force, ...], TRIPLE]] = Field(default_factory=dict)
+    tilting_moment: dict[Name, Annotated[tuple[Torque, ...], PAIR]] = Field(default_factory=dict)
     share: Annotated[float, Number(0.0, 1.0, open_low=True)] = 1.0
 
 

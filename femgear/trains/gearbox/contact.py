@@ -63,6 +63,7 @@ def stage_contact(
     slopes: np.ndarray,
     *,
     slices: int,
+    positions: int | None = None,
     steps: Steps | None = None,
 ) -> StageContact:
     """Solve the contact of the teeth of a stage.
@@ -78,10 +79,12 @@ def stage_contact(
         normal.
     slices : int
         Least number of slices over the width.
+    positions : int, optional
+        Most positions over the mesh period; by default those of the teeth.
     steps : Steps, optional
         Compliances that other contacts of the stage have left.
     """
-    case = stage_case_of(case_text.write(loaded_tables(stage, torque, slices)))
+    case = stage_case_of(case_text.write(loaded_tables(stage, torque, slices, positions)))
     cosine = math.cos(base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
     # along the normal the force is 1/cos(beta_b) of that in the transverse section, the approach cos(beta_b) of it
     deviations = askew(set_deviations(case), planetary_set(case), slopes / cosine, back=torque < 0.0)
@@ -110,8 +113,10 @@ def askew(deviations: SetDeviations, gears: GearSet, slopes: np.ndarray, *, back
     return replace(deviations, planet_misalignment=deviations.planet_misalignment + axes)
 
 
-def loaded_tables(stage: PairSection | BoxPlanetarySection, torque: float, slices: int) -> dict[str, Any]:
-    """Make the tables of the teeth of a stage with its load and slices."""
+def loaded_tables(
+    stage: PairSection | BoxPlanetarySection, torque: float, slices: int, positions: int | None = None
+) -> dict[str, Any]:
+    """Make the tables of the teeth of a stage with its load, slices, and at most so many positions."""
     tables = copy.deepcopy(stage.teeth or {})
     operation, static = tables.setdefault("operation", {}), tables.setdefault("static", {})
     operation["torque"] = f"{torque:.15g} N m"
@@ -119,5 +124,7 @@ def loaded_tables(stage: PairSection | BoxPlanetarySection, torque: float, slice
         operation["input"], operation["fixed"] = "sun", "ring"
     if slices > 1:
         static["slices"] = max(int(static.get("slices", 0)), slices)
+    if positions is not None:
+        static["positions"] = min(int(static.get("positions", positions)), positions)
     static["stresses"] = False
     return tables

@@ -23,8 +23,11 @@ from femgear.trains.gearbox.contact import StageContact, stage_contact
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
 
 _STEPS = 200
+# Positions of the contact while slopes are far from settled, and how near they come by them, relative.
+_COARSE, _NEAR = 12, 3e-3
 _SETTLED = 1e-11  # residual force over the largest one
 _BALANCED = 1e-6
+_STIFFEST = 1e12  # of a rigid axial bearing of one sense [N/m]
 # Stiffness that holds what hangs in clearances while bearings find their place, over that of a bearing.
 _GUESS = 1e8
 
@@ -109,6 +112,58 @@ def rolling_bearing(section: BoxBearingSection) -> Bearing:
     return RollerBearing(section.kind, count, section.effective_length, section.pitch_diameter, size, **common)
 
 
+@dataclass(frozen=True)
+class BearingLaw:
+    """Force and stiffness of a bearing that is no set of linear springs.
+
+    Parameters
+    ----------
+    section : BoxBearingSection
+        With a kind, or with an axial stiffness of one sense.
+    factor : float
+        On its stiffness: the same force at so many times smaller motions.
+    """
+
+    section: BoxBearingSection
+    factor: float = 1.0
+
+    def state(self, motion: np.ndarray) -> BearingState | None:
+        """State of the rolling bearing at a motion (6,) [m, rad]; None of springs."""
+        if self.section.kind is None:
+            return None
+        return bearing_state(rolling_bearing(self.section), self.factor * motion)
+
+    def force(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Force (6,) that holds a motion, and its derivative (6, 6) [N, N m]."""
+        if (state := self.state(motion)) is not None:
+            return state.force, self.factor * state.stiffness
+        sense = 1.0 if self.section.axial_sense == "positive" else -1.0
+        k = min(self.section.axial or 0.0, _STIFFEST) * self.factor
+        force, stiffness = np.zeros(6), np.zeros((6, 6))
+        if sense * motion[2] > 0.0:
+            force[2], stiffness[2, 2] = k * motion[2], k
+        return force, stiffness
+
+    @property
+    def held(self) -> np.ndarray:
+        """Stiffness (6,) of a linear bearing that holds the same motions [N/m, N m/rad]."""
+        if self.section.kind is None:
+            return np.array([0.0, 0.0, _GUESS, 0.0, 0.0, 0.0])
+        lever = 0.25 * (self.section.pitch_diameter or 0.0)
+        thrust = self.section.kind in ("ball", "tapered", "spherical")
+        tilt = 0.0 if self.section.kind == "spherical" else lever**2
+        return _GUESS * np.array([1.0, 1.0, float(thrust), tilt, tilt, 0.0])
+
+
+def laws_of(model: GearboxModel, factor: float = 1.0) -> list[tuple[int, BearingLaw, StationSprings]]:
+    """List number, law and rows of the bearings that are no set of linear springs."""
+    return [
+        (number, BearingLaw(section, factor if section.estimated else 1.0), springs)
+        for number, (section, springs) in enumerate(zip(model.case.bearing, model.bearings, strict=True))
+        if section.nonlinear
+    ]
+
+
 def mesh_slopes(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
     """Compute the slopes of the approach of all meshes along their widths [rad] from the motions (6n,)."""
     approach = assembly.columns.T @ motion
@@ -120,7 +175,12 @@ def mesh_slopes(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
 
 
 def solve_deflection(
-    case: GearboxCase, load_case: LoadCaseSection | None = None, *, slopes: Sequence[float] | None = None, steps=None
+    case: GearboxCase,
+    load_case: LoadCaseSection | None = None,
+    *,
+    slopes: Sequence[float] | None = None,
+    steps=None,
+    estimate: float = 1.0,
 ) -> Deflection:
     """Solve for the loaded state of a gearbox, teeth and system in turn until the slopes of the meshes settle.
 
@@ -134,6 +194,8 @@ def solve_deflection(
         Slopes from which the first contact starts [rad]; by default those of the system with linear meshes.
     steps : Steps, optional
         What other computations have left of compliances.
+    estimate : float
+        Factor on the stiffness of bearings that are estimated.
 
     Raises
     ------
@@ -142,7 +204,7 @@ def solve_deflection(
     ConvergenceError
         No balance, as of a bearing whose clearance swallows the load (E-CONVERGENCE).
     """
-    model = gearbox_model(case, load_case)
+    model = gearbox_model(case, load_case, estimate=estimate)
     gap = np.zeros(len(model.assembly.slice_stiffness))
     found = solve_state(model, gap)
     staged = [stage for stage in model.stages if stage.section.teeth is not None]
@@ -150,24 +212,28 @@ def solve_deflection(
         return replace(found, slopes=(found.mesh_slope,))
     history = [np.asarray(slopes, float) if slopes is not None else found.mesh_slope]
     contacts: dict[str, StageContact] = {}
-    settled = False
+    settled, coarse = False, True
     for _ in range(case.deflection.passes):
-        contacts = {stage.name: _contact(model, stage, history[-1], steps) for stage in staged}
+        positions = _COARSE if coarse else None
+        contacts = {stage.name: _contact(model, stage, history[-1], steps, positions) for stage in staged}
         stiffness = {name: contact.stiffness for name, contact in contacts.items()}
-        model = gearbox_model(case, load_case, mesh_stiffness=stiffness)
+        model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate)
         gap = _gaps(model, staged, contacts, history[-1])
         found = solve_state(model, gap, start=found)
         history.append(found.mesh_slope)
-        if _agree(model, history[-1], history[-2], case.deflection.tolerance):
+        if coarse:
+            coarse = not _agree(model, history[-1], history[-2], max(case.deflection.tolerance, _NEAR))
+        elif _agree(model, history[-1], history[-2], case.deflection.tolerance):
             settled = True
             break
     return replace(found, contacts=contacts, slopes=tuple(history), settled=settled)
 
 
-def _contact(model: GearboxModel, stage: StageModel, slopes: np.ndarray, steps) -> StageContact:
-    """Contact of the teeth of a stage with the slopes of its meshes."""
+def _contact(model: GearboxModel, stage: StageModel, slopes: np.ndarray, steps, positions: int | None) -> StageContact:
+    """Contact of the teeth of a stage with the slopes of its meshes, at few positions until these are near."""
     torque, own = -model.flow.first_torque(stage.section), slopes[list(stage.meshes)]
-    return stage_contact(stage.section, torque, own, slices=model.case.deflection.slices, steps=steps)
+    slices = model.case.deflection.slices
+    return stage_contact(stage.section, torque, own, slices=slices, positions=positions, steps=steps)
 
 
 def _gaps(model, staged, contacts, slopes) -> np.ndarray:
@@ -206,37 +272,33 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
     ConvergenceError
         No balance (E-CONVERGENCE).
     """
-    assembly, case = model.assembly, model.case
+    assembly = model.assembly
     held = assembly.held.copy()
     held[model.turns] = True
     fixed = replace(assembly, held=held)
     T, K, W, k = fixed.motions, assembly.stiffness, assembly.columns, assembly.slice_stiffness
-    rolling = [
-        (number, rolling_bearing(section), springs)
-        for number, (section, springs) in enumerate(zip(case.bearing, model.bearings, strict=True))
-        if section.kind is not None
-    ]
-    _check_held(fixed, T, K, W, k, rolling)
+    laws = laws_of(model, model.estimate)
+    _check_held(fixed, T, K, W, k, laws)
+    spread = [(_spread(springs, assembly), law) for _, law, springs in laws]
     scale = max(np.abs(model.load).max(initial=0.0), 1e-9)
     y = np.zeros(T.shape[1]) if start is None else np.linalg.lstsq(T, start.motion, rcond=None)[0]
-    if start is None and rolling:
-        y = _guess(T, K, W, k, gap, rolling, model.load, assembly)
+    if start is None and laws:
+        y = _guess(T, K, W, k, gap, laws, model.load, assembly)
 
     def forces(y):
         q = T @ y
         press = np.maximum(W.T @ q - gap, 0.0)
         inner = K @ q + W @ (k * press)
         tangent = K + (W * (k * (press > 0.0))) @ W.T
-        for _, bearing, springs in rolling:
-            rows = _spread(springs, assembly)
-            state = bearing_state(bearing, rows @ q)
-            inner = inner + rows.T @ state.force
-            tangent = tangent + rows.T @ state.stiffness @ rows
+        for rows, law in spread:
+            force, stiffness = law.force(rows @ q)
+            inner = inner + rows.T @ force
+            tangent = tangent + rows.T @ stiffness @ rows
         return T.T @ (model.load - inner), T.T @ tangent @ T
 
     y, residual, iterations = _newton(forces, y, scale)
     q = T @ y
-    return _state(model, q, gap, rolling, residual, iterations)
+    return _state(model, q, gap, laws, residual, iterations)
 
 
 def _newton(forces, y: np.ndarray, scale: float) -> tuple[np.ndarray, float, int]:
@@ -282,14 +344,12 @@ def _solved(tangent: np.ndarray, residual: np.ndarray) -> np.ndarray:
     return np.linalg.solve(scaled + 1e-10 * np.eye(len(size)), residual / size) / size
 
 
-def _guess(T, K, W, k, gap, rolling, load, assembly) -> np.ndarray:
+def _guess(T, K, W, k, gap, laws, load, assembly) -> np.ndarray:
     """Motions with a linear spring in the place of every rolling bearing."""
     tangent = K + (W * k) @ W.T
-    for _, bearing, springs in rolling:
+    for _, law, springs in laws:
         rows = _spread(springs, assembly)
-        # a tapered or angular bearing holds against thrust of one sense only: the start has both
-        lever = 0.25 * bearing.pitch_diameter
-        tangent = tangent + (rows.T * (_GUESS * np.array([1, 1, 1, lever**2, lever**2, 0.0]))) @ rows
+        tangent = tangent + (rows.T * law.held) @ rows
     return _solved(T.T @ tangent @ T, T.T @ (load + W @ (k * gap)))
 
 
@@ -302,15 +362,12 @@ def _spread(springs: StationSprings, assembly: Assembly) -> np.ndarray:
     return found
 
 
-def _check_held(fixed: Assembly, T, K, W, k, rolling) -> None:
+def _check_held(fixed: Assembly, T, K, W, k, laws) -> None:
     """Refuse motions that neither springs nor bearings nor meshes hold."""
     tangent = K + (W * k) @ W.T
-    for _, bearing, springs in rolling:
-        rows, lever = _spread(springs, fixed), 0.25 * bearing.pitch_diameter
-        held = np.array([1.0, 1.0, float(_thrust(bearing)), lever**2, lever**2, 0.0])
-        if getattr(bearing, "kind", "") == "spherical":
-            held[3:5] = 0.0
-        tangent = tangent + (rows.T * (_GUESS * held)) @ rows
+    for _, law, springs in laws:
+        rows = _spread(springs, fixed)
+        tangent = tangent + (rows.T * law.held) @ rows
     reduced = T.T @ tangent @ T
     size = np.sqrt(np.abs(np.diag(reduced)))
     size[size == 0.0] = 1.0
@@ -334,35 +391,32 @@ def _check_held(fixed: Assembly, T, K, W, k, rolling) -> None:
     )
 
 
-def _thrust(bearing: Bearing) -> bool:
-    """Whether a bearing holds along the axis."""
-    return isinstance(bearing, BallBearing) or bearing.kind in ("tapered", "spherical")
-
-
-def _state(model, q, gap, rolling, residual, iterations) -> Deflection:
+def _state(model: GearboxModel, q, gap, laws, residual: float, iterations: int) -> Deflection:
     """Forces and tangents of all bearings and slices at the motions."""
     assembly, case = model.assembly, model.case
     press = np.maximum(assembly.columns.T @ q - gap, 0.0)
     force, stiffness = np.zeros((len(case.bearing), 6)), np.zeros((len(case.bearing), 6, 6))
     states: list[BearingState | None] = [None] * len(case.bearing)
-    for number, bearing, springs in rolling:
-        state = bearing_state(bearing, _spread(springs, assembly) @ q)
-        states[number], force[number], stiffness[number] = state, -state.force, state.stiffness
-    _linear_bearings(model, q, press, rolling, force, stiffness)
+    _linear_bearings(model, q, press, laws, force, stiffness)
+    for number, law, springs in laws:
+        motion = _spread(springs, assembly) @ q
+        holding, tangent = law.force(motion)
+        states[number] = law.state(motion)
+        force[number] -= holding
+        stiffness[number] += tangent
     return Deflection(
         model, q, assembly.slice_stiffness * press, force, stiffness, tuple(states), residual, iterations, {}
     )
 
 
-def _linear_bearings(model, q, press, rolling, force, stiffness) -> None:
+def _linear_bearings(model: GearboxModel, q, press, laws, force, stiffness) -> None:
     """Forces of bearings of given stiffness; those of rigid ones balance their stations."""
     assembly, case = model.assembly, model.case
-    geared = {number for number, *_ in rolling}
     rigid: list[tuple[int, int]] = []
     for number, (section, springs) in enumerate(zip(case.bearing, model.bearings, strict=True)):
-        if number in geared:
+        if section.kind is not None:
             continue
-        values = np.array(section.stiffness)
+        values = np.array(model.linear_stiffness(section))
         finite = np.where(np.isfinite(values), values, 0.0)
         stiffness[number] = np.diag(values)
         force[number] = -finite * (_spread(springs, assembly) @ q)
@@ -371,11 +425,9 @@ def _linear_bearings(model, q, press, rolling, force, stiffness) -> None:
         return
     # what is out of balance at all stations is what rigid bearings, joints and held motions carry
     left = model.load - assembly.stiffness @ q - assembly.columns @ (assembly.slice_stiffness * press)
-    for number, springs in enumerate(model.bearings):
-        finite = np.isfinite(force[number]) & ~np.isin(np.arange(6), [w for n, w in rigid if n == number])
+    for _, law, springs in laws:
         rows = _spread(springs, assembly)
-        if number in geared:
-            left = left + rows.T @ force[number]
+        left = left - rows.T @ law.force(rows @ q)[0]
     rows = np.array([_spread(model.bearings[number], assembly)[way] for number, way in rigid])
     others = _conditions(assembly, model)
     found = np.linalg.lstsq(np.vstack([rows, others]).T, left, rcond=None)[0]

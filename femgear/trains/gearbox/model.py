@@ -111,6 +111,8 @@ class GearboxModel:
         Torques, forces and weight on all motions [N, N m].
     turns : (k,) int array
         Motions whose speed is given, one for every way in which the gearbox turns.
+    estimate : float
+        Factor on the stiffness of bearings that are estimated.
     """
 
     case: GearboxCase
@@ -123,6 +125,11 @@ class GearboxModel:
     ports: Mapping[str, Seat]
     load: np.ndarray
     turns: np.ndarray
+    estimate: float = 1.0
+
+    def linear_stiffness(self, section: BoxBearingSection) -> tuple[float, ...]:
+        """Stiffnesses (6,) of a bearing that is given by them, with the factor of estimates [N/m, N m/rad]."""
+        return scaled_stiffness(section, self.estimate)
 
     @cached_property
     def bearing_names(self) -> tuple[str, ...]:
@@ -147,6 +154,7 @@ def gearbox_model(
     load_case: LoadCaseSection | None = None,
     *,
     mesh_stiffness: Mapping[str, Any] | None = None,
+    estimate: float = 1.0,
 ) -> GearboxModel:
     """Assemble shafts, bearings, stages and loads of a gearbox.
 
@@ -159,6 +167,8 @@ def gearbox_model(
     mesh_stiffness : mapping of str to sequence, optional
         Mean stiffnesses of all meshes of stages by their names [N/m]. Without it teeth have those of ISO 6336-1,
         method B.
+    estimate : float
+        Factor on the stiffness of bearings that are estimated.
 
     Raises
     ------
@@ -167,15 +177,15 @@ def gearbox_model(
     """
     load_case = load_case or case.load_case
     flow = gearbox_flow(case, load_case)
-    build = _Builder(case, flow, dict(mesh_stiffness or {}))
+    build = _Builder(case, flow, dict(mesh_stiffness or {}), estimate)
     return build.model(load_case)
 
 
 class _Builder:
     """Collects stations and parts of a gearbox, one kind after the other."""
 
-    def __init__(self, case: GearboxCase, flow: BoxFlow, stiffness: Mapping[str, Any]):
-        self.case, self.flow, self.stiffness = case, flow, stiffness
+    def __init__(self, case: GearboxCase, flow: BoxFlow, stiffness: Mapping[str, Any], estimate: float):
+        self.case, self.flow, self.stiffness, self.estimate = case, flow, stiffness, estimate
         self.names: list[str] = []
         self.places: list[tuple[float, float, float]] = []
         self.inertias: list[Inertia] = []
@@ -197,7 +207,7 @@ class _Builder:
             self._coupling(coupling, number)
         bearings = tuple(self._bearing(bearing, i) for i, bearing in enumerate(case.bearing))
         self.springs += [
-            replace_stiffness(springs, section.stiffness)
+            replace_stiffness(springs, scaled_stiffness(section, self.estimate))
             for springs, section in zip(bearings, case.bearing)
             if section.kind is None
         ]
@@ -218,7 +228,7 @@ class _Builder:
         ports = {one.name: self.seat(one.shaft, one.position) for one in case.load}
         ports |= {shaft.name: Seat(self.first[shaft.name]) for shaft in case.shaft if not shaft.part}
         turns = [6 * self.first[name] + 5 for name in self.flow.independent]
-        load = self._loads(assembly, ports)
+        load = self._loads(assembly, ports, load_case)
         return GearboxModel(
             case,
             self.flow,
@@ -230,6 +240,7 @@ class _Builder:
             ports,
             load,
             np.array(turns, int),
+            self.estimate,
         )
 
     def seat(self, shaft: str, position: float | None) -> Seat:
@@ -449,7 +460,7 @@ class _Builder:
             )
         return mass, polar, 0.5 * polar if transverse is None else transverse
 
-    def _loads(self, assembly: Assembly, ports: Mapping[str, Seat]) -> np.ndarray:
+    def _loads(self, assembly: Assembly, ports: Mapping[str, Seat], load_case: LoadCaseSection) -> np.ndarray:
         load = np.zeros(assembly.count)
 
         def add(seat: Seat, wrench) -> None:
@@ -458,7 +469,9 @@ class _Builder:
         for name, torque in self.flow.port_torque.items():
             add(ports[name], [0.0, 0.0, 0.0, 0.0, 0.0, torque])
         for one in self.case.load:
-            add(ports[one.name], [*one.force, *one.tilting_moment, 0.0])
+            force = np.add(one.force, load_case.force.get(one.name, 0.0))
+            moment = np.add(one.tilting_moment, load_case.tilting_moment.get(one.name, 0.0))
+            add(ports[one.name], [*force, *moment, 0.0])
         if self.case.gravity is not None:
             along = np.asarray(self.case.gravity.direction)
             field = np.zeros((len(assembly.names), 6))
@@ -551,6 +564,11 @@ def seats_on(case: GearboxCase, shaft: str) -> set[float]:
             if getattr(stage, member) == shaft and place is not None:
                 found.add(place)
     return found
+
+
+def scaled_stiffness(section: BoxBearingSection, factor: float) -> tuple[float, ...]:
+    """Multiply the given stiffnesses (6,) of a bearing by a factor where they are estimated."""
+    return tuple(value * factor for value in section.stiffness) if section.estimated else section.stiffness
 
 
 def replace_stiffness(springs: StationSprings, stiffness: Sequence[float]) -> StationSprings:

@@ -11,7 +11,7 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import CampbellData, campbell_data
 from femgear.system.assembly import Assembly, Beam
 from femgear.system.system import MechanicalSystem, Modes
-from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.model import GearboxModel
 
 # Share of the kinetic energy from which a mode is of one kind.
@@ -20,6 +20,8 @@ _PURE = 0.8
 _MOST_BRANCHES = 40
 # Modes that are kept at least.
 _LEAST = 20
+# Modes at rest on which one of the Campbell diagram is followed.
+_BASIS = 2
 # Reach of the Campbell diagram and of the modes that are kept, over the highest mesh frequency.
 _HARMONICS = 3.0
 KINDS = ("torsional", "bending", "axial")
@@ -73,12 +75,13 @@ def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.nda
     Slices that carry nothing have no stiffness.
     """
     model = found.model
-    rolling = [
-        Beam(springs.stations, springs.rows.T @ found.bearing_stiffness[number] @ springs.rows)
-        for number, (section, springs) in enumerate(zip(model.case.bearing, model.bearings, strict=True))
-        if section.kind is not None
-    ]
-    assembly = replace(model.assembly, beams=(*model.assembly.beams, *rolling))
+    bearings = []
+    for number, law, springs in laws_of(model, model.estimate):
+        # of one axial sense: the rest of the bearing is among the springs
+        tangent = found.bearing_stiffness[number]
+        tangent = tangent if law.section.kind is not None else np.diag([0.0, 0.0, tangent[2, 2], 0, 0, 0])
+        bearings.append(Beam(springs.stations, springs.rows.T @ tangent @ springs.rows))
+    assembly = replace(model.assembly, beams=(*model.assembly.beams, *bearings))
     return assembly, assembly.system(), _pressed_stiffness(found)
 
 
@@ -109,12 +112,29 @@ def solve_gearbox_modes(found: Deflection) -> GearboxModes:
     reference = model.flow.independent[0] if model.flow.independent else case.shaft[0].name
     speed = abs(model.flow.speed[reference])
     orders = excitation_orders(model, reference)
-    turning = replace(still, gyroscopic=np.asarray(system.gyroscopic) / speed if speed else None)
     speeds = np.linspace(0.0, case.modes.highest_speed * max(speed, 1.0), case.modes.speeds)
     count = int(np.clip(np.count_nonzero(modes.frequency > 0.0), 1, _MOST_BRANCHES))
-    followed = campbell_data(lambda _: turning, speeds, stiffness, orders=tuple(orders.values()), count=count)
+    turning = _in_modes(still, stiffness, system.gyroscopic, speed, count)
+    followed = campbell_data(lambda _: turning, speeds, np.zeros(0), orders=tuple(orders.values()), count=count)
     return GearboxModes(
         found, replace(modes, kind=kinds), motion, members, kinetic, parts, strain, followed, reference, orders
+    )
+
+
+def _in_modes(still: MechanicalSystem, stiffness, gyroscopic, speed: float, count: int) -> MechanicalSystem:
+    """System on its lowest modes at rest, `_BASIS` for each that is followed; gyroscopic terms couple them."""
+    kept = min(len(still.dofs), _BASIS * count + _LEAST)
+    basis = solve_modes(still, stiffness, damping_ratio=0.0, count=kept)
+    size = len(basis.frequency)
+    coupling = basis.shape.T @ np.asarray(gyroscopic) @ basis.shape / speed if speed else None
+    return MechanicalSystem(
+        M=np.eye(size),
+        C=np.zeros((size, size)),
+        K=np.diag((2.0 * np.pi * basis.frequency) ** 2),
+        W=np.zeros((size, 0)),
+        load=np.zeros(size),
+        dofs=tuple(f"mode {i + 1}" for i in range(size)),
+        gyroscopic=coupling,
     )
 
 

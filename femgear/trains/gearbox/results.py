@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,16 +25,24 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+ESTIMATES = 0.5, 2.0
+"""Factors on the stiffness of estimated bearings between which results are shown."""
+# Spread of K_Hbeta by estimated bearings that is told.
+_SPREAD = 0.02
+
+
 @dataclass(frozen=True, eq=False)
 class DeflectionResult(StageResult):
     """Loaded states of all load cases.
 
     ``states`` stand in the order of the ``case``, ``chosen`` is the number of the one that modes start from.
+    ``estimates`` are its states with the factors `ESTIMATES` on the stiffness of bearings that are estimated.
     """
 
     case: GearboxCase
     states: tuple[Deflection, ...]
     chosen: int
+    estimates: tuple[Deflection, ...] = ()
 
     @property
     def state(self) -> Deflection:
@@ -97,7 +105,7 @@ class DeflectionResult(StageResult):
             "settled": (load_case, [one.settled for one in every], "1", "whether the slopes have settled"),
             "out_of_balance": (load_case, [one.residual for one in every], "1", "force out of balance, relative"),
         }
-        variables |= _of_bearings(every, state) | _distribution(state)
+        variables |= _of_bearings(every, state) | _distribution(state) | _of_estimates(self.estimates)
         coords = {
             "load_case": _names("load_case", [one.name for one in case.operation.load_case], "load case"),
             "shaft": _names("shaft", [one.name for one in case.shaft], "shaft"),
@@ -193,6 +201,19 @@ def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tu
     }
 
 
+def _of_estimates(states: Sequence[Deflection]) -> dict[str, tuple]:
+    """What other stiffnesses of estimated bearings make of the chosen load case."""
+    if not states:
+        return {}
+    misaligned = np.array([one.mesh_slope * _mesh_widths(one) for one in states])
+    face = np.array([_face_factors(one) for one in states])
+    return {
+        "estimate_factor": ("estimate", list(ESTIMATES), "1", "factor on the stiffness of estimated bearings"),
+        "estimate_misalignment": ("estimate mesh", misaligned, "m", "misalignment with that factor"),
+        "estimate_face_load_factor": ("estimate mesh", face, "1", "K_Hbeta with that factor"),
+    }
+
+
 def _distribution(state: Deflection) -> dict[str, tuple]:
     """Load of the slices of all meshes over the width, the largest number of slices for all."""
     assembly = state.model.assembly
@@ -283,8 +304,13 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
     meshes = {
         "mesh": lambda i: str(data["mesh"].values[i]),
         "force [N]": lambda i: f"{float(one['mesh_force'].values[i]):.5g}",
-        "misaligned [um]": lambda i: f"{1e6 * float(one['mesh_misalignment'].values[i]):+.3f}",
-        "K_Hbeta": lambda i: _number(one["face_load_factor"].values[i], ".3f"),
+        "misaligned [um]": lambda i: (
+            f"{1e6 * float(one['mesh_misalignment'].values[i]):+.3f}"
+            + _range(data, "estimate_misalignment", i, "+.2f", 1e6)
+        ),
+        "K_Hbeta": lambda i: (
+            _number(one["face_load_factor"].values[i], ".3f") + _range(data, "estimate_face_load_factor", i, ".3f")
+        ),
         "k [N/um]": lambda i: f"{1e-6 * float(one['mesh_stiffness'].values[i]):.4g}",
         "STE p-p [um]": lambda i: _number(1e6 * one["transmission_error"].values[i], ".3f"),
     }
@@ -295,12 +321,23 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
         "L10 [h]": lambda i: _number(one["rating_life"].values[i], ".4g"),
         "L10r [h]": lambda i: _number(one["reference_life"].values[i], ".4g"),
     }
+    if "estimate_factor" in data:
+        name += ", in brackets with half and twice the stiffness of estimated bearings"
     passes = int(one["passes"])
     note = f"forces balance to {float(one['out_of_balance']):.1g}" + (f", settled in {passes} passes" if passes else "")
     return (
         tabulate(f"Meshes{name}", range(data.sizes["mesh"]), meshes, (note,)),
         tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
     )
+
+
+def _range(data: Any, name: str, mesh: int, how: str, factor: float = 1.0) -> str:
+    """Write the range of a value of a mesh with all stiffnesses of estimated bearings, nothing without estimates."""
+    if f"estimate_{name}" not in data:
+        return ""
+    own = data["mesh_misalignment" if name == "misalignment" else name].values[mesh]
+    values = factor * np.sort([own, *data[f"estimate_{name}"].values[:, mesh]])
+    return "" if np.isnan(values).any() else f" ({values[0]:{how}} to {values[-1]:{how}})"
 
 
 def _number(value, how: str) -> str:
@@ -315,6 +352,16 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if open_cases:
         text = f"the misalignment of the meshes has not settled in load case {', '.join(open_cases[:5])}"
         yield Finding("W-PASSES", "deflection.passes", text, remedy="allow more passes")
+    if "estimate_face_load_factor" in data:
+        spread = np.ptp(data["estimate_face_load_factor"].values, axis=0)
+        worst = int(np.nan_to_num(spread).argmax()) if len(spread) else 0
+        if len(spread) and spread[worst] > _SPREAD:
+            low, high = np.sort(data["estimate_face_load_factor"].values[:, worst])[[0, -1]]
+            text = (
+                f"with half and twice the stiffness of the estimated bearings K_Hbeta of {data['mesh'].values[worst]} "
+                f"goes from {low:.2f} to {high:.2f}"
+            )
+            yield Finding("W-STIFFNESS", "bearing", text, remedy="give stiffness or catalogue numbers of the bearings")
     if "line_load" in data:
         load = data["line_load"].values
         idle = np.nansum(load <= 0.0, axis=1) / np.maximum(np.sum(np.isfinite(load), axis=1), 1)

@@ -13,6 +13,7 @@ from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
 from femgear.trains.gearbox.results import (
+    ESTIMATES,
     DeflectionResult,
     GearboxModesResult,
     deflection_warnings,
@@ -28,11 +29,17 @@ def solve_deflections(
 ) -> DeflectionResult:
     """Solve for the loaded states of all load cases: shafts, bearings and teeth together."""
     steps, states = steps or Steps(), []
-    cases = case.operation.load_case
+    cases, chosen = case.operation.load_case, case.operation.first - 1
+    factors = ESTIMATES if any(bearing.estimated for bearing in case.bearing) else ()
     for number, load_case in enumerate(cases):
-        progress("deflection", number, len(cases))
+        progress("deflection", number, len(cases) + len(factors))
         states.append(solve_deflection(case, load_case, steps=steps))
-    return DeflectionResult(case, tuple(states), case.operation.first - 1)
+    estimates = []
+    for number, factor in enumerate(factors, len(cases)):
+        progress("deflection", number, len(cases) + len(factors))
+        start = states[chosen].slopes[-1]
+        estimates.append(solve_deflection(case, cases[chosen], slopes=start, steps=steps, estimate=factor))
+    return DeflectionResult(case, tuple(states), chosen, tuple(estimates))
 
 
 @one_blas_thread()
