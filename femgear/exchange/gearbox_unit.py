@@ -24,7 +24,7 @@ from femgear.case.quantities import (
     Dimension,
     to_si,
 )
-from femgear.exchange.gear_unit import gears_of, plain_ids, shaft_of, stage_components, unit_flow, with_load_case
+from femgear.exchange.gear_unit import POWER, gears_of, plain_ids, shaft_of, stage_components, unit_flow, with_load_case
 from femgear.exchange.planetary_stage import is_bearing, with_unit
 from femgear.exchange.rexs import Component, Model
 from femgear.findings import DOUBT
@@ -69,6 +69,7 @@ def gearbox_tables(
     tables["pair"] = [unit.pair(stage, number) for number, stage in enumerate(stages)]
     tables["load"] = [unit.load(part) for part in unit.loads]
     tables["operation"] = unit.operation(load_case)
+    tables["load"] += [] if unit.extra is None else [unit.extra]
     weighs = any(
         model.text(part, "EIGENGEWICHT") == "true" for part in model.components.values() if part.type == "gear_unit"
     )
@@ -102,6 +103,7 @@ class _Unit:
         used = {shaft.id for shaft in self.on.values()}
         self.shafts = [part for part in model.components.values() if part.type == "shaft" and part.id in used]
         self.first: dict[str, float] = {}
+        self.extra: dict[str, Any] | None = None
         names = plain_ids([part.id for part in model.components.values()])
         self.name = {id: f"{_WORDS.get(model.components[id].type, 'bearing')} {plain}" for id, plain in names.items()}
         self.parts = {
@@ -306,14 +308,15 @@ class _Unit:
         """Torques, forces and speeds of all load cases."""
         number, _ = self.model.chosen_case(wanted)
         cases = self.model.load_cases or ({},)
-        found, output = [], self._output(cases[0])
+        found: list[dict[str, Any]] = []
+        output, self.extra = self._output(cases[0], unit_flow(self.model, cases[0]))
         for place, given in enumerate(cases):
             flow = unit_flow(self.model, given)
             torque, force, moment = {}, {}, {}
             for part in self.loads:
                 load = with_load_case(part, given)
-                value = self.model.number(load, "torque_around_u_axis", TORQUE)
-                if value and part.id != output:
+                value = self._torque(part, given, flow)
+                if value and self.name[part.id] != output:
                     torque[self.name[part.id]] = with_unit(value, TORQUE)
                 forces = [self.model.number(load, f"force_{way}_direction", FORCE) or 0.0 for way in "vwu"]
                 if any(forces):
@@ -332,22 +335,37 @@ class _Unit:
             if not torque or not table["speed"]:
                 raise NoGearbox(f"load case {place + 1} has no torque or no speed")
             found.append(table)
-        return {"output": [self.name[output]], "first": number, "load_case": found}
+        return {"output": [output], "first": number, "load_case": found}
 
-    def _output(self, given) -> str:
-        """Id of the load that takes the power: the one that says no torque, else the last."""
-        said = {
-            part.id: next(iter([self.model.number(with_load_case(part, given), "torque_around_u_axis", TORQUE)]))
-            for part in self.loads
-        }
-        silent = [
-            part.id
-            for part in self.loads
-            if not said[part.id] and (self.model.text(part, "transmits_torque") or "true") == "true"
-        ]
-        if not self.loads or not any(said.values()):
+    def _torque(self, part: Component, given, flow) -> float | None:
+        """Torque of a load [N m], from its power where that is what the file says."""
+        load = with_load_case(part, given)
+        torque = self.model.number(load, "torque_around_u_axis", TORQUE)
+        power = self.model.number(load, "power", POWER)
+        shaft = next(shaft for shaft in self.shafts if part in self.parts[shaft.id])
+        speed = flow.speed.get(shaft.id)
+        return power / speed if power is not None and speed and not torque else torque
+
+    def _output(self, given, flow) -> tuple[str, dict[str, Any] | None]:
+        """Name of the load that takes the power, and its table where the file has none.
+
+        It is the load that says no torque, else one at the end of a shaft of one gear without a load, else the last.
+        """
+        said = {part.id: self._torque(part, given, flow) for part in self.loads}
+        if not any(said.values()):
             raise NoGearbox("no load gives a torque")
-        return silent[-1] if silent else self.loads[-1].id
+        transmits = {part.id: (self.model.text(part, "transmits_torque") or "true") == "true" for part in self.loads}
+        silent = [id for id, torque in said.items() if not torque and transmits[id]]
+        if silent:
+            return self.name[silent[-1]], None
+        loaded = {shaft.id for shaft in self.shafts for part in self.loads if part in self.parts[shaft.id]}
+        for shaft in self.shafts:
+            if shaft.id not in loaded and [one.id for one in self.on.values()].count(shaft.id) == 1:
+                length = sum(to_si(part["length"], LENGTH) for part in self.shaft(shaft)["part"])
+                table = {"name": "output", "shaft": self.name[shaft.id], "position": with_unit(length, LENGTH)}
+                self.model.remark("load", f"the file has no load on {shaft}: its right end takes the power")
+                return "output", table
+        return self.name[self.loads[-1].id], None
 
     def _speed(self, flow, given) -> dict[str, str]:
         """Speed of the shaft that says it, else of the first one that is known."""

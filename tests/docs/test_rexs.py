@@ -4,7 +4,7 @@ import re
 import tomllib
 from pathlib import Path
 
-from rexs_stage import Gearbox
+from rexs_stage import Gearbox, ParallelUnit
 
 from femgear import cli
 
@@ -30,7 +30,19 @@ def test_the_case_of_the_example(tmp_path, monkeypatch, capsys):
     printed = tables(blocks("rexs.md")[0])
     assert len(printed) == 5 and set(printed) <= set(tables(written))
     assert "17" in capsys.readouterr().out
-    assert cli.main([*blocks("rexs.md", "sh")[1].split()[1:], "--force"]) == 0
+    assert cli.main([*blocks("rexs.md", "sh")[2].split()[1:], "--force"]) == 0
+
+
+def test_a_unit_becomes_the_gearbox_of_the_page(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    ParallelUnit().write(Path("unit.rexs"))
+    commands = [line.split()[1:] for line in blocks("rexs.md", "sh")[1].splitlines()]
+    assert len(commands) == 3
+    for command in commands[:2]:
+        assert cli.main(command) == 0
+    assert "Power flow" in capsys.readouterr().out
+    assert cli.main([*commands[2], "--no-pictures"]) == 0
+    assert "K_Hbeta" in capsys.readouterr().out
 
 
 def test_attributes_of_the_page_are_those_that_are_read():

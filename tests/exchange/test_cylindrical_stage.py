@@ -1,11 +1,10 @@
 """Two gears of a REXS file as a pair: internal ones, senses of thrusts."""
 
-import math
-
 import pytest
-from rexs_stage import DEG, NONE, ParallelUnit
+from rexs_stage import NONE, ParallelUnit
 from trains.test_imports import drafts_of
 
+from femgear.case import text as case_text
 from femgear.trains.reading import parse_case
 
 
@@ -26,19 +25,6 @@ def test_an_internal_pair(tmp_path):
     for flank in (1044, 2044):
         box = box.set(flank, addendum_coefficient_basic_profile=(0.8, NONE))
     found, _ = drafts_of(box, tmp_path)
-    case = parse_case(found["_52"].text)
+    unit = parse_case(found[""].text)
+    case = parse_case(case_text.write(unit.pair[1].teeth))
     assert case.gear_2.internal and case.gear_2.outer_radius == pytest.approx(0.11)
-    assert "" not in found  # no drivetrain of internal gears
-
-
-@pytest.mark.parametrize("sense", [1.0, -1.0])
-def test_the_thrust_of_helical_gears_has_its_sense(tmp_path, sense):
-    """A right-handed pinion that drives counter-clockwise is pushed along its axis, its wheel against it."""
-    box = ParallelUnit().set(10, rotational_speed=(sense * 1500.0, "1 / min"))
-    box = box.set(5, torque_around_u_axis=(sense * 100.0, "N m"))
-    box = box.set(41, helix_angle_reference_diameter=(10.0, DEG))
-    box = box.set(42, helix_angle_reference_diameter=(-10.0, DEG))
-    box = box.set(51, center_distance=(75.0 / math.cos(math.radians(10.0)), "mm"))
-    found, _ = drafts_of(box, tmp_path)
-    assert f'helix_angle = "{-sense * 10:g} deg"' in found[""].text
-    assert parse_case(found["_51"].text).static.slices == 25

@@ -193,6 +193,11 @@ def member_of_stations(model: GearboxModel) -> list[str]:
     return owner
 
 
+def _called(kind: str, name: str) -> str:
+    """Name of a part with its kind, once."""
+    return name if name.startswith(kind) else f"{kind} {name}"
+
+
 def _strain(
     found: Deflection, assembly: Assembly, motion, stiffness, modes: Modes
 ) -> tuple[tuple[str, ...], np.ndarray]:
@@ -208,16 +213,16 @@ def _strain(
         energies[name] = energies.get(name, 0.0) + energy
 
     for shaft, beam in zip(model.beams, model.assembly.beams, strict=True):
-        add(f"shaft {shaft}", beam.stations, beam.stiffness)
+        add(_called("shaft", shaft), beam.stations, beam.stiffness)
     for number, springs in enumerate(model.bearings):
         finite = np.where(np.isfinite(found.bearing_stiffness[number]), found.bearing_stiffness[number], 0.0)
-        add(f"bearing {springs.name}", springs.stations, springs.rows.T @ finite @ springs.rows)
+        add(_called("bearing", springs.name), springs.stations, springs.rows.T @ finite @ springs.rows)
     own = set(model.bearing_names)
     for springs in assembly.springs:
         if springs.name not in own:
             finite = np.where(np.isfinite(springs.stiffness), springs.stiffness, 0.0)
             name = springs.name.rsplit(" pin ", 1)
-            label = f"pins of {name[0]}" if len(name) > 1 else f"coupling {springs.name}"
+            label = f"pins of {name[0]}" if len(name) > 1 else _called("coupling", springs.name)
             add(label, springs.stations, (springs.rows.T * finite) @ springs.rows)
     approach = assembly.columns.T @ motion
     for stage in model.stages:

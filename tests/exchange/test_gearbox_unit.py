@@ -1,0 +1,118 @@
+"""Whole REXS units as gearboxes: places of shafts, bearings, loads, load cases, senses."""
+
+import math
+
+import numpy as np
+import pytest
+from rexs_stage import DEG, ParallelUnit
+
+from femgear.exchange.cylindrical_stage import pair_tables
+from femgear.exchange.gear_unit import case_flows, stage_components
+from femgear.exchange.gearbox_unit import NoGearbox, gearbox_tables
+from femgear.exchange.rexs import read_model
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.reading import read_case
+
+
+def tables_of(box, tmp_path) -> tuple[dict, dict, list]:
+    """Tables, remarks and findings of a unit."""
+    box.write(tmp_path / "unit.rexs")
+    model = read_model(tmp_path / "unit.rexs")
+    flows = case_flows(model, None)
+    pairs = {stage.id: pair_tables(model, stage, None, flows)[0] for stage in stage_components(model)}
+    model.findings.clear()
+    return *gearbox_tables(model, pairs), model.findings
+
+
+def test_shafts_lie_where_stages_put_them(tmp_path):
+    tables, _, _ = tables_of(ParallelUnit(), tmp_path)
+    case = read_case(tables)
+    # 75 mm along x, then 120 mm at -90 deg: the angle of the file turns around -u
+    assert [shaft.axis for shaft in case.shaft] == [
+        pytest.approx(axis, abs=1e-12) for axis in ((0.0, 0.0), (0.075, 0.0), (0.075, -0.12))
+    ]
+    # middles of gears: 80 and 35 mm, 85 and 100 mm from the left ends
+    assert [shaft.start for shaft in case.shaft] == pytest.approx([0.0, 0.045, 0.03], abs=1e-12)
+    assert [shaft.length for shaft in case.shaft] == pytest.approx([0.16, 0.12, 0.2])
+
+
+def test_in_format_1_0_places_of_gears_are_their_left_faces(tmp_path):
+    box = ParallelUnit()
+    box.version = "1.0"
+    case = read_case(tables_of(box, tmp_path)[0])
+    assert case.pair[0].positions == pytest.approx((0.080 + 0.012, 0.035 + 0.012))
+
+
+def test_the_load_that_the_file_lacks_takes_the_power(tmp_path):
+    tables, _, findings = tables_of(ParallelUnit(), tmp_path)
+    case = read_case(tables)
+    assert case.operation.output == ("output",)
+    assert case.load[-1].shaft == "shaft 30" and case.load[-1].position == pytest.approx(0.2)
+    assert any("takes the power" in one.text for one in findings)
+
+
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_thrust_of_helical_gears_has_its_sense(tmp_path, sense):
+    """A right-handed pinion that drives counter-clockwise is pushed along its axis, its wheel against it."""
+    box = ParallelUnit().set(10, rotational_speed=(sense * 1500.0, "1 / min"))
+    box = box.set(5, torque_around_u_axis=(sense * 100.0, "N m"))
+    box = box.set(41, helix_angle_reference_diameter=(10.0, DEG))
+    box = box.set(42, helix_angle_reference_diameter=(-10.0, DEG))
+    box = box.set(51, center_distance=(75.0 / math.cos(math.radians(10.0)), "mm"))
+    tables, _, _ = tables_of(box, tmp_path)
+    found = solve_deflection(read_case(tables | {"deflection": {"contact": False}}))
+    radius = 0.5 * 25 * 2.0e-3 / math.cos(math.radians(10.0))
+    thrust = sense * 100.0 / radius * math.tan(math.radians(10.0))
+    # bearings hold against the thrust
+    assert found.bearing_force[:2, 2].sum() == pytest.approx(-thrust, rel=1e-6)
+
+
+def test_rigid_bearings_of_known_size_become_bearings_of_assumed_elements(tmp_path):
+    box = ParallelUnit()
+    box.components[12]["attributes"] |= {
+        "radial_stiffness": (1e22, "N / m"),
+        "inner_diameter": (30.0, "mm"),
+        "outer_diameter": (62.0, "mm"),
+        "bearing_type": ("radial_grooved_ball_bearing", ""),
+        "dynamic_capacity": (19.5, "kN"),
+    }
+    tables, remarks, findings = tables_of(box, tmp_path)
+    bearing = read_case(tables).bearing[0]
+    assert (bearing.kind, bearing.estimated, bearing.dynamic_rating) == ("ball", True, 19500.0)
+    # a real one of this size has 9 balls of 9.5 mm on 46 mm
+    assert bearing.pitch_diameter == pytest.approx(0.046)
+    assert bearing.element_diameter == pytest.approx(9.5e-3, rel=0.05)
+    assert bearing.rolling_elements == 9
+    assert "bearing[0].element_diameter" in remarks
+    assert any("assumed size" in one.text for one in findings)
+
+
+def test_load_cases_bring_torques_forces_and_shares(tmp_path):
+    box = ParallelUnit()
+    box.write(tmp_path / "unit.rexs")
+    text = (tmp_path / "unit.rexs").read_text(encoding="utf-8")
+    case = """<load_case id="{0}">
+    <component id="1"><attribute id="load_duration_fraction" unit="%">{3}</attribute></component>
+    <component id="10"><attribute id="rotational_speed" unit="1 / min">{1}</attribute></component>
+    <component id="5"><attribute id="torque_around_u_axis" unit="N m">{2}</attribute>
+    <attribute id="force_v_direction" unit="N">456</attribute></component></load_case>"""
+    spectrum = f'<load_spectrum id="1">{case.format(1, 500, 80, 20)}{case.format(2, 900, 40, 80)}</load_spectrum>'
+    (tmp_path / "unit.rexs").write_text(text.replace("</model>", f"{spectrum}</model>"), encoding="utf-8")
+    model = read_model(tmp_path / "unit.rexs")
+    flows = case_flows(model, None)
+    pairs = {stage.id: pair_tables(model, stage, None, flows)[0] for stage in stage_components(model)}
+    found = read_case(gearbox_tables(model, pairs, 2)[0])
+    assert [one.torque["load 5"] for one in found.operation.load_case] == [80.0, 40.0]
+    assert [one.share for one in found.operation.load_case] == [0.2, 0.8]
+    assert found.load_case.speed["shaft 10"] == pytest.approx(900.0 * math.pi / 30.0)
+    assert found.load_case.force["load 5"] == (456.0, 0.0, 0.0)
+    assert found.operation.first == 2
+    state = solve_deflection(read_case(gearbox_tables(model, pairs, 2)[0] | {"deflection": {"contact": False}}))
+    assert np.isfinite(state.bearing_force).all()
+
+
+def test_units_without_sections_or_torque_make_no_gearbox(tmp_path):
+    box = ParallelUnit()
+    del box.components[5]["attributes"]["torque_around_u_axis"]
+    with pytest.raises(NoGearbox, match="torque"):
+        tables_of(box, tmp_path)
