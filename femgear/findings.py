@@ -77,7 +77,7 @@ CATALOGUE = {
     "W-SPECTRUM": (NOTE, "The stage spectrum refuses this case."),
     "W-SPEED": (NOTE, "Torques change the speed within the record."),
     "W-STEPS": (DOUBT, "Peaks of resonances are too narrow for the speeds of a run-up."),
-    "W-STIFFNESS": (DOUBT, "Results rest on estimated stiffnesses of bearings."),
+    "W-STIFFNESS": (DOUBT, "Results rest on estimated stiffnesses, of bearings or of meshes."),
     "W-SWEEP": (NOTE, "A sweep takes long."),
     "W-TAIL": (DOUBT, "The highest harmonics of a response are not small."),
     "W-TEETH": (NOTE, "Radii and teeth have different ratios, or shifted planets no centre distance."),

@@ -6,18 +6,25 @@ import math
 from typing import Any
 
 import numpy as np
-from gearbox_equivalents import drivetrain_tables, multistage_tables, set_tables
+from gearbox_equivalents import (
+    drivetrain_tables,
+    elastic_set_tables,
+    multistage_tables,
+    pair_of_rigid_gears_tables,
+    set_tables,
+)
 from published.planetary_sets import kahraman_set, lin_parker_set
 from small_gearbox import pair_tables
 
+from femgear.run import solve
 from femgear.solvers.linear.modal import solve_modes
 from femgear.stages.lumped_set import gear_set_modes
 from femgear.trains.drivetrain.stages import solve_drivetrain_modes
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
-from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.modes import linear_system, solve_gearbox_modes
 from femgear.trains.multistage.case_file import multistage_of
 from femgear.trains.multistage.stages import multistage_modes
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, with_values
 from validation.rows import Row, at_most, counted, within
 
 CLOSED = "closed form"
@@ -62,6 +69,25 @@ def other_trains() -> tuple[Row, ...]:
     drivetrain = read_case("cases/wind_turbine_drivetrain.toml")
     modes = solve_drivetrain_modes(drivetrain).modes
     rows += _alike("36 coordinates", "femgear, drivetrain", drivetrain_tables(drivetrain), modes.frequency)
+    pair = with_values(read_case("cases/spur_pair.toml"), {"gear_1.bearing_stiffness": "1e8 N/m"})
+    modes = solve(pair, only="modes")["modes"].modes
+    tables = pair_of_rigid_gears_tables(pair, float(modes.mesh_stiffness[0]))
+    return (*rows, *_alike("spur pair", "femgear, pair", tables, modes.frequency))
+
+
+def elastic_ring() -> tuple[Row, ...]:
+    """The reference set on its foundation, with motor and brake, written as a gearbox in the plane."""
+    path, name = "cases/planetary_27_40_108.toml", "reference set on its foundation"
+    expected = np.sort(solve(read_case(path), only="modes")["modes"].modes.frequency)
+    tables = elastic_set_tables(path) | {"modes": {"up_to": "500 kHz"}}
+    found = np.sort(solve_gearbox_modes(solve_deflection(read_case(tables))).modes.frequency)[: len(expected)]
+    high = expected > 1e3
+    source = "femgear, elastic"
+    apart = np.abs(found[high] / expected[high] - 1.0).max()
+    rows = [at_most(name, source, "largest difference of natural frequencies above 1 kHz, relative", LARGEST, apart)]
+    low = (expected > 1.0) & ~high
+    text = "the same below 1 kHz, where rounding of the highest modes shows"
+    rows.append(at_most(name, source, text, 1e-7, np.abs(found[low] / expected[low] - 1.0).max()))
     return tuple(rows)
 
 

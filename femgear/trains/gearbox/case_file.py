@@ -345,6 +345,8 @@ class BoxPlanetarySection(Section):
     ring_mesh: BoxMeshSection | None = None
     planet: BoxPlanetSection = BoxPlanetSection()
     pins: PinSection | None = None
+    elastic_ring: StrictBool = False
+    """In modes the ring in the casing is elastic, on the foundation that its teeth give."""
 
 
 class LoadSection(SeatSection):

@@ -334,6 +334,16 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
     if teeth is not None and teeth.train not in ("elastic", "planar", "helical"):
         yield _wrong_train(teeth, key, "planetary set")
         return
+    if stage.elastic_ring and (stage.ring != CASING or teeth is None or teeth.train != "elastic"):
+        yield CaseError(
+            "the ring has no grid to be elastic with",
+            code="E-CHOICE",
+            key=f"{key}.elastic_ring",
+            value=True,
+            limit='ring = "casing", and the teeth of a planetary set with an elastic ring',
+            remedy="give such teeth, or leave elastic_ring out",
+        )
+        return
     members = [getattr(stage, name) for name in ("sun", "carrier", "ring")]
     if len(set(members)) < 3:
         twice = next(name for name in members if members.count(name) > 1)

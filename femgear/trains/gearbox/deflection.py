@@ -23,6 +23,8 @@ from femgear.trains.gearbox.contact import StageContact, stage_contact
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
 
 _STEPS = 200
+# Misalignment over the width below which it is none [m].
+_UPRIGHT = 1e-7
 # Positions of the contact while slopes are far from settled, and how near they come by them, relative.
 _COARSE, _NEAR = 12, 3e-3
 _SETTLED = 1e-11  # residual force over the largest one
@@ -208,7 +210,7 @@ def solve_deflection(
     gap = np.zeros(len(model.assembly.slice_stiffness))
     found = solve_state(model, gap)
     staged = [stage for stage in model.stages if stage.section.teeth is not None]
-    if not (staged and case.deflection.contact and case.motions == "space"):
+    if not (staged and case.deflection.contact):
         return replace(found, slopes=(found.mesh_slope,))
     history = [np.asarray(slopes, float) if slopes is not None else found.mesh_slope]
     contacts: dict[str, StageContact] = {}
@@ -232,7 +234,7 @@ def solve_deflection(
 def _contact(model: GearboxModel, stage: StageModel, slopes: np.ndarray, steps, positions: int | None) -> StageContact:
     """Contact of the teeth of a stage with the slopes of its meshes, at few positions until these are near."""
     torque, own = -model.flow.first_torque(stage.section), slopes[list(stage.meshes)]
-    slices = model.case.deflection.slices
+    slices = model.case.deflection.slices if model.case.motions == "space" else 0
     return stage_contact(stage.section, torque, own, slices=slices, positions=positions, steps=steps)
 
 
@@ -256,8 +258,8 @@ def _agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: flo
         for mesh in stage.meshes:
             contact = model.assembly.contacts[mesh]
             width = stage.width
-            size = max(abs(new[mesh]) * width, 1e-7)
-            if abs(new[mesh] - old[mesh]) * width > max(tolerance * size, 1e-12) and len(contact.heights) > 1:
+            size = max(abs(new[mesh]) * width, _UPRIGHT)
+            if abs(new[mesh] - old[mesh]) * width > tolerance * size and len(contact.heights) > 1:
                 return False
     return True
 

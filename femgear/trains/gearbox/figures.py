@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _ARROW = 46.0  # length of the longest arrow [points]
 _LEAST = 0.04  # force that is drawn, over the largest
 _MOST_MODES = 24
-_KIND_COLOURS: dict[str, str] = dict(zip(("torsional", "bending", "axial", "mixed"), COLOURS, strict=False))
+_KIND_COLOURS: dict[str, str] = dict(zip(("torsional", "bending", "axial", "mixed", "ring"), COLOURS, strict=False))
 _DASHES = ("-", "--", "-.", ":")
 _PLANES = ((0, "x"), (1, "y"))
 

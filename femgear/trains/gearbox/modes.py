@@ -7,11 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from femgear.case.dependencies import Steps
 from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import CampbellData, campbell_data
 from femgear.system.assembly import Assembly, Beam
 from femgear.system.system import MechanicalSystem, Modes
 from femgear.trains.gearbox.deflection import Deflection, laws_of
+from femgear.trains.gearbox.elastic_ring import ElasticRing, elastic_rings, with_rings
 from femgear.trains.gearbox.model import GearboxModel
 
 # Share of the kinetic energy from which a mode is of one kind.
@@ -24,8 +26,8 @@ _LEAST = 20
 _BASIS = 2
 # Reach of the Campbell diagram and of the modes that are kept, over the highest mesh frequency.
 _HARMONICS = 3.0
-KINDS = ("torsional", "bending", "axial")
-"""Of modes by their kinetic energy: rotation about the axes; motions across them and tilts; motions along them."""
+KINDS = ("torsional", "bending", "axial", "ring")
+"""Of modes by their kinetic energy: rotation; motions across the axes and tilts; along them; elastic rings."""
 _MOTIONS = ((5,), (0, 1, 3, 4), (2,))
 
 
@@ -98,17 +100,21 @@ def _pressed_stiffness(found: Deflection) -> np.ndarray:
     return stiffness
 
 
-def solve_gearbox_modes(found: Deflection) -> GearboxModes:
+def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> GearboxModes:
     """Solve for the modes of a gearbox about its loaded state, and follow them over the speed."""
     model, case = found.model, found.model.case
     assembly, system, stiffness = linear_system(found)
+    rings = elastic_rings(model, steps=steps)
+    system, stiffness = with_rings(system, stiffness, model, rings)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
     frequencies = [hertz for hertz in model.flow.mesh_frequency.values() if hertz]
     top = case.modes.up_to or (_HARMONICS * max(frequencies) if frequencies else None)
     modes = solve_modes(still, stiffness, damping_ratio=case.modes.damping_ratio, count=_kept(still, stiffness, top))
-    motion = assembly.motions @ modes.shape
-    members, kinetic, kinds = _kinetic(model, assembly, motion, modes)
-    parts, strain = _strain(found, assembly, motion, stiffness, modes)
+    count = assembly.motions.shape[1]
+    motion, waves = assembly.motions @ modes.shape[:count], modes.shape[count:]
+    members, kinetic, kinds = _kinetic(model, assembly, motion, modes, _ring_energies(rings, waves**2))
+    of_rings = _ring_energies(rings, waves**2 * np.concatenate([[0.0], *(r.stiffness for r in rings)])[1:, None])
+    parts, strain = _strain(found, assembly, motion, _mesh_energies(system, stiffness, modes), modes, of_rings)
     reference = model.flow.independent[0] if model.flow.independent else case.shaft[0].name
     speed = abs(model.flow.speed[reference])
     orders = excitation_orders(model, reference)
@@ -119,6 +125,25 @@ def solve_gearbox_modes(found: Deflection) -> GearboxModes:
     return GearboxModes(
         found, replace(modes, kind=kinds), motion, members, kinetic, parts, strain, followed, reference, orders
     )
+
+
+def _ring_energies(rings: tuple[ElasticRing, ...], energy: np.ndarray) -> dict[str, np.ndarray]:
+    """Energy (m,) of every elastic ring in all modes, from that of its coordinates (n_ring, m)."""
+    ends = np.cumsum([0, *(len(ring.stiffness) for ring in rings)]).tolist()
+    return {ring.name: energy[a:b].sum(axis=0) for ring, a, b in zip(rings, ends[:-1], ends[1:], strict=True)}
+
+
+def _mesh_energies(system: MechanicalSystem, stiffness: np.ndarray, modes: Modes) -> np.ndarray:
+    """Energy (g, m) of all slices in all modes, with what bodies give way between them."""
+    approach = system.W.T @ modes.shape
+    if system.flexibility is None:
+        return stiffness[:, None] * approach**2
+    carrying = np.flatnonzero(stiffness > 0.0)
+    force, energy = np.zeros_like(approach), np.zeros_like(approach)
+    compliance = np.diag(1.0 / stiffness[carrying]) + system.flexibility[np.ix_(carrying, carrying)]
+    force[carrying] = np.linalg.solve(compliance, approach[carrying])
+    energy[carrying] = force[carrying] * approach[carrying]
+    return energy
 
 
 def _in_modes(still: MechanicalSystem, stiffness, gyroscopic, speed: float, count: int) -> MechanicalSystem:
@@ -162,7 +187,9 @@ def excitation_orders(model: GearboxModel, reference: str) -> dict[str, float]:
     return found
 
 
-def _kinetic(model, assembly: Assembly, motion, modes: Modes) -> tuple[tuple[str, ...], np.ndarray, tuple[str, ...]]:
+def _kinetic(
+    model, assembly: Assembly, motion, modes: Modes, rings: dict[str, np.ndarray]
+) -> tuple[tuple[str, ...], np.ndarray, tuple[str, ...]]:
     """Shares of members in the kinetic energy, and the kind of every mode."""
     moved = assembly.mass @ motion
     per_motion = (motion * moved).reshape(len(assembly.names), 6, -1)
@@ -171,13 +198,15 @@ def _kinetic(model, assembly: Assembly, motion, modes: Modes) -> tuple[tuple[str
     place = np.array([members.index(name) for name in owner])
     kinetic = np.zeros((len(members), motion.shape[1]))
     np.add.at(kinetic, place, per_motion.sum(axis=1))
+    kinetic = np.vstack([kinetic, *rings.values()])
     total = np.maximum(kinetic.sum(axis=0), 1e-300)
-    by_kind = np.array([per_motion[:, list(ways)].sum(axis=(0, 1)) for ways in _MOTIONS]) / total
+    of_rings = sum(rings.values()) if rings else np.zeros(motion.shape[1])
+    by_kind = np.array([*(per_motion[:, list(ways)].sum(axis=(0, 1)) for ways in _MOTIONS), of_rings]) / total
     kinds = [
         "rigid" if hertz == 0.0 else KINDS[int(share.argmax())] if share.max() >= _PURE else "mixed"
         for hertz, share in zip(modes.frequency, by_kind.T, strict=True)
     ]
-    return members, kinetic / total, tuple(kinds)
+    return (*members, *rings), kinetic / total, tuple(kinds)
 
 
 def member_of_stations(model: GearboxModel) -> list[str]:
@@ -199,9 +228,9 @@ def _called(kind: str, name: str) -> str:
 
 
 def _strain(
-    found: Deflection, assembly: Assembly, motion, stiffness, modes: Modes
+    found: Deflection, assembly: Assembly, motion, of_meshes, modes: Modes, rings: dict[str, np.ndarray]
 ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Shares of shafts, bearings, joints and meshes in the strain energy; none of rigid motions."""
+    """Shares of shafts, bearings, joints, meshes and rings in the strain energy; none of rigid motions."""
     model = found.model
     energies: dict[str, np.ndarray] = {}
 
@@ -224,13 +253,10 @@ def _strain(
             name = springs.name.rsplit(" pin ", 1)
             label = f"pins of {name[0]}" if len(name) > 1 else _called("coupling", springs.name)
             add(label, springs.stations, (springs.rows.T * finite) @ springs.rows)
-    approach = assembly.columns.T @ motion
     for stage in model.stages:
-        for mesh in stage.meshes:
-            part = assembly.slices[mesh]
-            name = f"meshes of {stage.name}"
-            energy = stiffness[part] @ approach[part] ** 2
-            energies[name] = energies.get(name, 0.0) + energy
+        name = f"meshes of {stage.name}"
+        energies[name] = np.sum([of_meshes[assembly.slices[mesh]].sum(axis=0) for mesh in stage.meshes], axis=0)
+    energies |= rings
     table = np.array(list(energies.values())).reshape(len(energies), -1)
     total = table.sum(axis=0)
     elastic = modes.frequency > 0.0

@@ -305,11 +305,10 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
         "mesh": lambda i: str(data["mesh"].values[i]),
         "force [N]": lambda i: f"{float(one['mesh_force'].values[i]):.5g}",
         "misaligned [um]": lambda i: (
-            f"{1e6 * float(one['mesh_misalignment'].values[i]):+.3f}"
-            + _range(data, "estimate_misalignment", i, "+.2f", 1e6)
+            f"{1e6 * float(one['mesh_misalignment'].values[i]):+.3f}" + _range(one, "misalignment", i, "+.2f", 1e6)
         ),
         "K_Hbeta": lambda i: (
-            _number(one["face_load_factor"].values[i], ".3f") + _range(data, "estimate_face_load_factor", i, ".3f")
+            _number(one["face_load_factor"].values[i], ".3f") + _range(one, "face_load_factor", i, ".3f")
         ),
         "k [N/um]": lambda i: f"{1e-6 * float(one['mesh_stiffness'].values[i]):.4g}",
         "STE p-p [um]": lambda i: _number(1e6 * one["transmission_error"].values[i], ".3f"),
@@ -321,12 +320,13 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
         "L10 [h]": lambda i: _number(one["rating_life"].values[i], ".4g"),
         "L10r [h]": lambda i: _number(one["reference_life"].values[i], ".4g"),
     }
+    brackets = ""
     if "estimate_factor" in data:
-        name += ", in brackets with half and twice the stiffness of estimated bearings"
+        brackets = ", in brackets with half and twice the stiffness of estimated bearings"
     passes = int(one["passes"])
     note = f"forces balance to {float(one['out_of_balance']):.1g}" + (f", settled in {passes} passes" if passes else "")
     return (
-        tabulate(f"Meshes{name}", range(data.sizes["mesh"]), meshes, (note,)),
+        tabulate(f"Meshes{name}{brackets}", range(data.sizes["mesh"]), meshes, (note,)),
         tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
     )
 
@@ -384,6 +384,9 @@ def describe_gearbox_modes(data: xr.Dataset) -> Block:
 
 def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     """List what of a gearbox case deserves a look: entries of teeth that have no effect, missing weight."""
+    if not case.deflection.contact and any(stage.teeth is not None for stage in (*case.pair, *case.planetary)):
+        text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
+        yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
             given = _without_effect(stage.teeth or {})

@@ -43,9 +43,11 @@ def solve_deflections(
 
 
 @one_blas_thread()
-def solve_box_modes(case: GearboxCase, deflection: DeflectionResult) -> GearboxModesResult:
-    """Solve for the modes of the gearbox about the loaded state of its first load case."""
-    return GearboxModesResult(solve_gearbox_modes(deflection.state))
+def solve_box_modes(
+    case: GearboxCase, deflection: DeflectionResult, *, steps: Steps | None = None
+) -> GearboxModesResult:
+    """Solve for the modes of the gearbox about the loaded state of its chosen load case."""
+    return GearboxModesResult(solve_gearbox_modes(deflection.state, steps=steps))
 
 
 def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
@@ -105,6 +107,7 @@ GEARBOX = Train(
             title="Modes",
             solve=solve_box_modes,
             takes=("deflection",),
+            options=("steps",),
             verdict=modes_verdict,
             describe=lambda results: describe_gearbox_modes(results.modes),
         ),

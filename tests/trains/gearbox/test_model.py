@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from gearbox_equivalents import drivetrain_tables, multistage_tables, set_tables
+from gearbox_equivalents import drivetrain_tables, multistage_tables, pair_of_rigid_gears_tables, set_tables
 from published.planetary_sets import kahraman_set, lin_parker_set
 from small_gearbox import pair_tables
 
+from femgear.run import solve
 from femgear.solvers.linear.modal import solve_modes
 from femgear.stages.lumped_set import gear_set_modes
 from femgear.trains.drivetrain.stages import solve_drivetrain_modes
@@ -16,7 +17,7 @@ from femgear.trains.gearbox.model import gearbox_model, mesh_normal, pin_flexibi
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.multistage.case_file import multistage_of
 from femgear.trains.multistage.stages import multistage_modes
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, with_values
 
 
 def frequencies(tables) -> np.ndarray:
@@ -56,6 +57,14 @@ def test_the_drivetrain_of_36_coordinates():
     found = frequencies(drivetrain_tables(case))
     assert len(found) == 36
     agree(found, solve_drivetrain_modes(case).modes.frequency)
+
+
+@pytest.mark.parametrize("torque", ["200 N m", "-200 N m"])
+def test_a_pair_on_its_bearings(torque):
+    values = {"static.positions": 16, "operation.torque": torque, "gear_1.bearing_stiffness": "1e8 N/m"}
+    case = with_values(read_case("cases/spur_pair.toml"), values)
+    modes = solve(case, only="modes")["modes"].modes
+    agree(frequencies(pair_of_rigid_gears_tables(case, float(modes.mesh_stiffness[0]))), modes.frequency)
 
 
 def test_a_right_handed_driver_is_pushed_the_way_its_thumb_points():

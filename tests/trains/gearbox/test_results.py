@@ -5,7 +5,7 @@ import pytest
 from small_gearbox import pair_tables
 
 from femgear.findings import Finding
-from femgear.trains.gearbox.results import deflection_warnings, gearbox_warnings
+from femgear.trains.gearbox.results import deflection_warnings, describe_deflection, gearbox_warnings
 from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
 from femgear.trains.reading import read_case
 
@@ -61,3 +61,23 @@ def test_modes_and_their_parts_are_in_the_file():
     assert data["strain"].dims == ("part", "mode")
     assert data.attrs["reference"] == "input"
     assert data["order"].values[list(data["line"].values).index("stage mesh")] == pytest.approx(24.0)
+
+
+def test_teeth_without_contact_have_the_stiffness_of_the_standard():
+    tables = pair_tables(teeth=True)
+    tables["deflection"] = {"contact": False}
+    (finding,) = gearbox_warnings(read_case(tables))
+    assert finding.code == "W-STIFFNESS"
+
+
+def test_estimated_bearings_show_the_range_that_they_make():
+    tables = pair_tables(teeth=True)
+    tables["bearing"][0]["estimated"] = True
+    result = solve_deflections(read_case(tables))
+    data = result.contents()
+    assert data["estimate_factor"].values.tolist() == [0.5, 2.0]
+    soft, stiff = data["estimate_misalignment"].values[:, 0]
+    own = data["mesh_misalignment"].values[0, 0]
+    # a softer bearing beside the gear moves its misalignment one way, a stiffer one the other way
+    assert (soft - own) * (stiff - own) < 0.0
+    assert describe_deflection(data)[0].rows[0][2].endswith(")")
