@@ -83,6 +83,9 @@ RUNS = {
     "grc_like_drivetrain": _case("grc_like_drivetrain", "Drivetrain like that of the gearbox collaborative"),
     "own_chain": _case("own_chain", "A drivetrain to start from", ("campbell", "mesh_force", "transient_forces")),
     "e_axle": _case("e_axle", "Electric axle: shafts, bearings and two stages"),
+    "five_megawatt_chain": _case(
+        "five_megawatt_chain", "Chain of a five-megawatt wind turbine", ("deflected_shafts", "mode_energy")
+    ),
     "four_stage_reducer": _case("four_stage_reducer", "Four planetary stages in series"),
     "published_four_stages": _case("published_four_stages", "Four published stages in series"),
     "spur_pair": _case("spur_pair", "Spur gear pair from its teeth"),

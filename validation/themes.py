@@ -305,7 +305,7 @@ THEMES = (
         "Shafts, bearings, teeth and weight in one model. Compared with: the models of single sets, stages and "
         "drivetrains, lever rules and textbook thrust, itself from another start; gates: 1e-9 of natural frequencies "
         "and forces, five passes of teeth and system.",
-        (gearbox.other_trains, gearbox.elastic_ring, gearbox.statics, gearbox.passes),
+        (gearbox.other_trains, gearbox.elastic_ring, gearbox.wind_turbine, gearbox.statics, gearbox.passes),
     ),
     Theme(
         "moving",

@@ -47,6 +47,14 @@ def test_lines_of_turns_and_meshes(found):
     )
 
 
+def test_the_wind_turbine_twists_as_its_rotor_and_generator_on_one_spring():
+    modes = solve_gearbox_modes(solve_deflection(read_case("cases/five_megawatt_chain.toml"))).modes
+    torsional = [hertz for hertz, kind in zip(modes.frequency, modes.kind, strict=True) if kind == "torsional"]
+    # 2.18 Hz without the inertia of the gears (NREL/TP-500-38060)
+    assert torsional[0] == pytest.approx(2.18, rel=0.03)
+    assert torsional[0] < 2.18
+
+
 def test_turning_splits_the_bending_of_a_heavy_disc():
     tables = pair_tables()
     disc = {"shaft": "input", "position": "90 mm", "mass": "8 kg", "inertia": "0.3 kg m^2"}
