@@ -684,7 +684,7 @@ def rexs(
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Write gears, material, bearings and operation of a planetary set as a REXS 1.4 file.
+    """Write a planetary set, or a gearbox with shafts, bearings, stages and load cases, as a REXS 1.4 file.
 
     Parameters
     ----------
@@ -695,17 +695,14 @@ def rexs(
     force
         Replace the file.
     """
-    from femgear.case.gear_set import need_set
-    from femgear.exchange.planetary_stage import stage_model
     from femgear.exchange.rexs import model_text
+    from femgear.trains.imports import rexs_model
     from femgear.trains.reading import read_case
 
     if output.suffix.lower() != ".rexs":
         message, limit = "femgear writes REXS as XML, unzipped", "a name that ends with .rexs"
         raise CaseError(message, code="E-OUTPUT", file=str(output), limit=limit)
-    data = read_case(case)
-    need_set(data)
-    model = stage_model(data, output.name)
+    model = rexs_model(read_case(case), output.name)
     text = model_text(model, "femgear", femgear.__version__)
     _warn(model.findings)
     _write_case(text, output, force=force)

@@ -675,7 +675,7 @@ def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[st
     return turns, loads
 
 
-class _Writer:
+class ModelWriter:
     """Components and relations of a new model."""
 
     def __init__(self):
@@ -702,12 +702,18 @@ _UNITS = {
     "kg / dm^3": 1e3,
     "N m": 1.0,
     "N / m": 1.0,
+    "N mm / rad": 1e-3,
+    "N": 1.0,
+    "kN": 1e3,
+    "mum": 1e-6,
+    "m / s^2": 1.0,
+    "%": 1e-2,
     "none": 1.0,
 }
 """SI values of units as REXS spells them."""
 
 
-def _attribute(value: float | None, unit: str = "none") -> tuple[str, str] | None:
+def rexs_attribute(value: float | None, unit: str = "none") -> tuple[str, str] | None:
     """SI value, or none, in a unit of REXS."""
     return None if value is None else (f"{value / _UNITS[unit]:.15g}", unit)
 
@@ -718,56 +724,81 @@ def stage_model(case: Case, name: str) -> Model:
     Masses, estimated stiffnesses, play, errors of teeth, dynamics and housing are left out. `Model.findings`
     holds modifications that REXS has no form for.
     """
-    gears, w, a = planetary_set(case), _Writer(), _attribute
+    gears, w = planetary_set(case), ModelWriter()
     unit, casing = w.add("gear_unit", case.title), w.add("gear_casing", "casing")
     stage, carrier = w.add("planetary_stage", case.title), w.add("planet_carrier", "carrier")
     for whole, part in ((unit, casing), (unit, stage), (stage, carrier)):
         w.relate("assembly", assembly=whole, part=part)
     model = Model(name, "1.4", w.components, (), ())
-    (sun, sun_shaft), (ring, ring_shaft) = (_add_gear(w, case, one.name, one, model) for one in (gears.sun, gears.ring))
+    (sun, sun_shaft), (ring, ring_shaft) = (add_gear(w, case, one.name, one, model) for one in (gears.sun, gears.ring))
     shafts = {"sun": sun_shaft, "ring": ring_shaft, "carrier": w.add("shaft", "carrier shaft")}
     w.relate("planet_carrier_shaft", planetary_stage=stage, shaft=shafts["carrier"])
     for shaft in (sun_shaft, ring_shaft):
         w.relate("central_shaft", planetary_stage=stage, shaft=shaft)
-    for number, angle in enumerate(gears.planet_angles, start=1):
-        planet, shaft = _add_gear(w, case, f"planet {number}", gears.planet, model)
-        pin, stiffness = w.add("shaft", f"pin {number}"), _stiffness(case, "planet", "bearing_stiffness")
-        w.relate("planet_shaft", planetary_stage=stage, shaft=shaft)
-        w.relate("planet_pin", planetary_stage=stage, shaft=pin)
-        bearing = w.add("concept_bearing", f"bearing of planet {number}", radial_stiffness=stiffness)
-        w.relate("side", assembly=bearing, outer_part=shaft, inner_part=pin)
-        for pair, turned in (((sun, planet), angle), ((planet, ring), angle + math.pi)):
-            mesh = w.add(
-                "cylindrical_stage",
-                center_distance=a(gears.centre_distance, "mm"),
-                rotating_angle_around_neg_u_axis=a(turned % math.tau, "deg"),
-            )
-            w.relate("assembly", assembly=stage, part=mesh)
-            w.relate("stage", stage=mesh, gear_1=pair[0], gear_2=pair[1])
+    bearing = {"radial_stiffness": _stiffness(case, "planet", "bearing_stiffness")}
+    add_planets(w, case, model, stage, (sun, ring), gears.planet_angles, bearing)
     load_cases = _add_operation(w, case, shafts, casing)
     return replace(model, relations=tuple(w.relations), load_cases=load_cases)
 
 
-def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tuple[str, str]:
-    """Add a gear with shaft, flanks, tool and material; ids of gear and shaft."""
-    a, section, internal = _attribute, getattr(case, gear.name), gear.internal
+def add_planets(
+    w: ModelWriter,
+    case: Any,
+    model: Model,
+    stage: str,
+    central: tuple[str, str],
+    turned: Iterable[float],
+    bearing: Mapping[str, tuple[str, str] | None],
+) -> None:
+    """Add planets on bearings on pins, and their meshes with the sun and ring of these ids.
+
+    ``turned`` are the angles of the planets around the negative u axis [rad], ``bearing`` the attributes of theirs.
+    """
+    gears, (sun, ring), a = planetary_set(case), central, rexs_attribute
+    for number, angle in enumerate(turned, start=1):
+        planet, shaft = add_gear(w, case, f"planet {number}", gears.planet, model)
+        pin = w.add("shaft", f"pin {number}")
+        w.relate("planet_shaft", planetary_stage=stage, shaft=shaft)
+        w.relate("planet_pin", planetary_stage=stage, shaft=pin)
+        held = w.add("concept_bearing", f"bearing of planet {number}", **bearing)
+        w.relate("side", assembly=held, outer_part=shaft, inner_part=pin)
+        for pair, direction in (((sun, planet), angle), ((planet, ring), angle + math.pi)):
+            mesh = w.add(
+                "cylindrical_stage",
+                center_distance=a(gears.centre_distance, "mm"),
+                rotating_angle_around_neg_u_axis=a(direction % math.tau, "deg"),
+            )
+            w.relate("assembly", assembly=stage, part=mesh)
+            w.relate("stage", stage=mesh, gear_1=pair[0], gear_2=pair[1])
+
+
+def add_gear(
+    w: ModelWriter, case: Any, name: str, gear: Any, model: Model, shaft: str | None = None, place: float = 0.0
+) -> tuple[str, str]:
+    """Add a gear with flanks, tool and material, at a place [m] on a shaft, else on one of its own; ids of both.
+
+    On a shaft of its own a ring has a section of its outer diameter, elsewhere REXS has no place for it.
+    """
+    a, section, internal = rexs_attribute, getattr(case, gear.name), gear.internal
     tip = 2.0 * gear.tip_radius if section.tip_diameter or gear.tip_shortening else None
     rack, helix, material = section.rack or case.rack, case.helix_angle or 0.0, gear_material(case, gear.name)
-    shaft, rim = w.add("shaft", f"{name} shaft"), a(2.0 * gear.rim_radius, "mm")
+    rim = a(2.0 * gear.rim_radius, "mm")
+    # gears on one axis have one hand, mates of external gears the other
+    hand = 1.0 if gear.name in ("sun", "gear_1") or (gear.name == "gear_2" and internal) else -1.0
     id = w.add(
         "ring_gear" if internal else "cylindrical_gear",
         name,
         number_of_teeth=a(gear.teeth),
         normal_module=a(case.module, "mm"),
         face_width=a(gear.face_width, "mm"),
-        helix_angle_reference_diameter=a(helix if gear.name == "sun" else -helix, "deg"),
+        helix_angle_reference_diameter=a(hand * helix, "deg"),
         tip_diameter=a(tip, "mm"),
         root_diameter=a(section.root_diameter, "mm"),
-        u_coordinate_on_shaft=a(0.0, "mm"),
+        u_coordinate_on_shaft=a(place, "mm"),
         inner_diameter=None if internal else rim,
     )
     parts = [id]
-    if internal:
+    if internal and shaft is None:
         parts += [
             w.add(
                 "shaft_section",
@@ -777,6 +808,7 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tup
                 outer_diameter_end=rim,
             )
         ]
+    shaft = shaft or w.add("shaft", f"{name} shaft")
     for part in parts:
         w.relate("assembly", assembly=shaft, part=part)
     made = w.add(
@@ -814,7 +846,7 @@ def _add_gear(w: _Writer, case: Case, name: str, gear: Any, model: Model) -> tup
     return id, shaft
 
 
-def _add_modifications(w: _Writer, case: Case, gear: Any, flanks: Mapping[str, str], model: Model) -> None:
+def _add_modifications(w: ModelWriter, case: Case, gear: Any, flanks: Mapping[str, str], model: Model) -> None:
     """Add the modifications of both flanks; the datum face is the end z < 0, as where REXS says nothing."""
     # looked at from z < 0 the flank towards the sun is the right one, see `_modifications`
     sides = {"right": "sun side", "left": "ring side"} if gear.name == "planet" else {}
@@ -834,12 +866,12 @@ def _stiffness(case: Case, member: str, key: str) -> tuple[str, str] | None:
     """Stiffness of a bearing, none where it is the estimate to its four digits."""
     given = support_stiffness(case, member) if key == "support_stiffness" else getattr(getattr(case, member), key)
     value, estimate = given, estimates(case)[f"{member}.{key}"].value
-    return None if f"{value or 0.0:.4g}" == f"{estimate:.4g}" else _attribute(value, "N / m")
+    return None if f"{value or 0.0:.4g}" == f"{estimate:.4g}" else rexs_attribute(value, "N / m")
 
 
-def _add_operation(w: _Writer, case: Case, shafts: dict[str, str], casing: str) -> tuple[dict, ...]:
+def _add_operation(w: ModelWriter, case: Case, shafts: dict[str, str], casing: str) -> tuple[dict, ...]:
     """Add load, coupling of the fixed member, bearings of sun and carrier; load cases of several speeds."""
-    operation, a = case.operation, _attribute
+    operation, a = case.operation, rexs_attribute
     joints = {operation.fixed: [w.add("coupling", f"{operation.fixed} held")]}
     for member in ("sun", "carrier"):
         if stiffness := _stiffness(case, member, "support_stiffness"):

@@ -5,16 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from femgear.case import text as case_text
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import need_set, planetary_set
 from femgear.case.teeth import flank_form
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.exchange.cylindrical_stage import pair_tables
 from femgear.exchange.gear_unit import UnitFlow, case_flows, plain_ids, stage_components, stage_in_words
 from femgear.exchange.gearbox_unit import NoGearbox, gearbox_tables
-from femgear.exchange.planetary_stage import case_tables, named
+from femgear.exchange.planetary_stage import case_tables, named, stage_model
 from femgear.exchange.rexs import Component, Model
+from femgear.exchange.unit_model import unit_model
 from femgear.findings import DOUBT, NOTE
 from femgear.trains.drafts import draft_text
 from femgear.trains.reading import parse_case
@@ -191,3 +193,16 @@ def _gearbox_text(model: Model, pairs: dict[str, dict], load_case: int | None) -
 
 def _listed(words: list[str]) -> str:
     return "; ".join(words[:20]) + " ..." * (len(words) > 20)
+
+
+def rexs_model(case: Any, name: str) -> Model:
+    """Write a planetary set or a gearbox as a REXS model; `Model.findings` holds what REXS has no form for.
+
+    CaseError: E-MODEL: neither of them. E-KEY-MISSING: a stage of a gearbox without teeth.
+    """
+    if case.train != "gearbox":
+        need_set(case)
+        return stage_model(case, name)
+    stages = [stage for stage in (*case.pair, *case.planetary) if stage.teeth is not None]
+    teeth = {stage.name: parse_case(case_text.write(stage.teeth), numbered=False) for stage in stages}
+    return unit_model(case, teeth, name)

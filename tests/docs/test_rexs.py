@@ -61,3 +61,12 @@ def test_the_new_case_of_the_page(tmp_path, monkeypatch):
     written = Path("case.toml").read_text(encoding="utf-8")
     printed = next(one for one in blocks("case_file.md") if "# estimated" in one)
     assert printed.strip() in tables(written) and tomllib.loads(printed)["sun"]["teeth"] == 24
+
+
+def test_a_gearbox_is_written_as_the_page_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ParallelUnit().write(Path("unit.rexs"))
+    assert cli.main(["import", "unit.rexs", "-o", "box.toml"]) == 0
+    assert cli.main(blocks("rexs.md", "sh")[-1].split()[1:]) == 0
+    assert cli.main(["import", "back.rexs", "-o", "again.toml"]) == 0
+    assert len(tomllib.loads(Path("again.toml").read_text(encoding="utf-8"))["pair"]) == 2
