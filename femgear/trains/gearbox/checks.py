@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import math
 from collections.abc import Iterable, Iterator
+from itertools import pairwise
 
 from femgear.case.quantities import LENGTH
 from femgear.case.text import CaseFile
@@ -18,7 +19,7 @@ from femgear.trains.gearbox.case_file import (
     embed_stages,
     teeth_of,
 )
-from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, StageSizes, pair_sizes, set_sizes
+from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, StageSizes, pair_sizes, rolling_bearing, set_sizes
 
 _ROLLER = ("rolling_elements", "element_diameter", "pitch_diameter")
 _SPRINGS = ("radial", "axial", "tilt", "torsional")
@@ -32,7 +33,20 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     if named:
         return named
     seats = [*_seats(case), *_bearings(case), *_shaft_parts(case)]
-    return [*seats, *_stages(case), *_loads(case)]
+    return [*seats, *_stages(case), *_loads(case), *_weight(case)]
+
+
+def _weight(case: GearboxCase) -> Iterator[CaseError]:
+    """A direction that is one."""
+    if case.gravity is not None and not any(case.gravity.direction):
+        yield CaseError(
+            "the weight has no direction",
+            code="E-RANGE",
+            key="gravity.direction",
+            value=list(case.gravity.direction),
+            limit="a vector that is not zero",
+            remedy="write direction = [0.0, -1.0, 0.0]",
+        )
 
 
 def _names(case: GearboxCase) -> Iterator[CaseError]:
@@ -178,7 +192,8 @@ def _bearings(case: GearboxCase) -> Iterator[CaseError]:
                 remedy=f"leave {', '.join(springs)} or kind out",
             )
         elif bearing.kind is not None:
-            yield from _geometry(bearing, key)
+            wrong = list(_geometry(bearing, key))
+            yield from wrong or _refused(bearing, key)
         if bearing.outer_shaft is not None:
             yield from _ring_places(case, bearing, key)
 
@@ -205,6 +220,18 @@ def _geometry(bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
                 value=bearing.rolling_elements,
                 limit=f"at most {math.floor(most)} of {LENGTH.show(d)} on {LENGTH.show(D)}",
             )
+
+
+def _refused(bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
+    """Numbers that no bearing can have."""
+    names = {"balls": "rolling_elements", "rollers": "rolling_elements", "axial_preload": "preload"}
+    names |= dict.fromkeys(("ball_diameter", "roller_diameter"), "element_diameter")
+    try:
+        rolling_bearing(bearing)
+    except CaseError as error:
+        entry = names.get(error.key or "", error.key or "kind")
+        told = {name: getattr(error, name) for name in ("code", "value", "limit", "remedy")}
+        yield CaseError(error.message, key=f"{key}.{entry}", **told)
 
 
 def _ring_places(case: GearboxCase, bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
@@ -356,6 +383,7 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
         )
         return
     sizes = set_sizes(stage)
+    yield from _neighbours(sizes, key)
     shafts = [
         (name, case.shaft_named(getattr(stage, name)))
         for name in ("sun", "carrier", "ring")
@@ -373,6 +401,23 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
     places = [shaft.start + (getattr(stage, f"{name}_position") or 0.0) for name, shaft in shafts]
     for place in places[1:]:
         yield from _mid_planes([places[0], place], sizes, f"{key}.sun_position")
+
+
+def _neighbours(sizes: StageSizes, key: str) -> Iterator[CaseError]:
+    """Planets whose pitch circles do not overlap."""
+    angles = sizes.planet_angles
+    apart = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
+    planet = sizes.centre_distance * sizes.base_radii[1] / (sizes.base_radii[0] + sizes.base_radii[1])
+    room = 2.0 * sizes.centre_distance * math.sin(0.5 * min(apart, math.pi))
+    if len(angles) > 1 and room <= 2.0 * planet:
+        yield CaseError(
+            "neighbouring planets overlap",
+            code="E-NEIGHBOURS",
+            key=f"{key}.gears.planets",
+            value=f"{LENGTH.show(room)} from axis to axis",
+            limit=f"more than {LENGTH.show(2.0 * planet)}",
+            remedy="take fewer planets, or smaller ones",
+        )
 
 
 def _wrong_train(teeth, key: str, wanted: str) -> CaseError:

@@ -17,9 +17,10 @@ import numpy as np
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.assembly import GROUND, MOTIONS, Assembly, StationSprings
 from femgear.system.bearing_life import basic_rating_life, reference_rating_life
-from femgear.system.rolling_bearings import BallBearing, Bearing, BearingState, RollerBearing, bearing_state
+from femgear.system.rolling_bearings import BearingState, bearing_state
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.contact import StageContact, stage_contact
+from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
 
 _STEPS = 200
@@ -85,33 +86,6 @@ class Deflection:
     def mesh_slope(self) -> np.ndarray:
         """Slope of the approach of the flanks of every mesh along its width [rad], closer at z > 0 positive."""
         return mesh_slopes(self.model.assembly, self.motion)
-
-
-def rolling_bearing(section: BoxBearingSection) -> Bearing:
-    """Make the rolling bearing of a section that has a kind.
-
-    CaseError: numbers that no bearing can have (E-BEARING).
-    """
-    count, size = section.rolling_elements, section.element_diameter
-    assert count is not None and size is not None and section.pitch_diameter is not None
-    common = {
-        "contact_angle": section.contact_angle,
-        "clearance": section.clearance,
-        "axial_preload": section.preload,
-        "rows": section.rows,
-        "row_distance": section.row_distance,
-    }
-    if section.kind == "ball":
-        return BallBearing(
-            count,
-            size,
-            section.pitch_diameter,
-            inner_osculation=section.inner_osculation,
-            outer_osculation=section.outer_osculation,
-            **common,
-        )
-    assert section.kind is not None and section.effective_length is not None
-    return RollerBearing(section.kind, count, section.effective_length, section.pitch_diameter, size, **common)
 
 
 @dataclass(frozen=True)

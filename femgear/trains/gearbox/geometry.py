@@ -1,4 +1,4 @@
-"""Sizes of the gears of a stage: radii, angles, centre distance, from teeth or as given."""
+"""Sizes of the gears of a stage, from teeth or as given, and rolling bearings of sections that have their geometry."""
 
 from __future__ import annotations
 
@@ -10,7 +10,9 @@ from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.planetary import equal_planet_angles
 from femgear.gears.profile import base_helix_angle
+from femgear.system.rolling_bearings import BallBearing, Bearing, RollerBearing
 from femgear.trains.gearbox.case_file import (
+    BoxBearingSection,
     BoxPlanetarySection,
     PairGearsSection,
     PairSection,
@@ -172,3 +174,30 @@ def _check_ratio(radii: float, teeth: float) -> None:
 
 def _base_helix(teeth: Any) -> float:
     return base_helix_angle(teeth.pressure_angle, teeth.helix_angle or 0.0)
+
+
+def rolling_bearing(section: BoxBearingSection) -> Bearing:
+    """Make the rolling bearing of a section that has a kind.
+
+    CaseError: numbers that no bearing can have (E-BEARING).
+    """
+    count, size = section.rolling_elements, section.element_diameter
+    assert count is not None and size is not None and section.pitch_diameter is not None
+    common = {
+        "contact_angle": section.contact_angle,
+        "clearance": section.clearance,
+        "axial_preload": section.preload,
+        "rows": section.rows,
+        "row_distance": section.row_distance,
+    }
+    if section.kind == "ball":
+        return BallBearing(
+            count,
+            size,
+            section.pitch_diameter,
+            inner_osculation=section.inner_osculation,
+            outer_osculation=section.outer_osculation,
+            **common,
+        )
+    assert section.kind is not None and section.effective_length is not None
+    return RollerBearing(section.kind, count, section.effective_length, section.pitch_diameter, size, **common)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from femgear.errors import CaseError, FemgearError
 from femgear.gears.power_flow import pair_condition, planetary_condition, power_flow
-from femgear.gears.shaft_graph import SpeedCondition
+from femgear.gears.shaft_graph import ShaftGraph, SpeedCondition
 from femgear.gears.stage_frequencies import StageFrequencies, stage_frequencies
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, GearboxCase, LoadCaseSection, PairSection
 from femgear.trains.gearbox.geometry import pair_sizes, set_sizes
@@ -124,8 +124,21 @@ def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) ->
         )
         for one in conditions
     }
-    independent = tuple(name for name in load_case.speed if {*graph.speed_ratio[name]} == {name})
+    independent = _independent(case, conditions, sorted(held), joined, load_case)
     return BoxFlow(dict(graph.stage_torque), {**graph.speed, CASING: 0.0}, ports, independent, frequencies)
+
+
+def _independent(case: GearboxCase, conditions, held, joined, load_case: LoadCaseSection) -> tuple[str, ...]:
+    """Choose of the given speeds those from which the others follow."""
+    links = tuple(tuple(pair) for pair in joined if CASING not in pair)
+    graph = ShaftGraph(tuple(shaft.name for shaft in case.shaft), tuple(conditions), tuple(held), links)
+    found: list[str] = []
+    for name in load_case.speed:
+        turning = graph.speeds([*found, name])
+        known = graph.group[name] in {graph.group[other] for other in found} | graph.standing
+        if not turning.relations and not known:
+            found.append(name)
+    return tuple(found)
 
 
 def port_shafts(case: GearboxCase) -> dict[str, str]:

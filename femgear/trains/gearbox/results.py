@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.findings import Finding
+from femgear.findings import DOUBT, Finding
 from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
@@ -18,6 +18,7 @@ from femgear.storage.results import coordinates, mode_entries
 from femgear.system.assembly import MOTIONS
 from femgear.trains.gearbox.case_file import GearboxCase
 from femgear.trains.gearbox.deflection import Deflection, bearing_lives
+from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.model import bearing_motions, bearing_places
 from femgear.trains.gearbox.modes import GearboxModes, member_of_stations
 
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 ESTIMATES = 0.5, 2.0
 """Factors on the stiffness of estimated bearings between which results are shown."""
+# Tilt up to which motions are small [rad].
+_LARGEST_TILT = 5e-3
 # Spread of K_Hbeta by estimated bearings that is told.
 _SPREAD = 0.02
 
@@ -352,6 +355,8 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if open_cases:
         text = f"the misalignment of the meshes has not settled in load case {', '.join(open_cases[:5])}"
         yield Finding("W-PASSES", "deflection.passes", text, remedy="allow more passes")
+    if "displacement" in data:
+        yield from _large(data)
     if "estimate_face_load_factor" in data:
         spread = np.ptp(data["estimate_face_load_factor"].values, axis=0)
         worst = int(np.nan_to_num(spread).argmax()) if len(spread) else 0
@@ -365,10 +370,24 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if "line_load" in data:
         load = data["line_load"].values
         idle = np.nansum(load <= 0.0, axis=1) / np.maximum(np.sum(np.isfinite(load), axis=1), 1)
+        idle = np.where(np.nansum(np.abs(load), axis=1) > 0.0, idle, 0.0)
         if idle.max(initial=0.0) > 0.0:
             worst = int(idle.argmax())
             text = f"{data['mesh'].values[worst]} carries on {1.0 - idle[worst]:.0%} of its width alone"
             yield Finding("W-FACE-LOAD", "", text, remedy="stiffer shafts or bearings, or a lead modification")
+
+
+def _large(data: xr.Dataset) -> Iterator[Finding]:
+    """Tell tilts beyond which motions are not small (W-DEFLECTION)."""
+    tilts = np.abs(data["displacement"].values[..., 3:5])
+    if tilts.max(initial=0.0) > _LARGEST_TILT:
+        case, station, _ = np.unravel_index(int(tilts.argmax()), tilts.shape)
+        text = (
+            f"{data['station'].values[station]} tilts by {1e3 * tilts.max():.3g} mrad in load case "
+            f"{data['load_case'].values[case]}: the model is one of small motions"
+        )
+        remedy = "less torque, or stiffer shafts and bearings"
+        yield Finding("W-DEFLECTION", "operation.load_case", text, remedy=remedy, limit=f"{1e3 * _LARGEST_TILT:g} mrad")
 
 
 def describe_gearbox_modes(data: xr.Dataset) -> Block:
@@ -387,12 +406,27 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     if not case.deflection.contact and any(stage.teeth is not None for stage in (*case.pair, *case.planetary)):
         text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
         yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")
+    yield from _not_assembled(case)
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
             given = _without_effect(stage.teeth or {})
             if given:
                 text = f"{', '.join(given)} of these teeth have no effect: shafts and bearings of the gearbox hold them"
                 yield Finding("W-UNUSED", f"{kind}[{i}].teeth", text)
+
+
+def _not_assembled(case: GearboxCase) -> Iterator[Finding]:
+    """Planets of given sizes whose teeth do not fit between sun and ring at their angles."""
+    for i, stage in enumerate(case.planetary):
+        if stage.gears is None:
+            continue
+        sizes = set_sizes(stage)
+        both = sizes.teeth[0] + sizes.teeth[2]
+        steps = [(psi - sizes.planet_angles[0]) * both / (2.0 * np.pi) for psi in sizes.planet_angles]
+        if any(abs(step - round(step)) > 1e-3 for step in steps):
+            text = f"planets of {'/'.join(map(str, sizes.teeth))} teeth do not assemble at these angles"
+            limit = f"whole multiples of 360 deg / {both} from one another"
+            yield Finding("W-TEETH", f"planetary[{i}].gears", text, limit=limit, severity=DOUBT)
 
 
 _HOLDS = ("support_stiffness", "bearing_stiffness", "tilt_stiffness", "foundation_radial", "foundation_tangential")

@@ -75,6 +75,24 @@ CHANGES = {
         lambda t: t["operation"]["load_case"][0].update(speed={"inputs": "10 rpm"}),
         "E-CHOICE",
     ),
+    "gravity.direction": (lambda t: t.update(gravity={"direction": [0.0, 0.0, 0.0]}), "E-RANGE"),
+    "bearing[3].clearance": (_replaced(3, **BALL | {"clearance": "2 mm"}), "E-BEARING"),
+    "planetary[0].gears.planets": (
+        lambda t: t.update(
+            shaft=[*t["shaft"], {"name": "sun"}, {"name": "carrier"}],
+            planetary=[
+                {
+                    "name": "set",
+                    "sun": "sun",
+                    "carrier": "carrier",
+                    "gears": {"teeth": [36, 24, 84], "module": "1.5 mm", "planets": 12},
+                    "sun_mesh": {"stiffness": "3e8 N/m"},
+                    "ring_mesh": {"stiffness": "3e8 N/m"},
+                }
+            ],
+        ),
+        "E-NEIGHBOURS",
+    ),
     "operation.first": (lambda t: t["operation"].update(first=2), "E-RANGE"),
 }
 

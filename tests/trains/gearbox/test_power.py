@@ -6,6 +6,7 @@ import pytest
 from small_gearbox import pair_tables
 
 from femgear.errors import FemgearError
+from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.power import gearbox_flow, turns_in_words
 from femgear.trains.reading import read_case
 
@@ -28,6 +29,15 @@ def test_the_electric_axle():
     sun, carrier = flow.speed["intermediate"], flow.speed["output"]
     assert flow.planet_speed["second stage"] == pytest.approx(carrier - (sun - carrier) * 23 / 24, rel=1e-12)
     assert flow.first_torque(read_case("cases/e_axle.toml").planetary[0]) == pytest.approx(35.0 * 72 / 25, rel=1e-12)
+
+
+def test_a_speed_that_follows_from_another_holds_nothing_more():
+    tables = pair_tables()
+    alone = solve_deflection(read_case(tables))
+    tables["operation"]["load_case"][0]["speed"]["output"] = f"{-1000.0 * 24 / 36!r} rpm"
+    case = read_case(tables)
+    assert gearbox_flow(case).independent == ("input",)
+    assert solve_deflection(case).mesh_force == pytest.approx(alone.mesh_force, rel=1e-9)
 
 
 @pytest.mark.parametrize(

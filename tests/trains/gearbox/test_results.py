@@ -81,3 +81,34 @@ def test_estimated_bearings_show_the_range_that_they_make():
     # a softer bearing beside the gear moves its misalignment one way, a stiffer one the other way
     assert (soft - own) * (stiff - own) < 0.0
     assert describe_deflection(data)[0].rows[0][2].endswith(")")
+
+
+def test_motions_that_are_not_small_are_told():
+    tables = pair_tables()
+    tables["operation"]["load_case"][0]["torque"]["motor"] = "1e8 N m"
+    found = list(deflection_warnings(solve_deflections(read_case(tables)).contents()))
+    assert codes(found) == ["W-DEFLECTION"]
+
+
+def test_a_mesh_without_load_carries_on_no_part_of_its_width():
+    tables = pair_tables()
+    tables["operation"]["load_case"][0]["torque"]["motor"] = "0 N m"
+    assert not list(deflection_warnings(solve_deflections(read_case(tables)).contents()))
+
+
+def test_planets_that_do_not_assemble_are_told():
+    tables = pair_tables()
+    tables["shaft"] += [{"name": "sun"}, {"name": "carrier"}]
+    tables["planetary"] = [
+        {
+            "name": "set",
+            "sun": "sun",
+            "carrier": "carrier",
+            "gears": {"teeth": [36, 24, 84], "module": "1.5 mm", "planets": 7},
+            "sun_mesh": {"stiffness": "3e8 N/m"},
+            "ring_mesh": {"stiffness": "3e8 N/m"},
+        }
+    ]
+    findings = list(gearbox_warnings(read_case(tables)))
+    assert [one.code for one in findings] == ["W-TEETH"]
+    assert "120" in findings[0].limit
