@@ -637,12 +637,13 @@ def import_rexs(
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("case.toml"),
     stage: str | None = None,
     load_case: Whole | None = None,
+    unused: Annotated[bool, Parameter(negative="")] = False,
     force: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
-    """Write the cases of the stages of a REXS file; say what they have not, what is assumed and not used.
+    """Write the gearbox of a REXS file; say what it has not, what is assumed and not used.
 
-    Of several stages each becomes a case with its id in the name, NAME_28.toml. NAME.toml is the drivetrain
-    of parallel stages, or the planetary stage where there is one.
+    Where shafts and stages make no gearbox each stage becomes a case with its id in the name, NAME_28.toml, the
+    planetary one NAME.toml.
 
     Parameters
     ----------
@@ -653,7 +654,9 @@ def import_rexs(
     stage
         Id of the only stage to take.
     load_case
-        Number of the load case, from 1. Default: the first, and the speeds of others with its torque.
+        Number of the load case, from 1. Default: the first; of single stages with the speeds of others with its torque.
+    unused
+        List all attributes of the file that no case uses.
     force
         Replace the files.
     """
@@ -670,8 +673,10 @@ def import_rexs(
         if len(drafts) > 1:
             _say(f"         {draft.words}")
     _say(f"entries that are assumed: {sum(one.text.count('# assumed') for one in drafts)}")
-    _say("attributes that are not used:")
-    for line in model.unused():
+    left = list(model.unused())
+    count = sum(line.count(",") + 1 for line in left)
+    _say(f"attributes that are not used: {count} of {len(left)} types{'' if unused else ', listed by --unused'}")
+    for line in left if unused else ():
         _say(textwrap.shorten(f"  {line}", 110, placeholder=" ..."))
     return 0
 

@@ -130,9 +130,23 @@ class Gearbox:
             for name, (value, unit) in one["attributes"].items():
                 of = "" if unit is None else f' unit="{unit}"'
                 lines.append(f'<attribute id="{name}"{of}>{escape(str(value))}</attribute>')
-            vector = "<array><c>1.0</c><c>0.0</c><c>0.0</c></array>"
-            lines.append(f'<attribute id="u_axis_vector" unit="mm">{vector}</attribute></component>')
-        return "\n".join([*lines, "</components></model>"])
+            for name, values in {"u_axis_vector": (1.0, 0.0, 0.0), **one.get("vectors", {})}.items():
+                entries = "".join(f"<c>{value}</c>" for value in values)
+                lines.append(f'<attribute id="{name}" unit="mm"><array>{entries}</array></attribute>')
+            lines.append("</component>")
+        lines.append("</components>")
+        if getattr(self, "load_cases", ()):
+            lines.append('<load_spectrum id="1">')
+            for number, case in enumerate(self.load_cases, start=1):
+                lines.append(f'<load_case id="{number}">')
+                for id, attributes in case.items():
+                    lines.append(f'<component id="{id}">')
+                    for name, (value, unit) in attributes.items():
+                        lines.append(f'<attribute id="{name}" unit="{unit}">{value}</attribute>')
+                    lines.append("</component>")
+                lines.append("</load_case>")
+            lines.append("</load_spectrum>")
+        return "\n".join([*lines, "</model>"])
 
     def json(self):
         def attribute(name, value, unit):
@@ -145,7 +159,11 @@ class Gearbox:
                 "id": id,
                 "type": one["type"],
                 "name": one["name"],
-                "attributes": [attribute(name, *pair) for name, pair in one["attributes"].items()],
+                "attributes": [attribute(name, *pair) for name, pair in one["attributes"].items()]
+                + [
+                    {"id": name, "unit": "mm", "floating_point_array": list(values)}
+                    for name, values in one.get("vectors", {}).items()
+                ],
             }
             for id, one in self.components.items()
         ]

@@ -1,47 +1,49 @@
-"""A whole REXS gear unit of shafts and cylindrical stages as the tables of a gearbox case.
+"""A whole REXS gear unit of shafts and stages as the tables of a gearbox.
 
-Shafts lie where the centre distances and angles of the stages put them, with z along the u axis of the file; along
-it the middles of two gears in mesh face each other. Places of gears on their shafts are their middles, in format 1.0
-their left faces. What the file has no word of and what results hang on is told first.
+Places of gears on their shafts are their middles, in format 1.0 their left faces. What the file has no word of and
+what results hang on is told first.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from femgear.case.estimates import SUPPORT_SHARE, USUAL_STIFFNESS
-from femgear.case.quantities import (
-    ANGLE,
-    DENSITY,
-    LENGTH,
-    MODULUS,
-    SPEED,
-    STIFFNESS,
-    TORQUE,
-    TORSION,
-    Dimension,
-    to_si,
-)
-from femgear.exchange.gear_unit import POWER, gears_of, plain_ids, shaft_of, stage_components, unit_flow, with_load_case
+from femgear.case.quantities import ACCELERATION, ANGLE, LENGTH, SPEED, STIFFNESS, to_si
+from femgear.exchange.gear_unit import gears_of, plain_ids, shaft_of, stage_components
 from femgear.exchange.planetary_stage import is_bearing, with_unit
 from femgear.exchange.rexs import Component, Model
-from femgear.findings import DOUBT
+from femgear.exchange.unit_bearings import BearingReader, coupling_table, engaged
+from femgear.exchange.unit_operation import OperationReader, shaft_groups
+from femgear.exchange.unit_shafts import (
+    TOLERANCE,
+    NoGearbox,
+    Piece,
+    Way,
+    file_pieces,
+    file_places,
+    joined_pieces,
+    material_table,
+    misses,
+    stage_way,
+    walked_places,
+)
+from femgear.findings import NOTE
 
-FORCE = Dimension("a force", "N", "N", 1.0)
+CASING = "casing"
 _ANGLE_KEY = "rotating_angle_around_neg_u_axis"
-_SOFT, _STIFF_TILT = 1e15, 1e11
-"""Stiffnesses that are rigid [N/m, N m/rad]."""
-_SAME = 1e-7
-_THRUST = {"both_directions": (1, -1), "positive": (1,), "negative": (-1,), "no_direction": ()}
-# Of bearings whose bore and outer diameter alone are known: diameters of the elements over (D - d), and how much of the
-# pitch circle they fill.
-_BALL, _BALL_FILL, _ROLLER, _ROLLER_FILL = 0.305, 0.62, 0.25, 0.82
+_PARTS = ("assembly", "ordered_assembly")
+_WORDS = {"shaft": "shaft", "external_load": "load"}
+_SUPPORT = "support of "
+_SUPPORTS = ("bearing_stiffness", "support_stiffness")
+# Parts beyond the end of a shaft by more make it longer, sections longer than this one [m].
+_EDGE, _SHORTEST = 1e-9, 1e-5
 
 
 def gearbox_tables(
-    model: Model, pairs: Mapping[str, dict[str, Any]], load_case: int | None = None
+    model: Model, stages: Mapping[str, dict[str, Any]], load_case: int | None = None
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Make the tables of a gearbox, with remarks by key on what is assumed.
 
@@ -49,85 +51,224 @@ def gearbox_tables(
     ----------
     model : Model
         The unit.
-    pairs : mapping of str to dict
-        Tables of the pair case of every stage by its id.
+    stages : mapping of str to dict
+        Tables of the case of every stage by its id.
     load_case : int, optional
         Number of the load case that contact, modes and pictures are of; by default the first.
 
     Raises
     ------
     NoGearbox
-        The unit has other stages, shafts without sections, or no speed or torque.
+        The unit has other stages, gears without shafts, no speed or torque, or axes that are not parallel.
     """
-    stages = stage_components(model)
-    if not stages or any(stage.id not in pairs for stage in stages):
-        raise NoGearbox("a gearbox is written of units whose stages are all pairs that became cases")
-    unit = _Unit(model, stages, pairs)
-    tables: dict[str, Any] = {"format": 1, "model": "gearbox", "title": _title(model, stages)}
-    tables["shaft"] = [unit.shaft(shaft) for shaft in unit.shafts]
-    tables["bearing"] = [unit.bearing(part, number) for number, part in enumerate(unit.bearings)]
-    tables["pair"] = [unit.pair(stage, number) for number, stage in enumerate(stages)]
-    tables["load"] = [unit.load(part) for part in unit.loads]
-    tables["operation"] = unit.operation(load_case)
-    tables["load"] += [] if unit.extra is None else [unit.extra]
-    weighs = any(
-        model.text(part, "EIGENGEWICHT") == "true" for part in model.components.values() if part.type == "gear_unit"
-    )
-    if weighs:
-        tables["gravity"] = {}
-    return tables, unit.remarks
+    components = stage_components(model)
+    if not components or any(stage.id not in stages for stage in components):
+        raise NoGearbox("a stage of the unit became no case")
+    unit = _Unit(model, components, stages)
+    tables: dict[str, Any] = {"format": 1, "model": "gearbox", "title": _title(model, components)}
+    operation, added = unit.operation(load_case)
+    tables["shaft"] = [unit.shaft_table(shaft) for shaft in unit.shafts]
+    tables["bearing"] = unit.bearing_tables()
+    tables["coupling"] = unit.coupling_tables()
+    tables["pair"] = [unit.pair(stage) for stage in components if stage.type == "cylindrical_stage"]
+    tables["planetary"] = [unit.planetary(stage) for stage in components if stage.type == "planetary_stage"]
+    tables["load"] = unit.load_tables(added)
+    tables["operation"] = operation
+    if (weight := _gravity(model)) is not None:
+        tables["gravity"] = weight
+    return {key: value for key, value in tables.items() if value != []}, unit.remarks
+
+
+def has_whole_shafts(tables: Mapping[str, Any]) -> bool:
+    """Whether all shafts of a gearbox have sections and bearings of the file."""
+    held = {one["shaft"] for one in tables.get("bearing", ()) if not one["name"].startswith(_SUPPORT)}
+    return all("part" in shaft and shaft["name"] in held for shaft in tables["shaft"])
 
 
 def _title(model: Model, stages) -> str:
     teeth = []
     for stage in stages:
-        numbers = [abs(model.number(gear, "number_of_teeth") or 0.0) for gear in gears_of(model, stage)]
-        teeth.append("/".join(f"{number:g}" for number in numbers))
-    return f"Gear unit of {len(stages)} stages, {', '.join(teeth)}"
+        gears = gears_of(model, stage)
+        if not gears:
+            meshes = model.related("assembly", "part", assembly=stage.id)
+            gears = list({gear.id: gear for mesh in meshes for gear in gears_of(model, mesh)}.values())
+        numbers = dict.fromkeys(f"{abs(model.number(gear, 'number_of_teeth') or 0.0):g}" for gear in gears)
+        teeth.append("/".join(numbers))
+    return f"Gear unit of {len(stages)} stage{'s' * (len(stages) > 1)}, {', '.join(teeth)}"
 
 
-class NoGearbox(Exception):
-    """Why a unit makes no gearbox, in words."""
+def _gravity(model: Model) -> dict[str, Any] | None:
+    """Table of the weight, where the unit says that it counts."""
+    for part in model.components.values():
+        if part.type == "gear_unit" and "true" in (
+            model.text(part, "EIGENGEWICHT"),
+            model.text(part, "account_for_gravity"),
+        ):
+            along = [model.number(part, f"direction_vector_gravity_{way}") or 0.0 for way in "vwu"]
+            size = model.number(part, "gravitational_acceleration", ACCELERATION)
+            table: dict[str, Any] = {"acceleration": with_unit(size, ACCELERATION)} if size else {}
+            if not any(along):
+                model.remark("gravity", "the file does not tell where its weight acts: along -y", severity=NOTE)
+                return table
+            return table | {"direction": [one / math.hypot(*along) for one in along]}
+    return None
 
 
 class _Unit:
     """Shafts, bearings, loads and stages of a unit, and where they are."""
 
-    def __init__(self, model: Model, stages: list[Component], pairs: Mapping[str, dict[str, Any]]):
-        self.model, self.stages, self.pairs = model, stages, pairs
+    def __init__(self, model: Model, stages: Sequence[Component], tables: Mapping[str, dict[str, Any]]):
+        self.model, self.stages, self.teeth = model, stages, tables
         self.remarks: dict[str, str] = {}
-        self.gears = {gear.id: (gear, stage) for stage in stages for gear in gears_of(model, stage)}
-        self.on = {id: shaft for id, (gear, _) in self.gears.items() if (shaft := shaft_of(model, gear)) is not None}
-        if len(self.on) != len(self.gears):
-            raise NoGearbox("a gear has no shaft")
-        used = {shaft.id for shaft in self.on.values()}
-        self.shafts = [part for part in model.components.values() if part.type == "shaft" and part.id in used]
-        self.first: dict[str, float] = {}
-        self.extra: dict[str, Any] | None = None
-        names = plain_ids([part.id for part in model.components.values()])
-        self.name = {id: f"{_WORDS.get(model.components[id].type, 'bearing')} {plain}" for id, plain in names.items()}
-        self.parts = {
-            shaft.id: model.related(("assembly", "ordered_assembly"), "part", assembly=shaft.id)
-            for shaft in self.shafts
-        }
-        self.bearings = [
-            part
-            for part in model.components.values()
-            if is_bearing(part) and part.type != "rolling_bearing_row" and self._sides(part)[0] is not None
+        self.plain = plain_ids([part.id for part in model.components.values()])
+        self.couplings = [
+            part for part in model.components.values() if part.type.endswith("coupling") and engaged(model, part)
         ]
-        self.loads = [part for shaft in self.shafts for part in self.parts[shaft.id] if part.type == "external_load"]
-        self.place = self._places()
+        self.members: dict[str, dict[str, tuple[Component | None, str | None]]] = {}
+        self.components: dict[str, list[Component]] = {}
+        self.main: dict[str, str] = {}
+        for stage in stages:
+            self.members[stage.id] = dict(self._stage_members(stage))
+        self._add_struts()
+        self._add_coupled()
+        self.shafts = [part.id for part in model.components.values() if part.id in self.components]
+        self.gears = {
+            gear.id for members in self.members.values() for gear, _ in members.values() if gear is not None
+        } | {gear.id for stage in stages for gear in self._planets(stage)}
+        self.bearings = [
+            (part, *sides)
+            for part in model.components.values()
+            if is_bearing(part) and part.type != "rolling_bearing_row" and (sides := self._sides(part)) is not None
+        ]
+        self.loads = [
+            (part, shaft)
+            for shaft in self.shafts
+            for component in self.components[shaft]
+            for part in model.related(_PARTS, "part", assembly=component.id)
+            if part.type == "external_load"
+        ]
+        self.zero = self._zeros()
+        self.pieces = {shaft: self._pieces(shaft) for shaft in self.shafts}
 
-    def _sides(self, part: Component) -> tuple[Component | None, Component | None]:
-        """Shaft inside and shaft outside a bearing; None is the casing, or a part that is not taken."""
+    # which shafts there are
+
+    def _stage_members(self, stage: Component) -> Iterator[tuple[str, tuple[Component | None, str | None]]]:
+        """Gears of a stage with their shafts by what they are; the shaft is None in the casing."""
+        model = self.model
+        if stage.type == "cylindrical_stage":
+            for name, gear in zip(("gear_1", "gear_2"), gears_of(model, stage), strict=True):
+                yield name, (gear, self._shaft(gear))
+            return
+        gears = {gear.id: gear for _, pair in self._meshes(stage) for gear in pair}
+        planets = {gear.id for gear in self._planets(stage)}
+        ring = next(gear for gear in gears.values() if gear.type == "ring_gear")
+        sun = next(gear for gear in gears.values() if gear.id not in planets and gear.id != ring.id)
+        yield "sun", (sun, self._shaft(sun))
+        carriers = model.related("planet_carrier_shaft", "shaft", planetary_stage=stage.id)
+        if not carriers:
+            raise NoGearbox(f"the carrier of {stage} has no shaft")
+        self.components.setdefault(carriers[0].id, list(carriers))
+        self.main |= {one.id: carriers[0].id for one in carriers}
+        yield "carrier", (None, carriers[0].id)
+        shaft = shaft_of(model, ring)
+        yield "ring", (ring, None if shaft is None or self._stands(stage, shaft) else self._shaft(ring))
+
+    def _meshes(self, stage: Component) -> list[tuple[Component, list[Component]]]:
+        meshes = self.model.related("assembly", "part", assembly=stage.id)
+        return [(mesh, pair) for mesh in meshes if len(pair := gears_of(self.model, mesh)) == 2]
+
+    def _planets(self, stage: Component) -> list[Component]:
+        """Planets of a planetary stage; none of another one."""
+        found = {one.id: one for _, pair in self._meshes(stage) if pair[1].type == "ring_gear" for one in pair[:1]}
+        return list(found.values())
+
+    def _shaft(self, gear: Component) -> str:
+        shaft = shaft_of(self.model, gear)
+        if shaft is None:
+            raise NoGearbox(f"{gear} has no shaft")
+        self.components.setdefault(shaft.id, [shaft])
+        return self.main.setdefault(shaft.id, shaft.id)
+
+    def _stands(self, stage: Component, shaft: Component) -> bool:
+        """Whether the shaft of a ring stands in the casing: held by a coupling, or by nothing else in its stage."""
+        held = [one for one in self.couplings if self._ends(one) == {shaft.id, None}]
+        if held:
+            return not any(value != "rigid" for one in held for value in coupling_table(self.model, one).values())
+        loaded = any(one.type == "external_load" for one in self.model.related(_PARTS, "part", assembly=shaft.id))
+        fixed = self.teeth[stage.id].get("operation", {}).get("fixed")
+        if fixed != "ring" or loaded or self.model.number(shaft, "rotational_speed", SPEED):
+            return False
+        self.model.remark(f"{stage.id}: ring", f"nothing holds or loads the ring of {stage}: it stands in the casing")
+        return True
+
+    def _ends(self, joint: Component) -> set[str | None]:
+        """Ids of the shafts that a joint joins, with None for the casing; other parts are left out."""
+        sides = [
+            one
+            for role in ("inner_part", "outer_part")
+            for one in self.model.related("side", role, assembly=joint.id)[:1]
+        ]
+        return {None if one.type == "gear_casing" else one.id for one in sides if one.type in ("gear_casing", "shaft")}
+
+    def _add_struts(self) -> None:
+        """Count shafts that several couplings join with the parts of one carrier, and nothing else, to it."""
+        for members in self.members.values():
+            carrier = members.get("carrier", (None, None))[1]
+            joined: dict[str, int] = {}
+            for ends in map(self._ends, self.couplings):
+                if carrier is not None and {self.main.get(one or "") for one in ends} == {carrier, None}:
+                    for one in ends - self.main.keys() - {None}:
+                        joined[one or ""] = joined.get(one or "", 0) + 1
+            for one, count in joined.items():
+                if count > 1 and carrier is not None and self._carries(one):
+                    self.components[carrier].append(self.model.components[one])
+                    self.main[one] = carrier
+
+    def _add_coupled(self) -> None:
+        """Add shafts that couplings join with those of stages, where anything is on them."""
+        roles = [("planet_shaft", "shaft"), ("planet_pin", "shaft")]
+        inside = {
+            one.id
+            for stage in self.stages
+            for kind, role in roles
+            for one in self.model.related(kind, role, planetary_stage=stage.id)
+        }
+        grown = True
+        while grown:
+            grown = False
+            for joint in self.couplings:
+                ends = {one for one in self._ends(joint) if one is not None and one not in inside}
+                new = [one for one in ends if one not in self.main]
+                if len(ends) == 2 and len(new) == 1 and self._carries(new[0]):
+                    self.components[new[0]] = [self.model.components[new[0]]]
+                    self.main[new[0]], grown = new[0], True
+
+    def _carries(self, shaft: str) -> bool:
+        """Whether a shaft has sections with sizes, or loads."""
+        parts = self.model.related(_PARTS, "part", assembly=shaft)
+        return any(one.type == "external_load" or self.model.number(one, "length", LENGTH) for one in parts)
+
+    def _sides(self, part: Component) -> tuple[Component, str, Component | None, bool] | None:
+        """Shaft of a bearing with its id, shaft around it if any, and whether the first is its outer part.
+
+        None of bearings that hold no shaft of the gearbox, or one against a part that is not in it.
+        """
         inner, outer = (
             next(iter(self.model.related("side", role, assembly=part.id)), None)
             for role in ("inner_part", "outer_part")
         )
-        known = {shaft.id for shaft in self.shafts}
-        return (inner if inner is not None and inner.id in known else None), (
-            outer if outer is not None and outer.id in known else None
-        )
+        known = [one is not None and one.id in self.main for one in (inner, outer)]
+        other = outer if known[0] else inner
+        if not any(known) or (not all(known) and other is not None and other.type == "shaft"):
+            return None
+        if all(known):
+            assert inner is not None and outer is not None
+            return inner, self.main[inner.id], outer, False
+        shaft = inner if known[0] else outer
+        assert shaft is not None
+        return shaft, self.main[shaft.id], None, known[1]
+
+    # where they lie
 
     def at(self, part: Component, key: str = "u_coordinate_on_shaft") -> float:
         """Place of a part on its shaft [m], of a gear its middle."""
@@ -136,251 +277,364 @@ class _Unit:
             place += 0.5 * (self.model.number(part, "face_width", LENGTH) or 0.0)
         return place
 
-    def _places(self) -> dict[str, tuple[float, float, float]]:
-        """Axis and left end (x, y, z) of every shaft [m], the first one at the origin."""
-        place = {self.shafts[0].id: (0.0, 0.0, 0.0)}
-        ways: list[tuple[str, str, tuple[float, float, float]]] = []
+    def _zeros(self) -> dict[str, tuple[float, float, float]]:
+        """Axis and zero (x, y, z) of the shafts of the file [m]: their coordinates, else from stage to stage."""
+        parts = [one for shaft in self.shafts for one in self.components[shaft]]
+        ways = list(self._stage_ways())
+        found = file_places(self.model, parts)
+        if found is not None and (off := misses(found, ways)) <= TOLERANCE:
+            return found
+        if found is not None:
+            text = f"coordinates of shafts miss the centre distances by up to {1e6 * off:.3g} um: not taken"
+            self.model.remark("shaft", text, remedy="shafts lie by centre distances and angles of the stages")
+        ways += self._joint_ways()
+        return walked_places([one.id for one in parts], ways)
+
+    def _stage_ways(self) -> Iterator[Way]:
         for stage in self.stages:
-            first, second = gears_of(self.model, stage)
-            pair = self.pairs[stage.id]
-            distance = to_si(pair["set"]["centre_distance"], LENGTH) if "centre_distance" in pair["set"] else None
-            if distance is None:
-                distance = self.model.number(stage, "center_distance", LENGTH)
-            if distance is None:
-                raise NoGearbox(f"{stage} has no centre distance")
-            angle = -(self.model.number(stage, _ANGLE_KEY, ANGLE) or 0.0)
-            # the table of the pair may have both gears the other way round
-            along = self.at(first) - self.at(second)
-            way = (distance * math.cos(angle), distance * math.sin(angle), along)
-            ways.append((self.on[first.id].id, self.on[second.id].id, way))
-        for part in self.bearings:
-            inner, outer = self._sides(part)
-            if inner is not None and outer is not None:
-                keys = ("u_coordinate_on_shaft_inner_side", "u_coordinate_on_shaft_outer_side")
-                along = self.at(part, keys[0]) - self.at(part, keys[1])
-                ways.append((inner.id, outer.id, (0.0, 0.0, along)))
-        for _ in self.shafts:
-            for first, second, way in ways:
-                if first in place and second not in place:
-                    place[second] = tuple(a + b for a, b in zip(place[first], way))  # type: ignore[assignment]
-                elif second in place and first not in place:
-                    place[first] = tuple(a - b for a, b in zip(place[second], way))  # type: ignore[assignment]
-        if len(place) < len(self.shafts):
-            raise NoGearbox("stages do not join all shafts")
-        return place
+            members = self.members[stage.id]
+            if stage.type == "cylindrical_stage":
+                (first, one), (second, other) = members["gear_1"], members["gear_2"]
+                assert first is not None and second is not None and one is not None and other is not None
+                angle = self.model.number(stage, _ANGLE_KEY, ANGLE) or 0.0
+                yield one, other, stage_way(self._distance(stage), angle, self.at(first) - self.at(second))
+                continue
+            sun, shaft = members["sun"]
+            ring, around = members["ring"]
+            assert sun is not None and ring is not None and shaft is not None
+            # the middle of the planets lies at the zero of the carrier where nothing else tells it
+            for one in self.components[str(members["carrier"][1])]:
+                yield shaft, one.id, (0.0, 0.0, self.at(sun))
+            if around is not None:
+                yield shaft, around, (0.0, 0.0, self.at(sun) - self.at(ring))
 
-    def shaft(self, shaft: Component) -> dict[str, Any]:
-        sections = sorted(
-            (part for part in self.parts[shaft.id] if part.type == "shaft_section"),
-            key=lambda part: self.model.number(part, "u_coordinate_on_shaft", LENGTH) or 0.0,
-        )
-        if not sections:
-            raise NoGearbox(f"{shaft} has no sections")
-        x, y, z = self.place[shaft.id]
-        first = self.model.number(sections[0], "u_coordinate_on_shaft", LENGTH) or 0.0
-        self.first[shaft.id] = first
-        table: dict[str, Any] = {"name": self.name[shaft.id], "axis": [with_unit(x, LENGTH), with_unit(y, LENGTH)]}
-        table["start"] = with_unit(z + first, LENGTH)
-        table["part"] = [self._section(part) for part in sections]
-        for made in self.model.related("reference", "referenced", origin=shaft.id)[:1]:
-            modulus = self.model.number(made, "elastic_modulus", MODULUS)
-            density = self.model.number(made, "density", DENSITY)
-            ratio = self.model.number(made, "poisson_ratio")
-            values = {"youngs_modulus": modulus and with_unit(modulus, MODULUS), "poisson_ratio": ratio}
-            values["density"] = density and with_unit(density, DENSITY)
-            table["material"] = {key: value for key, value in values.items() if value is not None}
+    def _distance(self, stage: Component) -> float:
+        given = self.teeth[stage.id]["set"].get("centre_distance")
+        distance = self.model.number(stage, "center_distance", LENGTH) if given is None else to_si(given, LENGTH)
+        if distance is None:
+            raise NoGearbox(f"{stage} has no centre distance")
+        return distance
+
+    def _joint_ways(self) -> Iterator[Way]:
+        """Ways along bearings and couplings between two shafts."""
+        keys = ("u_coordinate_on_shaft_inner_side", "u_coordinate_on_shaft_outer_side")
+        for joint in [*(one[0] for one in self.bearings), *self.couplings]:
+            sides = [
+                next(iter(self.model.related("side", r, assembly=joint.id)), None) for r in ("inner_part", "outer_part")
+            ]
+            if all(one is not None and one.id in self.main for one in sides):
+                inner, outer = (one.id for one in sides if one is not None)
+                yield inner, outer, (0.0, 0.0, self.at(joint, keys[0]) - self.at(joint, keys[1]))
+
+    def height(self, part: Component, shaft: Component, key: str = "u_coordinate_on_shaft") -> float:
+        """Place of a part of a shaft of the file along z [m]."""
+        return self.zero[shaft.id][2] + self.at(part, key)
+
+    def gear_height(self, gear: Component) -> float:
+        """Middle of a gear along z [m]; of a ring in the casing by its own coordinate."""
+        shaft = shaft_of(self.model, gear)
+        assert shaft is not None
+        return self.height(gear, shaft)
+
+    def _pieces(self, shaft: str) -> list[Piece]:
+        """Sections of a shaft, with what carriers have beside, as far as its parts reach."""
+        found = [p for one in self.components[shaft] for p in file_pieces(self.model, one, self.zero[one.id][2])]
+        if not found:
+            text = f"shaft {shaft} has no sections: it is one rigid body"
+            self.model.remark(f"shaft {shaft}", text, remedy="give it parts: what it bends misaligns teeth")
+            return []
+        for stage in self.stages:
+            if self.members[stage.id].get("carrier", (None, None))[1] == shaft:
+                found += self._carrier_body(stage, found)
+        found, gaps = joined_pieces(found)
+        if gaps:
+            text = f"sections of shaft {shaft} leave gaps of {1e3 * gaps:.4g} mm: they are closed"
+            self.model.remark(f"shaft {shaft}", text)
+        reach = [height for height in self._heights(shaft)]
+        low, high = min([*reach, found[0].start]), max([*reach, found[-1].end])
+        longer = max(found[0].start - low, high - found[-1].end)
+        if longer > _EDGE:
+            text = f"shaft {shaft} is made {1e3 * longer:.4g} mm longer, up to the last part on it"
+            self.model.remark(f"shaft {shaft}", text, remedy="correct the place of the part, or the sections")
+        if found[0].start - low > _EDGE:
+            found.insert(0, _extension(found[0], low, found[0].start))
+        if high - found[-1].end > _EDGE:
+            found.append(_extension(found[-1], found[-1].end, high))
+        return found
+
+    def _heights(self, shaft: str) -> Iterator[float]:
+        """Places along z of all that sits on a shaft [m]."""
+        for members in self.members.values():
+            for gear, own in members.values():
+                if own == shaft and gear is not None:
+                    yield self.gear_height(gear)
+        for stage in self.stages:
+            if self.members[stage.id].get("carrier", (None, None))[1] == shaft:
+                yield self.planet_height(stage)
+        for part, component, own, outer, turned in self.bearings:
+            if own == shaft:
+                yield self.height(part, component, _side(turned))
+            if outer is not None and self.main[outer.id] == shaft:
+                yield self.height(part, outer, _side(True))
+        for part, own in self.loads:
+            if own == shaft:
+                yield self.load_height(part)
+
+    def load_height(self, part: Component) -> float:
+        """Place of a load along z [m]."""
+        shaft = shaft_of(self.model, part)
+        assert shaft is not None
+        return self.height(part, shaft)
+
+    def planet_height(self, stage: Component) -> float:
+        """Middle of the planets of a stage along z [m]: that of the sun."""
+        sun = self.members[stage.id]["sun"][0]
+        assert sun is not None
+        return self.gear_height(sun)
+
+    def _carrier_body(self, stage: Component, known: Sequence[Piece]) -> list[Piece]:
+        """Side plates of a carrier, and a tube in place of the struts between them where its shafts have none."""
+        model = self.model
+        carriers = [one for one in model.related(_PARTS, "part", assembly=stage.id) if one.type == "planet_carrier"]
+        plates = []
+        for carrier in carriers:
+            for one in model.related(_PARTS, "part", assembly=carrier.id):
+                length, outer = model.number(one, "length", LENGTH), model.number(one, "outer_diameter", LENGTH)
+                place = model.vector(one, "support_vector", LENGTH)
+                if one.type == "side_plate" and length and outer and place:
+                    bore = model.number(one, "inner_diameter", LENGTH) or 0.0
+                    plates.append(Piece(place[0], place[0] + length, (outer, outer), (bore, bore)))
+        plates.sort(key=lambda one: one.start)
+        if len(plates) == 2 and not any(one.start < plates[1].start and one.end > plates[0].end for one in known):
+            bores = [model.number(one, "strut_inner_diameter", LENGTH) for one in carriers]
+            outer = min(one.outer[0] for one in plates)
+            bore = next((one for one in bores if one), 0.5 * outer)
+            plates.insert(1, Piece(plates[0].end, plates[1].start, (outer, outer), (bore, bore)))
+            text = f"the struts of the carrier of {stage} are taken as a tube: stiffer and heavier than they are"
+            model.remark(f"{stage.id}: carrier", text, severity=NOTE)
+        return plates
+
+    # tables
+
+    def name(self, part: Component | str) -> str:
+        """Name of a part in the case."""
+        one = self.model.components[part] if isinstance(part, str) else part
+        word = "bearing" if is_bearing(one) else "coupling" if one.type.endswith("coupling") else "stage"
+        return f"{_WORDS.get(one.type, word)} {self.plain[one.id]}"
+
+    def start(self, shaft: str) -> float:
+        """Left end of a shaft along z [m]; of a rigid body the middle of its first part."""
+        if self.pieces[shaft]:
+            return self.pieces[shaft][0].start
+        return next(self._heights(shaft), self.zero[shaft][2])
+
+    def position(self, shaft: str, height: float) -> str:
+        """Place on a shaft as a case has it."""
+        return with_unit(height - self.start(shaft), LENGTH)
+
+    def shaft_table(self, shaft: str) -> dict[str, Any]:
+        x, y, _ = self.zero[shaft]
+        table: dict[str, Any] = {"name": self.name(shaft), "axis": [_length(x), _length(y)]}
+        table["start"] = _length(self.start(shaft))
+        if pieces := [piece.table for piece in self.pieces[shaft] if piece.end - piece.start > _SHORTEST]:
+            table["part"] = pieces
+        if material := material_table(self.model, self.model.components[shaft]):
+            table["material"] = material
         return table
 
-    def _section(self, part: Component) -> dict[str, Any]:
-        keys = ("length", "outer_diameter_begin", "outer_diameter_end", "inner_diameter_begin", "inner_diameter_end")
-        length, begin, end, inner, inside = (self.model.number(part, key, LENGTH) for key in keys)
-        if not length or not begin:
-            self.model.refuse("a section without length and diameter", str(part))
-        table = {"length": with_unit(length, LENGTH), "outer_diameter": with_unit(begin, LENGTH)}
-        if inner:
-            table["inner_diameter"] = with_unit(inner, LENGTH)
-        if end and abs(end - begin) > _SAME:
-            table["end_outer_diameter"] = with_unit(end, LENGTH)
-        if inside is not None and abs(inside - (inner or 0.0)) > _SAME:
-            table["end_inner_diameter"] = with_unit(inside, LENGTH)
-        return table
+    def bearing_tables(self) -> list[dict[str, Any]]:
+        """Tables of all bearings, and of those that shafts without any need."""
+        reader, found = BearingReader(self.model, self.remarks), []
+        for part, component, shaft, outer, turned in self.bearings:
+            table: dict[str, Any] = {"name": self.name(part), "shaft": self.name(shaft)}
+            table["position"] = self.position(shaft, self.height(part, component, _side(turned)))
+            if outer is not None:
+                around = self.main[outer.id]
+                table["outer_shaft"] = self.name(around)
+                table["outer_position"] = self.position(around, self.height(part, outer, _side(True)))
+            own = reader.table(part, f"bearing[{len(found)}]", self._usual(shaft), turned=turned)
+            if not {"radial", "axial", "tilt", "kind"} & own.keys():
+                reader.tell(part, "holds nothing in the file: left out", severity=NOTE)
+                continue
+            found.append(table | own)
+        reader.finish()
+        for shaft in self.shafts:
+            self._hold(shaft, found)
+        return found
 
-    def _on_shaft(self, part: Component, shaft: Component, key: str = "u_coordinate_on_shaft") -> str:
-        return with_unit(self.at(part, key) - self.first[shaft.id], LENGTH)
+    def _hold(self, shaft: str, found: list[dict[str, Any]]) -> None:
+        """Hold a shaft without bearings, and tilts of one that is a rigid body in bearings at one place."""
+        name = self.name(shaft)
+        own = [one for one in found if name in (one["shaft"], one.get("outer_shaft"))]
+        coupled = any(shaft in self._ends(joint) for joint in self.couplings)
+        if not own and not coupled:
+            usual = with_unit(self._usual(shaft), STIFFNESS)
+            height = next(self._heights(shaft), self.start(shaft))
+            table = {"name": f"{_SUPPORT}{name}", "shaft": name, "position": self.position(shaft, height)}
+            found.append(table | {"radial": usual, "axial": usual, "estimated": True})
+            self.remarks[f"bearing[{len(found) - 1}].radial"] = "assumed: the shaft has no bearing"
+            text = f"{name} has no bearing: one of {usual} is assumed at its gear"
+            self.model.remark("bearing", text, remedy="give its bearings")
+        places = {one["position" if one["shaft"] == name else "outer_position"] for one in own}
+        if not self.pieces[shaft] and len(places) < 2:
+            for one in (own or found[-1:])[:1]:
+                if "kind" not in one:
+                    one["tilt"] = "rigid"
+                    text = f"{name} is a rigid body that one bearing holds: it is kept upright"
+                    self.model.remark("bearing", text, remedy="give the places of its bearings, and its parts")
 
-    def bearing(self, part: Component, number: int) -> dict[str, Any]:
-        inner, outer = self._sides(part)
-        assert inner is not None
-        table: dict[str, Any] = {"name": self.name[part.id], "shaft": self.name[inner.id]}
-        table["position"] = self._on_shaft(part, inner, "u_coordinate_on_shaft_inner_side")
-        if outer is not None:
-            table["outer_shaft"] = self.name[outer.id]
-            table["outer_position"] = self._on_shaft(part, outer, "u_coordinate_on_shaft_outer_side")
-        key, model = f"bearing[{number}]", self.model
-        radial = model.number(part, "radial_stiffness", STIFFNESS)
-        tilt = model.number(part, "bending_stiffness", TORSION)
-        axial = model.number(part, "axial_stiffness", STIFFNESS)
-        senses = _THRUST.get(model.text(part, "axial_force_absorption") or "both_directions", (1, -1))
-        bore, outside = (model.number(part, name, LENGTH) for name in ("inner_diameter", "outer_diameter"))
-        kind = model.text(part, "bearing_type") or ""
-        if (not radial or radial > _SOFT) and bore and outside and ("ball" in kind or "roller" in kind):
-            table |= self._assumed(part, key, bore, outside, ball="ball" in kind)
-            if senses and "ball" not in kind:
-                table |= {"kind": "ball"} | self._assumed(part, key, bore, outside, ball=True)
-            table |= self._ratings(part)
-            table["estimated"] = True
-            what = "rigid in the file" if radial else "without a stiffness in the file"
-            text = f"{part} is {what}: {table['kind']} of assumed size from {1e3 * bore:g} and {1e3 * outside:g} mm"
-            remedy = "misalignment rests on it: give the numbers of its catalogue"
-            model.remark(key, text, remedy=remedy, severity=DOUBT)
-            return table
-        if radial and radial <= _SOFT:
-            table["radial"] = with_unit(radial, STIFFNESS)
-        elif (model.text(part, "radial_force_absorption") or "true") == "true":
-            table["radial"] = with_unit(self._usual(inner), STIFFNESS)
-            table["estimated"] = True
-            self.remarks[f"{key}.radial"] = "assumed: the file has none"
-            text = f"{part} has neither stiffness nor sizes: its stiffness is assumed"
-            model.remark(key, text, remedy="misalignment rests on it: give stiffness or sizes", severity=DOUBT)
-        if senses:
-            stiff = axial if axial and axial <= _SOFT else self._usual(inner)
-            table["axial"] = with_unit(stiff, STIFFNESS)
-            if len(senses) == 1:
-                table["axial_sense"] = "positive" if senses[0] > 0 else "negative"
-        if tilt and tilt > _STIFF_TILT:
-            table["tilt"] = "rigid"
-            text = f"{part} holds the shaft upright with {tilt:.3g} N m/rad: taken as rigid, it decides misalignment"
-            model.remark(f"{key}.tilt", text, remedy="leave tilt out where the bearing gives way", severity=DOUBT)
-        elif tilt:
-            table["tilt"] = with_unit(tilt, TORSION)
-        return table
+    def _usual(self, shaft: str) -> float:
+        """Estimated stiffness of a bearing [N/m], from the widest gear of its shaft, else of the unit."""
+        widths = {
+            own: self.model.number(gear, "face_width", LENGTH) or 0.0
+            for members in self.members.values()
+            for gear, own in members.values()
+            if gear is not None and own is not None
+        }
+        width = widths.get(shaft) or max(widths.values(), default=0.0) or 0.02
+        for members in self.members.values():
+            for gear, own in members.values():
+                if gear is not None and own == shaft:
+                    width = max(width, self.model.number(gear, "face_width", LENGTH) or 0.0)
+        return float(f"{SUPPORT_SHARE * USUAL_STIFFNESS * width:.3g}")
 
-    def _usual(self, shaft: Component) -> float:
-        """Estimated stiffness of a bearing [N/m], from the widest gear of its shaft."""
-        widths = [
-            self.model.number(gear, "face_width", LENGTH) or 0.0
-            for id, (gear, _) in self.gears.items()
-            if self.on[id].id == shaft.id
+    def coupling_tables(self) -> list[dict[str, Any]]:
+        """Tables of the couplings between shafts of the gearbox, or of one and the casing."""
+        found = []
+        for joint in self.couplings:
+            ends = self._joined(joint)
+            if ends is None:
+                continue
+            table: dict[str, Any] = {"name": self.name(joint)}
+            table["between"] = [CASING if one is None else self.name(self.main[one.id]) for one in ends]
+            heights = [
+                None if one is None else self.height(joint, one, _side(number == 1)) for number, one in enumerate(ends)
+            ]
+            table["positions"] = [
+                _length(0.0) if one is None or height is None else self.position(self.main[one.id], height)
+                for one, height in zip(ends, heights, strict=True)
+            ]
+            found.append(table | coupling_table(self.model, joint))
+        return found
+
+    def _joined(self, joint: Component) -> list[Component | None] | None:
+        """Both ends of a coupling, None for the casing; None altogether where it joins no two of them."""
+        sides = [
+            next(iter(self.model.related("side", role, assembly=joint.id)), None)
+            for role in ("inner_part", "outer_part")
         ]
-        return float(f"{SUPPORT_SHARE * USUAL_STIFFNESS * max(widths):.3g}")
+        found: list[Component | None] = []
+        for one in sides:
+            if one is None or not (one.type == "gear_casing" or one.id in self.main):
+                return None
+            found.append(None if one.type == "gear_casing" else one)
+        shafts = {self.main[one.id] for one in found if one is not None}
+        return found if shafts and (None in found or len(shafts) == 2) else None
 
-    def _assumed(self, part: Component, key: str, bore: float, outside: float, *, ball: bool) -> dict[str, Any]:
-        """Elements of a bearing of which bore and outer diameter are known [m]."""
-        share, fill = (_BALL, _BALL_FILL) if ball else (_ROLLER, _ROLLER_FILL)
-        size, pitch = share * (outside - bore), 0.5 * (outside + bore)
-        count = max(6, math.floor(fill * math.pi * pitch / size))
-        table: dict[str, Any] = {"kind": "ball" if ball else "cylindrical", "rolling_elements": count}
-        table |= {"element_diameter": with_unit(size, LENGTH), "pitch_diameter": with_unit(pitch, LENGTH)}
-        for name in ("rolling_elements", "element_diameter"):
-            self.remarks[f"{key}.{name}"] = "assumed from bore and outer diameter"
-        if not ball:
-            width = self.model.number(part, "width", LENGTH) or size
-            table["effective_length"] = with_unit(min(0.6 * width, 1.2 * size), LENGTH)
-            self.remarks[f"{key}.effective_length"] = "assumed"
-        return table
+    def pair(self, stage: Component) -> dict[str, Any]:
+        """Table of a cylindrical stage."""
+        table: dict[str, Any] = {"name": self.name(stage), "shafts": [], "positions": []}
+        for gear, shaft in self.members[stage.id].values():
+            assert gear is not None and shaft is not None
+            table["shafts"].append(self.name(shaft))
+            table["positions"].append(self.position(shaft, self.gear_height(gear)))
+        return table | {"teeth": self._teeth(stage)}
 
-    def _ratings(self, part: Component) -> dict[str, Any]:
-        names = {"dynamic_rating": "dynamic_capacity", "static_rating": "static_capacity"}
-        names["fatigue_limit"] = "fatigue_limit_load"
-        found = {key: self.model.number(part, name, FORCE) for key, name in names.items()}
-        return {key: with_unit(value, FORCE) for key, value in found.items() if value}
+    def _teeth(self, stage: Component) -> dict[str, Any]:
+        """Tables of the teeth of a stage, without its supports, which the gearbox has."""
+        found = {key: value for key, value in self.teeth[stage.id].items() if key not in ("dynamics", "runup")}
+        for name in ("gear_1", "gear_2", "sun", "carrier", "ring"):
+            if name in found:
+                found[name] = {key: value for key, value in found[name].items() if key not in _SUPPORTS}
+        return {key: value for key, value in found.items() if value != {}}
 
-    def pair(self, stage: Component, number: int) -> dict[str, Any]:
-        gears = gears_of(self.model, stage)
-        shafts = [self.on[gear.id] for gear in gears]
-        table: dict[str, Any] = {"name": f"stage {plain_ids([stage.id])[stage.id]}"}
-        table["shafts"] = [self.name[shaft.id] for shaft in shafts]
-        table["positions"] = [self._on_shaft(gear, shaft) for gear, shaft in zip(gears, shafts, strict=True)]
-        teeth = {key: value for key, value in self.pairs[stage.id].items() if key not in ("dynamics", "runup")}
-        for name in ("gear_1", "gear_2"):
-            own = dict(teeth[name])
-            own.pop("bearing_stiffness", None)
-            teeth[name] = own
-        table["teeth"] = teeth
-        return table
+    def planetary(self, stage: Component) -> dict[str, Any]:
+        """Table of a planetary stage."""
+        members, table = self.members[stage.id], dict[str, Any]()
+        table["name"] = self.name(stage)
+        for name, (_, shaft) in members.items():
+            table[name] = CASING if shaft is None else self.name(shaft)
+        for name, (gear, shaft) in members.items():
+            if shaft is not None:
+                height = self.planet_height(stage) if gear is None else self.gear_height(gear)
+                table[f"{name}_position"] = self.position(shaft, height)
+        turned = [
+            self.model.number(mesh, _ANGLE_KEY, ANGLE)
+            for mesh, pair in self._meshes(stage)
+            if pair[1].type != "ring_gear"
+        ]
+        teeth = self._teeth(stage)
+        if turned and turned[0] is not None:
+            table["angle"] = with_unit((0.5 * math.pi - turned[0]) % math.tau, ANGLE)
+            known = [one for one in turned if one is not None]
+            if "planet_angles" in teeth["set"] and len(known) == len(turned):
+                # around -u they count the other way than around z
+                angles = sorted((turned[0] - one) % math.tau for one in known)
+                teeth["set"] = teeth["set"] | {"planet_angles": [with_unit(one, ANGLE) for one in angles]}
+        if pins := self._pins(stage):
+            table["pins"] = pins
+        if self._carrier_body(stage, ()):
+            # its mass is that of the parts of its shaft
+            teeth["carrier"] = {"mass": "0.001 kg", "inertia": "1e-6 kg m^2"}
+        return table | {"teeth": teeth}
 
-    def load(self, part: Component) -> dict[str, Any]:
-        shaft = next(shaft for shaft in self.shafts if part in self.parts[shaft.id])
-        position = self._on_shaft(part, shaft)
-        return {"name": self.name[part.id], "shaft": self.name[shaft.id], "position": position}
+    def _pins(self, stage: Component) -> dict[str, Any]:
+        """Pins of the planets, where the file has their sections and the couplings that hold them."""
+        pins = self.model.related("planet_pin", "shaft", planetary_stage=stage.id)
+        if not pins:
+            return {}
+        sections = file_pieces(self.model, pins[0], 0.0)
+        joints = [one for one in self.couplings if pins[0].id in self._ends(one)]
+        places = sorted(self.at(one, "u_coordinate_on_shaft_inner_side") for one in joints)
+        if not sections or len(places) != 2:
+            return {}
+        held = [self.model.number(one, "length", LENGTH) or 0.0 for one in joints]
+        free = places[1] - places[0] - 0.5 * sum(held)
+        outer, inner = sections[0].outer[0], sections[0].inner[0]
+        table: dict[str, Any] = {"diameter": with_unit(outer, LENGTH), "length": with_unit(0.5 * free, LENGTH)}
+        return table | ({"bore": with_unit(inner, LENGTH)} if inner else {}) if free > 0.0 else {}
 
-    def operation(self, wanted: int | None) -> dict[str, Any]:
-        """Torques, forces and speeds of all load cases."""
-        number, _ = self.model.chosen_case(wanted)
-        cases = self.model.load_cases or ({},)
-        found: list[dict[str, Any]] = []
-        output, self.extra = self._output(cases[0], unit_flow(self.model, cases[0]))
-        for place, given in enumerate(cases):
-            flow = unit_flow(self.model, given)
-            torque, force, moment = {}, {}, {}
-            for part in self.loads:
-                load = with_load_case(part, given)
-                value = self._torque(part, given, flow)
-                if value and self.name[part.id] != output:
-                    torque[self.name[part.id]] = with_unit(value, TORQUE)
-                forces = [self.model.number(load, f"force_{way}_direction", FORCE) or 0.0 for way in "vwu"]
-                if any(forces):
-                    force[self.name[part.id]] = [with_unit(one, FORCE) for one in forces]
-                moments = [self.model.number(load, f"torque_around_{way}_axis", TORQUE) or 0.0 for way in "vw"]
-                if any(moments):
-                    moment[self.name[part.id]] = [with_unit(one, TORQUE) for one in moments]
-            table: dict[str, Any] = {
-                "name": f"load case {place + 1}",
-                "torque": torque,
-                "speed": self._speed(flow, given),
+    def load_tables(self, added: Mapping[str, str]) -> list[dict[str, Any]]:
+        """Tables of the loads of the file, and of those that it lacks at the right ends of shafts."""
+        found = [
+            {
+                "name": self.name(part),
+                "shaft": self.name(shaft),
+                "position": self.position(shaft, self.load_height(part)),
             }
-            table |= {key: value for key, value in (("force", force), ("tilting_moment", moment)) if value}
-            if (share := self._share(given)) is not None:
-                table["share"] = share
-            if not torque or not table["speed"]:
-                raise NoGearbox(f"load case {place + 1} has no torque or no speed")
-            found.append(table)
-        return {"output": [output], "first": number, "load_case": found}
+            for part, shaft in self.loads
+        ]
+        for name, shaft in added.items():
+            end = self.pieces[shaft][-1].end if self.pieces[shaft] else self.start(shaft)
+            found.append({"name": name, "shaft": self.name(shaft), "position": self.position(shaft, end)})
+        return found
 
-    def _torque(self, part: Component, given, flow) -> float | None:
-        """Torque of a load [N m], from its power where that is what the file says."""
-        load = with_load_case(part, given)
-        torque = self.model.number(load, "torque_around_u_axis", TORQUE)
-        power = self.model.number(load, "power", POWER)
-        shaft = next(shaft for shaft in self.shafts if part in self.parts[shaft.id])
-        speed = flow.speed.get(shaft.id)
-        return power / speed if power is not None and speed and not torque else torque
-
-    def _output(self, given, flow) -> tuple[str, dict[str, Any] | None]:
-        """Name of the load that takes the power, and its table where the file has none.
-
-        It is the load that says no torque, else one at the end of a shaft of one gear without a load, else the last.
-        """
-        said = {part.id: self._torque(part, given, flow) for part in self.loads}
-        if not any(said.values()):
-            raise NoGearbox("no load gives a torque")
-        transmits = {part.id: (self.model.text(part, "transmits_torque") or "true") == "true" for part in self.loads}
-        silent = [id for id, torque in said.items() if not torque and transmits[id]]
-        if silent:
-            return self.name[silent[-1]], None
-        loaded = {shaft.id for shaft in self.shafts for part in self.loads if part in self.parts[shaft.id]}
-        for shaft in self.shafts:
-            if shaft.id not in loaded and [one.id for one in self.on.values()].count(shaft.id) == 1:
-                length = sum(to_si(part["length"], LENGTH) for part in self.shaft(shaft)["part"])
-                table = {"name": "output", "shaft": self.name[shaft.id], "position": with_unit(length, LENGTH)}
-                self.model.remark("load", f"the file has no load on {shaft}: its right end takes the power")
-                return "output", table
-        return self.name[self.loads[-1].id], None
-
-    def _speed(self, flow, given) -> dict[str, str]:
-        """Speed of the shaft that says it, else of the first one that is known."""
-        for shaft in self.shafts:
-            if (speed := self.model.number(with_load_case(shaft, given), "rotational_speed", SPEED)) is not None:
-                return {self.name[shaft.id]: with_unit(speed, SPEED)}
-        known = next((shaft for shaft in self.shafts if flow.speed.get(shaft.id)), None)
-        return {} if known is None else {self.name[known.id]: with_unit(flow.speed[known.id], SPEED)}
-
-    def _share(self, given) -> float | None:
-        for attributes in given.values():
-            value, unit = attributes.get("load_duration_fraction", (None, None))
-            if value is not None:
-                return float(f"{float(value) * (0.01 if unit == '%' else 1.0):.12g}")
-        return None
+    def operation(self, wanted: int | None) -> tuple[dict[str, Any], dict[str, str]]:
+        """Table of load cases, and shafts of loads that the file lacks by their names."""
+        stages = [[shaft for _, shaft in one.values()] for one in self.members.values()]
+        ends = [pair for joint in self.couplings if (pair := self._joined(joint)) is not None]
+        shafts = [[self.main[one.id] for one in pair if one is not None] for pair in ends]
+        joints, held = ([one for one in shafts if len(one) == count] for count in (2, 1))
+        groups = shaft_groups(self.shafts, stages, joints, [one for (one,) in held])
+        reader = OperationReader(
+            self.model,
+            groups,
+            self.components,
+            {self.name(part): (part, shaft) for part, shaft in self.loads},
+            {shaft: self.name(shaft) for shaft in self.shafts},
+        )
+        return reader.tables(wanted)
 
 
-_WORDS = {"shaft": "shaft", "external_load": "load", "cylindrical_gear": "gear"}
+def _side(outer: bool) -> str:
+    return f"u_coordinate_on_shaft_{'outer' if outer else 'inner'}_side"
+
+
+def _length(value: float) -> str:
+    """Length as a case has it; what is nothing but rounding is zero."""
+    return with_unit(0.0 if abs(value) < 1e-12 else value, LENGTH)
+
+
+def _extension(piece: Piece, start: float, end: float) -> Piece:
+    outer, inner = piece.at(piece.start if end <= piece.start + _EDGE else piece.end)
+    return Piece(start, end, (outer, outer), (inner, inner))

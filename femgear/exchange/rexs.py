@@ -36,6 +36,8 @@ MOST_CASES = 1000
 """Of load cases."""
 MOST_ELEMENTS = 500_000
 """Tags of an XML text, tables of a JSON text; those of whole gear units have some ten thousand."""
+MOST_ENTRIES = 1000
+"""Of an array that is kept."""
 _ENCODINGS = {
     "utf-8": "utf-8-sig",
     "us-ascii": "ascii",
@@ -50,6 +52,7 @@ _ENCODINGS = {
 _DECLARED = re.compile(rb"<\?xml\s[^>]{0,200}?\bencoding\s*=\s*[\"']([A-Za-z0-9._-]{1,40})[\"']")
 _VERSIONS = re.compile(r"(1\.[0-7]|2\.0)(\.\d+)?")
 _EXPORT = "export the gear unit again, or name another file"
+_BOOLEANS = {"true": "1", "false": "0"}
 _PLAIN = ("none", "-", "1", "")
 """Units of numbers without dimension."""
 
@@ -59,13 +62,15 @@ class Component:
     """A component of a gear unit, such as a gear or a shaft.
 
     ``id``, ``type`` and ``name`` are those of the file. ``attributes`` are texts with their unit,
-    ``{"face_width": ("50.0", "mm")}``: the unit is None where the file gives none; arrays and matrices are left out.
+    ``{"face_width": ("50.0", "mm")}``: the unit is None where the file gives none; ``vectors`` are the arrays of
+    numbers in the same way, matrices are left out.
     """
 
     id: str
     type: str
     name: str
     attributes: Mapping[str, tuple[str, str | None]]
+    vectors: Mapping[str, tuple[tuple[float, ...], str | None]] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return f"{self.type} {self.id}"
@@ -195,6 +200,20 @@ class Model:
             )
         return number
 
+    def vector(self, component: Component, attribute: str, dimension: Dimension | None = None):
+        """Read an array in SI units, None where it is not given; without a dimension plain numbers.
+
+        CaseError with file, component and attribute: no unit or one of another kind (E-UNIT).
+        """
+        values, unit = component.vectors.get(attribute, (None, None))
+        if values is None or dimension is None:
+            return values
+        try:
+            return tuple(to_si(f"{value!r} {unit or ''}", dimension) for value in values)
+        except CaseError as error:
+            error.key, error.file = f"{component}, {attribute}", self.name
+            raise
+
     def refuse(self, message: str, key: str, remedy: str = _EXPORT, limit: str | None = None) -> NoReturn:
         """Refuse what the file says of a component (E-REXS)."""
         raise CaseError(message, code="E-REXS", key=key, file=self.name, limit=limit, remedy=remedy)
@@ -287,6 +306,7 @@ def _from_json(text: str, name: str) -> dict:
         for one in _dicts(component, "attributes"):
             values = (one[key] for key in one if key not in ("id", "unit"))
             one["value"] = next((value for value in values if isinstance(value, str | int | float)), None)
+            one["vector"] = next((value for key, value in one.items() if isinstance(value, list)), None)
     return model if isinstance(model, dict) else {}
 
 
@@ -338,7 +358,11 @@ def _below(root: ElementTree.Element, group: str, tag: str) -> list[ElementTree.
 
 
 def _xml_component(element: ElementTree.Element) -> dict:
-    attributes = [{**one.attrib, "value": None if len(one) else one.text} for one in element]
+    attributes = []
+    for one in element:
+        arrays = [array for array in one if _tag(array) == "array"]
+        vector = [entry.text for entry in arrays[0]] if arrays else None
+        attributes.append({**one.attrib, "value": None if len(one) else one.text, "vector": vector})
     return {**element.attrib, "attributes": attributes}
 
 
@@ -368,7 +392,8 @@ def _model(data: dict, name: str) -> Model:
         if not id or not kind or id in components:
             wrong = "is given twice" if id in components else f"has no {'type' if id else 'id'}"
             model.refuse(f"the component {str(one.get('name', '')) or kind!a} {wrong}", f"component {id}")
-        components[id] = Component(id, kind, str(one.get("name", "")), _attributes(one, f"{kind} {id}", name))
+        attributes = _attributes(one, f"{kind} {id}", name)
+        components[id] = Component(id, kind, str(one.get("name", "")), attributes, _vectors(one))
     for relation in model.relations:
         for role, id in relation.refs:
             if id not in components:
@@ -393,6 +418,20 @@ def _attributes(table: dict, component: str, name: str) -> dict[str, tuple[str, 
         if value is not None:
             text = str(value).lower() if isinstance(value, bool) else str(value)
             found[str(one.get("id", ""))] = text, None if unit is None else str(unit)
+    return found
+
+
+def _vectors(table: dict) -> dict[str, tuple[tuple[float, ...], str | None]]:
+    """Arrays of finite numbers of a component, true as 1; what else stands in an array is left out."""
+    found = {}
+    for one in _dicts(table, "attributes"):
+        try:
+            values = tuple(float(_BOOLEANS.get(text := str(entry).lower().strip(), text)) for entry in one["vector"])
+        except (KeyError, TypeError, ValueError):
+            continue
+        if len(values) <= MOST_ENTRIES and all(map(math.isfinite, values)):
+            unit = one.get("unit")
+            found[str(one.get("id", ""))] = values, None if unit is None else str(unit)
     return found
 
 
@@ -440,7 +479,7 @@ def model_text(model: Model, program: str, version: str) -> str:
             ElementTree.SubElement(parent, "ref", id=id, role=role, hint=model.components[id].type)
     components = ElementTree.SubElement(root, "components")
     for one in model.components.values():
-        _write_component(components, one.id, one.attributes, type=one.type, name=one.name)
+        _write_component(components, one.id, one.attributes, one.vectors, type=one.type, name=one.name)
     if model.load_cases:
         spectrum = ElementTree.SubElement(root, "load_spectrum", id="1")
         for number, case in enumerate(model.load_cases, start=1):
@@ -451,7 +490,15 @@ def model_text(model: Model, program: str, version: str) -> str:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{ElementTree.tostring(root, encoding="unicode")}\n'
 
 
-def _write_component(parent: ElementTree.Element, id: str, attributes: Mapping, **more: str) -> None:
+def _write_component(
+    parent: ElementTree.Element, id: str, attributes: Mapping, vectors: Mapping | None = None, **more: str
+) -> None:
     component = ElementTree.SubElement(parent, "component", {"id": id, **more})
     for name, (value, unit) in attributes.items():
         ElementTree.SubElement(component, "attribute", id=name, unit=unit or "none").text = value
+    for name, (values, unit) in (vectors or {}).items():
+        array = ElementTree.SubElement(
+            ElementTree.SubElement(component, "attribute", id=name, unit=unit or "none"), "array"
+        )
+        for value in values:
+            ElementTree.SubElement(array, "c").text = repr(value)

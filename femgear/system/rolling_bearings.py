@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NoReturn
 
@@ -34,6 +34,7 @@ THRUST_ANGLE = math.radians(45.0)
 """Above this contact angle a bearing is a thrust bearing (ISO 281)."""
 _POINT_COEFFICIENT = math.pi * math.sqrt(2.0) / 3.0
 _STEPS, _CLOSE = 300, 1e-4
+_SLIDES = 60
 
 
 @dataclass(frozen=True)
@@ -254,6 +255,42 @@ def bearing_state(bearing: Bearing, motion: Sequence[float] | np.ndarray, *, fir
     if held.shape != (6,) or not np.isfinite(held).all():
         raise CaseError(f"motion of a bearing of shape {held.shape}", code="E-SHAPE", limit="six finite numbers")
     return _solved(bearing, held, first_angle)[1]
+
+
+def sliding_state(bearing: Bearing, motion: Sequence[float] | np.ndarray, sense: int) -> BearingState:
+    """Compute force and stiffness of a bearing of which a ring slides in its seat where it has no shoulder.
+
+    Parameters
+    ----------
+    bearing : BallBearing or RollerBearing
+    motion : (6,) array
+        As of `bearing_state`.
+    sense : {1, -1, 0}
+        Of the thrust on the inner ring that the seat takes: towards +z, -z or none.
+
+    Returns
+    -------
+    BearingState
+        Of the motion that is left where the ring slid until it carries no thrust; with ``K`` its stiffness,
+        ``K - K_z K_z^T / K_zz`` is that of the other motions. With thrust that the seat takes that of
+        `bearing_state`.
+    """
+    state = bearing_state(bearing, motion)
+    if state.stiffness[2, 2] <= 0.0 or sense * state.force[2] > 0.0:
+        return state
+    # where elements have lost contact the tangent reaches too far
+    held, reach = np.array(motion, float), 0.1 * bearing.element_diameter
+    for _ in range(_SLIDES):
+        thrust, stiffness = state.force[2], state.stiffness[2, 2]
+        if stiffness <= 0.0 or abs(thrust) <= 1e-12 * max(np.abs(state.force[:3]).max(), 1e-9):
+            break
+        held[2] += min(max(-thrust / stiffness, -reach), reach)
+        state = bearing_state(bearing, held)
+    force, full = state.force.copy(), state.stiffness
+    row = full[2]
+    reduced = full - np.outer(row, row) / row[2] if row[2] > 0.0 else full.copy()
+    reduced[2], reduced[:, 2], force[2] = 0.0, 0.0, 0.0
+    return replace(state, force=force, stiffness=reduced)
 
 
 def solve_motion(

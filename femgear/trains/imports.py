@@ -13,11 +13,11 @@ from femgear.case.teeth import flank_form
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.exchange.cylindrical_stage import pair_tables
 from femgear.exchange.gear_unit import UnitFlow, case_flows, plain_ids, stage_components, stage_in_words
-from femgear.exchange.gearbox_unit import NoGearbox, gearbox_tables
+from femgear.exchange.gearbox_unit import gearbox_tables, has_whole_shafts
 from femgear.exchange.planetary_stage import case_tables, named, stage_model
 from femgear.exchange.rexs import Component, Model
 from femgear.exchange.unit_model import unit_model
-from femgear.findings import DOUBT, NOTE
+from femgear.exchange.unit_shafts import NoGearbox
 from femgear.trains.drafts import draft_text
 from femgear.trains.reading import parse_case
 from femgear.trains.registry import train_of
@@ -43,7 +43,7 @@ class CaseDraft:
 def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case: int | None = None) -> list[CaseDraft]:
     """Write the cases of the stages of a REXS file; `Model.findings` holds what they have not.
 
-    Of one stage there is one case. Several cylindrical stages on shafts are one gearbox; of other units each stage
+    Stages on shafts are one gearbox. Where they make none, or the shafts of an only stage have no sections, each stage
     has its own case, called by its id, and the one without is the planetary stage where there is one.
 
     Parameters
@@ -61,7 +61,6 @@ def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case:
         What a stage is refused for, where it is the only one; E-CHOICE: no such stage.
     """
     stages = stage_components(model)
-    planetary = [one for one in stages if one.type == "planetary_stage"]
     if stage is not None:
         chosen = [one for one in stages if one.id == stage]
         if not chosen:
@@ -79,7 +78,7 @@ def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case:
             model.remark("--stage", f"stages that are not taken: {_listed(left)}", first=True)
         stages = chosen
     model.chosen_case(load_case)
-    if not [one for one in stages if one.type in _READ] or stages == planetary == stages[:1]:
+    if not [one for one in stages if one.type in _READ]:
         # a file without a stage is refused as one without a planetary stage
         return [CaseDraft("", _text(model, *case_tables(model, stage, load_case), stage), "the stage")]
     if len(stages) > MOST_STAGES:
@@ -104,7 +103,7 @@ def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case:
             model.remark(one.id, text, remedy=error.remedy or "", first=True)
     if not texts:
         raise refusals[0]
-    return list(_drafts(model, stages, found, texts, load_case))
+    return list(_drafts(model, stages, found, texts, load_case, alone=stage is not None))
 
 
 def _stage_tables(
@@ -153,40 +152,47 @@ def _shortened(tables: dict, key: str) -> str:
     return f"the {parts[number]['kind']} is taken to the end of the flank"
 
 
-def _drafts(model: Model, stages, found, texts, load_case: int | None) -> Iterator[CaseDraft]:
+def _drafts(model: Model, stages, found, texts, load_case: int | None, *, alone: bool) -> Iterator[CaseDraft]:
     """The case without an id in its name, then those of the stages."""
-    if len(stages) == 1:
-        yield CaseDraft("", texts[stages[0].id], stage_in_words(model, stages[0]))
-        return
     planetary = [one for one in stages if one.type == "planetary_stage" and one.id in texts]
     suffixes = {id: f"_{plain}" for id, plain in plain_ids(texts).items()}
     before = list(model.findings)
-    try:
-        pairs = {id: tables for id, (tables, _) in found.items() if tables.get("model") == "pair"}
-        yield CaseDraft("", _gearbox_text(model, pairs, load_case), "gearbox of all stages")
+    if not alone:
+        try:
+            text = _gearbox_text(model, {id: tables for id, (tables, _) in found.items()}, load_case)
+            yield CaseDraft("", text, f"gearbox of {'all stages' if len(stages) > 1 else 'the unit'}")
+            return
+        except NoGearbox as error:
+            model.findings[:] = before
+            if len(stages) > 1:
+                whole = f"no gearbox of all stages is written: {error}"
+                model.remark("", f"{whole}; each stage is a case of its own")
+    if len(stages) == 1:
+        yield CaseDraft("", texts[stages[0].id], stage_in_words(model, stages[0]))
         return
-    except NoGearbox as error:
-        model.findings[:] = before
-        whole = f"no gearbox of all stages is written: {error}"
-        severity = DOUBT if planetary else NOTE
-        model.remark("", f"{whole}; each stage is a case of its own", severity=severity)
-        if len(planetary) == 1:
-            yield CaseDraft("", texts[planetary[0].id], stage_in_words(model, planetary[0]))
+    if len(planetary) == 1:
+        yield CaseDraft("", texts[planetary[0].id], stage_in_words(model, planetary[0]))
     for one in stages:
         if one.id in texts and not (one in planetary and len(planetary) == 1):
             yield CaseDraft(suffixes[one.id], texts[one.id], stage_in_words(model, one))
 
 
-def _gearbox_text(model: Model, pairs: dict[str, dict], load_case: int | None) -> str:
-    """Text of the gearbox; NoGearbox where it makes no case."""
-    # supports of single stages and their load cases are those of the gearbox
-    model.findings[:] = [one for one in model.findings if not re.search(r"bearing_stiffness|: operation", one.key)]
-    tables, remarks = gearbox_tables(model, pairs, load_case)
+# Keys of findings on supports of single stages and on their load cases, which are those of the gearbox.
+_OF_STAGES = re.compile(r"(gear_\d|sun|carrier|ring)\.(bearing|support)_stiffness|(^|: )operation")
+
+
+def _gearbox_text(model: Model, stages: dict[str, dict], load_case: int | None) -> str:
+    """Text of the gearbox; NoGearbox where it makes no case, or of a single stage without whole shafts."""
+    model.findings[:] = [one for one in model.findings if not _OF_STAGES.search(one.key)]
+    tables, remarks = gearbox_tables(model, stages, load_case)
+    if len(stages) == 1 and not has_whole_shafts(tables):
+        raise NoGearbox("the shafts of the only stage have no sections or no bearings")
     try:
         case = parse_case(case_text.write(tables))
         train_of(case).describe_case(case)
     except FemgearError as error:
-        raise NoGearbox(f"{error.key}: {error.message}") from error
+        first = next(iter(error.problems), error)
+        raise NoGearbox(f"{first.key}: {first.message}") from error
     head = f"# Written by femgear import (REXS {model.version}). What is assumed says so."
     return "\n".join([head, case_text.write(tables, remarks)])
 

@@ -12,9 +12,11 @@ def test_a_unit_of_one_pair(tmp_path):
     box = ParallelUnit()
     del box.components[52]
     box.relations = [one for one in box.relations if 52 not in one[1].values()]
-    found, _ = drafts_of(box, tmp_path)
+    found, _ = drafts_of(box, tmp_path, stage="51")
     assert list(found) == [""]
     assert parse_case(found[""].text).operation.torque == 100.0
+    whole = parse_case(drafts_of(box, tmp_path)[0][""].text)
+    assert whole.train == "gearbox" and [one.name for one in whole.shaft] == ["shaft 10", "shaft 20"]
 
 
 def test_an_internal_pair(tmp_path):

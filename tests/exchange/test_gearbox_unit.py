@@ -4,14 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from rexs_stage import DEG, ParallelUnit
+from rexs_stage import DEG, ParallelUnit, both_units
+from rexs_units import IndustrialUnit, ThreeStageUnit
+from trains.test_imports import drafts_of
 
 from femgear.exchange.cylindrical_stage import pair_tables
 from femgear.exchange.gear_unit import case_flows, stage_components
-from femgear.exchange.gearbox_unit import NoGearbox, gearbox_tables
+from femgear.exchange.gearbox_unit import gearbox_tables
 from femgear.exchange.rexs import read_model
+from femgear.exchange.unit_shafts import NoGearbox
+from femgear.findings import DOUBT
 from femgear.trains.gearbox.deflection import solve_deflection
-from femgear.trains.reading import read_case
+from femgear.trains.gearbox.geometry import pair_sizes
+from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.reading import parse_case, read_case
 
 
 def tables_of(box, tmp_path) -> tuple[dict, dict, list]:
@@ -27,9 +33,9 @@ def tables_of(box, tmp_path) -> tuple[dict, dict, list]:
 def test_shafts_lie_where_stages_put_them(tmp_path):
     tables, _, _ = tables_of(ParallelUnit(), tmp_path)
     case = read_case(tables)
-    # 75 mm along x, then 120 mm at -90 deg: the angle of the file turns around -u
+    # 75 mm along w = y, then 120 mm at 90 deg around -u, from w to v = x
     assert [shaft.axis for shaft in case.shaft] == [
-        pytest.approx(axis, abs=1e-12) for axis in ((0.0, 0.0), (0.075, 0.0), (0.075, -0.12))
+        pytest.approx(axis, abs=1e-12) for axis in ((0.0, 0.0), (0.0, 0.075), (0.12, 0.075))
     ]
     # middles of gears: 80 and 35 mm, 85 and 100 mm from the left ends
     assert [shaft.start for shaft in case.shaft] == pytest.approx([0.0, 0.045, 0.03], abs=1e-12)
@@ -116,3 +122,87 @@ def test_units_without_sections_or_torque_make_no_gearbox(tmp_path):
     del box.components[5]["attributes"]["torque_around_u_axis"]
     with pytest.raises(NoGearbox, match="torque"):
         tables_of(box, tmp_path)
+
+
+def closed(case) -> float:
+    """Largest distance by which axes of shafts miss the centre distance of a pair."""
+    axis = {shaft.name: shaft.axis for shaft in case.shaft}
+    return max(
+        abs(math.dist(axis[pair.shafts[0]], axis[pair.shafts[1]]) - pair_sizes(pair).centre_distance)
+        for pair in case.pair
+    )
+
+
+def test_the_published_two_stage_unit(tmp_path):
+    found, findings = drafts_of(IndustrialUnit(), tmp_path)
+    case = parse_case(found[""].text)
+    assert [one.share for one in case.operation.load_case] == [0.2, 0.3, 0.35, 0.15]
+    for load_case, (speed, torque) in zip(
+        case.operation.load_case, ((543, 567), (3456, 345), (1234, 456), (789, 789)), strict=True
+    ):
+        flow = gearbox_flow(case, load_case)
+        turns = [flow.speed[f"shaft {id}"] * 30.0 / math.pi for id in (12, 13, 14)]
+        assert turns == pytest.approx([speed, -speed * 9 / 17, speed * 207 / 578], rel=1e-12)
+        assert flow.port_torque["load 41"] == pytest.approx(-torque * 578 / 207, rel=1e-11)
+        assert flow.stage_torque["stage 19"]["shaft 13"] == pytest.approx(-torque * 17 / 9, rel=1e-11)
+    first = gearbox_flow(case, case.operation.load_case[0])
+    assert [*first.mesh_frequency.values()] == pytest.approx([244.35, 110.19706], rel=1e-6)
+    assert closed(case) < 1e-9
+    # the input shaft ends inside the hollow output shaft, in a needle bearing
+    needle = next(one for one in case.bearing if one.outer_shaft is not None)
+    assert (needle.shaft, needle.outer_shaft) == ("shaft 12", "shaft 14")
+    # forces across the plane of the axes stay across it
+    assert case.operation.load_case[0].force["load 42"] == (456.0, 0.0, 0.0)
+    assert [shaft.axis for shaft in case.shaft] == [(0.0, 0.0), (0.0, -0.19), (0.0, 0.0)]
+    doubts = " ".join(one.text for one in findings if one.severity == DOUBT)
+    assert "tip diameter 1 mm" in doubts
+    assert "bearings 36, 37, 38: 1e+12 N m/rad against tilt" in doubts
+    assert "neither stiffness nor sizes" in doubts
+
+
+def test_the_published_three_stage_unit(tmp_path):
+    found, findings = drafts_of(ThreeStageUnit(), tmp_path)
+    case = parse_case(found[""].text)
+    flow = gearbox_flow(case)
+    ratio = 67 / 23 * 76 / 13 * 87 / 14
+    assert abs(flow.port_torque["load 68"]) == pytest.approx(4.724562306435156 * ratio, rel=1e-11)
+    assert abs(flow.port_torque["load 68"]) == pytest.approx(500.0, rel=1e-6)
+    assert [*flow.mesh_frequency.values()] == pytest.approx([536.6667, 104.1294, 19.18172], rel=1e-5)
+    assert closed(case) < 1e-6
+    start = {shaft.name: shaft.start for shaft in case.shaft}
+    middles = [
+        [start[shaft] + place for shaft, place in zip(pair.shafts, pair.positions, strict=True)] for pair in case.pair
+    ]
+    # mid planes of two stages are 2.5 mm apart
+    assert [b - a for a, b in middles] == pytest.approx([2.5e-3, 2.5e-3, 0.0], abs=1e-9)
+    assert [one.axial_sense for one in case.bearing] == [
+        None, "none", "negative", "positive", "negative", None, "positive", "none", None,
+    ]  # fmt: skip
+    assert all(one.estimated and one.dynamic_rating and one.static_rating for one in case.bearing)
+    assert any("bearings 20, 21, 32, 33, 49, 50, 51, 66, 67: rigid in the file" in one.text for one in findings)
+
+
+@pytest.mark.parametrize("unit", [IndustrialUnit, ThreeStageUnit])
+def test_bearings_of_published_units_balance_their_loads(tmp_path, unit):
+    tables = parse_case(drafts_of(unit(), tmp_path)[0][""].text)
+    case = tables.model_copy(update={"deflection": tables.deflection.model_copy(update={"contact": False})})
+    state = solve_deflection(case)
+    given = np.zeros(3)
+    for forces in case.load_case.force.values():
+        given += np.asarray(forces)
+    inside = [number for number, one in enumerate(case.bearing) if one.outer_shaft is None]
+    size = np.abs(state.bearing_force).max()
+    assert state.bearing_force[inside, :3].sum(axis=0) == pytest.approx(-given, abs=1e-9 * size)
+
+
+def test_a_planetary_stage_and_two_parallel_ones_are_one_gearbox(tmp_path):
+    found, findings = drafts_of(both_units(), tmp_path)
+    case = parse_case(found[""].text)
+    (stage,) = case.planetary
+    assert (stage.sun, stage.carrier, stage.ring) == ("shaft 34", "shaft 4", "casing")
+    # two trains that nothing joins: two speeds, two outputs
+    flow = gearbox_flow(case)
+    assert flow.speed["shaft 4"] == pytest.approx(1500.0 * 17 / 78 * math.pi / 30.0)
+    assert sorted(flow.port_torque.values())[0] == pytest.approx(-1591.5494309 * 78 / 17)
+    assert len(case.operation.output) == 2 and len(case.operation.load_case[0].speed) == 2
+    assert any("shaft 4 has no sections" in one.text for one in findings)

@@ -14,6 +14,7 @@ from femgear.system.rolling_bearings import (
     RollerBearing,
     bearing_state,
     point_contact,
+    sliding_state,
     solve_motion,
 )
 
@@ -310,3 +311,23 @@ def test_a_state_takes_less_than_a_millisecond():
         for _ in range(50):
             bearing_state(bearing, MOTIONS[0])
         assert (time.process_time() - start) / 50 < 1e-3
+
+
+@pytest.mark.parametrize("sense", [1, -1, 0])
+def test_a_sliding_ring_carries_no_thrust_and_its_stiffness_is_the_derivative(sense):
+    motion = np.array([12e-6, -3e-6, -20e-6 if sense != -1 else 20e-6, 2e-4, -1e-4, 0.0])
+    state = sliding_state(DEEP, motion, sense)
+    assert abs(state.force[2]) == 0.0
+    assert np.abs(bearing_state(DEEP, state.motion).force[2]) < 1e-9 * np.abs(state.force).max()
+    assert state.stiffness == pytest.approx(state.stiffness.T, rel=1e-9, abs=1e-6)
+    step = 1e-9
+    for k in range(5):
+        ends = [sliding_state(DEEP, motion + sign * step * np.eye(6)[k], sense).force for sign in (1, -1)]
+        scale = np.abs(state.stiffness).max()
+        assert (ends[0] - ends[1]) / (2 * step) == pytest.approx(state.stiffness[:, k], abs=2e-5 * scale)
+
+
+def test_a_ring_at_its_shoulder_carries_thrust_one_way():
+    pushed = np.array([5e-6, 0.0, 60e-6, 0.0, 0.0, 0.0])
+    assert sliding_state(DEEP, pushed, 1).force == pytest.approx(bearing_state(DEEP, pushed).force, rel=1e-12)
+    assert sliding_state(DEEP, pushed, -1).force[2] == 0.0

@@ -170,8 +170,9 @@ class BoxBearingSection(SeatSection):
 
     Stiffnesses may be ``"rigid"``; those left out are zero. A bearing of a ``kind`` has rolling elements, whose
     stiffness follows the load; ``contact_angle`` above zero takes thrust on the shaft towards +z, below zero
-    towards -z. ``clearance`` is the radial play, ``preload`` the axial approach of the rings. The ratings are those
-    of the catalogue.
+    towards -z. With an ``axial_sense`` it takes thrust on the shaft that way alone, with "none" of it nothing: a ring
+    slides in its seat. ``clearance`` is the radial play, ``preload`` the axial approach of the rings. The ratings are
+    those of the catalogue.
     """
 
     name: Name | None = None
@@ -179,7 +180,7 @@ class BoxBearingSection(SeatSection):
     outer_position: Along | None = None
     radial: Lateral | None = None
     axial: Lateral | None = None
-    axial_sense: Literal["positive", "negative"] | None = None
+    axial_sense: Literal["positive", "negative", "none"] | None = None
     tilt: Turning | None = None
     torsional: Turning | None = None
     kind: Literal["ball", "cylindrical", "needle", "tapered", "spherical"] | None = None

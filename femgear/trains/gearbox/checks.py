@@ -194,6 +194,15 @@ def _bearings(case: GearboxCase) -> Iterator[CaseError]:
         elif bearing.kind is not None:
             wrong = list(_geometry(bearing, key))
             yield from wrong or _refused(bearing, key)
+        elif bearing.axial_sense == "none":
+            yield CaseError(
+                "springs that take no thrust have no axial stiffness",
+                code="E-CHOICE",
+                key=f"{key}.axial_sense",
+                value="none",
+                limit="positive or negative, of a kind also none",
+                remedy="leave axial and axial_sense out",
+            )
         if bearing.outer_shaft is not None:
             yield from _ring_places(case, bearing, key)
 

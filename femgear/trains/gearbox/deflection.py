@@ -17,7 +17,7 @@ import numpy as np
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.assembly import GROUND, MOTIONS, Assembly, StationSprings
 from femgear.system.bearing_life import basic_rating_life, reference_rating_life
-from femgear.system.rolling_bearings import BearingState, bearing_state
+from femgear.system.rolling_bearings import BearingState, bearing_state, sliding_state
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.contact import StageContact, stage_contact
 from femgear.trains.gearbox.geometry import rolling_bearing
@@ -107,7 +107,10 @@ class BearingLaw:
         """State of the rolling bearing at a motion (6,) [m, rad]; None of springs."""
         if self.section.kind is None:
             return None
-        return bearing_state(rolling_bearing(self.section), self.factor * motion)
+        bearing, held = rolling_bearing(self.section), self.factor * motion
+        if (sense := self.section.axial_sense) is None:
+            return bearing_state(bearing, held)
+        return sliding_state(bearing, held, {"positive": 1, "negative": -1}.get(sense, 0))
 
     def force(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Force (6,) that holds a motion, and its derivative (6, 6) [N, N m]."""
@@ -126,7 +129,7 @@ class BearingLaw:
         if self.section.kind is None:
             return np.array([0.0, 0.0, _GUESS, 0.0, 0.0, 0.0])
         lever = 0.25 * (self.section.pitch_diameter or 0.0)
-        thrust = self.section.kind in ("ball", "tapered", "spherical")
+        thrust = self.section.kind in ("ball", "tapered", "spherical") and self.section.axial_sense != "none"
         tilt = 0.0 if self.section.kind == "spherical" else lever**2
         return _GUESS * np.array([1.0, 1.0, float(thrust), tilt, tilt, 0.0])
 
