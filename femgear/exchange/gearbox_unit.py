@@ -297,6 +297,9 @@ class _Unit:
                 (first, one), (second, other) = members["gear_1"], members["gear_2"]
                 assert first is not None and second is not None and one is not None and other is not None
                 angle = self.model.number(stage, _ANGLE_KEY, ANGLE) or 0.0
+                # the angle leads from gear 1 of the file, which may be the internal one, that is gear 2 here
+                if second in self.model.related("stage", "gear_1", stage=stage.id):
+                    angle += math.pi
                 yield one, other, stage_way(self._distance(stage), angle, self.at(first) - self.at(second))
                 continue
             sun, shaft = members["sun"]

@@ -42,6 +42,23 @@ def test_shafts_lie_where_stages_put_them(tmp_path):
     assert [shaft.length for shaft in case.shaft] == pytest.approx([0.16, 0.12, 0.2])
 
 
+def test_internal_pairs_lie_alike_whichever_gear_is_named_first(tmp_path):
+    box = ParallelUnit().set(44, number_of_teeth=(60, "none")).set(52, center_distance=(60.0, "mm"))
+    box.components[44]["type"] = "ring_gear"
+    box.components[31]["attributes"] |= {f"outer_diameter_{end}": (220.0, "mm") for end in ("begin", "end")}
+    for flank in (1044, 2044):
+        box = box.set(flank, addendum_coefficient_basic_profile=(0.8, "none"))
+    ring_first = box.set(52, rotating_angle_around_neg_u_axis=(270.0, DEG))
+    ring_first.relations = [
+        (kind, roles | {"gear_1": 44, "gear_2": 43} if roles.get("stage") == 52 else roles)
+        for kind, roles in ring_first.relations
+    ]
+    for unit in (box, ring_first):
+        shafts = read_case(tables_of(unit, tmp_path)[0]).shaft
+        # 60 mm at 90 deg around -u, from w to v = x
+        assert shafts[2].axis == pytest.approx((0.06, 0.075), abs=1e-12)
+
+
 def test_in_format_1_0_places_of_gears_are_their_left_faces(tmp_path):
     box = ParallelUnit()
     box.version = "1.0"
