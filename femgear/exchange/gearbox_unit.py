@@ -7,6 +7,8 @@ what results hang on is told first.
 from __future__ import annotations
 
 import math
+import re
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -34,8 +36,9 @@ from femgear.findings import NOTE
 
 CASING = "casing"
 _ANGLE_KEY = "rotating_angle_around_neg_u_axis"
+# Names of parts that a case can have.
+_NAME = re.compile(r"(?=.{1,40}$)[A-Za-z][A-Za-z0-9_.-]*( [A-Za-z0-9_.-]+)*")
 _PARTS = ("assembly", "ordered_assembly")
-_WORDS = {"shaft": "shaft", "external_load": "load"}
 _SUPPORT = "support of "
 _SUPPORTS = ("bearing_stiffness", "support_stiffness")
 # Parts beyond the end of a shaft by more make it longer, sections longer than this one [m].
@@ -120,7 +123,7 @@ class _Unit:
     def __init__(self, model: Model, stages: Sequence[Component], tables: Mapping[str, dict[str, Any]]):
         self.model, self.stages, self.teeth = model, stages, tables
         self.remarks: dict[str, str] = {}
-        self.plain = plain_ids([part.id for part in model.components.values()])
+        self.names = _part_names(model)
         self.couplings = [
             part for part in model.components.values() if part.type.endswith("coupling") and engaged(model, part)
         ]
@@ -138,7 +141,7 @@ class _Unit:
         self.bearings = [
             (part, *sides)
             for part in model.components.values()
-            if is_bearing(part) and part.type != "rolling_bearing_row" and (sides := self._sides(part)) is not None
+            if _is_whole(part) and (sides := self._sides(part)) is not None
         ]
         self.loads = [
             (part, shaft)
@@ -210,14 +213,24 @@ class _Unit:
         ]
         return {None if one.type == "gear_casing" else one.id for one in sides if one.type in ("gear_casing", "shaft")}
 
+    def _inside(self) -> set[str]:
+        """Ids of the shafts and pins of planets, which are no shafts of the gearbox."""
+        return {
+            one.id
+            for stage in self.stages
+            for kind in ("planet_shaft", "planet_pin")
+            for one in self.model.related(kind, "shaft", planetary_stage=stage.id)
+        }
+
     def _add_struts(self) -> None:
         """Count shafts that several couplings join with the parts of one carrier, and nothing else, to it."""
+        inside = self._inside()
         for members in self.members.values():
             carrier = members.get("carrier", (None, None))[1]
             joined: dict[str, int] = {}
             for ends in map(self._ends, self.couplings):
                 if carrier is not None and {self.main.get(one or "") for one in ends} == {carrier, None}:
-                    for one in ends - self.main.keys() - {None}:
+                    for one in ends - self.main.keys() - inside - {None}:
                         joined[one or ""] = joined.get(one or "", 0) + 1
             for one, count in joined.items():
                 if count > 1 and carrier is not None and self._carries(one):
@@ -226,13 +239,7 @@ class _Unit:
 
     def _add_coupled(self) -> None:
         """Add shafts that couplings join with those of stages, where anything is on them."""
-        roles = [("planet_shaft", "shaft"), ("planet_pin", "shaft")]
-        inside = {
-            one.id
-            for stage in self.stages
-            for kind, role in roles
-            for one in self.model.related(kind, role, planetary_stage=stage.id)
-        }
+        inside = self._inside()
         grown = True
         while grown:
             grown = False
@@ -395,35 +402,40 @@ class _Unit:
         assert sun is not None
         return self.gear_height(sun)
 
-    def _carrier_body(self, stage: Component, known: Sequence[Piece]) -> list[Piece]:
-        """Side plates of a carrier, and a tube in place of the struts between them where its shafts have none."""
-        model = self.model
-        carriers = [one for one in model.related(_PARTS, "part", assembly=stage.id) if one.type == "planet_carrier"]
-        plates = []
-        for carrier in carriers:
-            for one in model.related(_PARTS, "part", assembly=carrier.id):
+    def _carrier_parts(self, stage: Component, kind: str) -> list[Component]:
+        return [one for one in self.model.related(_PARTS, "part", assembly=stage.id) if one.type == kind]
+
+    def _side_plates(self, stage: Component) -> list[Piece]:
+        """Side plates of a carrier from left to right, where the file has their sizes and places."""
+        model, plates = self.model, []
+        for carrier in self._carrier_parts(stage, "planet_carrier"):
+            for one in self._carrier_parts(carrier, "side_plate"):
                 length, outer = model.number(one, "length", LENGTH), model.number(one, "outer_diameter", LENGTH)
                 place = model.vector(one, "support_vector", LENGTH)
-                if one.type == "side_plate" and length and outer and place:
+                if length and outer and place:
                     bore = model.number(one, "inner_diameter", LENGTH) or 0.0
                     plates.append(Piece(place[0], place[0] + length, (outer, outer), (bore, bore)))
-        plates.sort(key=lambda one: one.start)
+        return sorted(plates, key=lambda one: one.start)
+
+    def _carrier_body(self, stage: Component, known: Sequence[Piece]) -> list[Piece]:
+        """Side plates of a carrier, and a tube in place of the struts between them where its shafts have none."""
+        plates = self._side_plates(stage)
         if len(plates) == 2 and not any(one.start < plates[1].start and one.end > plates[0].end for one in known):
-            bores = [model.number(one, "strut_inner_diameter", LENGTH) for one in carriers]
+            carriers = self._carrier_parts(stage, "planet_carrier")
+            bores = [self.model.number(one, "strut_inner_diameter", LENGTH) for one in carriers]
             outer = min(one.outer[0] for one in plates)
             bore = next((one for one in bores if one), 0.5 * outer)
             plates.insert(1, Piece(plates[0].end, plates[1].start, (outer, outer), (bore, bore)))
             text = f"the struts of the carrier of {stage} are taken as a tube: stiffer and heavier than they are"
-            model.remark(f"{stage.id}: carrier", text, severity=NOTE)
+            self.model.remark(f"{stage.id}: carrier", text, severity=NOTE)
         return plates
 
     # tables
 
     def name(self, part: Component | str) -> str:
-        """Name of a part in the case."""
+        """Name of a part in the case: its own where that is a name that nothing else has, else kind and id."""
         one = self.model.components[part] if isinstance(part, str) else part
-        word = "bearing" if is_bearing(one) else "coupling" if one.type.endswith("coupling") else "stage"
-        return f"{_WORDS.get(one.type, word)} {self.plain[one.id]}"
+        return self.names[one.id]
 
     def start(self, shaft: str) -> float:
         """Left end of a shaft along z [m]; of a rigid body the middle of its first part."""
@@ -576,7 +588,7 @@ class _Unit:
                 teeth["set"] = teeth["set"] | {"planet_angles": [with_unit(one, ANGLE) for one in angles]}
         if pins := self._pins(stage):
             table["pins"] = pins
-        if self._carrier_body(stage, ()):
+        if self._side_plates(stage):
             # its mass is that of the parts of its shaft
             teeth["carrier"] = {"mass": "0.001 kg", "inertia": "1e-6 kg m^2"}
         return table | {"teeth": teeth}
@@ -627,6 +639,33 @@ class _Unit:
             {shaft: self.name(shaft) for shaft in self.shafts},
         )
         return reader.tables(wanted)
+
+
+def _part_names(model: Model) -> dict[str, str]:
+    """Names of all parts in a case: their own where a case can have it and no other part has, else kind and id."""
+    kinds = {"shaft": "shaft", "external_load": "load"}
+    parts = [
+        part
+        for part in model.components.values()
+        if part.type in kinds or part.type.endswith(("coupling", "_stage")) or _is_whole(part)
+    ]
+    plain, count = plain_ids([part.id for part in model.components.values()]), Counter(part.name for part in parts)
+    own = {
+        part.id: part.name
+        for part in parts
+        if count[part.name] == 1 and part.name != CASING and _NAME.fullmatch(part.name)
+    }
+    found = {}
+    for part in parts:
+        word = "bearing" if _is_whole(part) else "coupling" if part.type.endswith("coupling") else "stage"
+        found[part.id] = f"{kinds.get(part.type, word)} {plain[part.id]}"
+    made = {name for id, name in found.items() if id not in own}
+    return found | {id: name for id, name in own.items() if name not in made}
+
+
+def _is_whole(part: Component) -> bool:
+    """Whether a part is a bearing, and none of its rows."""
+    return is_bearing(part) and part.type != "rolling_bearing_row"
 
 
 def _side(outer: bool) -> str:

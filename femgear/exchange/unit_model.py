@@ -14,7 +14,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import SPEED
 from femgear.errors import CaseError
 from femgear.exchange.planetary_stage import ModelWriter, add_gear, add_planets, rexs_attribute
-from femgear.exchange.rexs import Component, Model
+from femgear.exchange.rexs import Model
 from femgear.findings import NOTE
 
 _CASING = "casing"
@@ -104,7 +104,18 @@ class _UnitWriter:
         """Give a component more attributes."""
         part = self.w.components[id]
         given = {key: value for key, value in attributes.items() if value is not None}
-        self.w.components[id] = Component(part.id, part.type, part.name, {**part.attributes, **given})
+        self.w.components[id] = replace(part, attributes={**part.attributes, **given})
+
+    def put_at(self, id: str, place: tuple[float, ...]) -> None:
+        """Give a component its place (u, v, w) in the unit [m], and axes along those of the unit."""
+        vectors = {
+            "u_axis_vector": ((1.0, 0.0, 0.0), "mm"),
+            "w_axis_vector": ((0.0, 0.0, 1.0), "mm"),
+            "support_vector": (tuple(float(f"{1e3 * one:.12g}") for one in place), "mm"),
+        }
+        reference = {"reference_component_for_position": (self.unit, "none")}
+        part = self.w.components[id]
+        self.w.components[id] = replace(part, attributes={**part.attributes, **reference}, vectors=vectors)
 
     def add_on(self, shaft: str, type: str, name: str, position: float | None, **more: tuple[str, str] | None) -> str:
         """Add a part of a shaft at a position [m]; its id."""
@@ -116,6 +127,7 @@ class _UnitWriter:
         """Add a shaft with its sections and its material."""
         a = rexs_attribute
         self.shafts[shaft.name] = id = self.w.add("shaft", shaft.name)
+        self.put_at(id, (shaft.start, *shaft.axis))
         self.w.relate("assembly", assembly=self.unit, part=id)
         for place, part in zip(shaft.places, shaft.part, strict=False):
             self.add_on(
@@ -293,7 +305,43 @@ class _UnitWriter:
         }
         add_planets(self.w, case, self.model, id, (central[0], central[1]), turned, bearing)
         if stage.pins is not None:
-            self.model.remark(f"{key}.pins", "pins and wind-up of the carrier are left out: they come back rigid")
+            self._pins(stage, id, key)
+
+    def _pins(self, stage: Any, id: str, key: str) -> None:
+        """Give the pins of a set held in two cheeks their sections, and couplings with the carrier at both ends."""
+        pins, a = stage.pins, rexs_attribute
+        if pins.wind_up_stiffness is not None:
+            self.model.remark(f"{key}.pins", "REXS has no wind-up of the carrier: left out")
+        carrier = self.shafts.get(stage.carrier)
+        if pins.cheeks != 2 or carrier is None:
+            self.model.remark(f"{key}.pins", "pins that one cheek holds are left out: they come back rigid")
+            return
+        shafts = [
+            one
+            for rel in self.w.relations
+            if rel.type == "planet_pin"
+            for one in rel.of("shaft")
+            if id in rel.of("planetary_stage")
+        ]
+        for pin in shafts:
+            section = self.w.add(
+                "shaft_section",
+                "",
+                u_coordinate_on_shaft=a(0.0, "mm"),
+                length=a(2.0 * pins.length, "mm"),
+                **{f"outer_diameter_{end}": a(pins.diameter, "mm") for end in ("begin", "end")},
+                **{f"inner_diameter_{end}": a(pins.bore, "mm") for end in ("begin", "end")},
+            )
+            self.w.relate("assembly", assembly=pin, part=section)
+            middle = stage.carrier_position or 0.0
+            for side in (0.0, 2.0 * pins.length):
+                places = {"inner": side, "outer": middle + side - pins.length}
+                joint = self.w.add(
+                    "coupling",
+                    "",
+                    **{f"u_coordinate_on_shaft_{end}_side": a(place, "mm") for end, place in places.items()},
+                )
+                self.w.relate("side", assembly=joint, inner_part=pin, outer_part=carrier)
 
     def load(self, load: Any) -> str:
         """Add the place of a load; its id."""

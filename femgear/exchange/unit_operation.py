@@ -163,7 +163,7 @@ class OperationReader:
             loaded = {self.loads[name][1] for name in own if self._transmits(name)}
             for shaft in group.ends:
                 if len(taking) < group.freedom and shaft not in loaded:
-                    name = f"output{f' {len(added) + 1}' if added else ''}"
+                    name = self._new_name(added)
                     added[name] = shaft
                     taking.append(name)
                     self.model.remark("load", f"the file has no load on {self.names[shaft]}: its end takes the power")
@@ -173,6 +173,12 @@ class OperationReader:
                 raise NoGearbox(f"{group.freedom} loads have to take the power, {len(taking)} are there")
             outputs += taking
         return outputs, added
+
+    def _new_name(self, added: Mapping[str, str]) -> str:
+        """Name of a load that the file lacks, which nothing else has."""
+        taken = {*added, *self.loads, *self.names.values()}
+        names = ("output", *(f"output {number}" for number in range(2, 10_000)))
+        return next(name for name in names if name not in taken)
 
     def _transmits(self, name: str) -> bool:
         return (self.model.text(self.loads[name][0], "transmits_torque") or "true") == "true"

@@ -159,7 +159,7 @@ def _drafts(model: Model, stages, found, texts, load_case: int | None, *, alone:
     before = list(model.findings)
     if not alone:
         try:
-            text = _gearbox_text(model, {id: tables for id, (tables, _) in found.items()}, load_case)
+            text = _gearbox_text(model, found, load_case)
             yield CaseDraft("", text, f"gearbox of {'all stages' if len(stages) > 1 else 'the unit'}")
             return
         except NoGearbox as error:
@@ -181,10 +181,10 @@ def _drafts(model: Model, stages, found, texts, load_case: int | None, *, alone:
 _OF_STAGES = re.compile(r"(gear_\d|sun|carrier|ring)\.(bearing|support)_stiffness|(^|: )operation")
 
 
-def _gearbox_text(model: Model, stages: dict[str, dict], load_case: int | None) -> str:
+def _gearbox_text(model: Model, stages: dict[str, tuple[dict, dict]], load_case: int | None) -> str:
     """Text of the gearbox; NoGearbox where it makes no case, or of a single stage without whole shafts."""
     model.findings[:] = [one for one in model.findings if not _OF_STAGES.search(one.key)]
-    tables, remarks = gearbox_tables(model, stages, load_case)
+    tables, remarks = gearbox_tables(model, {id: one for id, (one, _) in stages.items()}, load_case)
     if len(stages) == 1 and not has_whole_shafts(tables):
         raise NoGearbox("the shafts of the only stage have no sections or no bearings")
     try:
@@ -193,6 +193,10 @@ def _gearbox_text(model: Model, stages: dict[str, dict], load_case: int | None) 
     except FemgearError as error:
         first = next(iter(error.problems), error)
         raise NoGearbox(f"{first.key}: {first.message}") from error
+    for kind, wanted in (("pair", "cylindrical_stage"), ("planetary", "planetary_stage")):
+        own = [one.id for one in stage_components(model) if one.type == wanted]
+        for number, id in enumerate(own):
+            remarks |= {f"{kind}[{number}].teeth.{key}": text for key, text in stages[id][1].items()}
     head = f"# Written by femgear import (REXS {model.version}). What is assumed says so."
     return "\n".join([head, case_text.write(tables, remarks)])
 

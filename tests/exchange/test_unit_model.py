@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 from rexs_stage import ParallelUnit
+from rexs_units import IndustrialUnit, ThreeStageUnit
 
 from femgear import cli
 from femgear.case import text as case_text
@@ -107,7 +108,7 @@ def test_an_axle_with_a_planetary_set_is_written_whole(tmp_path):
         "cylindrical_stage": 1 + 6,
         "ring_gear": 1,
         "external_load": 2,
-        "coupling": 1,
+        "coupling": 1 + 2 * 3,
     }
     assert {kind: len(of_type(model, kind)) for kind in counts} == counts
     ball = of_type(model, "rolling_element")[0]
@@ -116,7 +117,7 @@ def test_an_axle_with_a_planetary_set_is_written_whole(tmp_path):
     (carrier,) = model.related("planet_carrier_shaft", "shaft", planetary_stage=planetary.id)
     assert carrier.name == "output"
     told = " ".join(f"{one.key} {one.text}" for one in findings)
-    assert "mass[0]" in told and "pins" in told
+    assert "mass[0]" in told and "pins" not in told
 
 
 def test_stages_without_teeth_are_refused():
@@ -155,3 +156,44 @@ def test_bearings_keep_their_geometry(tmp_path):
     assert got["raceway_radius_of_inner_ring"] == pytest.approx(0.515 * 9.5)
     assert float(bearing.attributes["radial_bearing_clearance"][0]) == pytest.approx(10.0)
     assert float(bearing.attributes["preload_distance"][0]) == pytest.approx(2.0)
+
+
+def _same(one, other, where: str = "") -> None:
+    """Both values are equal, numbers to rounding."""
+    if isinstance(one, dict):
+        assert one.keys() == other.keys(), where
+        for key in one:
+            _same(one[key], other[key], f"{where}.{key}")
+    elif isinstance(one, list | tuple):
+        assert len(one) == len(other), where
+        for number, pair in enumerate(zip(one, other, strict=True)):
+            _same(*pair, f"{where}[{number}]")
+    elif isinstance(one, float) and math.isfinite(one):
+        assert one == pytest.approx(other, rel=1e-9, abs=1e-12), where
+    else:
+        assert one == other, where
+
+
+@pytest.mark.parametrize("unit", ["e_axle", IndustrialUnit, ThreeStageUnit])
+def test_what_is_written_is_read_again(unit, tmp_path):
+    """Shafts, bearings, places of stages, pins, loads and load cases of an axle and of two published units."""
+    if isinstance(unit, str):
+        case = read_case(CASES / f"{unit}.toml")
+    else:
+        case = parse_case(case_drafts(read_model(unit().write(tmp_path / "unit.rexs")), "unit.toml")[0].text)
+    back = parse_case(case_drafts(written(case, tmp_path)[0], "unit.toml")[0].text)
+    assert [case.material_of(shaft) for shaft in case.shaft] == [back.material_of(shaft) for shaft in back.shaft]
+    # REXS cannot say what is estimated, and writes the bearing of a planet at its gear
+    left_out = {"shaft": {"material"}, "bearing": {"estimated"}, "pair": {"teeth"}, "planetary": {"teeth", "planet"}}
+    for kind in ("shaft", "bearing", "coupling", "pair", "planetary", "load"):
+        for one, other in zip(getattr(case, kind), getattr(back, kind), strict=True):
+            without = left_out.get(kind, set())
+            _same(one.model_dump(exclude=without), other.model_dump(exclude=without), kind)
+    for one, other in zip(case.operation.load_case, back.operation.load_case, strict=True):
+        _same(one.model_dump(exclude={"name"}), other.model_dump(exclude={"name"}), one.name)
+    assert case.operation.output == back.operation.output
+    for stage, same in zip((*case.pair, *case.planetary), (*back.pair, *back.planetary), strict=True):
+        first, second = (planetary_set(parse_case(case_text.write(one.teeth))) for one in (stage, same))
+        for gear, other in zip(first.gears, second.gears, strict=True):
+            for key in ("teeth", "module", "profile_shift", "tip_radius", "root_radius", "rim_radius", "face_width"):
+                assert getattr(gear, key) == pytest.approx(getattr(other, key), rel=1e-9, abs=1e-12), key
