@@ -19,6 +19,7 @@ from femgear.trains.gearbox.results import (
     deflection_warnings,
     describe_deflection,
     describe_gearbox_modes,
+    gearbox_verdict,
     gearbox_warnings,
 )
 
@@ -115,4 +116,5 @@ GEARBOX = Train(
     describe=describe_gearbox,
     warnings=gearbox_warnings,
     figures=FiguresOf("femgear.trains.gearbox.figures:FIGURES"),
+    verdict=gearbox_verdict,
 )

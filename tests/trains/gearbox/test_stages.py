@@ -6,7 +6,7 @@ from small_gearbox import pair_tables
 
 from femgear.run import run_case
 from femgear.storage.results import run_folder
-from femgear.trains.gearbox.results import describe_deflection, describe_gearbox_modes
+from femgear.trains.gearbox.results import describe_deflection, describe_gearbox_modes, gearbox_verdict
 from femgear.trains.gearbox.stages import describe_gearbox
 from femgear.trains.reading import open_results, read_case
 
@@ -57,3 +57,13 @@ def test_tables_tell_meshes_bearings_and_modes(results):
 def test_pictures_are_there(results):
     names = {path.name for path in results.folder.iterdir()}
     assert {"deflected_shafts.png", "load_patterns.png", "campbell.png", "mode_energy.png", "report.html"} <= names
+
+
+def test_the_verdict_names_the_worst_of_all_load_cases(results):
+    (verdict,) = gearbox_verdict(results)
+    rows = dict(verdict.rows)
+    misaligned = results.deflection["mesh_misalignment"].values
+    worst = "full" if abs(misaligned[0, 0]) > abs(misaligned[1, 0]) else "back"
+    assert rows["largest misalignment over the width"].endswith(f"stage, {worst}")
+    assert f"{np.nanmax(results.deflection['face_load_factor'].values):.3f}" in rows["largest face load factor K_Hβ"]
+    assert "stage mesh" in rows["mesh line nearest to a mode"]
