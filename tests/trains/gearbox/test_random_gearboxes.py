@@ -1,0 +1,162 @@
+"""What must hold for any valid gearbox: balance, power, and the same answer however it is put down.
+
+``pytest tests/trains/gearbox/test_random_gearboxes.py -m "" -k seed117`` repeats one gearbox, that of
+``random_gearbox(117)``.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from random_gearboxes import SYMMETRY, mirrored_across, mirrored_along, random_gearbox, renamed, shifted, turned
+
+from femgear.solvers.linear.modal import solve_modes
+from femgear.system.assembly import GROUND
+from femgear.trains.gearbox.case_file import CASING
+from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.model import bearing_motions, bearing_places
+from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.power import port_shafts
+from femgear.trains.reading import read_case
+
+QUICK, ALL = 24, 1000
+BALANCED, ALIKE = 1e-8, 1e-7
+MODES = 30
+IMAGES = ("turned", "shifted", "mirrored across", "mirrored along", "renamed")
+
+
+def seeds(count: int) -> list:
+    return [pytest.param(seed, id=f"seed{seed}") for seed in range(count)]
+
+
+def solved(tables) -> Deflection:
+    return solve_deflection(read_case(tables))
+
+
+def moments(points: np.ndarray, forces: np.ndarray) -> np.ndarray:
+    """Moments about the origin of forces at points."""
+    return np.cross(points, forces)
+
+
+def outside(found: Deflection) -> np.ndarray:
+    """Wrenches (w, 6) about the origin of all that acts from outside: loads, weight, casing, held shafts."""
+    model, assembly = found.model, found.model.assembly
+    load = model.load.reshape(-1, 6)
+    places = np.asarray(assembly.places)
+    wrenches = [np.hstack([load[:, :3], load[:, 3:] + moments(places, load[:, :3])])]
+    force, at = found.bearing_force, bearing_places(model)
+    mine = [bearing.outer_shaft is None for bearing in model.case.bearing]
+    wrenches.append(np.hstack([force[:, :3], force[:, 3:] + moments(at, force[:, :3])])[mine])
+    for contact, part in zip(assembly.contacts, assembly.slices, strict=True):
+        if GROUND in contact.stations:
+            side = contact.stations.index(GROUND)
+            back = (1.0 if side else -1.0) * -found.slice_force[part][:, None] * contact.normal
+            wrenches.append(np.hstack([back, moments(contact.points[side], back)]))
+    shafts = port_shafts(model.case)
+    for name in model.case.operation.fixed:
+        own = sum(torques.get(name, 0.0) for torques in model.flow.stage_torque.values())
+        own += sum(torque for port, torque in model.flow.port_torque.items() if shafts[port] == name)
+        wrenches.append(np.array([[0.0, 0.0, 0.0, 0.0, 0.0, -own]]))
+    return np.vstack(wrenches)
+
+
+def largest_load(found: Deflection) -> float:
+    """Largest force of loads and meshes [N]: bearings of a set without other loads carry nothing."""
+    return max(np.abs(found.model.load).max(), found.mesh_force.max())
+
+
+def check_balance(found: Deflection) -> None:
+    wrenches = outside(found)
+    total, size = wrenches.sum(axis=0), largest_load(found)
+    assert np.abs(total[:3]).max() <= BALANCED * size
+    # levers of a metre at most
+    assert np.abs(total[3:]).max() <= BALANCED * size
+
+
+def check_power(found: Deflection) -> None:
+    flow, shafts = found.model.flow, port_shafts(found.model.case)
+    power = np.array([torque * flow.speed[shafts[port]] for port, torque in flow.port_torque.items()])
+    assert abs(power.sum()) <= BALANCED * np.abs(power).max()
+    for torques in flow.stage_torque.values():
+        own = np.array([torque * flow.speed[shaft or CASING] for shaft, torque in torques.items()])
+        assert abs(own.sum()) <= BALANCED * np.abs(power).max()
+
+
+def check_meshes(found: Deflection) -> None:
+    force = found.mesh_force
+    for stage in found.model.stages:
+        torque = abs(found.model.flow.first_torque(stage.section))
+        lever = math.cos(stage.sizes.base_helix) * np.array(stage.sizes.base_radii)
+        if not stage.planets:
+            assert force[list(stage.meshes)] == pytest.approx([torque / lever[0]], rel=BALANCED)
+            continue
+        sun, ring = np.split(force[list(stage.meshes)], 2)
+        assert sun.sum() * lever[0] == pytest.approx(torque, rel=BALANCED)
+        assert ring.sum() * lever[2] == pytest.approx(torque * stage.sizes.teeth[2] / stage.sizes.teeth[0], rel=BALANCED)
+
+
+def answer(found: Deflection) -> dict[str, np.ndarray]:
+    """Magnitudes that hang on no direction, of bearings in the order of their names."""
+    order = np.argsort(found.model.bearing_names)
+    force, motion = found.bearing_force[order], bearing_motions(found.model, found.motion)[order]
+    _, system, stiffness = linear_system(found)
+    still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
+    frequency = solve_modes(still, stiffness, damping_ratio=0.03, count=min(MODES, len(system.dofs))).frequency
+
+    def sizes(vectors):
+        return np.column_stack([np.hypot(vectors[:, 0], vectors[:, 1]), np.abs(vectors[:, 2])])
+
+    tilts = np.hypot(force[:, 3], force[:, 4])
+    return {
+        "force": sizes(force),
+        "moment": tilts,
+        "deflection": sizes(motion),
+        "mesh force": np.sort(found.mesh_force),
+        "frequency": np.sort(frequency),
+    }
+
+
+def image(tables, name: str, seed: int):
+    """Put the gearbox down in another way."""
+    rng = np.random.default_rng(seed)
+    if name == "turned":
+        rolling = any("kind" in bearing for bearing in tables["bearing"])
+        return turned(tables, 2.0 * math.pi / SYMMETRY if rolling else float(rng.uniform(-2.0, 2.0)))
+    if name == "shifted":
+        return shifted(tables, tuple(rng.uniform(-1.0, 1.0, 3)))
+    if name == "renamed":
+        return renamed(tables, seed)
+    return mirrored_across(tables) if name == "mirrored across" else mirrored_along(tables)
+
+
+def check_image(tables, found: Deflection, name: str, seed: int) -> None:
+    wanted, met = answer(found), answer(solved(image(tables, name, seed)))
+    force = largest_load(found)
+    least = {"force": 1e-3 * force, "moment": 1e-4 * force, "deflection": 1e-12 * force}
+    for what, values in wanted.items():
+        # a shaft that is held is held at its left end: its mirror image is another shaft
+        if name == "mirrored along" and what == "frequency" and tables["operation"]["fixed"]:
+            continue
+        apart = np.abs(met[what] - values).max(initial=0.0)
+        assert apart <= ALIKE * max(np.abs(values).max(initial=0.0), least.get(what, 0.0)), f"{name}: {what}"
+
+
+def check_gearbox(seed: int, stages: int) -> None:
+    tables = random_gearbox(seed, stages)
+    found = solved(tables)
+    check_balance(found)
+    check_power(found)
+    check_meshes(found)
+    check_image(tables, found, IMAGES[seed % len(IMAGES)], seed)
+
+
+@pytest.mark.parametrize("seed", seeds(QUICK))
+def test_a_random_gearbox_balances_and_is_the_same_however_it_is_put_down(seed):
+    check_gearbox(seed, stages=2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", seeds(ALL))
+def test_a_thousand_gearboxes_of_up_to_four_stages(seed):
+    check_gearbox(seed, stages=4)
