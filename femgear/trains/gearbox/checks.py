@@ -392,6 +392,15 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
         )
         return
     sizes = set_sizes(stage)
+    if stage.gears and stage.gears.given("planets") and stage.gears.planets != len(sizes.planet_angles):
+        yield CaseError(
+            "planets and planet_angles say different numbers of planets",
+            code="E-COUNT",
+            key=f"{key}.gears.planet_angles",
+            value=len(sizes.planet_angles),
+            limit=f"one angle for each of {stage.gears.planets} planets",
+            remedy="give an angle for every planet, or leave planets out",
+        )
     yield from _neighbours(sizes, key)
     shafts = [
         (name, case.shaft_named(getattr(stage, name)))
@@ -413,8 +422,8 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
 
 
 def _neighbours(sizes: StageSizes, key: str) -> Iterator[CaseError]:
-    """Planets whose pitch circles do not overlap."""
-    angles = sizes.planet_angles
+    """Planets, listed in any order, whose pitch circles do not overlap."""
+    angles = sorted(angle % (2.0 * math.pi) for angle in sizes.planet_angles)
     apart = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
     planet = sizes.centre_distance * sizes.base_radii[1] / (sizes.base_radii[0] + sizes.base_radii[1])
     room = 2.0 * sizes.centre_distance * math.sin(0.5 * min(apart, math.pi))

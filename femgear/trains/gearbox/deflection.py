@@ -24,6 +24,8 @@ from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
 
 _STEPS = 200
+# Metres by which tilts and rotations are compared with shifts.
+_LEVERS = (1.0, 1.0, 1.0, 0.05, 0.05, 0.05)
 # Misalignment over the width below which it is none [m].
 _UPRIGHT = 1e-7
 # Positions of the contact while slopes are far from settled, and how near they come by them, relative.
@@ -275,12 +277,18 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
             tangent = tangent + rows.T @ stiffness @ rows
         return T.T @ (model.load - inner), T.T @ tangent @ T
 
-    y, residual, iterations = _newton(forces, y, scale)
+    y, residual, iterations = _newton(forces, y, scale, lambda y: _farthest(fixed.names, T @ y))
     q = T @ y
     return _state(model, q, gap, laws, residual, iterations)
 
 
-def _newton(forces, y: np.ndarray, scale: float) -> tuple[np.ndarray, float, int]:
+def _farthest(names: Sequence[str], motion: np.ndarray) -> str:
+    """Name the station that has moved the farthest, and its way; tilts and rotations count by 50 mm."""
+    station, way = divmod(int((np.abs(motion) * np.tile(_LEVERS, len(names))).argmax()), 6)
+    return f"{names[station]} ({'along z' if way == 2 else MOTIONS[way]})"
+
+
+def _newton(forces, y: np.ndarray, scale: float, farthest) -> tuple[np.ndarray, float, int]:
     """Newton's method with a shorter step where the residual does not fall."""
     residual, tangent = forces(y)
     size = np.abs(residual).max(initial=0.0)
@@ -307,11 +315,11 @@ def _newton(forces, y: np.ndarray, scale: float) -> tuple[np.ndarray, float, int
     if size <= 1e-7 * scale:
         return y, size / scale, _STEPS
     raise ConvergenceError(
-        f"the loads of the gearbox find no balance: {size:.3g} N are left",
+        f"the loads of the gearbox find no balance: {size:.3g} N are left, and {farthest(y)} moves the farthest",
         code="E-CONVERGENCE",
         key="bearing",
         limit=f"{_SETTLED:g} of the largest load",
-        remedy="check bearings whose clearance swallows the load, and what takes the thrust",
+        remedy="check the bearings of this part: clearance that swallows the load, thrust in the sense that none takes",
     )
 
 
@@ -355,11 +363,7 @@ def _check_held(fixed: Assembly, T, K, W, k, laws) -> None:
     if not loose.any():
         return
     motion = T @ (vectors[:, loose] / size[:, None])
-    names = []
-    for column in motion.T:
-        weight = np.abs(column) * np.tile([1, 1, 1, 0.05, 0.05, 0.05], len(fixed.names))
-        station, way = divmod(int(weight.argmax()), 6)
-        names.append(f"{fixed.names[station]} ({'along z' if way == 2 else MOTIONS[way]})")
+    names = [_farthest(fixed.names, column) for column in motion.T]
     raise CaseError(
         f"nothing holds {len(names)} motion{'s' * (len(names) > 1)}: {', '.join(dict.fromkeys(names))}",
         code="E-MECHANISM",

@@ -81,6 +81,15 @@ def pair_sizes(stage: PairSection) -> StageSizes:
     assert given is not None
     radii = _base_radii(given)
     _check_ratio(radii[1] / radii[0], given.teeth[1] / given.teeth[0])
+    if given.internal and not radii[0] < radii[1]:
+        raise CaseError(
+            "the pinion does not fit into the internal gear",
+            code="E-TEETH",
+            key="teeth",
+            value=list(given.teeth),
+            limit="gear 2 is the internal one and has more teeth than gear 1",
+            remedy="name the pinion first, in shafts, positions and teeth",
+        )
     sign = -1.0 if given.internal else 1.0
     distance = abs(radii[0] + sign * radii[1]) / math.cos(given.pressure_angle)
     helix = math.atan(math.tan(given.helix_angle) * math.cos(given.pressure_angle))

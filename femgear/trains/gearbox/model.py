@@ -351,9 +351,11 @@ class _Builder:
         members = {name: getattr(stage, name) for name in ("sun", "carrier", "ring")}
         seats = {name: self.seat(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
         places = {name: self._place(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
-        ring = places["carrier"] if places["ring"] is None else places["ring"]
+        # a member that stands in the casing lies where the others are
+        known = [place for place in places.values() if place is not None]
+        sun, ring = (known[at] if places[name] is None else places[name] for name, at in (("sun", 0), ("ring", -1)))
         flank = -1 if flow.first_torque(stage) > 0.0 else 1
-        centres, width, middle = _common([places["sun"], ring], (sizes.face_widths[0], sizes.face_widths[-1]))
+        centres, width, middle = _common([sun, ring], (sizes.face_widths[0], sizes.face_widths[-1]))
         width = min([w for w in sizes.face_widths if w] or [0.0])
         axis, angles = centres[0][:2], tuple(stage.angle + psi for psi in _from_first(sizes.planet_angles))
         teeth = teeth_of(stage)
@@ -362,8 +364,9 @@ class _Builder:
                 if seats[name].station != GROUND:
                     body = self._gear_body(teeth, name)
                     self._body(seats[name], *body, flow.speed[members[name]])
+        carrier = sun if places["carrier"] is None else places["carrier"]
         planets = [
-            self._planet(stage, sizes, teeth, n, psi, axis, middle, seats["carrier"], places["carrier"])
+            self._planet(stage, sizes, teeth, n, psi, axis, middle, seats["carrier"], carrier)
             for n, psi in enumerate(angles)
         ]
         contacts = []

@@ -27,6 +27,15 @@ def _replaced(number: int, **entries):
     return change
 
 
+def _set(tables, **entries) -> None:
+    """Put a set of sun and carrier shafts of their own beside the pair."""
+    stage = {"name": "set", "sun": "sun", "carrier": "carrier", "gears": {"teeth": [36, 24, 84], "module": "1.5 mm"}}
+    stage |= {"sun_mesh": {"stiffness": "3e8 N/m"}, "ring_mesh": {"stiffness": "3e8 N/m"}}
+    stage["gears"] |= entries
+    tables["shaft"] += [{"name": "sun"}, {"name": "carrier"}]
+    tables["planetary"] = [stage]
+
+
 CHANGES = {
     "shaft[1].name": (lambda t: t["shaft"][1].update(name="input"), "E-DUPLICATE"),
     "bearing[1].name": (lambda t: t["bearing"][1].update(name="A"), "E-DUPLICATE"),
@@ -77,21 +86,14 @@ CHANGES = {
     ),
     "gravity.direction": (lambda t: t.update(gravity={"direction": [0.0, 0.0, 0.0]}), "E-RANGE"),
     "bearing[3].clearance": (_replaced(3, **BALL | {"clearance": "2 mm"}), "E-BEARING"),
-    "planetary[0].gears.planets": (
-        lambda t: t.update(
-            shaft=[*t["shaft"], {"name": "sun"}, {"name": "carrier"}],
-            planetary=[
-                {
-                    "name": "set",
-                    "sun": "sun",
-                    "carrier": "carrier",
-                    "gears": {"teeth": [36, 24, 84], "module": "1.5 mm", "planets": 12},
-                    "sun_mesh": {"stiffness": "3e8 N/m"},
-                    "ring_mesh": {"stiffness": "3e8 N/m"},
-                }
-            ],
-        ),
-        "E-NEIGHBOURS",
+    "planetary[0].gears.planets": (lambda t: _set(t, planets=12), "E-NEIGHBOURS"),
+    "planetary[0].gears.planet_angles": (
+        lambda t: _set(t, planets=3, planet_angles=["0 deg", "180 deg"]),
+        "E-COUNT",
+    ),
+    "pair[0].gears.teeth": (
+        lambda t: t["pair"][0]["gears"].update(teeth=[36, 24], internal=True),
+        "E-TEETH",
     ),
     "operation.first": (lambda t: t["operation"].update(first=2), "E-RANGE"),
 }
@@ -134,3 +136,9 @@ def test_shares_of_the_time_are_at_most_the_whole():
     one = tables["operation"]["load_case"][0]
     tables["operation"]["load_case"] = [one | {"name": "a", "share": 0.7}, one | {"name": "b", "share": 0.4}]
     assert "operation.load_case[0].share" in problems(tables)
+
+
+def test_planets_may_be_listed_in_any_order():
+    tables = pair_tables()
+    _set(tables, planet_angles=["0 deg", "240 deg", "120 deg"])
+    assert len(read_case(tables).planetary[0].gears.planet_angles) == 3

@@ -159,3 +159,14 @@ def test_a_negative_number_of_rolling_elements_is_refused_where_it_stands():
     tables["bearing"][1] = {"shaft": "input", "position": "85 mm"} | BALL | {"rolling_elements": 2}
     with pytest.raises(CaseError, match=r"bearing\[1\]\.rolling_elements"):
         read_case(tables)
+
+
+def test_the_shaft_whose_thrust_no_bearing_takes_in_its_sense_is_named():
+    tables = pair_tables(helix="15 deg")
+    tables["bearing"][0]["axial_sense"] = "positive"
+    there = solve_deflection(read_case(pair_tables(helix="15 deg"))).bearing_force[0, 2]
+    if there < 0.0:
+        tables["bearing"][0]["axial_sense"] = "negative"
+    text = refused(tables)
+    assert "E-CONVERGENCE" in text
+    assert re.search(r"input \d+ \(along z\) moves the farthest", text)

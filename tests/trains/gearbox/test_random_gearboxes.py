@@ -4,6 +4,7 @@
 ``random_gearbox(117)``.
 """
 
+import copy
 import math
 from dataclasses import replace
 
@@ -93,7 +94,9 @@ def check_meshes(found: Deflection) -> None:
             continue
         sun, ring = np.split(force[list(stage.meshes)], 2)
         assert sun.sum() * lever[0] == pytest.approx(torque, rel=BALANCED)
-        assert ring.sum() * lever[2] == pytest.approx(torque * stage.sizes.teeth[2] / stage.sizes.teeth[0], rel=BALANCED)
+        assert ring.sum() * lever[2] == pytest.approx(
+            torque * stage.sizes.teeth[2] / stage.sizes.teeth[0], rel=BALANCED
+        )
 
 
 def answer(found: Deflection) -> dict[str, np.ndarray]:
@@ -160,3 +163,25 @@ def test_a_random_gearbox_balances_and_is_the_same_however_it_is_put_down(seed):
 @pytest.mark.parametrize("seed", seeds(ALL))
 def test_a_thousand_gearboxes_of_up_to_four_stages(seed):
     check_gearbox(seed, stages=4)
+
+
+@pytest.mark.parametrize("member", ["sun", "carrier", "ring"])
+def test_any_member_of_a_set_may_stand_in_the_casing(member):
+    tables = next(t for t in map(one_set, range(100)) if t["planetary"][0][member].startswith("held"))
+    alone, stage = copy.deepcopy(tables), tables["planetary"][0]
+    alone["operation"]["fixed"] = []
+    for kind, entry in (("shaft", "name"), ("bearing", "shaft")):
+        alone[kind] = [one for one in alone[kind] if one[entry] != stage[member]]
+    alone["planetary"][0][member] = "casing"
+    del alone["planetary"][0][f"{member}_position"]
+    on_shaft, in_casing = solved(tables), solved(alone)
+    check_power(in_casing)
+    check_meshes(in_casing)
+    assert in_casing.mesh_force.sum() == pytest.approx(on_shaft.mesh_force.sum(), rel=BALANCED)
+
+
+def one_set(seed: int):
+    """Draw gearboxes until one has a single set with a shaft that is held."""
+    while len((tables := random_gearbox(seed, 1))["planetary"]) != 1 or not tables["operation"]["fixed"]:
+        seed += 100
+    return tables
