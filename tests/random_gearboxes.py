@@ -35,6 +35,8 @@ class _Draw:
         self.rng = np.random.default_rng([seed, 42])
         self.kinds = [bool(self.rng.random() < 0.45) for _ in range(int(self.rng.integers(1, stages + 1)))]
         self.sets = any(self.kinds)
+        # bearings of one axial sense need thrust on every shaft
+        self.thrust = bool(self.rng.random() < 0.5) and not self.sets
         # rolling bearings need loads that leave their clearances behind
         self.rolling = bool(self.rng.random() < 0.5)
         self.tables: dict[str, Any] = {"model": "gearbox", "title": f"random gearbox {seed}"}
@@ -78,7 +80,12 @@ class _Draw:
             if self.rng.random() < 0.4:
                 part["inner_diameter"] = metres(self.between(0.005, 0.02))
             parts.append(part)
-        table = {"name": name, "axis": [metres(axis[0]), metres(axis[1])], "start": metres(low), "part": parts}
+        table: dict[str, Any] = {
+            "name": name,
+            "axis": [metres(axis[0]), metres(axis[1])],
+            "start": metres(low),
+            "part": parts,
+        }
         self.tables["shaft"].append(table)
         places = self.between(0.008, 0.015), length - self.between(0.008, 0.015)
         for bearing, place in zip(self.bearings(), places, strict=True):
@@ -91,15 +98,19 @@ class _Draw:
             first, second = ({"radial": f"{10.0 ** self.between(7.7, 9.0)!r} N/m"} for _ in range(2))
             if self.rng.random() < 0.3:
                 second["tilt"] = f"{10.0 ** self.between(4.0, 5.0)!r} N m/rad"
-            if self.rng.random() < 0.2:
+            if self.thrust and self.rng.random() < 0.5:
                 sense = {"axial": f"{10.0 ** self.between(7.7, 8.7)!r} N/m"}
                 return first | sense | {"axial_sense": "positive"}, second | sense | {"axial_sense": "negative"}
             first["axial"] = self.of("rigid", f"{10.0 ** self.between(7.7, 8.7)!r} N/m")
             return first, second
         count = SYMMETRY * int(self.rng.integers(3, 5))
         sizes = {"rolling_elements": count, "pitch_diameter": "0.075 m"}
-        ball = {"kind": "ball", "element_diameter": "0.012 m", "clearance": metres(self.play())} | sizes
-        roller = {"clearance": metres(-3e-6), "element_diameter": "0.01 m", "effective_length": "0.012 m"} | sizes
+        ball: dict[str, Any] = {"kind": "ball", "element_diameter": "0.012 m", "clearance": metres(self.play())} | sizes
+        roller: dict[str, Any] = {
+            "clearance": metres(-3e-6),
+            "element_diameter": "0.01 m",
+            "effective_length": "0.012 m",
+        } | sizes
         if kind == "ball":
             return ball, ball
         if kind == "cylindrical":
@@ -116,7 +127,8 @@ class _Draw:
         return {"stiffness": f"{10.0 ** self.between(8.3, 9.0)!r} N/m"}
 
     def gears(self) -> dict[str, Any]:
-        helix = 0.0 if self.rng.random() < 0.4 else self.between(-25.0, 25.0)
+        helix = self.of(-1.0, 1.0) * self.between(5.0, 25.0)
+        helix = helix if self.thrust or self.rng.random() < 0.6 else 0.0
         gears = {"module": metres(self.of(0.002, 0.003)), "helix_angle": f"{helix!r} deg"}
         return gears | ({} if self.rng.random() < 0.2 else {"face_width": metres(self.between(0.015, 0.03))})
 
@@ -142,7 +154,7 @@ class _Draw:
         held = self.of(*MEMBERS)
         turning = [member for member in MEMBERS if member != held]
         self.rng.shuffle(turning)
-        stage = {"name": name, turning[0]: first, turning[1]: second}
+        stage: dict[str, Any] = {"name": name, turning[0]: first, turning[1]: second}
         self.shaft(second, axis, *ends)
         if held == "ring" and self.rng.random() < 0.6:
             stage["ring"] = "casing"
@@ -183,7 +195,10 @@ class _Draw:
         """Add loads, masses, weight and the load case."""
         torque = self.of(-1.0, 1.0) * 10.0 ** self.between(1.7, 2.5)
         slices = self.of(1, 1, 5, 15)
-        case = {"torque": {"motor": f"{torque!r} N m"}, "speed": {first: f"{self.between(-3000, 3000)!r} rpm"}}
+        case: dict[str, Any] = {
+            "torque": {"motor": f"{torque!r} N m"},
+            "speed": {first: f"{self.between(-3000, 3000)!r} rpm"},
+        }
         end = _value(self.tables["shaft"][0]["start"])
         self.tables["load"] = [
             {"name": "motor", "shaft": first, "position": "0 m"},

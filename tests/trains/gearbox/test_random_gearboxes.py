@@ -21,7 +21,7 @@ from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.power import port_shafts
 from femgear.trains.reading import read_case
 
-QUICK, ALL = 24, 1000
+QUICK, ALL = 20, 1000
 BALANCED, ALIKE = 1e-8, 1e-7
 MODES = 30
 IMAGES = ("turned", "shifted", "mirrored across", "mirrored along", "renamed")
