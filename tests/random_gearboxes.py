@@ -200,13 +200,13 @@ class _Draw:
             "speed": {first: f"{self.between(-3000, 3000)!r} rpm"},
         }
         end = _value(self.tables["shaft"][0]["start"])
-        self.tables["load"] = [
+        loads: list[dict[str, Any]] = [
             {"name": "motor", "shaft": first, "position": "0 m"},
             {"name": "brake", "shaft": last, "position": metres(0.5 * _BEYOND)},
         ]
         if self.rng.random() < 0.5:
-            self.tables["load"][1]["force"] = [f"{self.between(-500, 500)!r} N" for _ in range(3)]
-            self.tables["load"][0]["tilting_moment"] = [f"{self.between(-10, 10)!r} N m" for _ in range(2)]
+            loads[1]["force"] = [f"{self.between(-500, 500)!r} N" for _ in range(3)]
+            loads[0]["tilting_moment"] = [f"{self.between(-10, 10)!r} N m" for _ in range(2)]
         if self.rng.random() < 0.4:
             case["force"] = {"motor": [f"{self.between(-300, 300)!r} N" for _ in range(3)]}
         if self.rng.random() < 0.5:
@@ -217,6 +217,7 @@ class _Draw:
             across = [0.0, 0.0, -1.0] if self.uneven else [0.6, 0.0, 0.8]
             way = self.of(across, across if self.uneven else [0.0, -1.0, 0.0], [0.0, 0.0, -1.0])
             self.tables["gravity"] = {"direction": way}
+        self.tables["load"] = loads
         self.tables["deflection"] = {"slices": slices}
         self.tables["modes"] = {"speeds": 2}
         self.tables["operation"] = {"output": ["brake"], "fixed": self.fixed, "load_case": [case]}
