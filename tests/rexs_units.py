@@ -72,6 +72,44 @@ class _Unit(Gearbox):
         self.relate("assembly", assembly=shaft, part=id)
 
 
+def planetary_unit():
+    """The stage of `Gearbox` with whole shafts: sun in two bearings, carrier of two plates with pins, ring held."""
+    box = Gearbox("1.4")
+    box.components[34]["vectors"] = {"support_vector": (0.0, 0.0, 0.0)}
+    box.components[38]["attributes"]["u_coordinate_on_shaft"] = (100.0, MM)
+    box.add(6, "shaft")
+    box.relate("planet_carrier_shaft", planetary_stage=9, shaft=6)
+    for shaft, zero, length, outer, inner in ((4, -100.0, 100.0, 80.0, 60.0), (6, 50.0, 8.0, 99.0, 88.0)):
+        box.components[shaft]["vectors"] = {"support_vector": (zero, 0.0, 0.0)}
+        box.add(
+            1000 + shaft,
+            "shaft_section",
+            u_coordinate_on_shaft=(0.0, MM),
+            length=(length, MM),
+            outer_diameter_begin=(outer, MM),
+            inner_diameter_begin=(inner, MM),
+            inner_diameter_end=(inner, MM),
+        )
+        box.relate("assembly", assembly=shaft, part=1000 + shaft)
+    box.components[3]["attributes"]["strut_inner_diameter"] = (110.0, MM)
+    for plate, zero, inner in ((67, -8.0, 80.0), (68, 50.0, 99.0)):
+        box.add(plate, "side_plate", length=(8.0, MM), outer_diameter=(219.0, MM), inner_diameter=(inner, MM))
+        box.components[plate]["vectors"] = {"support_vector": (zero, 0.0, 0.0)}
+        box.relate("assembly", assembly=3, part=plate)
+    for number in range(3):
+        pin = 270 + number
+        box.relate("planet_pin", planetary_stage=9, shaft=pin)
+        box.relate("planet_shaft", planetary_stage=9, shaft=230 + number)
+        box.add(1000 + pin, "shaft_section", length=(66.0, MM), outer_diameter_begin=(43.2, MM))
+        box.relate("assembly", assembly=pin, part=1000 + pin)
+        for joint, place, plate in ((600 + number, 4.0, 67), (700 + number, 62.0, 68)):
+            box.add(joint, "coupling", length=(8.0, MM), u_coordinate_on_shaft_inner_side=(place, MM))
+            box.relate("side", assembly=joint, inner_part=pin, outer_part=plate)
+    for bearing, place in ((36, 75.0), (37, 95.0), (59, 25.0), (60, 75.0)):
+        box.components[bearing]["attributes"]["u_coordinate_on_shaft_inner_side"] = (place, MM)
+    return box
+
+
 class IndustrialUnit(_Unit):
     """27/51 and 23/34 teeth on three shafts, two of them coaxial with a needle bearing between; four load cases."""
 

@@ -83,7 +83,7 @@ def _unit_stage(model: Model, stage: Component) -> UnitStage | None:
         planets = {one.id for mesh in meshes if ring in (pair := gears_of(model, mesh)) for one in pair}
         sun = next((one for one in gears.values() if one.id not in planets), None)
         carriers = model.related("planet_carrier_shaft", "shaft", planetary_stage=stage.id)
-        if ring is None or sun is None or not carriers:
+        if ring is None or sun is None or not carriers or carriers[0].type != "shaft":
             return None
         central, shafts = [sun, ring], [shaft_of(model, sun), carriers[0], shaft_of(model, ring)]
     elif stage.type == "cylindrical_stage":

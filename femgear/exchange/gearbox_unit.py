@@ -168,7 +168,7 @@ class _Unit:
         sun = next(gear for gear in gears.values() if gear.id not in planets and gear.id != ring.id)
         yield "sun", (sun, self._shaft(sun))
         carriers = model.related("planet_carrier_shaft", "shaft", planetary_stage=stage.id)
-        if not carriers:
+        if not carriers or any(one.type != "shaft" for one in carriers):
             raise NoGearbox(f"the carrier of {stage} has no shaft")
         self.components.setdefault(carriers[0].id, list(carriers))
         self.main |= {one.id: carriers[0].id for one in carriers}

@@ -154,7 +154,7 @@ def file_pieces(model: Model, shaft: Component, zero: float) -> list[Piece]:
         keys = ("u_coordinate_on_shaft", "length", "outer_diameter_begin", "outer_diameter_end")
         place, length, begin, outer_end = (model.number(part, key, LENGTH) for key in keys)
         inner, inner_end = (model.number(part, f"inner_diameter_{one}", LENGTH) for one in ("begin", "end"))
-        if not length or not begin:
+        if not length or not begin or min(length, begin) < _SAME:
             text = f"{part} of {shaft} has no length or no diameter: it is left out"
             model.remark(f"shaft {shaft.id}", text, severity=NOTE)
             continue

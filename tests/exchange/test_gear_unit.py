@@ -57,3 +57,11 @@ def test_stages_are_listed_without_the_meshes_of_planets(tmp_path):
     assert next(set(one.arms) for one in unit_stages(model)) == {"34", "62", "4"}
     box = Gearbox().set(58, number_of_teeth=("0", NONE))
     assert unit_stages(read_model(box.write(tmp_path / "none.rexs"))) == []
+
+
+def test_a_carrier_on_no_shaft_leaves_its_stage_out(tmp_path):
+    box = both_units()
+    box.components[4]["type"] = "gear_casing"
+    model = read_model(box.write(tmp_path / "unit.rexs"))
+    assert [one.component.id for one in unit_stages(model)] == ["50051", "50052"]
+    assert "9" not in unit_flow(model, {}).torque

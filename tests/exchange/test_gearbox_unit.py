@@ -1,11 +1,13 @@
 """Whole REXS units as gearboxes: places of shafts, bearings, loads, load cases, senses."""
 
 import math
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 from rexs_stage import DEG, ParallelUnit, both_units
-from rexs_units import IndustrialUnit, ThreeStageUnit
+from rexs_units import IndustrialUnit, ThreeStageUnit, planetary_unit
 from trains.test_imports import drafts_of
 
 from femgear.exchange.cylindrical_stage import pair_tables
@@ -14,9 +16,11 @@ from femgear.exchange.gearbox_unit import gearbox_tables
 from femgear.exchange.rexs import read_model
 from femgear.exchange.unit_shafts import NoGearbox
 from femgear.findings import DOUBT
+from femgear.trains.gearbox.case_file import DeflectionSection
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.geometry import pair_sizes
 from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.imports import case_drafts
 from femgear.trains.reading import parse_case, read_case
 
 
@@ -223,3 +227,65 @@ def test_a_planetary_stage_and_two_parallel_ones_are_one_gearbox(tmp_path):
     assert sorted(flow.port_torque.values())[0] == pytest.approx(-1591.5494309 * 78 / 17)
     assert len(case.operation.output) == 2 and len(case.operation.load_case[0].speed) == 2
     assert any("shaft 4 has no sections" in one.text for one in findings)
+
+
+def test_a_planetary_stage_on_whole_shafts_is_a_gearbox(tmp_path):
+    found, findings = drafts_of(planetary_unit(), tmp_path)
+    case = parse_case(found[""].text)
+    (stage,) = case.planetary
+    carrier = case.shaft_named("shaft 4")
+    # a shaft in a plate, a tube for the struts, the other plate on its ring: z from -100 to 58 mm
+    sizes = [(1e3 * one.length, 1e3 * one.outer_diameter, 1e3 * one.inner_diameter) for one in carrier.part]
+    assert sizes == [pytest.approx(one) for one in ((92, 80, 60), (8, 219, 60), (50, 219, 110), (8, 219, 88))]
+    assert (carrier.start, stage.carrier_position, stage.sun_position) == pytest.approx((-0.1, 0.125, 0.025))
+    assert stage.ring == "casing" and stage.pins.diameter == pytest.approx(0.0432)
+    # half of what is free between the plates
+    assert stage.pins.length == pytest.approx(0.025)
+    assert {one.shaft for one in case.bearing} == {"shaft 34", "shaft 4"}
+    assert any("struts" in one.text for one in findings)
+    flow = gearbox_flow(case)
+    # Willis with the ring held
+    assert flow.speed["shaft 4"] / flow.speed["shaft 34"] == pytest.approx(17 / 78)
+
+
+def test_planets_stand_where_their_meshes_do(tmp_path):
+    """Planet 1 of a mesh at 0 deg around -u lies along w, the y axis."""
+    case = parse_case(drafts_of(planetary_unit(), tmp_path)[0][""].text)
+    assert case.planetary[0].angle == pytest.approx(0.5 * math.pi)
+
+
+def test_struts_of_their_own_are_parts_of_the_carrier(tmp_path):
+    box = planetary_unit()
+    box.add(260, "shaft")
+    box.components[260]["vectors"] = {"support_vector": (0.0, 0.0, 0.0)}
+    box.add(
+        261,
+        "shaft_section",
+        length=(50.0, "mm"),
+        outer_diameter_begin=(164.25, "mm"),
+        inner_diameter_begin=(109.5, "mm"),
+        inner_diameter_end=(109.5, "mm"),
+    )
+    box.relate("assembly", assembly=260, part=261)
+    for joint, shaft in ((263, 4), (264, 6)):
+        box.add(joint, "coupling")
+        box.relate("side", assembly=joint, inner_part=shaft, outer_part=260)
+    found, findings = drafts_of(box, tmp_path)
+    case = parse_case(found[""].text)
+    assert [one.name for one in case.shaft] == ["shaft 34", "shaft 4"] and not case.coupling
+    assert 1e3 * case.shaft_named("shaft 4").part[2].outer_diameter == pytest.approx(164.25)
+    assert not any("struts" in one.text for one in findings)
+
+
+UNITS = os.environ.get("FEMGEAR_REXS_UNITS")
+
+
+@pytest.mark.skipif(UNITS is None, reason="FEMGEAR_REXS_UNITS names no folder of REXS units")
+def test_units_of_a_folder_are_gearboxes():
+    files = [one for one in sorted(Path(UNITS or "").iterdir()) if one.suffix in (".rexs", ".rexsj", ".rexsz")]
+    assert files
+    for file in files:
+        case = parse_case(case_drafts(read_model(file), "unit.toml")[0].text)
+        assert case.train == "gearbox", file.name
+        state = solve_deflection(case.model_copy(update={"deflection": DeflectionSection(contact=False)}))
+        assert state.residual < 1e-7, file.name

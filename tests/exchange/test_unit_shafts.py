@@ -10,6 +10,7 @@ from femgear.exchange.rexs import read_model
 from femgear.exchange.unit_shafts import (
     NoGearbox,
     Piece,
+    file_pieces,
     file_places,
     joined_pieces,
     misses,
@@ -83,3 +84,13 @@ def test_a_cone_keeps_its_ends():
         "end_inner_diameter": "20 mm",
     }
     assert gaps == 0.0
+
+
+def test_sections_without_sizes_are_left_out_and_told(tmp_path):
+    box = IndustrialUnit()
+    box.components[12001]["attributes"]["length"] = (-80.0, "mm")
+    box.components[12002]["attributes"]["outer_diameter_begin"] = (0.0, "mm")
+    model = read_model(box.write(tmp_path / "unit.rexs"))
+    (left,) = file_pieces(model, model.components["12"], 0.1)
+    assert (left.start, left.end) == pytest.approx((0.1, 0.18))
+    assert [one.text.split(" of ")[0] for one in model.findings] == ["shaft_section 12001", "shaft_section 12002"]
