@@ -26,6 +26,8 @@ _LEAST = 20
 _BASIS = 2
 # Reach of the Campbell diagram and of the modes that are kept, over the highest mesh frequency.
 _HARMONICS = 3.0
+# Share of the largest slice force below which a slice carries nothing but rounding.
+_IDLE = 1e-9
 KINDS = ("torsional", "bending", "axial", "ring")
 """Of modes by their kinetic energy: rotation; motions across the axes and tilts; along them; elastic rings."""
 _MOTIONS = ((5,), (0, 1, 3, 4), (2,))
@@ -88,12 +90,14 @@ def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.nda
 
 
 def _pressed_stiffness(found: Deflection) -> np.ndarray:
-    """Stiffness (g,) of the slices: those that carry share that of their mesh [N/m]."""
+    """Stiffness (g,) of the slices: those that carry share that of their mesh; an idle mesh keeps its own [N/m]."""
     stiffness = found.model.assembly.slice_stiffness.copy()
     if not np.any(found.model.load):
         return stiffness
+    # the forces of an idle mesh are rounding, and would choose its slices by chance
+    least = _IDLE * found.slice_force.max()
     for part in found.model.assembly.slices:
-        carrying = found.slice_force[part] > 0.0
+        carrying = found.slice_force[part] > least
         if carrying.any() and not carrying.all():
             total = stiffness[part].sum()
             stiffness[part] = np.where(carrying, total / carrying.sum(), 0.0)

@@ -159,6 +159,11 @@ def test_a_random_gearbox_balances_and_is_the_same_however_it_is_put_down(seed):
     check_gearbox(seed, stages=2)
 
 
+@pytest.mark.parametrize("seed", [55, 380])
+def test_a_mesh_that_carries_nothing_has_the_same_modes_however_the_gearbox_is_turned(seed):
+    check_gearbox(seed, stages=4)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(ALL))
 def test_a_thousand_gearboxes_of_up_to_four_stages(seed):
