@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from functools import cache
 from typing import Any
 
@@ -99,6 +99,28 @@ def _problem(item: dict, key: str, model: type[BaseModel]) -> CaseError:
         error.key = key
         return error
     return CaseError(f"not what is needed here: {item['msg'].lower()}", key=key, value=value)
+
+
+def no_such(what: str, key: str, name: str, names: Sequence[str], otherwise: str, *, limit: str) -> CaseError:
+    """Make the refusal of a name that nothing has, E-CHOICE, with the nearest of the names that are there.
+
+    Parameters
+    ----------
+    what : str
+        Kind of what is named, as "body".
+    key, name : str
+        Entry that names it, and the name there.
+    names : sequence of str
+        Names that are there; capitals do not count in the likeness.
+    otherwise : str
+        Remedy where no name is near.
+    limit : str
+        What is allowed.
+    """
+    spelt = {one.lower(): one for one in names}
+    near = difflib.get_close_matches(name.lower(), spelt, n=1, cutoff=0.6)
+    remedy = f"did you mean {spelt[near[0]]}?" if near else otherwise
+    return CaseError(f"there is no such {what}", code="E-CHOICE", key=key, value=name, limit=limit, remedy=remedy)
 
 
 def _unknown_key(location: tuple, key: str, model: type[BaseModel]) -> CaseError:

@@ -20,6 +20,7 @@ from femgear.case.gear_set import set_deviations
 from femgear.case.planetary import Case, RigidCase, output_member
 from femgear.case.sections import MeshStiffnessSection
 from femgear.errors import CaseError
+from femgear.fe.beam import AXES
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
 from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
@@ -207,7 +208,6 @@ def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:
     return 1 if found.sun > found.carrier else -1
 
 
-_AXES = ("x", "y", "z", "tilt x", "tilt y", "rotation")
 # natural frequencies closer than this, relative to the frequency, count as one
 _SAME = 1e-3
 # the same, of what rounding alone tells apart
@@ -613,5 +613,5 @@ def in_space(data: RigidSet, shape: np.ndarray) -> tuple[np.ndarray, list[str]]:
         full[3:, first + 1] = radial * sine + tangential * cosine
     full[:, -(axes // 2) :] /= data.radii[:, None, None]
     bodies = [*CENTRAL, *(f"planet {n + 1}" for n in range(N))]
-    names = [f"{body}: {_AXES[axis]}" for body in bodies for axis in data.axes]
+    names = [f"{body}: {AXES[axis]}" for body in bodies for axis in data.axes]
     return full.reshape(len(names), -1), names

@@ -7,7 +7,6 @@ sets without such a section.
 
 from __future__ import annotations
 
-import difflib
 import os
 import re
 from collections.abc import Callable, Mapping
@@ -21,7 +20,7 @@ from femgear.case.checks import cross_check, without_uncomputed
 from femgear.case.csv_columns import embed_checksum, embed_profiles
 from femgear.case.estimates import with_estimates
 from femgear.case.gear_set import check_shafts
-from femgear.case.messages import added_material, combine, notices, translate
+from femgear.case.messages import added_material, combine, no_such, notices, translate
 from femgear.case.planetary import Case
 from femgear.case.sections import FORMAT
 from femgear.case.text import described, text_with_points
@@ -344,15 +343,8 @@ def _unknown_model(value: object) -> CaseError:
     if not isinstance(value, str):
         message, limit = f"a text is needed, not {described(value)}", ", ".join(known)
         return CaseError(message, code="E-TYPE", key="model", value=value, limit=limit)
-    near = difflib.get_close_matches(value.lower(), known, n=1, cutoff=0.6)
-    return CaseError(
-        "there is no such model",
-        code="E-CHOICE",
-        key="model",
-        value=value,
-        limit=f"{', '.join(known)}; planetary sets have no entry model",
-        remedy=f"did you mean {near[0]}?" if near else "leave it out",
-    )
+    limit = f"{', '.join(known)}; planetary sets have no entry model"
+    return no_such("model", "model", value, known, "leave it out", limit=limit)
 
 
 def _train_of_set(data: dict) -> registry.Known:

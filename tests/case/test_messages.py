@@ -6,6 +6,7 @@ import pytest
 from trains.test_reading import CASE, TEXT, _root_radius_code, refused, replaced
 
 from femgear.case.gear_set import planetary_set
+from femgear.case.messages import no_such
 from femgear.errors import CaseError, GeometryError
 from femgear.trains.reading import read_case, with_value, with_values
 
@@ -103,3 +104,17 @@ def test_refusals_show_values_in_the_unit_of_their_entry():
         with pytest.raises(GeometryError) as caught:
             planetary_set(with_values(case, changes))
         assert (caught.value.key, caught.value.value) == (key, found)
+
+
+def test_a_name_that_nothing_has_is_refused_with_the_nearest():
+    names = ["Sun shaft", "ring"]
+    near = no_such("part", "load[0].shaft", "sun shfat", names, "name a [[shaft]]", limit="a shaft")
+    assert (near.code, near.key, near.value, near.remedy) == (
+        "E-CHOICE",
+        "load[0].shaft",
+        "sun shfat",
+        "did you mean Sun shaft?",
+    )
+    assert no_such("part", "load[0].shaft", "wheel", names, "name a [[shaft]]", limit="a shaft").remedy == (
+        "name a [[shaft]]"
+    )

@@ -5,7 +5,6 @@ A torque series in a CSV file that the case names is read once and kept inside t
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 import sys
@@ -20,6 +19,7 @@ from pydantic import Field, StrictBool
 from femgear.case import text as case_text
 from femgear.case.csv_columns import CsvColumns, embed_points, embed_profiles, embedded, read_columns
 from femgear.case.gear_set import line_play, planetary_set, set_deviations
+from femgear.case.messages import no_such
 from femgear.case.quantities import (
     ACCELERATION,
     ANGLE,
@@ -217,15 +217,7 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
     used += [(f"operation.torque[{i}].body", one.body) for i, one in enumerate(case.operation.torque)]
     for key, name in used:
         if name not in names:
-            near = difflib.get_close_matches(name, names, n=1, cutoff=0.6)
-            yield CaseError(
-                "there is no such body",
-                code="E-CHOICE",
-                key=key,
-                value=name,
-                limit=", ".join(names[:20]),
-                remedy=f"did you mean {near[0]}?" if near else "name a body of a [[body]] table",
-            )
+            yield no_such("body", key, name, names, "name a body of a [[body]] table", limit=", ".join(names[:20]))
     for key, first, second in _joints(case):
         if first == second:
             yield CaseError("a body is joined to itself", code="E-CHOICE", key=key, value=first, limit="two bodies")

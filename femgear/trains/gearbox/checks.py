@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 
+from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError, FemgearError
@@ -118,15 +118,8 @@ def port_names(case: GearboxCase) -> list[str]:
 
 def _unknown(key: str, name: str, known: list[str], what: str) -> Iterator[CaseError]:
     if name not in known:
-        near = difflib.get_close_matches(name, known, n=1, cutoff=0.6)
-        yield CaseError(
-            "there is no such part",
-            code="E-CHOICE",
-            key=key,
-            value=name,
-            limit=", ".join(known[:20]) or f"none: the case has no {what.split()[-1]}",
-            remedy=f"did you mean {near[0]}?" if near else f"name {what}",
-        )
+        limit = ", ".join(known[:20]) or f"none: the case has no {what.split()[-1]}"
+        yield no_such("part", key, name, known, f"name {what}", limit=limit)
 
 
 def _seats(case: GearboxCase) -> Iterator[CaseError]:
