@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _ARROW = 46.0  # length of the longest arrow [points]
+_STEP = 4.0  # by which names are pushed off one another [points]
 _LEAST = 0.04  # force that is drawn, over the largest
 _MOST_MODES = 24
 _KIND_COLOURS: dict[str, str] = dict(zip(("torsional", "bending", "axial", "mixed", "ring"), COLOURS, strict=False))
@@ -41,7 +42,22 @@ def deflected_shafts(deflection: xr.Dataset) -> Figure:
         _arrows(ax, one, way)
         label(ax, "z [mm]", f"deflection along {axis} [µm]")
     legend_below(figure, axes[0], columns=6)
+    _part_names(figure)
     return figure
+
+
+def _part_names(figure: Figure) -> None:
+    """Push names of bearings that lie on another one on, away from their arrows."""
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        placed = []
+        for text in sorted((text for text in ax.texts if text.get_text()), key=lambda text: text.xy[0]):
+            x, y = text.xyann
+            way = -1.0 if text.get_va() == "top" else 1.0
+            while any(text.get_window_extent().overlaps(box) for box in placed):
+                y += way * _STEP
+                text.xyann = (x, y)
+            placed.append(text.get_window_extent())
 
 
 def _arrows(ax, one: xr.Dataset, way: int) -> None:
@@ -56,7 +72,7 @@ def _arrows(ax, one: xr.Dataset, way: int) -> None:
         style = {"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
         ax.annotate("", tip, (0.0, -length), textcoords="offset points", arrowprops=style)
         ax.annotate(
-            f"{name}\n{abs(vector[way]):.0f} N",
+            f"{name}\n{_force_text(abs(vector[way]))}",
             tip,
             (0.0, -length - np.sign(length) * 3.0),
             textcoords="offset points",
@@ -64,6 +80,10 @@ def _arrows(ax, one: xr.Dataset, way: int) -> None:
             va="top" if length > 0.0 else "bottom",
             fontsize=SIZE - 3,
         )
+
+
+def _force_text(force: float) -> str:
+    return f"{force:.0f} N" if force < 1e4 else f"{1e-3 * force:.0f} kN"
 
 
 def load_patterns(deflection: xr.Dataset) -> Figure | None:

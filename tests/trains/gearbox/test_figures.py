@@ -28,6 +28,20 @@ def test_every_shaft_has_a_curve_in_both_planes_and_bearings_their_forces(data):
         assert {text.get_text().split("\n")[0] for text in ax.texts if text.get_text()} == {"A", "B", "C", "D"}
 
 
+def test_no_name_of_a_bearing_lies_on_another(data):
+    near = data[0].copy(deep=True)
+    near["bearing_place"][:] = near["bearing_place"][0]
+    near["bearing_displacement"][:] = 0.0
+    near["bearing_force"][:] = 2e4
+    figure = deflected_shafts(near)
+    figure.draw_without_rendering()
+    for ax in figure.axes:
+        names = [text for text in ax.texts if text.get_text()]
+        assert sorted(text.get_text() for text in names) == [f"{name}\n20 kN" for name in "ABCD"]
+        boxes = [text.get_window_extent() for text in names]
+        assert not any(box.overlaps(other) for i, box in enumerate(boxes) for other in boxes[:i])
+
+
 def test_loads_over_the_width_integrate_to_the_force(data):
     (ax,) = load_patterns(data[0]).axes
     line = ax.lines[0]
