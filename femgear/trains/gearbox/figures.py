@@ -48,12 +48,15 @@ def deflected_shafts(deflection: xr.Dataset) -> Figure:
 
 def _part_names(figure: Figure) -> None:
     """Push names of bearings that lie on another one on, away from their arrows."""
+    from matplotlib.text import Annotation
+
     figure.draw_without_rendering()
     for ax in figure.axes:
         placed = []
-        for text in sorted((text for text in ax.texts if text.get_text()), key=lambda text: text.xy[0]):
+        names = [text for text in ax.texts if isinstance(text, Annotation) and text.get_text()]
+        for text in sorted(names, key=lambda text: text.xy[0]):
             x, y = text.xyann
-            way = -1.0 if text.get_va() == "top" else 1.0
+            way = -1.0 if text.get_verticalalignment() == "top" else 1.0
             while any(text.get_window_extent().overlaps(box) for box in placed):
                 y += way * _STEP
                 text.xyann = (x, y)
