@@ -1,9 +1,11 @@
-"""A gearbox of one pair on two shafts of two bearings each, as tables."""
+"""A gearbox of one pair, or of one planetary set, on two shafts of two bearings each, as tables."""
 
 from __future__ import annotations
 
 import copy
 from typing import Any
+
+from femgear.trains.reading import read_case
 
 _TABLES: dict[str, Any] = {
     "model": "gearbox",
@@ -59,3 +61,30 @@ def pair_tables(*, teeth: bool = False, helix: str = "0 deg") -> dict[str, Any]:
     else:
         stage["gears"]["helix_angle"] = helix
     return tables
+
+
+def set_on_shafts(*, slices: int = 9) -> dict[str, Any]:
+    """Tables of a helical planetary set with teeth: sun and carrier on shafts of two bearings, the ring in the casing."""
+    teeth = read_case("cases/e_axle.toml").planetary[0].teeth
+    tables = pair_tables()
+    seats = {"A": ("input", "2 mm"), "B": ("input", "38 mm"), "C": ("output", "2 mm"), "D": ("output", "58 mm")}
+    sections = ({"outer_diameter": "24 mm"}, {"outer_diameter": "60 mm", "inner_diameter": "40 mm"})
+    for shaft, length, part in zip(tables["shaft"], (40, 60), sections, strict=True):
+        shaft |= {"axis": ["0 mm", "0 mm"], "start": f"{-length // 2} mm", "part": [{"length": f"{length} mm"} | part]}
+    for bearing in tables["bearing"]:
+        bearing["shaft"], bearing["position"] = seats[bearing["name"]]
+    tables["load"][1]["position"] = "60 mm"
+    del tables["pair"]
+    tables["planetary"] = [
+        {
+            "name": "set",
+            "sun": "input",
+            "carrier": "output",
+            "sun_position": "20 mm",
+            "carrier_position": "30 mm",
+            "pins": {"diameter": "16 mm", "length": "14 mm"},
+            "planet": {"bearing": {"radial": "3e8 N/m"}},
+            "teeth": copy.deepcopy(teeth) | {"static": {"positions": 12}},
+        }
+    ]
+    return tables | {"deflection": {"slices": slices}}

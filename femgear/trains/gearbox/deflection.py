@@ -2,8 +2,8 @@
 
 Newton's method on ``K q + B f(B^T q) + W p(W^T q) = load``: beams and linear springs in K, forces f of rolling
 bearings by their geometry, slices p of the meshes as springs that only press. The distribution of the load over the
-width comes from the contact of the teeth with the slopes that the system gives them; it shifts the slices, and the
-system is solved again until the slopes have settled.
+width and the planets comes from the contact of the teeth with the slopes and displacements that the system gives them;
+it shifts the slices, and the system is solved again until slopes and mesh forces have settled.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from femgear.system.assembly import GROUND, MOTIONS, Assembly, StationSprings
 from femgear.system.bearing_life import basic_rating_life, reference_rating_life
 from femgear.system.rolling_bearings import BearingState, bearing_state, sliding_state
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
-from femgear.trains.gearbox.contact import StageContact, stage_contact
+from femgear.trains.gearbox.contact import StageContact, given_separation, stage_contact
 from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
 
@@ -64,7 +64,7 @@ class Deflection:
     slopes : tuple of array
         Slopes of the meshes of every pass [rad]: of the approach of the flanks along the width.
     settled : bool
-        Whether the slopes of the last two passes agree.
+        Whether the slopes of the last two passes agree, and the mesh forces of contact and system.
     """
 
     model: GearboxModel
@@ -155,6 +155,14 @@ def mesh_slopes(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
     return found
 
 
+def mesh_separation(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
+    """Compute how far all motions (6n,) but rotations take the flanks of every mesh apart along the normal [m]."""
+    shifted = motion.reshape(-1, 6).copy()
+    shifted[:, 5] = 0.0
+    approach = assembly.columns.T @ shifted.ravel()
+    return np.array([-approach[part].mean() for part in assembly.slices])
+
+
 def solve_deflection(
     case: GearboxCase,
     load_case: LoadCaseSection | None = None,
@@ -163,7 +171,7 @@ def solve_deflection(
     steps=None,
     estimate: float = 1.0,
 ) -> Deflection:
-    """Solve for the loaded state of a gearbox, teeth and system in turn until the slopes of the meshes settle.
+    """Solve for the loaded state of a gearbox, teeth and system in turn until slopes and forces of the meshes settle.
 
     Parameters
     ----------
@@ -186,39 +194,63 @@ def solve_deflection(
         No balance, as of a bearing whose clearance swallows the load (E-CONVERGENCE).
     """
     model = gearbox_model(case, load_case, estimate=estimate)
-    gap = np.zeros(len(model.assembly.slice_stiffness))
-    found = solve_state(model, gap)
     staged = [stage for stage in model.stages if stage.section.teeth is not None]
+    gap = _first_gaps(model, staged)
+    found = solve_state(model, gap)
     if not (staged and case.deflection.contact):
         return replace(found, slopes=(found.mesh_slope,))
     history = [np.asarray(slopes, float) if slopes is not None else found.mesh_slope]
+    apart = mesh_separation(model.assembly, found.motion)
     contacts: dict[str, StageContact] = {}
     settled, coarse = False, True
     for _ in range(case.deflection.passes):
         positions = _COARSE if coarse else None
-        contacts = {stage.name: _contact(model, stage, history[-1], steps, positions) for stage in staged}
+        contacts = {stage.name: _contact(model, stage, history[-1], apart, steps, positions) for stage in staged}
         stiffness = {name: contact.stiffness for name, contact in contacts.items()}
         model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate)
         gap = _gaps(model, staged, contacts, history[-1])
         found = solve_state(model, gap, start=found)
+        apart = mesh_separation(model.assembly, found.motion)
         history.append(found.mesh_slope)
+        tolerance = max(case.deflection.tolerance, _NEAR) if coarse else case.deflection.tolerance
+        alike = _agree(model, history[-1], history[-2], tolerance) and _forces_agree(found, contacts, tolerance)
         if coarse:
-            coarse = not _agree(model, history[-1], history[-2], max(case.deflection.tolerance, _NEAR))
-        elif _agree(model, history[-1], history[-2], case.deflection.tolerance):
+            coarse = not alike
+        elif alike:
             settled = True
             break
     return replace(found, contacts=contacts, slopes=tuple(history), settled=settled)
 
 
-def _contact(model: GearboxModel, stage: StageModel, slopes: np.ndarray, steps, positions: int | None) -> StageContact:
-    """Contact of the teeth of a stage with the slopes of its meshes, at few positions until these are near."""
-    torque, own = -model.flow.first_torque(stage.section), slopes[list(stage.meshes)]
+def _contact(
+    model: GearboxModel, stage: StageModel, slopes: np.ndarray, apart: np.ndarray, steps, positions: int | None
+) -> StageContact:
+    """Contact of the teeth of a stage with slopes and separations of its meshes, at few positions until these settle."""
+    torque, own = -model.flow.first_torque(stage.section), list(stage.meshes)
     slices = model.case.deflection.slices if model.case.motions == "space" else 0
-    return stage_contact(stage.section, torque, own, slices=slices, positions=positions, steps=steps)
+    return stage_contact(
+        stage.section,
+        torque,
+        slopes[own],
+        separation=apart[own],
+        slices=slices,
+        positions=positions,
+        steps=steps,
+    )
+
+
+def _first_gaps(model: GearboxModel, staged: Sequence[StageModel]) -> np.ndarray:
+    """Gaps (g,) of the slices by errors of the teeth [m], as of planets off their places."""
+    gap = np.zeros(len(model.assembly.slice_stiffness))
+    for stage in staged:
+        apart = given_separation(stage.section, -model.flow.first_torque(stage.section))
+        for mesh, value in zip(stage.meshes, apart, strict=True):
+            gap[model.assembly.slices[mesh]] = value
+    return gap
 
 
 def _gaps(model, staged, contacts, slopes) -> np.ndarray:
-    """Gaps (g,) of the slices with which springs have the loads of the contact at the slopes that it had [m]."""
+    """Gaps (g,) of the slices with which springs have the loads of the contact at its slopes and approaches [m]."""
     assembly = model.assembly
     gap = np.zeros(len(assembly.slice_stiffness))
     for stage in staged:
@@ -226,9 +258,20 @@ def _gaps(model, staged, contacts, slopes) -> np.ndarray:
         for place, mesh in enumerate(stage.meshes):
             one, part = assembly.contacts[mesh], assembly.slices[mesh]
             force = contact.shares_at(place, len(one.heights)) * contact.normal_force[place]
-            # an even approach is that of the whole mesh; the slope is that with which the contact was solved
-            gap[part] = slopes[mesh] * one.heights + force.sum() / one.stiffness.sum() - force / one.stiffness
+            # slope and approach are those with which the contact was solved
+            gap[part] = slopes[mesh] * one.heights + contact.approach[place] - force / one.stiffness
     return gap
+
+
+def _forces_agree(found: Deflection, contacts: Mapping[str, StageContact], tolerance: float) -> bool:
+    """Whether all meshes have the forces of the contact of their teeth, against the largest one of their stage."""
+    for stage in found.model.stages:
+        if stage.name in contacts:
+            force = contacts[stage.name].normal_force
+            apart = np.abs(found.mesh_force[list(stage.meshes)] - force)
+            if apart.max() > tolerance * force.max():
+                return False
+    return True
 
 
 def _agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: float) -> bool:

@@ -389,10 +389,10 @@ class _Builder:
         station = self._station(f"{stage.name} planet {n + 1}", tuple(centre))
         mass, polar, transverse = self._planet_body(stage, teeth)
         self._body(Seat(station), mass, polar, transverse, self.flow.planet_speed[stage.name])
-        given, radial = stage.planet.bearing, math.inf
-        if given is None and teeth is not None and getattr(teeth.planet, "bearing_stiffness", None) is not None:
-            radial = teeth.planet.bearing_stiffness
-        radial, axial, tilt = (given.radial, given.axial, given.tilt) if given else (radial, math.inf, math.inf)
+        given = stage.planet.bearing
+        of_teeth = (getattr(teeth and teeth.planet, f"{name}_stiffness", None) for name in ("bearing", "tilt"))
+        radial, tilt = (math.inf if value is None else value for value in of_teeth)
+        radial, axial, tilt = (given.radial, given.axial, given.tilt) if given else (radial, math.inf, tilt)
         offset = np.asarray(carrier.offset) + (centre - place)
         stiffness = np.array([radial, radial, axial, tilt, tilt, 0.0])
         if stage.pins is not None:

@@ -19,7 +19,7 @@ from femgear.system.assembly import MOTIONS
 from femgear.trains.gearbox.case_file import GearboxCase
 from femgear.trains.gearbox.deflection import Deflection, bearing_lives
 from femgear.trains.gearbox.geometry import set_sizes
-from femgear.trains.gearbox.model import bearing_motions, bearing_places
+from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places
 from femgear.trains.gearbox.modes import GearboxModes, member_of_stations
 
 if TYPE_CHECKING:
@@ -85,6 +85,12 @@ class DeflectionResult(StageResult):
             "speed": ("load_case shaft", _speeds(every, case) / RPM, "rpm", "speed of the shaft"),
             "torque": ("load_case port", _torques(every), "N m", "torque from outside, reactions of outputs too"),
             "mesh_frequency": ("load_case stage", _of_stages(every, "mesh_frequency"), "Hz", "mesh frequency"),
+            "planet_load_factor": (
+                "load_case stage",
+                [[_planet_factor(one, stage) for stage in one.model.stages] for one in every],
+                "1",
+                "K_gamma: largest force of the planets' meshes over their mean; NaN of pairs",
+            ),
             "share": (load_case, [one.share for one in case.operation.load_case], "1", "share of the time"),
             "mesh_force": (mesh, [one.mesh_force for one in every], "N", "force along the normal of the flanks"),
             "mesh_slope": (mesh, slopes, "rad", "slope of the approach along the width, closer at z > 0 positive"),
@@ -105,7 +111,7 @@ class DeflectionResult(StageResult):
             ),
             "place": ("station axis", assembly.places, "m", "place of the station"),
             "passes": (load_case, [len(one.slopes) - 1 for one in every], "1", "passes of contact and system"),
-            "settled": (load_case, [one.settled for one in every], "1", "whether the slopes have settled"),
+            "settled": (load_case, [one.settled for one in every], "1", "whether slopes and mesh forces have settled"),
             "out_of_balance": (load_case, [one.residual for one in every], "1", "force out of balance, relative"),
         }
         variables |= _of_bearings(every, state) | _distribution(state) | _of_estimates(self.estimates)
@@ -166,6 +172,12 @@ def _per_mesh(state: Deflection, value) -> np.ndarray:
 
 def _face_factors(state: Deflection) -> np.ndarray:
     return _per_mesh(state, lambda contact: contact.face_load_factor)
+
+
+def _planet_factor(state: Deflection, stage: StageModel) -> float:
+    """K_gamma of a planetary set by its meshes with the sun; NaN of a pair."""
+    force = state.mesh_force[list(stage.meshes)[: len(stage.planets)]]
+    return float(force.max() / force.mean()) if len(force) and force.any() else math.nan
 
 
 def _errors(states) -> np.ndarray:
@@ -324,6 +336,10 @@ def _worst_of_deflection(data: Any) -> Iterator[tuple[str, str]]:
         if np.isfinite(factor).any():
             at = np.unravel_index(int(np.nanargmax(factor)), factor.shape)
             yield "largest face load factor K_Hβ", f"{factor[at]:.3f}, {where(at, meshes)}"
+    sharing = data["planet_load_factor"].values
+    if np.isfinite(sharing).any():
+        at = np.unravel_index(int(np.nanargmax(sharing)), sharing.shape)
+        yield "largest planet load factor K_γ", f"{sharing[at]:.3f}, {where(at, data['stage'].values)}"
     if len(bearings):
         force = np.hypot(data["radial_force"].values, data["axial_force"].values)
         at = np.unravel_index(int(force.argmax()), force.shape)
@@ -483,10 +499,11 @@ def _not_assembled(case: GearboxCase) -> Iterator[Finding]:
 
 
 _HOLDS = ("support_stiffness", "bearing_stiffness", "tilt_stiffness", "foundation_radial", "foundation_tangential")
+_WITHOUT_EFFECT = (("static", "members"), ("planet", "bearing_clearance"))
 
 
 def _without_effect(tables: dict) -> list[str]:
-    found = []
+    found = [f"{section}.{key}" for section, key in _WITHOUT_EFFECT if key in tables.get(section, {})]
     for gear in ("gear_1", "gear_2", "sun", "ring", "carrier"):
         section = tables.get(gear)
         found += [f"{gear}.{key}" for key in _HOLDS if isinstance(section, dict) and key in section]

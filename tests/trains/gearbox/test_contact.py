@@ -4,12 +4,20 @@ import math
 
 import numpy as np
 import pytest
-from small_gearbox import pair_tables
+from small_gearbox import pair_tables, set_on_shafts
 
 from femgear.case.gear_set import planetary_set
-from femgear.gears.deviations import misaligned_approach, no_deviations
+from femgear.gears.deviations import body_separation, misaligned_approach, no_deviations
 from femgear.trains.gearbox.case_file import teeth_of
-from femgear.trains.gearbox.contact import StageContact, askew, loaded_tables, stage_contact
+from femgear.trains.gearbox.contact import (
+    StageContact,
+    askew,
+    displaced,
+    given_separation,
+    loaded_tables,
+    stage_contact,
+    unequal_separation,
+)
 from femgear.trains.reading import read_case
 
 
@@ -19,6 +27,49 @@ def test_any_slopes_of_a_set_are_those_of_askew_planets(back):
     slopes = np.array([3.0, -1.0, 2.0, 0.5, 4.0, -2.0]) * 1e-5
     found = askew(no_deviations(gears), gears, slopes, back=back)
     assert misaligned_approach(found, gears, back=back) == pytest.approx(slopes, abs=1e-15)
+
+
+@pytest.mark.parametrize("back", [False, True])
+def test_any_separations_of_a_set_are_those_of_displaced_planets(back):
+    gears = planetary_set(teeth_of(read_case("cases/e_axle.toml").planetary[0]))
+    apart = np.array([3.0, -1.0, 2.0, 0.5, 4.0, -2.0]) * 1e-6
+    level = body_separation(no_deviations(gears), gears, 0.3, back=back)[:, 0]
+    found = displaced(no_deviations(gears), gears, apart, back=back)
+    assert body_separation(found, gears, 0.3, back=back)[:, 0] - level == pytest.approx(apart, abs=1e-15)
+
+
+def test_rotations_take_up_all_but_what_loads_planets_unequally():
+    def left(separation):
+        return unequal_separation(np.asarray(separation, float))
+
+    # of the sun alone, of the ring alone, of planet 2 alone
+    for turned in ([1, 1, 1, 0, 0, 0], [0, 0, 0, 1, 1, 1], [0, 1, 0, 0, -1, 0]):
+        assert left(turned) == pytest.approx(np.zeros(6), abs=1e-15)
+    assert left([2, 0, 0, 1, 0, 0]) == pytest.approx([1.0, -0.5, -0.5] * 2)
+    assert left([5.0]) == pytest.approx([0.0])
+
+
+def test_a_set_is_loaded_by_its_separations_as_by_its_pins():
+    stage = read_case(set_on_shafts()).planetary[0]
+    pins = [{"planet": 2, "tangential": "-10 um", "radial": "4 um"}]
+    off = stage.model_copy(update={"teeth": stage.teeth | {"set": stage.teeth["set"] | {"pin_errors": pins}}})
+    still = np.zeros(6)
+    for torque in (100.0, -100.0):
+        by_errors = stage_contact(off, torque, still, slices=9, positions=8)
+        by_system = stage_contact(
+            stage, torque, still, separation=given_separation(off, torque), slices=9, positions=8
+        )
+        assert by_system.normal_force == pytest.approx(by_errors.normal_force, rel=1e-6)
+        assert np.ptp(by_errors.normal_force) > 100.0
+
+
+def test_what_holds_the_gears_is_not_held_twice():
+    tables = set_on_shafts()
+    teeth = tables["planetary"][0]["teeth"]
+    teeth["static"]["members"] = "elastic"
+    teeth["sun"]["tilt_stiffness"] = "1e4 N m/rad"
+    found = loaded_tables(read_case(tables).planetary[0], 10.0, 9)
+    assert "members" not in found["static"] and "tilt_stiffness" not in found["sun"]
 
 
 def test_the_loads_of_the_gearbox_stand_in_the_tables():
@@ -40,7 +91,7 @@ def test_forces_follow_from_the_torque():
 
 def test_shares_keep_their_sum_in_other_slices():
     shares = np.array([[0.4, 0.3, 0.2, 0.1]])
-    contact = StageContact(None, np.ones(1), np.ones(1), shares)  # type: ignore[arg-type]
+    contact = StageContact(None, np.ones(1), np.ones(1), shares, np.zeros(1))  # type: ignore[arg-type]
     assert contact.shares_at(0, 4) == pytest.approx(shares[0])
     assert contact.shares_at(0, 2) == pytest.approx([0.7, 0.3])
     assert contact.shares_at(0, 8).sum() == pytest.approx(1.0)

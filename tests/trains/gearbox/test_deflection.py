@@ -1,16 +1,24 @@
 """Loaded states: closed forms, equilibrium, rolling bearings, the passes of contact and system."""
 
+import copy
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_gearbox import pair_tables
+from gearbox_equivalents import elastic_set_tables
+from small_gearbox import pair_tables, set_on_shafts
 
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, FemgearError
 from femgear.fe.beam import RoundSection
+from femgear.gears.deviations import misaligned_approach, no_deviations
+from femgear.stages.static import solve_static
 from femgear.system.rolling_bearings import bearing_state
-from femgear.trains.gearbox.deflection import mesh_slopes, rolling_bearing, solve_deflection
+from femgear.trains.gearbox.case_file import teeth_of
+from femgear.trains.gearbox.deflection import mesh_separation, mesh_slopes, rolling_bearing, solve_deflection
+from femgear.trains.gearbox.model import gearbox_model
 from femgear.trains.reading import read_case
 
 BALL = {
@@ -121,6 +129,77 @@ def test_the_slope_of_a_mesh_is_the_line_through_its_slices():
     approach = assembly.columns.T @ found.motion
     line = np.polyfit(assembly.contacts[0].heights, approach, 1)[0]
     assert mesh_slopes(assembly, found.motion) == pytest.approx([line], rel=1e-9)
+
+
+@pytest.mark.parametrize("torque", [100.0, -100.0])
+def test_unequal_planets_carry_what_the_set_alone_on_its_bearings_says(torque):
+    """Errors of pins in the plane, against the contact with sun and planets on springs, a solver of its own."""
+    tables = elastic_set_tables("cases/planetary_27_40_108.toml")
+    teeth = tables["planetary"][0]["teeth"]
+    teeth["operation"]["torque"] = f"{torque} N m"
+    teeth["set"]["pin_errors"] = [
+        {"planet": 2, "tangential": "-12 um", "radial": "8 um"},
+        {"planet": 3, "radial": "-10 um"},
+    ]
+    teeth["static"] = {"positions": 12, "members": "elastic"}
+    # the ring stands still, as in a casing
+    teeth["ring"] |= dict.fromkeys(("foundation_radial", "foundation_tangential"), "1e14 N/m^3")
+    alone = np.abs(solve_static(read_case(copy.deepcopy(teeth))).cycle.force).mean(axis=1)
+    tables["planetary"][0]["elastic_ring"] = False
+    tables["operation"]["load_case"][0]["torque"] = {"motor": f"{torque} N m"}
+    found = solve_deflection(read_case(tables | {"deflection": {}}))
+    assert np.ptp(alone) > 0.15 * alone.mean()
+    assert found.mesh_force == pytest.approx(alone, abs=2e-3 * np.ptp(alone))
+
+
+def test_contact_and_system_agree_on_unequal_forces_of_planets():
+    tables = set_on_shafts()
+    push = {"name": "push", "shaft": "input", "position": "20 mm", "force": ["500 N", "800 N", "0 N"]}
+    tables["load"].append(push)
+    tables["planetary"][0]["teeth"]["set"]["pin_errors"] = [{"planet": 2, "tangential": "-20 um"}]
+    found = solve_deflection(read_case(tables))
+    force = found.contacts["set"].normal_force
+    assert found.settled
+    assert found.mesh_force == pytest.approx(force, abs=1e-4 * force.max())
+    assert np.ptp(force) > 0.3 * force.mean()
+    # what the contact was solved with is what the system has
+    apart = mesh_separation(found.model.assembly, found.motion)
+    assert np.ptp(apart[:3] + apart[3:]) > 1e-6
+
+
+def test_planets_without_load_settle():
+    tables = elastic_set_tables("cases/planetary_27_40_108.toml") | {"deflection": {}}
+    tables["planetary"][0] |= {"elastic_ring": False}
+    teeth = tables["planetary"][0]["teeth"]
+    teeth["set"]["pin_errors"] = [{"planet": 2, "tangential": "-60 um"}]
+    teeth["static"] = {"positions": 12}
+    tables["operation"]["load_case"][0]["torque"] = {"motor": "10 N m"}
+    found = solve_deflection(read_case(tables))
+    assert found.settled
+    assert found.mesh_force[[0, 2]] == pytest.approx([0.0, 0.0], abs=1e-6)
+    radius = found.model.stages[0].sizes.base_radii[0]
+    assert found.mesh_force[1] == pytest.approx(10.0 / radius, rel=1e-9)
+
+
+@pytest.mark.parametrize("torque", ["100 N m", "-100 N m"])
+def test_tilts_of_sun_and_planets_give_meshes_the_slopes_that_the_contact_gives_them(torque):
+    tables = set_on_shafts()
+    tables["operation"]["load_case"][0]["torque"]["motor"] = torque
+    case = read_case(tables)
+    model, (stage,) = gearbox_model(case), case.planetary
+    gears, (staged,) = planetary_set(teeth_of(stage)), model.stages
+    cosine, back = math.cos(staged.sizes.base_helix), torque.startswith("-")
+    ideal = no_deviations(gears)
+    for lean in ((1e-4, 0.0), (0.0, 1e-4), (3e-5, -7e-5)):
+        # the end z > 0 moves by the slope along x and y: tilts about y and -x
+        motion = np.zeros(model.assembly.count).reshape(-1, 6)
+        motion[staged.members[0], 3:5] = -lean[1], lean[0]
+        wanted = misaligned_approach(replace(ideal, sun_misalignment=np.array(lean)), gears, back=back)
+        assert mesh_slopes(model.assembly, motion.ravel()) == pytest.approx(cosine * wanted, abs=1e-10)
+        motion[:] = 0.0
+        motion[list(staged.planets), 3:5] = -lean[1], lean[0]
+        wanted = misaligned_approach(replace(ideal, carrier_misalignment=np.array(lean)), gears, back=back)
+        assert mesh_slopes(model.assembly, motion.ravel()) == pytest.approx(cosine * wanted, abs=1e-10)
 
 
 def refused(tables) -> str:
