@@ -64,7 +64,7 @@ def pair_tables(*, teeth: bool = False, helix: str = "0 deg") -> dict[str, Any]:
 
 
 def set_on_shafts(*, slices: int = 9) -> dict[str, Any]:
-    """Tables of a helical planetary set with teeth: sun and carrier on shafts of two bearings, the ring in the casing."""
+    """Tables of a helical planetary set with teeth: two shafts of two bearings each, the ring in the casing."""
     teeth = read_case("cases/e_axle.toml").planetary[0].teeth
     tables = pair_tables()
     seats = {"A": ("input", "2 mm"), "B": ("input", "38 mm"), "C": ("output", "2 mm"), "D": ("output", "58 mm")}

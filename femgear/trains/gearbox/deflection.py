@@ -225,7 +225,7 @@ def solve_deflection(
 def _contact(
     model: GearboxModel, stage: StageModel, slopes: np.ndarray, apart: np.ndarray, steps, positions: int | None
 ) -> StageContact:
-    """Contact of the teeth of a stage with slopes and separations of its meshes, at few positions until these settle."""
+    """Contact of the teeth of a stage with slopes and separations of its meshes, few positions until they settle."""
     torque, own = -model.flow.first_torque(stage.section), list(stage.meshes)
     slices = model.case.deflection.slices if model.case.motions == "space" else 0
     return stage_contact(
