@@ -56,9 +56,7 @@ def test_a_set_is_loaded_by_its_separations_as_by_its_pins():
     still = np.zeros(6)
     for torque in (100.0, -100.0):
         by_errors = stage_contact(off, torque, still, slices=9, positions=8)
-        by_system = stage_contact(
-            stage, torque, still, separation=given_separation(off, torque), slices=9, positions=8
-        )
+        by_system = stage_contact(stage, torque, still, separation=given_separation(off, torque), slices=9, positions=8)
         assert by_system.normal_force == pytest.approx(by_errors.normal_force, rel=1e-6)
         assert np.ptp(by_errors.normal_force) > 100.0
 
