@@ -33,6 +33,7 @@ from validation import (
     nonlinear,
     nonlinear_tones,
     nrel,
+    one_system,
     pairs,
     parametric,
     parametric_routes,
@@ -539,7 +540,8 @@ THEMES = (
         "A ring on supports has no symmetry: forces and motions act both ways in orders of the carrier. The "
         "ring of these rows is thin and inextensional (206 GPa, 7850 kg/m3, radius 100 mm, 25 mm x 10 mm), "
         "the set in it a sun in springs and planets on fixed pins. Routes in time and by samples of a turn "
-        "share no equation with the solution.",
+        "share no equation with the solution; one linear system of all harmonics and side bands solves the "
+        "same equations without iterating.",
         (
             fixed_housing.splitting,
             fixed_housing.yielding,
@@ -548,6 +550,7 @@ THEMES = (
             fixed_housing.turning_errors,
             fixed_housing.axisymmetric,
             fixed_housing.green,
+            one_system.small_sets,
         ),
         (
             fixed_housing.in_time,
@@ -555,6 +558,7 @@ THEMES = (
             fixed_housing.by_samples,
             fixed_housing.reference_set_in_its_ring,
             fixed_housing.reference_set_on_supports,
+            one_system.reference_set,
         ),
     ),
     Theme(

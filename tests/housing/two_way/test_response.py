@@ -11,6 +11,7 @@ from femgear.housing.two_way.response import solve_two_way, structure_lines
 from femgear.solvers.linear.modal import solve_modes
 from femgear.stages.protocol import one_blas_thread
 from validation.fixed_housing import EQUAL, excitation, feet, gears, rigid_modes, shaken
+from validation.reference.two_way_direct import direct_forces, farthest_apart
 
 SPEEDS = np.array([-40.0, -70.0])
 STRUCTURE = feet(6)
@@ -58,3 +59,13 @@ def test_errors_that_are_not_small_are_solved():
     modes = solve_modes(gears(EQUAL), np.full(6, 5e6), damping_ratio=1e-3)
     found = solve_two_way(modes, wild, STRUCTURE, paths(3), SPEEDS[:1], **FEW, tolerance=1e-7)
     assert found.residual.max() < 1e-6 and found.spectral_radius[0] > 1.0 and found.products[0] > 100
+
+
+@pytest.mark.parametrize("coupled", [4, 2])
+@pytest.mark.parametrize(("sense", "symmetry"), [(1, 3), (-1, 1)])
+def test_one_linear_system_of_all_harmonics_gives_the_same_forces(sense, symmetry, coupled):
+    drive, structure, speed = excitation(paths(symmetry), sense), feet(4), 20.0 * sense
+    data = rigid_modes(paths(symmetry), drive), drive, structure, paths(symmetry)
+    found = solve_two_way(*data, [speed], harmonics=(2, 4), coupled_diameters=coupled, tolerance=1e-13)
+    direct = direct_forces(*data, speed, harmonics=(2, 4), coupled=coupled)
+    assert farthest_apart(found, 0, *direct) < 1e-9
