@@ -54,7 +54,7 @@ def promise(benchmark, title, note, limit):
 )
 def test_one_speed_at_full_band(benchmark, reference, supported, name, limit):
     note = solved(benchmark, reference, RUNS, rounds=3, supported=supported)
-    if supported is on_feet and (memory := peak_memory("two_way")):
+    if memory := peak_memory("two_way" if supported is on_feet else "two_way_bolts"):
         note += f"; peak {memory['peak']:.0f} MB"
     promise(benchmark, f"one speed, 250 rpm, {name}", note, limit)
 

@@ -465,6 +465,13 @@ STAGES = {
         lambda _, r: r.two_way.force[:, 1:].size * 2,
         3,
     ),
+    "two_way_bolts": Stage(
+        "the same, six bolts",
+        partial(two_way, supported=on_bolts),
+        ("modes",),
+        lambda _, r: r.two_way.force[:, 1:].size * 2,
+        3,
+    ),
     "housing": Stage("housing, 2 speeds", housing, ("dynamics",), lambda _, h: h.lines.displacement.size, 9),
     "whole": Stage("whole computation, grids cached", whole, ("grids",), _none, 3, 3.0),
     "whole_cold": Stage("whole computation, new grids", whole_cold, (), _none, 3),

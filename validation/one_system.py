@@ -1,4 +1,4 @@
-"""Two-way response against all harmonics and side bands in one linear system (`validation.reference.two_way_direct`)."""
+"""Two-way response against one linear system of all harmonics (`validation.reference.two_way_direct`)."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ class Lines:
         return self.product(harmonics)[:, (self.line == 0) & (self.band == 0)][:, 0]
 
 
-def direct_forces(  # noqa: PLR0913
+def direct_forces(
     gears: Modes,
     excitation: MeshExcitation,
     structure: FixedStructure,
@@ -247,11 +247,9 @@ def direct_damped_forces(
         at = np.searchsorted(reached, number[L] - step * structure.wave_order)
         for i, K in enumerate(at):
             S = structure.wave_shape[:, i]
-            velocity = 1j * turned[K] * S
-            equations[np.ix_(of_gears[L], of_modes[K])] += np.outer(damped.to_gears[:, i], velocity)
-            equations[np.ix_(of_modes[K], of_gears[L])] += (
-                1j * omega[L] * np.outer(S.conj(), damped.to_gears[:, i].conj())
-            )
+            velocity, on_gears = 1j * turned[K] * S, damped.to_gears[:, i]
+            equations[np.ix_(of_gears[L], of_modes[K])] += np.outer(on_gears, velocity)
+            equations[np.ix_(of_modes[K], of_gears[L])] += 1j * omega[L] * np.outer(S.conj(), on_gears.conj())
             for k, other in enumerate(at):
                 shape = structure.wave_shape[:, k]
                 equations[np.ix_(of_modes[other], of_modes[K])] += damped.on_waves[k, i] * np.outer(
