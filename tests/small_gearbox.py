@@ -88,3 +88,36 @@ def set_on_shafts(*, slices: int = 9) -> dict[str, Any]:
         }
     ]
     return tables | {"deflection": {"slices": slices}}
+
+
+def planetary_tables(**entries: Any) -> dict[str, Any]:
+    """Tables of a spur set of a sun and a carrier of one rigid body each, with further ``entries`` of the set."""
+    return {
+        "model": "gearbox",
+        "title": "a planetary set",
+        "shaft": [{"name": "sun"}, {"name": "carrier"}],
+        "mass": [
+            {"shaft": "sun", "mass": "2 kg", "inertia": "2e-3 kg m^2"},
+            {"shaft": "carrier", "mass": "8 kg", "inertia": "3e-2 kg m^2"},
+        ],
+        "bearing": [
+            {"shaft": "sun", "radial": "1e8 N/m", "axial": "1e8 N/m", "tilt": "1e6 N m/rad"},
+            {"shaft": "carrier", "radial": "5e8 N/m", "axial": "5e8 N/m", "tilt": "1e7 N m/rad"},
+        ],
+        "planetary": [
+            {
+                "name": "set",
+                "sun": "sun",
+                "carrier": "carrier",
+                "gears": {"teeth": [20, 20, 61], "module": "2 mm", "centre_distance": "40 mm", "face_width": "20 mm"},
+                "planet": {"mass": "0.4 kg", "inertia": "1e-4 kg m^2"},
+                "sun_mesh": {"stiffness": "3e8 N/m"},
+                "ring_mesh": {"stiffness": "3e8 N/m"},
+            }
+            | copy.deepcopy(entries)
+        ],
+        "operation": {
+            "output": ["carrier"],
+            "load_case": [{"torque": {"sun": "100 N m"}, "speed": {"sun": "1000 rpm"}}],
+        },
+    }

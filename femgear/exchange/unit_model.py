@@ -310,8 +310,8 @@ class _UnitWriter:
     def _pins(self, stage: Any, id: str, key: str) -> None:
         """Give the pins of a set held in two cheeks their sections, and couplings with the carrier at both ends."""
         pins, a = stage.pins, rexs_attribute
-        if pins.wind_up_stiffness is not None:
-            self.model.remark(f"{key}.pins", "REXS has no wind-up of the carrier: left out")
+        if stage.carrier_body is not None:
+            self.model.remark(f"{key}.carrier_body", "REXS has no elastic carrier: left out")
         carrier = self.shafts.get(stage.carrier)
         if pins.cheeks != 2 or carrier is None:
             self.model.remark(f"{key}.pins", "pins that one cheek holds are left out: they come back rigid")

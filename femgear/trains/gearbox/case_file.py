@@ -40,7 +40,7 @@ from femgear.case.quantities import (
     Title,
     Values,
 )
-from femgear.case.sections import FORMAT, Angle, DampingRatio, PressureAngle, Radius, Teeth
+from femgear.case.sections import FORMAT, Angle, DampingRatio, End, PressureAngle, Radius, Teeth
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError
 from femgear.trains.reading import parse_case
@@ -311,18 +311,32 @@ class BoxPlanetSection(Section):
 
 
 class PinSection(Section):
-    """Pins of the planets and wind-up of the carrier, by closed forms.
+    """Pins of the planets, by closed forms.
 
     Each pin is a round bar of a ``length`` from the cheek of the carrier to the middle of the planet; held in
-    ``cheeks`` 2 it is held at both ends of twice that length. ``wind_up_stiffness`` turns the far cheek against
-    that on the shaft.
+    ``cheeks`` 2 it is held at both ends of twice that length, in 1 at one end, on the side of the shaft.
     """
 
     diameter: Outer
     length: Length
     bore: Inner = 0.0
     cheeks: Literal[1, 2] = 2
+
+
+class CarrierBodySection(Section):
+    """What the carrier between its pins and its shaft gives way by: rigid where nothing is given.
+
+    By closed forms both cheeks, twice ``pins.length`` apart, wind up against one another: with a
+    ``wind_up_stiffness``, or that of the webs between them, of an outer and an inner diameter, which fill the
+    ``web_share`` of the circle; 1 is a closed tube. ``torque_end`` is the cheek on the shaft, the front at z < 0;
+    without it the one towards the longer end of the shaft, the back of a shaft that is one rigid body.
+    """
+
     wind_up_stiffness: Annotated[float, Quantity(TORSION, 1.0, 1e15)] | None = None
+    web_outer_diameter: Outer | None = None
+    web_inner_diameter: Inner | None = None
+    web_share: Annotated[float, Number(0.0, 1.0, open_low=True)] = 1.0
+    torque_end: End | None = None
 
 
 class BoxPlanetarySection(Section):
@@ -346,6 +360,7 @@ class BoxPlanetarySection(Section):
     ring_mesh: BoxMeshSection | None = None
     planet: BoxPlanetSection = BoxPlanetSection()
     pins: PinSection | None = None
+    carrier_body: CarrierBodySection | None = None
     elastic_ring: StrictBool = False
     """In modes the ring in the casing is elastic, on the foundation that its teeth give."""
 

@@ -10,6 +10,7 @@ from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
 from femgear.case.text import CaseFile
 from femgear.errors import CaseError, FemgearError
+from femgear.trains.gearbox.carrier import carrier_problems
 from femgear.trains.gearbox.case_file import (
     CASING,
     BoxBearingSection,
@@ -395,6 +396,7 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
             remedy="give an angle for every planet, or leave planets out",
         )
     yield from _neighbours(sizes, key)
+    yield from carrier_problems(stage, key)
     shafts = [
         (name, case.shaft_named(getattr(stage, name)))
         for name in ("sun", "carrier", "ring")

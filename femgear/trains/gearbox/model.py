@@ -19,9 +19,10 @@ from femgear.case.estimates import gear_cylinder
 from femgear.case.gear_set import planetary_set
 from femgear.case.sections import gear_material
 from femgear.errors import CaseError
-from femgear.fe.beam import BeamShaft, RoundSection, ShaftPart, beam_shaft, body_matrices, rigid_link
+from femgear.fe.beam import BeamShaft, ShaftPart, beam_shaft, body_matrices, rigid_link
 from femgear.gears.iso6336 import pair_mesh_stiffness
 from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, StationSprings, joint
+from femgear.trains.gearbox.carrier import pin_axes, pin_compliance, planet_springs
 from femgear.trains.gearbox.case_file import (
     CASING,
     BoxBearingSection,
@@ -365,12 +366,10 @@ class _Builder:
                     body = self._gear_body(teeth, name)
                     self._body(seats[name], *body, flow.speed[members[name]])
         carrier = sun if places["carrier"] is None else places["carrier"]
-        planets = [
-            self._planet(stage, sizes, teeth, n, psi, axis, middle, seats["carrier"], carrier)
-            for n, psi in enumerate(angles)
-        ]
-        contacts = []
         place = np.append(axis, middle)
+        planets = [self._planet(stage, sizes, teeth, n, psi, place) for n, psi in enumerate(angles)]
+        self._pins(stage, teeth, angles, planets, seats["carrier"], carrier)
+        contacts = []
         for ring_mesh in (False, True):
             for n, (psi, planet) in enumerate(zip(angles, planets, strict=True)):
                 pair = (Seat(planet), seats["ring"]) if ring_mesh else (seats["sun"], Seat(planet))
@@ -382,26 +381,27 @@ class _Builder:
         stations = tuple(seats[name].station for name in ("sun", "carrier", "ring"))
         return StageModel(stage, sizes, tuple(contacts), flank, stations, tuple(planets), angles, width)
 
-    def _planet(self, stage, sizes, teeth, n, psi, axis, middle, carrier: Seat, place) -> int:
-        """Add a planet on its pin; the number of its station."""
-        out, across = np.array([math.cos(psi), math.sin(psi), 0.0]), np.array([-math.sin(psi), math.cos(psi), 0.0])
-        centre = np.append(axis, middle) + sizes.centre_distance * out
+    def _planet(self, stage, sizes, teeth, n: int, psi: float, place) -> int:
+        """Add a planet around the centre of its set; the number of its station."""
+        centre = place + sizes.centre_distance * np.array([math.cos(psi), math.sin(psi), 0.0])
         station = self._station(f"{stage.name} planet {n + 1}", tuple(centre))
         mass, polar, transverse = self._planet_body(stage, teeth)
         self._body(Seat(station), mass, polar, transverse, self.flow.planet_speed[stage.name])
-        given = stage.planet.bearing
-        of_teeth = (getattr(teeth and teeth.planet, f"{name}_stiffness", None) for name in ("bearing", "tilt"))
-        radial, tilt = (math.inf if value is None else value for value in of_teeth)
-        radial, axial, tilt = (given.radial, given.axial, given.tilt) if given else (radial, math.inf, tilt)
-        offset = np.asarray(carrier.offset) + (centre - place)
-        stiffness = np.array([radial, radial, axial, tilt, tilt, 0.0])
-        if stage.pins is not None:
-            with np.errstate(divide="ignore"):
-                stiffness = 1.0 / (1.0 / stiffness + np.append(pin_flexibility(stage, self.case), 0.0))
-        axes = np.array([out, across, [0.0, 0.0, 1.0]])
-        name = f"{stage.name} pin {n + 1}"
-        self.springs.append(joint(name, (carrier.station, station), (offset, np.zeros(3)), stiffness, axes=axes))
         return station
+
+    def _pins(self, stage, teeth, angles, planets, carrier: Seat, place) -> None:
+        """Hold planets on the carrier, which is rigid, or gives way at its pins by closed forms."""
+        held = _planet_bearing(stage, teeth)
+        offsets = [np.asarray(carrier.offset) + np.asarray(self.places[planet]) - place for planet in planets]
+        axes = [pin_axes(psi) for psi in angles]
+        if stage.pins is None:
+            for n, (planet, offset) in enumerate(zip(planets, offsets, strict=True)):
+                ends = (offset, np.zeros(3))
+                name = f"{stage.name} pin {n + 1}"
+                self.springs.append(joint(name, (carrier.station, planet), ends, held, axes=axes[n]))
+            return
+        compliance = pin_compliance(self.case, stage, angles)
+        self.springs.append(planet_springs(stage, (carrier.station, *planets), offsets, axes, held, compliance))
 
     def _contact(self, name: str, seats: tuple[Seat, Seat], pitch, normal, width: float, stiffness: float) -> int:
         slices = self.case.deflection.slices if width and self.case.motions == "space" else 1
@@ -496,6 +496,15 @@ def mesh_normal(towards, pressure_angle: float, base_helix: float, flank: int) -
     return math.cos(base_helix) * plane - flank * math.sin(base_helix) * np.array([0.0, 0.0, 1.0])
 
 
+def _planet_bearing(stage: BoxPlanetarySection, teeth) -> np.ndarray:
+    """Stiffness (6,) between a planet and its pin along three axes and about them; none about the last one."""
+    given = stage.planet.bearing
+    of_teeth = (getattr(teeth and teeth.planet, f"{name}_stiffness", None) for name in ("bearing", "tilt"))
+    radial, tilt = (math.inf if value is None else value for value in of_teeth)
+    radial, axial, tilt = (given.radial, given.axial, given.tilt) if given else (radial, math.inf, tilt)
+    return np.array([radial, radial, axial, tilt, tilt, 0.0])
+
+
 def _set_mesh(sizes: StageSizes, psi: float, centre, flank: int, *, ring_mesh: bool) -> tuple[np.ndarray, np.ndarray]:
     """Normal and pitch point (3,) of a mesh of a set with the planet at an angle; centre (3,) of the set [m]."""
     out = np.array([math.cos(psi), math.sin(psi), 0.0])
@@ -519,33 +528,6 @@ def _common(places, widths) -> tuple[list[np.ndarray], float, float]:
 
 def _from_first(angles: Sequence[float]) -> list[float]:
     return [psi - angles[0] for psi in angles]
-
-
-def pin_flexibility(stage: BoxPlanetarySection, case: GearboxCase) -> np.ndarray:
-    """Compute what a pin and the wind-up of the carrier give way by, (5,) radially, around, along, two tilts.
-
-    A bar held at one end bends by ``L^3/(3 E I) + L/(kappa G A)`` and tilts by ``L/(E I)`` [m/N, rad/(N m)]; held at
-    both ends of ``2L`` by ``L^3/(24 E I) + L/(2 kappa G A)`` and ``L/(2 E I) / 4`` at its middle (S. Timoshenko,
-    Strength of Materials, part I). Wind-up of a stiffness K_c adds ``a^2 N / K_c`` around the axis, N planets
-    alike.
-    """
-    pins = stage.pins
-    assert pins is not None
-    material = case.material
-    section = RoundSection(pins.diameter, pins.bore, material.youngs_modulus, material.poisson_ratio)
-    bending = section.young * section.second_moment
-    shear = section.shear_coefficient * section.shear_modulus * section.area
-    length = pins.length
-    if pins.cheeks == 1:
-        bend, tilt = length**3 / (3.0 * bending) + length / shear, length / bending
-    else:
-        # clamped at both ends: P l^3/(192 E I) with l = 2 L, and half of each end's moment for a tilt
-        bend, tilt = length**3 / (24.0 * bending) + 0.5 * length / shear, length / (8.0 * bending)
-    sizes = set_sizes(stage)
-    wind = 0.0
-    if pins.wind_up_stiffness is not None:
-        wind = sizes.centre_distance**2 * len(sizes.planet_angles) / pins.wind_up_stiffness
-    return np.array([bend, bend + wind, 0.0, tilt, tilt])
 
 
 def seats_on(case: GearboxCase, shaft: str) -> set[float]:

@@ -12,6 +12,7 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import CampbellData, campbell_data
 from femgear.system.assembly import Assembly, Beam
 from femgear.system.system import MechanicalSystem, Modes
+from femgear.trains.gearbox.carrier import pins_of
 from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_ring import ElasticRing, elastic_rings, with_rings
 from femgear.trains.gearbox.model import GearboxModel
@@ -254,8 +255,7 @@ def _strain(
     for springs in assembly.springs:
         if springs.name not in own:
             finite = np.where(np.isfinite(springs.stiffness), springs.stiffness, 0.0)
-            name = springs.name.rsplit(" pin ", 1)
-            label = f"pins of {name[0]}" if len(name) > 1 else _called("coupling", springs.name)
+            label = pins_of(springs.name) or _called("coupling", springs.name)
             add(label, springs.stations, (springs.rows.T * finite) @ springs.rows)
     for stage in model.stages:
         name = f"meshes of {stage.name}"

@@ -13,7 +13,7 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.stages.lumped_set import gear_set_modes
 from femgear.trains.drivetrain.stages import solve_drivetrain_modes
 from femgear.trains.gearbox.deflection import solve_deflection
-from femgear.trains.gearbox.model import gearbox_model, mesh_normal, pin_flexibility
+from femgear.trains.gearbox.model import mesh_normal
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.multistage.case_file import multistage_of
 from femgear.trains.multistage.stages import multistage_modes
@@ -106,32 +106,3 @@ def test_the_whole_gearbox_turned_moved_and_renamed_is_itself():
     turned["pair"][0]["shafts"] = ["one", "output"]
     turned["operation"]["load_case"][0]["speed"] = {"one": "1000 rpm"}
     assert frequencies(turned) == pytest.approx(base, rel=1e-9, abs=1e-3)
-
-
-def test_pins_bend_as_bars_do():
-    tables = pair_tables()
-    tables["shaft"] += [{"name": "carrier", "axis": ["90 mm", "0 mm"]}, {"name": "sun", "axis": ["90 mm", "0 mm"]}]
-    tables["planetary"] = [
-        {
-            "name": "set",
-            "sun": "sun",
-            "carrier": "carrier",
-            "gears": {"teeth": [20, 20, 60], "module": "2 mm"},
-            "planet": {"mass": "1 kg", "inertia": "1e-3 kg m^2"},
-            "sun_mesh": {"stiffness": "3e8 N/m"},
-            "ring_mesh": {"stiffness": "3e8 N/m"},
-            "pins": {"diameter": "20 mm", "length": "400 mm", "cheeks": 1, "wind_up_stiffness": "1e6 N m/rad"},
-        }
-    ]
-    tables["operation"]["load_case"][0]["speed"]["sun"] = "10 rpm"
-    tables["operation"]["output"].append("carrier")
-    case = read_case(tables)
-    bending = 2.06e11 * math.pi / 64.0 * 0.02**4
-    found = pin_flexibility(case.planetary[0], case)
-    # a long bar hardly shears
-    assert found[0] == pytest.approx(0.4**3 / (3.0 * bending), rel=2e-3)
-    assert found[1] - found[0] == pytest.approx(3 * 0.04**2 / 1e6, rel=1e-9)
-    assert found[3] == pytest.approx(0.4 / bending, rel=1e-12)
-    model = gearbox_model(case)
-    springs = next(one for one in model.assembly.springs if one.name == "set pin 1")
-    assert springs.stiffness[0] == pytest.approx(1.0 / found[0], rel=1e-12)
