@@ -224,8 +224,59 @@ class _Draw:
 
 
 def random_gearbox(seed: int, stages: int = 4) -> dict[str, Any]:
-    """Draw the tables of a gearbox of at most so many stages."""
-    return _Draw(seed, stages).draw()
+    """Draw the tables of a gearbox of at most so many stages; a third of them have a casing on feet."""
+    tables = _Draw(seed, stages).draw()
+    # of its own numbers: all else is the same with and without a casing
+    rng = np.random.default_rng([seed, 43])
+    if rng.random() < 1.0 / 3.0:
+        tables["casing"] = random_casing(tables, rng)
+    return tables
+
+
+def random_casing(tables: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Draw a casing on feet that are as stiff along x as along y, some of them rigid."""
+    axes = np.array([[_value(text) for text in shaft["axis"]] for shaft in tables["shaft"]])
+    ends = np.array([_value(shaft["start"]) for shaft in tables["shaft"]])
+    low, high = np.append(axes.min(axis=0) - 0.1, ends.min()), np.append(axes.max(axis=0) + 0.1, ends.max() + 0.2)
+    mass = rng.uniform(20.0, 80.0)
+    # of eight points: an inertia that a body can have
+    points = rng.uniform(-0.2, 0.2, (8, 3))
+    points -= points.mean(axis=0)
+    tensor = mass * (np.eye(3) * (points**2).sum() - points.T @ points) / 8.0
+    casing = {"mass": f"{mass!r} kg", "centre": [metres(value) for value in rng.uniform(low, high)]}
+    casing |= _inertia_texts(tensor)
+    feet = []
+    for number in range(int(rng.integers(3, 7))):
+        across, along = (f"{10.0 ** rng.uniform(7.5, 9.0)!r} N/m" for _ in range(2))
+        if rng.random() < 0.1:
+            across = along = "rigid"
+        place = rng.uniform(low, high)
+        place[2] = (low[2], high[2])[number % 2]
+        foot = {"position": [metres(value) for value in place], "stiffness": [across, across, along]}
+        feet.append({"name": f"foot {number + 1}"} | foot)
+    casing["foot"] = feet
+    standing = [b["name"] for b in tables["bearing"] if "outer_shaft" not in b and rng.random() < 0.05]
+    return casing | ({"stands_still": standing} if standing else {})
+
+
+def _inertia_texts(tensor: np.ndarray) -> dict[str, list[str]]:
+    products = -tensor[[0, 0, 1], [1, 2, 2]]
+    return {
+        name: [f"{float(value)!r} kg m^2" for value in values]
+        for name, values in (("inertia", np.diag(tensor)), ("products", products))
+    }
+
+
+def _moved_casing(tables: dict[str, Any], matrix: np.ndarray, shift=(0.0, 0.0, 0.0)) -> None:
+    """Map the casing by an orthogonal matrix (3, 3) that keeps z in its place or turns it round, then shift it [m]."""
+    casing = tables.get("casing")
+    if casing is None:
+        return
+    for holder, name in [(casing, "centre"), *((foot, "position") for foot in casing["foot"])]:
+        holder[name] = [metres(x) for x in matrix @ [_value(text) for text in holder[name]] + np.asarray(shift)]
+    tensor, products = np.diag([_value(text) for text in casing["inertia"]]), np.zeros((3, 3))
+    products[[0, 0, 1], [1, 2, 2]] = [_value(text) for text in casing["products"]]
+    casing |= _inertia_texts(matrix @ (tensor - products - products.T) @ matrix.T)
 
 
 def _numbers(texts, factors) -> list[str]:
@@ -263,6 +314,7 @@ def turned(tables: dict[str, Any], angle: float) -> dict[str, Any]:
     for stage in new["planetary"]:
         stage["angle"] = f"{_value(stage['angle']) + angle!r} rad"
     _vectors(new, turn, turn)
+    _moved_casing(new, np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]]))
     return new
 
 
@@ -272,6 +324,7 @@ def shifted(tables: dict[str, Any], way: tuple[float, float, float]) -> dict[str
     for shaft in new["shaft"]:
         shaft["axis"] = [metres(_value(text) + step) for text, step in zip(shaft["axis"], way[:2], strict=True)]
         shaft["start"] = metres(_value(shaft["start"]) + way[2])
+    _moved_casing(new, np.eye(3), way)
     return new
 
 
@@ -290,6 +343,7 @@ def mirrored_across(tables: dict[str, Any]) -> dict[str, Any]:
         for name in ("torque", "speed"):
             case[name] = {port: _numbers([text], [-1.0])[0] for port, text in case[name].items()}
     _vectors(new, lambda v: _numbers(v, (1.0, -1.0, 1.0)), lambda v: _numbers(v, (-1.0, 1.0)))
+    _moved_casing(new, np.diag([1.0, -1.0, 1.0]))
     return new
 
 
@@ -323,6 +377,7 @@ def mirrored_along(tables: dict[str, Any]) -> dict[str, Any]:
             if f"{member}_position" in stage:
                 stage[f"{member}_position"] = place(stage[member], stage[f"{member}_position"])
     _vectors(new, lambda v: _numbers(v, (1.0, 1.0, -1.0)), lambda v: _numbers(v, (-1.0, -1.0)))
+    _moved_casing(new, np.diag([1.0, 1.0, -1.0]))
     return new
 
 

@@ -383,6 +383,9 @@ class _UnitWriter:
         for number, one in enumerate(case.mass):
             text = f"REXS has no mass such as {one.name or one.shaft}: left out, modes change"
             tell(f"mass[{number}]", text, remedy="give it again after import")
+        if case.casing is not None:
+            text = "REXS has no feet of a casing: left out, the casing comes back as one that stands still"
+            tell("casing", text, remedy="give it again after import")
         estimated = [number for number, one in enumerate(case.bearing) if one.estimated]
         if estimated:
             text = f"{len(estimated)} bearings are estimated, which REXS cannot say: they come back as given"

@@ -47,7 +47,7 @@ from femgear.trains.reading import parse_case
 
 FORCE = Dimension("a force", "N", "N", 1.0)
 CASING = "casing"
-"""In place of a shaft: what stands still."""
+"""In place of a shaft: the casing, which stands still unless the case describes it."""
 MOST_PARTS = 200
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .-]{0,39}")
 _LARGEST_TORQUE, _LARGEST_FORCE = 1e9, 1e9
@@ -81,6 +81,7 @@ PartInertia = Annotated[float, Quantity(INERTIA, 1e-15, 1e11)]
 Transverse = Annotated[float, Quantity(INERTIA, 0.0, 1e11)]
 Lateral = Annotated[float, StiffnessOrRigid(STIFFNESS, 0.0, 1e15)]
 Turning = Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)]
+Product = Annotated[float, Quantity(INERTIA, -1e11, 1e11)]
 MeshStiffness = Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
 Torque = Annotated[float, Quantity(TORQUE, -_LARGEST_TORQUE, _LARGEST_TORQUE)]
 Force = Annotated[float, Quantity(FORCE, -_LARGEST_FORCE, _LARGEST_FORCE)]
@@ -380,6 +381,35 @@ class BoxGravitySection(Section):
     direction: Annotated[tuple[Annotated[float, Number(-1.0, 1.0)], ...], TRIPLE] = (0.0, -1.0, 0.0)
 
 
+class CasingFootSection(Section):
+    """A foot of the casing: springs to the ground along x, y and z, each a stiffness or ``"rigid"``."""
+
+    name: Name | None = None
+    position: Annotated[tuple[Along, ...], TRIPLE]
+    stiffness: Annotated[tuple[Lateral, ...], TRIPLE]
+
+
+class BoxCasingSection(Section):
+    """The casing as a rigid body on feet, with all that is fixed in it; without it the casing stands still.
+
+    ``centre`` is its centre of mass, ``inertia`` are those about x, y and z through it, ``products`` the integrals of
+    x y, x z and y z over the mass. Seats of ``stands_still`` are not in it, but in what stands still: bearings by
+    their names, ``"ring of STAGE"``, ``"coupling NAME"``, ``"SHAFT held"``.
+    """
+
+    mass: PartMass
+    inertia: Annotated[tuple[PartInertia, ...], TRIPLE]
+    products: Annotated[tuple[Product, ...], TRIPLE] = (0.0, 0.0, 0.0)
+    centre: Annotated[tuple[Along, ...], TRIPLE]
+    foot: Annotated[tuple[CasingFootSection, ...], Field(min_length=1, max_length=MOST_PARTS)]
+    stands_still: Annotated[tuple[Name, ...], Field(max_length=MOST_PARTS)] = ()
+
+    @property
+    def foot_names(self) -> tuple[str, ...]:
+        """Names of the feet: as given, or by their numbers."""
+        return tuple(foot.name or str(number + 1) for number, foot in enumerate(self.foot))
+
+
 class LoadCaseSection(Section):
     """Torques at loads and speeds of shafts of one load case, and its share of the time.
 
@@ -395,7 +425,7 @@ class LoadCaseSection(Section):
 
 
 class BoxOperationSection(Section):
-    """Load cases; ``output`` are the loads whose torques balance the others, ``fixed`` the shafts that stand still."""
+    """Load cases; ``output`` are the loads whose torques balance the others, ``fixed`` shafts that the casing holds."""
 
     load_case: Annotated[tuple[LoadCaseSection, ...], Field(min_length=1, max_length=1000)]
     output: tuple[Name, ...] = ()
@@ -445,6 +475,7 @@ class GearboxCase(Section, ReadCase):
     planetary: Annotated[tuple[BoxPlanetarySection, ...], Field(max_length=20)] = ()
     load: Annotated[tuple[LoadSection, ...], Field(max_length=MOST_PARTS)] = ()
     gravity: BoxGravitySection | None = None
+    casing: BoxCasingSection | None = None
     operation: BoxOperationSection
     deflection: DeflectionSection = DeflectionSection()
     modes: BoxModesSection = BoxModesSection()

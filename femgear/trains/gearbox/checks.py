@@ -20,6 +20,7 @@ from femgear.trains.gearbox.case_file import (
     embed_stages,
     teeth_of,
 )
+from femgear.trains.gearbox.casing_checks import check_casing
 from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, StageSizes, pair_sizes, rolling_bearing, set_sizes
 
 _ROLLER = ("rolling_elements", "element_diameter", "pitch_diameter")
@@ -34,7 +35,7 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     if named:
         return named
     seats = [*_seats(case), *_bearings(case), *_shaft_parts(case)]
-    return [*seats, *_stages(case), *_loads(case), *_weight(case)]
+    return [*seats, *_stages(case), *_loads(case), *_weight(case), *check_casing(case)]
 
 
 def _weight(case: GearboxCase) -> Iterator[CaseError]:
@@ -71,7 +72,7 @@ def _names(case: GearboxCase) -> Iterator[CaseError]:
         known: dict[str, str] = {CASING: ""} if kind == "shaft" else {}
         for key, name in entries:
             if name in known:
-                first = f"that of {known[name]}" if known[name] else "the name of what stands still"
+                first = f"that of {known[name]}" if known[name] else "the word for the casing"
                 yield CaseError(
                     f"the name is {first} already",
                     code="E-DUPLICATE",

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from femgear.system.assembly import GROUND, MOTIONS, Assembly, StationSprings
 from femgear.system.bearing_life import basic_rating_life, reference_rating_life
 from femgear.system.rolling_bearings import BearingState, bearing_state, sliding_state
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
+from femgear.trains.gearbox.casing import check_casing_held, elastic_foot_forces, rigid_foot_rows
 from femgear.trains.gearbox.contact import StageContact, given_separation, stage_contact
 from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
@@ -65,6 +66,9 @@ class Deflection:
         Slopes of the meshes of every pass [rad]: of the approach of the flanks along the width.
     settled : bool
         Whether the slopes of the last two passes agree, and the mesh forces of contact and system.
+    foot_force : (f, 3) array
+        Of every foot on the casing, along x, y, z [N]; rigid ones that are more than needed share it with the
+        smallest sum of squares.
     """
 
     model: GearboxModel
@@ -78,6 +82,7 @@ class Deflection:
     contacts: Mapping[str, StageContact]
     slopes: tuple[np.ndarray, ...] = ()
     settled: bool = True
+    foot_force: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
 
     @property
     def mesh_force(self) -> np.ndarray:
@@ -407,6 +412,8 @@ def _check_held(fixed: Assembly, T, K, W, k, laws) -> None:
         return
     motion = T @ (vectors[:, loose] / size[:, None])
     names = [_farthest(fixed.names, column) for column in motion.T]
+    if CASING in fixed.names:
+        check_casing_held(motion, np.tile(_LEVERS, len(fixed.names)), fixed.names.index(CASING), len(names))
     raise CaseError(
         f"nothing holds {len(names)} motion{'s' * (len(names) > 1)}: {', '.join(dict.fromkeys(names))}",
         code="E-MECHANISM",
@@ -423,7 +430,7 @@ def _state(model: GearboxModel, q, gap, laws, residual: float, iterations: int) 
     press = np.maximum(assembly.columns.T @ q - gap, 0.0)
     force, stiffness = np.zeros((len(case.bearing), 6)), np.zeros((len(case.bearing), 6, 6))
     states: list[BearingState | None] = [None] * len(case.bearing)
-    _linear_bearings(model, q, press, laws, force, stiffness)
+    feet = _linear_bearings(model, q, press, laws, force, stiffness)
     for number, law, springs in laws:
         motion = _spread(springs, assembly) @ q
         holding, tangent = law.force(motion)
@@ -431,12 +438,21 @@ def _state(model: GearboxModel, q, gap, laws, residual: float, iterations: int) 
         force[number] -= holding
         stiffness[number] += tangent
     return Deflection(
-        model, q, assembly.slice_stiffness * press, force, stiffness, tuple(states), residual, iterations, {}
+        model,
+        q,
+        assembly.slice_stiffness * press,
+        force,
+        stiffness,
+        tuple(states),
+        residual,
+        iterations,
+        {},
+        foot_force=feet,
     )
 
 
-def _linear_bearings(model: GearboxModel, q, press, laws, force, stiffness) -> None:
-    """Forces of bearings of given stiffness; those of rigid ones balance their stations."""
+def _linear_bearings(model: GearboxModel, q, press, laws, force, stiffness) -> np.ndarray:
+    """Forces of bearings of given stiffness, and of feet (f, 3); those of rigid ones balance their stations."""
     assembly, case = model.assembly, model.case
     rigid: list[tuple[int, int]] = []
     for number, (section, springs) in enumerate(zip(case.bearing, model.bearings, strict=True)):
@@ -447,26 +463,29 @@ def _linear_bearings(model: GearboxModel, q, press, laws, force, stiffness) -> N
         stiffness[number] = np.diag(values)
         force[number] = -finite * (_spread(springs, assembly) @ q)
         rigid += [(number, int(way)) for way in np.flatnonzero(np.isinf(values))]
-    if not rigid:
-        return
+    feet, foot_rows = elastic_foot_forces(model.casing, q), rigid_foot_rows(model.casing, assembly.count)
+    if not rigid and not len(foot_rows):
+        return feet
     # what is out of balance at all stations is what rigid bearings, joints and held motions carry
     left = model.load - assembly.stiffness @ q - assembly.columns @ (assembly.slice_stiffness * press)
     for _, law, springs in laws:
         rows = _spread(springs, assembly)
         left = left - rows.T @ law.force(rows @ q)[0]
-    rows = np.array([_spread(model.bearings[number], assembly)[way] for number, way in rigid])
+    rows = np.array([_spread(model.bearings[number], assembly)[way] for number, way in rigid]).reshape(-1, len(q))
     others = _conditions(assembly, model)
-    found = np.linalg.lstsq(np.vstack([rows, others]).T, left, rcond=None)[0]
+    found = np.linalg.lstsq(np.vstack([rows, foot_rows, others]).T, left, rcond=None)[0]
     for (number, way), value in zip(rigid, found[: len(rigid)], strict=True):
         force[number, way] = -value
+    if model.casing is not None:
+        feet[np.isinf(model.casing.foot_stiffness[:, :3])] = -found[len(rigid) : len(rigid) + len(foot_rows)]
+    return feet
 
 
 def _conditions(assembly: Assembly, model: GearboxModel) -> np.ndarray:
-    """Rows of what is rigid or held but no bearing: joints, pins, held motions, given turns."""
-    own = {springs.name for springs in model.bearings}
+    """Rows of what is rigid or held but neither bearing nor foot: joints, pins, held motions, given turns."""
     rows = [np.zeros((0, assembly.count))]
-    for springs in assembly.springs:
-        if springs.name not in own and np.isinf(springs.stiffness).any():
+    for springs in model.joints:
+        if np.isinf(springs.stiffness).any():
             rows.append(_spread(springs, assembly)[np.isinf(springs.stiffness)])
     held = np.flatnonzero(assembly.held)
     both = np.unique(np.concatenate([held, model.turns]))

@@ -17,7 +17,9 @@ _ARROW = 46.0  # length of the longest arrow [points]
 _STEP = 4.0  # by which names are pushed off one another [points]
 _LEAST = 0.04  # force that is drawn, over the largest
 _MOST_MODES = 24
-_KIND_COLOURS: dict[str, str] = dict(zip(("torsional", "bending", "axial", "mixed", "ring"), COLOURS, strict=False))
+_KIND_COLOURS: dict[str, str] = dict(
+    zip(("torsional", "bending", "axial", "mixed", "ring", "casing"), COLOURS, strict=False)
+)
 _DASHES = ("-", "--", "-.", ":")
 _PLANES = ((0, "x"), (1, "y"))
 
@@ -38,6 +40,10 @@ def deflected_shafts(deflection: xr.Dataset) -> Figure:
             style = {"color": COLOURS[number % len(COLOURS)], "marker": "o" if len(own) == 1 else "."}
             ax.plot(1e3 * place[own, 2], 1e6 * moved[own, way], linewidth=2.2, label=str(shaft), **style)
         ax.axhline(0.0, color=GREY, linewidth=0.8)
+        if "seat_displacement" in one:
+            seats = 1e6 * one["seat_displacement"].values[:, way]
+            style = {"color": BLACK, "linestyle": "none", "marker": "s", "markerfacecolor": "none"}
+            ax.plot(1e3 * one["bearing_place"].values[:, 2], seats, label="casing at its bearings", **style)
         ax.margins(0.08, 0.34)
         _arrows(ax, one, way)
         label(ax, "z [mm]", f"deflection along {axis} [µm]")

@@ -1,7 +1,7 @@
 """A gearbox as stations, beams, springs and meshes: shafts, bearings, stages, loads.
 
 Planets stand at one angle of their carrier. Every planet is a station of its own, joined by its bearing to its
-pin, a point of the carrier; a ring in the casing stands still. Meshes are springs along the tooth normals, of
+pin, a point of the carrier; a ring in the casing moves with it. Meshes are springs along the tooth normals, of
 slices over the common width, which take up tilts as teeth do.
 """
 
@@ -26,12 +26,14 @@ from femgear.trains.gearbox.carrier import pin_axes, pin_compliance, planet_spri
 from femgear.trains.gearbox.case_file import (
     CASING,
     BoxBearingSection,
+    BoxCasingSection,
     BoxPlanetarySection,
     GearboxCase,
     LoadCaseSection,
     PairSection,
     teeth_of,
 )
+from femgear.trains.gearbox.casing import CasingModel, bearing_name, casing_mass, casing_model
 from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, set_sizes
 from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
 
@@ -114,6 +116,10 @@ class GearboxModel:
         Motions whose speed is given, one for every way in which the gearbox turns.
     estimate : float
         Factor on the stiffness of bearings that are estimated.
+    joints : tuple of StationSprings
+        Springs of the assembly that are neither bearings nor feet.
+    casing : CasingModel or None
+        Stations and feet of the casing; None where it stands still.
     """
 
     case: GearboxCase
@@ -127,6 +133,8 @@ class GearboxModel:
     load: np.ndarray
     turns: np.ndarray
     estimate: float = 1.0
+    joints: tuple[StationSprings, ...] = ()
+    casing: CasingModel | None = None
 
     def linear_stiffness(self, section: BoxBearingSection) -> tuple[float, ...]:
         """Stiffnesses (6,) of a bearing that is given by them, with the factor of estimates [N/m, N m/rad]."""
@@ -143,8 +151,6 @@ class GearboxModel:
 
 
 def _seat(case: GearboxCase, beams, first, shaft: str, position: float | None) -> Seat:
-    if shaft == CASING:
-        return Seat(GROUND)
     if shaft not in beams:
         return Seat(first[shaft], (0.0, 0.0, position or 0.0))
     return Seat(first[shaft] + beams[shaft].index_of(position or 0.0))
@@ -195,28 +201,39 @@ class _Builder:
         self.contacts: list[Contact] = []
         self.beams: dict[str, BeamShaft] = {}
         self.first: dict[str, int] = {}
-        self.held: list[int] = []
+        self.casing: CasingModel | None = None
 
     def model(self, load_case: LoadCaseSection) -> GearboxModel:
         case = self.case
         for shaft in case.shaft:
             self._shaft(shaft)
+        if case.casing is not None:
+            self._casing(case.casing)
         for mass in case.mass:
             at, speed = self.seat(mass.shaft, mass.position), self.flow.speed[mass.shaft]
             self._body(at, mass.mass, mass.inertia, mass.about_diameter, speed)
         for number, coupling in enumerate(case.coupling):
             self._coupling(coupling, number)
         bearings = tuple(self._bearing(bearing, i) for i, bearing in enumerate(case.bearing))
+        joints = list(self.springs)
         self.springs += [
             replace_stiffness(springs, scaled_stiffness(section, self.estimate))
             for springs, section in zip(bearings, case.bearing)
             if section.kind is None
         ]
+        others = len(self.springs)
         stages = [self._pair(stage) for stage in case.pair] + [self._planetary(stage) for stage in case.planetary]
         held = np.zeros((len(self.names), 6), bool)
         held[:, list(HELD[case.motions])] = True
         for name in case.operation.fixed:
-            held[self.first[name], 5] = True
+            seat = self.casing_seat(f"{name} held")
+            held[self.first[name], 5] = seat.station == GROUND
+            if seat.station != GROUND:
+                stations, turn = (seat.station, self.first[name]), [0.0, 0.0, 0.0, 0.0, 0.0, math.inf]
+                self.springs.append(joint(f"{name} held", stations, (np.zeros(3), np.zeros(3)), turn))
+        joints += self.springs[others:]
+        if self.casing is not None:
+            self.springs += [replace_stiffness(*foot) for foot in zip(self.casing.feet, self.casing.foot_stiffness)]
         assembly = Assembly(
             tuple(self.names),
             np.array(self.places),
@@ -242,7 +259,22 @@ class _Builder:
             load,
             np.array(turns, int),
             self.estimate,
+            tuple(joints),
+            self.casing,
         )
+
+    def _casing(self, section: BoxCasingSection) -> None:
+        """Add the station of the casing with its mass, and its feet."""
+        station = self._station(CASING, section.centre)
+        self.inertias.append(Inertia((station,), casing_mass(section), np.zeros((6, 6))))
+        self.casing = casing_model(self.case, station)
+
+    def casing_seat(self, name: str) -> Seat:
+        """Place in the casing of a seat; one of what stands still."""
+        if self.casing is None or name in self.casing.standing:
+            return Seat(GROUND)
+        offset = self.casing.seats[name] - np.asarray(self.casing.centre)
+        return Seat(self.casing.station, (float(offset[0]), float(offset[1]), float(offset[2])))
 
     def seat(self, shaft: str, position: float | None) -> Seat:
         return _seat(self.case, self.beams, self.first, shaft, position)
@@ -287,7 +319,11 @@ class _Builder:
 
     def _coupling(self, coupling, number: int) -> None:
         positions = coupling.positions or (None, None)
-        seats = [self.seat(shaft, place) for shaft, place in zip(coupling.between, positions, strict=True)]
+        named = f"coupling {coupling.name or number + 1}"
+        seats = [
+            self.casing_seat(named) if shaft == CASING else self.seat(shaft, place)
+            for shaft, place in zip(coupling.between, positions, strict=True)
+        ]
         ends = [self._place(shaft, place) for shaft, place in zip(coupling.between, positions, strict=True)]
         known = [end for end in ends if end is not None]
         way = known[-1] - known[0]
@@ -308,10 +344,12 @@ class _Builder:
         return np.array([*section.axis, section.start + (position or 0.0)])
 
     def _bearing(self, bearing: BoxBearingSection, number: int) -> StationSprings:
-        inner, outer = self.seat(bearing.shaft, bearing.position), Seat(GROUND)
+        name = bearing_name(bearing, number)
+        inner = self.seat(bearing.shaft, bearing.position)
         if bearing.outer_shaft is not None:
             outer = self.seat(bearing.outer_shaft, bearing.outer_position)
-        name = bearing.name or f"bearing {number + 1} of {bearing.shaft}"
+        else:
+            outer = self.casing_seat(name)
         return joint(name, (outer.station, inner.station), (outer.offset, inner.offset), np.ones(6))
 
     def _pair(self, stage: PairSection) -> StageModel:
@@ -350,7 +388,12 @@ class _Builder:
     def _planetary(self, stage: BoxPlanetarySection) -> StageModel:
         sizes, flow = set_sizes(stage), self.flow
         members = {name: getattr(stage, name) for name in ("sun", "carrier", "ring")}
-        seats = {name: self.seat(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
+        seats = {
+            name: self.casing_seat(f"{name} of {stage.name}")
+            if shaft == CASING
+            else self.seat(shaft, getattr(stage, f"{name}_position"))
+            for name, shaft in members.items()
+        }
         places = {name: self._place(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
         # a member that stands in the casing lies where the others are
         known = [place for place in places.values() if place is not None]
@@ -362,7 +405,7 @@ class _Builder:
         teeth = teeth_of(stage)
         if teeth is not None:
             for name in ("sun", "carrier", "ring"):
-                if seats[name].station != GROUND:
+                if members[name] != CASING:
                     body = self._gear_body(teeth, name)
                     self._body(seats[name], *body, flow.speed[members[name]])
         carrier = sun if places["carrier"] is None else places["carrier"]

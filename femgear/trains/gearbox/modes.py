@@ -13,6 +13,7 @@ from femgear.solvers.linear.tracking import CampbellData, campbell_data
 from femgear.system.assembly import Assembly, Beam
 from femgear.system.system import MechanicalSystem, Modes
 from femgear.trains.gearbox.carrier import pins_of
+from femgear.trains.gearbox.case_file import CASING
 from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_ring import ElasticRing, elastic_rings, with_rings
 from femgear.trains.gearbox.model import GearboxModel
@@ -29,8 +30,8 @@ _BASIS = 2
 _HARMONICS = 3.0
 # Share of the largest slice force below which a slice carries nothing but rounding.
 _IDLE = 1e-9
-KINDS = ("torsional", "bending", "axial", "ring")
-"""Of modes by their kinetic energy: rotation; motions across the axes and tilts; along them; elastic rings."""
+KINDS = ("torsional", "bending", "axial", "ring", "casing")
+"""Of modes by their kinetic energy: shafts' rotation, motions across the axes and tilts, along them; rings; casing."""
 _MOTIONS = ((5,), (0, 1, 3, 4), (2,))
 
 
@@ -206,7 +207,9 @@ def _kinetic(
     kinetic = np.vstack([kinetic, *rings.values()])
     total = np.maximum(kinetic.sum(axis=0), 1e-300)
     of_rings = sum(rings.values()) if rings else np.zeros(motion.shape[1])
-    by_kind = np.array([*(per_motion[:, list(ways)].sum(axis=(0, 1)) for ways in _MOTIONS), of_rings]) / total
+    in_casing = np.array([name == CASING for name in owner])
+    of_shafts = [per_motion[~in_casing][:, list(ways)].sum(axis=(0, 1)) for ways in _MOTIONS]
+    by_kind = np.array([*of_shafts, of_rings, per_motion[in_casing].sum(axis=(0, 1))]) / total
     kinds = [
         "rigid" if hertz == 0.0 else KINDS[int(share.argmax())] if share.max() >= _PURE else "mixed"
         for hertz, share in zip(modes.frequency, by_kind.T, strict=True)
@@ -215,8 +218,8 @@ def _kinetic(
 
 
 def member_of_stations(model: GearboxModel) -> list[str]:
-    """Name the shaft, or the planets, that every station belongs to."""
-    owner = [""] * len(model.assembly.names)
+    """Name the shaft, the planets or the casing that every station belongs to."""
+    owner = [CASING] * len(model.assembly.names)
     for shaft in model.case.shaft:
         count = len(model.beams[shaft.name].stations) if shaft.name in model.beams else 1
         first = model.first[shaft.name]
@@ -251,12 +254,14 @@ def _strain(
     for number, springs in enumerate(model.bearings):
         finite = np.where(np.isfinite(found.bearing_stiffness[number]), found.bearing_stiffness[number], 0.0)
         add(_called("bearing", springs.name), springs.stations, springs.rows.T @ finite @ springs.rows)
-    own = set(model.bearing_names)
-    for springs in assembly.springs:
-        if springs.name not in own:
-            finite = np.where(np.isfinite(springs.stiffness), springs.stiffness, 0.0)
-            label = pins_of(springs.name) or _called("coupling", springs.name)
-            add(label, springs.stations, (springs.rows.T * finite) @ springs.rows)
+    for springs in model.joints:
+        finite = np.where(np.isfinite(springs.stiffness), springs.stiffness, 0.0)
+        label = pins_of(springs.name) or _called("coupling", springs.name)
+        add(label, springs.stations, (springs.rows.T * finite) @ springs.rows)
+    if model.casing is not None:
+        for springs, values in zip(model.casing.feet, model.casing.foot_stiffness, strict=True):
+            finite = np.where(np.isfinite(values), values, 0.0)
+            add(_called("foot", springs.name), springs.stations, (springs.rows.T * finite) @ springs.rows)
     for stage in model.stages:
         name = f"meshes of {stage.name}"
         energies[name] = np.sum([of_meshes[assembly.slices[mesh]].sum(axis=0) for mesh in stage.meshes], axis=0)

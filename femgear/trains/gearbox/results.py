@@ -17,6 +17,12 @@ from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
 from femgear.system.assembly import MOTIONS
 from femgear.trains.gearbox.case_file import GearboxCase
+from femgear.trains.gearbox.casing_results import (
+    casing_coordinates,
+    casing_variables,
+    describe_feet,
+    largest_foot_force,
+)
 from femgear.trains.gearbox.deflection import Deflection, bearing_lives
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places
@@ -115,6 +121,7 @@ class DeflectionResult(StageResult):
             "out_of_balance": (load_case, [one.residual for one in every], "1", "force out of balance, relative"),
         }
         variables |= _of_bearings(every, state) | _distribution(state) | _of_estimates(self.estimates)
+        variables |= casing_variables(every)
         coords = {
             "load_case": _names("load_case", [one.name for one in case.operation.load_case], "load case"),
             "shaft": _names("shaft", [one.name for one in case.shaft], "shaft"),
@@ -127,7 +134,7 @@ class DeflectionResult(StageResult):
             "axis": _names("axis", "xyz", "coordinate"),
             "station": _names("station", assembly.names, "station of a shaft, or planet"),
             "member": ("station", member_of_stations(state.model), "1", "shaft or planets of the station"),
-        }
+        } | casing_coordinates(state)
         return Contents(variables, coords, {"title": "system deflection", "load_case": self.chosen})
 
 
@@ -208,7 +215,7 @@ def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tu
             "load_case bearing axis",
             np.array([bearing_motions(one.model, one.motion) for one in every]),
             "m",
-            "motion of the shaft in the bearing",
+            "motion of the shaft at the bearing",
         ),
         "bearing_place": ("bearing axis", bearing_places(state.model), "m", "place of the bearing"),
         "rating_life": (bearing, lives[..., 0], "h", "L10 of ISO 281 at the speed of the load case"),
@@ -348,6 +355,7 @@ def _worst_of_deflection(data: Any) -> Iterator[tuple[str, str]]:
         if np.isfinite(life).any():
             at = np.unravel_index(int(np.nanargmin(life)), life.shape)
             yield "shortest bearing life L10r", f"{life[at]:.4g} h, {where(at, bearings)}"
+    yield from largest_foot_force(data)
 
 
 def _nearest_mode(data: Any) -> Iterator[tuple[str, str]]:
@@ -400,6 +408,7 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
     return (
         tabulate(f"Meshes{name}{brackets}", range(data.sizes["mesh"]), meshes, (note,)),
         tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
+        *describe_feet(data, at, name),
     )
 
 

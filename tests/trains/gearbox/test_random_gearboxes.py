@@ -41,13 +41,23 @@ def moments(points: np.ndarray, forces: np.ndarray) -> np.ndarray:
 
 
 def outside(found: Deflection) -> np.ndarray:
-    """Wrenches (w, 6) about the origin of all that acts from outside: loads, weight, casing, held shafts."""
+    """Wrenches (w, 6) about the origin of all that acts from outside.
+
+    Loads and weight, and the feet of a casing, or a casing that stands still and the shafts that it holds.
+    """
     model, assembly = found.model, found.model.assembly
     load = model.load.reshape(-1, 6)
     places = np.asarray(assembly.places)
     wrenches = [np.hstack([load[:, :3], load[:, 3:] + moments(places, load[:, :3])])]
     force, at = found.bearing_force, bearing_places(model)
-    mine = [bearing.outer_shaft is None for bearing in model.case.bearing]
+    casing = model.case.casing
+    standing = {*model.bearing_names} if casing is None else {*casing.stands_still}
+    mine = [
+        bearing.outer_shaft is None and name in standing
+        for bearing, name in zip(model.case.bearing, model.bearing_names, strict=True)
+    ]
+    if model.casing is not None:
+        wrenches.append(np.hstack([found.foot_force, moments(model.casing.foot_places, found.foot_force)]))
     wrenches.append(np.hstack([force[:, :3], force[:, 3:] + moments(at, force[:, :3])])[mine])
     for contact, part in zip(assembly.contacts, assembly.slices, strict=True):
         if GROUND in contact.stations:
@@ -55,7 +65,7 @@ def outside(found: Deflection) -> np.ndarray:
             back = (1.0 if side else -1.0) * -found.slice_force[part][:, None] * contact.normal
             wrenches.append(np.hstack([back, moments(contact.points[side], back)]))
     shafts = port_shafts(model.case)
-    for name in model.case.operation.fixed:
+    for name in model.case.operation.fixed if casing is None else ():
         own = sum(torques.get(name, 0.0) for torques in model.flow.stage_torque.values())
         own += sum(torque for port, torque in model.flow.port_torque.items() if shafts[port] == name)
         wrenches.append(np.array([[0.0, 0.0, 0.0, 0.0, 0.0, -own]]))
@@ -111,7 +121,12 @@ def answer(found: Deflection) -> dict[str, np.ndarray]:
         return np.column_stack([np.hypot(vectors[:, 0], vectors[:, 1]), np.abs(vectors[:, 2])])
 
     tilts = np.hypot(force[:, 3], force[:, 4])
+    feet = found.foot_force
+    if found.model.casing is not None:
+        # rigid feet that are more than needed share forces
+        feet = feet[np.isfinite(found.model.casing.foot_stiffness[:, 0])]
     return {
+        "foot force": sizes(feet),
         "force": sizes(force),
         "moment": tilts,
         "deflection": sizes(motion),
@@ -136,7 +151,7 @@ def image(tables, name: str, seed: int):
 def check_image(tables, found: Deflection, name: str, seed: int) -> None:
     wanted, met = answer(found), answer(solved(image(tables, name, seed)))
     force = largest_load(found)
-    least = {"force": 1e-3 * force, "moment": 1e-4 * force, "deflection": 1e-12 * force}
+    least = {"foot force": 1e-3 * force, "force": 1e-3 * force, "moment": 1e-4 * force, "deflection": 1e-12 * force}
     for what, values in wanted.items():
         # a shaft that is held is held at its left end: its mirror image is another shaft
         if name == "mirrored along" and what == "frequency" and tables["operation"]["fixed"]:

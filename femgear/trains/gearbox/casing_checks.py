@@ -1,0 +1,98 @@
+"""What the casing of a gearbox case is refused for before anything is computed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from femgear.case.messages import no_such
+from femgear.case.quantities import INERTIA
+from femgear.errors import CaseError
+from femgear.trains.gearbox.case_file import CASING, BoxCasingSection, GearboxCase
+from femgear.trains.gearbox.casing import inertia_tensor, named_seats
+
+# By which the largest principal inertia may exceed the sum of both others, relative: rounding of a drawing.
+_FLAT = 1e-3
+
+
+def check_casing(case: GearboxCase) -> Iterator[CaseError]:
+    """List what no entry of the casing shows alone."""
+    section = case.casing
+    if section is None:
+        return
+    yield from _motions(case)
+    yield from _inertia(section)
+    yield from _feet(section)
+    yield from _standing(case, section)
+    for i, stage in enumerate(case.planetary):
+        if stage.elastic_ring and f"ring of {stage.name}" not in section.stands_still:
+            yield CaseError(
+                "an elastic ring stands on its foundation, which does not move",
+                code="E-CHOICE",
+                key=f"planetary[{i}].elastic_ring",
+                value=True,
+                limit="a ring in a casing that stands still",
+                remedy=f'leave elastic_ring out, or give casing.stands_still = ["ring of {stage.name}"]',
+            )
+
+
+def _motions(case: GearboxCase) -> Iterator[CaseError]:
+    """A casing that moves where its axes may move."""
+    if case.motions == "rotation":
+        yield CaseError(
+            "where shafts rotate alone their axes stand still, and the casing with them",
+            code="E-CHOICE",
+            key="casing",
+            value="motions = rotation",
+            limit="motions space or plane",
+            remedy='write motions = "plane", or leave casing out',
+        )
+
+
+def _inertia(section: BoxCasingSection) -> Iterator[CaseError]:
+    """Inertias that a body can have: positive, none larger than the sum of both others."""
+    principal = np.linalg.eigvalsh(inertia_tensor(section))
+    if principal[0] <= 0.0 or principal[2] > (1.0 + _FLAT) * (principal[0] + principal[1]):
+        yield CaseError(
+            "no body has these inertias",
+            code="E-RANGE",
+            key="casing.inertia",
+            value=f"about its principal axes {', '.join(INERTIA.show(float(value)) for value in principal)}",
+            limit="above 0, the largest at most the sum of both others",
+            remedy="correct inertia; products are the integrals of x y, x z and y z over the mass",
+        )
+
+
+def _feet(section: BoxCasingSection) -> Iterator[CaseError]:
+    """One name, one foot."""
+    names = section.foot_names
+    for number, name in enumerate(names):
+        if name in names[:number]:
+            yield CaseError(
+                f"the name is that of casing.foot[{names.index(name)}] already",
+                code="E-DUPLICATE",
+                key=f"casing.foot[{number}].name",
+                value=name,
+                remedy="give every foot a name of its own",
+            )
+
+
+def _standing(case: GearboxCase, section: BoxCasingSection) -> Iterator[CaseError]:
+    """Seats that there are, each of one name."""
+    seats = named_seats(case)
+    names = [name for _, name, _ in seats]
+    for number, (key, name, _) in enumerate(seats):
+        if name in names[:number]:
+            yield CaseError(
+                f"what sits in the {CASING} has the name of {seats[names.index(name)][0]} already",
+                code="E-DUPLICATE",
+                key=key,
+                value=name,
+                remedy="give one of them another name",
+            )
+    for number, name in enumerate(section.stands_still):
+        if name not in names:
+            what = f"name what sits in the {CASING}"
+            limit = ", ".join(names[:20]) or f"none: nothing sits in the {CASING}"
+            yield no_such("seat", f"casing.stands_still[{number}]", name, names, what, limit=limit)

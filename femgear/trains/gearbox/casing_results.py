@@ -1,0 +1,76 @@
+"""What deflection.nc has of a casing that moves: forces of its feet, its motion, its seats; tables and verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.report.tables import Block, tabulate
+from femgear.trains.gearbox.casing import seat_motions
+from femgear.trains.gearbox.deflection import Deflection
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def casing_variables(every: Sequence[Deflection]) -> dict[str, tuple]:
+    """Collect the variables of the casing of all load cases; none where it stands still."""
+    model = every[0].model
+    casing = model.casing
+    if casing is None:
+        return {}
+    station = slice(6 * casing.station, 6 * casing.station + 6)
+    seats = [seat_motions(model.case, casing, one.motion) for one in every]
+    return {
+        "foot_force": (
+            "load_case foot axis",
+            [one.foot_force for one in every],
+            "N",
+            "force of the foot on the casing",
+        ),
+        "foot_place": ("foot axis", casing.foot_places, "m", "place of the foot"),
+        "casing_motion": (
+            "load_case motion",
+            [one.motion[station] for one in every],
+            "m",
+            "motion of the casing at its centre of mass: x, y, z (m), tilts and rotation (rad)",
+        ),
+        "seat_displacement": (
+            "load_case bearing axis",
+            seats,
+            "m",
+            "motion of the casing at the bearing; NaN of bearings that are not in it",
+        ),
+    }
+
+
+def casing_coordinates(state: Deflection) -> dict[str, tuple]:
+    """Collect the names of the feet, by their dimension."""
+    casing = state.model.casing
+    return {} if casing is None else {"foot": (("foot",), list(casing.foot_names), "1", "foot of the casing")}
+
+
+def describe_feet(data: xr.Dataset, at: int, name: str) -> Iterator[Block]:
+    """Tabulate the forces of the feet in a load case, whose ``name`` the title has."""
+    if "foot_force" not in data:
+        return
+    force, motion = data["foot_force"].values[at], data["casing_motion"].values[at]
+    columns: dict[str, Any] = {"foot": lambda i: str(data["foot"].values[i])}
+    for way, axis in enumerate("xyz"):
+        columns[f"{axis} [N]"] = lambda i, way=way: f"{float(force[i, way]):+.5g}"
+    shift, turn = (", ".join(f"{value:+.3g}" for value in part) for part in np.split(1e6 * motion, 2))
+    note = f"on the casing, which moves by {shift} um and turns by {turn} urad along and about x, y, z"
+    yield tabulate(f"Feet{name}", range(len(force)), columns, (note,))
+
+
+def largest_foot_force(data: Any) -> Iterator[tuple[str, str]]:
+    """Say for the verdict which foot carries most in all load cases."""
+    if "foot_force" not in data:
+        return
+    cases, feet = data["load_case"].values, data["foot"].values
+    size = np.linalg.norm(data["foot_force"].values, axis=2)
+    case, foot = np.unravel_index(int(size.argmax()), size.shape)
+    where = f"foot {feet[foot]}" + (f", {cases[case]}" if len(cases) > 1 else "")
+    yield "largest foot force", f"{size[case, foot]:.4g} N, {where}"
