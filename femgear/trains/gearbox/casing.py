@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.fe.beam import rigid_link
 from femgear.system.assembly import GROUND, MOTIONS, StationSprings, joint
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, BoxCasingSection, GearboxCase
 
@@ -159,18 +158,6 @@ def rigid_foot_rows(casing: CasingModel | None, count: int) -> np.ndarray:
     if casing is None:
         return np.zeros((0, count))
     return _foot_rows(casing, count)[np.isinf(casing.foot_stiffness[:, :3])]
-
-
-def seat_motions(case: GearboxCase, casing: CasingModel, motion: np.ndarray) -> np.ndarray:
-    """Compute the motions (b, 3) of the casing at all bearings in it [m]; NaN at others, 0 in what stands still."""
-    found = np.full((len(case.bearing), 3), np.nan)
-    own = motion[6 * casing.station : 6 * casing.station + 6]
-    for number, bearing in enumerate(case.bearing):
-        name = bearing_name(bearing, number)
-        if bearing.outer_shaft is None:
-            link = rigid_link(casing.seats[name] - casing.centre)
-            found[number] = 0.0 if name in casing.standing else (link @ own)[:3]
-    return found
 
 
 def check_casing_held(motion: np.ndarray, levers: np.ndarray, station: int, count: int) -> None:

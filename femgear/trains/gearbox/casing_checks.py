@@ -25,6 +25,11 @@ def check_casing(case: GearboxCase) -> Iterator[CaseError]:
     yield from _inertia(section)
     yield from _feet(section)
     yield from _standing(case, section)
+    yield from _elastic_rings(case, section)
+
+
+def _elastic_rings(case: GearboxCase, section: BoxCasingSection) -> Iterator[CaseError]:
+    """Elastic rings in what stands still."""
     for i, stage in enumerate(case.planetary):
         if stage.elastic_ring and f"ring of {stage.name}" not in section.stands_still:
             yield CaseError(

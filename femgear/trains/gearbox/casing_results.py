@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.fe.beam import rigid_link
 from femgear.report.tables import Block, tabulate
-from femgear.trains.gearbox.casing import seat_motions
+from femgear.trains.gearbox.case_file import GearboxCase
+from femgear.trains.gearbox.casing import CasingModel, bearing_name
 from femgear.trains.gearbox.deflection import Deflection
 
 if TYPE_CHECKING:
@@ -46,6 +48,18 @@ def casing_variables(every: Sequence[Deflection]) -> dict[str, tuple]:
     }
 
 
+def seat_motions(case: GearboxCase, casing: CasingModel, motion: np.ndarray) -> np.ndarray:
+    """Compute the motions (b, 3) of the casing at all bearings in it [m]; NaN at others, 0 in what stands still."""
+    found = np.full((len(case.bearing), 3), np.nan)
+    own = motion[6 * casing.station : 6 * casing.station + 6]
+    for number, bearing in enumerate(case.bearing):
+        name = bearing_name(bearing, number)
+        if bearing.outer_shaft is None:
+            link = rigid_link(casing.seats[name] - casing.centre)
+            found[number] = 0.0 if name in casing.standing else (link @ own)[:3]
+    return found
+
+
 def casing_coordinates(state: Deflection) -> dict[str, tuple]:
     """Collect the names of the feet, by their dimension."""
     casing = state.model.casing
@@ -74,3 +88,10 @@ def largest_foot_force(data: Any) -> Iterator[tuple[str, str]]:
     case, foot = np.unravel_index(int(size.argmax()), size.shape)
     where = f"foot {feet[foot]}" + (f", {cases[case]}" if len(cases) > 1 else "")
     yield "largest foot force", f"{size[case, foot]:.4g} N, {where}"
+
+
+def seat_curve(one: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray] | None:
+    """Find place along z [mm] and motion along x or y [um] of the casing at its bearings, of one load case."""
+    if "seat_displacement" not in one:
+        return None
+    return 1e3 * one["bearing_place"].values[:, 2], 1e6 * one["seat_displacement"].values[:, way]

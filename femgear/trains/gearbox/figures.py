@@ -8,6 +8,7 @@ import numpy as np
 
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
 from femgear.stages.protocol import Drawn, Figures
+from femgear.trains.gearbox.casing_results import seat_curve
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -40,10 +41,9 @@ def deflected_shafts(deflection: xr.Dataset) -> Figure:
             style = {"color": COLOURS[number % len(COLOURS)], "marker": "o" if len(own) == 1 else "."}
             ax.plot(1e3 * place[own, 2], 1e6 * moved[own, way], linewidth=2.2, label=str(shaft), **style)
         ax.axhline(0.0, color=GREY, linewidth=0.8)
-        if "seat_displacement" in one:
-            seats = 1e6 * one["seat_displacement"].values[:, way]
+        if seats := seat_curve(one, way):
             style = {"color": BLACK, "linestyle": "none", "marker": "s", "markerfacecolor": "none"}
-            ax.plot(1e3 * one["bearing_place"].values[:, 2], seats, label="casing at its bearings", **style)
+            ax.plot(*seats, label="casing at its bearings", **style)
         ax.margins(0.08, 0.34)
         _arrows(ax, one, way)
         label(ax, "z [mm]", f"deflection along {axis} [µm]")

@@ -11,7 +11,8 @@ from scipy.linalg import eigh
 from small_gearbox import pair_tables
 
 from femgear.errors import CaseError
-from femgear.trains.gearbox.casing import casing_mass, casing_seats, seat_motions
+from femgear.trains.gearbox.casing import casing_mass, casing_seats
+from femgear.trains.gearbox.casing_results import seat_motions
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.reading import read_case
