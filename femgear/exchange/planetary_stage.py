@@ -316,8 +316,12 @@ def _one_width(tables: dict[str, Any], remarks: dict[str, str]) -> None:
 
 def _materials(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
     """Material of the sun for all gears, and what those of others have different."""
-    of = {k: s.model.related("reference", "referenced", origin=ones[0].id) for k, ones in s.gears.items()}
-    made = {name: [one for one in ones if one.type == "material"] for name, ones in of.items()}
+    made = {name: _made_of(s.model, ones[0]) for name, ones in s.gears.items()}
+    for name in [name for name, ones in made.items() if not ones]:
+        made[name] = _made_of(s.model, *s.shafts.get(name, ())[:1])
+        if made[name]:
+            text = f"{s.gears[name][0]} has no material: that of its shaft is taken"
+            s.model.remark(f"{name}.material", text, severity=NOTE)
     for key, attribute, dimension, usual in (
         ("youngs_modulus", "elastic_modulus", MODULUS, STEEL),
         ("poisson_ratio", "poisson_ratio", None, 0.3),
@@ -339,6 +343,12 @@ def _materials(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> No
             common = next(iter(known.values()))
             tables["material"][f"{key}_stress_limit"] = with_unit(common, STRESS)
         _differing(tables, f"{key}_stress_limit", STRESS, common, known)
+
+
+def _made_of(model: Model, *parts: Component) -> list[Component]:
+    """Materials that components refer to."""
+    referred = (one for part in parts for one in model.related("reference", "referenced", origin=part.id))
+    return [one for one in referred if one.type == "material"]
 
 
 def _differing(
@@ -546,18 +556,33 @@ def add_modifications(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]
     leads = (one["kind"] in OVER_WIDTH for section in sections for one in section.get("modifications", ()))
     if "helix_angle" in tables["set"] or any(leads):
         tables["static"], remarks["static.slices"] = {"slices": 25}, "assumed"
-    _chamfers(s)
+    _chamfers(s, tables)
 
 
-def _chamfers(s: _Stage) -> None:
-    """Findings on chamfers of the tips, which end the flanks below the tip circle."""
-    for name in s.gears:
+def _chamfers(s: _Stage, tables: dict[str, Any]) -> None:
+    """End the flanks of gears with chamfers of the tips where these begin, with findings.
+
+    Taken as the radial height h_K of ISO 21771, which leaves a flank up to the diameter d_a - 2 h_K.
+    """
+    for name, gears in s.gears.items():
         sizes = [s.model.number(one, "tooth_tip_chamfer", LENGTH) or 0.0 for one in s.flanks[name]]
-        if max(sizes, default=0.0) > 0.0:
-            size = with_unit(max(sizes), LENGTH)
-            text = f"tooth_tip_chamfer of {size} is not taken: flanks go up to the tip circle"
-            remedy = "give the diameter where the chamfer begins as tip_diameter"
-            s.model.remark(f"{name}.tip_diameter", text, remedy=remedy)
+        if not (height := max(sizes, default=0.0)) > 0.0:
+            continue
+        table, module = tables[name], to_si(tables["sun"]["module"], LENGTH)
+        if (tip := table.get("tip_diameter")) is not None:
+            inwards = -1.0 if gears[0].type == "ring_gear" else 1.0
+            table["tip_diameter"] = with_unit(to_si(tip, LENGTH) - inwards * 2.0 * height, LENGTH)
+            key, entry = "tip_diameter", f"tip_diameter = {table['tip_diameter']}"
+        else:
+            rack = table.get("rack", tables["rack"])
+            table["rack"] = rack | {"addendum": float(f"{rack['addendum'] - height / module:.12g}")}
+            key, entry = "rack.addendum", f"an addendum of {table['rack']['addendum']:g} modules"
+        s.model.remark(
+            f"{name}.{key}",
+            f"tooth_tip_chamfer of {with_unit(height, LENGTH)} is taken as its radial height, hence {entry}: flanks "
+            "end where it begins; transmission error hangs on it",
+            remedy="compare with the drawing",
+        )
 
 
 def _flanks_of(s: _Stage, tables: dict[str, Any], name: str, gear: Component) -> dict[str, Flank]:

@@ -2,16 +2,19 @@
 
 import math
 
+import numpy as np
 import pytest
 from exchange.test_rexs import CASES, imported
 from rexs_stage import MM, NONE, Gearbox
 from scipy.optimize import brentq
 
 from femgear.case.gear_set import planetary_set
+from femgear.case.sections import gear_material
 from femgear.errors import CaseError, GeometryError
 from femgear.exchange.planetary_stage import RIGID, case_tables
 from femgear.exchange.rexs import read_model
 from femgear.findings import DOUBT
+from femgear.stages.static import solve_static
 from femgear.trains.reading import read_case, with_values
 
 
@@ -118,3 +121,76 @@ def test_each_load_case_has_its_own_torque(tmp_path):
 def test_gears_that_make_no_set_are_refused(tmp_path):
     with pytest.raises(GeometryError, match="E-ASSEMBLY"):
         imported(Gearbox(planets=4).write(tmp_path / "stage.rexs"))
+
+
+def with_chamfer(height: float, **tip) -> Gearbox:
+    """The gearbox with chamfers on the tips of the ring, whose addendum the file has not."""
+    box = Gearbox(addendum=None)
+    for flank in (2058, 3058):
+        box = box.set(flank, tooth_tip_chamfer=(height, MM))
+    return box.set(58, **tip)
+
+
+def test_flanks_end_where_chamfers_of_the_tips_begin(tmp_path):
+    for box, key in (
+        (with_chamfer(0.5), "ring.rack.addendum"),
+        (with_chamfer(0.5, tip_diameter=(236.0, MM)), "ring.tip_diameter"),
+    ):
+        model = read_model(box.write(tmp_path / "stage.rexs"))
+        case = read_case(case_tables(model)[0])
+        # internal teeth end at the larger diameter: 61 modules less two of 4 mm, and two heights of 0.5 mm
+        assert planetary_set(case).ring.tip_radius == pytest.approx(0.5 * 237e-3, abs=1e-9)
+        (told,) = [one for one in model.findings if "tooth_tip_chamfer" in one.text]
+        assert (told.key, told.severity) == (key, DOUBT)
+
+
+def test_the_published_stage_with_its_modifications(tmp_path):
+    """Transmission error hangs on where the flanks of the ring end, which the file leaves open.
+
+    The stage by hand, with tips of the ring that are 0.1 modules shorter than those of ISO 53, had 2.10 um and
+    K_Hbeta 1.28.
+    """
+    um = "mum"
+    parts = {
+        9001: (
+            "helix_crowning",
+            {f"helix_crowning_amount_{end}": (5.0, um) for end in ("datum_face", "non_datum_face")},
+        ),
+        9002: ("profile_crowning", {f"profile_crowning_at_{end}": (5.0, um) for end in ("tip", "root")}),
+        9003: ("helix_slope", {"helix_slope": (6.0, um)}),
+        9004: ("helix_slope", {"helix_slope": (-6.0, um)}),
+    }
+    limits = {"tip": (76.0, MM), "root": (64.06386045216821, MM)}
+    parts[9002][1].update({f"diameter_where_profile_crowning_{k}_is_specified": v for k, v in limits.items()})
+    error = {}
+    for name, box in (
+        ("shorter", Gearbox(addendum=0.9)),
+        ("full", Gearbox(addendum=None)),
+        ("file", with_chamfer(0.5)),
+    ):
+        changed = box.set(38, torque_around_u_axis=(636.6197723675814, "N m")).set(85, number_of_teeth=(45, NONE))
+        for id, (kind, attributes) in parts.items():
+            changed.add(id, kind, **attributes)
+        for side, slope in ((2053, 9003), (3053, 9004)):
+            for part in (9001, 9002, slope):
+                changed.relate("reference", origin=side, referenced=part)
+        case = imported(changed.write(tmp_path / "stage.rexs"))[1]
+        cycle = solve_static(with_values(case, {"static.slices": 15, "static.positions": 32})).cycle
+        error[name] = np.ptp(cycle.deflection[0])
+        assert cycle.face_load_factor[0] == pytest.approx(1.28, abs=0.01)
+    assert error["shorter"] == pytest.approx(2.10e-6, rel=0.015)
+    assert error["full"] == pytest.approx(1.27e-6, rel=0.01)
+    assert error["file"] == pytest.approx(2.41e-6, rel=0.01)
+
+
+def test_a_gear_without_a_material_has_that_of_its_shaft(tmp_path):
+    box = Gearbox()
+    box.add(87, "material", elastic_modulus=(170000.0, "N / mm^2"))
+    box.relations = [
+        (kind, roles | {"origin": 34, "referenced": 87} if kind == "reference" and roles["origin"] == 53 else roles)
+        for kind, roles in box.relations
+    ]
+    model = read_model(box.write(tmp_path / "stage.rexs"))
+    case = read_case(case_tables(model)[0])
+    assert [1e-9 * gear_material(case, name).youngs_modulus for name in ("sun", "planet", "ring")] == [170, 210, 210]
+    assert any("that of its shaft" in one.text for one in model.findings)

@@ -12,7 +12,7 @@ import re
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema
+from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema, model_validator
 
 from femgear.case import text as case_text
 from femgear.case.csv_columns import embed_profiles, embedded
@@ -43,6 +43,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import FORMAT, Angle, DampingRatio, End, PressureAngle, Radius, Teeth
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError
+from femgear.trains.gearbox.materials import with_materials
 from femgear.trains.reading import parse_case
 
 FORCE = Dimension("a force", "N", "N", 1.0)
@@ -479,6 +480,11 @@ class GearboxCase(Section, ReadCase):
     operation: BoxOperationSection
     deflection: DeflectionSection = DeflectionSection()
     modes: BoxModesSection = BoxModesSection()
+
+    @model_validator(mode="before")
+    @classmethod
+    def _materials_of_teeth(cls, data: Any) -> Any:
+        return with_materials(data)
 
     @property
     def load_case(self) -> LoadCaseSection:

@@ -22,6 +22,7 @@ from femgear.trains.gearbox.case_file import (
 )
 from femgear.trains.gearbox.casing_checks import check_casing
 from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, StageSizes, pair_sizes, rolling_bearing, set_sizes
+from femgear.trains.gearbox.materials import material_notices
 
 _ROLLER = ("rolling_elements", "element_diameter", "pitch_diameter")
 _SPRINGS = ("radial", "axial", "tilt", "torsional")
@@ -511,5 +512,6 @@ FILE = CaseFile(
     claims=lambda tables: (
         "bearings on shafts" if isinstance(tables.get("shaft"), list) and "body" not in tables else ""
     ),
+    notices=material_notices,
     embed=embed_stages,
 )
