@@ -16,7 +16,10 @@ from femgear.exchange.rexs import Component, Model
 from femgear.exchange.unit_bearings import FORCE
 from femgear.exchange.unit_shafts import NoGearbox
 
+LoadCase = Mapping[str, Mapping[str, tuple[str, str | None]]]
+"""Attributes, with their units, of the components of a load case by their ids."""
 _USUAL_SPEED = 1000.0 * SPEED.scale
+_HOURS = {"h": 1.0, "min": 1.0 / 60.0, "s": 1.0 / 3600.0, "d": 24.0}
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,7 @@ class OperationReader:
         """
         number, _ = self.model.chosen_case(wanted)
         cases = self.model.load_cases or ({},)
-        flows = [unit_flow(self.model, given) for given in cases]
+        flows, shares = [unit_flow(self.model, given) for given in cases], load_case_shares(cases)
         torques = [self._torques(given, flow) for given, flow in zip(cases, flows, strict=True)]
         outputs, added = self._outputs(torques)
         found, places = [], {}
@@ -119,8 +122,8 @@ class OperationReader:
             table: dict[str, Any] = {"name": f"load case {place}", "torque": torque}
             table["speed"] = self._speeds(given, flow) | {}
             table |= self._forces(given)
-            if (share := _share(given)) is not None:
-                table["share"] = share
+            if (share := shares[place - 1]) is not None:
+                table["share"] = float(f"{share:.12g}")
             places[place] = len(found) + 1
             found.append(table)
         if not found:
@@ -237,9 +240,20 @@ def _share_time(load_cases: list[dict[str, Any]], model: Model) -> None:
         model.remark("operation", f"the shares of the load cases are {total:.4g} in all: they are divided by it")
 
 
-def _share(given) -> float | None:
-    for attributes in given.values():
-        value, unit = attributes.get("load_duration_fraction", (None, None))
-        if value is not None:
-            return float(f"{float(value) * (0.01 if unit == '%' else 1.0):.12g}")
-    return None
+def load_case_shares(cases: Sequence[LoadCase]) -> list[float | None]:
+    """Find the shares of the time of load cases: their fractions, else their durations where all have one.
+
+    None of a load case that says neither.
+    """
+    shares = [_first(given, "load_duration_fraction", {"%": 0.01}) for given in cases]
+    if any(share is not None for share in shares):
+        return shares
+    hours = [_first(given, "load_duration", _HOURS) for given in cases]
+    known = [value for value in hours if value]
+    return [value / sum(known) for value in known] if len(known) == len(cases) else shares
+
+
+def _first(given: LoadCase, name: str, units: Mapping[str | None, float]) -> float | None:
+    """First value of an attribute in a load case, by the size of its unit."""
+    found = (attributes.get(name) for attributes in given.values())
+    return next((float(value) * units.get(unit, 1.0) for value, unit in filter(None, found)), None)

@@ -200,7 +200,7 @@ class BoxBearingSection(SeatSection):
     dynamic_rating: Annotated[float, Quantity(FORCE, 1.0, _LARGEST_FORCE)] | None = None
     static_rating: Annotated[float, Quantity(FORCE, 1.0, _LARGEST_FORCE)] | None = None
     fatigue_limit: Annotated[float, Quantity(FORCE, 1e-3, _LARGEST_FORCE)] | None = None
-    viscosity_ratio: Annotated[float, Number(0.05, 100.0)] | None = None
+    viscosity_ratio: Annotated[float, Number(0.1, 100.0)] | None = None
     contamination: Annotated[float, Number(0.0, 1.0)] | None = None
     estimated: StrictBool = False
 

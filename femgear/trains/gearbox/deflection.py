@@ -8,7 +8,6 @@ it shifts the slices, and the system is solved again until slopes and mesh force
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -16,7 +15,6 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.assembly import GROUND, MOTIONS, Assembly, StationSprings
-from femgear.system.bearing_life import basic_rating_life, reference_rating_life
 from femgear.system.rolling_bearings import BearingState, bearing_state, sliding_state
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing import check_casing_held, elastic_foot_forces, rigid_foot_rows
@@ -491,23 +489,3 @@ def _conditions(assembly: Assembly, model: GearboxModel) -> np.ndarray:
     both = np.unique(np.concatenate([held, model.turns]))
     rows.append(np.eye(assembly.count)[both])
     return np.vstack(rows)
-
-
-def bearing_lives(found: Deflection) -> np.ndarray:
-    """Compute the lives (b, 2) of all bearings in hours: L10 of ISO 281, L10r of ISO/TS 16281.
-
-    NaN without geometry and dynamic rating; infinite without load or at rest.
-    """
-    lives = np.full((len(found.states), 2), np.nan)
-    speed = found.model.flow.speed
-    for number, (section, state) in enumerate(zip(found.model.case.bearing, found.states, strict=True)):
-        if state is None or section.dynamic_rating is None:
-            continue
-        force = found.bearing_force[number]
-        turning = abs(speed[section.shaft] - speed[section.outer_shaft or CASING])
-        hours = 1e6 * 2.0 * math.pi / 3600.0 / turning if turning else math.inf
-        basic = basic_rating_life(
-            state.bearing, math.hypot(force[0], force[1]), abs(float(force[2])), section.dynamic_rating
-        )
-        lives[number] = basic * hours, reference_rating_life(state, section.dynamic_rating) * hours
-    return lives

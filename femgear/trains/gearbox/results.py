@@ -23,8 +23,9 @@ from femgear.trains.gearbox.casing_results import (
     describe_feet,
     largest_foot_force,
 )
-from femgear.trains.gearbox.deflection import Deflection, bearing_lives
+from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.geometry import set_sizes
+from femgear.trains.gearbox.life import describe_spectrum, life_text, life_variables, shortest_life
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places
 from femgear.trains.gearbox.modes import GearboxModes, member_of_stations
 
@@ -200,7 +201,6 @@ def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tu
     """Forces, motions, stiffness and lives of all bearings in all load cases."""
     bearing, count = "load_case bearing", len(state.model.case.bearing)
     forces = np.array([one.bearing_force for one in every]).reshape(len(every), count, 6)
-    lives = np.array([bearing_lives(one) for one in every]).reshape(len(every), count, 2)
     return {
         "bearing_force": (f"{bearing} motion", forces, "N", "force on the shaft (N), moments about x, y, z (N m)"),
         "radial_force": (bearing, np.hypot(forces[..., 0], forces[..., 1]), "N", "radial bearing force"),
@@ -218,8 +218,7 @@ def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tu
             "motion of the shaft at the bearing",
         ),
         "bearing_place": ("bearing axis", bearing_places(state.model), "m", "place of the bearing"),
-        "rating_life": (bearing, lives[..., 0], "h", "L10 of ISO 281 at the speed of the load case"),
-        "reference_life": (bearing, lives[..., 1], "h", "L10r of ISO/TS 16281"),
+        **life_variables(every, [one.share for one in state.model.case.operation.load_case]),
     }
 
 
@@ -351,10 +350,7 @@ def _worst_of_deflection(data: Any) -> Iterator[tuple[str, str]]:
         force = np.hypot(data["radial_force"].values, data["axial_force"].values)
         at = np.unravel_index(int(force.argmax()), force.shape)
         yield "largest bearing force", f"{force[at]:.4g} N, {where(at, bearings)}"
-        life = data["reference_life"].values
-        if np.isfinite(life).any():
-            at = np.unravel_index(int(np.nanargmin(life)), life.shape)
-            yield "shortest bearing life L10r", f"{life[at]:.4g} h, {where(at, bearings)}"
+        yield from shortest_life(data)
     yield from largest_foot_force(data)
 
 
@@ -388,18 +384,20 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
             f"{1e6 * float(one['mesh_misalignment'].values[i]):+.3f}" + _range(one, "misalignment", i, "+.2f", 1e6)
         ),
         "K_Hbeta": lambda i: (
-            _number(one["face_load_factor"].values[i], ".3f") + _range(one, "face_load_factor", i, ".3f")
+            life_text(one["face_load_factor"].values[i], ".3f") + _range(one, "face_load_factor", i, ".3f")
         ),
         "k [N/um]": lambda i: f"{1e-6 * float(one['mesh_stiffness'].values[i]):.4g}",
-        "STE p-p [um]": lambda i: _number(1e6 * one["transmission_error"].values[i], ".3f"),
+        "STE p-p [um]": lambda i: life_text(1e6 * one["transmission_error"].values[i], ".3f"),
     }
     bearings = {
         "bearing": lambda i: str(data["bearing"].values[i]),
         "radial [N]": lambda i: f"{float(one['radial_force'].values[i]):.5g}",
         "axial [N]": lambda i: f"{float(one['axial_force'].values[i]):+.5g}",
-        "L10 [h]": lambda i: _number(one["rating_life"].values[i], ".4g"),
-        "L10r [h]": lambda i: _number(one["reference_life"].values[i], ".4g"),
+        "L10 [h]": lambda i: life_text(one["rating_life"].values[i]),
+        "L10r [h]": lambda i: life_text(one["reference_life"].values[i]),
     }
+    if np.isfinite(one["modified_life"].values).any():
+        bearings["a_ISO L10r [h]"] = lambda i: life_text(one["modified_life"].values[i])
     brackets = ""
     if "estimate_factor" in data:
         brackets = ", in brackets with half and twice the stiffness of estimated bearings"
@@ -409,6 +407,7 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
         tabulate(f"Meshes{name}{brackets}", range(data.sizes["mesh"]), meshes, (note,)),
         tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
         *describe_feet(data, at, name),
+        *describe_spectrum(data),
     )
 
 
@@ -419,11 +418,6 @@ def _range(data: Any, name: str, mesh: int, how: str, factor: float = 1.0) -> st
     own = data["mesh_misalignment" if name == "misalignment" else name].values[mesh]
     values = factor * np.sort([own, *data[f"estimate_{name}"].values[:, mesh]])
     return "" if np.isnan(values).any() else f" ({values[0]:{how}} to {values[-1]:{how}})"
-
-
-def _number(value, how: str) -> str:
-    value = float(value)
-    return "-" if math.isnan(value) else "no load" if math.isinf(value) else format(value, how)
 
 
 def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:

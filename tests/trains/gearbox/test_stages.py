@@ -40,7 +40,8 @@ def test_both_load_cases_are_in_the_file(results):
 
 
 def test_tables_tell_meshes_bearings_and_modes(results):
-    meshes, bearings = describe_deflection(results.deflection)
+    meshes, bearings, load_cases = describe_deflection(results.deflection)
+    assert [row[0] for row in load_cases.rows] == ["full", "back"]
     assert [row[0] for row in meshes.rows] == ["stage"]
     assert [row[0] for row in bearings.rows] == ["A", "B", "C", "D"]
     assert "settled in" in meshes.notes[0]
