@@ -148,7 +148,7 @@ def shortest_life(data: xr.Dataset) -> Iterator[tuple[str, str]]:
         yield f"shortest bearing life {words}", text
 
 
-def describe_spectrum(data: xr.Dataset) -> Iterator[Block]:
+def describe_load_cases(data: xr.Dataset) -> Iterator[Block]:
     """Tabulate load cases with what decides in each, and bearings over all load cases; nothing of one load case."""
     count = data.sizes["load_case"]
     if count < 2:

@@ -25,7 +25,7 @@ from femgear.trains.gearbox.casing_results import (
 )
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.geometry import set_sizes
-from femgear.trains.gearbox.life import describe_spectrum, life_text, life_variables, shortest_life
+from femgear.trains.gearbox.life import describe_load_cases, life_text, life_variables, shortest_life
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places
 from femgear.trains.gearbox.modes import GearboxModes, member_of_stations
 
@@ -407,7 +407,7 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
         tabulate(f"Meshes{name}{brackets}", range(data.sizes["mesh"]), meshes, (note,)),
         tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
         *describe_feet(data, at, name),
-        *describe_spectrum(data),
+        *describe_load_cases(data),
     )
 
 

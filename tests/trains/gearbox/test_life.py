@@ -11,7 +11,7 @@ from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.life import (
     added_damage,
     bearing_lives,
-    describe_spectrum,
+    describe_load_cases,
     life_text,
     life_variables,
     shortest_life,
@@ -106,7 +106,7 @@ def test_lubrication_and_fatigue_limit_modify_the_life():
 
 def test_tables_and_verdict_tell_which_load_case_decides(result):
     data = result.dataset()
-    load_cases, bearings = describe_spectrum(data)
+    load_cases, bearings = describe_load_cases(data)
     assert [row[0] for row in load_cases.rows] == ["start", "run", "back"]
     assert bearings.header[:2] == ("bearing", "equivalent load [N]")
     assert bearings.rows[3][1:3] == ("-", "-")
@@ -115,7 +115,7 @@ def test_tables_and_verdict_tell_which_load_case_decides(result):
     lives = data["spectrum_reference_life"].values
     assert name == "shortest bearing life L10r"
     assert text.startswith(f"{np.nanmin(lives):.4g} h, {data['bearing'].values[int(np.nanargmin(lives))]}, over all")
-    assert not list(describe_spectrum(data.isel(load_case=[0])))
+    assert not list(describe_load_cases(data.isel(load_case=[0])))
 
 
 def test_every_life_is_in_the_file(result):
