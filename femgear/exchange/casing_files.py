@@ -42,6 +42,8 @@ from femgear.housing.two_way.structure import ARRAY_NAMES, FixedStructure, from_
 
 UNITS = {"SI": (1.0, 1.0), "mm-t-s": (1e-3, 1e3)}
 """Systems of units: metres and kilograms of the units of length and mass; time is in seconds."""
+CASING_ROLES = {"ring": False, "sensor": True, "foot": True, "centre": False}
+"""What the nodes of a casing stand for, and whether a name follows."""
 _ARRAYS, _PUNCH, _UNIVERSAL = (".npz", ".nc"), (".pch", ".bdf", ".dat"), (".uff", ".unv")
 _KINDS = (*_ARRAYS, *_PUNCH, ".op4", *_UNIVERSAL)
 _STIFFNESS = {0: "SI", 3: "mm-t-s", 6: "mm-kg-ms"}  # powers of ten of the unit of stiffness [N/m]
@@ -194,7 +196,7 @@ def read_casing(
             if kind in _UNIVERSAL:
                 modes = _universal(path, table, *UNITS[units])
             else:
-                found = dmig_matrices(path) if kind in _PUNCH else _op4(path, table)
+                found = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
                 modes = _modes(*found, table, *UNITS[units])
             arrays = _arrays(modes, table, direction, pitch_radius, max_diameter, units)
         given = {} if damping_ratio is None else {"damping_ratio": damping_ratio}
@@ -302,8 +304,8 @@ def _foreign(words: str) -> Iterator[None]:
         raise CaseError(f"no {words} that can be read: {text}", code="E-FILE", limit=words) from error
 
 
-def read_nodes(path: Path) -> tuple[Node, ...]:
-    """Read the table of nodes of a casing.
+def read_nodes(path: Path, roles: Mapping[str, bool] = CASING_ROLES) -> tuple[Node, ...]:
+    """Read the table of nodes of a casing, or of a body of other roles, each with whether a name follows it.
 
     CaseError: E-FILE, E-KEY-MISSING (columns), E-CHOICE (roles, directions), E-DUPLICATE (nodes).
     """
@@ -319,8 +321,8 @@ def read_nodes(path: Path) -> tuple[Node, ...]:
             value=", ".join(columns),
             limit="node, role; x, y, z, direction, dofs where needed",
         )
-        table = tuple(_node({key: (row[key] or "").strip() for key in columns}) for row in rows)
-        ring = any(one.role == "ring" for one in table)
+        table = tuple(_node({key: (row[key] or "").strip() for key in columns}, roles) for row in rows)
+        ring = "ring" not in roles or any(one.role == "ring" for one in table)
         _check("no points of the ring", ring, code="E-COUNT", key="nodes", limit="nodes of the role ring")
         keys = [(one.number, one.role, one.direction * (one.role == "sensor")) for one in table]
         twice = [key for key in keys if keys.count(key) > 1]
@@ -335,11 +337,11 @@ def read_nodes(path: Path) -> tuple[Node, ...]:
     return table
 
 
-def _node(row: Mapping[str, str]) -> Node:
+def _node(row: Mapping[str, str], roles: Mapping[str, bool]) -> Node:
     """A row of the table of nodes."""
     (role, _, name), place = row["role"].partition(" "), [row.get(axis, "") for axis in "xyz"]
     direction, dofs = row.get("direction") or "radial", row.get("dofs") or "123"
-    known = bool(name) == (role in ("sensor", "foot")) and role in ("ring", "sensor", "foot", "centre")
+    known = role in roles and bool(name) == roles[role]
     known &= direction.removeprefix("-") in ("x", "y", "z", "radial", "tangential")
     try:
         position = np.array([float(one) for one in place]) if any(place) else None
@@ -353,10 +355,16 @@ def _node(row: Mapping[str, str]) -> Node:
         code="E-CHOICE",
         key="nodes",
         value=", ".join(row.values()),
-        limit="a whole number, finite coordinates, role ring, sensor NAME, foot NAME or centre, direction x, "
-        "y, z, radial or tangential, dofs of 123456",
+        limit=f"a whole number, finite coordinates, role {_listed(roles)}, direction x, y, z, radial or tangential, "
+        "dofs of 123456",
     )
     return Node(number, role, name, direction, dofs, position)
+
+
+def _listed(roles: Mapping[str, bool]) -> str:
+    """Name all roles."""
+    names = [f"{role} NAME" if named else role for role, named in roles.items()]
+    return " or ".join([*([", ".join(names[:-1])] if names[1:] else []), names[-1]])
 
 
 def _feet(table: Sequence[Node]) -> list[str]:
@@ -624,7 +632,7 @@ def _stiffness_or_mass(matrices: Mapping[str, Any], letter: str) -> list[str]:
     return [name for name in matrices if name[:1].upper() == letter]
 
 
-def _op4(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], dict, dict]:
+def op4_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], dict, dict]:
     """Matrices of an ASCII OUTPUT4 file, as `dmig_matrices`."""
     with nvh_library("matrices of Nastran"):
         from pyNastran.op4.op4 import OP4
@@ -649,7 +657,7 @@ def _op4(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], dict, dic
 
 def _modes(found, row, place, table: Sequence[Node], length: float, mass: float) -> _Modes:
     """Modes of a reduced stiffness and mass (r, r) in the units of the file, the feet held."""
-    _check_matrices(found)
+    check_matrices(found)
     # with time in seconds a stiffness scales as a mass; generalised coordinates take their units with them
     K, M = (0.5 * mass * np.real(matrix + matrix.T) for matrix in found)
     standing = [one for one in table if one.role == "foot"]
@@ -703,7 +711,7 @@ def _modes(found, row, place, table: Sequence[Node], length: float, mass: float)
     return _Modes(np.sqrt(square), phi, row, places, None, force, direct, compliance if len(light) else None)
 
 
-def _check_matrices(found) -> None:
+def check_matrices(found: Sequence[np.ndarray]) -> None:
     """Refuse stiffness and mass that are complex, not symmetric or not finite."""
     for matrix, name in zip(found, ("stiffness", "mass")):
         _check(

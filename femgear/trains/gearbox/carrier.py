@@ -28,7 +28,7 @@ _RIGID_AT_ALL = 1e-15  # [m/N], as springs that a case can give
 def carrier_problems(stage: BoxPlanetarySection, key: str) -> Iterator[CaseError]:
     """List what the entries of an elastic carrier contradict, of the stage at a key."""
     body, pins = stage.carrier_body, stage.pins
-    if body is None:
+    if body is None or body.superelement is not None:
         return
     where, webs = f"{key}.carrier_body", body.given("web_outer_diameter", "web_inner_diameter")
     webs += ["web_share"] if "web_share" in body.model_fields_set else []
@@ -154,7 +154,8 @@ def pin_axes(psi: float) -> np.ndarray:
 
 def planet_springs(
     stage: BoxPlanetarySection,
-    stations: tuple[int, ...],
+    holders: Sequence[int],
+    planets: Sequence[int],
     offsets: Sequence[np.ndarray],
     axes: Sequence[np.ndarray],
     bearing: np.ndarray,
@@ -166,10 +167,10 @@ def planet_springs(
     ----------
     stage : BoxPlanetarySection
         The set.
-    stations : (N + 1,) tuple of int
-        Of the carrier, then of the planets.
+    holders, planets : (N,) sequences of int
+        Stations that hold the pins, such as N times that of the carrier, and of the planets.
     offsets : N (3,) arrays
-        From the station of the carrier to the pins [m].
+        From the holders to the pins [m].
     axes : N (3, 3) arrays
         Of the bearings, see `pin_axes`.
     bearing : (6,) array
@@ -178,13 +179,14 @@ def planet_springs(
         Of the pins along and about x, y, z.
     """
     count, used = len(offsets), np.flatnonzero(bearing > 0.0)
-    rows = np.zeros((6 * count, 6 * (count + 1)))
-    turned = np.zeros((6 * count, 6 * count))
+    stations = (*dict.fromkeys(holders), *planets)
+    rows, turned = np.zeros((6 * count, 6 * len(stations))), np.zeros((6 * count, 6 * count))
     for number, (offset, along) in enumerate(zip(offsets, axes, strict=True)):
         part = slice(6 * number, 6 * number + 6)
         turned[part, part] = np.kron(np.eye(2), along)
-        rows[part, :6] = -turned[part, part] @ rigid_link(offset)
-        rows[part, 6 * number + 6 : 6 * number + 12] = turned[part, part]
+        first, second = (6 * stations.index(one) for one in (holders[number], planets[number]))
+        rows[part, first : first + 6] = -turned[part, part] @ rigid_link(offset)
+        rows[part, second : second + 6] = turned[part, part]
     kept = (6 * np.arange(count)[:, None] + used).ravel()
     whole = turned @ compliance @ turned.T + np.diag(np.tile(1.0 / np.where(bearing > 0.0, bearing, 1.0), count))
     lever = set_sizes(stage).centre_distance
@@ -192,9 +194,11 @@ def planet_springs(
 
 
 def pins_of(springs: str) -> str:
-    """Name the pins that springs of this name stand for, ``"pins of SET"``; empty of others."""
+    """Name what springs of this name stand for, ``"pins of SET"`` or ``"carrier of SET"``; empty of others."""
     name = springs.rsplit(" pin ", 1)
-    return springs if springs.startswith("pins of ") else f"pins of {name[0]}" if len(name) > 1 else ""
+    if springs.startswith(("pins of ", "carrier of ")):
+        return springs
+    return f"pins of {name[0]}" if len(name) > 1 else ""
 
 
 def compliance_springs(

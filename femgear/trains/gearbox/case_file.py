@@ -10,8 +10,10 @@ from __future__ import annotations
 import math
 import re
 from functools import lru_cache
-from typing import Annotated, Any, ClassVar, Literal
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
+import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema, model_validator
 
 from femgear.case import text as case_text
@@ -87,6 +89,8 @@ MeshStiffness = Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
 Torque = Annotated[float, Quantity(TORQUE, -_LARGEST_TORQUE, _LARGEST_TORQUE)]
 Force = Annotated[float, Quantity(FORCE, -_LARGEST_FORCE, _LARGEST_FORCE)]
 ShaftSpeed = Annotated[float, Quantity(SPEED, -1e6 * SPEED.scale, 1e6 * SPEED.scale)]
+Entry = Annotated[float, Number(-1e30, 1e30)]
+Entries = Annotated[tuple[Entry, ...], Values(max_length=100_000)]
 StageTables = Annotated[dict[str, Any], BeforeValidator(_tables), WithJsonSchema({"type": ["string", "object"]})]
 """Tables of a pair or of a planetary set, or of the name of a file, in whose place they stand when it was read."""
 
@@ -325,6 +329,20 @@ class PinSection(Section):
     cheeks: Literal[1, 2] = 2
 
 
+class SuperelementSection(Section):
+    """A carrier that was read from a file, as `femgear.exchange.carrier_files.CarrierBody` describes it, in SI units.
+
+    Places and matrices as lists of numbers, row by row; of the symmetric ones the lower triangle.
+    """
+
+    seat: Annotated[tuple[Entry, ...], TRIPLE]
+    pins: Annotated[tuple[Entry, ...], Values(min_length=3, max_length=100)]
+    compliance: Entries
+    mass: Entries
+    frequency: Entries = ()
+    coupling: Entries = ()
+
+
 class CarrierBodySection(Section):
     """What the carrier between its pins and its shaft gives way by: rigid where nothing is given.
 
@@ -332,6 +350,10 @@ class CarrierBodySection(Section):
     ``wind_up_stiffness``, or that of the webs between them, of an outer and an inner diameter, which fill the
     ``web_share`` of the circle; 1 is a closed tube. ``torque_end`` is the cheek on the shaft, the front at z < 0;
     without it the one towards the longer end of the shaft, the back of a shaft that is one rigid body.
+
+    Else a ``file`` has stiffness and mass of the whole carrier, with its pins or without them, see
+    `femgear.exchange.carrier_files`; ``nodes`` is its table of nodes. Reading puts both in its place, as the
+    ``superelement``.
     """
 
     wind_up_stiffness: Annotated[float, Quantity(TORSION, 1.0, 1e15)] | None = None
@@ -339,6 +361,10 @@ class CarrierBodySection(Section):
     web_inner_diameter: Inner | None = None
     web_share: Annotated[float, Number(0.0, 1.0, open_low=True)] = 1.0
     torque_end: End | None = None
+    file: Annotated[str, Field(max_length=1000)] | None = None
+    nodes: Annotated[str, Field(max_length=1000)] | None = None
+    units: Literal["SI", "mm-t-s"] = "SI"
+    superelement: SuperelementSection | None = None
 
 
 class BoxPlanetarySection(Section):
@@ -365,6 +391,22 @@ class BoxPlanetarySection(Section):
     carrier_body: CarrierBodySection | None = None
     elastic_ring: StrictBool = False
     """In modes the ring in the casing is elastic, on the foundation that its teeth give."""
+
+    @property
+    def superelement(self) -> SuperelementSection | None:
+        """The carrier that was read from a file; None of others."""
+        return None if self.carrier_body is None else self.carrier_body.superelement
+
+    @property
+    def seat_position(self) -> float | None:
+        """Position of the seat of the carrier on its shaft: where the planets are, or as far off as in its file [m]."""
+        if self.superelement is None or self.carrier == CASING:
+            return self.carrier_position
+        return (self.carrier_position or 0.0) + self.superelement.seat[2] - self.superelement.pins[2]
+
+    def member_position(self, member: str) -> float | None:
+        """Position of sun or ring on its shaft, at the middle of its face width, or of the carrier's seat [m]."""
+        return self.seat_position if member == "carrier" else getattr(self, f"{member}_position")
 
 
 class LoadSection(SeatSection):
@@ -524,7 +566,35 @@ def embed_stages(data: dict, name: str) -> dict[str, str]:
                 key, file = f"{kind}[{i}].teeth", table.pop("teeth")
                 table["teeth"] = embedded(file, name, key, _stage_tables)
                 found[key] = case_text.printable(file)
+            body = table.get("carrier_body") if isinstance(table, dict) else None
+            if isinstance(body, dict) and isinstance(body.get("file"), str):
+                key, file = f"{kind}[{i}].carrier_body.file", body["file"]
+                del table["carrier_body"]  # a file that cannot be read is refused for that alone
+                table["carrier_body"] = _superelement_tables(body, name, key)
+                found[key] = case_text.printable(file)
     return found
+
+
+def _there(path: str) -> Path:
+    """Path of a file that can be read. CaseError: E-FILE."""
+    case_text.read_text(path)
+    return Path(path)
+
+
+def _superelement_tables(body: dict, name: str, key: str) -> dict:
+    """Tables of a carrier whose file is read and put in its place."""
+    from femgear.exchange.carrier_files import read_carrier
+
+    others = {entry: value for entry, value in body.items() if entry not in ("file", "nodes", "units")}
+    nodes, units = body.get("nodes"), body.get("units", "SI")
+    if units not in get_args(CarrierBodySection.model_fields["units"].annotation) or not isinstance(nodes, str | None):
+        return body  # refused with the other entries
+    path = None if nodes is None else embedded(nodes, name, key.replace(".file", ".nodes"), _there)
+    read = embedded(body["file"], name, key, lambda file: read_carrier(Path(file), nodes=path, units=units))
+    symmetric = {entry: getattr(read, entry) for entry in ("compliance", "mass")}
+    triangles = {entry: matrix[np.tril_indices(len(matrix))].tolist() for entry, matrix in symmetric.items()}
+    lists = {entry: getattr(read, entry).ravel().tolist() for entry in ("seat", "pins", "frequency", "coupling")}
+    return others | {"superelement": lists | triangles}
 
 
 def _stage_tables(path: str) -> dict:

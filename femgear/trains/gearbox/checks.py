@@ -21,6 +21,7 @@ from femgear.trains.gearbox.case_file import (
     teeth_of,
 )
 from femgear.trains.gearbox.casing_checks import check_casing
+from femgear.trains.gearbox.elastic_carrier import superelement_problems
 from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, StageSizes, pair_sizes, rolling_bearing, set_sizes
 from femgear.trains.gearbox.materials import material_notices
 
@@ -163,7 +164,8 @@ def _all_seats(case: GearboxCase) -> Iterator[tuple[str, str, float | None]]:
                 yield f"{kind}[{i}].positions", shaft, position
     for i, stage in enumerate(case.planetary):
         for member in ("sun", "carrier", "ring"):
-            yield f"planetary[{i}].{member}_position", getattr(stage, member), getattr(stage, f"{member}_position")
+            key = "carrier_body.file" if member == "carrier" and stage.superelement else f"{member}_position"
+            yield f"planetary[{i}].{key}", getattr(stage, member), stage.member_position(member)
 
 
 def _bearings(case: GearboxCase) -> Iterator[CaseError]:
@@ -398,7 +400,7 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
             remedy="give an angle for every planet, or leave planets out",
         )
     yield from _neighbours(sizes, key)
-    yield from carrier_problems(stage, key)
+    yield from (*carrier_problems(stage, key), *superelement_problems(stage, sizes, key))
     shafts = [
         (name, case.shaft_named(getattr(stage, name)))
         for name in ("sun", "carrier", "ring")

@@ -19,7 +19,7 @@ _STEP = 4.0  # by which names are pushed off one another [points]
 _LEAST = 0.04  # force that is drawn, over the largest
 _MOST_MODES = 24
 _KIND_COLOURS: dict[str, str] = dict(
-    zip(("torsional", "bending", "axial", "mixed", "ring", "casing"), COLOURS, strict=False)
+    zip(("torsional", "bending", "axial", "mixed", "ring", "casing", "carrier"), COLOURS, strict=False)
 )
 _DASHES = ("-", "--", "-.", ":")
 _PLANES = ((0, "x"), (1, "y"))

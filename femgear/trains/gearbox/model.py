@@ -34,6 +34,7 @@ from femgear.trains.gearbox.case_file import (
     teeth_of,
 )
 from femgear.trains.gearbox.casing import CasingModel, bearing_name, casing_mass, casing_model
+from femgear.trains.gearbox.elastic_carrier import ElasticCarrier, elastic_carrier
 from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, set_sizes
 from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
 
@@ -71,6 +72,8 @@ class StageModel:
         Of the planets at the standing carrier [rad].
     width : float
         Common face width of the (narrowest) mesh [m]; zero where not given.
+    elastic_carrier : ElasticCarrier or None
+        Of a set whose carrier was read from a file.
     """
 
     section: PairSection | BoxPlanetarySection
@@ -81,6 +84,7 @@ class StageModel:
     planets: tuple[int, ...] = ()
     angles: tuple[float, ...] = ()
     width: float = 0.0
+    elastic_carrier: ElasticCarrier | None = None
 
     @property
     def name(self) -> str:
@@ -391,7 +395,7 @@ class _Builder:
         seats = {
             name: self.casing_seat(f"{name} of {stage.name}")
             if shaft == CASING
-            else self.seat(shaft, getattr(stage, f"{name}_position"))
+            else self.seat(shaft, stage.member_position(name))
             for name, shaft in members.items()
         }
         places = {name: self._place(shaft, getattr(stage, f"{name}_position")) for name, shaft in members.items()}
@@ -405,13 +409,13 @@ class _Builder:
         teeth = teeth_of(stage)
         if teeth is not None:
             for name in ("sun", "carrier", "ring"):
-                if members[name] != CASING:
+                if members[name] != CASING and not (name == "carrier" and stage.superelement):
                     body = self._gear_body(teeth, name)
                     self._body(seats[name], *body, flow.speed[members[name]])
-        carrier = sun if places["carrier"] is None else places["carrier"]
+        carrier = sun if places["carrier"] is None else self._place(stage.carrier, stage.seat_position)
         place = np.append(axis, middle)
         planets = [self._planet(stage, sizes, teeth, n, psi, place) for n, psi in enumerate(angles)]
-        self._pins(stage, teeth, angles, planets, seats["carrier"], carrier)
+        elastic = self._pins(stage, teeth, angles, planets, seats["carrier"], carrier)
         contacts = []
         for ring_mesh in (False, True):
             for n, (psi, planet) in enumerate(zip(angles, planets, strict=True)):
@@ -422,7 +426,7 @@ class _Builder:
                 stiffness = self._mesh_stiffness(stage, int(ring_mesh), number)
                 contacts.append(self._contact(name, pair, pitch, normal, width, stiffness))
         stations = tuple(seats[name].station for name in ("sun", "carrier", "ring"))
-        return StageModel(stage, sizes, tuple(contacts), flank, stations, tuple(planets), angles, width)
+        return StageModel(stage, sizes, tuple(contacts), flank, stations, tuple(planets), angles, width, elastic)
 
     def _planet(self, stage, sizes, teeth, n: int, psi: float, place) -> int:
         """Add a planet around the centre of its set; the number of its station."""
@@ -432,19 +436,27 @@ class _Builder:
         self._body(Seat(station), mass, polar, transverse, self.flow.planet_speed[stage.name])
         return station
 
-    def _pins(self, stage, teeth, angles, planets, carrier: Seat, place) -> None:
-        """Hold planets on the carrier, which is rigid, or gives way at its pins by closed forms."""
-        held = _planet_bearing(stage, teeth)
+    def _pins(self, stage, teeth, angles, planets, carrier: Seat, place) -> ElasticCarrier | None:
+        """Hold planets on the carrier: rigid, giving way at its pins by closed forms, or elastic as in its file."""
+        held, elastic = _planet_bearing(stage, teeth), None
         offsets = [np.asarray(carrier.offset) + np.asarray(self.places[planet]) - place for planet in planets]
+        holders = (carrier.station,) * len(planets)
+        if stage.superelement is not None:
+            pins = [self._station(f"{stage.name} pin {n + 1}", self.places[one]) for n, one in enumerate(planets)]
+            speed = 0.0 if stage.carrier == CASING else self.flow.speed[stage.carrier]
+            elastic = elastic_carrier(stage, (carrier.station, *pins), offsets, angles, speed)
+            self.springs += elastic.springs
+            self.inertias.append(Inertia(elastic.stations, elastic.mass, elastic.gyroscopic))
+            holders, offsets = tuple(pins), [np.zeros(3)] * len(pins)
         axes = [pin_axes(psi) for psi in angles]
-        if stage.pins is None:
-            for n, (planet, offset) in enumerate(zip(planets, offsets, strict=True)):
-                ends = (offset, np.zeros(3))
-                name = f"{stage.name} pin {n + 1}"
-                self.springs.append(joint(name, (carrier.station, planet), ends, held, axes=axes[n]))
-            return
-        compliance = pin_compliance(self.case, stage, angles)
-        self.springs.append(planet_springs(stage, (carrier.station, *planets), offsets, axes, held, compliance))
+        if stage.pins is not None:
+            compliance = pin_compliance(self.case, stage, angles)
+            self.springs.append(planet_springs(stage, holders, planets, offsets, axes, held, compliance))
+            return elastic
+        for n, (holder, planet, offset) in enumerate(zip(holders, planets, offsets, strict=True)):
+            ends, name = (offset, np.zeros(3)), f"{stage.name} pin {n + 1}"
+            self.springs.append(joint(name, (holder, planet), ends, held, axes=axes[n]))
+        return elastic
 
     def _contact(self, name: str, seats: tuple[Seat, Seat], pitch, normal, width: float, stiffness: float) -> int:
         slices = self.case.deflection.slices if width and self.case.motions == "space" else 1
@@ -588,7 +600,7 @@ def seats_on(case: GearboxCase, shaft: str) -> set[float]:
         found |= {p for name, p in zip(names, positions or (), strict=False) if name == shaft and p is not None}
     for stage in case.planetary:
         for member in ("sun", "carrier", "ring"):
-            place = getattr(stage, f"{member}_position")
+            place = stage.member_position(member)
             if getattr(stage, member) == shaft and place is not None:
                 found.add(place)
     return found

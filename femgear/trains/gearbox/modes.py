@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,7 +17,8 @@ from femgear.system.system import MechanicalSystem, Modes
 from femgear.trains.gearbox.carrier import pins_of
 from femgear.trains.gearbox.case_file import CASING
 from femgear.trains.gearbox.deflection import Deflection, laws_of
-from femgear.trains.gearbox.elastic_ring import ElasticRing, elastic_rings, with_rings
+from femgear.trains.gearbox.elastic_carrier import with_carriers
+from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
 from femgear.trains.gearbox.model import GearboxModel
 
 # Share of the kinetic energy from which a mode is of one kind.
@@ -28,10 +31,13 @@ _LEAST = 20
 _BASIS = 2
 # Reach of the Campbell diagram and of the modes that are kept, over the highest mesh frequency.
 _HARMONICS = 3.0
+# Reach of the inner modes of elastic carriers, over that of the modes.
+_REACH = 2.0
 # Share of the largest slice force below which a slice carries nothing but rounding.
 _IDLE = 1e-9
-KINDS = ("torsional", "bending", "axial", "ring", "casing")
-"""Of modes by their kinetic energy: shafts' rotation, motions across the axes and tilts, along them; rings; casing."""
+KINDS = ("torsional", "bending", "axial", "casing", "ring", "carrier")
+"""Of modes by their kinetic energy: shafts' rotation, motions across the axes and tilts, along them; casing; elastic
+rings and carriers."""
 _MOTIONS = ((5,), (0, 1, 3, 4), (2,))
 
 
@@ -48,11 +54,11 @@ class GearboxModes:
     motion : (6n, m) array
         Mode shapes in all motions of all stations [kg^-1/2], rotations in kg^-1/2 m^-1.
     members : tuple of str
-        Shafts, and planets of the stages.
+        Shafts, planets, elastic rings and carriers of the stages.
     kinetic : (members, m) array
         Share of every member in the kinetic energy.
     parts : tuple of str
-        Shafts, bearings, couplings and pins, meshes of the stages.
+        Shafts, bearings, couplings and pins, meshes, elastic rings and carriers of the stages.
     strain : (parts, m) array
         Share of every part in the strain energy; zero of rigid motions.
     campbell : CampbellData
@@ -110,17 +116,25 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     """Solve for the modes of a gearbox about its loaded state, and follow them over the speed."""
     model, case = found.model, found.model.case
     assembly, system, stiffness = linear_system(found)
-    rings = elastic_rings(model, steps=steps)
-    system, stiffness = with_rings(system, stiffness, model, rings)
-    still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
     frequencies = [hertz for hertz in model.flow.mesh_frequency.values() if hertz]
     top = case.modes.up_to or (_HARMONICS * max(frequencies) if frequencies else None)
+    rings = elastic_rings(model, steps=steps)
+    system, stiffness = with_rings(system, stiffness, model, rings)
+    carriers = [stage.elastic_carrier for stage in model.stages if stage.elastic_carrier is not None]
+    carriers = [carrier.below(math.inf if top is None else _REACH * top) for carrier in carriers]
+    system = with_carriers(system, assembly, carriers)
+    still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
     modes = solve_modes(still, stiffness, damping_ratio=case.modes.damping_ratio, count=_kept(still, stiffness, top))
     count = assembly.motions.shape[1]
     motion, waves = assembly.motions @ modes.shape[:count], modes.shape[count:]
-    members, kinetic, kinds = _kinetic(model, assembly, motion, modes, _ring_energies(rings, waves**2))
-    of_rings = _ring_energies(rings, waves**2 * np.concatenate([[0.0], *(r.stiffness for r in rings)])[1:, None])
-    parts, strain = _strain(found, assembly, motion, _mesh_energies(system, stiffness, modes), modes, of_rings)
+    squares = {ring.name: ring.stiffness for ring in rings} | {one.name: one.frequency**2 for one in carriers}
+    inner = _inner_energies(squares, waves * (system.M @ modes.shape)[count:])
+    moved = assembly.mass @ motion
+    for carrier, part in zip(carriers, _parts(squares)[len(rings) :], strict=True):
+        moved += carrier.on_all_motions(assembly.count) @ waves[part]
+    members, kinetic, kinds = _kinetic(model, motion, moved, modes, inner)
+    inner = _inner_energies(squares, waves**2 * np.concatenate([np.zeros(0), *squares.values()])[:, None])
+    parts, strain = _strain(found, assembly, motion, _mesh_energies(system, stiffness, modes), modes, inner)
     reference = model.flow.independent[0] if model.flow.independent else case.shaft[0].name
     speed = abs(model.flow.speed[reference])
     orders = excitation_orders(model, reference)
@@ -133,10 +147,15 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     )
 
 
-def _ring_energies(rings: tuple[ElasticRing, ...], energy: np.ndarray) -> dict[str, np.ndarray]:
-    """Energy (m,) of every elastic ring in all modes, from that of its coordinates (n_ring, m)."""
-    ends = np.cumsum([0, *(len(ring.stiffness) for ring in rings)]).tolist()
-    return {ring.name: energy[a:b].sum(axis=0) for ring, a, b in zip(rings, ends[:-1], ends[1:], strict=True)}
+def _parts(inner: Mapping[str, np.ndarray]) -> list[slice]:
+    """Coordinates of every elastic ring and carrier behind those of the stations."""
+    ends = np.cumsum([0, *(len(squares) for squares in inner.values())]).tolist()
+    return [slice(a, b) for a, b in pairwise(ends)]
+
+
+def _inner_energies(inner: Mapping[str, np.ndarray], energy: np.ndarray) -> dict[str, np.ndarray]:
+    """Energy (m,) of every elastic ring and carrier in all modes, from that of its coordinates (n, m)."""
+    return {name: energy[part].sum(axis=0) for name, part in zip(inner, _parts(inner), strict=True)}
 
 
 def _mesh_energies(system: MechanicalSystem, stiffness: np.ndarray, modes: Modes) -> np.ndarray:
@@ -194,31 +213,30 @@ def excitation_orders(model: GearboxModel, reference: str) -> dict[str, float]:
 
 
 def _kinetic(
-    model, assembly: Assembly, motion, modes: Modes, rings: dict[str, np.ndarray]
+    model, motion, moved, modes: Modes, inner: dict[str, np.ndarray]
 ) -> tuple[tuple[str, ...], np.ndarray, tuple[str, ...]]:
-    """Shares of members in the kinetic energy, and the kind of every mode."""
-    moved = assembly.mass @ motion
-    per_motion = (motion * moved).reshape(len(assembly.names), 6, -1)
+    """Shares of members in the kinetic energy, and the kind of every mode, of motions and momenta (6n, m)."""
     owner = member_of_stations(model)
-    members = tuple(dict.fromkeys(owner))
-    place = np.array([members.index(name) for name in owner])
+    per_motion = (motion * moved).reshape(len(owner), 6, -1)
+    members = tuple(dict.fromkeys((*owner, *inner)))
     kinetic = np.zeros((len(members), motion.shape[1]))
-    np.add.at(kinetic, place, per_motion.sum(axis=1))
-    kinetic = np.vstack([kinetic, *rings.values()])
+    np.add.at(kinetic, np.array([members.index(name) for name in owner]), per_motion.sum(axis=1))
+    for name, energy in inner.items():
+        kinetic[members.index(name)] += energy
     total = np.maximum(kinetic.sum(axis=0), 1e-300)
-    of_rings = sum(rings.values()) if rings else np.zeros(motion.shape[1])
     in_casing = np.array([name == CASING for name in owner])
     of_shafts = [per_motion[~in_casing][:, list(ways)].sum(axis=(0, 1)) for ways in _MOTIONS]
-    by_kind = np.array([*of_shafts, of_rings, per_motion[in_casing].sum(axis=(0, 1))]) / total
+    elastic = [sum((e for name, e in inner.items() if name.startswith(kind)), 0.0 * total) for kind in KINDS[-2:]]
+    by_kind = np.array([*of_shafts, per_motion[in_casing].sum(axis=(0, 1)), *elastic]) / total
     kinds = [
         "rigid" if hertz == 0.0 else KINDS[int(share.argmax())] if share.max() >= _PURE else "mixed"
         for hertz, share in zip(modes.frequency, by_kind.T, strict=True)
     ]
-    return (*members, *rings), kinetic / total, tuple(kinds)
+    return members, kinetic / total, tuple(kinds)
 
 
 def member_of_stations(model: GearboxModel) -> list[str]:
-    """Name the shaft, the planets or the casing that every station belongs to."""
+    """Name the shaft, the planets, the elastic carrier or the casing that every station belongs to."""
     owner = [CASING] * len(model.assembly.names)
     for shaft in model.case.shaft:
         count = len(model.beams[shaft.name].stations) if shaft.name in model.beams else 1
@@ -227,6 +245,8 @@ def member_of_stations(model: GearboxModel) -> list[str]:
     for stage in model.stages:
         for planet in stage.planets:
             owner[planet] = f"planets of {stage.name}"
+        for pin in stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ():
+            owner[pin] = f"carrier of {stage.name}"
     return owner
 
 
@@ -236,9 +256,9 @@ def _called(kind: str, name: str) -> str:
 
 
 def _strain(
-    found: Deflection, assembly: Assembly, motion, of_meshes, modes: Modes, rings: dict[str, np.ndarray]
+    found: Deflection, assembly: Assembly, motion, of_meshes, modes: Modes, inner: dict[str, np.ndarray]
 ) -> tuple[tuple[str, ...], np.ndarray]:
-    """Shares of shafts, bearings, joints, meshes and rings in the strain energy; none of rigid motions."""
+    """Shares of shafts, bearings, joints, meshes, rings and carriers in the strain energy; none of rigid motions."""
     model = found.model
     energies: dict[str, np.ndarray] = {}
 
@@ -265,7 +285,8 @@ def _strain(
     for stage in model.stages:
         name = f"meshes of {stage.name}"
         energies[name] = np.sum([of_meshes[assembly.slices[mesh]].sum(axis=0) for mesh in stage.meshes], axis=0)
-    energies |= rings
+    for name, energy in inner.items():
+        energies[name] = energies.get(name, 0.0) + energy
     table = np.array(list(energies.values())).reshape(len(energies), -1)
     total = table.sum(axis=0)
     elastic = modes.frequency > 0.0
