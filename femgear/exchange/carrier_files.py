@@ -25,7 +25,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from femgear.errors import CaseError
-from femgear.exchange.casing_files import UNITS, Node, check_matrices, dmig_matrices, op4_matrices, read_nodes
+from femgear.exchange.casing_files import UNITS, Node, check_reduced_matrices, dmig_matrices, op4_matrices, read_nodes
 from femgear.fe.beam import rigid_link
 
 CARRIER_ROLES = {"shaft": False, "pin": True}
@@ -169,7 +169,7 @@ def _body(matrices, row, place, table: Sequence[Node], length: float, mass: floa
             limit=f"square, of one size, {len(row)} rows or more",
             remedy="give all nodes in the order of the matrices, with their dofs",
         )
-    check_matrices(matrices)
+    check_reduced_matrices(matrices)
     seats, components = _seats(table)
     place = place | {node.number: node.position for node in table if node.position is not None}
     lost = [node.number for node in seats if node.number not in place]
