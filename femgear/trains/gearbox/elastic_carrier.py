@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -24,20 +25,11 @@ from femgear.trains.gearbox.carrier import compliance_springs, pin_axes
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, SuperelementSection
 from femgear.trains.gearbox.geometry import StageSizes
 
+if TYPE_CHECKING:
+    from femgear.exchange.carrier_files import CarrierBody
+
 _SUPERELEMENT = ("pins", "compliance", "mass", "frequency", "coupling")
 _OFF_CIRCLE = 0.01  # distance of a pin from its place over the centre distance, and angle [rad], at most
-
-
-@dataclass(frozen=True)
-class _Body:
-    """Arrays of a carrier, those of `femgear.exchange.carrier_files.CarrierBody`."""
-
-    seat: np.ndarray
-    pins: np.ndarray
-    compliance: np.ndarray
-    mass: np.ndarray
-    frequency: np.ndarray
-    coupling: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -162,14 +154,16 @@ def with_carriers(system: MechanicalSystem, assembly: Assembly, carriers: Sequen
     return system
 
 
-def _unpacked(section: SuperelementSection | None) -> _Body:
+def _unpacked(section: SuperelementSection | None) -> CarrierBody:
     """Arrays of a carrier that was read from a file."""
+    from femgear.exchange.carrier_files import CarrierBody
+
     assert section is not None
     pins = np.reshape(section.pins, (-1, 3))
     compliance, mass = (_symmetric(triangle) for triangle in (section.compliance, section.mass))
     frequency = np.array(section.frequency)
     coupling = np.reshape(section.coupling, (len(mass), len(frequency)))
-    return _Body(np.array(section.seat), pins, compliance, mass, frequency, coupling)
+    return CarrierBody(np.array(section.seat), pins, compliance, mass, frequency, coupling)
 
 
 def _symmetric(triangle: Sequence[float]) -> np.ndarray:
