@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
@@ -75,6 +78,56 @@ def _at(offset) -> np.ndarray:
     x, y, z = offset
     cross = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
     return np.block([[np.eye(3), cross], [np.zeros((3, 3)), np.eye(3)]])
+
+
+@dataclass(frozen=True)
+class Path:
+    """A node that springs along x, y, z (and about them) join to the rigid body of a file.
+
+    ``role`` and ``name`` of the node, its ``place`` (3,) [m], ``stiffness`` (3,) or (6,), and its ``mass`` [kg].
+    """
+
+    role: str
+    name: str
+    place: tuple[float, ...]
+    stiffness: tuple[float, ...]
+    mass: float = 0.05
+
+
+def body_matrices_of(paths: Sequence[Path]) -> tuple[np.ndarray, np.ndarray]:
+    """Stiffness and mass of a rigid body, six coordinates at `CENTRE`, and the nodes that hang on it."""
+    sizes = [len(path.stiffness) for path in paths]
+    count, at = 6 + sum(sizes), 6
+    stiffness, mass = np.zeros((count, count)), np.zeros((count, count))
+    mass[:3, :3], mass[3:6, 3:6] = MASS * np.eye(3), TENSOR
+    for path, size in zip(paths, sizes, strict=True):
+        rows = np.zeros((size, count))
+        rows[:, :6] = -_at(np.array(path.place) - CENTRE)[:size]
+        rows[:, at : at + size] = np.eye(size)
+        stiffness += rows.T @ np.diag(path.stiffness) @ rows
+        own = np.arange(at, at + size)
+        mass[own, own] = path.mass * np.array([1.0, 1.0, 1.0, 1e-4, 1e-4, 1e-4])[:size]
+        at += size
+    return stiffness, mass
+
+
+def casing_paths(seats: Any, feet: Any, names=("A", "B", "C", "D")) -> list[Path]:
+    """Nodes of the bearings of `rigid_tables` and of four feet, with the stiffness of their springs."""
+    places = {"A": (0.0, 0.0, -0.04), "B": (0.0, 0.0, 0.04), "C": (0.09, 0.0, -0.04), "D": (0.09, 0.0, 0.04)}
+    found = [Path("seat", name, places[name], tuple(seats)) for name in names]
+    return [*found, *(Path("foot", name, tuple(v / 1e3 for v in place), tuple(feet)) for name, place in FEET.items())]
+
+
+def write_casing_file(folder: FilePath, paths: Sequence[Path], matrices=None) -> dict[str, Any]:
+    """Write casing.npz and nodes.csv into a folder; tables of the casing without feet."""
+    stiffness, mass = matrices or body_matrices_of(paths)
+    np.savez(folder / "casing.npz", stiffness=stiffness, mass=mass)
+    rows = ["node,role,x,y,z,dofs", f"1,sensor body,{','.join(map(repr, CENTRE.tolist()))},123456"]
+    for number, path in enumerate(paths, 2):
+        dofs = "123456"[: len(path.stiffness)]
+        rows.append(f"{number},{path.role} {path.name},{','.join(map(repr, path.place))},{dofs}")
+    (folder / "nodes.csv").write_text("\n".join(rows))
+    return {"file": "casing.npz", "nodes": "nodes.csv"}
 
 
 def rigid_matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:

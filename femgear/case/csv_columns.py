@@ -277,14 +277,22 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
 def embed_checksum(data: dict, name: str) -> dict[str, str]:
     """Put the SHA-256 of the files of a casing beside their names, where a case does not have it already."""
     housing: Any = data.get("housing")
-    table = housing.get("structure") if isinstance(housing, dict) else None
+    return add_checksum(housing, "structure", name, "housing.structure") if isinstance(housing, dict) else {}
+
+
+def add_checksum(holder: dict, entry: str, name: str, key: str) -> dict[str, str]:
+    """Put the SHA-256 of ``file`` and ``nodes`` of a table beside them, as `embed_checksum`.
+
+    The table is an entry of a holder, and stands at the key of the case file of that name.
+    """
+    table = holder.get(entry)
     if not isinstance(table, dict) or "sha256" in table or not isinstance(table.get("file"), str):
         return {}
-    names = {key: table[key] for key in ("file", "nodes") if isinstance(table.get(key), str)}
-    del housing["structure"]  # a file that cannot be read is refused for that alone
-    found = [embedded(file, name, f"housing.structure.{key}", input_checksum) for key, file in names.items()]
-    housing["structure"] = table | {"sha256": checksum_of_all(found)}
-    return {"housing.structure": text.printable(names["file"])}
+    names = {part: table[part] for part in ("file", "nodes") if isinstance(table.get(part), str)}
+    del holder[entry]  # a file that cannot be read is refused for that alone
+    found = [embedded(file, name, f"{key}.{part}", input_checksum) for part, file in names.items()]
+    holder[entry] = table | {"sha256": checksum_of_all(found)}
+    return {key: text.printable(names["file"])}
 
 
 def checksum_of_all(checksums: Iterable[str]) -> str:

@@ -173,7 +173,7 @@ def read_casing(
         E-SUPPORT.
     """
     kind = path.suffix.lower()
-    with _of_file(path):
+    with file_in_refusals(path):
         known = ", ".join(UNITS)
         _check("no such units", units in UNITS, code="E-CHOICE", key="units", value=units, limit=known)
         _check(
@@ -283,7 +283,7 @@ def _check(message: str, ok: bool, **words: Any) -> None:
 
 
 @contextmanager
-def _of_file(path: Path) -> Iterator[None]:
+def file_in_refusals(path: Path) -> Iterator[None]:
     """Name the file in the refusals of the block; what a library says of a damaged one is E-FILE."""
     try:
         yield
@@ -293,7 +293,7 @@ def _of_file(path: Path) -> Iterator[None]:
 
 
 @contextmanager
-def _foreign(words: str) -> Iterator[None]:
+def foreign_refusals(words: str) -> Iterator[None]:
     """Turn what a library says of a damaged file into E-FILE."""
     try:
         yield
@@ -309,8 +309,8 @@ def read_nodes(path: Path, roles: Mapping[str, bool] = CASING_ROLES) -> tuple[No
 
     CaseError: E-FILE, E-KEY-MISSING (columns), E-CHOICE (roles, directions), E-DUPLICATE (nodes).
     """
-    with _of_file(path):
-        with _foreign("table of nodes (CSV)"), open(path, newline="", encoding="utf-8-sig") as stream:
+    with file_in_refusals(path):
+        with foreign_refusals("table of nodes (CSV)"), open(path, newline="", encoding="utf-8-sig") as stream:
             reader = csv.DictReader(stream)
             rows, columns = list(reader), list(reader.fieldnames or ())
         _check(
@@ -510,7 +510,7 @@ def _check_units(structure: FixedStructure, expected: float, units: str) -> None
 
 def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
     """Arrays of a file .npz or NetCDF by name in SI units, of units of length [m] and mass [kg]."""
-    with _foreign("arrays of a structure (.npz, NetCDF)"):
+    with foreign_refusals("arrays of a structure (.npz, NetCDF)"):
         if path.suffix.lower() == ".npz":
             with ZipFile(path) as archive:
                 size = sum(archive.getinfo(f"{name}.npy").file_size for name in _named(archive.namelist()))
@@ -581,7 +581,7 @@ def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:
         kept = line[:4].upper() in ("GRID", "CORD", "DMIG") if line[:1].isalpha() else kept
         lines += [line] if kept and not line.startswith("$") else []
     deck, place = BDF(debug=False), dict[int, np.ndarray]()
-    with _foreign("bulk data of Nastran"):
+    with foreign_refusals("bulk data of Nastran"):
         if lines:
             source: Any = StringIO("\n".join([*lines, ""]))
             deck.read_bdf(source, punch=True, xref=False)
@@ -636,7 +636,7 @@ def op4_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], d
     """Matrices of an ASCII OUTPUT4 file, as `dmig_matrices`."""
     with nvh_library("matrices of Nastran"):
         from pyNastran.op4.op4 import OP4
-    with _foreign("ASCII OP4"):
+    with foreign_refusals("ASCII OP4"):
         matrices = OP4(debug=False).read_op4(str(path))
     found = [getattr(one, "data", one) for one in _pair(matrices)]
     found = [one[1].toarray() if hasattr(one[1], "toarray") else np.asarray(one[1]) for one in found]
@@ -845,7 +845,7 @@ def _datasets(path: Path) -> list[dict]:
     """Read the datasets of a universal file in ASCII."""
     with nvh_library("universal files"):
         import pyuff
-    with _foreign("universal file"):
+    with foreign_refusals("universal file"):
         content = _without_binary(path.read_bytes())
         # the library reads a file that breaks off up to its last whole dataset
         if sum(line.strip() == b"-1" for line in content.splitlines()) % 2:

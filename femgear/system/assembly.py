@@ -74,6 +74,28 @@ class StationSprings:
 
 
 @dataclass(frozen=True)
+class Follower:
+    """A station that moves as others have it, such as a seat in an elastic casing.
+
+    Parameters
+    ----------
+    name : str
+        For messages and results.
+    station : int
+        Number of the station that follows.
+    leaders : tuple of int
+        Numbers of the k stations that it follows, none of them a follower.
+    rows : (6, 6k) array
+        Its motions per unit of theirs.
+    """
+
+    name: str
+    station: int
+    leaders: tuple[int, ...]
+    rows: np.ndarray
+
+
+@dataclass(frozen=True)
 class Contact:
     """A gear mesh on its common normal, of S slices over the width.
 
@@ -119,8 +141,8 @@ class Assembly:
         [m]
     held : (6n,) bool array
         Motions that do not take place.
-    inertias, beams, springs, contacts : tuples
-        Of `Inertia`, `Beam`, `StationSprings` and `Contact`.
+    inertias, beams, springs, contacts, followers : tuples
+        Of `Inertia`, `Beam`, `StationSprings`, `Contact` and `Follower`.
     """
 
     names: tuple[str, ...]
@@ -130,6 +152,7 @@ class Assembly:
     beams: tuple[Beam, ...] = ()
     springs: tuple[StationSprings, ...] = ()
     contacts: tuple[Contact, ...] = field(default=())
+    followers: tuple[Follower, ...] = ()
 
     def __post_init__(self):
         freeze(self)
@@ -194,7 +217,19 @@ class Assembly:
             for at, station in enumerate(group.stations):
                 if station != GROUND:
                     rows[-1][:, 6 * station : 6 * station + 6] += rigid[:, 6 * at : 6 * at + 6]
-        return solved_conditions(np.vstack(rows), self.held)
+        if not self.followers:
+            return solved_conditions(np.vstack(rows), self.held)
+        led, held = np.eye(self.count), self.held.copy()
+        for follower in self.followers:
+            own = slice(6 * follower.station, 6 * follower.station + 6)
+            led[own, own] = 0.0
+            for at, leader in enumerate(follower.leaders):
+                # motions that do not take place are no one's
+                part = np.where(self.held[own, None], 0.0, follower.rows[:, 6 * at : 6 * at + 6])
+                led[own, 6 * leader : 6 * leader + 6] += part
+            held[own] = True
+        found, free = solved_conditions(np.vstack(rows) @ led, held)
+        return led @ found, free
 
     @property
     def motions(self) -> np.ndarray:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.fe.beam import body_matrices, rigid_link
-from femgear.system.assembly import GROUND, Assembly, Contact, Inertia, joint, solved_conditions
+from femgear.system.assembly import GROUND, Assembly, Contact, Follower, Inertia, joint, solved_conditions
 
 
 def two_bodies(**parts) -> Assembly:
@@ -69,3 +69,31 @@ def test_free_motions_are_named_after_their_stations():
     assert two_bodies(springs=(tie,)).free_names == tuple(
         f"first: {way}" for way in ("x", "y", "z", "tilt x", "tilt y", "rotation")
     )
+
+
+def test_a_follower_moves_as_its_leaders_have_it():
+    """A spring on a point that follows two stations is that spring with the rows of both."""
+    rng = np.random.default_rng(7)
+    first, second = rng.normal(size=(2, 6, 6))
+    here = np.zeros(3), np.zeros(3)
+    ground = [joint(name, (GROUND, i), here, 1e6 * (1 + rng.random(6))) for i, name in enumerate("ab")]
+    at_point = joint("point", (GROUND, 2), here, 1e6 * (1 + rng.random(6)))
+    held = np.zeros(18, bool)
+    held[[2, 14]] = True  # along z of the first, and of the point
+    inertias = tuple(Inertia((i,), np.eye(6), np.zeros((6, 6))) for i in range(2))
+    led = Assembly(
+        ("a", "b", "point"),
+        np.zeros((3, 3)),
+        held,
+        inertias,
+        springs=(*ground, at_point),
+        followers=(Follower("point", 2, (0, 1), np.hstack([first, second])),),
+    )
+    system = led.system(np.arange(18.0))
+    assert system.dofs == led.motion_names[:2] + led.motion_names[3:12]
+    rows = np.hstack([first, second])
+    rows[2] = 0.0
+    plain = Assembly(("a", "b"), np.zeros((2, 3)), held[:12], inertias, springs=tuple(ground)).system(np.arange(12.0))
+    rows = rows[:, [i for i in range(12) if i != 2]]
+    assert system.K == pytest.approx(plain.K + rows.T @ np.diag(at_point.stiffness) @ rows, rel=1e-12)
+    assert system.load == pytest.approx(plain.load + rows.T @ np.arange(12.0, 18.0))

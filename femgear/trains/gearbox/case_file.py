@@ -17,7 +17,7 @@ import numpy as np
 from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema, model_validator
 
 from femgear.case import text as case_text
-from femgear.case.csv_columns import embed_profiles, embedded
+from femgear.case.csv_columns import add_checksum, embed_profiles, embedded
 from femgear.case.quantities import (
     ACCELERATION,
     ANGLE,
@@ -425,27 +425,37 @@ class BoxGravitySection(Section):
 
 
 class CasingFootSection(Section):
-    """A foot of the casing: springs to the ground along x, y and z, each a stiffness or ``"rigid"``."""
+    """A foot of the casing: springs to the ground along x, y and z, each a stiffness or ``"rigid"``.
+
+    Of a casing from a file ``name`` is that of a node of the role foot, and the position is that of the node.
+    """
 
     name: Name | None = None
-    position: Annotated[tuple[Along, ...], TRIPLE]
+    position: Annotated[tuple[Along, ...], TRIPLE] | None = None
     stiffness: Annotated[tuple[Lateral, ...], TRIPLE]
 
 
 class BoxCasingSection(Section):
-    """The casing as a rigid body on feet, with all that is fixed in it; without it the casing stands still.
+    """The casing on its feet, with all that is fixed in it; without this section it stands still.
 
-    ``centre`` is its centre of mass, ``inertia`` are those about x, y and z through it, ``products`` the integrals of
-    x y, x z and y z over the mass. Seats of ``stands_still`` are not in it, but in what stands still: bearings by
-    their names, ``"ring of STAGE"``, ``"coupling NAME"``, ``"SHAFT held"``.
+    It is a rigid body: ``centre`` is its centre of mass, ``inertia`` are those about x, y and z through it,
+    ``products`` the integrals of x y, x z and y z over the mass. Or it is elastic, the superelement of a ``file`` with
+    a table of ``nodes``, of which ``sha256`` is that of both; feet that the table has and that are not listed are
+    rigid. Seats of ``stands_still`` are not in it, but in what stands still: bearings by their names, ``"ring of
+    STAGE"``, ``"coupling NAME"``, ``"SHAFT held"``.
     """
 
-    mass: PartMass
-    inertia: Annotated[tuple[PartInertia, ...], TRIPLE]
+    mass: PartMass | None = None
+    inertia: Annotated[tuple[PartInertia, ...], TRIPLE] | None = None
     products: Annotated[tuple[Product, ...], TRIPLE] = (0.0, 0.0, 0.0)
-    centre: Annotated[tuple[Along, ...], TRIPLE]
-    foot: Annotated[tuple[CasingFootSection, ...], Field(min_length=1, max_length=MOST_PARTS)]
+    centre: Annotated[tuple[Along, ...], TRIPLE] | None = None
+    foot: Annotated[tuple[CasingFootSection, ...], Field(max_length=MOST_PARTS)] = ()
     stands_still: Annotated[tuple[Name, ...], Field(max_length=MOST_PARTS)] = ()
+    file: Annotated[str, Field(max_length=1000)] | None = None
+    nodes: Annotated[str, Field(max_length=1000)] | None = None
+    units: Literal["SI", "mm-t-s"] = "SI"
+    max_frequency: Annotated[float, Quantity(FREQUENCY, 10.0, 1e6)] | None = None
+    sha256: Annotated[str, Field(pattern="^[0-9a-f]{64}$")] | None = None
 
     @property
     def foot_names(self) -> tuple[str, ...]:
@@ -557,8 +567,8 @@ def teeth_of(stage: PairSection | BoxPlanetarySection) -> Any:
 
 
 def embed_stages(data: dict, name: str) -> dict[str, str]:
-    """Put the tables of stages in the place of the files that they name."""
-    found: dict[str, str] = {}
+    """Put the tables of stages in the place of the files that they name, and the SHA-256 of the files of a casing."""
+    found = add_checksum(data, "casing", name, "casing")
     for kind in ("pair", "planetary"):
         stages = data.get(kind)
         for i, table in enumerate(stages if isinstance(stages, list) else ()):

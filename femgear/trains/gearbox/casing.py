@@ -6,7 +6,7 @@ springs to the ground along x, y and z.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,13 +27,17 @@ class CasingModel:
     Parameters
     ----------
     station : int
-        Number of its station.
+        Number of its station, at its centre of mass.
+    stations : tuple of int
+        That station, and those of its elastic motions, six each.
     centre : (3,) array
-        Place of the station, the centre of mass [m].
+        Place of the station [m].
     seats : mapping of str to (3,) array
         Places of all that sits in the casing [m], by name, see `casing_seats`.
     standing : frozenset of str
         Names of those that are in what stands still instead.
+    own : mapping of str to int
+        Stations of seats that have one: those of an elastic casing.
     feet : tuple of StationSprings
         Of every foot: six rows of the motion of its place against the ground.
     foot_stiffness : (f, 6) array
@@ -43,9 +47,11 @@ class CasingModel:
     """
 
     station: int
+    stations: tuple[int, ...]
     centre: np.ndarray
     seats: Mapping[str, np.ndarray]
     standing: frozenset[str]
+    own: Mapping[str, int]
     feet: tuple[StationSprings, ...]
     foot_stiffness: np.ndarray
     foot_offsets: np.ndarray
@@ -59,6 +65,11 @@ class CasingModel:
     def foot_places(self) -> np.ndarray:
         """Places (f, 3) of the feet [m]."""
         return self.centre + self.foot_offsets
+
+    @property
+    def elastic(self) -> tuple[int, ...]:
+        """Stations that are no place, but elastic motions."""
+        return self.stations[1:]
 
 
 def bearing_name(bearing: BoxBearingSection, number: int) -> str:
@@ -107,12 +118,14 @@ def named_seats(case: GearboxCase) -> list[tuple[str, str, np.ndarray]]:
 
 def inertia_tensor(section: BoxCasingSection) -> np.ndarray:
     """Tensor of inertia (3, 3) about the centre of mass [kg m^2]: products of inertia enter with their sign turned."""
+    assert section.inertia is not None
     xy, xz, yz = section.products
     return np.diag(section.inertia) - np.array([[0.0, xy, xz], [xy, 0.0, yz], [xz, yz, 0.0]])
 
 
 def casing_mass(section: BoxCasingSection) -> np.ndarray:
-    """Mass matrix (6, 6) of the casing about its centre of mass [kg, kg m^2]."""
+    """Mass matrix (6, 6) of a rigid casing about its centre of mass [kg, kg m^2]."""
+    assert section.mass is not None
     found = section.mass * np.eye(6)
     found[3:, 3:] = inertia_tensor(section)
     return found
@@ -122,17 +135,24 @@ def casing_model(case: GearboxCase, station: int) -> CasingModel:
     """Make the seats and feet of a rigid casing on its station."""
     section = case.casing
     assert section is not None
-    # weight along held motions rests in these
-    ways = np.array([True, True, case.motions == "space"])
-    offsets = np.array([np.subtract(foot.position, section.centre) for foot in section.foot])
+    assert section.centre is not None
+    offsets = np.array([np.subtract(foot.position or (), section.centre) for foot in section.foot])
     feet = tuple(
         joint(name, (GROUND, station), (np.zeros(3), offset), np.ones(6))
         for name, offset in zip(section.foot_names, offsets, strict=True)
     )
-    stiffness = np.zeros((len(feet), 6))
-    stiffness[:, :3] = np.where(ways, [foot.stiffness for foot in section.foot], 0.0)
+    stiffness = foot_stiffness(case, [foot.stiffness for foot in section.foot])
     standing = frozenset(section.stands_still)
-    return CasingModel(station, np.array(section.centre), casing_seats(case), standing, feet, stiffness, offsets)
+    centre = np.array(section.centre)
+    return CasingModel(station, (station,), centre, casing_seats(case), standing, {}, feet, stiffness, offsets)
+
+
+def foot_stiffness(case: GearboxCase, given: Sequence[Sequence[float]]) -> np.ndarray:
+    """Arrange the stiffnesses (f, 3) of feet [N/m] as those (f, 6) of joints."""
+    found = np.zeros((len(given), 6))
+    # weight along held motions rests in these
+    found[:, :3] = np.where([True, True, case.motions == "space"], np.reshape(given, (-1, 3)), 0.0)
+    return found
 
 
 def _foot_rows(casing: CasingModel, count: int) -> np.ndarray:

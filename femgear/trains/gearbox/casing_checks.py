@@ -22,6 +22,7 @@ def check_casing(case: GearboxCase) -> Iterator[CaseError]:
     if section is None:
         return
     yield from _motions(case)
+    yield from _given(section)
     yield from _inertia(section)
     yield from _feet(section)
     yield from _standing(case, section)
@@ -55,8 +56,73 @@ def _motions(case: GearboxCase) -> Iterator[CaseError]:
         )
 
 
+def _given(section: BoxCasingSection) -> Iterator[CaseError]:
+    """A rigid body on feet, or a file."""
+    rigid = ("mass", "inertia", "centre")
+    given = section.given(*rigid)
+    if section.file is not None and given:
+        yield CaseError(
+            "the casing is given twice",
+            code="E-CHOICE",
+            key=f"casing.{given[0]}",
+            limit="file, or mass, inertia and centre",
+            remedy=f"leave {', '.join(given)} out: the file has them",
+        )
+    if section.file is not None:
+        yield from _nodes_and_feet(section)
+        return
+    for name in rigid:
+        if name not in given:
+            yield CaseError(
+                "a rigid casing needs it",
+                code="E-KEY-MISSING",
+                key=f"casing.{name}",
+                limit="mass, inertia and centre, or file",
+                remedy="give that of the casing with all that is fixed in it, or the file of a superelement",
+            )
+    if not section.foot:
+        yield CaseError(
+            "the casing has no feet",
+            code="E-KEY-MISSING",
+            key="casing.foot",
+            limit="one or more [[casing.foot]]",
+            remedy="give its feet, or leave [casing] out: it then stands still",
+        )
+    for number, foot in enumerate(section.foot):
+        if foot.position is None:
+            yield CaseError(
+                "the place of the foot is missing",
+                code="E-KEY-MISSING",
+                key=f"casing.foot[{number}].position",
+                remedy='give x, y and z, as in ["-80 mm", "-100 mm", "0 mm"]',
+            )
+
+
+def _nodes_and_feet(section: BoxCasingSection) -> Iterator[CaseError]:
+    """What a casing of a file needs, and what its nodes have already."""
+    if section.nodes is None:
+        yield CaseError(
+            "matrices do not say which node is what",
+            code="E-KEY-MISSING",
+            key="casing.nodes",
+            limit="a table of nodes (CSV): seat NAME, foot NAME",
+            remedy='give nodes = "nodes.csv" beside file',
+        )
+    for number, foot in enumerate(section.foot):
+        if foot.position is not None:
+            yield CaseError(
+                "the place of the foot is that of its node",
+                code="E-CHOICE",
+                key=f"casing.foot[{number}].position",
+                limit="name and stiffness",
+                remedy="leave it out",
+            )
+
+
 def _inertia(section: BoxCasingSection) -> Iterator[CaseError]:
     """Inertias that a body can have: positive, none larger than the sum of both others."""
+    if section.inertia is None:
+        return
     principal = np.linalg.eigvalsh(inertia_tensor(section))
     if principal[0] <= 0.0 or principal[2] > (1.0 + _FLAT) * (principal[0] + principal[1]):
         yield CaseError(

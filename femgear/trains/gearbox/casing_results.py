@@ -37,7 +37,7 @@ def casing_variables(every: Sequence[Deflection]) -> dict[str, tuple]:
             "load_case motion",
             [one.motion[station] for one in every],
             "m",
-            "motion of the casing at its centre of mass: x, y, z (m), tilts and rotation (rad)",
+            "motion of the casing as a whole, at its centre of mass: x, y, z (m), tilts and rotation (rad)",
         ),
         "seat_displacement": (
             "load_case bearing axis",
@@ -51,12 +51,13 @@ def casing_variables(every: Sequence[Deflection]) -> dict[str, tuple]:
 def seat_motions(case: GearboxCase, casing: CasingModel, motion: np.ndarray) -> np.ndarray:
     """Compute the motions (b, 3) of the casing at all bearings in it [m]; NaN at others, 0 in what stands still."""
     found = np.full((len(case.bearing), 3), np.nan)
-    own = motion[6 * casing.station : 6 * casing.station + 6]
+    motion = motion.reshape(-1, 6)
     for number, bearing in enumerate(case.bearing):
         name = bearing_name(bearing, number)
         if bearing.outer_shaft is None:
             link = rigid_link(casing.seats[name] - casing.centre)
-            found[number] = 0.0 if name in casing.standing else (link @ own)[:3]
+            own = motion[casing.own[name]] if name in casing.own else link @ motion[casing.station]
+            found[number] = 0.0 if name in casing.standing else own[:3]
     return found
 
 

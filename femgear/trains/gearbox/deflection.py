@@ -485,6 +485,11 @@ def _conditions(assembly: Assembly, model: GearboxModel) -> np.ndarray:
     for springs in model.joints:
         if np.isinf(springs.stiffness).any():
             rows.append(_spread(springs, assembly)[np.isinf(springs.stiffness)])
+    for follower in assembly.followers:
+        at = [6 * leader + way for leader in follower.leaders for way in range(6)]
+        own = np.arange(6 * follower.station, 6 * follower.station + 6)
+        rows.append(np.zeros((6, assembly.count)))
+        rows[-1][np.arange(6), own], rows[-1][:, at] = 1.0, -follower.rows
     held = np.flatnonzero(assembly.held)
     both = np.unique(np.concatenate([held, model.turns]))
     rows.append(np.eye(assembly.count)[both])

@@ -34,6 +34,7 @@ from femgear.trains.gearbox.case_file import (
     teeth_of,
 )
 from femgear.trains.gearbox.casing import CasingModel, bearing_name, casing_mass, casing_model
+from femgear.trains.gearbox.casing_file import ElasticParts, elastic_casing_model
 from femgear.trains.gearbox.elastic_carrier import ElasticCarrier, elastic_carrier
 from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, set_sizes
 from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
@@ -149,6 +150,12 @@ class GearboxModel:
         """Names of the bearings: as given, or by their shafts."""
         return tuple(bearing.name for bearing in self.bearings)
 
+    @cached_property
+    def places(self) -> np.ndarray:
+        """Numbers of the stations that are places, unlike elastic motions of the casing."""
+        elastic = () if self.casing is None else self.casing.elastic
+        return np.setdiff1d(np.arange(len(self.assembly.names)), elastic)
+
     def seat(self, shaft: str, position: float | None) -> Seat:
         """Find the place of a shaft at a position from its left end [m]; that of a rigid body where None."""
         return _seat(self.case, self.beams, self.first, shaft, position)
@@ -206,6 +213,7 @@ class _Builder:
         self.beams: dict[str, BeamShaft] = {}
         self.first: dict[str, int] = {}
         self.casing: CasingModel | None = None
+        self.elastic: ElasticParts | None = None
 
     def model(self, load_case: LoadCaseSection) -> GearboxModel:
         case = self.case
@@ -229,6 +237,9 @@ class _Builder:
         stages = [self._pair(stage) for stage in case.pair] + [self._planetary(stage) for stage in case.planetary]
         held = np.zeros((len(self.names), 6), bool)
         held[:, list(HELD[case.motions])] = True
+        if self.casing is not None and self.elastic is not None:
+            # elastic motions have no directions
+            held[list(self.casing.elastic)] = self.elastic.held[1 : 1 + len(self.casing.elastic)]
         for name in case.operation.fixed:
             seat = self.casing_seat(f"{name} held")
             held[self.first[name], 5] = seat.station == GROUND
@@ -246,6 +257,7 @@ class _Builder:
             tuple(self.stiff_beams),
             tuple(self.springs),
             tuple(self.contacts),
+            () if self.elastic is None else self.elastic.followers,
         )
         ports = {one.name: self.seat(one.shaft, one.position) for one in case.load}
         ports |= {shaft.name: Seat(self.first[shaft.name]) for shaft in case.shaft if not shaft.part}
@@ -268,15 +280,25 @@ class _Builder:
         )
 
     def _casing(self, section: BoxCasingSection) -> None:
-        """Add the station of the casing with its mass, and its feet."""
-        station = self._station(CASING, section.centre)
-        self.inertias.append(Inertia((station,), casing_mass(section), np.zeros((6, 6))))
-        self.casing = casing_model(self.case, station)
+        """Add the stations of the casing with its mass, and its feet."""
+        station = len(self.names)
+        if section.file is None:
+            self._station(CASING, section.centre or (0.0, 0.0, 0.0))
+            self.inertias.append(Inertia((station,), casing_mass(section), np.zeros((6, 6))))
+            self.casing = casing_model(self.case, station)
+            return
+        self.casing, self.elastic = elastic_casing_model(self.case, station)
+        for name, (x, y, z) in zip(self.elastic.names, self.elastic.places.tolist(), strict=True):
+            self._station(name, (x, y, z))
+        self.inertias += self.elastic.inertias
+        self.stiff_beams += [self.elastic.beam] if self.casing.elastic else []
 
     def casing_seat(self, name: str) -> Seat:
         """Place in the casing of a seat; one of what stands still."""
         if self.casing is None or name in self.casing.standing:
             return Seat(GROUND)
+        if name in self.casing.own:
+            return Seat(self.casing.own[name])
         offset = self.casing.seats[name] - np.asarray(self.casing.centre)
         return Seat(self.casing.station, (float(offset[0]), float(offset[1]), float(offset[2])))
 
@@ -534,6 +556,8 @@ class _Builder:
             along = np.asarray(self.case.gravity.direction)
             field = np.zeros((len(assembly.names), 6))
             field[:, :3] = self.case.gravity.acceleration * along / np.linalg.norm(along)
+            if self.casing is not None:
+                field[list(self.casing.elastic)] = 0.0
             load += assembly.mass @ field.ravel()
         return load
 

@@ -269,8 +269,11 @@ def _strain(
         energy = np.einsum("im,ij,jm->m", moved, matrix[np.ix_(kept, kept)], moved)
         energies[name] = energies.get(name, 0.0) + energy
 
-    for shaft, beam in zip(model.beams, model.assembly.beams, strict=True):
+    beams = model.assembly.beams
+    for shaft, beam in zip(model.beams, beams, strict=False):
         add(_called("shaft", shaft), beam.stations, beam.stiffness)
+    for beam in beams[len(model.beams) :]:
+        add(CASING, beam.stations, beam.stiffness)
     for number, springs in enumerate(model.bearings):
         finite = np.where(np.isfinite(found.bearing_stiffness[number]), found.bearing_stiffness[number], 0.0)
         add(_called("bearing", springs.name), springs.stations, springs.rows.T @ finite @ springs.rows)

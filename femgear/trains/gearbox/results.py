@@ -17,6 +17,7 @@ from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
 from femgear.system.assembly import MOTIONS
 from femgear.trains.gearbox.case_file import GearboxCase
+from femgear.trains.gearbox.casing_file import casing_notices
 from femgear.trains.gearbox.casing_results import (
     casing_coordinates,
     casing_variables,
@@ -85,6 +86,7 @@ class DeflectionResult(StageResult):
         """Collect the contents of deflection.nc."""
         case, state, every = self.case, self.state, self.states
         assembly, load_case, mesh = state.model.assembly, "load_case", "load_case mesh"
+        shown = state.model.places
         slopes = np.array([one.mesh_slope for one in every])
         widths = _mesh_widths(state)
         face = np.array([_face_factors(one) for one in every])
@@ -112,11 +114,11 @@ class DeflectionResult(StageResult):
             "transmission_error": (mesh, _errors(every), "m", "peak to peak of the static transmission error"),
             "displacement": (
                 "load_case station motion",
-                np.array([one.motion.reshape(-1, 6) for one in every]),
+                np.array([one.motion.reshape(-1, 6)[shown] for one in every]),
                 "m",
                 "motion of the station: x, y, z (m), tilts and rotation (rad)",
             ),
-            "place": ("station axis", assembly.places, "m", "place of the station"),
+            "place": ("station axis", assembly.places[shown], "m", "place of the station"),
             "passes": (load_case, [len(one.slopes) - 1 for one in every], "1", "passes of contact and system"),
             "settled": (load_case, [one.settled for one in every], "1", "whether slopes and mesh forces have settled"),
             "out_of_balance": (load_case, [one.residual for one in every], "1", "force out of balance, relative"),
@@ -133,8 +135,13 @@ class DeflectionResult(StageResult):
             "motion": _names("motion", MOTIONS, "motion"),
             "other_motion": _names("other_motion", MOTIONS, "motion"),
             "axis": _names("axis", "xyz", "coordinate"),
-            "station": _names("station", assembly.names, "station of a shaft, or planet"),
-            "member": ("station", member_of_stations(state.model), "1", "shaft or planets of the station"),
+            "station": _names("station", [assembly.names[i] for i in shown], "station of a shaft, or planet"),
+            "member": (
+                "station",
+                np.array(member_of_stations(state.model))[shown].tolist(),
+                "1",
+                "shaft or planets of the station",
+            ),
         } | casing_coordinates(state)
         return Contents(variables, coords, {"title": "system deflection", "load_case": self.chosen})
 
@@ -274,7 +281,7 @@ class GearboxModesResult(StageResult):
         """Collect the contents of modes.nc."""
         found = self.found
         modes, model, campbell = found.modes, found.deflection.model, found.campbell
-        critical = campbell.critical
+        critical, shown = campbell.critical, model.places
         variables = mode_entries(modes) | {
             "energy": ("member mode", found.kinetic, "1", "share of the member in the kinetic energy"),
             "strain": ("part mode", found.strain, "1", "share of the part in the strain energy"),
@@ -282,11 +289,11 @@ class GearboxModesResult(StageResult):
             "main_part": ("mode", _largest(found.parts, found.strain), "1", "part with most strain energy"),
             "motion": (
                 "station way mode",
-                found.motion.reshape(len(model.assembly.names), 6, -1),
+                found.motion.reshape(len(model.assembly.names), 6, -1)[shown],
                 "kg^-1/2",
                 "mode shape of unit mass; tilts and rotations in kg^-1/2 m^-1",
             ),
-            "place": ("station axis", model.assembly.places, "m", "place of the station"),
+            "place": ("station axis", model.assembly.places[shown], "m", "place of the station"),
             "order": ("line", list(found.orders.values()), "1", f"over the turn of {found.reference}"),
             "campbell_frequency": (
                 "campbell_speed branch",
@@ -301,7 +308,9 @@ class GearboxModesResult(StageResult):
             **coordinates(mode=np.arange(1, len(modes.frequency) + 1)),
             "member": _names("member", found.members, "shaft, or planets of a stage"),
             "part": _names("part", found.parts, "part that is strained"),
-            "station": _names("station", model.assembly.names, "station of a shaft, or planet"),
+            "station": _names(
+                "station", np.array(model.assembly.names)[shown].tolist(), "station of a shaft, or planet"
+            ),
             "way": _names("way", MOTIONS, "motion"),
             "axis": _names("axis", "xyz", "coordinate"),
             "line": _names("line", found.orders, "excitation"),
@@ -479,6 +488,7 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
         text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
         yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")
     yield from _not_assembled(case)
+    yield from casing_notices(case)
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
             given = _without_effect(stage.teeth or {})

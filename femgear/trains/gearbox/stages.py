@@ -9,6 +9,7 @@ from femgear.case.quantities import RPM
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
+from femgear.trains.gearbox.casing_file import check_casing_file
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
@@ -98,6 +99,7 @@ GEARBOX = Train(
             title="System deflection",
             solve=solve_deflections,
             options=("progress", "steps"),
+            check=check_casing_file,
             verdict=lambda result: {"load_cases": len(result.states)},
             describe=lambda results: describe_deflection(results.deflection)[0],
             tables=lambda results: describe_deflection(results.deflection)[1:],
