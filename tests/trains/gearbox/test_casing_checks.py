@@ -18,7 +18,7 @@ CHANGES = {
         {"casing.foot[1].name": "E-DUPLICATE"},
     ),
     "no such bearing": (lambda c: c.update(stands_still=["A", "E"]), {"casing.stands_still[1]": "E-CHOICE"}),
-    "no feet": (lambda c: c.update(foot=[]), {"casing.foot": "E-RANGE"}),
+    "no feet": (lambda c: c.update(foot=[]), {"casing.foot": "E-KEY-MISSING"}),
     "no place": (lambda c: c["foot"][1].pop("position"), {"casing.foot[1].position": "E-KEY-MISSING"}),
     "no mass": (lambda c: c.pop("mass"), {"casing.mass": "E-KEY-MISSING"}),
     "two faults": (
