@@ -207,7 +207,7 @@ def _check_nodes(table: Sequence[Node], row: Mapping[tuple[int, int], int], plac
         )
 
 
-def superelement_problems(body: Superelement) -> Iterator[CaseError]:
+def free_body_problems(body: Superelement) -> Iterator[CaseError]:
     """List what makes a superelement no elastic body that nothing holds."""
     for role in ("seat", "foot"):
         names = [node.name for node in body.nodes if node.role == role]
@@ -308,7 +308,7 @@ def modal_body(body: Superelement, numbers: Sequence[int], *, max_frequency: flo
     Parameters
     ----------
     body : Superelement
-        Without `superelement_problems`.
+        Without `free_body_problems`.
     numbers : sequence of int
         Nodes of the interface, which are loaded.
     max_frequency : float

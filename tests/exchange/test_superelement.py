@@ -11,7 +11,7 @@ from pyNastran.op4.op4 import OP4
 from scipy.linalg import eigh
 
 from femgear.errors import CaseError
-from femgear.exchange.superelement import modal_body, read_superelement, superelement_problems
+from femgear.exchange.superelement import free_body_problems, modal_body, read_superelement
 
 SEAT, FOOT = (3e8, 3e8, 5e8, 7e4, 7e4, 9e4), (4e8, 6e8, 2e8)
 PATHS = casing_paths(SEAT, FOOT)
@@ -113,7 +113,7 @@ def test_a_reduced_structure_is_the_whole_one_at_rest(tmp_path, body):
     lines = (tmp_path / "nodes.csv").read_text().splitlines()
     (tmp_path / "nodes.csv").write_text("\n".join([lines[0], *lines[2:]]))
     reduced = read_superelement(tmp_path / "casing.npz", tmp_path / "nodes.csv")
-    assert not list(superelement_problems(reduced))
+    assert not list(free_body_problems(reduced))
     interface = [node.number for node in reduced.nodes]
     one, two = modal_body(body, interface), modal_body(reduced, interface, max_frequency=10.0)
     assert len(two.stiffness) == len(outer) - 6
@@ -135,7 +135,7 @@ def test_what_gives_way_nowhere_is_rigid(tmp_path):
 
 
 def codes(body) -> list[str]:
-    return [one.code for one in superelement_problems(body)]
+    return [one.code for one in free_body_problems(body)]
 
 
 def changed(folder, change):
@@ -177,7 +177,7 @@ def test_a_node_off_its_place_makes_turns_carry_stiffness(tmp_path):
     write_casing_file(tmp_path, PATHS)
     text = (tmp_path / "nodes.csv").read_text().replace("seat A,0.0,0.0,-0.04", "seat A,0.0,0.02,-0.04")
     (tmp_path / "nodes.csv").write_text(text)
-    (problem,) = superelement_problems(read_superelement(tmp_path / "casing.npz", tmp_path / "nodes.csv"))
+    (problem,) = free_body_problems(read_superelement(tmp_path / "casing.npz", tmp_path / "nodes.csv"))
     assert problem.code == "E-SUPPORT"
     assert "about" in problem.message
 

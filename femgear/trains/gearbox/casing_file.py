@@ -82,10 +82,10 @@ def replaced_key(problem: CaseError, key: str) -> CaseError:
 @lru_cache(maxsize=8)
 def _read(file: str, nodes: str, units: str, sha256: str) -> tuple[Superelement, tuple[CaseError, ...]]:
     """Superelement of files of a checksum, each read once, and what makes it no elastic body."""
-    from femgear.exchange.superelement import read_superelement, superelement_problems
+    from femgear.exchange.superelement import free_body_problems, read_superelement
 
     element = read_superelement(Path(file), Path(nodes), units=units)
-    return element, tuple(superelement_problems(element))
+    return element, tuple(free_body_problems(element))
 
 
 def check_casing_file(case: GearboxCase) -> None:
