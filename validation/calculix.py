@@ -86,7 +86,8 @@ def tables(text: str, title: str) -> list[np.ndarray]:
                 rows = []
                 found.append(rows)
         elif rows is not None and line.strip():
-            rows.append([float(cell) for cell in line.split()])
+            # exponents of three digits stand without their letter
+            rows.append([float(cell) for cell in re.sub(r"(\d)([+-]\d{3})\b", r"\1E\2", line).split()])
     return [np.array(rows) for rows in found]
 
 

@@ -103,7 +103,7 @@ def _pressed_stiffness(found: Deflection) -> np.ndarray:
     if not np.any(found.model.load):
         return stiffness
     # the forces of an idle mesh are rounding, and would choose its slices by chance
-    least = _IDLE * found.slice_force.max()
+    least = _IDLE * found.slice_force.max(initial=0.0)
     for part in found.model.assembly.slices:
         carrying = found.slice_force[part] > least
         if carrying.any() and not carrying.all():
