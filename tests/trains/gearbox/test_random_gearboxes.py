@@ -205,3 +205,43 @@ def one_set(seed: int):
     while len((tables := random_gearbox(seed, 1))["planetary"]) != 1 or not tables["operation"]["fixed"]:
         seed += 100
     return tables
+
+
+def unequal_set(seed: int):
+    """A set whose planets stand unequally in a rigid casing, with its weight across the axis."""
+    tables = random_gearbox(seed, 1)
+    tables.pop("casing", None)
+    tables["gravity"] = {"direction": [0.6, -0.8, 0.0]}
+    return tables
+
+
+def planet_weight_moment(found: Deflection) -> float:
+    """Moment of the weight of all planets about the axis of their set [N m]."""
+    (stage,) = found.model.stages
+    gravity, mass = found.model.case.gravity, stage.section.planet.mass
+    field = gravity.acceleration * np.asarray(gravity.direction) / np.linalg.norm(gravity.direction)
+    arms = np.array([[math.cos(psi), math.sin(psi), 0.0] for psi in stage.angles]) * stage.sizes.centre_distance
+    return float(moments(arms, np.tile(mass * field, (len(arms), 1))).sum(axis=0)[2])
+
+
+@pytest.mark.parametrize("seed", [26, 53, 60])
+def test_what_is_held_takes_the_weight_of_unequal_planets(seed):
+    """A held carrier takes their moment alone; a turning one shares it between the held and the driven shaft."""
+    found = solved(unequal_set(seed))
+    assert found.model.case.operation.fixed
+    total, moment = outside(found).sum(axis=0), planet_weight_moment(found)
+    assert abs(moment) > 1e-3
+    assert total[:5] == pytest.approx(0.0, abs=BALANCED * largest_load(found))
+    # the torques of the power flow know no weight
+    assert total[5] == pytest.approx(moment, rel=1e-5)
+
+
+@pytest.mark.parametrize("seed", [2, 8, 22, 49])
+def test_a_driven_shaft_takes_its_share_of_the_weight_of_unequal_planets(seed):
+    """With the ring in the casing the driven shaft has the moment times the ratio of the carrier's speed to its own."""
+    found = solved(unequal_set(seed))
+    (stage,), flow = found.model.stages, found.model.flow
+    assert stage.section.ring == CASING
+    ratio = flow.speed[stage.section.carrier] / flow.speed[flow.independent[0]]
+    share = ratio * planet_weight_moment(found)
+    assert outside(found).sum(axis=0)[5] == pytest.approx(share, rel=1e-5)
