@@ -373,6 +373,11 @@ def mirrored_along(tables: dict[str, Any]) -> dict[str, Any]:
     for stage in new["pair"]:
         stage["positions"] = [place(*both) for both in zip(stage["shafts"], stage["positions"], strict=True)]
     for stage in new["planetary"]:
+        if "pins" in stage:
+            # the other cheek sits on the shaft, which is the longer one or, of a carrier amid its shaft, the back one
+            carrier, z = stage["carrier"], _value(stage.get("carrier_position", "0 m"))
+            back = carrier == "casing" or lengths[carrier] - z >= z - 1e-9
+            stage["carrier_body"] = {"torque_end": "front" if back else "back"}
         for member in MEMBERS:
             if f"{member}_position" in stage:
                 stage[f"{member}_position"] = place(stage[member], stage[f"{member}_position"])

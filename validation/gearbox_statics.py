@@ -267,7 +267,7 @@ class ToothState:
     Parameters
     ----------
     ours, other : LoadedState
-        Motions on springs of the mean mesh stiffness.
+        Motions with the mean transmission error of the contact, bearings and couplings of the train itself.
     apart : mapping of str to float
         Largest difference of the contact over one mesh period over the largest value, by what it is.
     """
@@ -275,6 +275,14 @@ class ToothState:
     ours: LoadedState
     other: LoadedState
     apart: Mapping[str, float]
+
+
+def _with_teeth(system, cycle, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Motions (n,) and mesh forces (M,) of a train whose teeth give way by the means of their contact."""
+    k, force = cycle.stiffness.mean(axis=1), cycle.force.mean(axis=1)
+    gap = cycle.deflection.mean(axis=1) - force / k
+    q = held_state(system.K + (system.W * k) @ system.W.T, system.load + system.W @ (k * gap), held)
+    return q, k * (system.W.T @ q - gap)
 
 
 def _contact_apart(ours, other) -> dict[str, float]:
@@ -295,15 +303,14 @@ def pair_with_teeth() -> ToothState:
     found = solve_deflection(read_case(tables))
     static = solve(case, only="static")["static"]
     model = pair_model(case, static.planetary_set)
-    system, k = model.system, static.cycle.stiffness.mean(axis=1)
+    system = model.system
     held = np.array([float(name == "gear 1: rotation") for name in system.dofs])
-    q = held_state(system.K + (system.W * k) @ system.W.T, system.load, held)
+    q, force = _with_teeth(system, static.cycle, held)
     motion = {name: np.zeros(6) for name in ("one", "two")}
     for name, value in zip(system.dofs, q, strict=True):
         gear, axis = name.split(": ")
         motion["one" if gear == "gear 1" else "two"][MOTIONS.index(axis)] = value
     supported = np.where(np.isinf(model.bearing_stiffness), 0.0, model.bearing_stiffness) * (model.supported @ q)
-    force = k * (system.W.T @ q)
     reaction = np.where(np.isinf(model.bearing_stiffness), np.concatenate([-model.normal, model.normal]) * force, 0.0)
     springs = {
         name: np.append(-part, np.zeros(4))
@@ -321,9 +328,8 @@ def reference_set() -> ToothState:
     found = solve_deflection(read_case(tables))
     results = solve(case, only="modes")
     static, system = results["static"], gears_alone(results["modes"].model, None)
-    k = static.cycle.stiffness.mean(axis=1)
     held = np.array([float(name == "sun: rotation") for name in system.dofs])
-    q = held_state(system.K + (system.W * k) @ system.W.T, system.load, held)
+    q, force = _with_teeth(system, static.cycle, held)
     motion: dict[str, np.ndarray] = {}
     for name, value in zip(system.dofs, q, strict=True):
         body, axis = name.split(": ")
@@ -333,7 +339,7 @@ def reference_set() -> ToothState:
         name: -np.append(getattr(case, name).support_stiffness * motion[name][:2], np.zeros(4))
         for name in ("sun", "carrier")
     }
-    other = LoadedState(motion, k * (system.W.T @ q), springs)
+    other = LoadedState(motion, force, springs)
     return ToothState(of_gearbox(found), other, _contact_apart(found.contacts["set"].result.cycle, static.cycle))
 
 

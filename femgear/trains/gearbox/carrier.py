@@ -22,6 +22,7 @@ from femgear.trains.gearbox.geometry import set_sizes
 SHEAR_OF_WEB = 5.0 / 6.0
 """Shear coefficient of the rectangular section of a web."""
 _RIGID = 1e-12  # of the largest compliance: a direction in which nothing gives way
+_ALIKE = 1e-9  # ends of a shaft that differ by less are equally long [m]
 _RIGID_AT_ALL = 1e-15  # [m/N], as springs that a case can give
 
 
@@ -75,15 +76,16 @@ def carrier_problems(stage: BoxPlanetarySection, key: str) -> Iterator[CaseError
 def torque_end(case: GearboxCase, stage: BoxPlanetarySection) -> int:
     """Tell the side of the cheek that sits on the shaft, -1 at z < 0 of the planets, 1 at z > 0.
 
-    As ``carrier_body.torque_end`` says; without it the side of the longer end of the carrier's shaft, z > 0 of a
-    shaft that is one rigid body.
+    As ``carrier_body.torque_end`` says; without it the side of the longer end of the carrier's shaft, z > 0 where both
+    are equally long and of a shaft that is one rigid body.
     """
     if stage.carrier_body is not None and stage.carrier_body.torque_end is not None:
         return {"front": -1, "back": 1}[stage.carrier_body.torque_end]
     if stage.carrier == CASING:
         return 1
     shaft, position = case.shaft_named(stage.carrier), stage.carrier_position or 0.0
-    return 1 if shaft.length - position >= position or not shaft.part else -1
+    # rounding of a position does not choose the side
+    return 1 if shaft.length - position >= position - _ALIKE or not shaft.part else -1
 
 
 def wind_up_stiffness(case: GearboxCase, stage: BoxPlanetarySection) -> float:

@@ -349,7 +349,7 @@ class CarrierBodySection(Section):
     By closed forms both cheeks, twice ``pins.length`` apart, wind up against one another: with a
     ``wind_up_stiffness``, or that of the webs between them, of an outer and an inner diameter, which fill the
     ``web_share`` of the circle; 1 is a closed tube. ``torque_end`` is the cheek on the shaft, the front at z < 0;
-    without it the one towards the longer end of the shaft, the back of a shaft that is one rigid body.
+    without it the one towards the longer end of the shaft, the back where both are equally long and of one rigid body.
 
     Else a ``file`` has stiffness and mass of the whole carrier, with its pins or without them, see
     `femgear.exchange.carrier_files`; ``nodes`` is its table of nodes. Reading puts both in its place, as the

@@ -179,6 +179,10 @@ def test_a_mesh_that_carries_nothing_has_the_same_modes_however_the_gearbox_is_t
     check_gearbox(seed, stages=4)
 
 
+def test_pins_in_one_cheek_of_a_carrier_amid_its_shaft_have_a_mirror_image():
+    check_gearbox(48, stages=4)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", seeds(ALL))
 def test_a_thousand_gearboxes_of_up_to_four_stages(seed):
