@@ -80,7 +80,10 @@ CATALOGUE = {
     "W-STIFFNESS": (DOUBT, "Results rest on estimated stiffnesses, of bearings or of meshes."),
     "W-SWEEP": (NOTE, "A sweep takes long."),
     "W-TAIL": (DOUBT, "The highest harmonics of a response are not small."),
-    "W-TEETH": (NOTE, "Radii and teeth have different ratios, or shifted planets no centre distance."),
+    "W-TEETH": (
+        NOTE,
+        "Teeth do not suit their radii, shifted planets have no centre distance, or planets do not assemble.",
+    ),
     "W-THRUST": (DOUBT, "Axial forces tilt the planets, which the model holds upright."),
     "W-TIP": (NOTE, "Tips are shorter than those of the basic rack."),
     "W-TIP-THIN": (NOTE, "The tooth is thin at its tip."),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
@@ -22,7 +21,15 @@ from femgear.trains.gearbox.case_file import (
 )
 from femgear.trains.gearbox.casing_checks import check_casing
 from femgear.trains.gearbox.elastic_carrier import superelement_problems
-from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, StageSizes, pair_sizes, rolling_bearing, set_sizes
+from femgear.trains.gearbox.geometry import (
+    DISTANCE_TOLERANCE,
+    StageSizes,
+    pair_sizes,
+    planet_distance,
+    planet_radius,
+    rolling_bearing,
+    set_sizes,
+)
 from femgear.trains.gearbox.materials import material_notices
 
 _ROLLER = ("rolling_elements", "element_diameter", "pitch_diameter")
@@ -422,11 +429,8 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
 
 def _neighbours(sizes: StageSizes, key: str) -> Iterator[CaseError]:
     """Planets, listed in any order, whose pitch circles do not overlap."""
-    angles = sorted(angle % (2.0 * math.pi) for angle in sizes.planet_angles)
-    apart = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
-    planet = sizes.centre_distance * sizes.base_radii[1] / (sizes.base_radii[0] + sizes.base_radii[1])
-    room = 2.0 * sizes.centre_distance * math.sin(0.5 * min(apart, math.pi))
-    if len(angles) > 1 and room <= 2.0 * planet:
+    planet, room = planet_radius(sizes), planet_distance(sizes)
+    if len(sizes.planet_angles) > 1 and room <= 2.0 * planet:
         yield CaseError(
             "neighbouring planets overlap",
             code="E-NEIGHBOURS",
@@ -475,8 +479,9 @@ def _mid_planes(places: Iterable[float], sizes: StageSizes, key: str) -> Iterato
 
 
 def _loads(case: GearboxCase) -> Iterator[CaseError]:
-    """Load cases that say something, outputs without a torque of their own."""
+    """Load cases that say something, outputs on shafts of their own without a torque of their own."""
     outputs = case.operation.output
+    yield from _outputs(case)
     for i, load_case in enumerate(case.operation.load_case):
         key = f"operation.load_case[{i}]"
         for name in set(load_case.torque) & set(outputs):
@@ -506,6 +511,28 @@ def _loads(case: GearboxCase) -> Iterator[CaseError]:
             limit="at most 1 in all",
             remedy="give every load case its share of the time",
         )
+
+
+def _outputs(case: GearboxCase) -> Iterator[CaseError]:
+    """Outputs, each of which balances torques on a shaft of its own."""
+    places = {shaft.name: shaft.name for shaft in case.shaft if not shaft.part}
+    places |= {load.name: load.shaft for load in case.load}
+    first: dict[str, str] = {}
+    for name in case.operation.output:
+        shaft = places[name]
+        if shaft in first:
+            twice = first[shaft] == name
+            yield CaseError(
+                "the output stands twice"
+                if twice
+                else f"two outputs on {shaft}: nothing says how they share its torque",
+                code="E-DUPLICATE",
+                key="operation.output",
+                value=name if twice else f"{first[shaft]}, {name}",
+                limit="one output on a shaft",
+                remedy="leave one out" if twice else f"leave {name} out, and give it its torque in every load case",
+            )
+        first.setdefault(shaft, name)
 
 
 FILE = CaseFile(

@@ -17,12 +17,13 @@ import numpy as np
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.errors import ContactError, FemgearError
 from femgear.gears.deviations import SetDeviations, body_separation, misaligned_approach, no_deviations
 from femgear.gears.pair import GearSet
 from femgear.gears.profile import base_helix_angle
 from femgear.stages.static import solve_static
 from femgear.stages.static_results import StaticResult
-from femgear.trains.gearbox.case_file import BoxPlanetarySection, PairSection, stage_case_of
+from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
 
 
 @dataclass(frozen=True)
@@ -183,6 +184,33 @@ def askew(deviations: SetDeviations, gears: GearSet, slopes: np.ndarray, *, back
     unit = np.array([misaligned_approach(one, gears, back=back) for one in leaning])
     axes = _of_planets(unit, slopes, count)
     return replace(deviations, planet_misalignment=deviations.planet_misalignment + axes)
+
+
+def locate_contact_error(
+    error: FemgearError, case: GearboxCase, stage: PairSection | BoxPlanetarySection, torque: float, width: float
+) -> None:
+    """Let a refusal of the contact of a stage name the stage, its load, and the entries of the gearbox.
+
+    Torque on gear 1 or the sun [N m], common face width [m].
+    """
+    kind = "pair" if isinstance(stage, PairSection) else "planetary"
+    where = f"{kind}[{[*getattr(case, kind)].index(stage)}].teeth"
+    slices = int((stage.teeth or {}).get("static", {}).get("slices", 0))
+    if error.key == "operation.torque":
+        error.key = "operation.load_case"
+    elif error.key == "static.slices" and slices <= case.deflection.slices:
+        error.key = "deflection.slices"
+    else:
+        error.key = f"{where}.{error.key}" if error.key else where
+    line = f", {1e-3 * abs(torque) / width:.4g} N m per mm of its width" if width else ""
+    error.message = f"stage {stage.name} with {torque:.6g} N m{line}: {error.message}"
+    less = "less torque in the load case"
+    remedies = [less if "operation.torque" in one else one for one in error.remedies]
+    if error.code == "E-SLICES":
+        remedies = ["use fewer slices", less] if any(one == less for one in remedies) else remedies
+    elif isinstance(error, ContactError) and less not in remedies:
+        remedies = [less, *remedies]
+    error.remedies = tuple(remedies)
 
 
 def loaded_tables(

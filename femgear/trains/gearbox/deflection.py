@@ -13,12 +13,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError
+from femgear.errors import CaseError, ConvergenceError, FemgearError
 from femgear.system.assembly import GROUND, MOTIONS, Assembly, StationSprings
 from femgear.system.rolling_bearings import BearingState, bearing_state, sliding_state
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing import check_casing_held, elastic_foot_forces, rigid_foot_rows
-from femgear.trains.gearbox.contact import StageContact, given_separation, stage_contact
+from femgear.trains.gearbox.contact import (
+    StageContact,
+    given_separation,
+    locate_contact_error,
+    stage_contact,
+)
 from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
 
@@ -231,15 +236,19 @@ def _contact(
     """Contact of the teeth of a stage with slopes and separations of its meshes, few positions until they settle."""
     torque, own = -model.flow.first_torque(stage.section), list(stage.meshes)
     slices = model.case.deflection.slices if model.case.motions == "space" else 0
-    return stage_contact(
-        stage.section,
-        torque,
-        slopes[own],
-        separation=apart[own],
-        slices=slices,
-        positions=positions,
-        steps=steps,
-    )
+    try:
+        return stage_contact(
+            stage.section,
+            torque,
+            slopes[own],
+            separation=apart[own],
+            slices=slices,
+            positions=positions,
+            steps=steps,
+        )
+    except FemgearError as error:
+        locate_contact_error(error, model.case, stage.section, torque, stage.width)
+        raise
 
 
 def _first_gaps(model: GearboxModel, staged: Sequence[StageModel]) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 from femgear.case.gear_set import planetary_set
@@ -168,6 +169,19 @@ def _given_set(given: SetGearsSection) -> StageSizes:
     psi = given.planet_angles or equal_planet_angles(given.planets)
     width = given.face_width or 0.0
     return StageSizes(tuple(given.teeth), (sun, planet, ring), distance, tuple(angles), helix, False, (width,) * 3, psi)
+
+
+def planet_radius(sizes: StageSizes) -> float:
+    """Compute the pitch radius of planets in mesh with the sun [m]."""
+    sun, planet, _ = sizes.base_radii
+    return sizes.centre_distance * planet / (sun + planet)
+
+
+def planet_distance(sizes: StageSizes) -> float:
+    """Compute the distance of the axes of the nearest neighbouring planets [m]."""
+    angles = sorted(angle % (2.0 * math.pi) for angle in sizes.planet_angles)
+    apart = min(b - a for a, b in pairwise((*angles, angles[0] + 2.0 * math.pi)))
+    return 2.0 * sizes.centre_distance * math.sin(0.5 * min(apart, math.pi))
 
 
 def _check_ratio(radii: float, teeth: float) -> None:

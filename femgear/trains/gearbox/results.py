@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.findings import DOUBT, Finding
+from femgear.errors import GeometryError
+from femgear.findings import DOUBT, FAULT, Finding
+from femgear.gears.planetary import assembly_positions
 from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
@@ -25,7 +27,7 @@ from femgear.trains.gearbox.casing_results import (
     largest_foot_force,
 )
 from femgear.trains.gearbox.deflection import Deflection
-from femgear.trains.gearbox.geometry import set_sizes
+from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_sizes
 from femgear.trains.gearbox.life import describe_load_cases, life_text, life_variables, shortest_life
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places
 from femgear.trains.gearbox.modes import GearboxModes, member_of_stations
@@ -38,6 +40,8 @@ ESTIMATES = 0.5, 2.0
 """Factors on the stiffness of estimated bearings between which results are shown."""
 # Tilt up to which motions are small [rad].
 _LARGEST_TILT = 5e-3
+# Approach of flanks over their base pitch that no teeth bear, and how far beyond it nothing real does.
+_LARGEST_APPROACH, _FAR = 0.05, 10.0
 # Spread of K_Hbeta by estimated bearings that is told.
 _SPREAD = 0.02
 
@@ -111,6 +115,12 @@ class DeflectionResult(StageResult):
             ),
             "face_load_factor": (mesh, face, "1", "K_Hbeta of the contact; NaN where teeth are not given"),
             "mesh_stiffness": (mesh, _mesh_stiffness(every), "N/m", "mean mesh stiffness along the normal"),
+            "relative_approach": (
+                mesh,
+                _approaches(every),
+                "1",
+                "approach of the flanks under load over the base pitch",
+            ),
             "transmission_error": (mesh, _errors(every), "m", "peak to peak of the static transmission error"),
             "displacement": (
                 "load_case station motion",
@@ -187,6 +197,14 @@ def _per_mesh(state: Deflection, value) -> np.ndarray:
 
 def _face_factors(state: Deflection) -> np.ndarray:
     return _per_mesh(state, lambda contact: contact.face_load_factor)
+
+
+def _approaches(states) -> np.ndarray:
+    """Approach of the flanks of every mesh under its load, over the base pitch of its stage."""
+    pitch = np.ones(len(states[0].model.assembly.contacts))
+    for stage in states[0].model.stages:
+        pitch[list(stage.meshes)] = 2.0 * math.pi * stage.sizes.base_radii[0] / stage.sizes.teeth[0]
+    return np.array([one.mesh_force for one in states]) / _mesh_stiffness(states) / pitch
 
 
 def _planet_factor(state: Deflection, stage: StageModel) -> float:
@@ -459,8 +477,18 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
 
 
 def _large(data: xr.Dataset) -> Iterator[Finding]:
-    """Tell tilts beyond which motions are not small (W-DEFLECTION)."""
-    tilts = np.abs(data["displacement"].values[..., 3:5])
+    """Tell tilts and approaches of flanks beyond which motions are not small (W-DEFLECTION)."""
+    tilts, approach = np.abs(data["displacement"].values[..., 3:5]), data["relative_approach"].values
+    if (largest := np.nan_to_num(approach).max(initial=0.0)) > _LARGEST_APPROACH:
+        case, mesh = np.unravel_index(int(np.nan_to_num(approach).argmax()), approach.shape)
+        text = (
+            f"the flanks of {data['mesh'].values[mesh]} approach by {largest:.3g} of their base pitch in load case "
+            f"{data['load_case'].values[case]}: no teeth carry that"
+        )
+        limit = f"{_LARGEST_APPROACH:g} of it"
+        severity = FAULT if largest > _FAR * _LARGEST_APPROACH else DOUBT
+        remedy = "less torque, or a larger stiffness"
+        yield Finding("W-DEFLECTION", "operation.load_case", text, remedy=remedy, limit=limit, severity=severity)
     if tilts.max(initial=0.0) > _LARGEST_TILT:
         case, station, _ = np.unravel_index(int(tilts.argmax()), tilts.shape)
         text = (
@@ -468,7 +496,8 @@ def _large(data: xr.Dataset) -> Iterator[Finding]:
             f"{data['load_case'].values[case]}: the model is one of small motions"
         )
         remedy = "less torque, or stiffer shafts and bearings"
-        yield Finding("W-DEFLECTION", "operation.load_case", text, remedy=remedy, limit=f"{1e3 * _LARGEST_TILT:g} mrad")
+        severity, limit = FAULT if tilts.max() > _FAR * _LARGEST_TILT else DOUBT, f"{1e3 * _LARGEST_TILT:g} mrad"
+        yield Finding("W-DEFLECTION", "operation.load_case", text, remedy=remedy, limit=limit, severity=severity)
 
 
 def describe_gearbox_modes(data: xr.Dataset) -> Block:
@@ -487,7 +516,7 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     if not case.deflection.contact and any(stage.teeth is not None for stage in (*case.pair, *case.planetary)):
         text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
         yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")
-    yield from _not_assembled(case)
+    yield from _given_planets(case)
     yield from casing_notices(case)
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
@@ -497,18 +526,28 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
                 yield Finding("W-UNUSED", f"{kind}[{i}].teeth", text)
 
 
-def _not_assembled(case: GearboxCase) -> Iterator[Finding]:
-    """Planets of given sizes whose teeth do not fit between sun and ring at their angles."""
+def _given_planets(case: GearboxCase) -> Iterator[Finding]:
+    """Planets of given sizes that do not assemble, or whose tips, of an addendum of one module, come close.
+
+    Published sets without teeth have planets that do not assemble: they are told, those with teeth refused.
+    """
     for i, stage in enumerate(case.planetary):
         if stage.gears is None:
             continue
         sizes = set_sizes(stage)
-        both = sizes.teeth[0] + sizes.teeth[2]
-        steps = [(psi - sizes.planet_angles[0]) * both / (2.0 * np.pi) for psi in sizes.planet_angles]
-        if any(abs(step - round(step)) > 1e-3 for step in steps):
-            text = f"planets of {'/'.join(map(str, sizes.teeth))} teeth do not assemble at these angles"
-            limit = f"whole multiples of 360 deg / {both} from one another"
-            yield Finding("W-TEETH", f"planetary[{i}].gears", text, limit=limit, severity=DOUBT)
+        try:
+            assembly_positions(sizes.teeth[0], sizes.teeth[2], sizes.planet_angles)
+        except GeometryError as error:
+            limit, remedy = error.limit or "", error.remedy or ""
+            key = f"planetary[{i}].gears"
+            yield Finding("W-TEETH", key, error.message, limit=limit, remedy=remedy, severity=DOUBT)
+        room, module = planet_distance(sizes), 2.0 * planet_radius(sizes) / sizes.teeth[1]
+        left = room - 2.0 * (planet_radius(sizes) + module)
+        if len(sizes.planet_angles) > 1 and left < module:
+            how = "overlap" if left < 0.0 else f"are {1e3 * left:.4g} mm apart"
+            text = f"tips of neighbouring planets with an addendum of one module {how}"
+            severity = DOUBT if left < 0.0 else ""
+            yield Finding("W-NEIGHBOURS", f"planetary[{i}].gears", text, limit=">= one module", severity=severity)
 
 
 _HOLDS = ("support_stiffness", "bearing_stiffness", "tilt_stiffness", "foundation_radial", "foundation_tangential")

@@ -1,9 +1,10 @@
 """What a gearbox is refused for: every fault with its key, all at once."""
 
 import pytest
-from small_gearbox import pair_tables
+from small_gearbox import pair_tables, set_on_shafts
 
 from femgear.errors import CaseError
+from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.reading import read_case
 
 BALL = {"kind": "ball", "rolling_elements": 9, "element_diameter": "9.5 mm", "pitch_diameter": "46 mm"}
@@ -142,3 +143,30 @@ def test_planets_may_be_listed_in_any_order():
     tables = pair_tables()
     _set(tables, planet_angles=["0 deg", "240 deg", "120 deg"])
     assert len(read_case(tables).planetary[0].gears.planet_angles) == 3
+
+
+def test_two_outputs_on_one_shaft_are_refused_where_they_stand():
+    tables = pair_tables()
+    tables["load"].append({"name": "brake 2", "shaft": "output", "position": "80 mm"})
+    tables["operation"]["output"] = ["brake", "brake 2"]
+    (error,) = problems(tables).values()
+    assert (error.code, error.key, error.value) == ("E-DUPLICATE", "operation.output", "brake, brake 2")
+    assert "brake 2" in error.remedy
+    tables["operation"]["output"] = ["brake", "brake"]
+    assert "twice" in problems(tables)["operation.output"].message
+    # one of them as a load with a torque of its own
+    tables["operation"]["output"] = ["brake"]
+    tables["operation"]["load_case"][0]["torque"]["brake 2"] = "-20 N m"
+    assert gearbox_flow(read_case(tables)).port_torque["brake"] == pytest.approx(100.0 * 36 / 24 + 20.0)
+
+
+@pytest.mark.parametrize(
+    ("planets", "code"),
+    [(5, "E-ASSEMBLY"), (7, "E-NEIGHBOURS")],
+)
+def test_planets_with_teeth_that_do_not_assemble_or_touch_are_refused(planets, code):
+    tables = set_on_shafts()
+    tables["planetary"][0]["teeth"]["set"]["planets"] = planets
+    (error,) = problems(tables).values()
+    assert (error.code, error.key) == (code, "planetary[0].teeth.set.planets")
+    assert error.remedy

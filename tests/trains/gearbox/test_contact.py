@@ -7,6 +7,7 @@ import pytest
 from small_gearbox import pair_tables, set_on_shafts
 
 from femgear.case.gear_set import planetary_set
+from femgear.errors import FemgearError
 from femgear.gears.deviations import body_separation, misaligned_approach, no_deviations
 from femgear.trains.gearbox.case_file import teeth_of
 from femgear.trains.gearbox.contact import (
@@ -15,9 +16,11 @@ from femgear.trains.gearbox.contact import (
     displaced,
     given_separation,
     loaded_tables,
+    locate_contact_error,
     stage_contact,
     unequal_separation,
 )
+from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.reading import read_case
 
 
@@ -93,3 +96,22 @@ def test_shares_keep_their_sum_in_other_slices():
     assert contact.shares_at(0, 4) == pytest.approx(shares[0])
     assert contact.shares_at(0, 2) == pytest.approx([0.7, 0.3])
     assert contact.shares_at(0, 8).sum() == pytest.approx(1.0)
+
+
+def test_refusals_name_the_stage_its_load_and_entries_of_the_gearbox():
+    tables = pair_tables(teeth=True)
+    for torque, code, key in (("1e4 N m", "E-SLICES", "deflection.slices"), ("1e8 N m", "E-CONTACT", "pair[0].teeth")):
+        tables["operation"]["load_case"][0]["torque"]["motor"] = torque
+        with pytest.raises(FemgearError) as error:
+            solve_deflection(read_case(tables))
+        assert (error.value.code, error.value.key) == (code, key)
+        assert error.value.message.startswith("stage stage with ") and "N m per mm" in error.value.message
+        assert "less torque in the load case" in error.value.remedy
+
+
+def test_slices_of_the_teeth_themselves_are_named_where_they_stand():
+    tables = pair_tables(teeth=True)
+    tables["pair"][0]["teeth"]["static"]["slices"] = 40
+    case, error = read_case(tables), FemgearError("too many", code="E-SLICES", key="static.slices", remedy="fewer")
+    locate_contact_error(error, case, case.pair[0], 10.0, 0.02)
+    assert error.key == "pair[0].teeth.static.slices" and "0.5 N m per mm" in error.message

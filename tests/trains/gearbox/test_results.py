@@ -1,5 +1,7 @@
 """Contents of the files of a gearbox, and what they say against themselves."""
 
+import math
+
 import numpy as np
 import pytest
 from small_gearbox import pair_tables
@@ -87,7 +89,20 @@ def test_motions_that_are_not_small_are_told():
     tables = pair_tables()
     tables["operation"]["load_case"][0]["torque"]["motor"] = "1e8 N m"
     found = list(deflection_warnings(solve_deflections(read_case(tables)).contents()))
-    assert codes(found) == ["W-DEFLECTION"]
+    # the flanks, and the shafts
+    assert codes(found) == ["W-DEFLECTION", "W-DEFLECTION"]
+    assert {one.severity for one in found} == {"fault"}
+
+
+def test_flanks_that_approach_too_far_are_told_where_nothing_tilts():
+    tables = pair_tables() | {"motions": "rotation"}
+    tables["operation"]["load_case"][0]["torque"]["motor"] = "2e4 N m"
+    data = solve_deflections(read_case(tables)).contents()
+    (found,) = deflection_warnings(data)
+    assert (found.code, found.severity) == ("W-DEFLECTION", "doubt") and "base pitch" in found.text
+    pitch = math.pi * 3e-3 * math.cos(math.radians(20.0))
+    approach = 2e4 / (0.036 * math.cos(math.radians(20.0))) / 4e8
+    assert data["relative_approach"].values[0, 0] == pytest.approx(approach / pitch, rel=1e-9)
 
 
 def test_a_mesh_without_load_carries_on_no_part_of_its_width():
@@ -110,5 +125,10 @@ def test_planets_that_do_not_assemble_are_told():
         }
     ]
     findings = list(gearbox_warnings(read_case(tables)))
-    assert [one.code for one in findings] == ["W-TEETH"]
+    # 120 teeth over 7 planets; and 2 x 45 mm sin(180 deg / 7) less two tip radii of 19.5 mm
+    assert [one.code for one in findings] == ["W-TEETH", "W-NEIGHBOURS"]
+    assert "(z_s + z_r)/N = 17.1429" in findings[0].text and "nearest planet_angles" in findings[0].remedy
+    assert "0.04954 mm apart" in findings[1].text
+    tables["planetary"][0]["gears"]["planets"] = 4
+    assert not list(gearbox_warnings(read_case(tables)))
     assert "120" in findings[0].limit
