@@ -89,8 +89,8 @@ def stage_contact(
         Slope of the approach of the flanks of every mesh along its width [rad], closer at z > 0 positive; along the
         normal.
     separation : (M,) array, optional
-        How far the displacements of the axes take the flanks of every mesh apart along the normal [m]. What rotations
-        of the gears take up is no matter; the rest is of sets alone, whose planets it loads unequally.
+        How far the system takes the flanks of every mesh apart along the normal [m]. What rotations of the gears about
+        their axes take up is no matter; the rest is of sets alone, whose planets it loads unequally.
     slices : int
         Least number of slices over the width.
     positions : int, optional

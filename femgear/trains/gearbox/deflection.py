@@ -164,10 +164,8 @@ def mesh_slopes(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
 
 
 def mesh_separation(assembly: Assembly, motion: np.ndarray) -> np.ndarray:
-    """Compute how far all motions (6n,) but rotations take the flanks of every mesh apart along the normal [m]."""
-    shifted = motion.reshape(-1, 6).copy()
-    shifted[:, 5] = 0.0
-    approach = assembly.columns.T @ shifted.ravel()
+    """Compute how far motions (6n,) take the flanks of every mesh apart along the normal [m]."""
+    approach = assembly.columns.T @ motion
     return np.array([-approach[part].mean() for part in assembly.slices])
 
 
