@@ -514,7 +514,7 @@ def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
         if path.suffix.lower() == ".npz":
             with ZipFile(path) as archive:
                 size = sum(archive.getinfo(f"{name}.npy").file_size for name in _named(archive.namelist()))
-            _check_size(size)
+            check_array_size(size)
             with np.load(path, allow_pickle=False) as stored:
                 found = {name: stored[name] for name in ARRAY_NAMES if name in stored}
         else:
@@ -522,7 +522,7 @@ def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
 
             with xr.open_dataset(path) as data:
                 named = {name: data[name] for name in ARRAY_NAMES if name in data}
-                _check_size(sum(one.nbytes for one in named.values()))
+                check_array_size(sum(one.nbytes for one in named.values()))
                 found = {name: one.values for name, one in named.items()}
     words = [name for name, one in found.items() if one.dtype.kind not in "buifc"]
     _check(
@@ -557,7 +557,7 @@ def _named(entries: Sequence[str]) -> list[str]:
     return [name for name in ARRAY_NAMES if f"{name}.npy" in entries]
 
 
-def _check_size(size: int) -> None:
+def check_array_size(size: int) -> None:
     """Refuse arrays that fill more memory than any casing needs (E-MEMORY)."""
     _check(
         f"the arrays of the structure fill {size / 1e6:.0f} MB",

@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 import xarray as xr
@@ -25,7 +26,7 @@ from femgear.errors import CaseError
 from femgear.exchange.casing_files import (
     UNITS,
     Node,
-    check_reduced_matrices,
+    check_array_size,
     dmig_matrices,
     file_in_refusals,
     foreign_refusals,
@@ -41,7 +42,7 @@ RIGID_STIFFNESS = 1e15
 _ARRAYS, _PUNCH = (".npz", ".nc"), (".pch", ".bdf", ".dat")
 _KINDS = (*_ARRAYS, *_PUNCH, ".op4")
 _DIRECTIONS = "x", "y", "z"
-# Smallest eigenvalue of a matrix, of unit diagonal, from which it is positive; negative ones are no rounding.
+# Smallest eigenvalue of a matrix, of unit diagonal, from which it is positive; part of it that digits of a file leave.
 _POSITIVE, _ROUNDING = 1e-12, 1e-6
 # Part of the square of the first elastic natural frequency with which a rigid motion may swing: 1 % of the frequency.
 _FREE = 1e-4
@@ -61,6 +62,8 @@ class Superelement:
         Places of the nodes [m].
     nodes : tuple of Node
         Table of nodes.
+    asymmetry : (float, float)
+        Largest difference between both halves of stiffness and mass in the file, over the largest entry.
     """
 
     stiffness: np.ndarray
@@ -68,6 +71,7 @@ class Superelement:
     row: Mapping[tuple[int, int], int]
     place: Mapping[int, np.ndarray]
     nodes: tuple[Node, ...]
+    asymmetry: tuple[float, float] = (0.0, 0.0)
 
     def of_role(self, role: str) -> dict[str, Node]:
         """Find the nodes of a role by their names."""
@@ -157,7 +161,8 @@ def read_superelement(path: Path, nodes: Path, *, units: str = "SI") -> Superele
             found, row, place = _stored_matrices(path, table)
         else:
             found, row, place = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
-        check_reduced_matrices(found)
+        _check_real(found)
+        asymmetry = tuple(float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max()) for matrix in found)
         length, mass = UNITS[units]
         # with time in seconds a stiffness scales as a mass; rotations have no length
         scale = np.ones(len(found[0]))
@@ -165,13 +170,29 @@ def read_superelement(path: Path, nodes: Path, *, units: str = "SI") -> Superele
         K, M = (0.5 * mass * np.outer(scale, scale) * np.real(matrix + matrix.T) for matrix in found)
         places = dict(place) | {node.number: node.position for node in table if node.position is not None}
         _check_nodes(table, row, places)
-    return Superelement(K, M, row, {number: length * x for number, x in places.items()}, table)
+    return Superelement(K, M, row, {number: length * x for number, x in places.items()}, table, asymmetry)
+
+
+def _check_real(found: Sequence[np.ndarray]) -> None:
+    """Refuse matrices that are empty, complex or not finite."""
+    for matrix, name in zip(found, ("stiffness", "mass"), strict=True):
+        if not matrix.any() or not np.isfinite(matrix).all() or np.imag(matrix).any():
+            raise CaseError(
+                f"the {name} matrix holds other entries than real numbers",
+                code="E-TYPE",
+                key="file",
+                value="nothing but zeros" if not matrix.any() else "entries that are complex or not finite",
+                limit="finite real numbers",
+                remedy="export it again, without structural damping",
+            )
 
 
 def _stored_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], dict, dict]:
     """Arrays of a file .npz or NetCDF, as `op4_matrices`."""
     with foreign_refusals("stiffness and mass (.npz, NetCDF)"):
         if path.suffix.lower() == ".npz":
+            with ZipFile(path) as archive:
+                check_array_size(sum(entry.file_size for entry in archive.infolist()))
             with np.load(path, allow_pickle=False) as stored:
                 found = [np.asarray(stored[name]) for name in ("stiffness", "mass") if name in stored]
         else:
@@ -189,7 +210,7 @@ def _stored_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray
             limit=f"arrays stiffness and mass, square, {len(labels)} rows or more",
             remedy="give all nodes of the matrices in their order, with their dofs",
         )
-    return [matrix.astype(float) for matrix in found], {label: i for i, label in enumerate(labels)}, {}
+    return found, {label: i for i, label in enumerate(labels)}, {}
 
 
 def _check_nodes(table: Sequence[Node], row: Mapping[tuple[int, int], int], place: Mapping[int, np.ndarray]) -> None:
@@ -229,6 +250,16 @@ def free_body_problems(body: Superelement) -> Iterator[CaseError]:
                 value=f"node {node.number}, components {', '.join(map(str, body.components(node))) or 'none'}",
                 limit="components 1, 2 and 3, or 1 to 6, in the matrices",
                 remedy="keep them in the reduction; dofs of the table are those of arrays and OUTPUT4",
+            )
+    for name, apart in zip(("stiffness", "mass"), body.asymmetry, strict=True):
+        if apart > _ROUNDING:
+            yield CaseError(
+                f"the {name} matrix is not symmetric",
+                code="E-SYMMETRY",
+                key="file",
+                value=f"halves that are {apart:.3g} of the largest entry apart",
+                limit=f"{_ROUNDING:g} of it",
+                remedy="export it again, both halves of the matrix or one and its kind",
             )
     lowest = _lowest(body.mass)
     if not lowest > _POSITIVE:

@@ -15,13 +15,16 @@ from casings import (
     rigid_tables,
     write_casing_file,
 )
+from random_gearboxes import random_casing, random_gearbox
 from scipy.linalg import eigh
 
 from femgear.case import text
 from femgear.errors import CaseError
 from femgear.system.assembly import GROUND
+from femgear.trains.gearbox.casing import casing_seats
 from femgear.trains.gearbox.casing_file import casing_element, casing_notices, check_casing_file, elastic_casing
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.model import bearing_places
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
 from femgear.trains.reading import read_case
@@ -317,3 +320,37 @@ def test_a_limit_of_frequency_leaves_what_the_interface_gives_way(tmp_path):
     few = solved(tmp_path, without)
     del without["casing"]["max_frequency"]
     assert apart(few.foot_force, solved(tmp_path, without).foot_force) <= LARGEST
+
+
+@pytest.mark.parametrize("seed", [0, 3, 11])
+def test_a_random_gearbox_in_the_casing_of_a_file_balances(tmp_path, seed):
+    """Nodes of seats with and without rotations, up to half a millimetre off; weight, held shafts and rings."""
+    tables, rng = random_gearbox(seed, 2), np.random.default_rng([seed, 44])
+    tables["casing"] = random_casing(tables, rng)
+    standing = tables["casing"].get("stands_still", [])
+    case = read_case(tables)
+    size = 3 if seed else 6
+    paths = [
+        Path(
+            "seat",
+            name,
+            tuple((place + rng.uniform(-5e-4, 5e-4, 3)).tolist()),
+            tuple(np.append(10.0 ** rng.uniform(8.0, 9.5, 3), 10.0 ** rng.uniform(4.0, 6.0, 3))[:size].tolist()),
+        )
+        for name, place in casing_seats(case).items()
+        if name not in standing
+    ]
+    for name, foot in zip(case.casing.foot_names, case.casing.foot, strict=True):
+        paths.append(Path("foot", name, foot.position, tuple((10.0 ** rng.uniform(8.0, 9.5, 3)).tolist())))
+    feet = [{name: foot[name] for name in ("name", "stiffness")} for foot in tables["casing"]["foot"]]
+    tables["casing"] = write_casing_file(tmp_path, paths) | {"foot": feet, "stands_still": standing}
+    found = solved(tmp_path, tables)
+    load, places = found.model.load.reshape(-1, 6), np.asarray(found.model.assembly.places)
+    force, at = [found.foot_force], [found.model.casing.foot_places]
+    still = [name in standing for name in found.model.bearing_names]
+    force.append(found.bearing_force[still][:, :3])
+    at.append(bearing_places(found.model)[still])
+    moment = (load[:, 3:] + np.cross(places, load[:, :3])).sum(axis=0) + found.bearing_force[still][:, 3:].sum(axis=0)
+    moment = moment + np.cross(np.vstack(at), np.vstack(force)).sum(axis=0)
+    total = load[:, :3].sum(axis=0) + np.vstack(force).sum(axis=0)
+    assert np.abs(np.append(total, moment)).max() <= 1e-8 * max(np.abs(load).max(), found.mesh_force.max())
