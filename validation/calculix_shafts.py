@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
 
@@ -26,7 +26,7 @@ SECTORS = 16
 LAYER, LENGTH = 0.012, 0.016
 """Thickest layer and longest element [m]."""
 FINE, SHARP = 0.004, 0.0015
-"""Elements beside a step [m], and where the step is what is looked at."""
+"""Elements beside a step [m], and where the step alone is looked at."""
 SAME = 1e-9
 MODES = 14
 LOAD, TORQUE, PULL = 1000.0, 100.0, 1e4
@@ -169,12 +169,11 @@ def _graded(a: float, b: float, longest: float, left: float | None, right: float
     return ends.tolist()
 
 
-def round_solid(shaft: Shaft, *, finer: float = 1.0) -> RoundSolid:
-    """Mesh a shaft by rings of elements, around the axis wedges; ``finer`` divides all lengths."""
+def round_solid(shaft: Shaft) -> RoundSolid:
+    """Mesh a shaft by rings of elements, around the axis wedges."""
     points: dict[tuple[int, int, int], int] = {}
     places: list[np.ndarray] = []
     elements: dict[int, list[list[int]]] = {20: [], 15: []}
-    sectors = round(SECTORS * math.sqrt(finer) / 4) * 4
 
     def node(radius: float, angle: float, z: float) -> int:
         place = np.array([radius * math.cos(angle), radius * math.sin(angle), z])
@@ -184,8 +183,8 @@ def round_solid(shaft: Shaft, *, finer: float = 1.0) -> RoundSolid:
             places.append(place)
         return points[key]
 
-    divided = cuts(shaft.parts, shaft.stations, LENGTH / finer, shaft.fine / finer)
-    radii = layers(shaft.parts, LAYER / finer, shaft.fine / finer)
+    divided = cuts(shaft.parts, shaft.stations, LENGTH, shaft.fine)
+    radii = layers(shaft.parts, LAYER, shaft.fine)
     for line, (left, right) in zip(divided, radii, strict=True):
         tracks = [left + (right - left) * (z - line[0]) / (line[-1] - line[0]) for z in line]
         for (a, inner), (b, outer) in pairwise(zip(line, tracks, strict=True)):
@@ -197,12 +196,12 @@ def round_solid(shaft: Shaft, *, finer: float = 1.0) -> RoundSolid:
                 if axis:
                     # a corner on the axis has any angle: the sides that end there are radii
                     shares[[8, 11], 1] = 1.0
-                for sector in range(sectors):
+                for sector in range(SECTORS):
                     row = []
                     for u, v, w in shares:
                         near = inner[layer] + u * (inner[layer + 1] - inner[layer])
                         far = outer[layer] + u * (outer[layer + 1] - outer[layer])
-                        angle = 2.0 * math.pi * (sector + v) / sectors
+                        angle = 2.0 * math.pi * (sector + v) / SECTORS
                         row.append(node(near + w * (far - near), angle, a + w * (b - a)))
                     elements[len(row)].append(row)
     found = np.array(places)
@@ -317,11 +316,9 @@ def mean_motions(solid: RoundSolid, rows: np.ndarray) -> dict[float, np.ndarray]
     return {place: np.array([(m[axis] * moved).sum() for axis in AXES]) for place, m in solid.means.items()}
 
 
-def solid_statics(
-    shaft: Shaft, loads: Sequence[Mapping[tuple[float, str], float]], *, finer: float = 1.0
-) -> list[dict]:
+def solid_statics(shaft: Shaft, loads: Sequence[Mapping[tuple[float, str], float]]) -> list[dict]:
     """Mean motions of all sections under several loads, each of forces [N] and moments [N m] by place and motion."""
-    solid = round_solid(shaft, finer=finer)
+    solid = round_solid(shaft)
     lines = solid_input(shaft, solid)
     for load in loads:
         force = np.zeros_like(solid.points)
@@ -334,9 +331,9 @@ def solid_statics(
     return [mean_motions(solid, rows) for rows in calculix.tables(text, "displacements")]
 
 
-def solid_frequencies(shaft: Shaft, *, finer: float = 1.0) -> dict[str, list[float]]:
+def solid_frequencies(shaft: Shaft) -> dict[str, list[float]]:
     """Natural frequencies [Hz] of the solid by their kind: bending once of every two, torsion, stretch."""
-    solid = round_solid(shaft, finer=finer)
+    solid = round_solid(shaft)
     lines = solid_input(shaft, solid)
     lines.append(f"*STEP\n*FREQUENCY\n{MODES}\n*NODE PRINT, NSET=SHOWN\nU\n*END STEP")
     text = calculix.run("\n".join(lines) + "\n").tables
@@ -409,7 +406,7 @@ def beam_statics(assembly: Assembly, places: Mapping[float, int], load: Mapping[
     return {place: moved[6 * station : 6 * station + 6] for place, station in places.items()}
 
 
-def step_flexibility(thin: ShaftPart, thick: ShaftPart, *, finer: float = 1.0) -> np.ndarray:
+def step_flexibility(thin: ShaftPart, thick: ShaftPart, *, fine: float = SHARP) -> np.ndarray:
     """Lengths (3,) of the thinner part that bend, twist and stretch as much as a step beyond its beams, over d.
 
     A shaft of 2 d and 1.5 D, held on springs at the end of the thinner part, a moment, a torque and a force at the
@@ -421,12 +418,12 @@ def step_flexibility(thin: ShaftPart, thick: ShaftPart, *, finer: float = 1.0) -
         for part, factor in ((thin, 2.0), (thick, 1.5))
     )
     end = sum(part.length for part in parts)
-    shaft = Shaft(parts, (Bearing(0.0, HELD),), (end,), SHARP)
+    shaft = Shaft(parts, (Bearing(0.0, HELD),), (end,), fine)
     loads = [{(end, axis): 1.0} for axis in STEP_AXES]
     beam = assembled(shaft)
     more = [
         (solid[end] - beam_statics(*beam, load)[end])[AXES.index(axis)]
-        for solid, load, axis in zip(solid_statics(shaft, loads, finer=finer), loads, STEP_AXES, strict=True)
+        for solid, load, axis in zip(solid_statics(shaft, loads), loads, STEP_AXES, strict=True)
     ]
     return np.array(more) * _section_stiffness(thin) / d
 
@@ -454,9 +451,7 @@ ALL = on_two(
     0.75,
     0.3,
 )
-HIGH = replace(
-    on_two([ShaftPart(0.2, 0.06), ShaftPart(0.15, 0.08), ShaftPart(0.25, 0.05, 0.02)], 0.06, 0.5, 0.275), fine=SHARP
-)
+HIGH = on_two([ShaftPart(0.2, 0.06), ShaftPart(0.15, 0.08), ShaftPart(0.25, 0.05, 0.02)], 0.06, 0.5, 0.275)
 SHAFTS = (
     ("uniform shaft of 50 mm by 1 m", UNIFORM, 1e-3, 2e-3),
     ("hollow shaft of 80/40, a cone, 50/25 mm", CONICAL, 5e-3, 5e-3),
@@ -520,7 +515,8 @@ def shafts_beside_solids() -> tuple[Row, ...]:
     rows = []
     for name, shaft, *gates in SHAFTS:
         rows += _beside_solid(name, shaft, (gates[0], gates[1]))
-    joints = {1: 0.06 * _flexibility(1), 2: 0.05 * _flexibility(2)}
+    # of the same elements as the shaft
+    joints = {1: 0.06 * step_flexibility(*STEPS[1], fine=FINE), 2: 0.05 * step_flexibility(*STEPS[2], fine=FINE)}
     rows += _beside_solid("shaft of 60, 80 and 50/20 mm", HIGH, (1e-2, 5e-3), (None, joints), NO_BEAM)
     return tuple(rows)
 
@@ -537,6 +533,6 @@ def steps_of_solids() -> tuple[Row, ...]:
         note = "no beam has it: it belongs to the table of docs/gearbox.md"
         for words, value in zip(("bending", "torsion", "tension"), _flexibility(number), strict=True):
             rows.append(information("step", SOURCE, f"{text}{words} [d]", None, value, note=note))
-    finer = step_flexibility(*STEPS[1], finer=1.5)
-    text = "the same of 60 to 80 mm with elements 1.5 times as fine, in bending [d]"
+    finer = step_flexibility(*STEPS[1], fine=0.5 * SHARP)
+    text = "the same of 60 to 80 mm with elements half as long at the step, in bending [d]"
     return (*rows, within("step", SOURCE, text, finer[0], _flexibility(1)[0], 0.02))

@@ -22,6 +22,7 @@ from femgear.errors import CaseError, GeometryError, several
 from femgear.gears.exact_linear import ExactSolution, reduce_rows
 from femgear.gears.shaft_graph import EXTERNAL, INTERNAL, ShaftGraph, SpeedCondition, StageGears, connected_sets
 
+_RPM = math.pi / 30.0  # [rad/s]
 AGREEMENT = 1e-9
 """Given speeds and torques contradict where they miss a ratio by more than this, relative to the largest term."""
 Ratios = Mapping[str, Mapping[str, Fraction]]
@@ -366,7 +367,8 @@ def _locks(graph: ShaftGraph) -> tuple[list[CaseError], set[int]]:
         locked |= groups
         holds = sorted({shaft for group in turnable for shaft in graph.names(stopped[group][1])} & {*graph.held})
         text = f"{_stages(graph, part)} cannot turn with {_shafts(holds)} held"
-        problems.append(CaseError(text, code="E-MECHANISM", remedy="hold one shaft less"))
+        limit = "shafts held so that the stages can turn"
+        problems.append(CaseError(text, code="E-MECHANISM", limit=limit, remedy="hold one shaft less"))
     return problems, locked
 
 
@@ -395,6 +397,7 @@ def _free(graph: ShaftGraph, turning: ExactSolution) -> list[CaseError]:
             CaseError(
                 f"{_shafts(shafts)} turn{'s' * (len(shafts) == 1)} freely: {more} missing",
                 code="E-MECHANISM",
+                limit="one given speed for every way in which the shafts turn",
                 remedy=(f"give the speed of {_listed(free)}", f"hold {_listed(free)}"),
             )
         )
@@ -430,8 +433,8 @@ def _speed_problem(shaft: str, speed: float, fits: float, against: str) -> CaseE
     return CaseError(
         f"the speed of shaft {shaft!r} does not fit {against}",
         code="E-SPEED",
-        value=float(speed),
-        limit=f"{fits:.9g} rad/s",
+        value=f"{speed:.9g} rad/s, {speed / _RPM:.6g} rpm",
+        limit=f"{fits:.9g} rad/s, {fits / _RPM:.6g} rpm",
         remedy=f"leave the speed of {shaft!r} out",
     )
 
@@ -456,7 +459,8 @@ def _undetermined(
         else:
             text = f"{_stages(graph, stages)} carry torque that tooth numbers do not share out"
             remedy = "leave out one of the stages, or the coupling that closes the loop"
-        problems.append(CaseError(text, code="E-TORQUE", remedy=remedy))
+        limit = "torques that follow from the given ones and the tooth numbers"
+        problems.append(CaseError(text, code="E-TORQUE", limit=limit, remedy=remedy))
     return problems
 
 

@@ -1,7 +1,6 @@
 """Round solids: elements that fit one another, means of sections, a bar in tension by CalculiX."""
 
 from collections import Counter
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -29,7 +28,7 @@ _FACES = {
 
 @pytest.mark.parametrize("shaft", [UNIFORM, SLENDER, ALL, HIGH], ids=["uniform", "slender", "all", "high"])
 def test_elements_fit_and_the_free_faces_are_the_surface(shaft):
-    solid = round_solid(replace(shaft, fine=0.004))
+    solid = round_solid(shaft)
     faces = Counter(
         tuple(sorted(row[side]))
         for elements in (solid.hexahedra, solid.wedges)
@@ -49,7 +48,7 @@ def test_elements_fit_and_the_free_faces_are_the_surface(shaft):
 
 
 def test_means_of_sections_are_those_of_rigid_motions():
-    solid = round_solid(replace(ALL, fine=0.004))
+    solid = round_solid(ALL)
     turn, shift = np.array([0.3, -0.2, 0.5]), np.array([1.0, 2.0, -3.0])
     for place, means in solid.means.items():
         moved = shift + np.cross(turn, solid.points - [0.0, 0.0, place])

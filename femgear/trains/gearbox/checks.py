@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
@@ -30,8 +30,12 @@ from femgear.trains.gearbox.geometry import (
     rolling_bearing,
     set_sizes,
 )
+from femgear.trains.gearbox.holding import floating_shafts, loose_fits, untaken_thrust
 from femgear.trains.gearbox.materials import material_notices
+from femgear.trains.gearbox.power import gearbox_flow
 
+# Entries that speeds and torques hang on.
+_OF_THE_FLOW = ("pair", "planetary", "coupling", "operation", "load")
 _ROLLER = ("rolling_elements", "element_diameter", "pitch_diameter")
 _SPRINGS = ("radial", "axial", "tilt", "torsional")
 # Positions on a shaft that are off it by less are on it [m].
@@ -39,12 +43,46 @@ _EDGE = 1e-9
 
 
 def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
-    """List what no entry of a gearbox case shows alone; sizes and loads once all names are known."""
+    """List what no entry of a gearbox case shows alone: all that can be judged beside wrong names and sizes."""
     named = [*_names(case), *_references(case)]
-    if named:
-        return named
-    seats = [*_seats(case), *_bearings(case), *_shaft_parts(case)]
-    return [*seats, *_stages(case), *_loads(case), *_weight(case), *check_casing(case)]
+    stages, loads = [*_stages(case)], [*_loads(case)]
+    problems = [*named, *_seats(case), *_bearings(case), *_shaft_parts(case), *stages, *loads, *_weight(case)]
+    problems += [] if named else check_casing(case)
+    return [*problems, *_held(case, problems)]
+
+
+def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseError]:
+    """What holds and drives all shafts, where the entries that it hangs on are sound."""
+    keys = [problem.key or "" for problem in problems if not _misplaced(problem)]
+    judged = {
+        kind: [
+            i
+            for i in range(len(getattr(case, kind)))
+            if not any(key == f"{kind}[{i}]" or key.startswith(f"{kind}[{i}].") for key in keys)
+        ]
+        for kind in ("pair", "planetary")
+    }
+    yield from loose_fits(case, [case.pair[i] for i in judged["pair"]])
+    floating = [*floating_shafts(case, judged=judged)]
+    yield from floating
+    if any(key.startswith(_OF_THE_FLOW) or (key.startswith("shaft") and key.endswith("].name")) for key in keys):
+        return
+    told: set[str] = set()
+    for number, load_case in enumerate(case.operation.load_case):
+        try:
+            flow = gearbox_flow(case, load_case)
+        except FemgearError as error:
+            yield from (problem for problem in error.problems if problem.message not in told)  # type: ignore[misc]
+            told |= {problem.message for problem in error.problems}
+            continue
+        if not floating and not any(key.startswith(("bearing", "shaft")) for key in keys):
+            yield from untaken_thrust(case, flow, number)
+
+
+def _misplaced(problem: CaseError) -> bool:
+    """Whether a gear or bearing is only at a wrong place: its stage turns as it would at the right one."""
+    ends = ("position", "positions", "shafts", "_position")
+    return problem.code in ("E-CENTRE-DISTANCE", "E-RANGE") and (problem.key or "").endswith(ends)
 
 
 def _weight(case: GearboxCase) -> Iterator[CaseError]:
@@ -133,10 +171,15 @@ def _unknown(key: str, name: str, known: list[str], what: str) -> Iterator[CaseE
         yield no_such("part", key, name, known, f"name {what}", limit=limit)
 
 
+def _known(case: GearboxCase, *names: str) -> bool:
+    """Whether all of the names are those of shafts, or of the casing."""
+    return {*names} <= {CASING, *(shaft.name for shaft in case.shaft)}
+
+
 def _seats(case: GearboxCase) -> Iterator[CaseError]:
     """Positions that lie on their shafts, given where the shaft is more than one rigid body."""
     for key, shaft, position in _all_seats(case):
-        if shaft == CASING:
+        if shaft == CASING or not _known(case, shaft):
             continue
         section = case.shaft_named(shaft)
         if position is None and section.part:
@@ -208,7 +251,7 @@ def _bearings(case: GearboxCase) -> Iterator[CaseError]:
                 limit="positive or negative, of a kind also none",
                 remedy="leave axial and axial_sense out",
             )
-        if bearing.outer_shaft is not None:
+        if bearing.outer_shaft is not None and _known(case, bearing.shaft, bearing.outer_shaft):
             yield from _ring_places(case, bearing, key)
 
 
@@ -313,6 +356,9 @@ def _stages(case: GearboxCase) -> Iterator[CaseError]:
             key = f"{kind}[{i}]"
             if problem := _given_once(stage, key):
                 yield problem
+                continue
+            members = stage.shafts if isinstance(stage, PairSection) else (stage.sun, stage.carrier, stage.ring)
+            if not _known(case, *members):
                 continue
             try:
                 yield from sizes(case, stage, key)

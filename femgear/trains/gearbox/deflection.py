@@ -13,8 +13,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from femgear.errors import CaseError, ConvergenceError, FemgearError
-from femgear.system.assembly import GROUND, MOTIONS, Assembly, StationSprings
+from femgear.errors import FemgearError, several
+from femgear.system.assembly import GROUND, Assembly, StationSprings
 from femgear.system.rolling_bearings import BearingState, bearing_state, sliding_state
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing import check_casing_held, elastic_foot_forces, rigid_foot_rows
@@ -25,7 +25,8 @@ from femgear.trains.gearbox.contact import (
     stage_contact,
 )
 from femgear.trains.gearbox.geometry import rolling_bearing
-from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model
+from femgear.trains.gearbox.holding import loose_shafts, without_balance
+from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model, member_of_stations
 
 _STEPS = 200
 # Metres by which tilts and rotations are compared with shifts.
@@ -312,7 +313,7 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
     fixed = replace(assembly, held=held)
     T, K, W, k = fixed.motions, assembly.stiffness, assembly.columns, assembly.slice_stiffness
     laws = laws_of(model, model.estimate)
-    _check_held(fixed, T, K, W, k, laws)
+    _check_held(model, fixed, T, K, W, k, laws)
     spread = [(_spread(springs, assembly), law) for _, law, springs in laws]
     scale = max(np.abs(model.load).max(initial=0.0), 1e-9)
     y = np.zeros(T.shape[1]) if start is None else np.linalg.lstsq(T, start.motion, rcond=None)[0]
@@ -330,24 +331,30 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
             tangent = tangent + rows.T @ stiffness @ rows
         return T.T @ (model.load - inner), T.T @ tangent @ T
 
-    y, residual, iterations = _newton(forces, y, scale, lambda y: _farthest(fixed.names, T @ y))
+    y, residual, iterations, left = _newton(forces, y, scale)
+    if left is not None:
+        station, way = _farthest(T @ y)
+        raise without_balance(model.case, member_of_stations(model)[station], way, left)
     q = T @ y
     return _state(model, q, gap, laws, residual, iterations)
 
 
-def _farthest(names: Sequence[str], motion: np.ndarray) -> str:
-    """Name the station that has moved the farthest, and its way; tilts and rotations count by 50 mm."""
-    station, way = divmod(int((np.abs(motion) * np.tile(_LEVERS, len(names))).argmax()), 6)
-    return f"{names[station]} ({'along z' if way == 2 else MOTIONS[way]})"
+def _farthest(motion: np.ndarray) -> tuple[int, int]:
+    """Find the station that has moved the farthest, and its way; tilts and rotations count by 50 mm."""
+    station, way = divmod(int((np.abs(motion) * np.tile(_LEVERS, len(motion) // 6)).argmax()), 6)
+    return station, way
 
 
-def _newton(forces, y: np.ndarray, scale: float, farthest) -> tuple[np.ndarray, float, int]:
-    """Newton's method with a shorter step where the residual does not fall."""
+def _newton(forces, y: np.ndarray, scale: float) -> tuple[np.ndarray, float, int, float | None]:
+    """Newton's method with a shorter step where the residual does not fall.
+
+    The last value is the force that is left where there is no balance [N], else None.
+    """
     residual, tangent = forces(y)
     size = np.abs(residual).max(initial=0.0)
     for iteration in range(_STEPS):
         if size <= _SETTLED * scale:
-            return y, size / scale, iteration
+            return y, size / scale, iteration, None
         step = _solved(tangent, residual)
         share = 1.0
         while True:
@@ -360,20 +367,14 @@ def _newton(forces, y: np.ndarray, scale: float, farthest) -> tuple[np.ndarray, 
         if share < 1e-3 and not new_size < size:
             # rounding of stiff springs leaves the last digits open
             if size <= 1e-7 * scale:
-                return y, size / scale, iteration
+                return y, size / scale, iteration, None
             trial = y + step
             new, new_tangent = forces(trial)
             new_size = np.abs(new).max(initial=0.0)
         y, residual, tangent, size = trial, new, new_tangent, new_size
     if size <= 1e-7 * scale:
-        return y, size / scale, _STEPS
-    raise ConvergenceError(
-        f"the loads of the gearbox find no balance: {size:.3g} N are left, and {farthest(y)} moves the farthest",
-        code="E-CONVERGENCE",
-        key="bearing",
-        limit=f"{_SETTLED:g} of the largest load",
-        remedy="check the bearings of this part: clearance that swallows the load, thrust in the sense that none takes",
-    )
+        return y, size / scale, _STEPS, None
+    return y, size / scale, _STEPS, float(size)
 
 
 def _solved(tangent: np.ndarray, residual: np.ndarray) -> np.ndarray:
@@ -402,7 +403,20 @@ def _spread(springs: StationSprings, assembly: Assembly) -> np.ndarray:
     return found
 
 
-def _check_held(fixed: Assembly, T, K, W, k, laws) -> None:
+def check_held(case: GearboxCase) -> None:
+    """Refuse motions of shafts that neither springs nor bearings nor meshes hold.
+
+    CaseError: one for every shaft (E-MECHANISM).
+    """
+    model = gearbox_model(case)
+    held = model.assembly.held.copy()
+    held[model.turns] = True
+    fixed = replace(model.assembly, held=held)
+    parts = fixed.motions, fixed.stiffness, fixed.columns, fixed.slice_stiffness
+    _check_held(model, fixed, *parts, laws_of(model, model.estimate))
+
+
+def _check_held(model: GearboxModel, fixed: Assembly, T, K, W, k, laws) -> None:
     """Refuse motions that neither springs nor bearings nor meshes hold."""
     tangent = K + (W * k) @ W.T
     for _, law, springs in laws:
@@ -416,17 +430,11 @@ def _check_held(fixed: Assembly, T, K, W, k, laws) -> None:
     if not loose.any():
         return
     motion = T @ (vectors[:, loose] / size[:, None])
-    names = [_farthest(fixed.names, column) for column in motion.T]
     if CASING in fixed.names:
-        check_casing_held(motion, np.tile(_LEVERS, len(fixed.names)), fixed.names.index(CASING), len(names))
-    raise CaseError(
-        f"nothing holds {len(names)} motion{'s' * (len(names) > 1)}: {', '.join(dict.fromkeys(names))}",
-        code="E-MECHANISM",
-        key="bearing",
-        limit="bearings that hold every shaft across, along and against tilting",
-        remedy='give every shaft two bearings across and one along its axis (axial = "rigid" or a stiffness), '
-        "and take the thrust of helical teeth",
-    )
+        check_casing_held(
+            motion, np.tile(_LEVERS, len(fixed.names)), fixed.names.index(CASING), int(np.count_nonzero(loose))
+        )
+    raise several(loose_shafts(model.case, member_of_stations(model), motion))
 
 
 def _state(model: GearboxModel, q, gap, laws, residual: float, iterations: int) -> Deflection:

@@ -641,6 +641,21 @@ def replace_stiffness(springs: StationSprings, stiffness: Sequence[float]) -> St
     return replace(springs, rows=springs.rows[values > 0.0], stiffness=values[values > 0.0])
 
 
+def member_of_stations(model: GearboxModel) -> list[str]:
+    """Name the shaft, the planets, the elastic carrier or the casing that every station belongs to."""
+    owner = [CASING] * len(model.assembly.names)
+    for shaft in model.case.shaft:
+        count = len(model.beams[shaft.name].stations) if shaft.name in model.beams else 1
+        first = model.first[shaft.name]
+        owner[first : first + count] = [shaft.name] * count
+    for stage in model.stages:
+        for planet in stage.planets:
+            owner[planet] = f"planets of {stage.name}"
+        for pin in stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ():
+            owner[pin] = f"carrier of {stage.name}"
+    return owner
+
+
 def bearing_places(model: GearboxModel) -> np.ndarray:
     """Find the places (b, 3) of all bearings [m]."""
     found = np.zeros((len(model.case.bearing), 3))

@@ -19,7 +19,7 @@ from femgear.trains.gearbox.case_file import CASING
 from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_carrier import with_carriers
 from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
-from femgear.trains.gearbox.model import GearboxModel
+from femgear.trains.gearbox.model import GearboxModel, member_of_stations
 
 # Share of the kinetic energy from which a mode is of one kind.
 _PURE = 0.8
@@ -233,21 +233,6 @@ def _kinetic(
         for hertz, share in zip(modes.frequency, by_kind.T, strict=True)
     ]
     return members, kinetic / total, tuple(kinds)
-
-
-def member_of_stations(model: GearboxModel) -> list[str]:
-    """Name the shaft, the planets, the elastic carrier or the casing that every station belongs to."""
-    owner = [CASING] * len(model.assembly.names)
-    for shaft in model.case.shaft:
-        count = len(model.beams[shaft.name].stations) if shaft.name in model.beams else 1
-        first = model.first[shaft.name]
-        owner[first : first + count] = [shaft.name] * count
-    for stage in model.stages:
-        for planet in stage.planets:
-            owner[planet] = f"planets of {stage.name}"
-        for pin in stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ():
-            owner[pin] = f"carrier of {stage.name}"
-    return owner
 
 
 def _called(kind: str, name: str) -> str:

@@ -29,8 +29,8 @@ from femgear.trains.gearbox.casing_results import (
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_sizes
 from femgear.trains.gearbox.life import describe_load_cases, life_text, life_variables, shortest_life
-from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places
-from femgear.trains.gearbox.modes import GearboxModes, member_of_stations
+from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
+from femgear.trains.gearbox.modes import GearboxModes
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -10,7 +10,7 @@ from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing_file import check_casing_file
-from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.deflection import check_held, solve_deflection
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
 from femgear.trains.gearbox.results import (
@@ -50,6 +50,12 @@ def solve_box_modes(
 ) -> GearboxModesResult:
     """Solve for the modes of the gearbox about the loaded state of its chosen load case."""
     return GearboxModesResult(solve_gearbox_modes(deflection.state, steps=steps))
+
+
+def check_before_run(case: GearboxCase) -> None:
+    """Refuse files of a casing that are none of this case, and shafts that the assembled model leaves loose."""
+    check_casing_file(case)
+    check_held(case)
 
 
 def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
@@ -99,7 +105,7 @@ GEARBOX = Train(
             title="System deflection",
             solve=solve_deflections,
             options=("progress", "steps"),
-            check=check_casing_file,
+            check=check_before_run,
             verdict=lambda result: {"load_cases": len(result.states)},
             describe=lambda results: describe_deflection(results.deflection)[0],
             tables=lambda results: describe_deflection(results.deflection)[1:],

@@ -142,7 +142,8 @@ def test_shares_of_the_time_are_at_most_the_whole():
 def test_planets_may_be_listed_in_any_order():
     tables = pair_tables()
     _set(tables, planet_angles=["0 deg", "240 deg", "120 deg"])
-    assert len(read_case(tables).planetary[0].gears.planet_angles) == 3
+    # beside shafts that nothing holds or turns
+    assert not any(key.startswith("planetary") for key in problems(tables))
 
 
 def test_two_outputs_on_one_shaft_are_refused_where_they_stand():

@@ -2,7 +2,6 @@
 
 import copy
 import math
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -213,7 +212,7 @@ def test_a_shaft_that_floats_along_its_axis_is_named():
     del tables["bearing"][0]["axial"]
     text = refused(tables)
     assert "E-MECHANISM" in text
-    assert re.search(r"input \d+ \(along z\)", text)
+    assert "shaft input floats along the axis" in text
 
 
 def test_thrust_that_cylindrical_bearings_do_not_take_is_refused():
@@ -223,7 +222,7 @@ def test_thrust_that_cylindrical_bearings_do_not_take_is_refused():
         bearing.pop("radial")
         bearing.pop("axial", None)
         bearing |= roller
-    assert "along z" in refused(tables)
+    assert "shaft input" in refused(tables)
 
 
 def test_a_bearing_on_one_seat_alone_leaves_the_shaft_to_tilt():
@@ -247,5 +246,4 @@ def test_the_shaft_whose_thrust_no_bearing_takes_in_its_sense_is_named():
     if there < 0.0:
         tables["bearing"][0]["axial_sense"] = "negative"
     text = refused(tables)
-    assert "E-CONVERGENCE" in text
-    assert re.search(r"input \d+ \(along z\) moves the farthest", text)
+    assert "nothing takes the thrust on shaft input" in text

@@ -113,7 +113,9 @@ def test_a_mesh_without_load_carries_on_no_part_of_its_width():
 
 def test_planets_that_do_not_assemble_are_told():
     tables = pair_tables()
+    tables["motions"] = "plane"
     tables["shaft"] += [{"name": "sun"}, {"name": "carrier"}]
+    tables["operation"]["fixed"] = ["sun"]
     tables["planetary"] = [
         {
             "name": "set",
