@@ -223,7 +223,7 @@ def _bearings(case: GearboxCase) -> Iterator[CaseError]:
     for i, bearing in enumerate(case.bearing):
         key = f"bearing[{i}]"
         springs = bearing.given(*_SPRINGS)
-        if bearing.kind is None and not any(bearing.stiffness):
+        if bearing.kind is None and not any(bearing.stiffness) and not bearing.axial:
             yield CaseError(
                 "the bearing holds nothing",
                 code="E-KEY-MISSING",

@@ -115,7 +115,7 @@ def test_planets_that_do_not_assemble_are_told():
     tables = pair_tables()
     tables["motions"] = "plane"
     tables["shaft"] += [{"name": "sun"}, {"name": "carrier"}]
-    tables["operation"]["fixed"] = ["sun"]
+    tables["operation"]["load_case"][0]["speed"]["sun"] = "0 rpm"
     tables["planetary"] = [
         {
             "name": "set",
