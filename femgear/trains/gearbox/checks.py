@@ -565,7 +565,8 @@ def _outputs(case: GearboxCase) -> Iterator[CaseError]:
     places |= {load.name: load.shaft for load in case.load}
     first: dict[str, str] = {}
     for name in case.operation.output:
-        shaft = places[name]
+        if (shaft := places.get(name)) is None:
+            continue
         if shaft in first:
             twice = first[shaft] == name
             yield CaseError(

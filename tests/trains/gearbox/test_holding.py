@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 from random_gearboxes import random_gearbox
-from small_gearbox import pair_tables, planetary_tables
+from small_gearbox import pair_tables, planetary_tables, set_on_shafts
 
 from femgear.case import text as case_text
 from femgear.cli import main
@@ -269,3 +269,35 @@ def test_a_load_without_balance_names_a_bearing():
     assert (error.key, error.value) == ("bearing[3].clearance", "0.08 mm")
     assert "12.5 N" in error.message and error.limit and error.remedy
     assert without_balance(read_case(tables), "input", 2, 12.5).key == "bearing"
+
+
+def _references(value, path=()):
+    """Places of all texts in tables that name a shaft, a load, or the casing."""
+    if isinstance(value, dict):
+        for key, part in value.items():
+            yield from _references(part, (*path, key))
+    elif isinstance(value, list):
+        for number, part in enumerate(value):
+            yield from _references(part, (*path, number))
+    elif isinstance(value, str) and path[-1] != "name" and path[0] not in ("model", "title", "motions"):
+        yield path
+
+
+@pytest.mark.parametrize(
+    "tables", [pair_tables(), set_on_shafts(), random_gearbox(7, 4)], ids=["pair", "set", "random"]
+)
+def test_no_wrong_name_breaks_the_checks(tables):
+    names = {shaft["name"] for shaft in tables["shaft"]} | {load["name"] for load in tables["load"]} | {"casing"}
+    count = 0
+    for path in _references(tables):
+        new = copy.deepcopy(tables)
+        place = new
+        for key in path[:-1]:
+            place = place[key]
+        if place[path[-1]] not in names:
+            continue
+        place[path[-1]], count = "nowhere", count + 1
+        with pytest.raises(CaseError) as caught:
+            read_case(new)
+        assert any(problem.value == "nowhere" for problem in caught.value.problems), path
+    assert count > 8
