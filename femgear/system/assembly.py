@@ -6,6 +6,7 @@ infinite stiffness are conditions, which are eliminated: all motions follow from
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,7 +16,6 @@ import numpy as np
 from scipy import linalg
 
 from femgear.fe.beam import rigid_link
-from femgear.system.mesh_directions import assemble, point_approach, stiffness_matrix
 from femgear.system.system import MechanicalSystem, freeze
 
 MOTIONS = ("x", "y", "z", "tilt x", "tilt y", "rotation")
@@ -125,8 +125,9 @@ class Contact:
     @property
     def approach(self) -> np.ndarray:
         """Approach of the flanks (2, S, 6) per unit of the motions of either station [1, m/rad]."""
-        first, second = (point_approach(self.normal, points) for points in self.points)
-        return np.stack([first, -second])
+        effect = point_approach(self.normal, self.points)
+        effect[1] *= -1.0
+        return effect
 
 
 @dataclass(frozen=True)
@@ -267,6 +268,135 @@ class Assembly:
         return total
 
 
+def assemble(
+    mass: np.ndarray,
+    stiffness: np.ndarray,
+    columns: np.ndarray,
+    load: np.ndarray,
+    *,
+    motions: np.ndarray,
+    dofs: Sequence[str],
+    gyroscopic: np.ndarray | None = None,
+) -> MechanicalSystem:
+    """Reduce the matrices of bodies, springs and meshes to the motions that are free; ``C`` is zero.
+
+    Parameters
+    ----------
+    mass : (n,) or (n, n) array
+        In all coordinates [kg, kg m^2].
+    stiffness : (n, n) array
+        Of springs that are not columns of ``W``, see `stiffness_matrix` [N/m, N m/rad].
+    columns : (n, g) array
+        Deflections of meshes, and of bearings that are elements, per unit of the coordinates.
+    load : (n,) array
+        [N, N m]
+    motions : (n, m) array
+        All coordinates per unit of the free ones: unit columns, and what follows them.
+    dofs : (m,) sequence of str
+        Names of the free coordinates.
+    gyroscopic : (n, n) array, optional
+        [kg]
+    """
+    T = motions
+    return MechanicalSystem(
+        M=(T.T * mass) @ T if mass.ndim == 1 else T.T @ mass @ T,
+        C=np.zeros((T.shape[1], T.shape[1])),
+        K=T.T @ stiffness @ T,
+        W=T.T @ columns,
+        load=T.T @ load,
+        dofs=tuple(str(name) for name in dofs),
+        gyroscopic=None if gyroscopic is None else T.T @ gyroscopic @ T,
+    )
+
+
+def stiffness_matrix(columns: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
+    """Sum ``k w w^T`` (n, n) [N/m, ...] over springs with columns w (n, g) and stiffnesses k (g,) [N/m].
+
+    Infinite ones hold motions and are not in it.
+    """
+    k = np.where(np.isfinite(stiffness), stiffness, 0.0)
+    return np.einsum("ig,g,jg->ij", columns, k, columns)
+
+
+def point_approach(normal: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Compute ``n . (v + phi x c)`` per unit of v and phi of a rigid body (..., 6), ``n`` and ``c x n``.
+
+    That is the motion along a normal (3,) of points (..., 3) [m] of the body, from its centre: per displacement
+    along x, y and z [1], and per rotation about them [m/rad].
+    """
+    effect = np.empty((*points.shape[:-1], 6))
+    effect[..., :3] = normal
+    x, y, z = points[..., 0], points[..., 1], points[..., 2]
+    n_x, n_y, n_z = normal
+    effect[..., 3], effect[..., 4], effect[..., 5] = y * n_z - z * n_y, z * n_x - x * n_z, x * n_y - y * n_x
+    return effect
+
+
+def mesh_normal(towards, pressure_angle: float, base_helix: float, flank: int) -> np.ndarray:
+    """Compute the unit normal (3,) of a mesh, into gear 2, from its pressure angle in the transverse section.
+
+    ``towards`` (2,) is the radial direction at the pitch point, away from the axis of gear 1. Gear 1 pushes
+    counter-clockwise for ``flank`` 1: ``n = (sin(alpha) e_r + flank cos(alpha) e_t) cos(beta_b) - flank
+    sin(beta_b) e_z``, with the helix positive of a right-handed gear 1 (ISO 21771). In an internal mesh the flank
+    of the pinion faces outwards all the same.
+    """
+    radial, around = np.append(towards, 0.0), np.array([-towards[1], towards[0], 0.0])
+    plane = math.sin(pressure_angle) * radial + flank * math.cos(pressure_angle) * around
+    return math.cos(base_helix) * plane - flank * math.sin(base_helix) * np.array([0.0, 0.0, 1.0])
+
+
+def gear_contact(  # noqa: PLR0913
+    name: str,
+    stations: tuple[int, int],
+    towards,
+    base_radii: tuple[float, float],
+    pressure_angle: float,
+    *,
+    flank: int,
+    internal: bool = False,
+    base_helix: float = 0.0,
+    heights: Sequence[float] = (0.0,),
+    stiffness: float = 0.0,
+    on_base_circles: bool = False,
+) -> Contact:
+    """Make the mesh of two gears whose stations are their centres, with slices at heights (S,) [m].
+
+    Each gear is touched on its own pitch circle ``r_b / cos(alpha)``, so that its rotation moves the flank by its
+    base radius also where radii, centre distance and pressure angle do not close.
+
+    Parameters
+    ----------
+    name : str
+        Of the mesh.
+    stations : (2,) tuple of int
+        Of gear 1 and gear 2, `GROUND` for a gear that stands still.
+    towards, pressure_angle, base_helix, flank
+        See `mesh_normal`.
+    base_radii : (2,) floats
+        Of gear 1 and gear 2 [m].
+    internal : bool
+        Gear 2 is a ring.
+    heights : (S,) floats
+        Of the slices above the middle of the common width [m].
+    stiffness : float
+        Of the whole mesh, in equal parts on the slices [N/m].
+    on_base_circles : bool
+        Forces act where the line of action touches the base circle of each gear.
+    """
+    radial = np.append(np.asarray(towards, float), 0.0)
+    around = np.array([-radial[1], radial[0], 0.0])
+    foot = radial / math.cos(pressure_angle)
+    if on_base_circles:
+        foot = math.cos(pressure_angle) * radial - flank * math.sin(pressure_angle) * around
+    levels, count = np.asarray(heights, float), len(heights)
+    points = np.empty((2, count, 3))
+    for own, radius, side in zip(points, base_radii, (1.0, 1.0 if internal else -1.0), strict=True):
+        own[:] = side * radius * foot
+        own[:, 2] = levels
+    normal = mesh_normal(radial[:2], pressure_angle, base_helix, flank)
+    return Contact(name, stations, normal, points, levels, np.full(count, stiffness / count))
+
+
 def solved_conditions(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Solve the conditions ``rows q = 0`` (c, n) for all motions (n, m) per unit of free ones.
 
@@ -316,8 +446,9 @@ def joint(
     axes : (3, 3) array, optional
         Rows are the axes of the joint; x, y, z where not given.
     """
-    turned = np.eye(6) if axes is None else np.kron(np.eye(2), np.asarray(axes, float))
-    rows = turned @ np.hstack([-rigid_link(offsets[0]), rigid_link(offsets[1])])
+    rows = np.hstack([-rigid_link(offsets[0]), rigid_link(offsets[1])])
+    if axes is not None:
+        rows = np.concatenate([np.asarray(axes, float) @ half for half in (rows[:3], rows[3:])])
     stiffness = np.asarray(stiffness, float)
     used = stiffness > 0.0
     return StationSprings(name, stations, rows[used], stiffness[used])

@@ -9,20 +9,30 @@ six as in A. Kahraman, J. Mech. Des. 116, 1994, 713-720. The equation of motion 
 
 ``M q'' + Omega G q' + [K_b + K_m - Omega^2 K_Omega] q = T + F``
 
-with the matrices printed in the appendix of Lin and Parker. Here K_b and K_m follow from kinematics: every
-spring is a column of deflections, ``w^T q``, and adds ``k w w^T``; the meshes stay columns of W. `assemble`
-reduces the matrices of any bodies, springs and meshes to the motions that are free.
+with the matrices printed in the appendix of Lin and Parker. Here bodies, supports, pins and meshes are those of
+`femgear.system.assembly` (`set_assembly`), in these coordinates (`station_motions`); the meshes stay columns of W.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from femgear.errors import CaseError
+from femgear.fe.beam import body_matrices
+from femgear.gears.kinematics import across, unit_vectors
+from femgear.system.assembly import (
+    GROUND,
+    Assembly,
+    Contact,
+    Inertia,
+    StationSprings,
+    assemble,
+    gear_contact,
+    joint,
+)
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import Series, constant
 from femgear.system.rigid_bodies import (
@@ -39,56 +49,6 @@ from femgear.system.system import MechanicalSystem, MeshExcitation, gear_meshes
 
 CENTRAL_AXES = ("x", "y", "z", "tilt x", "tilt y", "u")
 PLANET_AXES = ("radial", "tangential", "z", "tilt radial", "tilt tangential", "u")
-
-
-def assemble(
-    mass: np.ndarray,
-    stiffness: np.ndarray,
-    columns: np.ndarray,
-    load: np.ndarray,
-    *,
-    motions: np.ndarray,
-    dofs: Sequence[str],
-    gyroscopic: np.ndarray | None = None,
-) -> MechanicalSystem:
-    """Reduce the matrices of bodies, springs and meshes to the motions that are free; ``C`` is zero.
-
-    Parameters
-    ----------
-    mass : (n,) or (n, n) array
-        In all coordinates [kg, kg m^2].
-    stiffness : (n, n) array
-        Of springs that are not columns of ``W``, see `stiffness_matrix` [N/m, N m/rad].
-    columns : (n, g) array
-        Deflections of meshes, and of bearings that are elements, per unit of the coordinates.
-    load : (n,) array
-        [N, N m]
-    motions : (n, m) array
-        All coordinates per unit of the free ones: unit columns, and what follows them.
-    dofs : (m,) sequence of str
-        Names of the free coordinates.
-    gyroscopic : (n, n) array, optional
-        [kg]
-    """
-    T = motions
-    return MechanicalSystem(
-        M=(T.T * mass) @ T if mass.ndim == 1 else T.T @ mass @ T,
-        C=np.zeros((T.shape[1], T.shape[1])),
-        K=T.T @ stiffness @ T,
-        W=T.T @ columns,
-        load=T.T @ load,
-        dofs=tuple(str(name) for name in dofs),
-        gyroscopic=None if gyroscopic is None else T.T @ gyroscopic @ T,
-    )
-
-
-def stiffness_matrix(columns: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
-    """Sum ``k w w^T`` (n, n) [N/m, ...] over springs with columns w (n, g) and stiffnesses k (g,) [N/m].
-
-    Infinite ones hold motions and are not in it.
-    """
-    k = np.where(np.isfinite(stiffness), stiffness, 0.0)
-    return np.einsum("ig,g,jg->ij", columns, k, columns)
 
 
 def gear_set_system(
@@ -136,16 +96,14 @@ def gear_set_system(
             code="E-MECHANISM",
             remedy="give the support or the bearing of a body finite stiffnesses",
         )
-    masses = body_masses(data)
-    columns = [mesh_directions(data, flank)]
+    masses, whole, motions = body_masses(data), set_assembly(data, flank), station_motions(data)
+    columns = [motions.T @ whole.columns]
     if back_flanks:
         columns.append(mesh_directions(data, -flank))
     if planet_bearings:
         columns.append(pin_directions(data)[..., :2].reshape(kept.size, -1))
-    stiffness, load = np.diag(support_diagonal(data).ravel()), torque_load(data, torque, kept)
-    if not planet_bearings:
-        pins = pin_directions(data)
-        stiffness += stiffness_matrix(pins.reshape(len(pins), -1), data.pin_stiffness.ravel())
+        whole = replace(whole, springs=tuple(one for one in whole.springs if GROUND in one.stations))
+    stiffness, load = motions.T @ whole.stiffness @ motions, torque_load(data, torque, kept)
     gyroscopic = None
     if carrier_speed:
         # the translational part is the K_Omega of Lin and Parker
@@ -154,7 +112,7 @@ def gear_set_system(
         load[9::3] += carrier_speed**2 * data.planet.mass * data.centre_distance
         gyroscopic = _gyroscopic(along)
     return assemble(
-        masses.ravel(),
+        motions.T @ whole.mass @ motions,
         stiffness,
         np.hstack(columns),
         load,
@@ -238,31 +196,101 @@ def check_mesh_columns(data: RigidSet, meshes: GearMeshes) -> None:
         )
 
 
+def set_assembly(data: RigidSet, flank: int = 1) -> Assembly:
+    """Make the stations of carrier, ring, sun and planets, their supports, pins and meshes.
+
+    A flank of 1 is that of a sun that drives counter-clockwise, else -1. Motions that are none of ``data.axes`` are
+    held; infinite stiffnesses are conditions.
+    """
+    N, directions = data.n_planets, planet_directions(data)
+    bodies = [*((name, getattr(data, name)) for name in CENTRAL), *((f"planet {n + 1}", data.planet) for n in range(N))]
+    places = np.zeros((N + 3, 3))
+    places[3:] = data.centre_distance * directions[:, 0]
+    inertias, springs, contacts = list[Inertia](), list[StationSprings](), list[Contact]()
+    for station, (_, body) in enumerate(bodies):
+        across = getattr(body, "diametral_inertia", 0.5 * body.inertia)
+        inertias.append(Inertia((station,), *body_matrices(body.mass, body.inertia, across)))
+    axes = list(data.axes)
+    for station, (name, support) in enumerate(zip(CENTRAL, data.support_stiffness, strict=True)):
+        stiffness = np.zeros(6)
+        stiffness[axes] = support
+        springs.append(joint(f"support of {name}", (GROUND, station), (np.zeros(3), np.zeros(3)), stiffness))
+    springs += [_pin(data, n, stiffness, directions[n]) for n, stiffness in enumerate(data.pin_stiffness)]
+    lines, stiffnesses = data.contact_lines, (data.stiffness_sun_planet, data.stiffness_planet_ring)
+    angles = data.pressure_angle_sun_planet, data.pressure_angle_planet_ring
+    for internal in (False, True):
+        radii = (data.planet_radius, data.ring_radius) if internal else (data.sun_radius, data.planet_radius)
+        # planets turn against the sun, and have the other hand
+        sense = -1 if internal else 1
+        for n, stiffness in enumerate(np.asarray(stiffnesses[internal]).tolist()):
+            gears = (3 + n, CENTRAL.index("ring")) if internal else (CENTRAL.index("sun"), 3 + n)
+            contacts.append(
+                gear_contact(
+                    f"planet {n + 1}-ring" if internal else f"sun-planet {n + 1}",
+                    gears,
+                    directions[n, 0, :2],
+                    radii,
+                    angles[internal],
+                    flank=sense * flank,
+                    internal=internal,
+                    base_helix=sense * lines.base_helix_angle,
+                    heights=lines.heights,
+                    stiffness=stiffness,
+                    on_base_circles=lines.on_base_circles,
+                )
+            )
+    held = np.tile(~np.isin(np.arange(6), axes), N + 3)
+    names = tuple(name for name, _ in bodies)
+    return Assembly(names, places, held, tuple(inertias), (), tuple(springs), tuple(contacts))
+
+
+def planet_directions(data: RigidSet) -> np.ndarray:
+    """Compute the radial, tangential and axial unit vectors (N, 3, 3) of every planet, one a row."""
+    directions = np.zeros((data.n_planets, 3, 3))
+    directions[:, 0, :2] = unit_vectors(data.angles)
+    directions[:, 1, :2] = across(directions[:, 0, :2])
+    directions[:, 2, 2] = 1.0
+    return directions
+
+
+def _pin(data: RigidSet, planet: int, stiffness, directions: np.ndarray) -> StationSprings:
+    """Springs of a planet bearing along the directions (3, 3) of its planet, planet less pin."""
+    wanted = np.zeros(6)
+    wanted[: len(stiffness)] = stiffness
+    offsets = data.centre_distance * directions[0], np.zeros(3)
+    return joint(f"pin {planet + 1}", (CENTRAL.index("carrier"), 3 + planet), offsets, wanted, axes=directions)
+
+
+def station_motions(data: RigidSet) -> np.ndarray:
+    """Compute the motions (6 (N + 3), n) of all stations [m, rad] per unit of the coordinates of a set.
+
+    Arcs ``w`` and ``u`` are on the radius of the body, planets move along their own directions.
+    """
+    arcs = np.ones((data.n_planets + 3, 6))
+    arcs[:, 3:] = 1.0 / data.radii[:, None]
+    turned = np.zeros((data.n_planets + 3, 6, 6))
+    turned[:3] = np.eye(6)
+    for half in (slice(3), slice(3, 6)):
+        turned[3:, half, half] = np.swapaxes(planet_directions(data), 1, 2)
+    motions = block_diag(*(turned * arcs[:, None]))
+    return motions[:, np.tile(np.isin(np.arange(6), data.axes), data.n_planets + 3)]
+
+
 def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
     """Make the mesh columns (n, 2N S): approach of the flanks [m] per unit of the coordinates.
 
-    Along the common normal, of S slices each, n in all coordinates.
+    Along the common normal, of S slices each, n in all coordinates; see `femgear.system.assembly.Contact`.
 
-    A rigid body whose centre moves by v and which rotates by phi moves its point c by ``v + phi x c``, so
-    that the flanks of gears 1 and 2 approach by ``n . (v_1 + phi_1 x c_1) - n . (v_2 + phi_2 x c_2)`` with
-    the normal n into gear 2. Seen from the planet's centre n is ``(sin alpha cos beta_b, +- cos alpha cos
-    beta_b, - sin beta_b)`` radially, tangentially and axially for the flanks of a sun that drives
-    counter-clockwise (`flank` = 1, else -1). The rotation about the own axis gives ``+- u cos beta_b``.
-    Forces on base circles give a sun and one planet the mesh deflection of the helical pair of M. Kubur et
-    al., J. Mech. Des. 126, 2004, 398-406. In the plane these are Lin and Parker's mesh deflections, psi_sn =
-    psi_n - alpha_s and psi_rn = psi_n + alpha_r:
+    Seen from the planet's centre the normal is ``(sin alpha cos beta_b, +- cos alpha cos beta_b, - sin beta_b)``
+    radially, tangentially and axially for the flanks of a sun that drives counter-clockwise (`flank` = 1, else -1).
+    The rotation about the own axis gives ``+- u cos beta_b``. Forces on base circles give a sun and one planet the
+    mesh deflection of the helical pair of M. Kubur et al., J. Mech. Des. 126, 2004, 398-406. In the plane these
+    are Lin and Parker's mesh deflections, psi_sn = psi_n - alpha_s and psi_rn = psi_n + alpha_r:
 
     ``delta_sn = y_s cos psi_sn - x_s sin psi_sn - zeta_n sin alpha_s - eta_n cos alpha_s + u_s + u_n``
     ``delta_rn = y_r cos psi_rn - x_r sin psi_rn + zeta_n sin alpha_r - eta_n cos alpha_r + u_r - u_n``
     """
-    N, S = data.n_planets, len(data.contact_lines.heights)
-    W = np.zeros((N + 3, 6, 2 * N, S))
-    n = np.arange(N)
-    for mesh, gear in enumerate(("sun", "ring")):
-        central, planet = _local_columns(data, gear, flank)
-        W[CENTRAL.index(gear), :, mesh * N + n] = _turned(data, central)
-        W[3 + n, :, mesh * N + n] = planet
-    return W[:, list(data.axes)].reshape(-1, 2 * N * S)
+    return station_motions(data).T @ set_assembly(data, flank).columns
 
 
 def pin_directions(data: RigidSet) -> np.ndarray:
@@ -271,23 +299,21 @@ def pin_directions(data: RigidSet) -> np.ndarray:
     Radial and tangential, of bodies in space also axial [m], tilt about the radial and the tangential axis
     and rotation [rad]. A carrier that tilts by phi moves the pin along z by ``phi x a e_n``.
     """
-    N, n = data.n_planets, np.arange(data.n_planets)
-    own = np.diag([1.0] * 3 + [1.0 / data.planet_radius] * 3)
-    # motion of the pin (6,) per local coordinate of the carrier (6,)
-    pin = np.diag([1.0] * 3 + [1.0 / data.centre_distance] * 3)
-    pin[1, 5], pin[2, 4] = 1.0, -1.0
-    W = np.zeros((N + 3, 6, N, 6))
-    W[3 + n, :, n] = own.T
-    W[CENTRAL.index("carrier")] = -_turned(data, pin.T).transpose(1, 0, 2)
-    axes = list(data.axes)
-    return W[:, axes][..., axes[: data.pin_stiffness.shape[1]]].reshape(len(axes) * (N + 3), N, -1)
+    N, d = data.pin_stiffness.shape
+    columns = np.zeros((6 * (N + 3), N, d))
+    for n, directions in enumerate(planet_directions(data)):
+        pin = _pin(data, n, np.ones(d), directions)
+        at = np.concatenate([6 * station + np.arange(6) for station in pin.stations])
+        columns[at, n] = pin.rows.T
+    return np.tensordot(station_motions(data), columns, axes=(0, 0))
 
 
 def free_motions(data: RigidSet) -> np.ndarray:
     """Make all coordinates (n_all, n) per unit of those that infinite stiffnesses leave free."""
-    pins, axes = pin_directions(data), len(data.axes)
-    T, central = np.eye(len(pins)), 3 * axes
-    for n, axis in zip(*np.nonzero(np.isinf(data.pin_stiffness))):
+    axes, rigid = len(data.axes), np.isinf(data.pin_stiffness)
+    T, central = np.eye(axes * (data.n_planets + 3)), 3 * axes
+    pins = pin_directions(data) if rigid.any() else np.zeros(0)
+    for n, axis in zip(*np.nonzero(rigid)):
         row = central + axes * n + axis
         T[row, :central] = -pins[:central, n, axis] / pins[row, n, axis]
     return T[:, _kept(data)]
@@ -295,10 +321,10 @@ def free_motions(data: RigidSet) -> np.ndarray:
 
 def support_diagonal(data: RigidSet) -> np.ndarray:
     """Collect the finite stiffnesses (N + 3, axes) [N/m] of the supports in all coordinates."""
-    diagonal = np.zeros((data.n_planets + 3, len(data.axes)))
-    # tilts and rotations are arcs on the radius of the body
-    diagonal[:3] = data.support_stiffness / np.where(_turning(data), data.radii[:3, None], 1.0) ** 2
-    return np.where(np.isfinite(diagonal), diagonal, 0.0)
+    whole = set_assembly(data)
+    supports = replace(whole, springs=tuple(one for one in whole.springs if GROUND in one.stations))
+    motions = station_motions(data)
+    return np.diag(motions.T @ supports.stiffness @ motions).reshape(data.n_planets + 3, -1)
 
 
 def _turning(data: RigidSet) -> np.ndarray:
@@ -311,61 +337,6 @@ def _kept(data: RigidSet) -> np.ndarray:
     planets = np.ones((data.n_planets, len(data.axes)), bool)
     planets[:, : data.pin_stiffness.shape[1]] = np.isfinite(data.pin_stiffness)
     return np.concatenate([np.isfinite(data.support_stiffness), planets]).ravel()
-
-
-def _local_columns(data: RigidSet, gear: str, flank: int) -> tuple[np.ndarray, np.ndarray]:
-    """Columns (6, S) of the central gear and of a planet in one mesh, in the planet's directions.
-
-    Gear 1 is the sun or, in the ring mesh, the planet.
-    """
-    external, lines = gear == "sun", data.contact_lines
-    alpha = data.pressure_angle_sun_planet if external else data.pressure_angle_planet_ring
-    side = flank if external else -flank
-    along = np.array([math.sin(alpha), side * math.cos(alpha)])
-    beta = lines.base_helix_angle
-    normal = np.array([*(along * math.cos(beta)), -flank * math.sin(beta)])
-    r, r_p, a = getattr(data, f"{gear}_radius"), data.planet_radius, data.centre_distance
-    # speed of the point of each gear along the line of action per unit of its u
-    turn, turn_p = side, -flank
-    if lines.on_base_circles:
-        foot = np.array([along[1], -along[0]])
-        point, point_p = turn * r * foot, turn_p * r_p * foot
-    else:
-        point = np.array([a * r / (r + r_p if external else r - r_p), 0.0])
-        point_p = point - (a, 0.0)
-    sign = 1.0 if external else -1.0
-    heights, around = np.array(lines.heights), math.cos(beta)
-    central = sign * _point_column(normal, point, heights, r, turn * around)
-    return central, -sign * _point_column(normal, point_p, heights, r_p, turn_p * around)
-
-
-def point_approach(normal: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Compute ``n . (v + phi x c)`` per unit of v and phi of a rigid body (..., 6), ``n`` and ``c x n``.
-
-    That is the motion along a normal (3,) of points (..., 3) [m] of the body, from its centre: per displacement
-    along x, y and z [1], and per rotation about them [m/rad].
-    """
-    return np.concatenate([np.broadcast_to(normal, points.shape), np.cross(points, normal)], axis=-1)
-
-
-def _point_column(normal, point, heights, radius: float, around: float) -> np.ndarray:
-    """Column (6, S) of tilts ``w`` and rotation ``u`` on a radius, for points at all heights; `around` is that of u."""
-    places = np.column_stack([np.broadcast_to(point, (len(heights), 2)), heights])
-    column = point_approach(normal, places).T.copy()
-    column[3:5] /= radius
-    column[5] = around
-    return column
-
-
-def _turned(data: RigidSet, local: np.ndarray) -> np.ndarray:
-    """Coordinates (N, 6, k) of a central member of columns (6, k) in every planet's directions."""
-    cosine, sine = np.cos(data.angles), np.sin(data.angles)
-    turned = np.repeat(np.asarray(local, float)[None], data.n_planets, axis=0)
-    for first in (0, 3):
-        one, two = local[first], local[first + 1]
-        turned[:, first] = cosine[:, None] * one - sine[:, None] * two
-        turned[:, first + 1] = sine[:, None] * one + cosine[:, None] * two
-    return turned
 
 
 def _gyroscopic(along: np.ndarray) -> np.ndarray:

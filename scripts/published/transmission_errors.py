@@ -22,13 +22,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from femgear.errors import CaseError, checked_numbers
+from femgear.system.assembly import stiffness_matrix
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, StepSeries, SummedSeries, distinct_lines
 from femgear.system.mesh_directions import (
     free_motions,
     mesh_directions,
     pin_directions,
-    stiffness_matrix,
     support_diagonal,
 )
 from femgear.system.rigid_bodies import CENTRAL, PlanarSet, body_masses

@@ -1,10 +1,22 @@
 """Stations, springs, conditions and meshes: against closed forms and matrices written by hand."""
 
+import math
+
 import numpy as np
 import pytest
 
 from femgear.fe.beam import body_matrices, rigid_link
-from femgear.system.assembly import GROUND, Assembly, Contact, Follower, Inertia, joint, solved_conditions
+from femgear.system.assembly import (
+    GROUND,
+    Assembly,
+    Contact,
+    Follower,
+    Inertia,
+    gear_contact,
+    joint,
+    mesh_normal,
+    solved_conditions,
+)
 
 
 def two_bodies(**parts) -> Assembly:
@@ -97,3 +109,29 @@ def test_a_follower_moves_as_its_leaders_have_it():
     rows = rows[:, [i for i in range(12) if i != 2]]
     assert system.K == pytest.approx(plain.K + rows.T @ np.diag(at_point.stiffness) @ rows, rel=1e-12)
     assert system.load == pytest.approx(plain.load + rows.T @ np.arange(12.0, 18.0))
+
+
+def test_a_right_handed_driver_is_pushed_the_way_its_thumb_points():
+    # fingers along the rotation of the driver, here about +z: thrust on it along +z, on its mate along -z
+    normal = mesh_normal(np.array([1.0, 0.0]), math.radians(20.0), math.radians(15.0), 1)
+    assert normal[2] < 0.0  # into gear 2
+    assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-15)
+    assert mesh_normal(np.array([1.0, 0.0]), math.radians(20.0), math.radians(15.0), -1)[2] > 0.0
+
+
+@pytest.mark.parametrize("on_base_circles", [False, True])
+@pytest.mark.parametrize("internal", [False, True])
+@pytest.mark.parametrize("flank", [1, -1])
+def test_the_rotation_of_each_gear_moves_its_flank_by_the_base_radius(flank, internal, on_base_circles):
+    """Radii, centre distance and pressure angle need not close; gears of a helix move along the slanted normal."""
+    towards, helix = np.array([math.cos(0.7), math.sin(0.7)]), math.radians(15.0)
+    known = {"flank": flank, "internal": internal, "base_helix": helix, "on_base_circles": on_base_circles}
+    contact = gear_contact(
+        "mesh", (0, 1), towards, (0.03, 0.08), math.radians(22.0), heights=(-0.01, 0.01), stiffness=4e8, **known
+    )
+    effect = contact.approach
+    second = -1.0 if internal else 1.0
+    assert effect[0, :, 5] == pytest.approx(flank * 0.03 * math.cos(helix), rel=1e-14)
+    assert effect[1, :, 5] == pytest.approx(flank * second * 0.08 * math.cos(helix), rel=1e-14)
+    assert effect[0, :, :3] == pytest.approx(-effect[1, :, :3], rel=1e-14)
+    assert contact.stiffness.tolist() == [2e8, 2e8]

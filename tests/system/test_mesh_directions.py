@@ -6,7 +6,8 @@ import numpy as np
 from published.planetary_sets import lin_parker_set
 from scipy.spatial.transform import Rotation
 
-from femgear.system.mesh_directions import gear_set_system, point_approach, support_diagonal
+from femgear.system.assembly import point_approach
+from femgear.system.mesh_directions import gear_set_system, support_diagonal
 
 
 def test_supports_that_hold_a_motion_are_no_stiffness():

@@ -17,8 +17,8 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.fe.beam import AXES, joint_deflections, joint_springs
-from femgear.system.assembly import solved_conditions
-from femgear.system.mesh_directions import mesh_directions, pin_directions, point_approach
+from femgear.system.assembly import point_approach, solved_conditions
+from femgear.system.mesh_directions import mesh_directions, pin_directions
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
 from femgear.trains.drivetrain.parts import Drivetrain, ParallelSection, PlanetarySection, numbered
 

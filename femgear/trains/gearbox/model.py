@@ -21,7 +21,7 @@ from femgear.case.sections import gear_material
 from femgear.errors import CaseError
 from femgear.fe.beam import BeamShaft, ShaftPart, beam_shaft, body_matrices, rigid_link
 from femgear.gears.iso6336 import pair_mesh_stiffness
-from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, StationSprings, joint
+from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, StationSprings, joint, mesh_normal
 from femgear.trains.gearbox.carrier import pin_axes, pin_compliance, planet_springs
 from femgear.trains.gearbox.case_file import (
     CASING,
@@ -560,19 +560,6 @@ class _Builder:
                 field[list(self.casing.elastic)] = 0.0
             load += assembly.mass @ field.ravel()
         return load
-
-
-def mesh_normal(towards, pressure_angle: float, base_helix: float, flank: int) -> np.ndarray:
-    """Compute the unit normal (3,) of a mesh, into gear 2, from its pressure angle in the transverse section.
-
-    ``towards`` (2,) is the radial direction at the pitch point, away from the axis of gear 1. Gear 1 pushes
-    counter-clockwise for ``flank`` 1: ``n = (sin(alpha) e_r + flank cos(alpha) e_t) cos(beta_b) - flank
-    sin(beta_b) e_z``, with the helix positive of a right-handed gear 1 (ISO 21771). In an internal mesh the flank
-    of the pinion faces outwards all the same.
-    """
-    radial, around = np.append(towards, 0.0), np.array([-towards[1], towards[0], 0.0])
-    plane = math.sin(pressure_angle) * radial + flank * math.cos(pressure_angle) * around
-    return math.cos(base_helix) * plane - flank * math.sin(base_helix) * np.array([0.0, 0.0, 1.0])
 
 
 def _planet_bearing(stage: BoxPlanetarySection, teeth) -> np.ndarray:

@@ -25,7 +25,7 @@ from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
 from femgear.stages.static import over_width, record_positions
 from femgear.stages.static_results import StaticResult
-from femgear.system.mesh_directions import assemble, stiffness_matrix
+from femgear.system.assembly import assemble, stiffness_matrix
 from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem, gear_meshes
 from femgear.trains.pair.case_file import PairCase
 

@@ -13,7 +13,6 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.stages.lumped_set import gear_set_modes
 from femgear.trains.drivetrain.stages import solve_drivetrain_modes
 from femgear.trains.gearbox.deflection import solve_deflection
-from femgear.trains.gearbox.model import mesh_normal
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.multistage.case_file import multistage_of
 from femgear.trains.multistage.stages import multistage_modes
@@ -65,14 +64,6 @@ def test_a_pair_on_its_bearings(torque):
     case = with_values(read_case("cases/spur_pair.toml"), values)
     modes = solve(case, only="modes")["modes"].modes
     agree(frequencies(pair_of_rigid_gears_tables(case, float(modes.mesh_stiffness[0]))), modes.frequency)
-
-
-def test_a_right_handed_driver_is_pushed_the_way_its_thumb_points():
-    # fingers along the rotation of the driver, here about +z: thrust on it along +z, on its mate along -z
-    normal = mesh_normal(np.array([1.0, 0.0]), math.radians(20.0), math.radians(15.0), 1)
-    assert normal[2] < 0.0  # into gear 2
-    assert np.linalg.norm(normal) == pytest.approx(1.0, abs=1e-15)
-    assert mesh_normal(np.array([1.0, 0.0]), math.radians(20.0), math.radians(15.0), -1)[2] > 0.0
 
 
 @pytest.mark.parametrize("torque", ["100 N m", "-100 N m"])
