@@ -309,6 +309,35 @@ def assemble(
     )
 
 
+def with_modal_body(
+    system: MechanicalSystem, stiffness: np.ndarray, columns: np.ndarray, names: Sequence[str]
+) -> MechanicalSystem:
+    """Join the coordinates of a body by its modes to a system; ``flexibility`` is left to the caller.
+
+    Parameters
+    ----------
+    system : MechanicalSystem
+        Of all else; without damping.
+    stiffness : (m,) array
+        Squares of the natural circular frequencies of mass-normalised modes [1/s^2].
+    columns : (m, g) array
+        Deflection of every column of ``W`` per unit of a mode [kg^-1/2].
+    names : (m,) sequence of str
+        Of the modal coordinates.
+    """
+    count, none = len(stiffness), np.zeros((len(stiffness), len(stiffness)))
+    gyroscopic = system.gyroscopic
+    return MechanicalSystem(
+        M=np.asarray(linalg.block_diag(system.M, np.eye(count))),
+        C=np.zeros((len(system.M) + count,) * 2),
+        K=np.asarray(linalg.block_diag(system.K, np.diag(stiffness))),
+        W=np.vstack([system.W, columns]),
+        load=np.concatenate([system.load, np.zeros(count)]),
+        dofs=(*system.dofs, *names),
+        gyroscopic=None if gyroscopic is None else np.asarray(linalg.block_diag(gyroscopic, none)),
+    )
+
+
 def stiffness_matrix(columns: np.ndarray, stiffness: np.ndarray) -> np.ndarray:
     """Sum ``k w w^T`` (n, n) [N/m, ...] over springs with columns w (n, g) and stiffnesses k (g,) [N/m].
 

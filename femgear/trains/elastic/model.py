@@ -20,12 +20,25 @@ import numpy as np
 from femgear.case.gear_set import support_stiffness
 from femgear.contact.bodies import active_flank_load, active_flank_weights, flank_stations
 from femgear.errors import ContactError
+from femgear.fe.beam import body_matrices
 from femgear.fe.compliance import rim_compliance, sector_harmonics, static_cut_shapes
 from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis, smooth_cut_shapes
 from femgear.gears.gear import half_thickness_angle
-from femgear.gears.kinematics import across, body_approach, torques, unit_vectors
+from femgear.gears.kinematics import torques, unit_vectors
 from femgear.housing.two_way.structure import circumferential
 from femgear.stages.static import mesh_backlash
+from femgear.system.assembly import (
+    GROUND,
+    MOTIONS,
+    ROTATION,
+    Assembly,
+    Contact,
+    Inertia,
+    StationSprings,
+    gear_contact,
+    joint,
+    with_modal_body,
+)
 from femgear.system.system import MechanicalSystem, MeshExcitation
 
 if TYPE_CHECKING:
@@ -72,13 +85,6 @@ class ElasticSet:
     planet_angles: np.ndarray
 
 
-def _rigid_dofs(n_planets: int, motor: bool = False, brake: bool = False) -> tuple[str, ...]:
-    """Names of the rigid-body degrees of freedom."""
-    bodies = ["sun", "carrier", *(f"planet {n + 1}" for n in range(n_planets))]
-    names = [f"{body}: {axis}" for body in bodies for axis in ("x", "y", "rotation")]
-    return tuple(names + ["motor: rotation"] * motor + ["brake: rotation"] * brake)
-
-
 def elastic_set(
     case: Case, planetary_set: PlanetarySet, ring: RingModel, *, sun_torque: float, flexibility=None
 ) -> ElasticSet:
@@ -96,30 +102,28 @@ def elastic_set(
     flexibility : (2N, 2N) array, optional
         Compliance of the bodies between the meshes, see `body_flexibility` [m/N].
     """
-    names = _rigid_dofs(planetary_set.n_planets, case.motor is not None, case.brake is not None)
-    place = {name: i for i, name in enumerate(names)}
-    n_rigid, n_p, modes = len(names), planetary_set.n_planets, ring.modes
-    paired = modes.paired
+    modes, paired = ring.modes, ring.modes.paired
     ring_mode = np.repeat(np.arange(len(paired)), np.where(paired, 2, 1))
     ring_phase = np.concatenate([np.arange(2 if p else 1) for p in paired]).astype(int)
-    n = n_rigid + len(ring_mode)
-    M, K, load, rigid = np.zeros(n), np.zeros((n, n)), np.zeros(n), np.zeros((n, 2 * n_p))
-    M[n_rigid:] = 1.0
-    K[range(n_rigid, n), range(n_rigid, n)] = (2 * np.pi * modes.frequency[ring_mode]) ** 2
-    _place_bodies(M, K, place, planetary_set, case)
-    _place_shafts(M, K, load, place, planetary_set, case, sun_torque)
-    _mesh_directions(rigid, place, planetary_set, sun_torque)
-    W = rigid.copy()
+    machines = _machines(case)
+    gears = rigid_gears(case, planetary_set, machines, sun_torque=sun_torque)
+    load = np.zeros((len(gears.names), 6))
+    acting = torques(planetary_set, member="sun", torque=sun_torque)
+    for member in ("sun", "carrier"):
+        ends = [name for name, joined, _ in machines if joined == member]
+        load[gears.names.index(ends[0] if ends else member), ROTATION] += getattr(acting, member)
+    rigid = gears.system(load.ravel())
     angles = np.asarray(planetary_set.planet_angles) + ring.load_angle
-    W[n_rigid:, n_p:] -= ring_displacement(modes, ring_mode, ring_phase, angles)
+    columns = np.zeros((len(ring_mode), 2 * planetary_set.n_planets))
+    columns[:, planetary_set.n_planets :] = -ring_displacement(modes, ring_mode, ring_phase, angles)
     ring_names = tuple(
         f"ring: n={modes.nodal_diameter[m]} mode {m} {'sine' if p else 'cosine'}" for m, p in zip(ring_mode, ring_phase)
     )
-    system = MechanicalSystem(M=np.diag(M), C=np.zeros((n, n)), K=K, W=W, load=load, dofs=names + ring_names)
-    system = replace(system, flexibility=flexibility)
+    system = with_modal_body(rigid, (2 * np.pi * modes.frequency[ring_mode]) ** 2, columns, ring_names)
+    system, n_rigid, n = replace(system, flexibility=flexibility), len(rigid.dofs), len(system.dofs)
     return ElasticSet(
         system=system,
-        rigid_directions=rigid,
+        rigid_directions=np.vstack([rigid.W, np.zeros_like(columns)]),
         ring_slice=slice(n_rigid, n),
         ring_diameter=modes.nodal_diameter[ring_mode],
         ring_phase=ring_phase,
@@ -156,46 +160,51 @@ def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.nd
     return ring.norm[ring_mode, None] * np.where(sine, factor.imag, factor.real)
 
 
-def _place_bodies(M, K, place, planetary_set: PlanetarySet, case: Case) -> None:
-    for name, body in (("sun", case.sun), ("carrier", case.carrier)):
-        for axis in ("x", "y"):
-            i = place[f"{name}: {axis}"]
-            M[i] = body.mass
-            K[i, i] += support_stiffness(case, name)
-        M[place[f"{name}: rotation"]] = body.inertia
-    a, planet = planetary_set.centre_distance, case.planet
-    c = [place[f"carrier: {axis}"] for axis in ("x", "y", "rotation")]
-    # the pin moves with the carrier: translation plus rotation about its centre
-    for n, arms in enumerate(a * across(unit_vectors(np.array(planetary_set.planet_angles)))):
-        p = [place[f"planet {n + 1}: {axis}"] for axis in ("x", "y", "rotation")]
-        M[p] = planet.mass, planet.mass, planet.inertia
-        for planet_dof, carrier_dof, arm in zip(p[:2], c[:2], arms, strict=True):
-            column = np.zeros(len(K))
-            column[planet_dof], column[carrier_dof], column[c[2]] = 1.0, -1.0, -arm
-            K += planet.bearing_stiffness * np.outer(column, column)
-
-
-def _place_shafts(M, K, load, place, planetary_set: PlanetarySet, case: Case, sun_torque: float) -> None:
-    """Motor at the input, brake at the output, and the torques behind them."""
-    acting = torques(planetary_set, member="sun", torque=sun_torque)
+def _machines(case: Case) -> list[tuple[str, str, Any]]:
+    """List motor at the input and brake at the output: name, member that it is coupled to, and entries."""
     output = "carrier" if case.operation.input == "sun" else "sun"
-    for name, shaft, member in (("motor", case.motor, case.operation.input), ("brake", case.brake, output)):
-        end = place[f"{member}: rotation"]
-        if shaft is not None:
-            i = place[f"{name}: rotation"]
-            M[i] = shaft.inertia
-            K[np.ix_([i, end], [i, end])] += shaft.coupling_stiffness * np.array([[1.0, -1.0], [-1.0, 1.0]])
-            end = i
-        load[end] += getattr(acting, member)
+    both = ("motor", case.operation.input, case.motor), ("brake", output, case.brake)
+    return [one for one in both if one[2] is not None]
 
 
-def _mesh_directions(W, place, planetary_set: PlanetarySet, sun_torque: float) -> None:
-    """Columns whose product with the motions is the approach of the flanks, ring displacement excluded."""
-    effect = body_approach(planetary_set, back=sun_torque < 0.0)
-    for number, body in enumerate(planetary_set.bodies):
-        # the ring is elastic, with motions of its own
-        if body.name != "ring":
-            W[[place[f"{body.name}: {axis}"] for axis in ("x", "y", "rotation")]] = effect[:, number].T
+def rigid_gears(case: Case, planetary_set: PlanetarySet, machines, *, sun_torque: float) -> Assembly:
+    """Make sun, carrier and planets in the plane, machines behind couplings, and meshes against a ring at rest.
+
+    ``machines`` are names, members that they are coupled to, and entries; the sign of the torque [N m] tells which
+    flanks carry.
+    """
+    N, s = planetary_set.n_planets, planetary_set
+    sections = [("sun", case.sun), ("carrier", case.carrier), *((f"planet {n + 1}", case.planet) for n in range(N))]
+    names = (*(name for name, _ in sections), *(name for name, *_ in machines))
+    inertias, places = list[Inertia](), np.zeros((len(names), 3))
+    for station, (_, body) in enumerate(sections):
+        inertias.append(Inertia((station,), *body_matrices(body.mass, body.inertia, 0.5 * body.inertia)))
+    directions, nowhere = unit_vectors(np.asarray(s.planet_angles)), np.zeros(3)
+    places[2 : 2 + N, :2] = s.centre_distance * directions
+    springs = list[StationSprings]()
+    for station, name in enumerate(("sun", "carrier")):
+        radial = support_stiffness(case, name)
+        springs.append(
+            joint(f"support of {name}", (GROUND, station), (nowhere, nowhere), [radial, radial, *np.zeros(4)])
+        )
+    bearing = [case.planet.bearing_stiffness] * 2 + [0.0] * 4
+    for station in range(2, 2 + N):
+        springs.append(joint(f"pin {station - 1}", (1, station), (places[station], nowhere), bearing))
+    for station, (name, member, machine) in enumerate(machines, 2 + N):
+        inertias.append(Inertia((station,), *body_matrices(0.0, machine.inertia, 0.0)))
+        coupling = [*np.zeros(5), machine.coupling_stiffness]
+        springs.append(joint(f"coupling of {name}", (names.index(member), station), (nowhere, nowhere), coupling))
+    flank, contacts = -1 if sun_torque < 0.0 else 1, list[Contact]()
+    radii = s.sun.base_radius, s.planet.base_radius, s.ring.base_radius
+    for n in range(N):
+        alpha = s.working_pressure_angle_sun_planet
+        contacts.append(gear_contact(f"sun-planet {n + 1}", (0, 2 + n), directions[n], radii[:2], alpha, flank=flank))
+    for n in range(N):
+        known, alpha = {"flank": -flank, "internal": True}, s.working_pressure_angle_planet_ring
+        contacts.append(gear_contact(f"planet {n + 1}-ring", (2 + n, GROUND), directions[n], radii[1:], alpha, **known))
+    held = np.tile(np.isin(MOTIONS, ("z", "tilt x", "tilt y")), (len(names), 1))
+    held[2 + N :, :ROTATION] = True
+    return Assembly(names, places, held.ravel(), tuple(inertias), (), tuple(springs), tuple(contacts))
 
 
 def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun_torque: float) -> float:
@@ -212,13 +221,9 @@ def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun
         Mean mesh stiffness [N/m].
     """
     _refuse_open(stiffness <= 0)
-    names = _rigid_dofs(planetary_set.n_planets)
-    place = {name: i for i, name in enumerate(names)}
-    M, K, W = np.zeros(len(names)), np.zeros((len(names),) * 2), np.zeros((len(names), len(stiffness)))
-    _place_bodies(M, K, place, planetary_set, case)
-    _mesh_directions(W, place, planetary_set, sun_torque)
-    K += (W * stiffness) @ W.T
-    values, shapes = np.linalg.eigh(K / np.sqrt(np.outer(M, M)))
+    system = rigid_gears(case, planetary_set, (), sun_torque=sun_torque).system()
+    M, W = np.diag(system.M), system.W
+    values, shapes = np.linalg.eigh((system.K + (W * stiffness) @ W.T) / np.sqrt(np.outer(M, M)))
     strain = stiffness @ (W.T @ (shapes / np.sqrt(M)[:, None])) ** 2
     return float(np.sqrt(values[strain > 0.1 * np.abs(values)].max()) / (2 * np.pi))
 

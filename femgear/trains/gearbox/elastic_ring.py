@@ -6,13 +6,13 @@ compliance of the bodies between them at the loaded state. Its coordinates join 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
+from femgear.system.assembly import with_modal_body
 from femgear.system.system import MechanicalSystem
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, stage_case_of
 from femgear.trains.gearbox.contact import loaded_tables
@@ -101,18 +101,7 @@ def with_rings(
             for other, mate in enumerate(ring.stage.meshes):
                 flexibility[part, slices[mate]] = ring.flexibility[place, other]
         rows.append(approach)
-    size = sum(len(ring.stiffness) for ring in rings)
-    gyroscopic = system.gyroscopic
-    return (
-        MechanicalSystem(
-            M=np.asarray(block_diag(system.M, np.eye(size))),
-            C=np.zeros((len(system.M) + size,) * 2),
-            K=np.asarray(block_diag(system.K, np.diag(np.concatenate([ring.stiffness for ring in rings])))),
-            W=np.vstack([system.W, *rows]),
-            load=np.concatenate([system.load, np.zeros(size)]),
-            dofs=(*system.dofs, *(f"{ring.name}: mode {i + 1}" for ring in rings for i in range(len(ring.stiffness)))),
-            gyroscopic=None if gyroscopic is None else np.asarray(block_diag(gyroscopic, np.zeros((size, size)))),
-            flexibility=flexibility if flexibility.any() else None,
-        ),
-        stiffness,
-    )
+    names = [f"{ring.name}: mode {i + 1}" for ring in rings for i in range(len(ring.stiffness))]
+    squares = np.concatenate([ring.stiffness for ring in rings])
+    joined = with_modal_body(system, squares, np.vstack(rows), names)
+    return replace(joined, flexibility=flexibility if flexibility.any() else None), stiffness

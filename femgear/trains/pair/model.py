@@ -20,12 +20,13 @@ import numpy as np
 from femgear.case.gear_set import line_play, set_deviations
 from femgear.contact.cycle import CycleOptions
 from femgear.contact.loaded_period import loaded_period
-from femgear.gears.kinematics import body_approach
+from femgear.fe.beam import body_matrices
+from femgear.gears.kinematics import unit_vectors
 from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
 from femgear.stages.static import over_width, record_positions
 from femgear.stages.static_results import StaticResult
-from femgear.system.assembly import assemble, stiffness_matrix
+from femgear.system.assembly import GROUND, MOTIONS, ROTATION, Assembly, Inertia, gear_contact, joint
 from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem, gear_meshes
 from femgear.trains.pair.case_file import PairCase
 
@@ -33,7 +34,6 @@ _RECORD = 2**13
 """Positions of the excitation in the mesh period."""
 _ONE_KIND = 0.9
 """Share of the kinetic energy from which on a mode is torsional, or lateral."""
-_NAMES = ("x", "y", "rotation")
 
 
 @dataclass(frozen=True)
@@ -80,40 +80,45 @@ class PairModel:
 
 def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     """Assemble bodies, bearings, couplings and mesh of a case; the torque loads motor, mesh and brake."""
-    machines = [(name, getattr(case, name)) for name in ("motor", "brake")]
-    machines = [(2 + 3 * i, name, one) for i, (name, one) in enumerate(machines) if one is not None]
-    sections, size = (case.gear_1, case.gear_2), 6 + len(machines)
-    radii, effect = [gear.base_radius for gear in gears.gears], body_approach(gears, back=case.operation.torque < 0)[0]
-    mesh, normal = np.concatenate([effect.ravel(), np.zeros(len(machines))]), effect[0, :2]
-    mass = np.array(
-        [
-            *(value for one in sections for value in (one.mass, one.mass, one.inertia)),
-            *(one.inertia for *_, one in machines),
-        ]
-    )
+    machines = [(gear, name, getattr(case, name)) for gear, name in enumerate(("motor", "brake"))]
+    machines = [one for one in machines if one[2] is not None]
+    sections, torque = (case.gear_1, case.gear_2), case.operation.torque
+    radii = [gear.base_radius for gear in gears.gears]
+    names = ("gear 1", "gear 2", *(name for _, name, _ in machines))
+    bodies = (body_matrices(one.mass, one.inertia, 0.5 * one.inertia) for one in sections)
+    inertias = [Inertia((i,), *matrices) for i, matrices in enumerate(bodies)]
     bearing = np.repeat([one.bearing_stiffness or np.inf for one in sections], 2)
-    lateral, columns, load = [0, 1, 3, 4], np.eye(size)[:, [0, 1, 3, 4]], np.zeros(size)
-    springs, torque = list(bearing), case.operation.torque
-    ends = [2, 5]
-    for place, (rotation, _, one) in enumerate(machines, 6):
-        coupling = np.zeros(size)
-        coupling[[rotation, place]] = 1.0, -1.0
-        columns, springs = np.column_stack([columns, coupling]), [*springs, one.coupling_stiffness]
-        ends[rotation // 3] = place
-    load[ends] = torque, -gears.senses[1] * torque * radii[1] / radii[0]
-    free = np.setdiff1d(np.arange(size), np.array(lateral)[np.isinf(bearing)])
-    names = [f"gear {i}: {axis}" for i in (1, 2) for axis in _NAMES]
-    names += [f"{name}: rotation" for _, name, _ in machines]
-    system = assemble(
-        mass,
-        stiffness_matrix(columns, np.array(springs)),
-        mesh[:, None],
-        load,
-        motions=np.eye(size)[:, free],
-        dofs=[names[i] for i in free],
+    nowhere = np.zeros(3), np.zeros(3)
+    springs = [
+        joint(f"bearing of {names[i]}", (GROUND, i), nowhere, [*bearing[2 * i : 2 * i + 2], 0.0, 0.0, 0.0, 0.0])
+        for i in (0, 1)
+    ]
+    ends = [0, 1]
+    for station, (gear, name, one) in enumerate(machines, 2):
+        inertias.append(Inertia((station,), *body_matrices(0.0, one.inertia, 0.0)))
+        springs.append(joint(f"coupling of {name}", (gear, station), nowhere, [*np.zeros(5), one.coupling_stiffness]))
+        ends[gear] = station
+    (kind,), (angle,) = gears.kinds, gears.mesh_angles.tolist()
+    contact = gear_contact(
+        "mesh",
+        (0, 1),
+        unit_vectors(angle),
+        (radii[0], radii[1]),
+        kind.working_pressure_angle,
+        flank=-1 if torque < 0 else 1,
+        internal=gears.gears[1].internal,
     )
-    rotation = np.where(np.isin(np.arange(size), (2, 5)), mesh, 0.0)
-    return PairModel(system, rotation[free], np.eye(size)[lateral][:, free], bearing, normal)
+    held = np.tile(np.isin(MOTIONS, ("z", "tilt x", "tilt y")), (len(names), 1))
+    held[2:, :ROTATION] = True
+    load = np.zeros((len(names), 6))
+    load[ends, ROTATION] = torque, -gears.senses[1] * torque * radii[1] / radii[0]
+    places = np.zeros((len(names), 3))
+    centre = gears.centres[1][0]
+    places[1, :2] = centre.real, centre.imag
+    assembly = Assembly(names, places, held.ravel(), tuple(inertias), (), tuple(springs), (contact,))
+    system, motions = assembly.system(load.ravel()), assembly.motions.reshape(len(names), 6, -1)
+    rotation = np.einsum("s,sm->m", assembly.columns[[ROTATION, 6 + ROTATION], 0], motions[:2, ROTATION])
+    return PairModel(system, rotation, motions[:2, :2].reshape(4, -1), bearing, contact.normal[:2])
 
 
 def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
