@@ -112,7 +112,7 @@ def gear_set_system(
         load[9::3] += carrier_speed**2 * data.planet.mass * data.centre_distance
         gyroscopic = _gyroscopic(along)
     return assemble(
-        motions.T @ whole.mass @ motions,
+        masses.ravel(),  # bodies are round: the same along the directions of their planets, without rounding
         stiffness,
         np.hstack(columns),
         load,

@@ -3,11 +3,13 @@
 from dataclasses import replace
 
 import numpy as np
-from published.planetary_sets import lin_parker_set
+import pytest
+from published.planetary_sets import kahraman_set, lin_parker_set
 from scipy.spatial.transform import Rotation
 
 from femgear.system.assembly import point_approach
-from femgear.system.mesh_directions import gear_set_system, support_diagonal
+from femgear.system.mesh_directions import gear_set_system, set_assembly, station_motions, support_diagonal
+from femgear.system.rigid_bodies import body_masses
 
 
 def test_supports_that_hold_a_motion_are_no_stiffness():
@@ -20,6 +22,15 @@ def test_supports_that_hold_a_motion_are_no_stiffness():
     assert support_diagonal(held)[2].tolist() == [2e7, 2e7, 0.0]
     assert support_diagonal(held)[1, :2].tolist() == [0.0, 0.0]
     assert len(gear_set_system(held).M) == len(gear_set_system(replace(data, sun=free)).M) - 3
+
+
+@pytest.mark.parametrize("data", [lin_parker_set(3), kahraman_set()], ids=["plane", "space"])
+def test_bodies_have_the_masses_of_their_data_in_the_coordinates_of_the_set(data):
+    motions, assembly = station_motions(data), set_assembly(data)
+    mass = motions.T @ assembly.mass @ motions
+    assert mass == pytest.approx(np.diag(body_masses(data).ravel()), abs=1e-14 * mass.max())
+    # what does not move in the plane is held, whatever else moves along
+    assert assembly.held.sum() == motions.shape[0] - motions.shape[1]
 
 
 def test_a_point_moves_with_its_body_as_far_as_its_place_says():
