@@ -1,7 +1,8 @@
 """One assembler of stations with six motions: inertias, beams, springs, rigid joints and gear meshes -> M, C, G, K, W.
 
-A station has the motions `MOTIONS` along and about x, y, z; tilts and rotation are right-handed and small. Springs of
-infinite stiffness are conditions, which are eliminated: all motions follow from the free ones.
+A station has the motions `MOTIONS` along and about its axes: x, y, z unless all parts that act on it have others, as
+planets may have theirs. Tilts and rotation are right-handed and small. Springs of infinite stiffness are conditions,
+which are eliminated: all motions follow from the free ones.
 """
 
 from __future__ import annotations
@@ -105,10 +106,10 @@ class Contact:
         Of the mesh.
     stations : (2,) tuple of int
         Of gear 1 and gear 2, `GROUND` for a gear that stands still.
-    normal : (3,) array
-        Unit normal of the flanks, into gear 2.
+    normals : (2, 3) array
+        Unit normal of the flanks, into gear 2, along the axes of either station.
     points : (2, S, 3) array
-        Contact point of every slice, from either station [m].
+        Contact point of every slice, from either station and along its axes [m].
     heights : (S,) array
         Of the slices above the middle of the common width [m].
     stiffness : (S,) array
@@ -117,7 +118,7 @@ class Contact:
 
     name: str
     stations: tuple[int, int]
-    normal: np.ndarray
+    normals: np.ndarray
     points: np.ndarray
     heights: np.ndarray
     stiffness: np.ndarray
@@ -125,9 +126,10 @@ class Contact:
     @property
     def approach(self) -> np.ndarray:
         """Approach of the flanks (2, S, 6) per unit of the motions of either station [1, m/rad]."""
-        effect = point_approach(self.normal, self.points)
-        effect[1] *= -1.0
-        return effect
+        first, second = (
+            point_approach(normal, points) for normal, points in zip(self.normals, self.points, strict=True)
+        )
+        return np.stack([first, -second])
 
 
 @dataclass(frozen=True)
@@ -399,8 +401,10 @@ def gear_contact(  # noqa: PLR0913
         Of the mesh.
     stations : (2,) tuple of int
         Of gear 1 and gear 2, `GROUND` for a gear that stands still.
-    towards, pressure_angle, base_helix, flank
+    pressure_angle, base_helix, flank
         See `mesh_normal`.
+    towards : (2,) or (2, 2) array
+        See `mesh_normal`; of each station along its own axes where these differ.
     base_radii : (2,) floats
         Of gear 1 and gear 2 [m].
     internal : bool
@@ -412,18 +416,17 @@ def gear_contact(  # noqa: PLR0913
     on_base_circles : bool
         Forces act where the line of action touches the base circle of each gear.
     """
-    radial = np.append(np.asarray(towards, float), 0.0)
-    around = np.array([-radial[1], radial[0], 0.0])
-    foot = radial / math.cos(pressure_angle)
-    if on_base_circles:
-        foot = math.cos(pressure_angle) * radial - flank * math.sin(pressure_angle) * around
     levels, count = np.asarray(heights, float), len(heights)
-    points = np.empty((2, count, 3))
-    for own, radius, side in zip(points, base_radii, (1.0, 1.0 if internal else -1.0), strict=True):
-        own[:] = side * radius * foot
-        own[:, 2] = levels
-    normal = mesh_normal(radial[:2], pressure_angle, base_helix, flank)
-    return Contact(name, stations, normal, points, levels, np.full(count, stiffness / count))
+    points, normals = np.zeros((2, count, 3)), np.zeros((2, 3))
+    arms = base_radii[0], base_radii[1] if internal else -base_radii[1]
+    for gear, (radial, arm) in enumerate(zip(np.broadcast_to(towards, (2, 2)), arms, strict=True)):
+        foot = radial / math.cos(pressure_angle)
+        if on_base_circles:
+            around = np.array([-radial[1], radial[0]])
+            foot = math.cos(pressure_angle) * radial - flank * math.sin(pressure_angle) * around
+        points[gear, :, :2], points[gear, :, 2] = arm * foot, levels
+        normals[gear] = mesh_normal(radial, pressure_angle, base_helix, flank)
+    return Contact(name, stations, normals, points, levels, np.full(count, stiffness / count))
 
 
 def solved_conditions(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -472,12 +475,13 @@ def joint(
         From either station to the joint [m].
     stiffness : (6,) array
         Along three axes [N/m] and about them [N m/rad]; those of zero are left out, infinite ones are conditions.
-    axes : (3, 3) array, optional
-        Rows are the axes of the joint; x, y, z where not given.
+    axes : (3, 3) or (2, 3, 3) array, optional
+        Rows are the axes of the joint along those of both stations, or of either one; these where not given.
     """
     rows = np.hstack([-rigid_link(offsets[0]), rigid_link(offsets[1])])
     if axes is not None:
-        rows = np.concatenate([np.asarray(axes, float) @ half for half in (rows[:3], rows[3:])])
+        turned = np.broadcast_to(np.asarray(axes, float), (2, 3, 3))
+        rows = np.hstack([np.kron(np.eye(2), one) @ half for one, half in zip(turned, np.hsplit(rows, 2), strict=True)])
     stiffness = np.asarray(stiffness, float)
     used = stiffness > 0.0
     return StationSprings(name, stations, rows[used], stiffness[used])

@@ -18,7 +18,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from femgear.errors import CaseError
 from femgear.fe.beam import body_matrices
@@ -112,7 +111,7 @@ def gear_set_system(
         load[9::3] += carrier_speed**2 * data.planet.mass * data.centre_distance
         gyroscopic = _gyroscopic(along)
     return assemble(
-        masses.ravel(),  # bodies are round: the same along the directions of their planets, without rounding
+        masses.ravel(),
         stiffness,
         np.hstack(columns),
         load,
@@ -200,7 +199,7 @@ def set_assembly(data: RigidSet, flank: int = 1) -> Assembly:
     """Make the stations of carrier, ring, sun and planets, their supports, pins and meshes.
 
     A flank of 1 is that of a sun that drives counter-clockwise, else -1. Motions that are none of ``data.axes`` are
-    held; infinite stiffnesses are conditions.
+    held; infinite stiffnesses are conditions. Planets move along their own axes: radial, tangential, axial.
     """
     N, directions = data.n_planets, planet_directions(data)
     bodies = [*((name, getattr(data, name)) for name in CENTRAL), *((f"planet {n + 1}", data.planet) for n in range(N))]
@@ -224,11 +223,13 @@ def set_assembly(data: RigidSet, flank: int = 1) -> Assembly:
         sense = -1 if internal else 1
         for n, stiffness in enumerate(np.asarray(stiffnesses[internal]).tolist()):
             gears = (3 + n, CENTRAL.index("ring")) if internal else (CENTRAL.index("sun"), 3 + n)
+            # a planet sees the central gear along its own radial axis
+            towards = np.stack([directions[n, 0, :2], (1.0, 0.0)])
             contacts.append(
                 gear_contact(
                     f"planet {n + 1}-ring" if internal else f"sun-planet {n + 1}",
                     gears,
-                    directions[n, 0, :2],
+                    towards[::-1] if internal else towards,
                     radii,
                     angles[internal],
                     flank=sense * flank,
@@ -254,26 +255,21 @@ def planet_directions(data: RigidSet) -> np.ndarray:
 
 
 def _pin(data: RigidSet, planet: int, stiffness, directions: np.ndarray) -> StationSprings:
-    """Springs of a planet bearing along the directions (3, 3) of its planet, planet less pin."""
+    """Springs of a planet bearing along the axes of its planet, rows of ``directions`` (3, 3), planet less pin."""
     wanted = np.zeros(6)
     wanted[: len(stiffness)] = stiffness
-    offsets = data.centre_distance * directions[0], np.zeros(3)
-    return joint(f"pin {planet + 1}", (CENTRAL.index("carrier"), 3 + planet), offsets, wanted, axes=directions)
+    offsets, axes = (data.centre_distance * directions[0], np.zeros(3)), np.stack([directions, np.eye(3)])
+    return joint(f"pin {planet + 1}", (CENTRAL.index("carrier"), 3 + planet), offsets, wanted, axes=axes)
 
 
 def station_motions(data: RigidSet) -> np.ndarray:
     """Compute the motions (6 (N + 3), n) of all stations [m, rad] per unit of the coordinates of a set.
 
-    Arcs ``w`` and ``u`` are on the radius of the body, planets move along their own directions.
+    Arcs ``w`` and ``u`` are on the radius of the body.
     """
-    arcs = np.ones((data.n_planets + 3, 6))
-    arcs[:, 3:] = 1.0 / data.radii[:, None]
-    turned = np.zeros((data.n_planets + 3, 6, 6))
-    turned[:3] = np.eye(6)
-    for half in (slice(3), slice(3, 6)):
-        turned[3:, half, half] = np.swapaxes(planet_directions(data), 1, 2)
-    motions = block_diag(*(turned * arcs[:, None]))
-    return motions[:, np.tile(np.isin(np.arange(6), data.axes), data.n_planets + 3)]
+    scale = np.ones((data.n_planets + 3, 6))
+    scale[:, 3:] = 1.0 / data.radii[:, None]
+    return np.diag(scale.ravel())[:, np.tile(np.isin(np.arange(6), data.axes), data.n_planets + 3)]
 
 
 def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:

@@ -66,13 +66,13 @@ def test_a_mesh_approaches_by_the_difference_of_both_points_along_its_normal():
     normal = np.array([0.6, 0.7, 0.3])
     normal /= np.linalg.norm(normal)
     points = np.array([[[0.04, 0.0, 0.01]], [[-0.06, 0.0, 0.01]]])
-    mesh = Contact("mesh", (0, 1), normal, points, np.zeros(1), np.array([4e8]))
+    mesh = Contact("mesh", (0, 1), np.tile(normal, (2, 1)), points, np.zeros(1), np.array([4e8]))
     moved = np.arange(1.0, 13.0) * 1e-6
     first = moved[:3] + np.cross(moved[3:6], points[0, 0])
     second = moved[6:9] + np.cross(moved[9:], points[1, 0])
     assembly = two_bodies(contacts=(mesh,))
     assert assembly.columns.T @ moved == pytest.approx([normal @ (first - second)], rel=1e-12)
-    standing = Contact("mesh", (GROUND, 1), normal, points, np.zeros(1), np.array([4e8]))
+    standing = Contact("mesh", (GROUND, 1), np.tile(normal, (2, 1)), points, np.zeros(1), np.array([4e8]))
     assert two_bodies(contacts=(standing,)).columns.T @ moved == pytest.approx([-normal @ second], rel=1e-12)
 
 

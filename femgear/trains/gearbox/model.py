@@ -490,7 +490,7 @@ class _Builder:
             own.append(points - np.asarray(self.places[seat.station] if seat.station != GROUND else (0.0, 0.0, 0.0)))
         stations = (seats[0].station, seats[1].station)
         spread = np.full(slices, stiffness / slices)
-        self.contacts.append(Contact(name, stations, np.asarray(normal), np.stack(own), heights, spread))
+        self.contacts.append(Contact(name, stations, np.tile(normal, (2, 1)), np.stack(own), heights, spread))
         return len(self.contacts) - 1
 
     def _mesh_stiffness(self, stage: PairSection | BoxPlanetarySection, kind: int, mesh: int) -> float:

@@ -23,7 +23,7 @@ import math
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, NoReturn
 
 import numpy as np
 
@@ -446,16 +446,21 @@ def _check_supports(case: HelicalCase, gears: PlanetarySet) -> None:
     except ConvergenceError as error:
         if error.code not in ("E-RIGID-MODE", "E-STIFFNESS"):
             raise
-        raise CaseError(
-            "the stiffest supports are too stiff beside the softest: rounding hides the soft ones",
-            code="E-RANGE",
-            key="helical",
-            limit="tilt and torsional stiffnesses over the radius squared within 1e17 N/m",
-            remedy="bring axial_stiffness, tilt_stiffness and torsional_stiffness closer together",
-            file=case.location("helical"),
-        ) from None
+        _refuse_hidden(case)
     if not balanced:
         _refuse_loose(case, data)
+
+
+def _refuse_hidden(case: HelicalCase) -> NoReturn:
+    """Refuse supports that are there, but too soft beside the others for a number to hold both."""
+    raise CaseError(
+        "the stiffest supports are too stiff beside the softest: rounding hides the soft ones",
+        code="E-RANGE",
+        key="helical",
+        limit="tilt and torsional stiffnesses over the radius squared within 1e17 N/m",
+        remedy="bring axial_stiffness, tilt_stiffness and torsional_stiffness closer together",
+        file=case.location("helical"),
+    ) from None
 
 
 def _balanced(case: HelicalCase, data: HelicalSet) -> bool:
@@ -477,6 +482,8 @@ def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
         for entry in _AXES
         if getattr(getattr(case.helical, body), entry) == 0.0
     ]
+    if not free and data.support_stiffness[:, 0].all():
+        _refuse_hidden(case)
     cures = [one for one in free if _balanced(case, _supported(data, *one))] or free
     names = [f"helical.{body}.{entry}" for body, entry in cures]
     lost = " or the ".join(dict.fromkeys(_AXES[entry][1] for _, entry in cures)) or "torque"

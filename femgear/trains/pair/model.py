@@ -118,7 +118,7 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     assembly = Assembly(names, places, held.ravel(), tuple(inertias), (), tuple(springs), (contact,))
     system, motions = assembly.system(load.ravel()), assembly.motions.reshape(len(names), 6, -1)
     rotation = np.einsum("s,sm->m", assembly.columns[[ROTATION, 6 + ROTATION], 0], motions[:2, ROTATION])
-    return PairModel(system, rotation, motions[:2, :2].reshape(4, -1), bearing, contact.normal[:2])
+    return PairModel(system, rotation, motions[:2, :2].reshape(4, -1), bearing, contact.normals[0, :2])
 
 
 def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:

@@ -62,7 +62,7 @@ def outside(found: Deflection) -> np.ndarray:
     for contact, part in zip(assembly.contacts, assembly.slices, strict=True):
         if GROUND in contact.stations:
             side = contact.stations.index(GROUND)
-            back = (1.0 if side else -1.0) * -found.slice_force[part][:, None] * contact.normal
+            back = (1.0 if side else -1.0) * -found.slice_force[part][:, None] * contact.normals[side]
             wrenches.append(np.hstack([back, moments(contact.points[side], back)]))
     shafts = port_shafts(model.case)
     for name in model.case.operation.fixed if casing is None else ():
