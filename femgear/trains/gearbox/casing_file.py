@@ -14,13 +14,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+from scipy import linalg
 
 from femgear.case.csv_columns import checksum_of_all, input_checksum
 from femgear.case.messages import no_such
-from femgear.case.quantities import LENGTH
+from femgear.case.quantities import LENGTH, MASS
 from femgear.errors import CaseError, several
 from femgear.fe.beam import rigid_link
 from femgear.findings import Finding
+from femgear.report.tables import Block
 from femgear.system.assembly import GROUND, Beam, Follower, Inertia, StationSprings
 from femgear.trains.gearbox.case_file import CASING, BoxCasingSection, GearboxCase
 from femgear.trains.gearbox.casing import CasingModel, casing_seats, foot_stiffness
@@ -274,3 +276,32 @@ def casing_notices(case: GearboxCase) -> Iterator[Finding]:
             "and moments on them do not bend it"
         )
         yield Finding("W-BEARING", "casing.nodes", text, remedy="keep six directions of the node in the reduction")
+
+
+def describe_casing(case: GearboxCase) -> Iterator[Block]:
+    """Tabulate mass, centre of mass, feet and seats of a casing, and the first mode of one of a file."""
+    section = case.casing
+    if section is None:
+        return
+    seats = [name for name in casing_seats(case) if name not in section.stands_still]
+    if section.file is None:
+        assert section.mass is not None
+        mass, centre, feet, elastic = section.mass, section.centre or (), section.foot_names, "rigid"
+    else:
+        element, body = elastic_casing(case)
+        mass, centre, feet = body.rigid_mass[0, 0], body.centre, [*element.of_role("foot")]
+        soft = np.isfinite(body.stiffness)
+        elastic = f"{int(soft.sum())} elastic motions"
+        if soft.any():
+            square = linalg.eigvalsh(np.diag(body.stiffness[soft]), body.mass[np.ix_(soft, soft)])
+            elastic += f", first mode {math.sqrt(float(square[0])) / (2.0 * math.pi):.4g} Hz when free"
+    rows = [
+        ("mass", MASS.show(float(mass))),
+        ("centre of mass x, y, z", ", ".join(LENGTH.show(float(value)) for value in centre)),
+        ("gives way", elastic),
+        ("feet", ", ".join(feet)),
+        ("sits in it", ", ".join(seats) or "nothing"),
+    ]
+    if section.stands_still:
+        rows.append(("stands still", ", ".join(section.stands_still)))
+    yield Block("Casing", rows=tuple(rows))

@@ -9,7 +9,7 @@ from femgear.case.quantities import RPM
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
-from femgear.trains.gearbox.casing_file import check_casing_file
+from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import check_held, solve_deflection
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
@@ -63,7 +63,7 @@ def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
     blocks = []
     for load_case in case.operation.load_case[:12]:
         blocks += list(_flow_blocks(case, load_case))
-    return tuple(blocks)
+    return (*blocks, *describe_casing(case))
 
 
 def _flow_blocks(case: GearboxCase, load_case: LoadCaseSection) -> Iterator[Block]:

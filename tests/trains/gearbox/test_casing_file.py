@@ -22,11 +22,17 @@ from femgear.case import text
 from femgear.errors import CaseError
 from femgear.system.assembly import GROUND
 from femgear.trains.gearbox.casing import casing_seats
-from femgear.trains.gearbox.casing_file import casing_element, casing_notices, check_casing_file, elastic_casing
+from femgear.trains.gearbox.casing_file import (
+    casing_element,
+    casing_notices,
+    check_casing_file,
+    describe_casing,
+    elastic_casing,
+)
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.model import bearing_places
 from femgear.trains.gearbox.modes import solve_gearbox_modes
-from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
+from femgear.trains.gearbox.stages import describe_gearbox, solve_box_modes, solve_deflections
 from femgear.trains.reading import read_case
 from femgear.trains.registry import check_case
 
@@ -287,6 +293,27 @@ def test_seats_of_three_directions_are_told(tmp_path):
     assert solve_deflection(case).residual < 1e-9
     assert not list(casing_notices(read(tmp_path, box(tmp_path, casing_paths(SEAT, FOOT)))))
     assert not list(casing_notices(read_case(rigid_tables())))
+
+
+def test_check_tells_what_the_casing_is(tmp_path):
+    tables = box(tmp_path, casing_paths(SEAT, FOOT))
+    case = read(tmp_path, tables)
+    (block,) = describe_casing(case)
+    rows = dict(block.rows)
+    assert rows["mass"] == f"{MASS + 8 * 0.05:g} kg"
+    assert rows["sits in it"] == "A, B, C, D"
+    assert rows["feet"] == "left front, left rear, right front, right"
+    first = np.sqrt(eigh(*body_matrices_of(casing_paths(SEAT, FOOT)), eigvals_only=True)[6]) / (2.0 * np.pi)
+    assert f"30 + 6 elastic motions, first mode {first:.4g} Hz" in rows["gives way"].replace("36", "30 + 6")
+    rigid = rigid_tables()
+    rigid["casing"]["stands_still"] = ["C"]
+    (block,) = describe_casing(read_case(rigid))
+    assert dict(block.rows)["gives way"] == "rigid"
+    assert dict(block.rows)["sits in it"] == "A, B, D"
+    assert dict(block.rows)["stands still"] == "C"
+    del rigid["casing"]
+    assert not list(describe_casing(read_case(rigid)))
+    assert [block.title for block in describe_gearbox(case)][-1] == "Casing"
 
 
 def test_other_files_than_those_that_were_read_are_refused(tmp_path):
