@@ -1,0 +1,42 @@
+"""What docs/gearbox.md shows of casings is what is read."""
+
+import csv
+import re
+import tomllib
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from small_gearbox import pair_tables
+
+from femgear.exchange.casing_files import read_nodes
+from femgear.exchange.superelement import SUPERELEMENT_ROLES
+from femgear.trains.gearbox.case_file import BoxCasingSection
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.reading import read_case
+
+PAGE = (Path(__file__).parents[2] / "docs" / "gearbox.md").read_text(encoding="utf-8")
+CASING = PAGE[PAGE.index("## The casing") : PAGE.index("## What comes out")]
+BLOCKS = [tomllib.loads(block) for block in re.findall(r"```toml\n(.*?)```", CASING, re.S)]
+
+
+def test_the_rigid_casing_of_the_page_stands_on_more_such_feet():
+    tables = pair_tables() | BLOCKS[0]
+    (foot,) = tables["casing"]["foot"]
+    for number, (x, z) in enumerate(((-80, 95), (180, 0), (180, 95))):
+        more = {"name": f"foot {number}", "position": [f"{x} mm", "-100 mm", f"{z} mm"]}
+        tables["casing"]["foot"].append(foot | more)
+    found = solve_deflection(read_case(tables))
+    # torques of 100 and 150 N m turn the box the same way round
+    assert found.foot_force.sum(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
+    assert len(found.foot_force) == 4
+
+
+def test_the_elastic_casing_of_the_page_has_entries_and_roles_that_there_are(tmp_path):
+    table = BLOCKS[1]["casing"]
+    assert BoxCasingSection.model_validate(table).foot_names == ("left front",)
+    text = re.search(r"```text\n(node,role.*?)```", CASING, re.S)
+    assert text is not None
+    assert next(csv.reader(StringIO(text[1])))[:2] == ["node", "role"]
+    (tmp_path / "nodes.csv").write_text(text[1])
+    assert [node.role for node in read_nodes(tmp_path / "nodes.csv", SUPERELEMENT_ROLES)] == ["seat", "seat", "foot"]
