@@ -339,6 +339,14 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
         "deflection",
         xr.Dataset({"settled": ("load_case", [False])}, coords={"load_case": ["nominal"]}),
     ),
+    "W-FREE": lambda: of_stage(
+        "gearbox",
+        "modes",
+        xr.Dataset(
+            {"kind": ("mode", ["rigid", "rigid", "casing"]), "main_member": ("mode", ["input", "casing", "casing"])},
+            attrs={"ways": 1},
+        ),
+    ),
     "W-SETTLED": lambda: of_stage("gear_pair", "sweep", xr.Dataset({"settled": ("ratio", [1, 0])})),
     "W-STEPS": lambda: of_stage("elastic", "runup", runup(missed=3)),
     "W-TAIL": lambda: of_stage("planar", "response", tail(0.3)),

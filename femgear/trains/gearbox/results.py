@@ -295,6 +295,11 @@ class GearboxModesResult(StageResult):
         """How the solutions were found."""
         return "modes about the loaded state"
 
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what modes.nc says against itself, see `gearbox_modes_warnings`."""
+        return gearbox_modes_warnings(data)
+
     def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
         found = self.found
@@ -336,7 +341,7 @@ class GearboxModesResult(StageResult):
         }
         speed = abs(model.flow.speed[found.reference]) / RPM
         attrs = {"title": "modes of the gearbox", "reference": found.reference, "speed": speed}
-        return Contents(variables, coords, attrs)
+        return Contents(variables, coords, attrs | {"ways": len(model.turns)})
 
 
 def _largest(names, shares: np.ndarray) -> list[str]:
@@ -498,6 +503,20 @@ def _large(data: xr.Dataset) -> Iterator[Finding]:
         remedy = "less torque, or stiffer shafts and bearings"
         severity, limit = FAULT if tilts.max() > _FAR * _LARGEST_TILT else DOUBT, f"{1e3 * _LARGEST_TILT:g} mrad"
         yield Finding("W-DEFLECTION", "operation.load_case", text, remedy=remedy, limit=limit, severity=severity)
+
+
+def gearbox_modes_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """List what modes.nc says against itself: motions without stiffness beside those of the turning shafts."""
+    rigid = data["kind"].values == "rigid"
+    count, ways = int(rigid.sum()), int(data.attrs.get("ways", len(rigid)))
+    if count <= ways:
+        return
+    members = dict.fromkeys(str(name) for name in data["main_member"].values[rigid])
+    text = f"{count} modes have no stiffness, where the gearbox turns in {ways}; they move {', '.join(members)}"
+    remedy = (
+        "bearings that carry, and feet above the rounding of the stiffest part, some 1e-12 of its frequency squared"
+    )
+    yield Finding("W-FREE", "", text, remedy=remedy)
 
 
 def describe_gearbox_modes(data: xr.Dataset) -> Block:

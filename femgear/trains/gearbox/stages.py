@@ -20,6 +20,7 @@ from femgear.trains.gearbox.results import (
     deflection_warnings,
     describe_deflection,
     describe_gearbox_modes,
+    gearbox_modes_warnings,
     gearbox_verdict,
     gearbox_warnings,
 )
@@ -119,6 +120,7 @@ GEARBOX = Train(
             options=("steps",),
             verdict=modes_verdict,
             describe=lambda results: describe_gearbox_modes(results.modes),
+            warnings=gearbox_modes_warnings,
         ),
     ),
     describe=describe_gearbox,

@@ -4,10 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from casings import casing_tables
 from small_gearbox import pair_tables
 
 from femgear.findings import Finding
-from femgear.trains.gearbox.results import deflection_warnings, describe_deflection, gearbox_warnings
+from femgear.trains.gearbox.results import (
+    deflection_warnings,
+    describe_deflection,
+    gearbox_modes_warnings,
+    gearbox_warnings,
+)
 from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
 from femgear.trains.reading import read_case
 
@@ -63,6 +69,17 @@ def test_modes_and_their_parts_are_in_the_file():
     assert data["strain"].dims == ("part", "mode")
     assert data.attrs["reference"] == "input"
     assert data["order"].values[list(data["line"].values).index("stage mesh")] == pytest.approx(24.0)
+
+
+def test_modes_below_the_rounding_of_the_stiffest_part_are_told():
+    tables = pair_tables() | {"casing": casing_tables()}
+    case = read_case(tables)
+    assert not list(gearbox_modes_warnings(solve_box_modes(case, solve_deflections(case)).contents()))
+    tables["casing"]["mass"] = "1e8 kg"  # swings at 0.3 Hz
+    case = read_case(tables)
+    (finding,) = gearbox_modes_warnings(solve_box_modes(case, solve_deflections(case)).contents())
+    assert finding.code == "W-FREE"
+    assert "casing" in finding.text
 
 
 def test_teeth_without_contact_have_the_stiffness_of_the_standard():
