@@ -1,0 +1,266 @@
+#!/usr/bin/env python3
+"""A planet carrier as another program would export it: two cheek plates with webs and pins, reduced to its seats."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+from dataclasses import astuple, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Annotated
+
+import numpy as np
+from casing import condensed
+from cyclopts import Parameter
+from script_tools import Progress, print_table, ready_folder, run_script, say_files
+
+from femgear.errors import CaseError
+from femgear.exchange.carrier_files import read_carrier
+from femgear.storage.files import replaced_file
+
+FILES = ("carrier.npz",)
+E, NU, RHO = 206e9, 0.3, 7850.0
+# a sector that ends in the middle of a pin and in the middle of a web, or the whole carrier
+DRUM = """SetFactory("OpenCASCADE"); Geometry.OCCUnionUnify = 0;
+Cylinder(1) = {{0, 0, -{end}, 0, 0, 2*{end}, {outer}, {sector}}};
+Cylinder(2) = {{0, 0, {end}, 0, 0, {stub}, {shaft}, {sector}}};
+BooleanUnion(3) = {{ Volume{{1}}; Delete; }}{{ Volume{{2}}; Delete; }};
+Cylinder(4) = {{0, 0, -1, 0, 0, 1 + {half_span}, {bore}}};
+Cylinder(5) = {{0, 0, 0, 0, 0, 1, {shaft_bore}}};
+"""
+POCKET = "Cylinder({number}) = {{{x}, {y}, -{half_span}, 0, 0, 2*{half_span}, {pocket}}};\n"
+PIN = """Cylinder({number}) = {{{x}, {y}, -{half_span}, 0, 0, {half_span} - {half_bearing}, {pin}, {turn}}};
+Cylinder({number} + 1) = {{{x}, {y}, -{half_bearing}, 0, 0, 2*{half_bearing}, {pin}, {turn}}};
+Cylinder({number} + 2) = {{{x}, {y}, {half_bearing}, 0, 0, {half_span} - {half_bearing}, {pin}, {turn}}};
+"""
+JOINED = """BooleanDifference(6) = {{ Volume{{3}}; Delete; }}{{ Volume{{4, 5, 10:{pockets}}}; Delete; }};
+{pins_text}BooleanUnion(7) = {{ Volume{{6}}; Delete; }}{{ Volume{{100:{last}}}; Delete; }};
+Mesh.MeshSizeMax = {size}; Mesh.MeshSizeFromCurvature = {around}; Mesh.RandomSeed = 1; General.NumThreads = 1;
+"""
+
+
+@dataclass(frozen=True)
+class Carrier:
+    """Sizes of the carrier [m], for the planetary stage of cases/e_axle.toml; its planets stand at z = 0.
+
+    ``size`` of the elements, tetrahedra of ten nodes, ``around`` of them on every circle at least; ``modes``, the
+    lowest ones with the seat held, kept beside the static shapes. A drum of the radius ``outer`` has pockets for
+    ``planets`` on the circle of the ``radius`` of their pins, and a ``bore`` for the sun. Its cheeks are ``half_span``
+    from the middle and ``cheek`` thick; pins are solid, and under a bearing of the width ``bearing``. A ``stub`` of
+    the shaft, between the radii ``shaft_bore`` and ``shaft``, ends in the seat.
+    """
+
+    size: float = 0.008
+    around: int = 10
+    modes: int = 12
+    planets: int = 3
+    outer: float = 0.05
+    radius: float = 0.036775941598708325
+    pocket: float = 0.022
+    pin: float = 0.008
+    bore: float = 0.0215
+    shaft: float = 0.0225
+    shaft_bore: float = 0.0075
+    half_span: float = 0.014
+    cheek: float = 0.008
+    stub: float = 0.003
+    bearing: float = 0.018
+
+
+def geometry(carrier: Carrier, *, whole: bool = False) -> str:
+    """Text of the geometry for Gmsh: half a sector, or the whole carrier."""
+    sector = 2.0 * math.pi if whole else math.pi / carrier.planets
+    names = vars(carrier) | {"end": carrier.half_span + carrier.cheek, "half_bearing": 0.5 * carrier.bearing}
+    names |= {"sector": sector, "turn": 2.0 * math.pi if whole else math.pi}
+    angles = [2.0 * math.pi * n / carrier.planets for n in range(carrier.planets if whole else 1)]
+    places = [{"x": carrier.radius * math.cos(a), "y": carrier.radius * math.sin(a)} for a in angles]
+    pockets, pins = (
+        "".join(text.format(number=first + step * n, **names, **place) for n, place in enumerate(places))
+        for text, first, step in ((POCKET, 10, 1), (PIN, 100, 3))
+    )
+    last = {"pockets": 9 + len(places), "last": 99 + 3 * len(places), "pins_text": pins}
+    return DRUM.format(**names) + pockets + JOINED.format(**names, **last)
+
+
+def grid_of(carrier: Carrier):
+    """Grid of the whole carrier: half a sector by Gmsh in a process of its own, mirrored and turned.
+
+    Planes of symmetry of the grid are those of the carrier, so that all its pins are alike. Its edges follow the
+    circles.
+    """
+    from skfem import MeshTet, MeshTet2
+
+    with TemporaryDirectory() as folder:
+        source, grid = Path(folder) / "carrier.geo", Path(folder) / "carrier.msh"
+        source.write_text(geometry(carrier), encoding="utf-8")
+        run = "import sys, gmsh; gmsh.initialize(sys.argv, run=True)"
+        words = [sys.executable, "-c", run, "-3", "-v", "1", "-format", "msh22", source, "-o", grid]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=300)
+        if done.returncode or not grid.is_file():
+            raise CaseError(f"Gmsh made no grid: {done.stderr[-200:]}", code="E-GRID-GMSH")
+        half = MeshTet.load(grid)
+    points, cells = [], []
+    for number in range(carrier.planets):
+        turn = 2.0 * math.pi * number / carrier.planets
+        turned = np.array([[math.cos(turn), -math.sin(turn), 0], [math.sin(turn), math.cos(turn), 0], [0, 0, 1]])
+        for side in (1.0, -1.0):
+            cells.append(half.t + len(points) * half.p.shape[1])
+            points.append(turned @ (half.p * [[1.0], [side], [1.0]]))
+    joined = np.hstack(points)
+    # nodes on the planes of symmetry stand twice
+    _, first, place = np.unique(np.rint(1e8 * joined), axis=1, return_index=True, return_inverse=True)
+    cells = place.ravel()[np.hstack(cells)]
+    mesh = MeshTet(np.ascontiguousarray(joined[:, first]), np.ascontiguousarray(cells))
+    curved = MeshTet2.from_mesh(mesh)
+    return MeshTet2(on_circles(carrier, mesh, curved.doflocs.copy()), mesh.t)
+
+
+def on_circles(carrier: Carrier, mesh, points: np.ndarray) -> np.ndarray:
+    """Nodes (3, n), those in the middles of edges of round faces put onto their cylinders."""
+    outside = np.zeros(mesh.edges.shape[1], bool)
+    corners = np.sort(np.vstack([mesh.facets[[0, 1, 0]][None], mesh.facets[[1, 2, 2]][None]]), axis=0)
+    known = {tuple(edge): number for number, edge in enumerate(np.sort(mesh.edges, axis=0).T.tolist())}
+    for facet in mesh.boundary_facets():
+        outside[[known[tuple(pair)] for pair in corners[:, :, facet].T.tolist()]] = True
+    edges = np.flatnonzero(outside)
+    ends, middle = mesh.p[:, mesh.edges[:, edges]], mesh.p.shape[1] + edges
+    angles = 2.0 * np.pi / carrier.planets * np.arange(carrier.planets)
+    axes = [(carrier.radius * math.cos(a), carrier.radius * math.sin(a)) for a in angles]
+    round_faces = [(axis, radius) for axis in axes for radius in (carrier.pin, carrier.pocket)]
+    round_faces += [((0.0, 0.0), r) for r in (carrier.outer, carrier.bore, carrier.shaft, carrier.shaft_bore)]
+    for axis, radius in round_faces:
+        arms = ends[:2] - np.reshape(axis, (2, 1, 1))
+        chosen = middle[(np.abs(np.hypot(*arms) - radius) < 1e-8).all(axis=0)]
+        arm = points[:2, chosen] - np.reshape(axis, (2, 1))
+        points[:2, chosen] = np.reshape(axis, (2, 1)) + arm * radius / np.hypot(*arm)
+    return points
+
+
+def assembled(carrier: Carrier):
+    """Basis, stiffness [N/m] and mass [kg] of the free carrier."""
+    from skfem import Basis, BilinearForm, ElementTetP2, ElementVector
+    from skfem.helpers import dot
+    from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+    mesh, element = grid_of(carrier), ElementVector(ElementTetP2())
+    K = linear_elasticity(*lame_parameters(E, NU)).assemble(Basis(mesh, element, intorder=4))
+    basis = Basis(mesh, element, intorder=5)
+    return basis, K.tocsc(), BilinearForm(lambda u, v, w: RHO * dot(u, v)).assemble(basis).tocsc()
+
+
+def motions_of_pin(carrier: Carrier, basis, place: np.ndarray) -> np.ndarray:
+    """Columns (n, 6): mean displacement and rotation of a pin under its bearing, by least squares over its surface."""
+    from skfem import FacetBasis, LinearForm
+
+    def on_pin(x):
+        return (np.hypot(x[0] - place[0], x[1] - place[1]) < 1.2 * carrier.pin) & (np.abs(x[2]) < 0.5 * carrier.bearing)
+
+    facets = basis.mesh.facets_satisfying(on_pin, boundaries_only=True)
+    surface = FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=6)
+
+    def field(x, way):
+        """Displacement at points x of a rigid motion: along x, y, z or about them through the place."""
+        if way < 3:
+            return [float(way == component) * np.ones_like(x[0]) for component in range(3)]
+        return np.cross(np.eye(3)[way - 3], np.moveaxis(x - place[:, None, None], 0, -1)).transpose(2, 0, 1)
+
+    x = np.asarray(surface.global_coordinates())
+    fields = np.array([field(x, way) for way in range(6)])
+    columns = np.zeros((basis.N, 6))
+    for way in range(6):
+
+        def work(v, w, way=way):
+            return sum(a * v[i] for i, a in enumerate(field(w.x, way)))
+
+        columns[:, way] = LinearForm(work).assemble(surface)
+    return columns @ np.linalg.inv(np.einsum("fq,acfq,bcfq->ab", surface.dx, fields, fields))
+
+
+def motions_of_seat(carrier: Carrier, basis) -> tuple[np.ndarray, np.ndarray]:
+    """Columns (n, 6) of the face that moves rigidly with the shaft, and its place (3,)."""
+    place = np.array([0.0, 0.0, carrier.half_span + carrier.cheek + carrier.stub])
+
+    def on_face(x):
+        return np.abs(x[2] - place[2]) < 1e-6
+
+    held = basis.get_dofs(basis.mesh.facets_satisfying(on_face, boundaries_only=True))
+    columns = np.zeros((basis.N, 6))
+    for way in range(3):
+        dofs = held.all(f"u^{way + 1}")
+        arm = basis.doflocs[:, dofs] - place[:, None]
+        columns[dofs, way] = 1.0
+        for about in range(3):
+            # rotation times arm, along this way
+            columns[dofs, 3 + about] = np.cross(np.eye(3)[about], arm.T)[:, way]
+    return columns, place
+
+
+def reduced(carrier: Carrier) -> dict[str, np.ndarray]:
+    """Arrays of the file: stiffness and mass on pins, shaft and inner coordinates, and where the seats are."""
+    basis, K, M = assembled(carrier)
+    angles = 2.0 * np.pi / carrier.planets * np.arange(carrier.planets)
+    pins = [np.array([carrier.radius * math.cos(a), carrier.radius * math.sin(a), 0.0]) for a in angles]
+    watched = np.hstack([motions_of_pin(carrier, basis, place) for place in pins])
+    carried, seat = motions_of_seat(carrier, basis)
+    K, M, _ = condensed(K, M, watched, carried, carrier.modes)
+    return {
+        "stiffness": 0.5 * (K + K.T),
+        "mass": 0.5 * (M + M.T),
+        "role": np.array([*(f"pin {n + 1}" for n in range(len(pins))), "shaft"]),
+        "position": np.array([*pins, seat]),
+        "dofs": np.full(len(pins) + 1, "123456"),
+    }
+
+
+def main(
+    *,
+    output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/carrier"),
+    size: float = Carrier.size,
+    modes: int = Carrier.modes,
+) -> None:
+    """Mesh a carrier of two cheeks with webs and pins, reduce it to the shaft's seat and its pins, and write it.
+
+    Parameters
+    ----------
+    output
+        Folder of the file; what is there of the same sizes is not computed again.
+    size
+        Of the elements [m].
+    modes
+        Lowest modes that the reduction keeps, the seat on the shaft held.
+    """
+    carrier, folder = Carrier(size=size, modes=modes), ready_folder(output, FILES)
+    if not (0.002 <= size <= 0.02 and 1 <= modes <= 60):
+        raise CaseError(
+            "sizes of the carrier", code="E-RANGE", value=(size, modes), limit="0.002 to 0.02 m, 1 to 60 modes"
+        )
+    path = folder / FILES[0]
+    if not path.is_file() or tuple(np.load(path)["sizes"]) != astuple(carrier):
+        with Progress() as progress:
+            progress("carrier")
+            arrays = reduced(carrier)
+            with replaced_file(path) as part, open(part, "wb") as stream:
+                np.savez(stream, **arrays, sizes=astuple(carrier))
+            progress("carrier", 1)
+    body = read_carrier(path)
+    count = carrier.planets
+    compliance = body.compliance.reshape(count, 6, count, 6)
+    around = sum(compliance[0, 1, n, :2] @ [-math.sin(a), math.cos(a)] for n, a in enumerate(_angles(body.pins)))
+    rows = [
+        ("a pin radially, alone [um/kN]", f"{1e9 * compliance[0, 0, 0, 0]:.3f}"),
+        ("a pin around the axis, alone [um/kN]", f"{1e9 * compliance[0, 1, 0, 1]:.3f}"),
+        ("all pins around the axis [um/kN each]", f"{1e9 * around:.3f}"),
+        ("lowest inner mode [Hz]", f"{body.frequency[0] / (2.0 * math.pi):.0f}"),
+    ]
+    print_table("Carrier with the seat on the shaft held", ("motion", "value"), rows)
+    say_files(folder, FILES)
+
+
+def _angles(pins: np.ndarray) -> np.ndarray:
+    return np.arctan2(pins[:, 1], pins[:, 0])
+
+
+if __name__ == "__main__":
+    sys.exit(run_script(main))
