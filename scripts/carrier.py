@@ -39,6 +39,10 @@ JOINED = """BooleanDifference(6) = {{ Volume{{3}}; Delete; }}{{ Volume{{4, 5, 10
 {pins_text}BooleanUnion(7) = {{ Volume{{6}}; Delete; }}{{ Volume{{100:{last}}}; Delete; }};
 Mesh.MeshSizeMax = {size}; Mesh.MeshSizeFromCurvature = {around}; Mesh.RandomSeed = 1; General.NumThreads = 1;
 """
+# points and weights of a triangle, exact to degree five (A. H. Stroud, Approximate Calculation of Multiple Integrals)
+FAR, NEAR = (6.0 + math.sqrt(15.0)) / 21.0, (6.0 - math.sqrt(15.0)) / 21.0
+TRIANGLE_POINTS = [(1 / 3, 1 / 3), *(pair for q in (FAR, NEAR) for pair in ((q, q), (1 - 2 * q, q), (q, 1 - 2 * q)))]
+TRIANGLE_WEIGHTS = [9 / 80, *[(155 + math.sqrt(15.0)) / 2400] * 3, *[(155 - math.sqrt(15.0)) / 2400] * 3]
 
 
 @dataclass(frozen=True)
@@ -119,12 +123,7 @@ def grid_of(carrier: Carrier):
 
 def on_circles(carrier: Carrier, mesh, points: np.ndarray) -> np.ndarray:
     """Nodes (3, n), those in the middles of edges of round faces put onto their cylinders."""
-    outside = np.zeros(mesh.edges.shape[1], bool)
-    corners = np.sort(np.vstack([mesh.facets[[0, 1, 0]][None], mesh.facets[[1, 2, 2]][None]]), axis=0)
-    known = {tuple(edge): number for number, edge in enumerate(np.sort(mesh.edges, axis=0).T.tolist())}
-    for facet in mesh.boundary_facets():
-        outside[[known[tuple(pair)] for pair in corners[:, :, facet].T.tolist()]] = True
-    edges = np.flatnonzero(outside)
+    edges = np.unique(mesh.f2e[:, mesh.boundary_facets()])
     ends, middle = mesh.p[:, mesh.edges[:, edges]], mesh.p.shape[1] + edges
     angles = 2.0 * np.pi / carrier.planets * np.arange(carrier.planets)
     axes = [(carrier.radius * math.cos(a), carrier.radius * math.sin(a)) for a in angles]
@@ -150,32 +149,39 @@ def assembled(carrier: Carrier):
     return basis, K.tocsc(), BilinearForm(lambda u, v, w: RHO * dot(u, v)).assemble(basis).tocsc()
 
 
+def mean_motions(points: np.ndarray, triangles: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """Weights (n, 3, 6) of nodes (n, 3) for mean displacement and rotation of a surface, by least squares over it.
+
+    Triangles have six nodes; rotations are about a place (3,).
+    """
+    s, t = np.array(TRIANGLE_POINTS).T
+    r = 1.0 - s - t
+    shapes = np.array([r * (2 * r - 1), s * (2 * s - 1), t * (2 * t - 1), 4 * r * s, 4 * s * t, 4 * t * r])
+    by_s = np.array([1 - 4 * r, 4 * s - 1, 0 * s, 4 * (r - s), 4 * t, -4 * t])
+    by_t = np.array([1 - 4 * r, 0 * s, 4 * t - 1, -4 * s, 4 * s, 4 * (r - t)])
+    x, along, across = (np.einsum("kq,ekd->eqd", one, points[triangles]) for one in (shapes, by_s, by_t))
+    area = np.linalg.norm(np.cross(along, across), axis=2) * np.array(TRIANGLE_WEIGHTS)
+    directions = np.broadcast_to(np.eye(3)[:, None, None], (3, *x.shape))
+    fields = np.concatenate([directions, np.cross(directions, x - place)])
+    weights = np.zeros((len(points), 3, 6))
+    np.add.at(weights, triangles.T, np.einsum("kq,eq,aeqd->keda", shapes, area, fields))
+    return weights @ np.linalg.inv(np.einsum("eq,aeqd,beqd->ab", area, fields, fields))
+
+
 def motions_of_pin(carrier: Carrier, basis, place: np.ndarray) -> np.ndarray:
-    """Columns (n, 6): mean displacement and rotation of a pin under its bearing, by least squares over its surface."""
-    from skfem import FacetBasis, LinearForm
+    """Columns (n, 6): mean displacement and rotation of a pin under its bearing."""
+    mesh = basis.mesh
 
     def on_pin(x):
         return (np.hypot(x[0] - place[0], x[1] - place[1]) < 1.2 * carrier.pin) & (np.abs(x[2]) < 0.5 * carrier.bearing)
 
-    facets = basis.mesh.facets_satisfying(on_pin, boundaries_only=True)
-    surface = FacetBasis(basis.mesh, basis.elem, facets=facets, intorder=6)
-
-    def field(x, way):
-        """Displacement at points x of a rigid motion: along x, y, z or about them through the place."""
-        if way < 3:
-            return [float(way == component) * np.ones_like(x[0]) for component in range(3)]
-        return np.cross(np.eye(3)[way - 3], np.moveaxis(x - place[:, None, None], 0, -1)).transpose(2, 0, 1)
-
-    x = np.asarray(surface.global_coordinates())
-    fields = np.array([field(x, way) for way in range(6)])
+    facets = mesh.facets_satisfying(on_pin, boundaries_only=True)
+    count = basis.nodal_dofs.shape[1]
+    triangles = np.vstack([mesh.facets[:, facets], count + mesh.f2e[:, facets]]).T
+    weights = mean_motions(mesh.doflocs.T, triangles, place)
     columns = np.zeros((basis.N, 6))
-    for way in range(6):
-
-        def work(v, w, way=way):
-            return sum(a * v[i] for i, a in enumerate(field(w.x, way)))
-
-        columns[:, way] = LinearForm(work).assemble(surface)
-    return columns @ np.linalg.inv(np.einsum("fq,acfq,bcfq->ab", surface.dx, fields, fields))
+    columns[basis.nodal_dofs.T], columns[basis.edge_dofs.T] = weights[:count], weights[count:]
+    return columns
 
 
 def motions_of_seat(carrier: Carrier, basis) -> tuple[np.ndarray, np.ndarray]:

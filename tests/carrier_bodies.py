@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
+from scipy.linalg import block_diag, eigh
 
 from femgear.fe.beam import RoundSection, beam_element, rigid_link
+from femgear.trains.gearbox.modes import linear_system
 
 RADIUS, HALF, SEAT = 0.04, 0.018, 0.03
 """Of the pins' circle, of the span of a pin, and z of the seat on the shaft above the planets [m]."""
@@ -79,3 +82,25 @@ def written(folder: Path, arrays: dict[str, np.ndarray], name: str = "carrier.np
     """Path of a file of these arrays."""
     np.savez(folder / name, **arrays)
     return str(folder / name)
+
+
+def unreduced_frequencies(found, arrays):
+    """Natural frequencies of the gearbox with all coordinates of the carrier's file in place of its superelement."""
+    assembly, _, stiffness = linear_system(found)
+    carrier = found.model.stages[0].elastic_carrier
+    springs = tuple(one for one in assembly.springs if one.name != carrier.name)
+    inertias = tuple(one for one in assembly.inertias if one.stations != carrier.stations)
+    rest = replace(assembly, springs=springs, inertias=inertias)
+    inner = len(arrays["mass"]) - 24
+    link = np.zeros((len(arrays["mass"]), assembly.count + inner))
+    link[:6, 6 * carrier.stations[0] : 6 * carrier.stations[0] + 6] = rigid_link((0.0, 0.0, SEAT))
+    for number, station in enumerate(carrier.stations[1:], 1):
+        link[6 * number : 6 * number + 6, 6 * station : 6 * station + 6] = np.eye(6)
+    link[24:, assembly.count :] = np.eye(inner)
+    T = block_diag(rest.motions, np.eye(inner))
+    W = np.vstack([rest.columns, np.zeros((inner, len(stiffness)))])
+    K = block_diag(rest.stiffness, np.zeros((inner, inner))) + link.T @ arrays["stiffness"] @ link
+    M = block_diag(rest.mass, np.zeros((inner, inner))) + link.T @ arrays["mass"] @ link
+    K = K + (W * stiffness) @ W.T
+    squares = eigh(T.T @ K @ T, T.T @ M @ T, eigvals_only=True)
+    return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi)

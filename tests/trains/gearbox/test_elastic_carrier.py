@@ -1,18 +1,16 @@
 """Carriers from files in a gearbox: the same beams without reduction, stiff and turned ones, places that do not fit."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from carrier_bodies import ANGLES, HALF, SEAT, SECTION, beam_carrier, without_tilts, written
-from scipy.linalg import block_diag, eigh
+from carrier_bodies import ANGLES, HALF, SEAT, SECTION, beam_carrier, unreduced_frequencies, without_tilts, written
 from small_gearbox import planetary_tables
 
 from femgear.errors import CaseError
 from femgear.fe.beam import rigid_link
 from femgear.trains.gearbox.deflection import solve_deflection
-from femgear.trains.gearbox.modes import linear_system, solve_gearbox_modes
+from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.reading import read_case, with_value
 
 PINS = {"diameter": "20 mm", "length": f"{HALF!r} m"}
@@ -59,28 +57,6 @@ def test_pins_of_the_case_give_way_beside_the_carrier_of_the_file(case_of):
     alone, rigid = (solve_deflection(read_case(planetary_tables(**entries))) for entries in both)
     along = planets(soft) - planets(hard)
     assert along == pytest.approx(planets(alone) - planets(rigid), rel=1e-6, abs=1e-10)
-
-
-def unreduced_frequencies(found, arrays):
-    """Natural frequencies of the gearbox with all coordinates of the carrier's file in place of its superelement."""
-    assembly, _, stiffness = linear_system(found)
-    carrier = found.model.stages[0].elastic_carrier
-    springs = tuple(one for one in assembly.springs if one.name != carrier.name)
-    inertias = tuple(one for one in assembly.inertias if one.stations != carrier.stations)
-    rest = replace(assembly, springs=springs, inertias=inertias)
-    inner = len(arrays["mass"]) - 24
-    link = np.zeros((len(arrays["mass"]), assembly.count + inner))
-    link[:6, 6 * carrier.stations[0] : 6 * carrier.stations[0] + 6] = rigid_link((0.0, 0.0, SEAT))
-    for number, station in enumerate(carrier.stations[1:], 1):
-        link[6 * number : 6 * number + 6, 6 * station : 6 * station + 6] = np.eye(6)
-    link[24:, assembly.count :] = np.eye(inner)
-    T = block_diag(rest.motions, np.eye(inner))
-    W = np.vstack([rest.columns, np.zeros((inner, len(stiffness)))])
-    K = block_diag(rest.stiffness, np.zeros((inner, inner))) + link.T @ arrays["stiffness"] @ link
-    M = block_diag(rest.mass, np.zeros((inner, inner))) + link.T @ arrays["mass"] @ link
-    K = K + (W * stiffness) @ W.T
-    squares = eigh(T.T @ K @ T, T.T @ M @ T, eigvals_only=True)
-    return np.sqrt(np.maximum(squares, 0.0)) / (2.0 * math.pi)
 
 
 @pytest.mark.parametrize("entries", [{}, BEARING])
