@@ -264,11 +264,23 @@ def _foot_problems(section: BoxCasingSection, element: Superelement) -> Iterator
         )
 
 
+def _at_hand(case: GearboxCase) -> Superelement | None:
+    """Superelement of a case; None where its files are not there, as beside the results of a run."""
+    try:
+        return casing_element(case)
+    except CaseError as error:
+        if error.code in ("E-FILE", "E-OTHER-CASE"):
+            return None
+        raise
+
+
 def casing_notices(case: GearboxCase) -> Iterator[Finding]:
     """Tell seats whose nodes have no rotations (W-BEARING): they tilt as the casing does as a whole."""
     if case.casing is None or case.casing.file is None:
         return
-    element = casing_element(case)
+    element = _at_hand(case)
+    if element is None:
+        return
     plain = [name for name, node in element.of_role("seat").items() if len(element.components(node)) == 3]
     if plain:
         text = (
@@ -287,6 +299,9 @@ def describe_casing(case: GearboxCase) -> Iterator[Block]:
     if section.file is None:
         assert section.mass is not None
         mass, centre, feet, elastic = section.mass, section.centre or (), section.foot_names, "rigid"
+    elif _at_hand(case) is None:
+        yield Block("Casing", rows=(("file", section.file), ("sits in it", ", ".join(seats) or "nothing")))
+        return
     else:
         element, body = elastic_casing(case)
         mass, centre, feet = body.rigid_mass[0, 0], body.centre, [*element.of_role("foot")]

@@ -18,6 +18,7 @@ from casings import (
 from random_gearboxes import random_casing, random_gearbox
 from scipy.linalg import eigh
 
+from femgear import cli
 from femgear.case import text
 from femgear.errors import CaseError
 from femgear.system.assembly import GROUND
@@ -314,6 +315,29 @@ def test_check_tells_what_the_casing_is(tmp_path):
     del rigid["casing"]
     assert not list(describe_casing(read_case(rigid)))
     assert [block.title for block in describe_gearbox(case)][-1] == "Casing"
+
+
+def test_pages_of_a_run_need_no_file(tmp_path):
+    """Beside results there is the case without the files of its casing."""
+    case = read(tmp_path, box(tmp_path, casing_paths(SEAT[:3], FOOT)))
+    away = tmp_path / "out"
+    away.mkdir()
+    (away / "case.toml").write_text(case.source)
+    moved = read_case(str(away / "case.toml"))
+    (block,) = describe_casing(moved)
+    assert dict(block.rows) == {"file": "casing.npz", "sits in it": "A, B, C, D"}
+    assert not list(casing_notices(moved))
+    with pytest.raises(CaseError, match="E-FILE"):
+        check_case(moved)
+
+
+def test_a_run_writes_its_page(tmp_path):
+    tables = box(tmp_path, casing_paths(SEAT, FOOT))
+    read(tmp_path, tables)
+    assert cli.main(["run", str(tmp_path / "box.toml"), "-o", str(tmp_path / "out")]) == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "largest foot force" in page
+    assert cli.main(["report", str(tmp_path / "out")]) == 0
 
 
 def test_other_files_than_those_that_were_read_are_refused(tmp_path):
