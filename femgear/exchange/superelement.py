@@ -97,7 +97,7 @@ class Superelement:
             found[row] = rigid_link(self.place[number] - centre)[component - 1]
         inner = np.setdiff1d(np.arange(len(found)), list(self.row.values()))
         if len(inner):
-            outer = list(self.row.values())
+            outer = np.array([*self.row.values()])
             held = self.stiffness[np.ix_(inner, outer)] @ found[outer]
             found[inner] = -np.linalg.lstsq(self.stiffness[np.ix_(inner, inner)], held, rcond=None)[0]
         return found
@@ -162,7 +162,7 @@ def read_superelement(path: Path, nodes: Path, *, units: str = "SI") -> Superele
         else:
             found, row, place = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
         _check_real(found)
-        asymmetry = tuple(float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max()) for matrix in found)
+        apart = [float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max()) for matrix in found]
         length, mass = UNITS[units]
         # with time in seconds a stiffness scales as a mass; rotations have no length
         scale = np.ones(len(found[0]))
@@ -170,7 +170,8 @@ def read_superelement(path: Path, nodes: Path, *, units: str = "SI") -> Superele
         K, M = (0.5 * mass * np.outer(scale, scale) * np.real(matrix + matrix.T) for matrix in found)
         places = dict(place) | {node.number: node.position for node in table if node.position is not None}
         _check_nodes(table, row, places)
-    return Superelement(K, M, row, {number: length * x for number, x in places.items()}, table, asymmetry)
+        in_metres = {number: length * x for number, x in places.items()}
+    return Superelement(K, M, row, in_metres, table, (apart[0], apart[1]))
 
 
 def _check_real(found: Sequence[np.ndarray]) -> None:
@@ -348,7 +349,7 @@ def modal_body(body: Superelement, numbers: Sequence[int], *, max_frequency: flo
     centre = _centre(body)
     rigid = body.rigid_motions(centre)
     count = len(body.stiffness)
-    interface = [body.row[number, c] for number in numbers for c in range(1, 7) if (number, c) in body.row]
+    interface = np.array([body.row[number, c] for number in numbers for c in range(1, 7) if (number, c) in body.row])
     turns = np.array([c > 3 for number in numbers for c in range(1, 7) if (number, c) in body.row])
     inner = np.setdiff1d(np.arange(count), interface)
     K, M = body.stiffness, body.mass

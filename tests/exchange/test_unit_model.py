@@ -5,8 +5,10 @@ import tomllib
 from pathlib import Path
 
 import pytest
+from casings import casing_tables
 from rexs_stage import ParallelUnit
 from rexs_units import IndustrialUnit, ThreeStageUnit
+from small_gearbox import pair_tables
 
 from femgear import cli
 from femgear.case import text as case_text
@@ -118,6 +120,14 @@ def test_an_axle_with_a_planetary_set_is_written_whole(tmp_path):
     assert carrier.name == "output"
     told = " ".join(f"{one.key} {one.text}" for one in findings)
     assert "mass[0]" in told and "pins" not in told
+
+
+def test_feet_of_a_casing_are_left_out_and_told(tmp_path):
+    case = read_case(pair_tables(teeth=True) | {"casing": casing_tables()})
+    model, findings = written(case, tmp_path)
+    assert [one.key for one in findings] == ["casing"]
+    assert "stands still" in findings[0].text
+    assert len(of_type(model, "gear_casing")) == 1
 
 
 def test_stages_without_teeth_are_refused():

@@ -205,7 +205,7 @@ class _Builder:
     def __init__(self, case: GearboxCase, flow: BoxFlow, stiffness: Mapping[str, Any], estimate: float):
         self.case, self.flow, self.stiffness, self.estimate = case, flow, stiffness, estimate
         self.names: list[str] = []
-        self.places: list[tuple[float, float, float]] = []
+        self.places: list[Sequence[float]] = []
         self.inertias: list[Inertia] = []
         self.stiff_beams: list[Beam] = []
         self.springs: list[StationSprings] = []
@@ -305,7 +305,7 @@ class _Builder:
     def seat(self, shaft: str, position: float | None) -> Seat:
         return _seat(self.case, self.beams, self.first, shaft, position)
 
-    def _station(self, name: str, place: tuple[float, float, float]) -> int:
+    def _station(self, name: str, place: Sequence[float]) -> int:
         self.names.append(name)
         self.places.append(place)
         return len(self.names) - 1
