@@ -55,6 +55,7 @@ CATALOGUE = {
     "W-OPEN": (NOTE, "A planet carries nothing at some positions."),
     "W-PARTED": (NOTE, "Teeth never touch."),
     "W-PLANETS": (NOTE, "Planets are not equally spaced, or their number is unusual."),
+    "W-PLAY": (DOUBT, "Bearings that carry nothing hold nothing: shafts float in their play."),
     "W-PLUGIN": (NOTE, "A package has a train of a name that is taken."),
     "W-POINTS": (DOUBT, "Points on the ring do not resolve its waves."),
     "W-POSITIONS": (DOUBT, "Peaks between positions may be higher."),

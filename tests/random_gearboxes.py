@@ -224,13 +224,36 @@ class _Draw:
 
 
 def random_gearbox(seed: int, stages: int = 4) -> dict[str, Any]:
-    """Draw the tables of a gearbox of at most so many stages; a third of them have a casing on feet."""
+    """Draw the tables of a gearbox of at most so many stages; a third in a casing, a third with play."""
     tables = _Draw(seed, stages).draw()
     # of its own numbers: all else is the same with and without a casing
     rng = np.random.default_rng([seed, 43])
     if rng.random() < 1.0 / 3.0:
         tables["casing"] = random_casing(tables, rng)
+    elif rng.random() < 0.5:
+        return loosened(tables, np.random.default_rng([seed, 44]))
     return tables
+
+
+def loosened(tables: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
+    """Give balls clearance, and springs along z one sense each, whatever presses shafts into their bearings."""
+    new = copy.deepcopy(tables)
+    if rng.random() < 0.5:
+        # planets, and spur gears along z, leave shafts without load
+        new.pop("gravity", None)
+        for load in new["load"]:
+            load.pop("force", None)
+            load.pop("tilting_moment", None)
+        new["operation"]["load_case"][0].pop("force", None)
+    for shaft in new["shaft"]:
+        first, second = (one for one in new["bearing"] if one["shaft"] == shaft["name"])
+        if first.get("kind") == second.get("kind") == "ball":
+            first["clearance"] = second["clearance"] = metres(float(rng.choice([0.0, 5e-6, 2e-5])))
+        elif "kind" not in first and first.get("axial", "rigid") != "rigid" and rng.random() < 0.7:
+            stiffness = {"axial": first["axial"]}
+            first |= {"axial_sense": "positive"}
+            second |= stiffness | {"axial_sense": "negative"}
+    return new
 
 
 def random_casing(tables: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:

@@ -29,14 +29,16 @@ from femgear.trains.gearbox.holding import loose_shafts, without_balance
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model, member_of_stations
 
 _STEPS = 200
-# Metres by which tilts and rotations are compared with shifts.
-_LEVERS = (1.0, 1.0, 1.0, 0.05, 0.05, 0.05)
+LEVERS = (1.0, 1.0, 1.0, 0.05, 0.05, 0.05)
+"""Metres by which tilts and rotations are compared with shifts."""
 # Misalignment over the width below which it is none [m].
 _UPRIGHT = 1e-7
 # Positions of the contact while slopes are far from settled, and how near they come by them, relative.
 _COARSE, _NEAR = 12, 3e-3
 _SETTLED = 1e-11  # residual force over the largest one
-_BALANCED = 1e-6
+_LEAST_LOAD = 1e-3  # against which residuals count where nothing loads a gearbox [N]
+# Load of a rolling element over the largest force of the gearbox up to which it is rounding.
+_PRESSED = 1e-9
 _STIFFEST = 1e12  # of a rigid axial bearing of one sense [N/m]
 # Stiffness that holds what hangs in clearances while bearings find their place, over that of a bearing.
 _GUESS = 1e8
@@ -133,6 +135,12 @@ class BearingLaw:
         if sense * motion[2] > 0.0:
             force[2], stiffness[2, 2] = k * motion[2], k
         return force, stiffness
+
+    def pressing(self, motion: np.ndarray) -> float:
+        """Largest load of its elements, or its thrust, at a motion (6,) [N]."""
+        if (state := self.state(motion)) is not None:
+            return float(state.lamina_load.max(initial=0.0))
+        return float(np.abs(self.force(motion)[0]).max())
 
     @property
     def held(self) -> np.ndarray:
@@ -314,8 +322,8 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
     T, K, W, k = fixed.motions, assembly.stiffness, assembly.columns, assembly.slice_stiffness
     laws = laws_of(model, model.estimate)
     _check_held(model, fixed, T, K, W, k, laws)
-    spread = [(_spread(springs, assembly), law) for _, law, springs in laws]
-    scale = max(np.abs(model.load).max(initial=0.0), 1e-9)
+    spread = [(spread_rows(springs, assembly), law) for _, law, springs in laws]
+    scale = max(np.abs(model.load).max(initial=0.0), _LEAST_LOAD)
     y = np.zeros(T.shape[1]) if start is None else np.linalg.lstsq(T, start.motion, rcond=None)[0]
     if start is None and laws:
         y = _guess(T, K, W, k, gap, laws, model.load, assembly)
@@ -341,7 +349,7 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
 
 def _farthest(motion: np.ndarray) -> tuple[int, int]:
     """Find the station that has moved the farthest, and its way; tilts and rotations count by 50 mm."""
-    station, way = divmod(int((np.abs(motion) * np.tile(_LEVERS, len(motion) // 6)).argmax()), 6)
+    station, way = divmod(int((np.abs(motion) * np.tile(LEVERS, len(motion) // 6)).argmax()), 6)
     return station, way
 
 
@@ -389,12 +397,12 @@ def _guess(T, K, W, k, gap, laws, load, assembly) -> np.ndarray:
     """Motions with a linear spring in the place of every rolling bearing."""
     tangent = K + (W * k) @ W.T
     for _, law, springs in laws:
-        rows = _spread(springs, assembly)
+        rows = spread_rows(springs, assembly)
         tangent = tangent + (rows.T * law.held) @ rows
     return _solved(T.T @ tangent @ T, T.T @ (load + W @ (k * gap)))
 
 
-def _spread(springs: StationSprings, assembly: Assembly) -> np.ndarray:
+def spread_rows(springs: StationSprings, assembly: Assembly) -> np.ndarray:
     """Rows (r, 6n) of springs among all motions."""
     found = np.zeros((len(springs.rows), assembly.count))
     for at, station in enumerate(springs.stations):
@@ -420,7 +428,7 @@ def _check_held(model: GearboxModel, fixed: Assembly, T, K, W, k, laws) -> None:
     """Refuse motions that neither springs nor bearings nor meshes hold."""
     tangent = K + (W * k) @ W.T
     for _, law, springs in laws:
-        rows = _spread(springs, fixed)
+        rows = spread_rows(springs, fixed)
         tangent = tangent + (rows.T * law.held) @ rows
     reduced = T.T @ tangent @ T
     size = np.sqrt(np.abs(np.diag(reduced)))
@@ -432,7 +440,7 @@ def _check_held(model: GearboxModel, fixed: Assembly, T, K, W, k, laws) -> None:
     motion = T @ (vectors[:, loose] / size[:, None])
     if CASING in fixed.names:
         check_casing_held(
-            motion, np.tile(_LEVERS, len(fixed.names)), fixed.names.index(CASING), int(np.count_nonzero(loose))
+            motion, np.tile(LEVERS, len(fixed.names)), fixed.names.index(CASING), int(np.count_nonzero(loose))
         )
     raise several(loose_shafts(model.case, member_of_stations(model), motion))
 
@@ -444,12 +452,14 @@ def _state(model: GearboxModel, q, gap, laws, residual: float, iterations: int) 
     force, stiffness = np.zeros((len(case.bearing), 6)), np.zeros((len(case.bearing), 6, 6))
     states: list[BearingState | None] = [None] * len(case.bearing)
     feet = _linear_bearings(model, q, press, laws, force, stiffness)
+    least = _PRESSED * max(np.abs(model.load).max(initial=0.0), (assembly.slice_stiffness * press).max(initial=0.0))
     for number, law, springs in laws:
-        motion = _spread(springs, assembly) @ q
+        motion = spread_rows(springs, assembly) @ q
         holding, tangent = law.force(motion)
         states[number] = law.state(motion)
         force[number] -= holding
-        stiffness[number] += tangent
+        # elements that rounding presses hold nothing
+        stiffness[number] += tangent if law.pressing(motion) > least else 0.0
     return Deflection(
         model,
         q,
@@ -474,7 +484,7 @@ def _linear_bearings(model: GearboxModel, q, press, laws, force, stiffness) -> n
         values = np.array(model.linear_stiffness(section))
         finite = np.where(np.isfinite(values), values, 0.0)
         stiffness[number] = np.diag(values)
-        force[number] = -finite * (_spread(springs, assembly) @ q)
+        force[number] = -finite * (spread_rows(springs, assembly) @ q)
         rigid += [(number, int(way)) for way in np.flatnonzero(np.isinf(values))]
     feet, foot_rows = elastic_foot_forces(model.casing, q), rigid_foot_rows(model.casing, assembly.count)
     if not rigid and not len(foot_rows):
@@ -482,9 +492,9 @@ def _linear_bearings(model: GearboxModel, q, press, laws, force, stiffness) -> n
     # what is out of balance at all stations is what rigid bearings, joints and held motions carry
     left = model.load - assembly.stiffness @ q - assembly.columns @ (assembly.slice_stiffness * press)
     for _, law, springs in laws:
-        rows = _spread(springs, assembly)
+        rows = spread_rows(springs, assembly)
         left = left - rows.T @ law.force(rows @ q)[0]
-    rows = np.array([_spread(model.bearings[number], assembly)[way] for number, way in rigid]).reshape(-1, len(q))
+    rows = np.array([spread_rows(model.bearings[number], assembly)[way] for number, way in rigid]).reshape(-1, len(q))
     others = _conditions(assembly, model)
     found = np.linalg.lstsq(np.vstack([rows, foot_rows, others]).T, left, rcond=None)[0]
     for (number, way), value in zip(rigid, found[: len(rigid)], strict=True):
@@ -499,7 +509,7 @@ def _conditions(assembly: Assembly, model: GearboxModel) -> np.ndarray:
     rows = [np.zeros((0, assembly.count))]
     for springs in model.joints:
         if np.isinf(springs.stiffness).any():
-            rows.append(_spread(springs, assembly)[np.isinf(springs.stiffness)])
+            rows.append(spread_rows(springs, assembly)[np.isinf(springs.stiffness)])
     for follower in assembly.followers:
         at = [6 * leader + way for leader in follower.leaders for way in range(6)]
         own = np.arange(6 * follower.station, 6 * follower.station + 6)

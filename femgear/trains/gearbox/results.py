@@ -31,6 +31,7 @@ from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_
 from femgear.trains.gearbox.life import describe_load_cases, life_text, life_variables, shortest_life
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
 from femgear.trains.gearbox.modes import GearboxModes
+from femgear.trains.gearbox.play import play_findings, slack_bearings
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -38,6 +39,8 @@ if TYPE_CHECKING:
 
 ESTIMATES = 0.5, 2.0
 """Factors on the stiffness of estimated bearings between which results are shown."""
+# Line loads whose sum over the slices is rounding [N/m].
+_LEAST_LOAD = 1e-3
 # Tilt up to which motions are small [rad].
 _LARGEST_TILT = 5e-3
 # Approach of flanks over their base pitch that no teeth bear, and how far beyond it nothing real does.
@@ -243,6 +246,12 @@ def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tu
             "motion of the shaft at the bearing",
         ),
         "bearing_place": ("bearing axis", bearing_places(state.model), "m", "place of the bearing"),
+        "slack": (
+            f"{bearing} motion",
+            np.array([slack_bearings(one) for one in every]).reshape(len(every), count, 6).astype(float),
+            "1",
+            "1 where the bearing holds no such motion for want of load and its shaft is free; else 0",
+        ),
         **life_variables(every, [one.share for one in state.model.case.operation.load_case]),
     }
 
@@ -461,6 +470,8 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield Finding("W-PASSES", "deflection.passes", text, remedy="allow more passes")
     if "displacement" in data:
         yield from _large(data)
+    if "slack" in data:
+        yield from play_findings(data)
     if "estimate_face_load_factor" in data:
         spread = np.ptp(data["estimate_face_load_factor"].values, axis=0)
         worst = int(np.nan_to_num(spread).argmax()) if len(spread) else 0
@@ -474,7 +485,7 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if "line_load" in data:
         load = data["line_load"].values
         idle = np.nansum(load <= 0.0, axis=1) / np.maximum(np.sum(np.isfinite(load), axis=1), 1)
-        idle = np.where(np.nansum(np.abs(load), axis=1) > 0.0, idle, 0.0)
+        idle = np.where(np.nansum(np.abs(load), axis=1) > _LEAST_LOAD, idle, 0.0)
         if idle.max(initial=0.0) > 0.0:
             worst = int(idle.argmax())
             text = f"{data['mesh'].values[worst]} carries on {1.0 - idle[worst]:.0%} of its width alone"

@@ -1,0 +1,86 @@
+"""Shafts that float in the play of their bearings: motions that the loaded state leaves free.
+
+A bearing with clearance holds what its loaded elements hold, one of a single axial sense what thrust presses into it.
+Where neither load nor weight nor preload presses a shaft into its bearings, nothing holds it there, and its modes are
+rigid ones. Meshes count with their whole stiffness.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.findings import Finding
+from femgear.trains.gearbox.deflection import LEVERS, Deflection, laws_of, spread_rows
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+# Eigenvalue over the largest one below which a motion has no stiffness, and motions that are none over the largest.
+_FREE, _STILL = 1e-10, 1e-3
+_WAYS = {"across": (0, 1), "along z": (2,), "against tilting": (3, 4)}
+_MOST_NAMED = 12
+
+
+def slack_bearings(found: Deflection) -> np.ndarray:
+    """Find the motions (b, 6) of bearings that they hold under load and leave free at this state."""
+    slack = np.zeros((len(found.states), 6), bool)
+    laws = laws_of(found.model, found.model.estimate)
+    if not any(_yields(law.held, found.bearing_stiffness[number]) for number, law, _ in laws):
+        return slack
+    free = free_motions(found)
+    for number, law, springs in laws:
+        moved = np.abs(spread_rows(springs, found.model.assembly) @ free) * np.array(LEVERS)[:, None]
+        slack[number] = (law.held > 0.0) & (moved.max(axis=1, initial=0.0) > _STILL)
+    return slack
+
+
+def _yields(held: np.ndarray, stiffness: np.ndarray) -> bool:
+    """Whether a bearing lacks stiffness in motions that it holds under load."""
+    ways = np.flatnonzero(held[:3] > 0.0)
+    values = np.linalg.eigvalsh(stiffness[np.ix_(ways, ways)])
+    return bool(values[0] <= _FREE * max(values[-1], 1.0))
+
+
+def free_motions(found: Deflection) -> np.ndarray:
+    """Find the motions (6n, f) that nothing holds at a loaded state, each at most 1 (m, or 20 rad)."""
+    assembly, model = found.model.assembly, found.model
+    held = assembly.held.copy()
+    held[model.turns] = True
+    T = replace(assembly, held=held).motions
+    tangent = assembly.stiffness + (assembly.columns * assembly.slice_stiffness) @ assembly.columns.T
+    for number, law, springs in laws_of(model, model.estimate):
+        rows = spread_rows(springs, assembly)
+        stiffness = found.bearing_stiffness[number]
+        if law.section.kind is None:
+            # of one axial sense: the rest of the bearing is among the springs
+            stiffness = np.diag([0.0, 0.0, stiffness[2, 2], 0.0, 0.0, 0.0])
+        tangent = tangent + rows.T @ stiffness @ rows
+    reduced = T.T @ tangent @ T
+    size = np.sqrt(np.abs(np.diag(reduced)))
+    size[size == 0.0] = size.max(initial=1.0)
+    values, vectors = np.linalg.eigh(reduced / np.outer(size, size))
+    free = T @ (vectors[:, values < _FREE * values.max(initial=0.0)] / size[:, None])
+    levers = np.tile(LEVERS, len(assembly.names))
+    return free / np.abs(free * levers[:, None]).max(axis=0, initial=0.0)
+
+
+def play_findings(data: xr.Dataset) -> Iterator[Finding]:
+    """Name bearings that carry nothing and hold nothing, with what is free in them (W-PLAY)."""
+    for number, name in enumerate(data["load_case"].values):
+        slack = data["slack"].values[number] > 0
+        loose = np.flatnonzero(slack.any(axis=1))
+        if not len(loose):
+            continue
+        names = [str(data["bearing"].values[place]) for place in loose]
+        ways = [words for words, places in _WAYS.items() if slack[:, places].any()]
+        more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
+        text = (
+            f"bearing{'s' * (len(names) > 1)} {', '.join(names[:_MOST_NAMED])}{more}: nothing presses the shaft into "
+            f"the play, which leaves it free {' and '.join(ways)} in load case {name}; modes of that are at 0 Hz"
+        )
+        remedy = "give weight ([gravity]), preload or less clearance, or a load that presses"
+        yield Finding("W-PLAY", "bearing", text, remedy=remedy)
