@@ -44,7 +44,7 @@ def test_without_load_shafts_float_in_the_clearance_of_their_balls():
     result, (text,), rigid = answers(on_balls("0 N m"))
     assert text.startswith("bearings A, B, C, D: ")
     assert "across and along z and against tilting in load case nominal" in text
-    # twelve motions of two shafts, but the rotation that is given, and two that the mesh ties: along its normal, and slope
+    # twelve motions of two shafts, but the given rotation, and two that the mesh ties: along its normal, and its slope
     assert rigid == free_motions(result.state).shape[1] == 9
     assert slack_bearings(result.state)[:, :5].all() and not slack_bearings(result.state)[:, 5].any()
 
