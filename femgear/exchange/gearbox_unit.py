@@ -14,6 +14,7 @@ from typing import Any
 
 from femgear.case.estimates import SUPPORT_SHARE, USUAL_STIFFNESS
 from femgear.case.quantities import ACCELERATION, ANGLE, LENGTH, SPEED, STIFFNESS, to_si
+from femgear.errors import CaseError
 from femgear.exchange.gear_unit import gears_of, plain_ids, shaft_of, stage_components
 from femgear.exchange.planetary_stage import is_bearing, with_unit
 from femgear.exchange.rexs import Component, Model
@@ -35,10 +36,13 @@ from femgear.exchange.unit_shafts import (
 from femgear.findings import NOTE
 
 CASING = "casing"
+SEATS = "seats"
+"""Key of findings on places of gears and bearings that the file does not have."""
 _ANGLE_KEY = "rotating_angle_around_neg_u_axis"
 # Names of parts that a case can have.
 _NAME = re.compile(r"(?=.{1,40}$)[A-Za-z][A-Za-z0-9_.-]*( [A-Za-z0-9_.-]+)*")
 _PARTS = ("assembly", "ordered_assembly")
+_SIDES = ("inner_part", "outer_part")
 _SUPPORT = "support of "
 _SUPPORTS = ("bearing_stiffness", "support_stiffness")
 # Parts beyond the end of a shaft by more make it longer, sections longer than this one [m].
@@ -46,7 +50,11 @@ _EDGE, _SHORTEST = 1e-9, 1e-5
 
 
 def gearbox_tables(
-    model: Model, stages: Mapping[str, dict[str, Any]], load_case: int | None = None
+    model: Model,
+    stages: Mapping[str, dict[str, Any]],
+    load_case: int | None = None,
+    *,
+    refused: Mapping[str, str] | None = None,
 ) -> tuple[dict[str, Any], dict[str, str]]:
     """Make the tables of a gearbox, with remarks by key on what is assumed.
 
@@ -58,6 +66,8 @@ def gearbox_tables(
         Tables of the case of every stage by its id.
     load_case : int, optional
         Number of the load case that contact, modes and pictures are of; by default the first.
+    refused : mapping of str to str, optional
+        Bearings by their names in the case that get a stiffness of usual size in place of what the file has, and why.
 
     Raises
     ------
@@ -67,7 +77,7 @@ def gearbox_tables(
     components = stage_components(model)
     if not components or any(stage.id not in stages for stage in components):
         raise NoGearbox("a stage of the unit became no case")
-    unit = _Unit(model, components, stages)
+    unit = _Unit(model, components, stages, refused or {})
     tables: dict[str, Any] = {"format": 1, "model": "gearbox", "title": _title(model, components)}
     operation, added = unit.operation(load_case)
     tables["shaft"] = [unit.shaft_table(shaft) for shaft in unit.shafts]
@@ -79,6 +89,9 @@ def gearbox_tables(
     tables["operation"] = operation
     if (weight := _gravity(model)) is not None:
         tables["gravity"] = weight
+    for entry, why in unit.unseated.items():
+        text, remedy = f"{entry}: {why}: taken as 0 mm", "give it in the gear unit, or the position in the case"
+        model.remark(SEATS, text, remedy=remedy)
     return {key: value for key, value in tables.items() if value != []}, unit.remarks
 
 
@@ -120,8 +133,15 @@ def _gravity(model: Model) -> dict[str, Any] | None:
 class _Unit:
     """Shafts, bearings, loads and stages of a unit, and where they are."""
 
-    def __init__(self, model: Model, stages: Sequence[Component], tables: Mapping[str, dict[str, Any]]):
-        self.model, self.stages, self.teeth = model, stages, tables
+    def __init__(
+        self,
+        model: Model,
+        stages: Sequence[Component],
+        tables: Mapping[str, dict[str, Any]],
+        refused: Mapping[str, str],
+    ):
+        self.model, self.stages, self.teeth, self.refused = model, stages, tables, refused
+        self.unseated: dict[str, str] = {}
         self.remarks: dict[str, str] = {}
         self.names = _part_names(model)
         self.couplings = [
@@ -188,7 +208,7 @@ class _Unit:
     def _shaft(self, gear: Component) -> str:
         shaft = shaft_of(self.model, gear)
         if shaft is None:
-            raise NoGearbox(f"{gear} has no shaft")
+            raise NoGearbox(f"{gear} has no shaft: no relation of the type assembly has it as part of one")
         self.components.setdefault(shaft.id, [shaft])
         return self.main.setdefault(shaft.id, shaft.id)
 
@@ -279,10 +299,20 @@ class _Unit:
 
     def at(self, part: Component, key: str = "u_coordinate_on_shaft") -> float:
         """Place of a part on its shaft [m], of a gear its middle."""
-        place = self.model.number(part, key, LENGTH) or 0.0
+        place = self._place(part, key)
         if part.id in self.gears and self.model.version.startswith("1.0"):
             place += 0.5 * (self.model.number(part, "face_width", LENGTH) or 0.0)
         return place
+
+    def _place(self, part: Component, key: str) -> float:
+        """Place of a part as the file has it [m], else zero; of gears and bearings that is kept to be told."""
+        try:
+            place, why = self.model.number(part, key, LENGTH), "the attribute is missing"
+        except CaseError as error:
+            place, why = None, f"{error.value}: {error.message}"
+        if place is None and (part.id in self.gears or _is_whole(part)):
+            self.unseated[f"{part}, {key}"] = why
+        return place or 0.0
 
     def _zeros(self) -> dict[str, tuple[float, float, float]]:
         """Axis and zero (x, y, z) of the shafts of the file [m]: their coordinates, else from stage to stage."""
@@ -467,15 +497,32 @@ class _Unit:
                 around = self.main[outer.id]
                 table["outer_shaft"] = self.name(around)
                 table["outer_position"] = self.position(around, self.height(part, outer, _side(True)))
-            own = reader.table(part, f"bearing[{len(found)}]", self._usual(shaft), turned=turned)
+            own = self._bearing(reader, part, f"bearing[{len(found)}]", self._usual(shaft), turned)
             if not {"radial", "axial", "tilt", "kind"} & own.keys():
                 reader.tell(part, "holds nothing in the file: left out", severity=NOTE)
                 continue
             found.append(table | own)
+        for part in self.model.components.values():
+            if _is_whole(part) and not any(self.model.related("side", r, assembly=part.id) for r in _SIDES):
+                reader.tell(
+                    part,
+                    "no relation of the type side joins it with a shaft: left out",
+                    "give inner_part and outer_part",
+                )
         reader.finish()
         for shaft in self.shafts:
             self._hold(shaft, found)
         return found
+
+    def _bearing(self, reader: BearingReader, part: Component, key: str, usual: float, turned: bool) -> dict[str, Any]:
+        """Table of a bearing, or of what stands in its place where it cannot be taken."""
+        why = self.refused.get(self.name(part))
+        if why is None:
+            try:
+                return reader.table(part, key, usual, turned=turned)
+            except CaseError as error:
+                why = " ".join(str(one) for one in (error.key, error.value) if one is not None) + f": {error.message}"
+        return reader.stand_in(part, usual, why, turned=turned)
 
     def _hold(self, shaft: str, found: list[dict[str, Any]]) -> None:
         """Hold a shaft without bearings, and tilts of one that is a rigid body in bearings at one place."""

@@ -171,7 +171,24 @@ def named(model: Model, wanted: str | None = None) -> Iterator[None]:
             read = [m for m in near if attribute in m.attributes and (m.type, attribute) in model.used]
             if len({member.attributes[attribute] for member in read}) == 1:
                 one.key = f"{read[0]}, {attribute} ({one.key})"
+            _suspect_ring(s, one)
         raise
+
+
+def _suspect_ring(s: _Stage, error: FemgearError) -> None:
+    """Let a refusal of the set name the teeth of the ring, where they are not those that sun and planets ask for."""
+    if "planet" not in s.gears or error.code not in ("E-ASSEMBLY", "E-CENTRE-DISTANCE", "E-NEIGHBOURS"):
+        return
+    counts = {name: s.model.number(gears[0], "number_of_teeth") for name, gears in s.gears.items()}
+    sun, planet, ring = (abs(counts[name] or 0.0) for name in _GEARS)
+    suiting = sun + 2.0 * planet
+    # profile shifts move it by a tooth or two
+    if abs(ring - suiting) > 0.0 and (error.code == "E-ASSEMBLY" or abs(ring - suiting) > 2.0):
+        error.remedies = (
+            f"check number_of_teeth of {s.gears['ring'][0]}: {ring:g}, where a sun of {sun:g} and planets of "
+            f"{planet:g} teeth without profile shift ask for {suiting:g}",
+            *error.remedies,
+        )
 
 
 def _chosen(model: Model, wanted: str | None) -> Component:
@@ -481,7 +498,7 @@ def add_bearings(
     width, modulus = to_si(tables["set"]["face_width"], LENGTH), tables["material"]["youngs_modulus"]
     rigid = min(RIGID * USUAL_STIFFNESS * to_si(modulus, MODULUS) / STEEL * width, _SOFT)
     springs = [one for one in found if is_bearing(one)]
-    values = [k for one in springs if (k := s.model.number(one, "radial_stiffness", STIFFNESS))]
+    values = [k for one in springs if (k := _radial_stiffness(s.model, one, f"{name}.{key}")) and k > 0.0]
     if max(values, default=0.0) > _SOFT:
         many = Counter(f"{one:.3g} N/m" for one in values).items()
         what = ", ".join(f"{n} bearing{'s' * (n > 1)} of {one}" for one, n in many)
@@ -499,6 +516,16 @@ def add_bearings(
     elif springs:
         text = f"{len(springs)} bearings without radial_stiffness, such as {springs[0]}: it is estimated"
         s.model.remark(f"{name}.{key}", text, remedy="give it in the case")
+
+
+def _radial_stiffness(model: Model, bearing: Component, key: str) -> float | None:
+    """Radial stiffness of a bearing [N/m]; None of one without it, or whose it cannot be read, which is told."""
+    try:
+        return model.number(bearing, "radial_stiffness", STIFFNESS)
+    except CaseError as error:
+        text = f"{bearing}, radial_stiffness {error.value}: {error.message}: not taken"
+        model.remark(key, text, remedy="correct it in the file, or give the stiffness in the case")
+        return None
 
 
 def is_bearing(part: Component) -> bool:

@@ -100,6 +100,21 @@ class BearingReader:
                 return self._assumed(part, key, kind, (bore, outside), sense, rigid=bool(radial))
         return self._springs(part, key, radial, sense, usual)
 
+    def stand_in(self, part: Component, usual: float, why: str, *, turned: bool = False) -> dict[str, Any]:
+        """Table of a bearing that cannot be taken: a usual stiffness [N/m], ``estimated``, told before all else."""
+        guess, sense = (
+            with_unit(usual, STIFFNESS),
+            SENSES.get(self.model.text(part, "axial_force_absorption") or "", "both"),
+        )
+        text = f"{part} is not taken: {why}; a bearing of {guess} stands in its place"
+        remedy = "correct it in the file, or give its stiffness, or kind with the geometry, in the case"
+        self.model.remark("bearing", text, remedy=remedy, first=True)
+        table: dict[str, Any] = {"radial": guess, "estimated": True}
+        if sense != "none":
+            table["axial"] = guess
+        sense = _OPPOSITE.get(sense, sense) if turned else sense
+        return table | ({"axial_sense": sense} if sense in _OPPOSITE else {})
+
     def _springs(self, part: Component, key: str, radial: float | None, sense: str, usual: float) -> dict[str, Any]:
         model, table = self.model, dict[str, Any]()
         tilt, axial = (

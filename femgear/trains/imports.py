@@ -13,7 +13,7 @@ from femgear.case.teeth import flank_form
 from femgear.errors import CaseError, FemgearError, GeometryError
 from femgear.exchange.cylindrical_stage import pair_tables
 from femgear.exchange.gear_unit import UnitFlow, case_flows, plain_ids, stage_components, stage_in_words
-from femgear.exchange.gearbox_unit import gearbox_tables, has_whole_shafts
+from femgear.exchange.gearbox_unit import SEATS, gearbox_tables, has_whole_shafts
 from femgear.exchange.planetary_stage import case_tables, named, stage_model
 from femgear.exchange.rexs import Component, Model
 from femgear.exchange.unit_model import unit_model
@@ -23,6 +23,7 @@ from femgear.trains.reading import parse_case
 from femgear.trains.registry import train_of
 
 _READ = ("planetary_stage", "cylindrical_stage")
+_NUMBERS = (("found", "value"), ("allowed", "limit"))
 MOST_STAGES = 40
 """Of a file from which all are taken."""
 
@@ -163,7 +164,7 @@ def _drafts(model: Model, stages, found, texts, load_case: int | None, *, alone:
             yield CaseDraft("", text, f"gearbox of {'all stages' if len(stages) > 1 else 'the unit'}")
             return
         except NoGearbox as error:
-            model.findings[:] = before
+            model.findings[:] = before + [one for one in model.findings if one.key == SEATS]
             if len(stages) > 1:
                 whole = f"no gearbox of all stages is written: {error}"
                 model.remark("", f"{whole}; each stage is a case of its own")
@@ -183,22 +184,41 @@ _OF_STAGES = re.compile(r"(gear_\d|sun|carrier|ring)\.(bearing|support)_stiffnes
 
 def _gearbox_text(model: Model, stages: dict[str, tuple[dict, dict]], load_case: int | None) -> str:
     """Text of the gearbox; NoGearbox where it makes no case, or of a single stage without whole shafts."""
-    model.findings[:] = [one for one in model.findings if not _OF_STAGES.search(one.key)]
-    tables, remarks = gearbox_tables(model, {id: one for id, (one, _) in stages.items()}, load_case)
-    if len(stages) == 1 and not has_whole_shafts(tables):
-        raise NoGearbox("the shafts of the only stage have no sections or no bearings")
-    try:
-        case = parse_case(case_text.write(tables))
-        train_of(case).describe_case(case)
-    except FemgearError as error:
-        first = next(iter(error.problems), error)
-        raise NoGearbox(f"{first.key}: {first.message}") from error
+    known = [one for one in model.findings if not _OF_STAGES.search(one.key)]
+    teeth, refused = {id: one for id, (one, _) in stages.items()}, dict[str, str]()
+    while True:
+        model.findings[:] = known
+        tables, remarks = gearbox_tables(model, teeth, load_case, refused=refused)
+        if len(stages) == 1 and not has_whole_shafts(tables):
+            raise NoGearbox("the shafts of the only stage have no sections or no bearings")
+        try:
+            case = parse_case(case_text.write(tables))
+            train_of(case).describe_case(case)
+            break
+        except FemgearError as error:
+            wrong = _refused_bearings(tables, error)
+            if not wrong or wrong.keys() & refused.keys():
+                first = next(iter(error.problems), error)
+                more = "".join(f", {word} {value}" for word, name in _NUMBERS if (value := getattr(first, name)))
+                raise NoGearbox(f"{first.key}: {first.message}{more}") from error
+            refused |= wrong
     for kind, wanted in (("pair", "cylindrical_stage"), ("planetary", "planetary_stage")):
         own = [one.id for one in stage_components(model) if one.type == wanted]
         for number, id in enumerate(own):
             remarks |= {f"{kind}[{number}].teeth.{key}": text for key, text in stages[id][1].items()}
     head = f"# Written by femgear import (REXS {model.version}). What is assumed says so."
     return "\n".join([head, case_text.write(tables, remarks)])
+
+
+def _refused_bearings(tables: dict, error: FemgearError) -> dict[str, str]:
+    """Bearings that a case refuses, by their names, and why."""
+    found: dict[str, str] = {}
+    for one in error.problems:
+        if place := re.match(r"bearing\[(\d+)\]\.(\w+)$", one.key or ""):
+            value = "" if one.value is None else f" {one.value}"
+            limit = f", allowed: {one.limit}" if one.limit else ""
+            found.setdefault(tables["bearing"][int(place[1])]["name"], f"{place[2]}{value}: {one.message}{limit}")
+    return found
 
 
 def _listed(words: list[str]) -> str:

@@ -4,7 +4,8 @@ import math
 from pathlib import Path
 
 import pytest
-from rexs_stage import Gearbox, ParallelUnit, both_units
+from rexs_stage import MM, NONE, Gearbox, ParallelUnit, both_units
+from rexs_units import ThreeStageUnit, planetary_unit
 
 from femgear import cli
 from femgear.case import text as case_text
@@ -182,3 +183,79 @@ def test_names_without_an_ending(tmp_path, monkeypatch):
     ParallelUnit().write(Path("unit.rexs"))
     assert cli.main(["import", "unit.rexs", "-o", "unit"]) == 0
     assert len(read_case("unit").pair) == 2
+
+
+BAD_BEARINGS = {
+    "too many balls": {
+        "number_of_rolling_elements": (100, NONE),
+        "diameter_of_rolling_element": (9.0, MM),
+        "pitch_diameter": (25.0, MM),
+    },
+    "a bore below zero": {"inner_diameter": (-5.0, MM)},
+    "a rating below zero": {"dynamic_capacity": (-3.0, "kN")},
+    "a clearance of 50 mm": {"radial_bearing_clearance": (50.0, MM)},
+    "a unit that is none": {"radial_stiffness": (5.0, "furlong")},
+    "no number": {"radial_stiffness": ("stiff", "N / m")},
+}
+
+
+@pytest.mark.parametrize("what", BAD_BEARINGS)
+def test_a_bearing_that_cannot_be_taken_leaves_the_gearbox_whole(tmp_path, what):
+    box = ThreeStageUnit()
+    box.components[32]["attributes"] |= BAD_BEARINGS[what]
+    found, findings = drafts_of(box, tmp_path)
+    case = parse_case(found[""].text)
+    assert case.train == "gearbox" and len(case.bearing) == 9
+    # said before all else, with what stands in its place: it takes thrust one way, as that of the file
+    assert findings[0].text.startswith("rolling_bearing_with_catalog_geometry 32 is not taken: ")
+    assert "a bearing of 92000000 N/m stands in its place" in findings[0].text
+    (bearing,) = (one for one in case.bearing if one.radial is not None)
+    assert (bearing.radial, bearing.axial, bearing.axial_sense, bearing.estimated) == (92e6, 92e6, "negative", True)
+    assert sum("is not taken" in one.text for one in findings) == 1
+
+
+def test_two_bad_bearings_are_both_replaced(tmp_path):
+    box = ThreeStageUnit()
+    box.components[32]["attributes"] |= BAD_BEARINGS["too many balls"]
+    box.components[51]["attributes"] |= BAD_BEARINGS["no number"]
+    found, findings = drafts_of(box, tmp_path)
+    assert parse_case(found[""].text).train == "gearbox"
+    assert sum("stands in its place" in one.text for one in findings) == 2
+
+
+def test_places_that_the_file_does_not_have_are_named(tmp_path):
+    box = ThreeStageUnit()
+    del box.components[32]["attributes"]["u_coordinate_on_shaft_inner_side"]
+    found, findings = drafts_of(box, tmp_path)
+    case = parse_case(found[""].text)
+    assert case.train == "gearbox" and case.bearing[2].position == 0.0
+    (told,) = (one for one in findings if one.key == "seats")
+    assert "catalog_geometry 32, u_coordinate_on_shaft_inner_side: the attribute is missing" in told.text
+    # of a gear: it does not face its mate
+    box = ThreeStageUnit()
+    del box.components[38]["attributes"]["u_coordinate_on_shaft"]
+    found, findings = drafts_of(box, tmp_path)
+    assert "" not in found
+    texts = " ".join(one.text for one in findings)
+    assert "cylindrical_gear 38, u_coordinate_on_shaft: the attribute is missing" in texts
+    assert "do not face each other along their axes, found middles at z = " in texts
+
+
+def test_bearings_that_nothing_joins_are_told(tmp_path):
+    box = ThreeStageUnit()
+    box.relations = [one for one in box.relations if not (one[0] == "side" and one[1]["assembly"] == 32)]
+    found, findings = drafts_of(box, tmp_path)
+    assert len(parse_case(found[""].text).bearing) == 8
+    assert any("bearing 32: no relation of the type side" in one.text for one in findings)
+
+
+@pytest.mark.parametrize(("teeth", "code"), [(60, "E-ASSEMBLY"), (610, "E-CENTRE-DISTANCE")])
+def test_teeth_of_a_ring_that_do_not_suit_are_named(tmp_path, teeth, code):
+    box = planetary_unit().set(58, number_of_teeth=(teeth, NONE))
+    with pytest.raises(FemgearError) as error:
+        drafts_of(box, tmp_path)
+    assert error.value.code == code
+    wanted = (
+        f"check number_of_teeth of ring_gear 58: {teeth}, where a sun of 17 and planets of 22 teeth without profile"
+    )
+    assert error.value.remedy.startswith(wanted) and "ask for 61" in error.value.remedy
