@@ -26,7 +26,13 @@ _MOST_NAMED = 12
 
 
 def slack_bearings(found: Deflection) -> np.ndarray:
-    """Find the motions (b, 6) of bearings that they hold under load and leave free at this state."""
+    """Find the motions of bearings that they hold under load and leave free at this state.
+
+    Returns
+    -------
+    (b, 6) bool array
+        By bearing and motion of the inner ring against the outer one; a bearing counts where its shaft moves freely.
+    """
     slack = np.zeros((len(found.states), 6), bool)
     laws = laws_of(found.model, found.model.estimate)
     if not any(_yields(law.held, found.bearing_stiffness[number]) for number, law, _ in laws):
@@ -46,7 +52,13 @@ def _yields(held: np.ndarray, stiffness: np.ndarray) -> bool:
 
 
 def free_motions(found: Deflection) -> np.ndarray:
-    """Find the motions (6n, f) that nothing holds at a loaded state, each at most 1 (m, or 20 rad)."""
+    """Find the motions that nothing holds at a loaded state, but for the rotations that are given.
+
+    Returns
+    -------
+    (6n, f) array
+        Motions of all stations, each of a size of 1 m, or of 20 rad.
+    """
     assembly, model = found.model.assembly, found.model
     held = assembly.held.copy()
     held[model.turns] = True
@@ -69,7 +81,10 @@ def free_motions(found: Deflection) -> np.ndarray:
 
 
 def play_findings(data: xr.Dataset) -> Iterator[Finding]:
-    """Name bearings that carry nothing and hold nothing, with what is free in them (W-PLAY)."""
+    """Name bearings that carry nothing and hold nothing, with what is free in them (W-PLAY).
+
+    ``data`` is that of deflection.nc; every load case has a finding of its own.
+    """
     for number, name in enumerate(data["load_case"].values):
         slack = data["slack"].values[number] > 0
         loose = np.flatnonzero(slack.any(axis=1))
