@@ -19,6 +19,7 @@ from femgear.exchange.gear_unit import gears_of, plain_ids, shaft_of, stage_comp
 from femgear.exchange.planetary_stage import is_bearing, with_unit
 from femgear.exchange.rexs import Component, Model
 from femgear.exchange.unit_bearings import BearingReader, coupling_table, engaged
+from femgear.exchange.unit_lubrication import temperature_rise, thermal_expansion, unit_lubrication
 from femgear.exchange.unit_operation import OperationReader, shaft_groups
 from femgear.exchange.unit_shafts import (
     TOLERANCE,
@@ -89,6 +90,9 @@ def gearbox_tables(
     tables["operation"] = operation
     if (weight := _gravity(model)) is not None:
         tables["gravity"] = weight
+    casings = (part for part in model.components.values() if part.type == "gear_casing")
+    if rise := next((one for part in casings if (one := temperature_rise(model, part))), None):
+        tables["thermal"] = {"casing_rise": f"{rise:.6g} K"}
     for entry, why in unit.unseated.items():
         text, remedy = f"{entry}: {why}: taken as 0 mm", "give it in the gear unit, or the position in the case"
         model.remark(SEATS, text, remedy=remedy)
@@ -170,6 +174,7 @@ class _Unit:
             for part in model.related(_PARTS, "part", assembly=component.id)
             if part.type == "external_load"
         ]
+        self.lubrication = unit_lubrication(model)
         self.zero = self._zeros()
         self.pieces = {shaft: self._pieces(shaft) for shaft in self.shafts}
 
@@ -483,9 +488,12 @@ class _Unit:
         table["start"] = _length(self.start(shaft))
         if pieces := [piece.table for piece in self.pieces[shaft] if piece.end - piece.start > _SHORTEST]:
             table["part"] = pieces
-        if material := material_table(self.model, self.model.components[shaft]):
-            table["material"] = material
-        return table
+        material = material_table(self.model, self.model.components[shaft])
+        if rise := temperature_rise(self.model, self.model.components[shaft]):
+            table["temperature_rise"] = f"{rise:.6g} K"
+            if (expansion := thermal_expansion(self.model, self.model.components[shaft])) is not None:
+                material["thermal_expansion"] = f"{expansion:.6g} 1/K"
+        return table | ({"material": material} if material else {})
 
     def bearing_tables(self) -> list[dict[str, Any]]:
         """Tables of all bearings, and of those that shafts without any need."""
@@ -501,7 +509,7 @@ class _Unit:
             if not {"radial", "axial", "tilt", "kind"} & own.keys():
                 reader.tell(part, "holds nothing in the file: left out", severity=NOTE)
                 continue
-            found.append(table | own)
+            found.append(table | own | self._oil(part, own, component, outer, f"bearing[{len(found)}]"))
         for part in self.model.components.values():
             if _is_whole(part) and not any(self.model.related("side", r, assembly=part.id) for r in _SIDES):
                 reader.tell(
@@ -523,6 +531,22 @@ class _Unit:
             except CaseError as error:
                 why = " ".join(str(one) for one in (error.key, error.value) if one is not None) + f": {error.message}"
         return reader.stand_in(part, usual, why, turned=turned)
+
+    def _oil(self, part: Component, table: Mapping[str, Any], inner: Component, outer: Component | None, key: str):
+        """Lubrication of a rolling bearing; nothing, and told, where its numbers cannot be read."""
+        if "kind" not in table:
+            return {}
+        try:
+            pitch = to_si(table["pitch_diameter"], LENGTH)
+            shafts = [inner.id, *([] if outer is None else [outer.id])]
+            entries = self.lubrication.entries(part, table, pitch, shafts)
+        except CaseError as error:
+            where = f"{error.key} " if error.key else ""
+            self.model.remark("bearing", f"{part}: {where}{error.message}: its lubrication is not taken")
+            return {}
+        if "viscosity_ratio" in entries:
+            self.remarks[f"{key}.viscosity_ratio"] = "least of all load cases, of the oil at its temperature"
+        return entries
 
     def _hold(self, shaft: str, found: list[dict[str, Any]]) -> None:
         """Hold a shaft without bearings, and tilts of one that is a rigid body in bearings at one place."""

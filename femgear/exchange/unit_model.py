@@ -390,6 +390,10 @@ class _UnitWriter:
         if estimated:
             text = f"{len(estimated)} bearings are estimated, which REXS cannot say: they come back as given"
             tell(f"bearing[{estimated[0]}].estimated", text, severity=NOTE)
+        warm = [f"shaft[{number}]" for number, one in enumerate(case.shaft) if one.temperature_rise]
+        warm += ["thermal"] if case.thermal.casing_rise else []
+        if warm:
+            tell(warm[0], f"temperatures of {', '.join(warm[:6])} are left out", remedy="give them again after import")
         for number, one in enumerate(case.bearing):
             if one.torsional:
                 tell(f"bearing[{number}].torsional", "REXS has no stiffness of a bearing against rotation: left out")

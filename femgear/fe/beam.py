@@ -362,6 +362,17 @@ def joint_deflections(length: float) -> np.ndarray:
     return np.hstack([-first, second])
 
 
+def growth_load(shaft: BeamShaft, growth: float) -> np.ndarray:
+    """Compute the loads (6n,) on its stations that give a free shaft its growth along the axis [N].
+
+    ``growth`` is that of its length over it, such as alpha dT by heat. The loads are the stiffness times the motions of
+    a shaft that grows freely, exact for sections of any size.
+    """
+    free = np.zeros((len(shaft.stations), 6))
+    free[:, 2] = growth * np.asarray(shaft.stations)
+    return shaft.stiffness @ free.ravel()
+
+
 def rigid_link(offset) -> np.ndarray:
     """Compute the motions (6, 6) of a point at an offset (3,) [m] per unit of the motions of its station.
 

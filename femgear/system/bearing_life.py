@@ -285,6 +285,32 @@ def life_factor(bearing: Bearing, viscosity_ratio: float, contamination: float, 
     return LARGEST_LIFE_FACTOR if bracket <= 0.0 else min(0.1 * bracket**exponent, LARGEST_LIFE_FACTOR)
 
 
+def reference_viscosity(pitch_diameter: float, speed: float) -> float:
+    """Compute the viscosity nu_1 that a bearing needs [m^2/s] (ISO 281), from its pitch diameter [m] and speed [rad/s].
+
+    ``nu_1 = 45000 n^-0.83 D_pw^-0.5`` below 1000 rpm, ``4500 n^-0.5 D_pw^-0.5`` from there on [mm^2/s, rpm, mm].
+    """
+    if not (pitch_diameter > 0.0 and speed > 0.0):
+        raise CaseError(f"a pitch diameter of {pitch_diameter} m and {speed} rad/s", code="E-RANGE", limit="above 0")
+    turns = speed * 30.0 / math.pi
+    factor = 45000.0 * turns**-0.83 if turns < 1000.0 else 4500.0 * turns**-0.5
+    return 1e-6 * factor / math.sqrt(1e3 * pitch_diameter)
+
+
+def oil_viscosity(at_40: float, at_100: float, temperature: float) -> float:
+    """Compute the kinematic viscosity of an oil [m^2/s] at a temperature [degrees Celsius] (ASTM D341).
+
+    ``lg lg (nu + 0.7) = A - B lg T`` [mm^2/s, K] through those at 40 and 100 degrees.
+    """
+    if not (at_40 > at_100 > 0.3e-6 and temperature > -273.0):
+        found = f"{1e6 * at_40:g} mm^2/s at 40, {1e6 * at_100:g} at 100, asked at {temperature:g} degrees"
+        raise CaseError(found, code="E-RANGE", limit="an oil that is thinner when it is hot, above 0.3 mm^2/s")
+    low, high = (math.log10(math.log10(1e6 * value + 0.7)) for value in (at_40, at_100))
+    cold, hot = math.log10(313.15), math.log10(373.15)
+    place = low + (high - low) * (math.log10(temperature + 273.15) - cold) / (hot - cold)
+    return 1e-6 * (10.0 ** (10.0**place) - 0.7)
+
+
 def _ball_factors(bearing: BallBearing, axial: float) -> LoadFactors:
     """Radial and angular contact ball bearings: ISO 281, Table 3."""
     degrees = math.degrees(abs(bearing.contact_angle))

@@ -14,6 +14,7 @@ from femgear.fe.beam import (
     beam_element,
     beam_shaft,
     body_matrices,
+    growth_load,
     joint_deflections,
     part_element,
     rigid_link,
@@ -319,3 +320,20 @@ def test_shafts_of_the_printed_springs_are_those_of_the_page():
     words = "{}, {} and {} mm diameter and {}, {} and {} m length"
     found = [f"{1e3 * d:.0f}" for d, _ in sizes] + [f"{length:.2f}" for _, length in sizes]
     assert words.format(*found) in " ".join(page.split())
+
+
+def test_growth_moves_the_stations_of_a_free_shaft_apart_and_loads_nothing_else():
+    parts = [ShaftPart(0.05, 0.03), ShaftPart(0.04, 0.05, end_outer_diameter=0.03), ShaftPart(0.06, 0.03, 0.01)]
+    shaft = beam_shaft(parts, [0.07])
+    load = growth_load(shaft, 4.6e-4).reshape(-1, 6)
+    assert load.sum(axis=0) == pytest.approx(np.zeros(6), abs=1e-6 * np.abs(load).max())
+    held = np.ones(load.size, bool)
+    held[:6] = False
+    motion = np.zeros(load.size)
+    motion[held] = np.linalg.solve(shaft.stiffness[np.ix_(held, held)], load.ravel()[held])
+    assert motion.reshape(-1, 6)[:, 2] == pytest.approx(4.6e-4 * np.asarray(shaft.stations), rel=1e-9)
+    # held at both ends it presses with E A growth, of a bar of one section
+    bar = beam_shaft([ShaftPart(0.1, 0.03)], [])
+    assert growth_load(bar, 1e-3).reshape(-1, 6)[[0, -1], 2] == pytest.approx(
+        2.06e11 * 0.25 * math.pi * 0.03**2 * 1e-3 * np.array([-1.0, 1.0])
+    )

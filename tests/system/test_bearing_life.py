@@ -12,9 +12,11 @@ from femgear.system.bearing_life import (
     equivalent_load,
     life_factor,
     load_factors,
+    oil_viscosity,
     passing_orders,
     reference_load,
     reference_rating_life,
+    reference_viscosity,
 )
 from femgear.system.rolling_bearings import BallBearing, RollerBearing, bearing_state, solve_motion
 
@@ -197,3 +199,21 @@ def test_numbers_out_of_range_are_refused():
         with pytest.raises(CaseError) as caught:
             call()
         assert caught.value.code == code
+
+
+def test_the_viscosity_that_a_bearing_needs_joins_at_1000_rpm():
+    below, above = (reference_viscosity(0.07, turns * math.pi / 30.0) for turns in (999.999, 1000.0))
+    # 45000 n^-0.83 and 4500 n^-0.5 meet within their rounding: 10^0.01
+    assert below == pytest.approx(above, rel=0.025)
+    assert reference_viscosity(0.07, 1500.0 * math.pi / 30.0) == pytest.approx(4500e-6 / math.sqrt(1500.0 * 70.0))
+    with pytest.raises(CaseError, match="E-RANGE"):
+        reference_viscosity(0.07, 0.0)
+
+
+def test_the_viscosity_of_an_oil_goes_through_its_points():
+    for temperature, value in ((40.0, 100.0), (100.0, 11.0)):
+        assert 1e6 * oil_viscosity(100e-6, 11e-6, temperature) == pytest.approx(value, rel=1e-12)
+    # ISO VG 100 with a viscosity index of 95 at 70 degrees: charts have 27 to 28 mm^2/s
+    assert 1e6 * oil_viscosity(100e-6, 11e-6, 70.0) == pytest.approx(27.5, rel=0.03)
+    with pytest.raises(CaseError, match="E-RANGE"):
+        oil_viscosity(11e-6, 100e-6, 70.0)

@@ -49,6 +49,8 @@ from femgear.trains.gearbox.materials import with_materials
 from femgear.trains.reading import parse_case
 
 FORCE = Dimension("a force", "N", "N", 1.0)
+RISE = Dimension("a temperature difference", "K", "K", 1.0)
+EXPANSION = Dimension("a thermal expansion", "1/K", "1/K", 1.0)
 CASING = "casing"
 """In place of a shaft: the casing, which stands still unless the case describes it."""
 MOST_PARTS = 200
@@ -87,6 +89,9 @@ Turning = Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)]
 Product = Annotated[float, Quantity(INERTIA, -1e11, 1e11)]
 MeshStiffness = Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
 Torque = Annotated[float, Quantity(TORQUE, -_LARGEST_TORQUE, _LARGEST_TORQUE)]
+Rise = Annotated[float, Quantity(RISE, -300.0, 1000.0)]
+"""Of the temperature in operation over that at which the gearbox was put together."""
+Expansion = Annotated[float, Quantity(EXPANSION, -1e-4, 1e-3)]
 Force = Annotated[float, Quantity(FORCE, -_LARGEST_FORCE, _LARGEST_FORCE)]
 ShaftSpeed = Annotated[float, Quantity(SPEED, -1e6 * SPEED.scale, 1e6 * SPEED.scale)]
 Entry = Annotated[float, Number(-1e30, 1e30)]
@@ -101,6 +106,7 @@ class ShaftMaterialSection(Section):
     youngs_modulus: Annotated[float, Quantity(MODULUS, 1e6, 1e12)] = 2.06e11
     poisson_ratio: Annotated[float, Number(0.0, 0.5, open_high=True)] = 0.3
     density: Annotated[float, Quantity(DENSITY, 0.0, 25000.0)] = 7850.0
+    thermal_expansion: Expansion = 1.15e-5
 
 
 class BoxShaftPartSection(Section):
@@ -132,6 +138,7 @@ class BoxShaftSection(Section):
     start: Along = 0.0
     part: Annotated[tuple[BoxShaftPartSection, ...], Field(max_length=MOST_PARTS)] = ()
     material: ShaftMaterialSection | None = None
+    temperature_rise: Rise = 0.0
 
     @property
     def length(self) -> float:
@@ -417,6 +424,13 @@ class LoadSection(SeatSection):
     tilting_moment: Annotated[tuple[Torque, ...], PAIR] = (0.0, 0.0)
 
 
+class ThermalSection(Section):
+    """Growth of the casing by heat; that of shafts is by their ``temperature_rise``."""
+
+    casing_rise: Rise = 0.0
+    casing_expansion: Expansion = 1.1e-5
+
+
 class BoxGravitySection(Section):
     """Weight of all parts, in a direction across the axes or along them."""
 
@@ -528,6 +542,7 @@ class GearboxCase(Section, ReadCase):
     planetary: Annotated[tuple[BoxPlanetarySection, ...], Field(max_length=20)] = ()
     load: Annotated[tuple[LoadSection, ...], Field(max_length=MOST_PARTS)] = ()
     gravity: BoxGravitySection | None = None
+    thermal: ThermalSection = ThermalSection()
     casing: BoxCasingSection | None = None
     operation: BoxOperationSection
     deflection: DeflectionSection = DeflectionSection()
@@ -546,6 +561,12 @@ class GearboxCase(Section, ReadCase):
     def shaft_named(self, name: str) -> BoxShaftSection:
         """Find the shaft of that name."""
         return next(shaft for shaft in self.shaft if shaft.name == name)
+
+    def growth_of(self, shaft: str) -> float:
+        """Compute by how much a shaft grows along its axis beyond the casing, over its length [1]."""
+        section, casing = self.shaft_named(shaft), self.thermal
+        growth = self.material_of(section).thermal_expansion * section.temperature_rise
+        return growth - casing.casing_expansion * casing.casing_rise
 
     def material_of(self, shaft: BoxShaftSection) -> ShaftMaterialSection:
         """Find the material of a shaft."""

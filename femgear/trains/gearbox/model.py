@@ -19,7 +19,7 @@ from femgear.case.estimates import gear_cylinder
 from femgear.case.gear_set import planetary_set
 from femgear.case.sections import gear_material
 from femgear.errors import CaseError
-from femgear.fe.beam import BeamShaft, ShaftPart, beam_shaft, body_matrices, rigid_link
+from femgear.fe.beam import BeamShaft, ShaftPart, beam_shaft, body_matrices, growth_load, rigid_link
 from femgear.gears.iso6336 import pair_mesh_stiffness
 from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, StationSprings, joint, mesh_normal
 from femgear.trains.gearbox.carrier import pin_axes, pin_compliance, planet_springs
@@ -559,6 +559,10 @@ class _Builder:
             if self.casing is not None:
                 field[list(self.casing.elastic)] = 0.0
             load += assembly.mass @ field.ravel()
+        for name, beam in self.beams.items():
+            # motions are those against the grown casing: beams carry what they grow beyond it
+            start = 6 * self.first[name]
+            load[start : start + len(beam.stiffness)] += growth_load(beam, self.case.growth_of(name))
         return load
 
 

@@ -37,7 +37,7 @@ def slack_bearings(found: Deflection) -> np.ndarray:
     laws = laws_of(found.model, found.model.estimate)
     if not any(_yields(law.held, found.bearing_stiffness[number]) for number, law, _ in laws):
         return slack
-    free = free_motions(found)
+    free = unheld_motions(found)
     for number, law, springs in laws:
         moved = np.abs(spread_rows(springs, found.model.assembly) @ free) * np.array(LEVERS)[:, None]
         slack[number] = (law.held > 0.0) & (moved.max(axis=1, initial=0.0) > _STILL)
@@ -51,7 +51,7 @@ def _yields(held: np.ndarray, stiffness: np.ndarray) -> bool:
     return bool(values[0] <= _FREE * max(values[-1], 1.0))
 
 
-def free_motions(found: Deflection) -> np.ndarray:
+def unheld_motions(found: Deflection) -> np.ndarray:
     """Find the motions that nothing holds at a loaded state, but for the rotations that are given.
 
     Returns

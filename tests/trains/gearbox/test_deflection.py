@@ -247,3 +247,60 @@ def test_the_shaft_whose_thrust_no_bearing_takes_in_its_sense_is_named():
         tables["bearing"][0]["axial_sense"] = "negative"
     text = refused(tables)
     assert "nothing takes the thrust on shaft input" in text
+
+
+E, AREA, LENGTH = 2.06e11, 0.25 * math.pi * 0.03**2, 0.08  # of the input shaft, and between its bearings
+
+
+def hot(axial="rigid", **entries):
+    """Tables of a pair whose input shaft is held along its axis in both bearings, 80 mm apart."""
+    tables = pair_tables()
+    tables["shaft"][0] |= {"temperature_rise": "40 K"} | entries
+    for bearing in tables["bearing"][:2]:
+        bearing["axial"] = axial
+    return tables
+
+
+def thrusts(tables) -> np.ndarray:
+    return solve_deflection(read_case(tables)).bearing_force[:, 2]
+
+
+def test_a_shaft_between_two_fixed_bearings_presses_on_them():
+    force = E * AREA * 1.15e-5 * 40.0
+    # bearings push the shaft together: the left one towards +z
+    assert thrusts(hot()) == pytest.approx([force, -force, 0.0, 0.0], rel=1e-9, abs=1e-6 * force)
+
+
+def test_springs_along_the_axis_give_way():
+    stiffness = 1e8
+    force = 1.15e-5 * 40.0 * LENGTH / (LENGTH / (E * AREA) + 2.0 / stiffness)
+    assert thrusts(hot("1e8 N/m"))[:2] == pytest.approx([force, -force], rel=1e-9)
+
+
+def test_steps_of_the_shaft_count_each():
+    halves = [{"length": "45 mm", "outer_diameter": "30 mm"}, {"length": "45 mm", "outer_diameter": "24 mm"}]
+    # held from 5 to 85 mm: 40 mm of either part
+    compliance = 0.04 / (E * AREA) + 0.04 / (E * AREA * 0.64)
+    force = 1.15e-5 * 40.0 * LENGTH / compliance
+    assert thrusts(hot(part=halves))[:2] == pytest.approx([force, -force], rel=1e-9)
+
+
+def test_the_growth_of_the_casing_counts_against_it():
+    tables = hot() | {"thermal": {"casing_rise": "20 K", "casing_expansion": "2.3e-5 1/K"}}
+    case = read_case(tables)
+    # aluminium of half the rise grows as steel of the whole one
+    assert case.growth_of("input") == pytest.approx(40.0 * 1.15e-5 - 20.0 * 2.3e-5, abs=1e-18)
+    assert thrusts(tables) == pytest.approx(np.zeros(4), abs=1e-3)
+    # the other shaft is colder than the casing: it is pulled, but for one bearing that lets it slide
+    assert case.growth_of("output") == pytest.approx(-4.6e-4)
+
+
+def test_a_shaft_that_may_slide_grows_without_force():
+    tables = pair_tables()
+    tables["shaft"][0]["temperature_rise"] = "40 K"
+    found = solve_deflection(read_case(tables))
+    assert found.bearing_force[:, 2] == pytest.approx(np.zeros(4), abs=1e-6)
+    end = found.model.seat("input", 0.09).station, found.model.seat("input", 0.005).station
+    along = found.motion.reshape(-1, 6)[list(end), 2]
+    # from bearing A, at 5 mm, to the end of the shaft
+    assert along[0] - along[1] == pytest.approx(1.15e-5 * 40.0 * 0.085, rel=1e-9)

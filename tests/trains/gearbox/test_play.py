@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_gearbox import pair_tables
 
-from femgear.trains.gearbox.play import free_motions, play_findings, slack_bearings
+from femgear.trains.gearbox.play import play_findings, slack_bearings, unheld_motions
 from femgear.trains.gearbox.results import deflection_warnings
 from femgear.trains.gearbox.stages import solve_box_modes, solve_deflections
 from femgear.trains.reading import read_case
@@ -45,7 +45,7 @@ def test_without_load_shafts_float_in_the_clearance_of_their_balls():
     assert text.startswith("bearings A, B, C, D: ")
     assert "across and along z and against tilting in load case nominal" in text
     # twelve motions of two shafts, but the given rotation, and two that the mesh ties: along its normal, and its slope
-    assert rigid == free_motions(result.state).shape[1] == 9
+    assert rigid == unheld_motions(result.state).shape[1] == 9
     assert slack_bearings(result.state)[:, :5].all() and not slack_bearings(result.state)[:, 5].any()
 
 
@@ -57,7 +57,7 @@ def test_load_weight_or_preload_hold_them(what):
     result, texts, rigid = answers(tables)
     assert (texts, rigid) == ([], 0)
     assert not result.contents()["slack"].values.any()
-    assert free_motions(result.state).shape[1] == 0
+    assert unheld_motions(result.state).shape[1] == 0
 
 
 def test_bearings_of_one_sense_hold_nothing_along_their_axis_without_thrust():

@@ -27,7 +27,7 @@ from femgear.trains.gearbox.case_file import CASING
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.model import bearing_motions, bearing_places
 from femgear.trains.gearbox.modes import linear_system
-from femgear.trains.gearbox.play import free_motions, slack_bearings
+from femgear.trains.gearbox.play import slack_bearings, unheld_motions
 from femgear.trains.gearbox.power import port_shafts
 from femgear.trains.reading import read_case
 
@@ -197,7 +197,7 @@ def test_bearings_that_are_named_are_those_of_the_rigid_modes(seed):
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
     modes = solve_modes(still, stiffness, damping_ratio=0.03, count=min(MODES, len(system.dofs)))
     rigid = sum(kind == "rigid" for kind in modes.kind)
-    assert rigid == len(found.model.turns) + free_motions(found).shape[1]
+    assert rigid == len(found.model.turns) + unheld_motions(found).shape[1]
     assert slack_bearings(found).any() == (rigid > len(found.model.turns))
 
 
