@@ -347,6 +347,17 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
             attrs={"ways": 1},
         ),
     ),
+    "W-PLAY": lambda: of_stage(
+        "gearbox",
+        "deflection",
+        xr.Dataset(
+            {
+                "settled": ("load_case", [True]),
+                "slack": (("load_case", "bearing", "motion"), [[[0.0, 0.0, 1.0, 0.0, 0.0, 0.0]]]),
+            },
+            coords={"load_case": ["nominal"], "bearing": ["A"]},
+        ),
+    ),
     "W-SETTLED": lambda: of_stage("gear_pair", "sweep", xr.Dataset({"settled": ("ratio", [1, 0])})),
     "W-STEPS": lambda: of_stage("elastic", "runup", runup(missed=3)),
     "W-TAIL": lambda: of_stage("planar", "response", tail(0.3)),
