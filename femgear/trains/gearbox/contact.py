@@ -26,6 +26,10 @@ from femgear.stages.static_results import StaticResult
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
 
 
+# Separations of planets' meshes that differ by less are rounding [m].
+_ALIKE = 1e-12
+
+
 @dataclass(frozen=True)
 class StageContact:
     """Contact of the teeth of a stage over one mesh period.
@@ -145,7 +149,9 @@ def unequal_separation(separation: np.ndarray) -> np.ndarray:
     if len(separation) < 2:
         return np.zeros(len(separation))
     both = 0.5 * separation.reshape(2, -1).sum(axis=0)
-    return np.tile(both - both.mean(), 2)
+    left = both - both.mean()
+    # equal planets stay equal, and are solved as one
+    return np.tile(left if np.abs(left).max() > _ALIKE else np.zeros(len(left)), 2)
 
 
 def displaced(

@@ -48,6 +48,8 @@ def test_rotations_take_up_all_but_what_loads_planets_unequally():
     # of the sun alone, of the ring alone, of planet 2 alone
     for turned in ([1, 1, 1, 0, 0, 0], [0, 0, 0, 1, 1, 1], [0, 1, 0, 0, -1, 0]):
         assert left(turned) == pytest.approx(np.zeros(6), abs=1e-15)
+    # rounding leaves equal planets equal
+    assert not left([1e-6, 1e-6 + 1e-16, 1e-6, 0, 0, 1e-17]).any()
     assert left([2, 0, 0, 1, 0, 0]) == pytest.approx([1.0, -0.5, -0.5] * 2)
     assert left([5.0]) == pytest.approx([0.0])
 
