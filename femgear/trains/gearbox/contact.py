@@ -25,7 +25,6 @@ from femgear.stages.static import solve_static
 from femgear.stages.static_results import StaticResult
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
 
-
 # Separations of planets' meshes that differ by less are rounding [m].
 _ALIKE = 1e-12
 
