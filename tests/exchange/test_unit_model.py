@@ -157,6 +157,8 @@ def test_bearings_keep_their_geometry(tmp_path):
         "bearing[0].clearance": "10 um",
         "bearing[0].preload": "2 um",
         "bearing[0].inner_osculation": 0.515,
+        # in the sense of thrust that the angle takes
+        "operation.load_case": [{"torque": {"motor": "35 N m"}, "speed": {"rotor": "9000 rpm"}}],
     }
     model, _ = written(with_values(read_case(CASES / "e_axle.toml"), values), tmp_path)
     bearing = of_type(model, "rolling_bearing_with_detailed_geometry")[0]
