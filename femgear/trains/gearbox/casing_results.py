@@ -91,8 +91,9 @@ def largest_foot_force(data: Any) -> Iterator[tuple[str, str]]:
     yield "largest foot force", f"{size[case, foot]:.4g} N, {where}"
 
 
-def seat_curve(one: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray] | None:
-    """Find place along z [mm] and motion along x or y [um] of the casing at its bearings, of one load case."""
+def seat_curve(one: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Find place along z [mm], motions along x or y [um] of casing and shaft at its bearings, of one load case."""
     if "seat_displacement" not in one:
         return None
-    return 1e3 * one["bearing_place"].values[:, 2], 1e6 * one["seat_displacement"].values[:, way]
+    moved = (1e6 * one[name].values[:, way] for name in ("seat_displacement", "bearing_displacement"))
+    return 1e3 * one["bearing_place"].values[:, 2], *moved

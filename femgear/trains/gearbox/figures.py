@@ -42,8 +42,10 @@ def deflected_shafts(deflection: xr.Dataset) -> Figure:
             ax.plot(1e3 * place[own, 2], 1e6 * moved[own, way], linewidth=2.2, label=str(shaft), **style)
         ax.axhline(0.0, color=GREY, linewidth=0.8)
         if seats := seat_curve(one, way):
+            z, casing, inner = seats
             style = {"color": BLACK, "linestyle": "none", "marker": "s", "markerfacecolor": "none"}
-            ax.plot(*seats, label="casing at its bearings", **style)
+            ax.plot(z, casing, label="casing at its bearings", **style)
+            ax.vlines(z, casing, inner, color=GREY, linewidth=1.0, linestyle=":")
         ax.margins(0.08, 0.34)
         _arrows(ax, one, way)
         label(ax, "z [mm]", f"deflection along {axis} [µm]")

@@ -65,6 +65,9 @@ def test_the_picture_has_the_casing_where_the_bearings_are(data):
     for way, ax in enumerate(deflected_shafts(data).axes):
         (line,) = (line for line in ax.lines if line.get_label() == "casing at its bearings")
         assert line.get_ydata() == pytest.approx(1e6 * data["seat_displacement"].values[0, :, way])
+        # a line across every bearing, to its shaft
+        ends = np.array([segment[1] for lines in ax.collections for segment in lines.get_segments()])
+        assert ends[:, 1] == pytest.approx(1e6 * data["bearing_displacement"].values[0, :, way])
 
 
 def test_without_a_casing_there_is_nothing_of_it():
