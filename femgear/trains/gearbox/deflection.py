@@ -33,8 +33,9 @@ LEVERS = (1.0, 1.0, 1.0, 0.05, 0.05, 0.05)
 """Metres by which tilts and rotations are compared with shifts."""
 # Misalignment over the width below which it is none [m].
 _UPRIGHT = 1e-7
-# Positions of the contact while slopes are far from settled, and how near they come by them, relative.
-_COARSE, _NEAR = 12, 3e-3
+# Positions of the contact while slopes are far from settled, how near they come by them, relative, and the misalignment
+# below which they are near at any rate [m].
+_COARSE, _NEAR, _NEARLY_UPRIGHT = 12, 3e-3, 1e-6
 _SETTLED = 1e-11  # residual force over the largest one
 _LEAST_LOAD = 1e-3  # against which residuals count where nothing loads a gearbox [N]
 # Load of a rolling element over the largest force of the gearbox up to which it is rounding.
@@ -228,7 +229,8 @@ def solve_deflection(
         apart = mesh_separation(model.assembly, found.motion)
         history.append(found.mesh_slope)
         tolerance = max(case.deflection.tolerance, _NEAR) if coarse else case.deflection.tolerance
-        alike = _agree(model, history[-1], history[-2], tolerance) and _forces_agree(found, contacts, tolerance)
+        least = _NEARLY_UPRIGHT if coarse else _UPRIGHT
+        alike = _agree(model, history[-1], history[-2], tolerance, least) and _forces_agree(found, contacts, tolerance)
         if coarse:
             coarse = not alike
         elif alike:
@@ -293,13 +295,13 @@ def _forces_agree(found: Deflection, contacts: Mapping[str, StageContact], toler
     return True
 
 
-def _agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: float) -> bool:
-    """Whether slopes agree: their difference over the width against the approach of the mesh."""
+def _agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: float, least: float) -> bool:
+    """Whether slopes agree: their difference over the width against the misalignment, or a least one [m]."""
     for stage in model.stages:
         for mesh in stage.meshes:
             contact = model.assembly.contacts[mesh]
             width = stage.width
-            size = max(abs(new[mesh]) * width, _UPRIGHT)
+            size = max(abs(new[mesh]) * width, least)
             if abs(new[mesh] - old[mesh]) * width > tolerance * size and len(contact.heights) > 1:
                 return False
     return True
