@@ -76,7 +76,10 @@ def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseErro
             told |= {problem.message for problem in error.problems}
             continue
         if not floating and not any(key.startswith(("bearing", "shaft")) for key in keys):
-            yield from untaken_thrust(case, flow, number)
+            thrusts = [problem for problem in untaken_thrust(case, flow, number) if problem.key not in told]
+            # of many load cases the first one
+            told |= {str(problem.key) for problem in thrusts}
+            yield from thrusts
 
 
 def _misplaced(problem: CaseError) -> bool:

@@ -134,11 +134,14 @@ def untaken_thrust(case: GearboxCase, flow: BoxFlow, number: int) -> Iterator[Ca
     """
     if case.motions != "space" or (case.gravity is not None and case.gravity.direction[2]):
         return
+    names = [shaft.name for shaft in case.shaft]
+    ends, bounds = _holders(case)
+    held = next((cluster for cluster in connected_sets([{CASING}, *map(set, ends)]) if CASING in cluster), set())
+    if {*names} <= held and all(bound == (None, None) for bound in bounds):
+        return
     from scipy.optimize import linprog
 
-    names = [shaft.name for shaft in case.shaft]
     thrust = shaft_thrusts(case, flow, number)
-    ends, bounds = _holders(case)
     count, size = len(names), max(np.abs(thrust).max(initial=0.0), 1e-300)
     balance = np.zeros((count, len(ends)))
     for column, (inner, outer) in enumerate(ends):

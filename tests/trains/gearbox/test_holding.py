@@ -186,6 +186,17 @@ def test_one_file_with_many_faults_names_all_that_can_be_judged(tmp_path, capsys
     assert "9 problems" in error
 
 
+def test_thrust_is_told_once_of_all_load_cases():
+    tables = pair_tables()
+    one_sided(tables)
+    case = tables["operation"]["load_case"][0]
+    tables["operation"]["load_case"] = [case | {"name": name, "share": 0.3} for name in ("a", "b", "c")]
+    with pytest.raises(CaseError) as caught:
+        read_case(tables)
+    assert [one.key for one in caught.value.problems] == ["bearing[0].axial_sense", "bearing[2].axial_sense"]
+    assert all("load case a" in one.message for one in caught.value.problems)
+
+
 def test_a_wrong_name_near_a_right_one_is_one_fault():
     tables = pair_tables()
     tables["bearing"][0]["shaft"] = "inptu"
