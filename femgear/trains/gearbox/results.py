@@ -39,6 +39,8 @@ if TYPE_CHECKING:
 
 ESTIMATES = 0.5, 2.0
 """Factors on the stiffness of estimated bearings between which results are shown."""
+# Force of a mesh over the largest one of its set up to which it is none.
+_IDLE = 1e-9
 # Line loads whose sum over the slices is rounding [N/m].
 _LEAST_LOAD = 1e-3
 # Tilt up to which motions are small [rad].
@@ -472,6 +474,8 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield from _large(data)
     if "slack" in data:
         yield from play_findings(data)
+    if "planet_load_factor" in data:
+        yield from _idle_planets(data)
     if "estimate_face_load_factor" in data:
         spread = np.ptp(data["estimate_face_load_factor"].values, axis=0)
         worst = int(np.nan_to_num(spread).argmax()) if len(spread) else 0
@@ -490,6 +494,19 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
             worst = int(idle.argmax())
             text = f"{data['mesh'].values[worst]} carries on {1.0 - idle[worst]:.0%} of its width alone"
             yield Finding("W-FACE-LOAD", "", text, remedy="stiffer shafts or bearings, or a lead modification")
+
+
+def _idle_planets(data: xr.Dataset) -> Iterator[Finding]:
+    """Name planets that carry nothing where others of their set do (W-OPEN)."""
+    meshes, force = [str(name) for name in data["mesh"].values], data["mesh_force"].values
+    for stage, factor in zip(data["stage"].values, data["planet_load_factor"].values.T, strict=True):
+        own = [number for number, name in enumerate(meshes) if name.startswith(f"{stage} sun-planet ")]
+        for case in np.flatnonzero(np.isfinite(factor)):
+            idle = [meshes[number] for number in own if force[case, number] <= _IDLE * force[case, own].max()]
+            if idle:
+                text = f"{', '.join(idle)} carry nothing in load case {data['load_case'].values[case]}"
+                remedy = "smaller errors of the pins, or members that give way"
+                yield Finding("W-OPEN", "operation.load_case", text, remedy=remedy)
 
 
 def _large(data: xr.Dataset) -> Iterator[Finding]:

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 from casings import casing_tables
+from gearbox_equivalents import elastic_set_tables
 from small_gearbox import pair_tables
 
 from femgear.findings import Finding
@@ -150,3 +151,16 @@ def test_planets_that_do_not_assemble_are_told():
     assert "0.04954 mm apart" in findings[1].text
     tables["planetary"][0]["gears"]["planets"] = 4
     assert not list(gearbox_warnings(read_case(tables)))
+
+
+def test_planets_that_carry_nothing_are_named():
+    tables = elastic_set_tables("cases/planetary_27_40_108.toml") | {"deflection": {}}
+    tables["planetary"][0] |= {"elastic_ring": False}
+    teeth = tables["planetary"][0]["teeth"]
+    teeth["set"]["pin_errors"] = [{"planet": 2, "tangential": "-60 um"}]
+    teeth["static"] = {"positions": 12}
+    tables["operation"]["load_case"][0]["torque"] = {"motor": "10 N m"}
+    data = solve_deflections(read_case(tables)).contents()
+    assert data["planet_load_factor"].values == pytest.approx(np.array([[3.0]]), rel=1e-9)
+    (text,) = (one.text for one in deflection_warnings(data) if one.code == "W-OPEN")
+    assert text == "set sun-planet 1, set sun-planet 3 carry nothing in load case nominal"
