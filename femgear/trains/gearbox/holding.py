@@ -285,4 +285,5 @@ def without_balance(case: GearboxCase, owner: str, way: int, left: float) -> Con
         value=value,
         limit="bearings that carry what loads and weight put on the shaft, in its sense",
         remedy=remedies[0] if way == 2 else remedies[1],
+        file=case.location(key),
     )

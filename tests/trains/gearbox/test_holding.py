@@ -272,6 +272,18 @@ def test_planets_that_nothing_holds_are_named():
     assert {one.key for one in caught.value.problems} == {"planetary[0].planet.bearing"}
 
 
+def test_weight_along_the_axis_that_nothing_takes_is_told_at_the_terminal(tmp_path, capsys):
+    tables = pair_tables(helix="15 deg")
+    tables["bearing"][0]["axial_sense"], tables["bearing"][2]["axial_sense"] = "positive", "negative"
+    tables["gravity"] = {"direction": [0.0, 0.0, -1.0]}
+    tables["mass"] = [{"shaft": "input", "position": "10 mm", "mass": "200 kg", "inertia": "1 kg m^2"}]
+    assert terminal(tables, tmp_path, capsys, "check")[0] == 0
+    status, error = terminal(tables, tmp_path, capsys, "run")
+    assert status == 3 and "Traceback" not in error
+    assert f"[E-CONVERGENCE] {tmp_path / 'box.toml'}:" in error and "bearing[0].axial_sense: " in error
+    assert "along its axis" in error and "remedy:" in error
+
+
 def test_a_load_without_balance_names_a_bearing():
     tables = pair_tables()
     rolling(tables, 2, clearance="40 um")
