@@ -4,8 +4,7 @@
 
 * ``.npz``: arrays ``stiffness`` and ``mass`` (r, r); of every node ``role``, ``position`` (x, y, z), and ``dofs``, such
   as ``"123456"`` (all six where left out); rows are those of the nodes in their order, other coordinates after them;
-* ``.pch``, ``.bdf``, ``.dat``: DMIG, ``.op4``: ASCII OP4, as those of casings (`femgear.exchange.casing_files`), with
-  a table of nodes (CSV) of the columns node, role, x, y, z, dofs.
+* arrays, DMIG and ASCII OP4 with a table of nodes (CSV), as `femgear.exchange.superelement` does.
 
 Roles: ``shaft``, the seat on the shaft, of six components; ``pin 1`` to ``pin N`` in the order of the planets, where
 the planets sit, of three or six components alike. All other coordinates are free. The carrier is held nowhere, and
@@ -17,23 +16,23 @@ Craig and M. C. C. Bampton, AIAA J. 6 (1968) 1313-1319).
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 from scipy.linalg import eigh
 
 from femgear.errors import CaseError
-from femgear.exchange.casing_files import UNITS, Node, check_reduced_matrices, dmig_matrices, op4_matrices, read_nodes
+from femgear.exchange.casing_files import Node, check_array_size, file_in_refusals, foreign_refusals
+from femgear.exchange.superelement import Superelement, read_superelement, superelement_of
 from femgear.fe.beam import rigid_link
 
 CARRIER_ROLES = {"shaft": False, "pin": True}
 """What the nodes of a carrier stand for, and whether a name follows."""
-_PUNCH = (".pch", ".bdf", ".dat")
-_KINDS = (".npz", *_PUNCH, ".op4")
+_ALL = (1, 2, 3, 4, 5, 6)
 _MOST_MODES = 60
-_MOST_BYTES = 100_000_000
+_ASYMMETRY = 1e-6  # of a matrix over its largest entry: files hold 7 to 16 digits
 _RIGID_FORCE = 1e-5  # of rigid motions over that of motions of one seat: files hold 7 to 16 digits
 _MASSLESS = 1e-12  # of the largest compliance with mass: a coordinate without mass
 
@@ -84,52 +83,29 @@ def read_carrier(path: Path, *, nodes: Path | None = None, units: str = "SI") ->
         E-FILE, E-KEY-MISSING, E-COUNT (seats), E-SHAPE, E-SYMMETRY, E-TYPE (complex), E-SUPPORT (held somewhere, or
         springs to the ground), E-MECHANISM (nothing holds a motion), E-MASS.
     """
-    kind = path.suffix.lower()
-    try:
-        if not path.is_file() or kind not in _KINDS:
+    with file_in_refusals(path):
+        if nodes is not None:
+            return _body(read_superelement(path, nodes, units=units, roles=CARRIER_ROLES))
+        if not path.is_file() or path.suffix.lower() != ".npz":
             raise CaseError(
-                "no such file, or no kind of file that holds a carrier",
+                "no such file, or matrices that do not say where shaft and pins are",
                 code="E-FILE",
                 value=path.name,
-                limit=f"a file {', '.join(_KINDS)}",
-                remedy="export reduced stiffness and mass: modes alone lack the static part",
+                limit="a file .npz that says it, or .npz, .nc, .pch, .bdf, .dat, .op4 with a table of nodes (CSV)",
+                remedy='export reduced stiffness and mass, and name the table, as in nodes = "carrier.csv"',
             )
-        if kind == ".npz":
-            matrices, row, place, table = _arrays(path)
-        else:
-            if nodes is None:
-                raise CaseError(
-                    "matrices do not say where shaft and pins are",
-                    code="E-KEY-MISSING",
-                    key="nodes",
-                    limit="a table of nodes (CSV)",
-                    remedy='name it, as in nodes = "carrier.csv"',
-                )
-            table = read_nodes(nodes, CARRIER_ROLES)
-            matrices, row, place = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
-        return _body(matrices, row, place, table, *UNITS[units])
-    except CaseError as error:
-        error.file = error.file or str(path)
-        raise
+        return _body(superelement_of(*_arrays(path), units))
 
 
 def _arrays(path: Path) -> tuple[list[np.ndarray], dict, dict, tuple[Node, ...]]:
-    """Stiffness and mass, rows by node and component, places and nodes of a file .npz."""
-    if path.stat().st_size > _MOST_BYTES:
-        raise CaseError(
-            f"the carrier fills {path.stat().st_size / 1e6:.0f} MB",
-            code="E-MEMORY",
-            limit=f"{_MOST_BYTES / 1e6:.0f} MB",
-            remedy="reduce it to the seats and some inner modes",
-        )
+    """Stiffness and mass, rows by node and component, places and nodes of a file .npz that says them all."""
     names = ("stiffness", "mass", "role", "position")
-    try:
+    with foreign_refusals("arrays of a carrier (.npz)"):
+        with ZipFile(path) as archive:
+            check_array_size(sum(entry.file_size for entry in archive.infolist()))
         with np.load(path, allow_pickle=False) as stored:
             lacking = [name for name in names if name not in stored]
             arrays = {name: stored[name] for name in (*names, "dofs") if name in stored}
-    except Exception as error:
-        message = f"no arrays of a carrier that can be read: {' '.join(str(error).split())[:200]}"
-        raise CaseError(message, code="E-FILE", limit="arrays (.npz)", remedy="export the file again") from error
     if lacking:
         raise CaseError(
             f"the file lacks {', '.join(lacking)}",
@@ -155,48 +131,43 @@ def _arrays(path: Path) -> tuple[list[np.ndarray], dict, dict, tuple[Node, ...]]
     )
     labels = [(node.number, int(component)) for node in table for component in node.dofs if component in "123456"]
     matrices = [np.atleast_2d(arrays[name]) for name in ("stiffness", "mass")]
+    sizes = {side for matrix in matrices for side in matrix.shape}
+    if len(sizes) != 1 or max(sizes) < len(labels):
+        raise CaseError(
+            f"matrices of {matrices[0].shape} and {matrices[1].shape} do not fit {len(labels)} components of nodes",
+            code="E-SHAPE",
+            key="dofs",
+            limit=f"square, of one size, {len(labels)} rows or more",
+            remedy="give all nodes in the order of the matrices, with their dofs",
+        )
     return matrices, {label: i for i, label in enumerate(labels)}, {}, table
 
 
-def _body(matrices, row, place, table: Sequence[Node], length: float, mass: float) -> CarrierBody:
-    """Reduce stiffness and mass in the units of the file to seat, pins and inner modes."""
-    sizes = {side for matrix in matrices for side in matrix.shape}
-    if len(sizes) != 1 or max(sizes) < len(row):
-        raise CaseError(
-            f"matrices of {matrices[0].shape} and {matrices[1].shape} do not fit {len(row)} components of nodes",
-            code="E-SHAPE",
-            key="nodes",
-            limit=f"square, of one size, {len(row)} rows or more",
-            remedy="give all nodes in the order of the matrices, with their dofs",
-        )
-    check_reduced_matrices(matrices)
-    seats, components = _seats(table)
-    place = place | {node.number: node.position for node in table if node.position is not None}
-    lost = [node.number for node in seats if node.number not in place]
-    labels = [(node.number, c) for node, count in zip(seats, components) for c in range(1, count + 1)]
-    if lost or any(label not in row for label in labels):
-        raise CaseError(
-            "a seat has no coordinates, or does not move in all its components",
-            code="E-SHAPE",
-            key="nodes",
-            value=f"node {lost[0] if lost else next(label for label in labels if label not in row)}",
-            limit="x, y, z, and the components 1 to 6 of the shaft, 1 to 3 or 1 to 6 of pins",
-            remedy="keep them in the reduction, and give x, y, z in the table of nodes",
-        )
-    scale = np.ones(len(matrices[0]))
-    for (_, component), i in row.items():
-        scale[i] = length if component > 3 else 1.0
-    K, M = (mass * np.outer(scale, scale) * 0.5 * np.real(matrix + matrix.T) for matrix in matrices)
-    places = length * np.array([place[node.number] for node in seats])
-    return _reduced(K, M, np.array([row[label] for label in labels]), places, components[-1])
+def _body(element: Superelement) -> CarrierBody:
+    """Reduce a superelement to seat, pins and inner modes."""
+    for matrix, apart in zip(("stiffness", "mass"), element.asymmetry, strict=True):
+        if apart > _ASYMMETRY:
+            raise CaseError(
+                f"the {matrix} matrix is not symmetric",
+                code="E-SYMMETRY",
+                key=matrix,
+                value=f"halves that are {apart:.3g} of the largest entry apart",
+                limit=f"{_ASYMMETRY:g} of it",
+                remedy="export it again, both halves of the matrix or one and its kind",
+            )
+    seats, components = _seats(element)
+    rows = [element.row[node.number, c] for node, count in zip(seats, components) for c in range(1, count + 1)]
+    places = np.array([element.place[node.number] for node in seats])
+    return _reduced(element.stiffness, element.mass, np.array(rows), places, components[-1])
 
 
-def _seats(table: Sequence[Node]) -> tuple[list[Node], list[int]]:
+def _seats(element: Superelement) -> tuple[list[Node], list[int]]:
     """Nodes of the shaft and of the pins in their order, and how many components each has."""
+    table = element.nodes
     shaft = [node for node in table if node.role == "shaft"]
     pins = {node.name: node for node in table if node.role == "pin"}
     ordered = [pins[str(number)] for number in range(1, len(pins) + 1) if str(number) in pins]
-    whole = [len(set(node.dofs) & set("123456")) for node in (*shaft, *ordered)]
+    components = [element.components(node) for node in (*shaft, *ordered)]
     count = sum(node.role == "pin" for node in table)
     if len(shaft) != 1 or not ordered or len(ordered) != count:
         raise CaseError(
@@ -207,16 +178,16 @@ def _seats(table: Sequence[Node]) -> tuple[list[Node], list[int]]:
             limit="the roles shaft, pin 1, pin 2 and so on, each once",
             remedy="name the seats in the order of the planets",
         )
-    if whole[0] != 6 or set(whole[1:]) not in ({3}, {6}) or (whole[1] == 3 and {n.dofs for n in ordered} != {"123"}):
+    if components[0] != _ALL or set(components[1:]) not in ({_ALL}, {_ALL[:3]}):
         raise CaseError(
             "the seats have other components than the carrier needs",
             code="E-SHAPE",
             key="nodes",
-            value=", ".join(f"{node.role} {node.name} {node.dofs}" for node in (*shaft, *ordered))[:200],
+            value=", ".join("".join(map(str, ways)) or "none" for ways in components)[:200],
             limit="123456 of the shaft, 123 or 123456 of all pins",
             remedy="tie the seats to nodes with six components (RBE3, distributing coupling) before the reduction",
         )
-    return [*shaft, *ordered], whole
+    return [*shaft, *ordered], [len(ways) for ways in components]
 
 
 def _reduced(K: np.ndarray, M: np.ndarray, seats: np.ndarray, places: np.ndarray, components: int) -> CarrierBody:

@@ -129,7 +129,9 @@ class ModalBody:
     shape: Mapping[int, np.ndarray]
 
 
-def read_superelement(path: Path, nodes: Path, *, units: str = "SI") -> Superelement:
+def read_superelement(
+    path: Path, nodes: Path, *, units: str = "SI", roles: Mapping[str, bool] = SUPERELEMENT_ROLES
+) -> Superelement:
     """Read stiffness and mass with a table of nodes.
 
     Parameters
@@ -140,6 +142,8 @@ def read_superelement(path: Path, nodes: Path, *, units: str = "SI") -> Superele
         Table of nodes (CSV).
     units : str
         Of the file: "SI" or "mm-t-s" (N, MPa).
+    roles : mapping of str to bool
+        What the nodes stand for, and whether a name follows.
 
     Raises
     ------
@@ -156,21 +160,34 @@ def read_superelement(path: Path, nodes: Path, *, units: str = "SI") -> Superele
                 limit=f"a file {', '.join(_KINDS)}",
                 remedy="export reduced stiffness and mass",
             )
-        table = read_nodes(nodes, roles=SUPERELEMENT_ROLES)
+        table = read_nodes(nodes, roles)
         if kind in _ARRAYS:
             found, row, place = _stored_matrices(path, table)
         else:
             found, row, place = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
-        _check_real(found)
-        apart = [float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max()) for matrix in found]
-        length, mass = UNITS[units]
-        # with time in seconds a stiffness scales as a mass; rotations have no length
-        scale = np.ones(len(found[0]))
-        scale[[at for (_, component), at in row.items() if component > 3]] = length
-        K, M = (0.5 * mass * np.outer(scale, scale) * np.real(matrix + matrix.T) for matrix in found)
-        places = dict(place) | {node.number: node.position for node in table if node.position is not None}
-        _check_nodes(table, row, places)
-        in_metres = {number: length * x for number, x in places.items()}
+        return superelement_of(found, row, place, table, units)
+
+
+def superelement_of(
+    found: Sequence[np.ndarray],
+    row: Mapping[tuple[int, int], int],
+    place: Mapping[int, np.ndarray],
+    table: tuple[Node, ...],
+    units: str,
+) -> Superelement:
+    """Make the superelement of stiffness and mass in the units of a file, rows by node and component, places, nodes."""
+    _check_real(found)
+    apart = [float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max()) for matrix in found]
+    length, mass = UNITS[units]
+    # scalar points, such as those of inner modes, have the component 0 and no place
+    row = {label: at for label, at in row.items() if label[1] > 0}
+    # with time in seconds a stiffness scales as a mass; rotations have no length
+    scale = np.ones(len(found[0]))
+    scale[[at for (_, component), at in row.items() if component > 3]] = length
+    K, M = (0.5 * mass * np.outer(scale, scale) * np.real(matrix + matrix.T) for matrix in found)
+    places = dict(place) | {node.number: node.position for node in table if node.position is not None}
+    _check_nodes(table, row, places)
+    in_metres = {number: length * x for number, x in places.items()}
     return Superelement(K, M, row, in_metres, table, (apart[0], apart[1]))
 
 
