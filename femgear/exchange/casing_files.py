@@ -657,7 +657,7 @@ def op4_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], d
 
 def _modes(found, row, place, table: Sequence[Node], length: float, mass: float) -> _Modes:
     """Modes of a reduced stiffness and mass (r, r) in the units of the file, the feet held."""
-    check_reduced_matrices(found)
+    _check_matrices(found)
     # with time in seconds a stiffness scales as a mass; generalised coordinates take their units with them
     K, M = (0.5 * mass * np.real(matrix + matrix.T) for matrix in found)
     standing = [one for one in table if one.role == "foot"]
@@ -711,7 +711,7 @@ def _modes(found, row, place, table: Sequence[Node], length: float, mass: float)
     return _Modes(np.sqrt(square), phi, row, places, None, force, direct, compliance if len(light) else None)
 
 
-def check_reduced_matrices(found: Sequence[np.ndarray]) -> None:
+def _check_matrices(found: Sequence[np.ndarray]) -> None:
     """Refuse stiffness and mass that are complex, not symmetric or not finite."""
     for matrix, name in zip(found, ("stiffness", "mass")):
         _check(
