@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -247,9 +247,9 @@ class Assembly:
     def system(self, load: np.ndarray | None = None) -> MechanicalSystem:
         """Make the matrices of the free motions; ``C`` is zero, meshes are columns of ``W`` and not in ``K``.
 
-        ``load`` (6n,) acts on all motions [N, N m].
+        ``load`` (6n,) acts on all motions [N, N m]. ``gyroscopic`` is None where no body tilts that turns.
         """
-        return assemble(
+        made = assemble(
             self.mass,
             self.stiffness,
             self.columns,
@@ -258,6 +258,7 @@ class Assembly:
             dofs=self.free_names,
             gyroscopic=self.gyroscopic,
         )
+        return made if np.any(made.gyroscopic) else replace(made, gyroscopic=None)
 
     def _sum(self, matrices) -> np.ndarray:
         """Add matrices of stations into one of all motions; rows of the ground are left out."""

@@ -176,7 +176,9 @@ def _in_modes(still: MechanicalSystem, stiffness, gyroscopic, speed: float, coun
     kept = min(len(still.dofs), _BASIS * count + _LEAST)
     basis = solve_modes(still, stiffness, damping_ratio=0.0, count=kept)
     size = len(basis.frequency)
-    coupling = basis.shape.T @ np.asarray(gyroscopic) @ basis.shape / speed if speed else None
+    coupling = (
+        basis.shape.T @ np.asarray(gyroscopic) @ basis.shape / speed if speed and gyroscopic is not None else None
+    )
     return MechanicalSystem(
         M=np.eye(size),
         C=np.zeros((size, size)),
