@@ -125,9 +125,10 @@ def _arrays(path: Path) -> tuple[list[np.ndarray], dict, dict, tuple[Node, ...]]
             limit="a role, three coordinates and the dofs of every node",
             remedy="save one row a node",
         )
+    words = (role.partition(" ") for role in roles)
     table = tuple(
-        Node(number, *role.partition(" ")[::2], "", dof, np.asarray(place, float))
-        for number, (role, dof, place) in enumerate(zip(roles, dofs, places, strict=True), 1)
+        Node(number, kind, name, "", dof, np.asarray(place, float))
+        for number, ((kind, _, name), dof, place) in enumerate(zip(words, dofs, places, strict=True), 1)
     )
     labels = [(node.number, int(component)) for node in table for component in node.dofs if component in "123456"]
     matrices = [np.atleast_2d(arrays[name]) for name in ("stiffness", "mass")]

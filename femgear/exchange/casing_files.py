@@ -716,7 +716,7 @@ def _check_matrices(found: Sequence[np.ndarray]) -> None:
     for matrix, name in zip(found, ("stiffness", "mass")):
         _check(
             "a complex matrix",
-            not np.iscomplexobj(matrix) or not matrix.imag.any(),
+            not np.imag(matrix).any(),
             code="E-TYPE",
             key=name,
             limit="real numbers",

@@ -66,12 +66,15 @@ class Lubrication:
 
     def least_ratio(self, pitch: float, shafts: Sequence[str]) -> float | None:
         """Least viscosity ratio kappa over the load cases in which rings turn; None where the file has no oil."""
+        if not self.viscosities:
+            return None
+        cool, warm = self.viscosities
         found = []
         for temperature, speed in zip(self.temperatures, self.speeds, strict=True):
             first, second = (*(speed.get(id, 0.0) for id in shafts), 0.0)[:2]
-            if self.viscosities and temperature is not None and first != second:
+            if temperature is not None and first != second:
                 needed = reference_viscosity(pitch, abs(first - second))
-                found.append(oil_viscosity(*self.viscosities, temperature) / needed)
+                found.append(oil_viscosity(cool, warm, temperature) / needed)
         return min(found, default=None)
 
 

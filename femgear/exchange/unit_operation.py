@@ -19,7 +19,8 @@ from femgear.exchange.unit_shafts import NoGearbox
 LoadCase = Mapping[str, Mapping[str, tuple[str, str | None]]]
 """Attributes, with their units, of the components of a load case by their ids."""
 _USUAL_SPEED = 1000.0 * SPEED.scale
-_HOURS = {"h": 1.0, "min": 1.0 / 60.0, "s": 1.0 / 3600.0, "d": 24.0}
+_FRACTIONS: Mapping[str | None, float] = {"%": 0.01}
+_HOURS: Mapping[str | None, float] = {"h": 1.0, "min": 1.0 / 60.0, "s": 1.0 / 3600.0, "d": 24.0}
 
 
 @dataclass(frozen=True)
@@ -245,7 +246,7 @@ def load_case_shares(cases: Sequence[LoadCase]) -> list[float | None]:
 
     None of a load case that says neither.
     """
-    shares = [_first(given, "load_duration_fraction", {"%": 0.01}) for given in cases]
+    shares = [_first(given, "load_duration_fraction", _FRACTIONS) for given in cases]
     if any(share is not None for share in shares):
         return shares
     hours = [_first(given, "load_duration", _HOURS) for given in cases]

@@ -95,5 +95,5 @@ def seat_curve(one: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray, np.nd
     """Find place along z [mm], motions along x or y [um] of casing and shaft at its bearings, of one load case."""
     if "seat_displacement" not in one:
         return None
-    moved = (1e6 * one[name].values[:, way] for name in ("seat_displacement", "bearing_displacement"))
-    return 1e3 * one["bearing_place"].values[:, 2], *moved
+    casing, shaft = (1e6 * one[name].values[:, way] for name in ("seat_displacement", "bearing_displacement"))
+    return 1e3 * one["bearing_place"].values[:, 2], casing, shaft

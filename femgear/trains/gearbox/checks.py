@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
@@ -354,7 +354,8 @@ def _shaft_parts(case: GearboxCase) -> Iterator[CaseError]:
 
 
 def _stages(case: GearboxCase) -> Iterator[CaseError]:
-    for kind, sizes in (("pair", _pair), ("planetary", _planetary)):
+    kinds: Sequence[tuple[str, Callable[..., Iterator[CaseError]]]] = ("pair", _pair), ("planetary", _planetary)
+    for kind, sizes in kinds:
         for i, stage in enumerate(getattr(case, kind)):
             key = f"{kind}[{i}]"
             if problem := _given_once(stage, key):

@@ -104,7 +104,7 @@ def elastic_carrier(
     way = body.pins[0] - body.seat
     turn = pin_axes(angles[0] - math.atan2(way[1], way[0])).T
     of_pins = np.kron(np.eye(count), np.kron(np.eye(components // 3), turn))
-    turned = block_diag(np.kron(np.eye(2), turn), of_pins)
+    turned = np.asarray(block_diag(np.kron(np.eye(2), turn), of_pins))
     rows, link = np.zeros((components * count, 6 * count + 6)), np.zeros((components * count + 6, 6 * count + 6))
     link[:6, :6] = rigid_link(offsets[0] - turn @ way)
     for number, offset in enumerate(offsets):
@@ -138,7 +138,7 @@ def with_carriers(system: MechanicalSystem, assembly: Assembly, carriers: Sequen
     free = assembly.motions.shape[1]
     for carrier in carriers:
         size, count = len(system.dofs), len(carrier.frequency)
-        mass, still = block_diag(system.M, np.eye(count)), np.zeros((count, count))
+        mass, still = np.asarray(block_diag(system.M, np.eye(count))), np.zeros((count, count))
         mass[:free, size:] = assembly.motions.T @ carrier.on_all_motions(assembly.count)
         mass[size:, :free] = mass[:free, size:].T
         system = MechanicalSystem(

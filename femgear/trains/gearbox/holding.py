@@ -171,8 +171,10 @@ def shaft_thrusts(case: GearboxCase, flow: BoxFlow, number: int) -> np.ndarray:
             thrust[names.index(name)] += value
 
     for stage in (*case.pair, *case.planetary):
-        sizes = pair_sizes(stage) if hasattr(stage, "shafts") else set_sizes(stage)
-        first, last = stage.shafts if hasattr(stage, "shafts") else (stage.sun, stage.ring)
+        if isinstance(stage, PairSection):
+            sizes, (first, last) = pair_sizes(stage), stage.shafts
+        else:
+            sizes, first, last = set_sizes(stage), stage.sun, stage.ring
         push = -flow.first_torque(stage) * math.tan(sizes.base_helix) / sizes.base_radii[0]
         add(first, push)
         add(last, -push)
@@ -192,7 +194,7 @@ def _holders(case: GearboxCase) -> tuple[list[tuple[str, str]], list[tuple[float
             ends.append((bearing.shaft, bearing.outer_shaft or CASING))
             # thrust towards +z is held by a force towards -z
             bounds.append((None if positive else 0.0, None if negative else 0.0))
-    ends += [tuple(one.between) for one in case.coupling if one.axial]
+    ends += [(one.between[0], one.between[1]) for one in case.coupling if one.axial]
     bounds += [(None, None)] * (len(ends) - len(bounds))
     return ends, bounds
 

@@ -68,11 +68,10 @@ def bearing_lives(found: Deflection) -> np.ndarray:
         basic = basic_rating_life(state.bearing, math.hypot(force[0], force[1]), abs(float(force[2])), rating)
         reference = reference_rating_life(state, rating)
         lives[number, :2] = basic * hours, reference * hours
-        given = section.viscosity_ratio, section.contamination, section.fatigue_limit
-        if None not in given:
+        viscosity, contamination, limit = section.viscosity_ratio, section.contamination, section.fatigue_limit
+        if viscosity is not None and contamination is not None and limit is not None:
             load = reference_load(state.bearing, reference, rating)
-            ratio = section.fatigue_limit / load if load else math.inf
-            factor = life_factor(state.bearing, section.viscosity_ratio, section.contamination, ratio)
+            factor = life_factor(state.bearing, viscosity, contamination, limit / load if load else math.inf)
             lives[number, 2] = factor * reference * hours
     return lives
 
@@ -83,7 +82,7 @@ def turning_speed(found: Deflection, number: int) -> float:
     return abs(speed[section.shaft] - speed[section.outer_shaft or CASING]) / (2.0 * math.pi)
 
 
-def added_damage(hours: np.ndarray, shares: Sequence[float]) -> np.ndarray:
+def added_damage(hours: np.ndarray, shares: Sequence[float] | np.ndarray) -> np.ndarray:
     """Compute the lives over load cases (c, ...) [h] with their shares of the time (c,): ``1/L = sum q_i / L_i``."""
     damage = np.tensordot(np.asarray(shares, float), 1.0 / np.asarray(hours, float), axes=1)
     with np.errstate(divide="ignore"):
