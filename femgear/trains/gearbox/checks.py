@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
@@ -354,8 +354,7 @@ def _shaft_parts(case: GearboxCase) -> Iterator[CaseError]:
 
 
 def _stages(case: GearboxCase) -> Iterator[CaseError]:
-    kinds: Sequence[tuple[str, Callable[..., Iterator[CaseError]]]] = ("pair", _pair), ("planetary", _planetary)
-    for kind, sizes in kinds:
+    for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
             key = f"{kind}[{i}]"
             if problem := _given_once(stage, key):
@@ -365,7 +364,8 @@ def _stages(case: GearboxCase) -> Iterator[CaseError]:
             if not _known(case, *members):
                 continue
             try:
-                yield from sizes(case, stage, key)
+                pair = isinstance(stage, PairSection)
+                yield from _pair(case, stage, key) if pair else _planetary(case, stage, key)
             except FemgearError as error:
                 for one in getattr(error, "problems", None) or (error,):
                     told = {name: getattr(one, name) for name in ("code", "value", "limit", "remedy")}
