@@ -193,6 +193,20 @@ class FemgearError(Exception):
         return "\n".join([*map(printable, lines), *map(str, several)])
 
 
+def refused_at(problem: FemgearError, key: str) -> CaseError:
+    """Copy a refusal as that of another entry of a case."""
+    return CaseError(
+        problem.message,
+        code=problem.code,
+        key=key,
+        value=problem.value,
+        limit=problem.limit,
+        remedy=problem.remedies or None,
+        file=problem.file,
+        gear=problem.gear,
+    )
+
+
 def printable(text: str) -> str:
     """Write every control character of ``text`` as an escape: it then fits one line of a message."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape", "surrogatepass").decode() for c in text)

@@ -300,6 +300,19 @@ def checksum_of_all(checksums: Iterable[str]) -> str:
     return hashlib.sha256("".join(checksums).encode()).hexdigest()
 
 
+def refuse_other_files(files: Iterable[str | os.PathLike], name: str, sha256: str | None) -> None:
+    """Refuse (E-OTHER-CASE) files, under the ``name`` of the first, that are not those of a checksum."""
+    if checksum_of_all(input_checksum(one) for one in files) != sha256:
+        raise CaseError(
+            "these are not the files that the case was read with",
+            code="E-OTHER-CASE",
+            key="file",
+            value=name,
+            limit=f"SHA-256 {sha256}",
+            remedy="put them beside the case file, or leave out sha256 for those that are there",
+        )
+
+
 def input_checksum(path: str | os.PathLike) -> str:
     """Compute the SHA-256 of a file, as hexadecimal text. CaseError: it cannot be read (E-FILE)."""
     name = os.fsdecode(path)

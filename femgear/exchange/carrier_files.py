@@ -23,16 +23,20 @@ from zipfile import ZipFile
 import numpy as np
 from scipy.linalg import eigh
 
-from femgear.errors import CaseError
+from femgear.errors import CaseError, several
 from femgear.exchange.casing_files import Node, check_array_size, file_in_refusals, foreign_refusals
-from femgear.exchange.superelement import Superelement, read_superelement, superelement_of
+from femgear.exchange.superelement import (
+    Superelement,
+    read_superelement,
+    superelement_of,
+    unsymmetric_matrices,
+)
 from femgear.fe.beam import rigid_link
 
 CARRIER_ROLES = {"shaft": False, "pin": True}
 """What the nodes of a carrier stand for, and whether a name follows."""
 _ALL = (1, 2, 3, 4, 5, 6)
 _MOST_MODES = 60
-_ASYMMETRY = 1e-6  # of a matrix over its largest entry: files hold 7 to 16 digits
 _RIGID_FORCE = 1e-5  # of rigid motions over that of motions of one seat: files hold 7 to 16 digits
 _MASSLESS = 1e-12  # of the largest compliance with mass: a coordinate without mass
 
@@ -146,16 +150,8 @@ def _arrays(path: Path) -> tuple[list[np.ndarray], dict, dict, tuple[Node, ...]]
 
 def _body(element: Superelement) -> CarrierBody:
     """Reduce a superelement to seat, pins and inner modes."""
-    for matrix, apart in zip(("stiffness", "mass"), element.asymmetry, strict=True):
-        if apart > _ASYMMETRY:
-            raise CaseError(
-                f"the {matrix} matrix is not symmetric",
-                code="E-SYMMETRY",
-                key=matrix,
-                value=f"halves that are {apart:.3g} of the largest entry apart",
-                limit=f"{_ASYMMETRY:g} of it",
-                remedy="export it again, both halves of the matrix or one and its kind",
-            )
+    if unsymmetric := [*unsymmetric_matrices(element)]:
+        raise several(unsymmetric)
     seats, components = _seats(element)
     rows = [element.row[node.number, c] for node, count in zip(seats, components) for c in range(1, count + 1)]
     places = np.array([element.place[node.number] for node in seats])

@@ -269,16 +269,7 @@ def free_body_problems(body: Superelement) -> Iterator[CaseError]:
                 limit="components 1, 2 and 3, or 1 to 6, in the matrices",
                 remedy="keep them in the reduction; dofs of the table are those of arrays and OUTPUT4",
             )
-    for name, apart in zip(("stiffness", "mass"), body.asymmetry, strict=True):
-        if apart > _ROUNDING:
-            yield CaseError(
-                f"the {name} matrix is not symmetric",
-                code="E-SYMMETRY",
-                key="file",
-                value=f"halves that are {apart:.3g} of the largest entry apart",
-                limit=f"{_ROUNDING:g} of it",
-                remedy="export it again, both halves of the matrix or one and its kind",
-            )
+    yield from unsymmetric_matrices(body)
     lowest = _lowest(body.mass)
     if not lowest > _POSITIVE:
         yield CaseError(
@@ -301,6 +292,20 @@ def free_body_problems(body: Superelement) -> Iterator[CaseError]:
         )
     elif _lowest(body.mass) > _POSITIVE:
         yield from _held(body)
+
+
+def unsymmetric_matrices(body: Superelement) -> Iterator[CaseError]:
+    """List the matrices of a superelement whose halves differ by more than the digits of a file."""
+    for name, apart in zip(("stiffness", "mass"), body.asymmetry, strict=True):
+        if apart > _ROUNDING:
+            yield CaseError(
+                f"the {name} matrix is not symmetric",
+                code="E-SYMMETRY",
+                key="file",
+                value=f"halves that are {apart:.3g} of the largest entry apart",
+                limit=f"{_ROUNDING:g} of it",
+                remedy="export it again, both halves of the matrix or one and its kind",
+            )
 
 
 def _lowest(matrix: np.ndarray) -> float:

@@ -21,6 +21,8 @@ from femgear.system.system import MechanicalSystem, freeze
 
 MOTIONS = ("x", "y", "z", "tilt x", "tilt y", "rotation")
 ROTATION = 5
+IN_PLANE = (0, 1, ROTATION)
+"""Motions of what moves in the plane across its axis."""
 GROUND = -1
 """In place of a station: what stands still."""
 # Row of a condition, relative to the largest, that counts as none.
@@ -315,7 +317,7 @@ def assemble(
 def with_modal_body(
     system: MechanicalSystem, stiffness: np.ndarray, columns: np.ndarray, names: Sequence[str]
 ) -> MechanicalSystem:
-    """Join the coordinates of a body by its modes to a system; ``flexibility`` is left to the caller.
+    """Join the coordinates of a body by its modes to a system.
 
     Parameters
     ----------
@@ -338,6 +340,7 @@ def with_modal_body(
         load=np.concatenate([system.load, np.zeros(count)]),
         dofs=(*system.dofs, *names),
         gyroscopic=None if gyroscopic is None else np.asarray(linalg.block_diag(gyroscopic, none)),
+        flexibility=system.flexibility,
     )
 
 
@@ -428,6 +431,68 @@ def gear_contact(  # noqa: PLR0913
         points[gear, :, :2], points[gear, :, 2] = arm * foot, levels
         normals[gear] = mesh_normal(radial, pressure_angle, base_helix, flank)
     return Contact(name, stations, normals, points, levels, np.full(count, stiffness / count))
+
+
+def planetary_contacts(
+    stations: tuple[int, Sequence[int], int],
+    towards: np.ndarray,
+    base_radii: tuple[float, float, float],
+    pressure_angles: tuple[float, float],
+    *,
+    flank: int,
+    base_helix: float = 0.0,
+    heights: Sequence[float] = (0.0,),
+    stiffness: tuple[Sequence[float], Sequence[float]] | None = None,
+    on_base_circles: bool = False,
+) -> list[Contact]:
+    """Make the meshes of N planets with the sun, then with the ring, see `gear_contact`.
+
+    Parameters
+    ----------
+    stations : int, (N,) sequence of int, int
+        Of sun, planets and ring; `GROUND` for a gear that stands still.
+    towards : (N, 2, 2) array
+        Radial direction of every planet, along the axes of sun and ring, and along its own.
+    base_radii : (3,) floats
+        Of sun, planets and ring [m].
+    pressure_angles : (2,) floats
+        Working ones of sun-planet and planet-ring [rad].
+    flank : int
+        1 for the flanks of a sun that pushes counter-clockwise, else -1.
+    base_helix : float
+        Positive of a right-handed sun [rad].
+    heights, on_base_circles
+        See `gear_contact`.
+    stiffness : two (N,) sequences of float, optional
+        Of the meshes with the sun and with the ring [N/m]; zero where not given.
+    """
+    sun, planets, ring = stations
+    known = {"heights": heights, "on_base_circles": on_base_circles}
+    contacts = list[Contact]()
+    for internal, alpha in enumerate(pressure_angles):
+        # planets turn against the sun, and have the other hand
+        sense, radii = (-1, base_radii[1:]) if internal else (1, base_radii[:2])
+        for n, planet in enumerate(planets):
+            contacts.append(
+                gear_contact(
+                    f"planet {n + 1}-ring" if internal else f"sun-planet {n + 1}",
+                    (planet, ring) if internal else (sun, planet),
+                    towards[n, ::-1] if internal else towards[n],
+                    radii,
+                    alpha,
+                    flank=sense * flank,
+                    internal=bool(internal),
+                    base_helix=sense * base_helix,
+                    stiffness=0.0 if stiffness is None else stiffness[internal][n],
+                    **known,
+                )
+            )
+    return contacts
+
+
+def held_motions(count: int, free: Sequence[int]) -> np.ndarray:
+    """Tell the motions (6 count,) that do not take place, where those of the numbers ``free`` among `MOTIONS` do."""
+    return np.tile(~np.isin(np.arange(6), free), count)
 
 
 def solved_conditions(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -25,12 +25,12 @@ from femgear.gears.kinematics import across, unit_vectors
 from femgear.system.assembly import (
     GROUND,
     Assembly,
-    Contact,
     Inertia,
     StationSprings,
     assemble,
-    gear_contact,
+    held_motions,
     joint,
+    planetary_contacts,
 )
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import Series, constant
@@ -205,7 +205,7 @@ def set_assembly(data: RigidSet, flank: int = 1) -> Assembly:
     bodies = [*((name, getattr(data, name)) for name in CENTRAL), *((f"planet {n + 1}", data.planet) for n in range(N))]
     places = np.zeros((N + 3, 3))
     places[3:] = data.centre_distance * directions[:, 0]
-    inertias, springs, contacts = list[Inertia](), list[StationSprings](), list[Contact]()
+    inertias, springs = list[Inertia](), list[StationSprings]()
     for station, (_, body) in enumerate(bodies):
         across = getattr(body, "diametral_inertia", 0.5 * body.inertia)
         inertias.append(Inertia((station,), *body_matrices(body.mass, body.inertia, across)))
@@ -215,34 +215,20 @@ def set_assembly(data: RigidSet, flank: int = 1) -> Assembly:
         stiffness[axes] = support
         springs.append(joint(f"support of {name}", (GROUND, station), (np.zeros(3), np.zeros(3)), stiffness))
     springs += [_pin(data, n, stiffness, directions[n]) for n, stiffness in enumerate(data.pin_stiffness)]
-    lines, stiffnesses = data.contact_lines, (data.stiffness_sun_planet, data.stiffness_planet_ring)
-    angles = data.pressure_angle_sun_planet, data.pressure_angle_planet_ring
-    for internal in (False, True):
-        radii = (data.planet_radius, data.ring_radius) if internal else (data.sun_radius, data.planet_radius)
-        # planets turn against the sun, and have the other hand
-        sense = -1 if internal else 1
-        for n, stiffness in enumerate(np.asarray(stiffnesses[internal]).tolist()):
-            gears = (3 + n, CENTRAL.index("ring")) if internal else (CENTRAL.index("sun"), 3 + n)
-            # a planet sees the central gear along its own radial axis
-            towards = np.stack([directions[n, 0, :2], (1.0, 0.0)])
-            contacts.append(
-                gear_contact(
-                    f"planet {n + 1}-ring" if internal else f"sun-planet {n + 1}",
-                    gears,
-                    towards[::-1] if internal else towards,
-                    radii,
-                    angles[internal],
-                    flank=sense * flank,
-                    internal=internal,
-                    base_helix=sense * lines.base_helix_angle,
-                    heights=lines.heights,
-                    stiffness=stiffness,
-                    on_base_circles=lines.on_base_circles,
-                )
-            )
-    held = np.tile(~np.isin(np.arange(6), axes), N + 3)
+    lines, of_planet = data.contact_lines, np.tile([1.0, 0.0], (N, 1))
+    contacts = planetary_contacts(
+        (CENTRAL.index("sun"), range(3, N + 3), CENTRAL.index("ring")),
+        np.stack([directions[:, 0, :2], of_planet], axis=1),
+        (data.sun_radius, data.planet_radius, data.ring_radius),
+        (data.pressure_angle_sun_planet, data.pressure_angle_planet_ring),
+        flank=flank,
+        base_helix=lines.base_helix_angle,
+        heights=lines.heights,
+        stiffness=(np.asarray(data.stiffness_sun_planet).tolist(), np.asarray(data.stiffness_planet_ring).tolist()),
+        on_base_circles=lines.on_base_circles,
+    )
     names = tuple(name for name, _ in bodies)
-    return Assembly(names, places, held, tuple(inertias), (), tuple(springs), tuple(contacts))
+    return Assembly(names, places, held_motions(N + 3, axes), tuple(inertias), (), tuple(springs), tuple(contacts))
 
 
 def planet_directions(data: RigidSet) -> np.ndarray:

@@ -143,7 +143,7 @@ def with_a_loose_pin():
 @pytest.mark.parametrize(
     ("arrays", "code", "key"),
     [
-        (changed("stiffness", entry((0, 7), 1e9)), "E-SYMMETRY", "stiffness"),
+        (changed("stiffness", entry((0, 7), 1e9)), "E-SYMMETRY", "file"),
         (changed("stiffness", held_at(7)), "E-SUPPORT", "stiffness"),
         (changed("position", lambda x: x + 0.02 * np.eye(4)[:, 1:]), "E-SUPPORT", "stiffness"),
         (changed("position", lambda x: x[:3]), "E-SHAPE", "position"),

@@ -8,13 +8,16 @@ import pytest
 from femgear.fe.beam import body_matrices, rigid_link
 from femgear.system.assembly import (
     GROUND,
+    IN_PLANE,
     Assembly,
     Contact,
     Follower,
     Inertia,
     gear_contact,
+    held_motions,
     joint,
     mesh_normal,
+    planetary_contacts,
     solved_conditions,
 )
 
@@ -135,3 +138,27 @@ def test_the_rotation_of_each_gear_moves_its_flank_by_the_base_radius(flank, int
     assert effect[1, :, 5] == pytest.approx(flank * second * 0.08 * math.cos(helix), rel=1e-14)
     assert effect[0, :, :3] == pytest.approx(-effect[1, :, :3], rel=1e-14)
     assert contact.stiffness.tolist() == [2e8, 2e8]
+
+
+def test_meshes_of_planets_are_those_of_their_gears_one_by_one():
+    """The flanks of sun and planet, and of planet and ring, that a driving sun presses; planets have the other hand."""
+    towards = np.array([[math.cos(0.7), math.sin(0.7)], [math.cos(2.9), math.sin(2.9)]])
+    known = {"flank": 1, "base_helix": 0.2, "heights": (-0.01, 0.01)}
+    both = np.stack([towards, towards], axis=1)
+    contacts = planetary_contacts(
+        (0, (1, 2), GROUND), both, (0.03, 0.02, 0.07), (0.38, 0.34), stiffness=([1e8, 2e8], [3e8, 4e8]), **known
+    )
+    assert [(one.name, one.stations) for one in contacts] == [
+        ("sun-planet 1", (0, 1)),
+        ("sun-planet 2", (0, 2)),
+        ("planet 1-ring", (1, GROUND)),
+        ("planet 2-ring", (2, GROUND)),
+    ]
+    assert [one.stiffness.sum() for one in contacts] == pytest.approx([1e8, 2e8, 3e8, 4e8])
+    # the rotation of a planet opens the mesh with the sun as it closes that with the ring
+    turned = [contacts[1].approach[1, :, 5], contacts[3].approach[0, :, 5]]
+    assert turned[0] == pytest.approx(0.02 * math.cos(0.2), rel=1e-14)
+    assert turned[1] == pytest.approx(-0.02 * math.cos(0.2), rel=1e-14)
+    # thrusts of the sun and of the ring on a planet cancel
+    assert contacts[0].normals[1, 2] == pytest.approx(contacts[2].normals[0, 2], rel=1e-14)
+    assert held_motions(2, IN_PLANE).tolist() == 2 * [False, False, True, True, True, False]

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.checks import runup_range
-from femgear.case.csv_columns import checksum_of_all, input_checksum
+from femgear.case.csv_columns import refuse_other_files
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.planetary import Case, check_floating, output_member
 from femgear.case.quantities import RPM
@@ -201,15 +201,7 @@ def imported_casing(
     psi, on_ring = gears.planet_angles[0], mesh_normals(gears, back=case.torque_on_first_gear() < 0)[gears.n_planets]
     turned = np.array([[np.cos(psi), np.sin(psi)], [-np.sin(psi), np.cos(psi)]])
     try:
-        if checksum_of_all(input_checksum(one) for one in (file, nodes) if one) != section.sha256:
-            raise CaseError(
-                "these are not the files that the case was read with",
-                code="E-OTHER-CASE",
-                key="file",
-                value=section.file,
-                limit=f"SHA-256 {section.sha256}",
-                remedy="put them beside the case file, or leave out sha256 for those that are there",
-            )
+        refuse_other_files((one for one in (file, nodes) if one), section.file, section.sha256)
         from femgear.exchange.casing_files import named_outputs, read_casing
 
         structure = read_casing(

@@ -29,14 +29,14 @@ from femgear.housing.two_way.structure import circumferential
 from femgear.stages.static import mesh_backlash
 from femgear.system.assembly import (
     GROUND,
-    MOTIONS,
+    IN_PLANE,
     ROTATION,
     Assembly,
-    Contact,
     Inertia,
     StationSprings,
-    gear_contact,
+    held_motions,
     joint,
+    planetary_contacts,
     with_modal_body,
 )
 from femgear.system.system import MechanicalSystem, MeshExcitation
@@ -194,17 +194,16 @@ def rigid_gears(case: Case, planetary_set: PlanetarySet, machines, *, sun_torque
         inertias.append(Inertia((station,), *body_matrices(0.0, machine.inertia, 0.0)))
         coupling = [*np.zeros(5), machine.coupling_stiffness]
         springs.append(joint(f"coupling of {name}", (names.index(member), station), (nowhere, nowhere), coupling))
-    flank, contacts = -1 if sun_torque < 0.0 else 1, list[Contact]()
-    radii = s.sun.base_radius, s.planet.base_radius, s.ring.base_radius
-    for n in range(N):
-        alpha = s.working_pressure_angle_sun_planet
-        contacts.append(gear_contact(f"sun-planet {n + 1}", (0, 2 + n), directions[n], radii[:2], alpha, flank=flank))
-    for n in range(N):
-        known, alpha = {"flank": -flank, "internal": True}, s.working_pressure_angle_planet_ring
-        contacts.append(gear_contact(f"planet {n + 1}-ring", (2 + n, GROUND), directions[n], radii[1:], alpha, **known))
-    held = np.tile(np.isin(MOTIONS, ("z", "tilt x", "tilt y")), (len(names), 1))
-    held[2 + N :, :ROTATION] = True
-    return Assembly(names, places, held.ravel(), tuple(inertias), (), tuple(springs), tuple(contacts))
+    contacts = planetary_contacts(
+        (0, range(2, 2 + N), GROUND),
+        np.stack([directions, directions], axis=1),
+        (s.sun.base_radius, s.planet.base_radius, s.ring.base_radius),
+        (s.working_pressure_angle_sun_planet, s.working_pressure_angle_planet_ring),
+        flank=-1 if sun_torque < 0.0 else 1,
+    )
+    held = held_motions(len(names), IN_PLANE)
+    held.reshape(-1, 6)[2 + N :, :ROTATION] = True
+    return Assembly(names, places, held, tuple(inertias), (), tuple(springs), tuple(contacts))
 
 
 def highest_mesh_mode(case: Case, planetary_set: PlanetarySet, stiffness, *, sun_torque: float) -> float:

@@ -195,14 +195,6 @@ def planet_springs(
     return compliance_springs(f"pins of {stage.name}", stations, rows[kept], whole[np.ix_(kept, kept)], lever)
 
 
-def pins_of(springs: str) -> str:
-    """Name what springs of this name stand for, ``"pins of SET"`` or ``"carrier of SET"``; empty of others."""
-    name = springs.rsplit(" pin ", 1)
-    if springs.startswith(("pins of ", "carrier of ")):
-        return springs
-    return f"pins of {name[0]}" if len(name) > 1 else ""
-
-
 def compliance_springs(
     name: str, stations: tuple[int, ...], rows: np.ndarray, compliance: np.ndarray, lever: float
 ) -> StationSprings:

@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import linalg
 
-from femgear.case.csv_columns import checksum_of_all, input_checksum
+from femgear.case.csv_columns import refuse_other_files
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH, MASS
-from femgear.errors import CaseError, several
+from femgear.errors import CaseError, refused_at, several
 from femgear.fe.beam import rigid_link
 from femgear.findings import Finding
 from femgear.report.tables import Block
@@ -45,21 +45,13 @@ def casing_element(case: GearboxCase) -> Superelement:
     section, (file, nodes) = case.casing, _files(case)
     assert section is not None
     try:
-        if checksum_of_all(input_checksum(one) for one in (file, nodes)) != section.sha256:
-            raise CaseError(
-                "these are not the files that the case was read with",
-                code="E-OTHER-CASE",
-                key="file",
-                value=section.file,
-                limit=f"SHA-256 {section.sha256}",
-                remedy="put them beside the case file, or leave out sha256 for those that are there",
-            )
+        refuse_other_files((file, nodes), section.file or "", section.sha256)
         element, problems = _read(str(file), str(nodes), section.units, section.sha256 or "")
     except CaseError as error:
         known = error.key in BoxCasingSection.model_fields
         error.key, error.file = f"casing.{error.key if known else 'file'}", error.file or str(file)
         raise
-    every = [replaced_key(one, f"casing.{one.key}") for one in problems]
+    every = [refused_at(one, f"casing.{one.key}") for one in problems]
     every += [*_seat_problems(case, section, element), *_foot_problems(section, element)]
     for problem in every:
         problem.file = str(nodes if problem.key == "casing.nodes" else file)
@@ -73,12 +65,6 @@ def _files(case: GearboxCase) -> tuple[Path, Path]:
     section, folder = case.casing, Path(case.name).parent
     assert section is not None
     return folder / (section.file or ""), folder / (section.nodes or "")
-
-
-def replaced_key(problem: CaseError, key: str) -> CaseError:
-    """Copy a refusal with another key."""
-    told = {name: getattr(problem, name) for name in ("code", "value", "limit", "remedy")}
-    return CaseError(problem.message, key=key, **told)
 
 
 @lru_cache(maxsize=8)

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
 from femgear.case.text import CaseFile
-from femgear.errors import CaseError, FemgearError
+from femgear.errors import CaseError, FemgearError, refused_at
 from femgear.trains.gearbox.carrier import carrier_problems
 from femgear.trains.gearbox.case_file import (
     CASING,
@@ -290,8 +290,7 @@ def _refused(bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
         rolling_bearing(bearing)
     except CaseError as error:
         entry = names.get(error.key or "", error.key or "kind")
-        told = {name: getattr(error, name) for name in ("code", "value", "limit", "remedy")}
-        yield CaseError(error.message, key=f"{key}.{entry}", **told)
+        yield refused_at(error, f"{key}.{entry}")
 
 
 def _ring_places(case: GearboxCase, bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
@@ -367,10 +366,8 @@ def _stages(case: GearboxCase) -> Iterator[CaseError]:
                 pair = isinstance(stage, PairSection)
                 yield from _pair(case, stage, key) if pair else _planetary(case, stage, key)
             except FemgearError as error:
-                for one in getattr(error, "problems", None) or (error,):
-                    told = {name: getattr(one, name) for name in ("code", "value", "limit", "remedy")}
-                    where = f"{key}.{'teeth' if stage.teeth is not None else 'gears'}"
-                    yield CaseError(one.message, key=f"{where}.{one.key}" if one.key else where, **told)
+                where = f"{key}.{'teeth' if stage.teeth is not None else 'gears'}"
+                yield from (refused_at(one, f"{where}.{one.key}" if one.key else where) for one in error.problems)
 
 
 def _given_once(stage: PairSection | BoxPlanetarySection, key: str) -> CaseError | None:

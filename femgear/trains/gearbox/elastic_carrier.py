@@ -19,7 +19,7 @@ from scipy.linalg import block_diag
 from femgear.case.quantities import LENGTH
 from femgear.errors import CaseError
 from femgear.fe.beam import rigid_link
-from femgear.system.assembly import GROUND, Assembly, StationSprings
+from femgear.system.assembly import GROUND, Assembly, StationSprings, with_modal_body
 from femgear.system.system import MechanicalSystem
 from femgear.trains.gearbox.carrier import compliance_springs, pin_axes
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, SuperelementSection
@@ -138,19 +138,12 @@ def with_carriers(system: MechanicalSystem, assembly: Assembly, carriers: Sequen
     free = assembly.motions.shape[1]
     for carrier in carriers:
         size, count = len(system.dofs), len(carrier.frequency)
-        mass, still = np.asarray(block_diag(system.M, np.eye(count))), np.zeros((count, count))
+        names = [f"{carrier.name}: mode {i + 1}" for i in range(count)]
+        system = with_modal_body(system, carrier.frequency**2, np.zeros((count, system.W.shape[1])), names)
+        mass = np.array(system.M)
         mass[:free, size:] = assembly.motions.T @ carrier.on_all_motions(assembly.count)
         mass[size:, :free] = mass[:free, size:].T
-        system = MechanicalSystem(
-            M=mass,
-            C=np.asarray(block_diag(system.C, still)),
-            K=np.asarray(block_diag(system.K, np.diag(carrier.frequency**2))),
-            W=np.vstack([system.W, np.zeros((count, system.W.shape[1]))]),
-            load=np.append(system.load, np.zeros(count)),
-            dofs=(*system.dofs, *(f"{carrier.name}: mode {i + 1}" for i in range(count))),
-            gyroscopic=None if system.gyroscopic is None else np.asarray(block_diag(system.gyroscopic, still)),
-            flexibility=system.flexibility,
-        )
+        system = replace(system, M=mass)
     return system
 
 

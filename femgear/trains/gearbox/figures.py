@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,9 +14,14 @@ from femgear.trains.gearbox.casing_results import seat_curve
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
+    from matplotlib.transforms import Bbox
 
 _ARROW = 46.0  # length of the longest arrow [points]
-_STEP = 4.0  # by which names are pushed off one another [points]
+_HEAD = 9.0  # length of its head [points]
+_BESIDE = 6.0  # distance of a name beside its arrow [points]
+_STEP, _MOST_STEPS = 4.0, 60  # by which names are pushed on [points], and how often
+_NEAR = 16  # first places of a name, which are near enough to its arrow to leave a curve for
 _LEAST = 0.04  # force that is drawn, over the largest
 _MOST_MODES = 24
 _KIND_COLOURS: dict[str, str] = dict(
@@ -55,20 +61,43 @@ def deflected_shafts(deflection: xr.Dataset) -> Figure:
 
 
 def _part_names(figure: Figure) -> None:
-    """Push names of bearings that lie on another one on, away from their arrows."""
+    """Move names of bearings off one another and off arrows, and off curves where there is room."""
     from matplotlib.text import Annotation
 
     figure.draw_without_rendering()
     for ax in figure.axes:
-        placed = []
-        names = [text for text in ax.texts if isinstance(text, Annotation) and text.get_text()]
-        for text in sorted(names, key=lambda text: text.xy[0]):
-            x, y = text.xyann
-            way = -1.0 if text.get_verticalalignment() == "top" else 1.0
-            while any(text.get_window_extent().overlaps(box) for box in placed):
-                y += way * _STEP
-                text.xyann = (x, y)
-            placed.append(text.get_window_extent())
+        notes = [text for text in ax.texts if isinstance(text, Annotation)]
+        arrows = [text.arrow_patch.get_window_extent().padded(1.0) for text in notes if text.arrow_patch is not None]
+        curves = [line.get_transform().transform_path(line.get_path()) for line in ax.lines]
+        placed: list[Bbox] = []
+        for text in sorted((text for text in notes if text.get_text()), key=lambda text: text.xy[0]):
+            spots = [*_spots(text.xyann[1], text.get_verticalalignment())]
+            boxes = [_moved(text, spot) for spot in spots]
+            clear = [i for i, box in enumerate(boxes) if not any(box.overlaps(other) for other in (*arrows, *placed))]
+            inside = [i for i in clear if ax.bbox.x0 <= boxes[i].x0 and boxes[i].x1 <= ax.bbox.x1]
+            free = [i for i in inside if not any(curve.intersects_bbox(boxes[i], filled=False) for curve in curves)]
+            near = [i for i in free if i < _NEAR]
+            chosen = next(iter((*near, *inside, *clear)), 0)
+            placed.append(_moved(text, spots[chosen]))
+
+
+def _moved(text: Annotation, spot: tuple[tuple[float, float], str, str]) -> Bbox:
+    """Move a name to an offset with alignments, and give its place in the picture."""
+    text.xyann, ha, va = spot
+    text.set_horizontalalignment(ha)
+    text.set_verticalalignment(va)
+    return text.get_window_extent()
+
+
+def _spots(behind: float, va: str) -> Iterator[tuple[tuple[float, float], str, str]]:
+    """Offsets of a name from the tip of its arrow [points], with alignments: behind it, beside it, farther on."""
+    way = -1.0 if va == "top" else 1.0
+    yield (0.0, behind), "center", va
+    for side, ha in ((_BESIDE, "left"), (-_BESIDE, "right")):
+        yield (side, 0.5 * behind), ha, "center"
+        yield (side, behind), ha, va
+    for step in range(1, _MOST_STEPS):
+        yield (0.0, behind + way * step * _STEP), "center", va
 
 
 def _arrows(ax, one: xr.Dataset, way: int) -> None:
@@ -85,7 +114,7 @@ def _arrows(ax, one: xr.Dataset, way: int) -> None:
         ax.annotate(
             f"{name}\n{_force_text(abs(vector[way]))}",
             tip,
-            (0.0, -length - np.sign(length) * 3.0),
+            (0.0, -np.sign(length) * (max(abs(length), _HEAD) + 3.0)),
             textcoords="offset points",
             ha="center",
             va="top" if length > 0.0 else "bottom",

@@ -122,7 +122,7 @@ class GearboxModel:
     estimate : float
         Factor on the stiffness of bearings that are estimated.
     joints : tuple of StationSprings
-        Springs of the assembly that are neither bearings nor feet.
+        Springs of the assembly that are neither bearings nor feet: couplings, then pins, carriers and held shafts.
     casing : CasingModel or None
         Stations and feet of the casing; None where it stands still.
     """
@@ -476,8 +476,8 @@ class _Builder:
             self.springs.append(planet_springs(stage, holders, planets, offsets, axes, held, compliance))
             return elastic
         for n, (holder, planet, offset) in enumerate(zip(holders, planets, offsets, strict=True)):
-            ends, name = (offset, np.zeros(3)), f"{stage.name} pin {n + 1}"
-            self.springs.append(joint(name, (holder, planet), ends, held, axes=axes[n]))
+            ends = offset, np.zeros(3)
+            self.springs.append(joint(f"pins of {stage.name}", (holder, planet), ends, held, axes=axes[n]))
         return elastic
 
     def _contact(self, name: str, seats: tuple[Seat, Seat], pitch, normal, width: float, stiffness: float) -> int:

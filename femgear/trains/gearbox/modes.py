@@ -14,7 +14,6 @@ from femgear.solvers.linear.modal import solve_modes
 from femgear.solvers.linear.tracking import CampbellData, campbell_data
 from femgear.system.assembly import Assembly, Beam
 from femgear.system.system import MechanicalSystem, Modes
-from femgear.trains.gearbox.carrier import pins_of
 from femgear.trains.gearbox.case_file import CASING
 from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_carrier import with_carriers
@@ -132,7 +131,8 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     moved = assembly.mass @ motion
     for carrier, part in zip(carriers, _parts(squares)[len(rings) :], strict=True):
         moved += carrier.on_all_motions(assembly.count) @ waves[part]
-    members, kinetic, kinds = _kinetic(model, motion, moved, modes, inner)
+    named = [ring.name for ring in rings], [carrier.name for carrier in carriers]
+    members, kinetic, kinds = _kinetic(model, motion, moved, modes, inner, named)
     inner = _inner_energies(squares, waves**2 * np.concatenate([np.zeros(0), *squares.values()])[:, None])
     parts, strain = _strain(found, assembly, motion, _mesh_energies(system, stiffness, modes), modes, inner)
     reference = model.flow.independent[0] if model.flow.independent else case.shaft[0].name
@@ -215,9 +215,12 @@ def excitation_orders(model: GearboxModel, reference: str) -> dict[str, float]:
 
 
 def _kinetic(
-    model, motion, moved, modes: Modes, inner: dict[str, np.ndarray]
+    model, motion, moved, modes: Modes, inner: dict[str, np.ndarray], named: tuple[Sequence[str], Sequence[str]]
 ) -> tuple[tuple[str, ...], np.ndarray, tuple[str, ...]]:
-    """Shares of members in the kinetic energy, and the kind of every mode, of motions and momenta (6n, m)."""
+    """Shares of members in the kinetic energy, and the kind of every mode, of motions and momenta (6n, m).
+
+    ``inner`` are the energies of elastic rings and carriers, which are ``named`` kind by kind.
+    """
     owner = member_of_stations(model)
     per_motion = (motion * moved).reshape(len(owner), 6, -1)
     members = tuple(dict.fromkeys((*owner, *inner)))
@@ -228,7 +231,7 @@ def _kinetic(
     total = np.maximum(kinetic.sum(axis=0), 1e-300)
     in_casing = np.array([name == CASING for name in owner])
     of_shafts = [per_motion[~in_casing][:, list(ways)].sum(axis=(0, 1)) for ways in _MOTIONS]
-    elastic = [sum((e for name, e in inner.items() if name.startswith(kind)), 0.0 * total) for kind in KINDS[-2:]]
+    elastic = [sum((inner[name] for name in names), 0.0 * total) for names in named]
     by_kind = np.array([*of_shafts, per_motion[in_casing].sum(axis=(0, 1)), *elastic]) / total
     kinds = [
         "rigid" if hertz == 0.0 else KINDS[int(share.argmax())] if share.max() >= _PURE else "mixed"
@@ -264,9 +267,9 @@ def _strain(
     for number, springs in enumerate(model.bearings):
         finite = np.where(np.isfinite(found.bearing_stiffness[number]), found.bearing_stiffness[number], 0.0)
         add(_called("bearing", springs.name), springs.stations, springs.rows.T @ finite @ springs.rows)
-    for springs in model.joints:
+    for number, springs in enumerate(model.joints):
         finite = np.where(np.isfinite(springs.stiffness), springs.stiffness, 0.0)
-        label = pins_of(springs.name) or _called("coupling", springs.name)
+        label = _called("coupling", springs.name) if number < len(model.case.coupling) else springs.name
         add(label, springs.stations, (springs.rows.T * finite) @ springs.rows)
     if model.casing is not None:
         for springs, values in zip(model.casing.feet, model.casing.foot_stiffness, strict=True):

@@ -26,7 +26,7 @@ from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
 from femgear.stages.static import over_width, record_positions
 from femgear.stages.static_results import StaticResult
-from femgear.system.assembly import GROUND, MOTIONS, ROTATION, Assembly, Inertia, gear_contact, joint
+from femgear.system.assembly import GROUND, IN_PLANE, ROTATION, Assembly, Inertia, gear_contact, held_motions, joint
 from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem, gear_meshes
 from femgear.trains.pair.case_file import PairCase
 
@@ -108,14 +108,14 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
         flank=-1 if torque < 0 else 1,
         internal=gears.gears[1].internal,
     )
-    held = np.tile(np.isin(MOTIONS, ("z", "tilt x", "tilt y")), (len(names), 1))
-    held[2:, :ROTATION] = True
+    held = held_motions(len(names), IN_PLANE)
+    held.reshape(-1, 6)[2:, :ROTATION] = True
     load = np.zeros((len(names), 6))
     load[ends, ROTATION] = torque, -gears.senses[1] * torque * radii[1] / radii[0]
     places = np.zeros((len(names), 3))
     centre = gears.centres[1][0]
     places[1, :2] = centre.real, centre.imag
-    assembly = Assembly(names, places, held.ravel(), tuple(inertias), (), tuple(springs), (contact,))
+    assembly = Assembly(names, places, held, tuple(inertias), (), tuple(springs), (contact,))
     system, motions = assembly.system(load.ravel()), assembly.motions.reshape(len(names), 6, -1)
     rotation = np.einsum("s,sm->m", assembly.columns[[ROTATION, 6 + ROTATION], 0], motions[:2, ROTATION])
     return PairModel(system, rotation, motions[:2, :2].reshape(4, -1), bearing, contact.normals[0, :2])

@@ -6,7 +6,7 @@ from small_gearbox import pair_tables
 
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.modes import excitation_orders, linear_system, solve_gearbox_modes
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, with_values
 
 
 @pytest.fixture(scope="module")
@@ -63,3 +63,12 @@ def test_turning_splits_the_bending_of_a_heavy_disc():
     campbell = solve_gearbox_modes(solve_deflection(read_case(tables))).campbell
     still, fast = np.sort(campbell.frequency[0]), np.sort(campbell.frequency[-1])
     assert np.abs(fast / np.where(still > 0.0, still, 1.0) - 1.0)[still > 0.0].max() > 0.05
+
+
+def test_a_coupling_is_none_of_the_pins_whatever_it_is_called():
+    """Parts of the strain energy go by what they are, not by their names."""
+    case = read_case("cases/e_axle.toml")
+    stiff = {"between": ["rotor", "casing"], "torsion": "1e3 N m/rad", "positions": ["10 mm", "0 mm"], "transmits": False, "name": "shear pin 1"}
+    modes = solve_gearbox_modes(solve_deflection(with_values(case, {"coupling": [stiff], "deflection.contact": False})))
+    assert "coupling shear pin 1" in modes.parts and "pins of second stage" in modes.parts
+    assert not any(part.startswith("pins of shear") for part in modes.parts)
