@@ -84,8 +84,7 @@ def _part_names(figure: Figure) -> None:
 def _moved(text: Annotation, spot: tuple[tuple[float, float], str, str]) -> Bbox:
     """Move a name to an offset with alignments, and give its place in the picture."""
     text.xyann, ha, va = spot
-    text.set_horizontalalignment(ha)
-    text.set_verticalalignment(va)
+    text.set(ha=ha, va=va)
     return text.get_window_extent()
 
 
