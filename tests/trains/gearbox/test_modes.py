@@ -68,7 +68,10 @@ def test_turning_splits_the_bending_of_a_heavy_disc():
 def test_a_coupling_is_none_of_the_pins_whatever_it_is_called():
     """Parts of the strain energy go by what they are, not by their names."""
     case = read_case("cases/e_axle.toml")
-    stiff = {"between": ["rotor", "casing"], "torsion": "1e3 N m/rad", "positions": ["10 mm", "0 mm"], "transmits": False, "name": "shear pin 1"}
-    modes = solve_gearbox_modes(solve_deflection(with_values(case, {"coupling": [stiff], "deflection.contact": False})))
+    spring = {"name": "shear pin 1", "between": ["rotor", "casing"], "positions": ["10 mm", "0 mm"]}
+    coupling = [spring | {"torsion": "1e3 N m/rad", "transmits": False}]
+    modes = solve_gearbox_modes(
+        solve_deflection(with_values(case, {"coupling": coupling, "deflection.contact": False}))
+    )
     assert "coupling shear pin 1" in modes.parts and "pins of second stage" in modes.parts
     assert not any(part.startswith("pins of shear") for part in modes.parts)
