@@ -118,8 +118,8 @@ class ModalBody:
     mass : (m, m) array
         Of the elastic motions.
     shape : mapping of int to (6, m) array
-        Elastic displacements and rotations of the nodes of the interface, by their numbers; rotations that a node has
-        not are zero.
+        Elastic displacements and rotations of the nodes of the interface, and of others that were asked for, by their
+        numbers; those that a node has not are zero.
     """
 
     centre: np.ndarray
@@ -356,7 +356,9 @@ def _centre(body: Superelement) -> np.ndarray:
     return np.array([-about[2, 4], about[2, 3], about[0, 4]]) / (np.trace(about[:3, :3]) / 3.0)
 
 
-def modal_body(body: Superelement, numbers: Sequence[int], *, max_frequency: float = np.inf) -> ModalBody:
+def modal_body(
+    body: Superelement, numbers: Sequence[int], *, others: Sequence[int] = (), max_frequency: float = np.inf
+) -> ModalBody:
     """Split a superelement into a rigid body and its elastic motions.
 
     Parameters
@@ -365,6 +367,8 @@ def modal_body(body: Superelement, numbers: Sequence[int], *, max_frequency: flo
         Without `free_body_problems`.
     numbers : sequence of int
         Nodes of the interface, which are loaded.
+    others : sequence of int
+        Further nodes whose shapes are wanted: these follow.
     max_frequency : float
         Modes with the interface held beyond it are left out [Hz]; static shapes of the interface are whole.
     """
@@ -393,7 +397,7 @@ def modal_body(body: Superelement, numbers: Sequence[int], *, max_frequency: flo
     motions = motions - rigid @ np.linalg.solve(rigid_mass, rigid.T @ M @ motions)
     mass = motions.T @ M @ motions
     shapes = {}
-    for number in numbers:
+    for number in (*numbers, *others):
         shapes[number] = np.zeros((6, motions.shape[1]))
         for c in body.components(Node(number, "", "", "", "", None)):
             shapes[number][c - 1] = motions[body.row[number, c]]

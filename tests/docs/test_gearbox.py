@@ -13,6 +13,7 @@ from femgear.exchange.casing_files import read_nodes
 from femgear.exchange.superelement import SUPERELEMENT_ROLES
 from femgear.trains.gearbox.case_file import BoxCasingSection
 from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.reading import read_case
 
 PAGE = (Path(__file__).parents[2] / "docs" / "gearbox.md").read_text(encoding="utf-8")
@@ -21,7 +22,7 @@ BLOCKS = [tomllib.loads(block) for block in re.findall(r"```toml\n(.*?)```", CAS
 
 
 def test_the_rigid_casing_of_the_page_stands_on_more_such_feet():
-    tables = pair_tables() | BLOCKS[0]
+    tables = pair_tables() | BLOCKS[0] | BLOCKS[2]
     (foot,) = tables["casing"]["foot"]
     for number, (x, z) in enumerate(((-80, 95), (180, 0), (180, 95))):
         more = {"name": f"foot {number}", "position": [f"{x} mm", "-100 mm", f"{z} mm"]}
@@ -30,6 +31,8 @@ def test_the_rigid_casing_of_the_page_stands_on_more_such_feet():
     # torques of 100 and 150 N m turn the box the same way round
     assert found.foot_force.sum(axis=0) == pytest.approx([0.0, 0.0, 0.0], abs=1e-6)
     assert len(found.foot_force) == 4
+    (row,) = sensor_rows(found.model)
+    assert row.any()
 
 
 def test_the_elastic_casing_of_the_page_has_entries_and_roles_that_there_are(tmp_path):

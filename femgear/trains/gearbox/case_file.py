@@ -54,6 +54,12 @@ EXPANSION = Dimension("a thermal expansion", "1/K", "1/K", 1.0)
 CASING = "casing"
 """In place of a shaft: the casing, which stands still unless the case describes it."""
 MOST_PARTS = 200
+DIRECTION_VECTORS = {
+    f"{'-' * (sign < 0)}{axis}": tuple(sign * (axis == other) for other in "xyz")
+    for axis in "xyz"
+    for sign in (1.0, -1.0)
+}
+"""Unit vectors of the words for directions along the axes."""
 _NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_ .-]{0,39}")
 _LARGEST_TORQUE, _LARGEST_FORCE = 1e9, 1e9
 
@@ -73,6 +79,11 @@ def _tables(value: object) -> object:
         what = f"the tables of a case are needed, not {described(value)}"
         raise CaseError(what, code="E-TYPE", value=value, remedy='name its file, as in "stage.toml"')
     return value
+
+
+def _axis_vector(value: object) -> object:
+    """Vector of an axis in a word, x, y or z, which a minus sign may turn round."""
+    return DIRECTION_VECTORS.get(value, value) if isinstance(value, str) else value
 
 
 Name = Annotated[str, BeforeValidator(_name)]
@@ -96,6 +107,10 @@ Force = Annotated[float, Quantity(FORCE, -_LARGEST_FORCE, _LARGEST_FORCE)]
 ShaftSpeed = Annotated[float, Quantity(SPEED, -1e6 * SPEED.scale, 1e6 * SPEED.scale)]
 Entry = Annotated[float, Number(-1e30, 1e30)]
 Entries = Annotated[tuple[Entry, ...], Values(max_length=100_000)]
+SensorDirection = Annotated[
+    tuple[Annotated[float, Number(-1.0, 1.0)], ...], TRIPLE, WithJsonSchema({"type": ["string", "array"]})
+]
+"""A vector; x, y, z or one of these after a minus sign are read as one."""
 StageTables = Annotated[dict[str, Any], BeforeValidator(_tables), WithJsonSchema({"type": ["string", "object"]})]
 """Tables of a pair or of a planetary set, or of the name of a file, in whose place they stand when it was read."""
 
@@ -477,6 +492,18 @@ class BoxCasingSection(Section):
         return tuple(foot.name or str(number + 1) for number, foot in enumerate(self.foot))
 
 
+class BoxSensorSection(Section):
+    """A sensor on the casing, which feels its motion in a ``direction``: along an axis, or a vector of three numbers.
+
+    On a rigid casing it is at a ``position`` in the coordinates of the case. On one from a file ``name`` is that of a
+    node of the role sensor, whose row of the table of nodes has place and direction; a direction here goes before it.
+    """
+
+    name: Name
+    position: Annotated[tuple[Along, ...], TRIPLE] | None = None
+    direction: Annotated[SensorDirection, BeforeValidator(_axis_vector)] | None = None
+
+
 class LoadCaseSection(Section):
     """Torques at loads and speeds of shafts of one load case, and its share of the time.
 
@@ -544,6 +571,7 @@ class GearboxCase(Section, ReadCase):
     gravity: BoxGravitySection | None = None
     thermal: ThermalSection = ThermalSection()
     casing: BoxCasingSection | None = None
+    sensor: Annotated[tuple[BoxSensorSection, ...], Field(max_length=MOST_PARTS)] = ()
     operation: BoxOperationSection
     deflection: DeflectionSection = DeflectionSection()
     modes: BoxModesSection = BoxModesSection()

@@ -1,4 +1,4 @@
-"""What the casing of a gearbox case is refused for before anything is computed."""
+"""What the casing of a gearbox case and the sensors on it are refused for before anything is computed."""
 
 from __future__ import annotations
 
@@ -9,16 +9,18 @@ import numpy as np
 from femgear.case.messages import no_such
 from femgear.case.quantities import INERTIA
 from femgear.errors import CaseError
-from femgear.trains.gearbox.case_file import CASING, BoxCasingSection, GearboxCase
+from femgear.trains.gearbox.case_file import CASING, BoxCasingSection, BoxSensorSection, GearboxCase
 from femgear.trains.gearbox.casing import inertia_tensor, named_seats
 
 # By which the largest principal inertia may exceed the sum of both others, relative: rounding of a drawing.
 _FLAT = 1e-3
+_DIRECTIONS = '"x", "y", "z", one of these after a minus sign, or three numbers'
 
 
 def check_casing(case: GearboxCase) -> Iterator[CaseError]:
-    """List what no entry of the casing shows alone."""
+    """List what no entry of the casing and of its sensors shows alone."""
     section = case.casing
+    yield from _sensors(case)
     if section is None:
         return
     yield from _motions(case)
@@ -167,3 +169,58 @@ def _standing(case: GearboxCase, section: BoxCasingSection) -> Iterator[CaseErro
             what = f"name what sits in the {CASING}"
             limit = ", ".join(names[:20]) or f"none: nothing sits in the {CASING}"
             yield no_such("seat", f"casing.stands_still[{number}]", name, names, what, limit=limit)
+
+
+def _sensors(case: GearboxCase) -> Iterator[CaseError]:
+    """Sensors on a casing that moves, each with a name, a direction and a place."""
+    if case.sensor and case.casing is None:
+        yield CaseError(
+            "a casing that stands still has no motion for a sensor",
+            code="E-KEY-MISSING",
+            key="casing",
+            limit="a casing on feet, rigid or from a file",
+            remedy="give [casing] with mass, centre, inertia and [[casing.foot]], or leave [[sensor]] out",
+        )
+    names = [sensor.name for sensor in case.sensor]
+    for number, sensor in enumerate(case.sensor):
+        key = f"sensor[{number}]"
+        if sensor.name in names[:number]:
+            yield CaseError(
+                f"the name is that of sensor[{names.index(sensor.name)}] already",
+                code="E-DUPLICATE",
+                key=f"{key}.name",
+                value=sensor.name,
+                remedy="give every sensor a name of its own",
+            )
+        if sensor.direction is not None and not any(sensor.direction):
+            yield CaseError(
+                "the sensor has no direction",
+                code="E-RANGE",
+                key=f"{key}.direction",
+                value=list(sensor.direction),
+                limit="a vector that is not zero",
+                remedy='write direction = "y"',
+            )
+        if case.casing is not None:
+            yield from _place_of_sensor(key, sensor, case.casing)
+
+
+def _place_of_sensor(key: str, sensor: BoxSensorSection, casing: BoxCasingSection) -> Iterator[CaseError]:
+    """Place and direction that a rigid casing needs, and a place that one of a file has already."""
+    if casing.file is not None:
+        if sensor.position is not None:
+            yield CaseError(
+                "the place of the sensor is that of its node",
+                code="E-CHOICE",
+                key=f"{key}.position",
+                limit="name and direction",
+                remedy="leave it out",
+            )
+        return
+    needed = {"position": 'give x, y and z, as in ["60 mm", "90 mm", "40 mm"]', "direction": f"give {_DIRECTIONS}"}
+    for name, remedy in needed.items():
+        if getattr(sensor, name) is None:
+            what = "place" if name == "position" else name
+            limit = "place and direction of every sensor on a rigid casing"
+            message = f"the {what} of the sensor is missing"
+            yield CaseError(message, code="E-KEY-MISSING", key=f"{key}.{name}", limit=limit, remedy=remedy)

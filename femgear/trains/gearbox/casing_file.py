@@ -42,7 +42,7 @@ def casing_element(case: GearboxCase) -> Superelement:
     CaseError: as `femgear.exchange.superelement.read_superelement`; E-OTHER-CASE: files that are not those that the
     case was read with; all that makes it no casing of this case, at once.
     """
-    section, (file, nodes) = case.casing, _files(case)
+    section, (file, nodes) = case.casing, casing_file_paths(case)
     assert section is not None
     try:
         refuse_other_files((file, nodes), section.file or "", section.sha256)
@@ -60,8 +60,8 @@ def casing_element(case: GearboxCase) -> Superelement:
     return element
 
 
-def _files(case: GearboxCase) -> tuple[Path, Path]:
-    """File and table of nodes, beside the case file or below."""
+def casing_file_paths(case: GearboxCase) -> tuple[Path, Path]:
+    """Find file and table of nodes of a casing, beside the case file or below."""
     section, folder = case.casing, Path(case.name).parent
     assert section is not None
     return folder / (section.file or ""), folder / (section.nodes or "")
@@ -92,16 +92,20 @@ def elastic_casing(case: GearboxCase) -> tuple[Superelement, ModalBody]:
     seats = element.of_role("seat")
     used = [seats[name].number for name in casing_seats(case) if name not in section.stands_still]
     used += [node.number for node in element.of_role("foot").values()]
-    file, nodes = map(str, _files(case))
+    heard = [node.number for node in element.nodes if node.role == "sensor" and node.number not in used]
+    numbers = tuple(dict.fromkeys(used)), tuple(dict.fromkeys(heard))
+    file, nodes = map(str, casing_file_paths(case))
     highest = section.max_frequency or HIGHEST_MODE
-    return element, _split(file, nodes, section.units, section.sha256 or "", tuple(dict.fromkeys(used)), highest)
+    return element, _split(file, nodes, section.units, section.sha256 or "", numbers, highest)
 
 
 @lru_cache(maxsize=8)
-def _split(file: str, nodes: str, units: str, sha256: str, numbers: tuple[int, ...], highest: float) -> ModalBody:
+def _split(file: str, nodes: str, units: str, sha256: str, numbers: tuple, highest: float) -> ModalBody:
+    """Modal body of files of a checksum, of the ``numbers`` of the nodes of its interface and of sensors."""
     from femgear.exchange.superelement import modal_body
 
-    return modal_body(_read(file, nodes, units, sha256)[0], numbers, max_frequency=highest)
+    interface, sensors = numbers
+    return modal_body(_read(file, nodes, units, sha256)[0], interface, others=sensors, max_frequency=highest)
 
 
 @dataclass(frozen=True)
@@ -250,8 +254,8 @@ def _foot_problems(section: BoxCasingSection, element: Superelement) -> Iterator
         )
 
 
-def _at_hand(case: GearboxCase) -> Superelement | None:
-    """Superelement of a case; None where its files are not there, as beside the results of a run."""
+def casing_at_hand(case: GearboxCase) -> Superelement | None:
+    """Read the superelement of a case; None where its files are not there, as beside the results of a run."""
     try:
         return casing_element(case)
     except CaseError as error:
@@ -264,7 +268,7 @@ def casing_notices(case: GearboxCase) -> Iterator[Finding]:
     """Tell seats whose nodes have no rotations (W-BEARING): they tilt as the casing does as a whole."""
     if case.casing is None or case.casing.file is None:
         return
-    element = _at_hand(case)
+    element = casing_at_hand(case)
     if element is None:
         return
     plain = [name for name, node in element.of_role("seat").items() if len(element.components(node)) == 3]
@@ -285,7 +289,7 @@ def describe_casing(case: GearboxCase) -> Iterator[Block]:
     if section.file is None:
         assert section.mass is not None
         mass, centre, feet, elastic = section.mass, section.centre or (), section.foot_names, "rigid"
-    elif _at_hand(case) is None:
+    elif casing_at_hand(case) is None:
         yield Block("Casing", rows=(("file", section.file), ("sits in it", ", ".join(seats) or "nothing")))
         return
     else:

@@ -32,6 +32,13 @@ from femgear.trains.gearbox.life import describe_load_cases, life_text, life_var
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
 from femgear.trains.gearbox.modes import GearboxModes
 from femgear.trains.gearbox.play import play_findings, slack_bearings
+from femgear.trains.gearbox.sensors import (
+    describe_sensors,
+    modal_sensor_variables,
+    sensor_coordinates,
+    sensor_notices,
+    static_sensor_variables,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -139,7 +146,7 @@ class DeflectionResult(StageResult):
             "out_of_balance": (load_case, [one.residual for one in every], "1", "force out of balance, relative"),
         }
         variables |= _of_bearings(every, state) | _distribution(state) | _of_estimates(self.estimates)
-        variables |= casing_variables(every)
+        variables |= casing_variables(every) | static_sensor_variables(every)
         coords = {
             "load_case": _names("load_case", [one.name for one in case.operation.load_case], "load case"),
             "shaft": _names("shaft", [one.name for one in case.shaft], "shaft"),
@@ -157,7 +164,8 @@ class DeflectionResult(StageResult):
                 "1",
                 "shaft or planets of the station",
             ),
-        } | casing_coordinates(state)
+        }
+        coords |= casing_coordinates(state) | sensor_coordinates(state.model)
         return Contents(variables, coords, {"title": "system deflection", "load_case": self.chosen})
 
 
@@ -338,6 +346,7 @@ class GearboxModesResult(StageResult):
             "critical_speed": ("crossing", [one.speed / RPM for one in critical], "rpm", "speed of a line on a branch"),
             "critical_frequency": ("crossing", [one.frequency for one in critical], "Hz", "frequency there"),
         }
+        variables |= modal_sensor_variables(model, found.motion)
         coords = {
             **coordinates(mode=np.arange(1, len(modes.frequency) + 1)),
             "member": _names("member", found.members, "shaft, or planets of a stage"),
@@ -349,6 +358,7 @@ class GearboxModesResult(StageResult):
             "axis": _names("axis", "xyz", "coordinate"),
             "line": _names("line", found.orders, "excitation"),
             "campbell_speed": (("campbell_speed",), campbell.speed / RPM, "rpm", f"speed of {found.reference}"),
+            **sensor_coordinates(model),
         }
         speed = abs(model.flow.speed[found.reference]) / RPM
         attrs = {"title": "modes of the gearbox", "reference": found.reference, "speed": speed}
@@ -450,6 +460,7 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
         tabulate(f"Meshes{name}{brackets}", range(data.sizes["mesh"]), meshes, (note,)),
         tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
         *describe_feet(data, at, name),
+        *describe_sensors(data, at, name),
         *describe_load_cases(data),
     )
 
@@ -565,6 +576,7 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
         yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")
     yield from _given_planets(case)
     yield from casing_notices(case)
+    yield from sensor_notices(case)
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
             given = _without_effect(stage.teeth or {})

@@ -24,6 +24,7 @@ from femgear.trains.gearbox.results import (
     gearbox_verdict,
     gearbox_warnings,
 )
+from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors
 
 
 @one_blas_thread()
@@ -54,9 +55,10 @@ def solve_box_modes(
 
 
 def check_before_run(case: GearboxCase) -> None:
-    """Refuse files of a casing that are none of this case, and shafts that the assembled model leaves loose."""
+    """Refuse files of a casing that are none of this case, shafts that the model leaves loose, sensors that stand still."""
     check_casing_file(case)
     check_held(case)
+    check_sensors(case)
 
 
 def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
@@ -120,6 +122,7 @@ GEARBOX = Train(
             options=("steps",),
             verdict=modes_verdict,
             describe=lambda results: describe_gearbox_modes(results.modes),
+            tables=lambda results: tuple(describe_modes_at_sensors(results.modes)),
             warnings=gearbox_modes_warnings,
         ),
     ),
