@@ -55,7 +55,7 @@ def solve_box_modes(
 
 
 def check_before_run(case: GearboxCase) -> None:
-    """Refuse files of a casing that are none of this case, shafts that the model leaves loose, sensors that stand still."""
+    """Refuse files of a casing that are none of this case, shafts that the model leaves loose, and idle sensors."""
     check_casing_file(case)
     check_held(case)
     check_sensors(case)
