@@ -318,13 +318,13 @@ def test_poincare_section(benchmark):
 @question_group
 @pytest.mark.parametrize("route", ["direct", "modal"])
 def test_frequency_response(benchmark, route):
-    from femgear.solvers.linear.modal import solve_modes
+    from femgear.solvers.linear.modal import undamped_modes
     from femgear.solvers.linear.receptance import modal_response
     from validation.reference.frequency_response import direct_response
 
     system, k = problem(0.05).system, problem(0.05).reference
     frequency, W = np.linspace(50.0, 12000.0, 2000), system.W
-    modes = solve_modes(system, k)
+    modes = undamped_modes(system, k)
     routes = {
         "direct": lambda: direct_response(system, frequency, W, W.T, mesh_stiffness=k),
         "modal": lambda: modal_response(system, modes, frequency, W, W.T),
@@ -375,12 +375,12 @@ def test_stability_chart(benchmark):
 
 @question_group
 def test_spectral_speeds(benchmark):
-    from femgear.solvers.linear.modal import solve_modes
+    from femgear.solvers.linear.modal import undamped_modes
     from femgear.solvers.periodic.spectral import solve_spectral
     from femgear.system.system import MeshExcitation
 
     system, k = problem(0.05).system, problem(0.05).reference
-    modes = solve_modes(system, k)
+    modes = undamped_modes(system, k)
     phase = 2.0 * np.pi * np.arange(64)[:, None] / 64
     stiffness = train.mesh_stiffness().at(phase).T
     none = np.zeros_like(stiffness)

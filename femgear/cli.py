@@ -731,8 +731,8 @@ class Tasks:
     cluster: str | None = None
 
 
-@app.command
-def sweep(
+@app.command(name="sweep")
+def compute_sweep(
     case: Path,
     /,
     *,

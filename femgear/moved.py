@@ -1,9 +1,13 @@
-"""Former names of modules: they can be imported until the next minor release, with a DeprecationWarning."""
+"""Former names of modules and of what is in them, until the next minor release, with a DeprecationWarning.
+
+`FormerNames` finds modules, `former_names` gives a module those of its functions and classes.
+"""
 
 from __future__ import annotations
 
 import sys
 import warnings
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from importlib.util import spec_from_loader
 from typing import Any
@@ -51,6 +55,19 @@ class FormerNames:
             return
         warnings.warn(f"{former} is called {new} now", DeprecationWarning, stacklevel=2)
         sys.modules[former] = import_module(new)
+
+
+def former_names(module: str, renamed: Mapping[str, object]) -> Callable[[str], object]:
+    """Make the ``__getattr__`` of a module whose functions or classes had other names: what they are now by those."""
+
+    def find(name: str) -> object:
+        if name not in renamed:
+            raise AttributeError(f"module {module!r} has no attribute {name!r}")
+        new = renamed[name]
+        warnings.warn(f"{module}.{name} is called {new.__name__} now", DeprecationWarning, stacklevel=2)  # type: ignore[attr-defined]
+        return new
+
+    return find
 
 
 def _new_name(former: str) -> str | None:

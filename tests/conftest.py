@@ -102,7 +102,7 @@ def gmsh_is_loaded_once(folder_of_both_workers):
     def answer(words):
         said, output = io.StringIO(), io.BytesIO()
         with one_at_a_time, contextlib.redirect_stderr(said):
-            code = worker.main(io.BytesIO(words), output)
+            code = worker.answer(io.BytesIO(words), output)
             if hasattr(signal, "alarm"):
                 signal.alarm(0)
         return code, output.getvalue(), said.getvalue().encode()

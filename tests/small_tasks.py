@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 
 from femgear.errors import ContactError
-from femgear.study.objectives import NUMBER, Quantity
+from femgear.study.objectives import NUMBER, StudyQuantity
 
 POISON = 0.5
 
@@ -89,5 +89,5 @@ def _ends_its_process(variant):
     return variant.case.dynamics.damping_ratio / 7.0
 
 
-VALLEY = Quantity("valley", NUMBER, "gears", _valley)
-DEADLY = Quantity("deadly", NUMBER, "gears", _ends_its_process)
+VALLEY = StudyQuantity("valley", NUMBER, "gears", _valley)
+DEADLY = StudyQuantity("deadly", NUMBER, "gears", _ends_its_process)

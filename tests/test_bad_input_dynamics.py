@@ -8,7 +8,7 @@ import pytest
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.continuation.branches import frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.time.transient import solve_transient
@@ -50,7 +50,7 @@ def test_a_converged_fixed_point_does_not_hide_parametric_instability():
 def test_where_the_fixed_point_diverges_the_direct_solution_steps_in_and_says_so():
     found = rectangular()
     record = found.elements[0].stiffness.at(2.0 * np.pi * np.arange(256)[:, None] / 256).T
-    modes = solve_modes(found.system, record.mean(axis=1))
+    modes = undamped_modes(found.system, record.mean(axis=1))
     deflection = 1.0 / record
     excitation = MeshExcitation(record, deflection, np.ones_like(record), np.array([np.inf]))
     response = solve_spectral(

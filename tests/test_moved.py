@@ -1,11 +1,12 @@
-"""Former names of modules."""
+"""Former names of modules, functions and classes."""
 
 import subprocess
 import sys
+from importlib import import_module
 
 import pytest
 
-from femgear.moved import MOVED
+from femgear.moved import MOVED, former_names
 
 
 @pytest.mark.parametrize(
@@ -38,3 +39,22 @@ def test_new_names_exist_and_former_ones_have_no_file():
     for former, new in MOVED.items():
         assert find_spec(new) is not None
         assert find_spec(former).origin is None
+
+
+@pytest.mark.parametrize(
+    ("module", "former", "new"),
+    [
+        ("femgear.solvers.linear.modal", "solve_modes", "undamped_modes"),
+        ("femgear.solvers", "solve_modes", "undamped_modes"),
+        ("femgear.study.objectives", "Quantity", "StudyQuantity"),
+    ],
+)
+def test_former_functions_and_classes_are_those_by_their_new_names(module, former, new):
+    place = import_module(module)
+    with pytest.warns(DeprecationWarning, match=f"{former} is called {new} now"):
+        assert getattr(place, former) is getattr(place, new)
+
+
+def test_another_name_is_not_there():
+    with pytest.raises(AttributeError, match="no attribute .newer"):
+        former_names("femgear.curves", {"older": pytest})("newer")

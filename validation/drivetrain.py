@@ -16,7 +16,7 @@ from published.wind_turbine_drivetrain import (
     wind_turbine_drivetrain,
 )
 
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.system.mesh_directions import gear_set_system
 from femgear.trains.drivetrain.kinematics import coordinates_of, planar_of, rigid_rotation
 from femgear.trains.drivetrain.model import (
@@ -111,7 +111,7 @@ def base_line() -> tuple[Row, ...]:
         ("shafts that bend", 2.5, drivetrain_model(train)),
         ("torsional", 2.0, torsional_model(train)),
     ):
-        ours = solve_modes(model.still, model.mean_stiffness).frequency[1]
+        ours = undamped_modes(model.still, model.mean_stiffness).frequency[1]
         rows.append(information("modes", f"{PAPER}, Fig. 5", f"base line, {words} [Hz]", value, ours))
     lower = rows[0].ours / rows[1].ours
     text = "lowest mode with shafts that bend over that with held axes: above one"
@@ -149,8 +149,8 @@ def reductions() -> tuple[Row, ...]:
     carrier, sun = replace(lumped.carrier, support=2e8), replace(lumped.sun, support=3e7)
     lumped = replace(lumped, carrier=carrier, sun=sun)
     ours = drivetrain_model(alone)
-    ours = solve_modes(ours.still, ours.mean_stiffness).frequency[1:]
-    theirs = solve_modes(gear_set_system(lumped), lumped.mesh_stiffness).frequency[1:]
+    ours = undamped_modes(ours.still, ours.mean_stiffness).frequency[1:]
+    theirs = undamped_modes(gear_set_system(lumped), lumped.mesh_stiffness).frequency[1:]
     planar = np.abs(ours / theirs - 1.0).max()
     return (
         at_most("reductions", "torsional matrices", "chain with held axes, error of M, K and W", 1e-9, error),
@@ -209,7 +209,7 @@ def _pair(harmonics: int):
     )
     held = (BearingSection.in_si(body="a", radial=math.inf), BearingSection.in_si(body="b", radial=math.inf))
     model = drivetrain_model(Drivetrain(bodies, parallel=(stage,), bearings=held, gravity=0.0), harmonics=harmonics)
-    frequency = solve_modes(model.still, model.mean_stiffness).frequency[-1]
+    frequency = undamped_modes(model.still, model.mean_stiffness).frequency[-1]
     return model, 2.0 * math.pi * float(frequency)
 
 

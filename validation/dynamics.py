@@ -235,7 +235,7 @@ def harmonics_kept() -> tuple[Row, ...]:
 
 def modes_kept() -> tuple[Row, ...]:
     """Modes of ring and set, the static flexibility of the others kept or dropped."""
-    from femgear.solvers.linear.modal import solve_modes
+    from femgear.solvers.linear.modal import undamped_modes
     from femgear.trains.elastic.stages import solve_modes as pipeline_modes
 
     basis = reference_modes()
@@ -246,7 +246,7 @@ def modes_kept() -> tuple[Row, ...]:
         reference = _periodic(fine.modes, fine.excitation, frequency)
         source = f"{len(fine.modes.frequency)} modes of set and ring below {2e-3 * top:.1f} kHz"
         for factor in (0.5, 1.0):
-            modes = solve_modes(
+            modes = undamped_modes(
                 basis.model.system,
                 basis.modes.mesh_stiffness,
                 damping_ratio=reference_case().dynamics.damping_ratio,

@@ -20,7 +20,7 @@ from femgear.housing.sensor import component_lines
 from femgear.housing.two_way.response import MeshPaths, TwoWayResponse, solve_two_way, structure_lines
 from femgear.housing.two_way.structure import FixedStructure, Support, circumferential, supported_ring
 from femgear.housing.two_way.turn_stability import turn_stability
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from femgear.solvers.periodic.spectral import HarmonicProblem, solve_direct, solve_spectral
 from femgear.solvers.stability.parametric import stability
 from femgear.stages.static import solve_static
@@ -180,7 +180,7 @@ def rigid_modes(paths: MeshPaths, drive: MeshExcitation, ratio: float = 0.04) ->
     """Modes of sun and planets with the mean stiffness of all planets."""
     mean, N = drive.stiffness.mean(axis=1), len(paths.planet_angles)
     equal = np.repeat([mean[:N].mean(), mean[N:].mean()], N)
-    return solve_modes(gears(paths.planet_angles), equal, damping_ratio=ratio)
+    return undamped_modes(gears(paths.planet_angles), equal, damping_ratio=ratio)
 
 
 def feet(max_diameter: int, highest: int = 20) -> FixedStructure:
@@ -199,7 +199,7 @@ def feet(max_diameter: int, highest: int = 20) -> FixedStructure:
 def solved(paths: MeshPaths, structure, speeds, *, depth=0.15, harmonics=6, ratio=0.04, **known) -> TwoWayResponse:
     """The set in a structure by the two-way solution."""
     drive = excitation(paths, int(np.sign(speeds[0])), depth)
-    modes = solve_modes(gears(paths.planet_angles), drive.stiffness.mean(axis=1), damping_ratio=ratio)
+    modes = undamped_modes(gears(paths.planet_angles), drive.stiffness.mean(axis=1), damping_ratio=ratio)
     return solve_two_way(modes, drive, structure, paths, speeds, harmonics=(2, harmonics), **known)
 
 
@@ -275,7 +275,7 @@ def axisymmetric() -> tuple[Row, ...]:
     kept = {"excitation_harmonics": 2, "response_harmonics": 6}
     for ratio in (0.0, 0.01, 0.05):
         structure = _foundation(5, ratio)[1]
-        modes, rigid = (solve_modes(one, mean, damping_ratio=ratio) for one in (whole, system))
+        modes, rigid = (undamped_modes(one, mean, damping_ratio=ratio) for one in (whole, system))
         present = solve_spectral(modes, drive, speed / (2 * np.pi), tolerance=1e-12, method="direct", **kept)
         field = np.swapaxes(modes.shape[len(system.K) :] @ present.modal, 1, 2)
         field = field @ circumferential(ring, ring.output[:, 0], 5)
@@ -481,7 +481,7 @@ def multipliers() -> tuple[Row, ...]:
         start, end = np.eye(size).ravel(), 2 * np.pi * drive.periods / speed
         turn = solve_ivp(rate, (0, end), start, "DOP853", args=(0.0,), rtol=1e-9, atol=1e-12).y[:, -1]
         reference = np.abs(np.linalg.eigvals(turn.reshape(size, size))).max()
-        modes = solve_modes(gears(EQUAL), mean, damping_ratio=ratio)
+        modes = undamped_modes(gears(EQUAL), mean, damping_ratio=ratio)
         kept = {"harmonics": 2, "damping": joint, "frequency_ratio": 1e3, "tolerance": 1e-8}
         found = turn_stability(modes, drive, structure, paths, [speed], **kept)
         turns = "a turn" if drive.periods == 1 else f"{drive.periods} turns"
@@ -495,7 +495,7 @@ def multipliers() -> tuple[Row, ...]:
     for words, speed, depth in (("stable", 100.0, 0.15), ("unstable", 170.0, 0.4)):
         drive = excitation(paths, depth=depth)
         mean, whole = drive.stiffness.mean(axis=1), joined(paths, ring, 0)
-        modes, rigid = (solve_modes(one, mean, damping_ratio=ratio) for one in (whole, gears(EQUAL)))
+        modes, rigid = (undamped_modes(one, mean, damping_ratio=ratio) for one in (whole, gears(EQUAL)))
         frequency, joint = 37 * speed / (2 * np.pi), modal_damping(whole, mean, ratio)
         kept = {"excitation_harmonics": 2, "frequency_ratio": 1e3, "steps": 800}
         present = stability(modes, drive, frequency, **kept).modulus[0] ** 37
@@ -767,7 +767,7 @@ def _present(whole, drive, ratio: float, frequency, kept) -> tuple[Modes, Any]:
     for digits in range(-_ROUNDINGS, _ROUNDINGS + 1) if few else (0,):
         factor = 1.0 + digits * np.finfo(float).eps
         stiffness, flexibility = factor * drive.stiffness, whole.flexibility / factor
-        joint = solve_modes(replace(whole, flexibility=flexibility), stiffness.mean(axis=1), damping_ratio=ratio)
+        joint = undamped_modes(replace(whole, flexibility=flexibility), stiffness.mean(axis=1), damping_ratio=ratio)
         response = solve_spectral(
             joint,
             replace(drive, stiffness=stiffness),
@@ -796,7 +796,7 @@ def _in_its_ring(case, modes, ratio: float, frequency, kept) -> tuple[np.ndarray
     whole, teeth = replace(model.system, W=W, flexibility=flexibility), 108 * 10**9
     base = 2 * np.pi * frequency / teeth
     paths = MeshPaths(teeth, tuple(planetary_set(case).planet_angles), ring.load_angle, 3)
-    rigid = solve_modes(gears_alone(model, flexibility), mean, damping_ratio=ratio)
+    rigid = undamped_modes(gears_alone(model, flexibility), mean, damping_ratio=ratio)
     joint, present = _present(whole, drive, ratio, frequency, kept)
     field = np.swapaxes(joint.shape[model.ring_slice] @ present.modal, 1, 2)
     field = field @ circumferential(ring.modes, ring.modes.output[:, 0], n_max)

@@ -17,7 +17,7 @@ import numpy as np
 
 from femgear.fe.elasticity import Material, foundation, mass, stiffness
 from femgear.gears.kinematics import speeds
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from femgear.solvers.time.transient import solve_transient
 from femgear.stages.protocol import one_blas_thread
 from femgear.system.system import HarmonicForce, MechanicalSystem, Modes, NonlinearSystem, external_force
@@ -103,7 +103,7 @@ def moving_force() -> MovingForce:
     sensor = np.zeros((n, 1))
     sensor[2 * np.argmax(grid.points[:, 0])] = 1.0
     system = MechanicalSystem(M, np.zeros((n, n)), K, sensor, np.zeros(n), ())
-    modes = solve_modes(system, np.zeros(1), damping_ratio=DAMPING)
+    modes = undamped_modes(system, np.zeros(1), damping_ratio=DAMPING)
     turning = speeds(gears, input="sun", fixed="ring", speed=SUN_SPEED)
     forces = _travelling_forces(grid, gears)
     C = modal_damping(system, np.zeros(1), DAMPING)

@@ -8,7 +8,7 @@ import numpy as np
 
 from femgear.housing.two_way.response import MeshPaths, solve_two_way
 from femgear.housing.two_way.structure import supported_ring
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from femgear.stages.static import solve_static
 from femgear.trains.elastic import stages as elastic
 from femgear.trains.elastic.fixed_housing import HousingModel
@@ -74,7 +74,7 @@ def _damped() -> tuple[Row, ...]:
         drive = excitation(paths, sense)
         mean = drive.stiffness.mean(axis=1)
         matrix = modal_damping(joined(paths, ring, 2), mean, 0.04)
-        modes = solve_modes(gears(EQUAL), mean, damping_ratio=0.04)
+        modes = undamped_modes(gears(EQUAL), mean, damping_ratio=0.04)
         known = {"harmonics": (2, 6), "tolerance": 1e-13}
         found = solve_two_way(modes, drive, structure, paths, [20.0 * sense], damping=matrix, **known)
         direct = direct_damped_forces(modes, drive, structure, paths, 20.0 * sense, matrix, harmonics=(2, 6))

@@ -61,7 +61,7 @@ def _collect(gmsh, n_outline, n_faces):
     return {"points": points, "triangles": np.vstack(triangles), "face": np.concatenate(face)}
 
 
-def main(source, target):
+def answer(source, target):
     """Triangulate the job of one ``.npz`` stream into another; returns 0, 3 without Gmsh, 4 if it fails."""
     with np.load(io.BytesIO(source.read())) as file:
         job = dict(file)
@@ -90,4 +90,4 @@ if __name__ == "__main__":
     # whatever Gmsh prints goes to standard error: standard output holds the grid
     with open(os.dup(1), "wb") as output:
         os.dup2(2, 1)
-        sys.exit(main(sys.stdin.buffer, output))
+        sys.exit(answer(sys.stdin.buffer, output))

@@ -10,7 +10,7 @@ if TYPE_CHECKING:
     from femgear.solvers.continuation.branches import frequency_response_curve as frequency_response_curve
     from femgear.solvers.continuation.branches import parameter_curve as parameter_curve
     from femgear.solvers.linear.modal import complex_modes as complex_modes
-    from femgear.solvers.linear.modal import solve_modes as solve_modes
+    from femgear.solvers.linear.modal import undamped_modes as undamped_modes
     from femgear.solvers.linear.receptance import modal_response as modal_response
     from femgear.solvers.linear.tracking import campbell_data as campbell_data
     from femgear.solvers.periodic.harmonic_balance import displacements as displacements
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 _HOME = {
     "continuation.branches": ["frequency_response_curve", "parameter_curve"],
-    "linear.modal": ["complex_modes", "solve_modes"],
+    "linear.modal": ["complex_modes", "solve_modes", "undamped_modes"],
     "linear.receptance": ["modal_response"],
     "linear.tracking": ["campbell_data"],
     "periodic.harmonic_balance": ["displacements", "periodic_response", "solve_harmonic_balance"],

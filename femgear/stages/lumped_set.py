@@ -23,7 +23,7 @@ from femgear.errors import CaseError
 from femgear.fe.beam import AXES
 from femgear.gears.deviations import common_period
 from femgear.gears.kinematics import Speeds, speeds
-from femgear.solvers.linear.modal import modal_damping, solve_modes, viscous_damping
+from femgear.solvers.linear.modal import modal_damping, undamped_modes, viscous_damping
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries, shape_entries
 from femgear.system.force_laws import GearMeshes, RadialBearings
@@ -327,7 +327,7 @@ def gear_set_modes(
     """
     system = gear_set_system(data) if system is None else system
     stiffness = data.column_stiffness if mesh_stiffness is None else mesh_stiffness
-    modes = solve_modes(system, stiffness, damping_ratio=damping_ratio, max_frequency=max_frequency)
+    modes = undamped_modes(system, stiffness, damping_ratio=damping_ratio, max_frequency=max_frequency)
     if len(data.axes) > 3:
         # tilts of the planets that no mesh feels have one frequency in several classes
         Q = phase_basis(gear_set_motions(data, modes.shape), modes.frequency, tolerance=_ONE_FREQUENCY)
@@ -402,7 +402,7 @@ def gear_set_problem(
     still = bearings.join(data, gear_set_system(data, **options))
     springs = working_springs(NonlinearSystem(still, elements), bearings.members)
     # refuses a load that nothing takes up before a solver drifts away with it
-    modes = solve_modes(still, springs)
+    modes = undamped_modes(still, springs)
     if damping is None or np.ndim(damping) > 1:
         C = viscous_damping(still, springs, damping)
     else:

@@ -33,7 +33,7 @@ from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.findings import NOTE, Finding, once, tell
 from femgear.stages.protocol import Progress
 from femgear.storage.files import exclusive_lock, storage_errors
-from femgear.study.objectives import STAGES, Quantity
+from femgear.study.objectives import STAGES, StudyQuantity
 from femgear.study.problem import Limit, Point, Problem, Variable, Vector
 from femgear.study.runner import Runner, check_complete
 from femgear.trains.live import Answer
@@ -53,7 +53,7 @@ _WRITTEN = {
     "positions": "for other positions",
 }
 _Fits = Callable[[str, dict], bool]  # tells whether a record belongs to a key
-_Values = Callable[[Sequence[Quantity]], Mapping[str, float]]
+_Values = Callable[[Sequence[StudyQuantity]], Mapping[str, float]]
 """Gives quantities by name [SI], and maybe others."""
 OUTSIDE, _REFUSED = 1e6, 1e9
 """Costs from which designs lie outside the limits, and of those that cannot be computed."""
@@ -124,7 +124,7 @@ def _append(path: Path, stream: FileIO, line: bytes) -> None:
             raise
 
 
-def fingerprint(text: str) -> str:
+def text_checksum(text: str) -> str:
     """Compute the SHA-256 of a text."""
     return hashlib.sha256(text.encode()).hexdigest()
 
@@ -135,7 +135,7 @@ def open_journal(path: str | Path | None, case: Case, more: dict, fits: _Fits) -
     if path is None:
         yield Journal()
         return
-    header = {"format": _FORMAT, "femgear": __version__, "case": fingerprint(to_toml(case)), **more}
+    header = {"format": _FORMAT, "femgear": __version__, "case": text_checksum(to_toml(case)), **more}
     path = Path(path)
     with storage_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -302,7 +302,7 @@ class Designs:
             self._last = key, self._first.of(self.at(point))
         return self._last[1]
 
-    def values(self, point: Point, quantities: Sequence[Quantity]) -> dict[str, float]:
+    def values(self, point: Point, quantities: Sequence[StudyQuantity]) -> dict[str, float]:
         """Compute quantities at a point, by name [SI].
 
         Failure: the design cannot be computed, now or when it was tried before; FemgearError: nor can the
@@ -317,12 +317,12 @@ class Designs:
             raise Failure(self.journal[key]["error"])
         return {q.name: found[q.name] for q in quantities}
 
-    def doubts(self, point: Point, quantities: Sequence[Quantity]) -> dict[str, list[str]]:
+    def doubts(self, point: Point, quantities: Sequence[StudyQuantity]) -> dict[str, list[str]]:
         """Codes of the doubts and faults that concern quantities at a point that was computed, by name."""
         known = self.journal.get(json.dumps(point), {}).get("doubts", {})
         return {quantity.name: known.get(quantity.name, []) for quantity in quantities}
 
-    def findings(self, quantities: Sequence[Quantity], point: Point) -> tuple[Finding, ...]:
+    def findings(self, quantities: Sequence[StudyQuantity], point: Point) -> tuple[Finding, ...]:
         """List the doubts and faults of a design that can be computed, each once.
 
         Those that concern the quantities, and those of the contact and of the stresses that they come from.
@@ -336,7 +336,7 @@ class Designs:
         return once(one for one in found if one.severity != NOTE)
 
     def ahead(
-        self, points: Iterable[Point], quantities: Sequence[Quantity], limits: Sequence[Limit] = ()
+        self, points: Iterable[Point], quantities: Sequence[StudyQuantity], limits: Sequence[Limit] = ()
     ) -> Iterator[int]:
         """Compute quantities of many points, of those within limits, and count after each those known.
 
@@ -358,7 +358,7 @@ class Designs:
         (point, known), start = task, time.perf_counter()
         found, doubts = dict(known), dict[str, list[str]]()
 
-        def values(quantities: Sequence[Quantity]) -> dict[str, float]:
+        def values(quantities: Sequence[StudyQuantity]) -> dict[str, float]:
             missing = [quantity for quantity in quantities if quantity.name not in found]
             for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
                 found[quantity.name] = float(_finite(quantity, quantity.compute(self.answer(point))))
@@ -386,7 +386,7 @@ class Designs:
         known, record = self._known(key), self.journal.get(key, {})
         doubts = record.get("doubts", {})
 
-        def values(quantities: Sequence[Quantity]) -> dict[str, float]:
+        def values(quantities: Sequence[StudyQuantity]) -> dict[str, float]:
             if self.telling and not all(quantity.name in doubts for quantity in quantities):
                 raise KeyError
             return {quantity.name: known[quantity.name] for quantity in quantities}
@@ -419,7 +419,7 @@ def _told(error: FemgearError) -> dict:
     return {"code": error.code, "key": error.key, "message": error.message}
 
 
-def _ask(quantities: Sequence[Quantity], limits: Sequence[Limit], values: _Values) -> None:
+def _ask(quantities: Sequence[StudyQuantity], limits: Sequence[Limit], values: _Values) -> None:
     """Ask for quantities of a design within limits, elsewhere for those of the limits alone."""
     if not _violation(limits, values):
         values(quantities)
@@ -435,7 +435,7 @@ def _violation(limits: Sequence[Limit], values: _Values) -> float:
     return 0.0
 
 
-def _finite(quantity: Quantity, value: float) -> float:
+def _finite(quantity: StudyQuantity, value: float) -> float:
     """The value, refused where it is no number."""
     if not math.isfinite(value):
         message = f"{quantity.name} is not finite"
@@ -501,7 +501,7 @@ class Evaluations:
         self._asked: dict[tuple, None] = {}
         self._most = max_designs
 
-    def towards(self, objective: Quantity) -> Evaluations:
+    def towards(self, objective: StudyQuantity) -> Evaluations:
         """Give the same designs, counted together, another objective."""
         found = Evaluations(replace(self.problem, objective=objective), self.designs, max_designs=self._most)
         found._asked = self._asked
@@ -517,7 +517,7 @@ class Evaluations:
         """These points but for the case as it is, in their order."""
         return [point for point in self._asked if point]
 
-    def values(self, x: Vector | None, quantities: Sequence[Quantity]) -> dict[str, float]:
+    def values(self, x: Vector | None, quantities: Sequence[StudyQuantity]) -> dict[str, float]:
         """Compute quantities [SI] at a point x (n,), or of the case as it is; see `Designs`."""
         point = () if x is None else self.problem.point(x)
         self._asked[point] = None
@@ -540,7 +540,7 @@ class Evaluations:
             self.best = np.array(x, float), found
         return found
 
-    def ahead(self, places: Iterable[Vector], also: Sequence[Quantity] = ()) -> None:
+    def ahead(self, places: Iterable[Vector], also: Sequence[StudyQuantity] = ()) -> None:
         """Compute at once what `cost` will ask of many points, and further quantities."""
         points = dict.fromkeys(self.problem.point(x) for x in places)
         new = [point for point in points if point not in self._asked]
@@ -569,7 +569,7 @@ class Evaluations:
         """Sum the relative violations of limits of the first stage that breaks any. May raise `Failure`."""
         return _violation(self.problem.limits, lambda quantities: self.values(x, quantities))
 
-    def scale(self, quantity: Quantity) -> float:
+    def scale(self, quantity: StudyQuantity) -> float:
         """Find the value [SI] of the case as it is, by which costs are divided; 1 where it is zero."""
         return abs(self.values(None, [quantity])[quantity.name]) or 1.0
 
@@ -610,7 +610,7 @@ class Tolerance:
 
 
 def tolerances(
-    evaluations: Evaluations, x: Vector, quantities: Sequence[Quantity]
+    evaluations: Evaluations, x: Vector, quantities: Sequence[StudyQuantity]
 ) -> tuple[tuple[Tolerance, ...], dict[str, float]]:
     """Compute quantities with every variable off by its tolerance, alone and all at once.
 

@@ -13,7 +13,7 @@ from femgear.errors import CaseError, FemgearError
 from femgear.findings import Finding, tell
 from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.study.designs import Enough, Evaluations, Failure, evaluations
-from femgear.study.objectives import Quantity
+from femgear.study.objectives import StudyQuantity
 from femgear.study.problem import Problem, Vector
 from femgear.study.runner import Runner
 from femgear.study.search import (
@@ -40,7 +40,7 @@ class ParetoFront:
     ----------
     problem : Problem
         Its objective is the first one.
-    second : Quantity
+    second : StudyQuantity
         The second objective, minimised as the first.
     x : (m, n) array
         In the units of the variables.
@@ -59,7 +59,7 @@ class ParetoFront:
     """
 
     problem: Problem
-    second: Quantity
+    second: StudyQuantity
     x: np.ndarray
     values: np.ndarray
     before: np.ndarray
@@ -76,7 +76,7 @@ class ParetoFront:
         return int(((self.values - low) / np.where(high > low, high - low, 1.0)).max(axis=1).argmin())
 
 
-def check_second(problem: Problem, second: Quantity) -> None:
+def check_second(problem: Problem, second: StudyQuantity) -> None:
     """Refuse (E-OBJECTIVE) the objective of a problem as the second one of its front."""
     if second.name == problem.objective.name:
         raise CaseError(
@@ -92,7 +92,7 @@ def check_second(problem: Problem, second: Quantity) -> None:
 @one_blas_thread()
 def pareto_front(
     problem: Problem,
-    second: Quantity,
+    second: StudyQuantity,
     *,
     points: int = 5,
     start: Vector | None = None,
@@ -114,7 +114,7 @@ def pareto_front(
     ----------
     problem : Problem
         Variables, first objective and limits.
-    second : Quantity
+    second : StudyQuantity
         Second objective, minimised as well.
     points : int
         Weights, the two ends included.
@@ -189,7 +189,7 @@ def non_dominated(values: np.ndarray) -> np.ndarray:
     return np.array(kept, int)
 
 
-def _search(run: Evaluations, second: Quantity, points: int, places) -> None:
+def _search(run: Evaluations, second: StudyQuantity, points: int, places) -> None:
     """Both ends, and the weights between."""
     both = (run.problem.objective, second)
     run.ahead(places, both)

@@ -1,6 +1,6 @@
 """What can be minimised or limited: numbers that follow from a case, each from as few stages as it needs.
 
-`femgear.trains.live.Answer` holds the stages of one case, `Quantity` takes a number from them, and
+`femgear.trains.live.Answer` holds the stages of one case, `StudyQuantity` takes a number from them, and
 `named_quantity` finds it by the words of a command line.
 """
 
@@ -22,6 +22,7 @@ from femgear.case.sections import LARGEST_TORQUE
 from femgear.errors import CaseError
 from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness
+from femgear.moved import former_names
 from femgear.stages.static_results import LARGE
 from femgear.system.fourier import sample
 from femgear.trains.elastic import stages as elastic_stages
@@ -119,7 +120,7 @@ def _of_level(at: Range, answer: Answer) -> Iterator[Finding]:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class StudyQuantity:
     """A number that follows from a case.
 
     Parameters
@@ -161,7 +162,7 @@ class Quantity:
         return number if self.dimension is NUMBER else f"{number} {self.dimension.shown}"
 
 
-def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> Quantity:
+def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> StudyQuantity:
     """Define the static transmission error, peak to peak over the record [m].
 
     "overall" goes from sun to ring along the base circle of the sun and may vanish while the errors of the
@@ -184,7 +185,7 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
     where = "" if value is None else f" at {TORQUE.show(value)}"
     findings = partial(_of_static, (*LARGE, "W-POSITIONS"), value)
     name = f"STE peak to peak, {mesh}{where}"
-    return Quantity(name, _MICROMETRES, "static", compute, signal, value, findings)
+    return StudyQuantity(name, _MICROMETRES, "static", compute, signal, value, findings)
 
 
 def _signal(mesh: Mesh, arc: np.ndarray, deflection: np.ndarray, n: int) -> np.ndarray:
@@ -201,7 +202,9 @@ def _peak_to_peak(signal: Callable, torque: float | None, answer: Answer) -> flo
     return float((high - low).max())
 
 
-def mesh_force(first: str, last: str, *, speeds: int = 51, part: Literal["dynamic", "peak"] = "dynamic") -> Quantity:
+def mesh_force(
+    first: str, last: str, *, speeds: int = 51, part: Literal["dynamic", "peak"] = "dynamic"
+) -> StudyQuantity:
     """Define the largest mesh force over equidistant input speeds, of all times and meshes [N].
 
     Part "dynamic" is the largest deviation from the mean force of a mesh, which follows from the torque
@@ -213,7 +216,7 @@ def mesh_force(first: str, last: str, *, speeds: int = 51, part: Literal["dynami
     at = _range(first, last, speeds)
     of_mean = _chosen(part, {"dynamic": True, "peak": False}, "part")
     name, compute = f"{part} mesh force, {_words(at)}", partial(_largest_force, at, of_mean)
-    return Quantity(name, _FORCE, "dynamics", compute, findings=partial(_of_response, at))
+    return StudyQuantity(name, _FORCE, "dynamics", compute, findings=partial(_of_response, at))
 
 
 def _largest_force(at: Range, dynamic: bool, answer: Answer) -> float:
@@ -232,7 +235,7 @@ def forces_over_time(force: np.ndarray, *, dynamic: bool) -> np.ndarray:
     return np.abs(history - np.real(force[..., :1])).max(axis=-1)
 
 
-def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
+def housing_level(first: str, last: str, *, speeds: int = 51) -> StudyQuantity:
     """Define the largest amplitude of any carrier order at the fixed sensor over speeds [m/s^2].
 
     Speeds are as for `mesh_force`, lines the exact ones of the radial acceleration, see
@@ -240,7 +243,7 @@ def housing_level(first: str, last: str, *, speeds: int = 51) -> Quantity:
     """
     at = _range(first, last, speeds)
     name, compute = f"largest carrier order, {_words(at)}", partial(_largest_level, at)
-    return Quantity(name, ACCELERATION, "housing", compute, findings=partial(_of_level, at))
+    return StudyQuantity(name, ACCELERATION, "housing", compute, findings=partial(_of_level, at))
 
 
 def _largest_level(at: Range, answer: Answer) -> float:
@@ -248,7 +251,7 @@ def _largest_level(at: Range, answer: Answer) -> float:
     return float(np.abs(there.housing.exact.acceleration).max())
 
 
-def natural_frequency(mode: int) -> Quantity:
+def natural_frequency(mode: int) -> StudyQuantity:
     """Define a natural frequency of the set [Hz] by its number from 1, as tables have it.
 
     Modes are counted by frequency in every case: two that meet over a sweep exchange their numbers.
@@ -257,7 +260,7 @@ def natural_frequency(mode: int) -> Quantity:
     """
     if not (isinstance(mode, int) and 1 <= mode <= 1000):
         raise CaseError("no mode", code="E-OBJECTIVE", key="mode", value=mode, limit="1 to 1000")
-    return Quantity(f"natural frequency {mode}", FREQUENCY, "modes", partial(_frequency, mode))
+    return StudyQuantity(f"natural frequency {mode}", FREQUENCY, "modes", partial(_frequency, mode))
 
 
 def _frequency(mode: int, answer: Answer) -> float:
@@ -273,27 +276,27 @@ def _frequency(mode: int, answer: Answer) -> float:
     return float(found[mode - 1])
 
 
-def contact_ratio(mesh: _MeshKind) -> Quantity:
+def contact_ratio(mesh: _MeshKind) -> StudyQuantity:
     """Define the transverse contact ratio [1] of a ``mesh``, "sun-planet" or "planet-ring", from the tip circles.
 
     CaseError: no such mesh (E-OBJECTIVE).
     """
     names = {"sun-planet": "contact_ratio_sun_planet", "planet-ring": "contact_ratio_planet_ring"}
     name = _chosen(mesh, names, "mesh")
-    return Quantity(f"contact ratio, {mesh}", NUMBER, "gears", partial(_of_gears, name))
+    return StudyQuantity(f"contact ratio, {mesh}", NUMBER, "gears", partial(_of_gears, name))
 
 
 def _of_gears(name: str, answer: Answer) -> float:
     return float(getattr(planetary_set(answer.case), name))
 
 
-def tip_thickness(gear: _GearName) -> Quantity:
+def tip_thickness(gear: _GearName) -> StudyQuantity:
     """Define the thickness of the teeth of a ``gear`` on its tip circle, over the module [1].
 
     CaseError: none of "sun", "planet" and "ring" (E-OBJECTIVE).
     """
     name = _chosen(gear, {g: g for g in get_args(_GearName)}, "gear")
-    return Quantity(f"tip thickness over module, {gear}", NUMBER, "gears", partial(_tip_thickness, name))
+    return StudyQuantity(f"tip thickness over module, {gear}", NUMBER, "gears", partial(_tip_thickness, name))
 
 
 def _tip_thickness(name: str, answer: Answer) -> float:
@@ -301,17 +304,17 @@ def _tip_thickness(name: str, answer: Answer) -> float:
     return float(tooth_thickness(found, found.tip_radius)) / found.module
 
 
-def contact_pressure() -> Quantity:
+def contact_pressure() -> StudyQuantity:
     """Define the largest contact pressure away from the ends of the flanks [Pa]."""
     findings = partial(_of_static, ("W-PRESSURE", "W-EDGE", "W-KINK"), None)
-    return Quantity("contact pressure", _STRESS, "static", _largest_pressure, findings=findings)
+    return StudyQuantity("contact pressure", _STRESS, "static", _largest_pressure, findings=findings)
 
 
 def _largest_pressure(answer: Answer) -> float:
     return float(answer.static.cycle.extremes("max_pressure")[1].max())
 
 
-def root_stress(gear: _GearName) -> Quantity:
+def root_stress(gear: _GearName) -> StudyQuantity:
     """Define the largest stress in the roots of a ``gear`` [Pa], of a planet in both its meshes.
 
     CaseError: none of "sun", "planet" and "ring" (E-OBJECTIVE).
@@ -319,7 +322,7 @@ def root_stress(gear: _GearName) -> Quantity:
     places = {"sun": ((0, 0),), "planet": ((0, 1), (1, 0)), "ring": ((1, 1),)}
     wanted = _chosen(gear, places, "gear")
     compute = partial(_largest_stress, wanted)
-    return Quantity(f"root stress, {gear}", _STRESS, "stress", compute, findings=_of_stresses)
+    return StudyQuantity(f"root stress, {gear}", _STRESS, "stress", compute, findings=_of_stresses)
 
 
 def _largest_stress(wanted: tuple[tuple[int, int], ...], answer: Answer) -> float:
@@ -359,7 +362,7 @@ def _words(at: Range) -> str:
     return f"{at[0] / SPEED.scale:.6g} to {SPEED.show(at[1])} ({at[2]} speeds)"
 
 
-_WORDS: dict[str, Callable[..., Quantity]] = {
+_WORDS: dict[str, Callable[..., StudyQuantity]] = {
     "ste": transmission_error,
     **{f"ste {mesh}": partial(transmission_error, mesh) for mesh in get_args(Mesh)[1:]},
     "mesh force": mesh_force,
@@ -375,7 +378,7 @@ _OVER_SPEEDS = ("mesh force", "peak mesh force", "housing")
 NAMES = tuple(_WORDS)
 
 
-def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
+def named_quantity(words: str, *, speeds: Speeds | None = None) -> StudyQuantity:
     """Find the quantity of some words, one of `NAMES`.
 
     Mesh forces and housing levels need the first and the last speed of the input, with units.
@@ -401,3 +404,6 @@ def named_quantity(words: str, *, speeds: Speeds | None = None) -> Quantity:
         message = f"{name} is found over a range of speeds"
         raise CaseError(message, code="E-OBJECTIVE", key="speeds", remedy=remedy)
     return _WORDS[name](*speeds)
+
+
+__getattr__ = former_names(__name__, {"Quantity": StudyQuantity})

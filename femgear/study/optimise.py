@@ -23,10 +23,18 @@ from femgear.study.designs import open_designs
 from femgear.study.faults import all_faults
 from femgear.study.figures import before_and_after, front_figure, tolerance_bars
 from femgear.study.front import ParetoFront, check_second, pareto_front
-from femgear.study.objectives import Quantity, forces_over_time, named_quantity
+from femgear.study.objectives import StudyQuantity, forces_over_time, named_quantity
 from femgear.study.problem import Problem, Shape, Variable, parse_limit, parse_variable, tip_reliefs
 from femgear.study.runner import Runner
-from femgear.study.search import Method, Optimum, SearchOptions, comparison_rows, minimise, tolerance_rows, verdict
+from femgear.study.search import (
+    Method,
+    Optimum,
+    SearchOptions,
+    comparison_rows,
+    minimise,
+    search_verdict,
+    tolerance_rows,
+)
 from femgear.trains.reading import to_toml, with_value, with_values
 
 if TYPE_CHECKING:
@@ -167,7 +175,7 @@ def optimise_into(
     return [*names, *_JOURNALS, *runs]
 
 
-def _problem(case: Case, request: SearchRequest, effort: SearchEffort) -> tuple[Case, Problem, Quantity | None]:
+def _problem(case: Case, request: SearchRequest, effort: SearchEffort) -> tuple[Case, Problem, StudyQuantity | None]:
     """The case with its variables, the problem on a coarse grid, and the second goal; all faults at once."""
     need_set(case)
     with all_faults() as part:
@@ -317,11 +325,11 @@ def _write(found: Optimum, data: Case, folder: Path, rough: Optimum) -> list[Blo
         header = ("variable", "off by", "less", "more")
         blocks.append(Block(f"{name} with tolerances", header, tuple(tolerance_rows(found))))
     notes = [f"at a bound: {variable}" for variable in found.at_bounds]
-    ended = f"search: {verdict(rough)}", f"refinement: {verdict(found)}"
+    ended = f"search: {search_verdict(rough)}", f"refinement: {search_verdict(found)}"
     return [*blocks, Block("How it was found", notes=(*notes, *ended))]
 
 
-def _write_front(found: ParetoFront, problem: Problem, second: Quantity, folder: Path) -> Block:
+def _write_front(found: ParetoFront, problem: Problem, second: StudyQuantity, folder: Path) -> Block:
     """Write the files of a Pareto front, and tell its ends and its compromise."""
     both = (problem.objective, second)
     scale = np.array([q.dimension.scale for q in both])

@@ -21,7 +21,7 @@ from femgear.case.planetary import Case
 from femgear.case.quantities import Dimension, to_si
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
-from femgear.study.objectives import NUMBER, Quantity, Speeds, named_quantity
+from femgear.study.objectives import NUMBER, Speeds, StudyQuantity, named_quantity
 from femgear.trains.reading import with_values
 
 Vector = Sequence[float] | np.ndarray
@@ -231,7 +231,7 @@ def _check_variables(case: Case, variables: Sequence[Variable]) -> None:
 class Limit:
     """What a ``quantity`` may be, in SI units: at least ``low``, at most ``high``; one of them is enough."""
 
-    quantity: Quantity
+    quantity: StudyQuantity
     low: float = -math.inf
     high: float = math.inf
 
@@ -271,9 +271,9 @@ class Problem:
         Its positions, flank elements and harmonics are those of the search; a coarse one is fast.
     variables : sequence of Variable
         What is changed, within its bounds.
-    objective : Quantity
+    objective : StudyQuantity
         What is minimised.
-    also : sequence of Quantity
+    also : sequence of StudyQuantity
         Reported of the case and of the optimum as well.
     limits : sequence of Limit
         What a design must keep to.
@@ -286,8 +286,8 @@ class Problem:
 
     case: Case
     variables: Sequence[Variable]
-    objective: Quantity
-    also: Sequence[Quantity] = ()
+    objective: StudyQuantity
+    also: Sequence[StudyQuantity] = ()
     limits: Sequence[Limit] = ()
 
     def __post_init__(self):
@@ -296,7 +296,7 @@ class Problem:
         _check_variables(self.case, self.variables)
 
     @property
-    def reported(self) -> tuple[Quantity, ...]:
+    def reported(self) -> tuple[StudyQuantity, ...]:
         """Objective, further quantities and those of the limits, each once."""
         every = (self.objective, *self.also, *(limit.quantity for limit in self.limits))
         return tuple({quantity.name: quantity for quantity in every}.values())

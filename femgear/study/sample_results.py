@@ -33,7 +33,7 @@ from femgear.storage.files import (
     write_text,
 )
 from femgear.storage.results import dataset
-from femgear.study.designs import Journal, fingerprint, open_journal
+from femgear.study.designs import Journal, open_journal, text_checksum
 from femgear.study.runner import Runner, check_complete
 from femgear.study.samples import (
     MOST_SAMPLES,
@@ -117,7 +117,7 @@ def samples_into(
             remedy="name a new folder, or replace them with --force",
         )
     method = "exact" if exact else "spring"
-    more = {"tolerances": fingerprint(text), "seed": seed, "method": method, "positions": len(model.position)}
+    more = {"tolerances": text_checksum(text), "seed": seed, "method": method, "positions": len(model.position)}
     widths = {n: model.basis.gears.n_planets * ("planet" in dims) for n, (dims, *_) in NUMBERS.items()}
     with (
         resumable(folder),
@@ -202,7 +202,7 @@ class _Tasks:
         """Numbers of some samples (n,), solved exactly."""
         size = self._sizes["exact"]
         items = [tuple(map(int, part)) for part in np.split(chosen, range(size, len(chosen), size))]
-        keys = [f"exact {fingerprint(str(item))[:16]} {len(item)}" for item in items]
+        keys = [f"exact {text_checksum(str(item))[:16]} {len(item)}" for item in items]
 
         def keep(key: str, numbers: dict[str, np.ndarray]) -> dict:
             return {name: part.tolist() for name, part in numbers.items()}

@@ -1,7 +1,7 @@
 """Search for the best design within the bounds and limits of a problem.
 
 `minimise` goes from samples of the design space to a local finish, by descents with derivatives (`descend`)
-where the objective has them, else by SciPy's optimisers. `comparison_rows`, `tolerance_rows` and `verdict`
+where the objective has them, else by SciPy's optimisers. `comparison_rows`, `tolerance_rows` and `search_verdict`
 put an optimum into words.
 
 A descent of a peak to peak goes by linear programs in a trust region: with ``y(x)`` the transmission error at
@@ -171,7 +171,7 @@ class Optimum:
         lines += [f"at a bound: {name}" for name in self.at_bounds]
         for name, tolerance, less, more in tolerance_rows(self):
             lines.append(f"{name} off by {tolerance}: {less} less, {more} more")
-        return "\n".join([*lines, verdict(self)])
+        return "\n".join([*lines, search_verdict(self)])
 
 
 @one_blas_thread()
@@ -601,7 +601,7 @@ def tolerance_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:
         yield "all at once, each to its worse side", "", worst, worst
 
 
-def verdict(found: Optimum) -> str:
+def search_verdict(found: Optimum) -> str:
     """Tell how the optimum was found, and what to think of it."""
     each = f" ({found.seconds:.2g} s each)" if found.computed else ""
     text = (

@@ -25,7 +25,7 @@ from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.storage.files import own_files, resumable, write_csv
 from femgear.study.designs import Failure, open_designs
 from femgear.study.faults import all_faults
-from femgear.study.objectives import Quantity, named_quantity, need_elastic_ring
+from femgear.study.objectives import StudyQuantity, named_quantity, need_elastic_ring
 from femgear.study.problem import Variable, split
 from femgear.study.runner import Runner
 from femgear.trains.reading import with_values
@@ -52,7 +52,7 @@ class Sweep:
         Entries of the case that are varied, one a number of a point.
     points : tuple of tuple
         Values as the case file holds them; the last key runs fastest.
-    quantities : tuple of Quantity
+    quantities : tuple of StudyQuantity
         What is computed of every case.
     values : (points, quantities) array
         [SI]; NaN where a case cannot be computed.
@@ -66,7 +66,7 @@ class Sweep:
 
     keys: tuple[str, ...]
     points: tuple[tuple[object, ...], ...]
-    quantities: tuple[Quantity, ...]
+    quantities: tuple[StudyQuantity, ...]
     values: np.ndarray
     errors: tuple[str, ...]
     computed: int
@@ -93,7 +93,7 @@ class Sweep:
 def sweep(
     case: Case,
     over: Over,
-    quantities: Sequence[Quantity],
+    quantities: Sequence[StudyQuantity],
     *,
     journal: str | Path | None = None,
     cache: Path | None = None,
@@ -109,7 +109,7 @@ def sweep(
     over : mapping of str or of tuple of str to sequence
         Values of dotted keys, as the case file would hold them; all combinations are computed. Entries that
         go together are a tuple of keys, whose values are tuples.
-    quantities : sequence of Quantity
+    quantities : sequence of StudyQuantity
         What is computed of every case, such as `transmission_error`.
     journal : path-like, optional
         File that keeps every case; an interrupted sweep goes on from it.
@@ -176,7 +176,7 @@ def _axes(over: Over) -> dict[tuple[str, ...], list[tuple[object, ...]]]:
 
 
 def _check_sweep(
-    case: Case, axes: Mapping[tuple[str, ...], Sequence[tuple[object, ...]]], quantities: Sequence[Quantity]
+    case: Case, axes: Mapping[tuple[str, ...], Sequence[tuple[object, ...]]], quantities: Sequence[StudyQuantity]
 ) -> int:
     """Number of cases; what `sweep` refuses is refused, all at once."""
     count = math.prod(len(values) for values in axes.values()) if axes else 0
@@ -240,7 +240,7 @@ def _joined(values: Sequence[object]) -> str:
     return "/".join(map(str, values))
 
 
-def _check_stages(case: Case, quantities: Sequence[Quantity], keys: Iterable[str] = ()) -> None:
+def _check_stages(case: Case, quantities: Sequence[StudyQuantity], keys: Iterable[str] = ()) -> None:
     """Refuse quantities that the case can never have: without torque, or without an elastic ring."""
     stages = {quantity.stage for quantity in quantities}
     elastic = [quantity.name for quantity in quantities if quantity.stage in ("modes", "dynamics", "housing")]
@@ -366,7 +366,7 @@ def sweep_into(
     cache, progress, runner
         As for `sweep`.
     """
-    parsed, quantities = list[tuple[Any, Sequence[object]]](), list[Quantity]()
+    parsed, quantities = list[tuple[Any, Sequence[object]]](), list[StudyQuantity]()
     with all_faults() as part:
         for text in over:
             with part("--over"):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.receptance import modal_response
 from femgear.solvers.linear.tracking import campbell_data
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -96,7 +96,7 @@ def test_a_step_that_errs_by_more_than_the_motion_is_no_solution(duffing):
 
 def test_empty_lists_and_ranges_are_refused(duffing):
     system, unit, k = duffing.system, np.ones(1), np.ones(1)
-    modes = solve_modes(system, k)
+    modes = undamped_modes(system, k)
     for call, code in (
         (lambda: modal_response(system, modes, [], unit, unit), "E-RANGE"),
         (lambda: sweep_response(duffing, []), "E-RANGE"),

@@ -21,7 +21,7 @@ from femgear.errors import ContactError, StorageError
 from femgear.storage import files
 from femgear.study import search
 from femgear.study.designs import Failure, _check, _sealed, _unsealed, evaluations
-from femgear.study.objectives import NUMBER, Quantity
+from femgear.study.objectives import NUMBER, StudyQuantity
 from femgear.study.problem import Problem, Variable
 from femgear.study.search import signals
 from femgear.study.sweep import sweep_into
@@ -42,8 +42,8 @@ def second_of(variant) -> float:
     return ratio**2 / 3
 
 
-FIRST = Quantity("first", NUMBER, "gears", lambda v: v.case.dynamics.damping_ratio / 7)
-SECOND = Quantity("second", NUMBER, "gears", second_of)
+FIRST = StudyQuantity("first", NUMBER, "gears", lambda v: v.case.dynamics.damping_ratio / 7)
+SECOND = StudyQuantity("second", NUMBER, "gears", second_of)
 
 
 @pytest.fixture(scope="module", autouse=True)

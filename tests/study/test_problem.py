@@ -6,7 +6,7 @@ from study.test_designs import CASE, SPEEDS
 from femgear.case.quantities import FREQUENCY
 from femgear.errors import CaseError
 from femgear.study.objectives import (
-    Quantity,
+    StudyQuantity,
     mesh_force,
     named_quantity,
     natural_frequency,
@@ -55,7 +55,7 @@ def test_words_of_the_command_line():
     [
         (lambda: named_quantity("noise"), "no such quantity"),
         (lambda: named_quantity("natural frequency 0"), "no mode"),
-        (lambda: Quantity("mine", FREQUENCY, "fe", float), "no such stage"),
+        (lambda: StudyQuantity("mine", FREQUENCY, "fe", float), "no such stage"),
         (lambda: named_quantity("mesh force"), "range of speeds"),
         (lambda: transmission_error(torque="0 N m"), "no tooth bends"),
         (lambda: transmission_error(torque="5 mm"), "not a unit of torque"),

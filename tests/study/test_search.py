@@ -21,7 +21,7 @@ from femgear.study.designs import Designs, Failure, Journal, evaluations, open_d
 from femgear.study.front import check_second, pareto_front
 from femgear.study.objectives import (
     NUMBER,
-    Quantity,
+    StudyQuantity,
     contact_ratio,
     named_quantity,
     tip_thickness,
@@ -45,7 +45,9 @@ def case():
 
 def function(name, value):
     """Quantity of the damping ratio and the mass of the carrier [kg]."""
-    return Quantity(name, NUMBER, "gears", lambda v: float(value(v.case.dynamics.damping_ratio, v.case.carrier.mass)))
+    return StudyQuantity(
+        name, NUMBER, "gears", lambda v: float(value(v.case.dynamics.damping_ratio, v.case.carrier.mass))
+    )
 
 
 ROSENBROCK = function("Rosenbrock", lambda x, y: 1.0 + (0.6 - x) ** 2 + 10.0 * (y - x**2 / 0.6**2) ** 2)
@@ -94,7 +96,7 @@ def test_a_limit_of_the_gears_is_met_exactly(case):
     open_tips = {"sun.tip_diameter": None, "planet.tip_diameter": None}
     free = with_values(case, {"sun.profile_shift": None, "ring.profile_shift": None, **open_tips})
     shift, limit = Variable("planet.profile_shift", -0.05, 0.25), Limit(tip_thickness("planet"), low=0.74)
-    thin = Quantity("thinness", NUMBER, "gears", lambda v: tip_thickness("planet").compute(v) ** 2)
+    thin = StudyQuantity("thinness", NUMBER, "gears", lambda v: tip_thickness("planet").compute(v) ** 2)
     found = minimise(
         Problem(free, [shift], thin, limits=[limit]),
         method="simplex",
@@ -534,7 +536,7 @@ def test_thousands_of_cases_say_how_long_they_take(case, tmp_path, capsys):
 
 def test_whole_numbers(case):
     teeth = Variable("housing.points", 40, 60, integer=True)
-    parabola = Quantity("parabola", NUMBER, "gears", lambda v: 1.0 + (v.case.housing.points - 47) ** 2)
+    parabola = StudyQuantity("parabola", NUMBER, "gears", lambda v: 1.0 + (v.case.housing.points - 47) ** 2)
     options = SearchOptions(samples=6, generations=8)
     found = minimise(Problem(case, [teeth], parabola), method="global", options=options)
     assert found.values == {"housing.points": 47} and found.after["parabola"] == 1.0

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.floquet import monodromy
 from femgear.solvers.stability.parametric import stability
@@ -124,7 +124,7 @@ def rectangular_case(damping_ratio, positions=2000):
     one = np.ones((1, 1))
     stiffness = np.where((np.arange(positions) + 0.5) / positions < SHARE, 1.0, LOW)[None]
     system = MechanicalSystem(one, 0 * one, 0 * one, one, np.ones(1), ("x",))
-    modes = solve_modes(system, [NATURAL**2], damping_ratio=damping_ratio)
+    modes = undamped_modes(system, [NATURAL**2], damping_ratio=damping_ratio)
     return modes, MeshExcitation(stiffness, 1 / stiffness, np.ones_like(stiffness), np.zeros(1))
 
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.modal import modal_damping, residual_output, solve_modes
+from femgear.solvers.linear.modal import modal_damping, residual_output, undamped_modes
 from femgear.solvers.time.steps import step_matrices
 from femgear.system.system import MechanicalSystem
 from validation.reference.guyan import choose_masters, condense
@@ -81,14 +81,14 @@ def solve_force_history(
     start : pair of (n,) arrays, optional
         Displacement and velocity at the first instant; at rest when not given.
     count, max_frequency : optional
-        Modes kept, as in `solve_modes`; with "guyan", ``count`` is a number of masters to be chosen.
+        Modes kept, as in `undamped_modes`; with "guyan", ``count`` is a number of masters to be chosen.
     masters : (n_masters,) int array, optional
         For "guyan".
 
     Raises
     ------
     CaseError
-        Instants that are not equidistant, shapes that do not fit, an unknown route, what `solve_modes`,
+        Instants that are not equidistant, shapes that do not fit, an unknown route, what `undamped_modes`,
         `condense` refuse.
     """
     step = equidistant(times)
@@ -131,7 +131,7 @@ def _modal(system, stiffness, step, force, start, keep):
     n = len(system.M)
     total = system.K + (system.W * stiffness) @ system.W.T
     linear = replace(system, K=total, W=np.zeros((n, 0)), load=np.zeros(n), gyroscopic=None)
-    modes = solve_modes(linear, np.zeros(0), **keep)
+    modes = undamped_modes(linear, np.zeros(0), **keep)
     natural, shape = 2.0 * np.pi * modes.frequency, modes.shape
     begin = start @ (system.M @ shape)
     y, v = modal_history(natural, modes.damping_ratio, step, force @ shape, start=begin)

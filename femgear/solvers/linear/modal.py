@@ -17,6 +17,7 @@ import scipy
 from numpy.typing import NDArray
 
 from femgear.errors import CaseError, ConvergenceError
+from femgear.moved import former_names
 from femgear.system.mode_kinds import fixed_basis
 from femgear.system.system import MechanicalSystem, Modes, Response, check_matrices, damping_matrix, freeze
 
@@ -90,7 +91,7 @@ class ComplexModes:
         return np.where(self.rigid, 0.0, -self.eigenvalue.real / np.where(self.rigid, 1.0, np.abs(self.eigenvalue)))
 
 
-def solve_modes(
+def undamped_modes(
     system: MechanicalSystem,
     mesh_stiffness,
     *,
@@ -316,7 +317,7 @@ def modal_damping(system: MechanicalSystem, mesh_stiffness, ratio) -> np.ndarray
     Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 3.1: all modes of the system whose columns have
     stiffnesses ``mesh_stiffness`` (n_columns,) [N/m] get ``ratio``, a number or one a mode; rigid ones none.
     """
-    modes = solve_modes(system, mesh_stiffness, damping_ratio=ratio)
+    modes = undamped_modes(system, mesh_stiffness, damping_ratio=ratio)
     carried = system.M @ modes.shape
     return (carried * (4.0 * np.pi * modes.damping_ratio * modes.frequency)) @ carried.T
 
@@ -582,3 +583,6 @@ def _normalised(modes: ComplexModes, mass: np.ndarray) -> ComplexModes:
     phase = np.where(np.abs(square) > 1e-9 * size**2, np.sqrt(square / np.abs(np.where(square == 0, 1, square))), 1.0)
     factor = 1.0 / (size * phase)
     return replace(modes, shape=modes.shape * factor, drift=modes.drift * factor, left=modes.left / factor.conj())
+
+
+__getattr__ = former_names(__name__, {"solve_modes": undamped_modes})

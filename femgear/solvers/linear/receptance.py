@@ -18,9 +18,9 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.linear.modal import (
     pseudo_solve,
     rigid_basis,
-    solve_modes,
     state_matrix,
     total_stiffness,
+    undamped_modes,
 )
 from femgear.system.system import MechanicalSystem, Modes, NonlinearSystem
 
@@ -430,7 +430,7 @@ def _modes_with_loads(problem: NonlinearSystem, reference: np.ndarray) -> Modes:
         load=problem.system.load + sum(steady),
     )
     try:
-        modes = solve_modes(bare, reference, damping_ratio=0.0)
+        modes = undamped_modes(bare, reference, damping_ratio=0.0)
     except ConvergenceError as error:
         if error.code != "E-STIFFNESS" or problem.system.gyroscopic is None:
             raise
@@ -444,7 +444,7 @@ def _modes_with_loads(problem: NonlinearSystem, reference: np.ndarray) -> Modes:
     for force in problem.forces:
         loads += [np.real(force.force), np.imag(force.force)]
     rows = np.column_stack([bare.W, *loads]).T @ modes.shape
-    # columns and constant load leave rigid motions alone, solve_modes has made sure
+    # columns and constant load leave rigid motions alone, undamped_modes has made sure
     rows[: len(reference) + 1, modes.frequency == 0.0] = 0.0
     stiffness = np.concatenate([reference, np.zeros(len(loads))])
     return replace(modes, mesh_stiffness=stiffness, mesh_deflection=rows)

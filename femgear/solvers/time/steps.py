@@ -29,7 +29,7 @@ from scipy import linalg
 from scipy.linalg import expm, get_lapack_funcs
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import mass_error, output_load, residual_output, solve_modes
+from femgear.solvers.linear.modal import mass_error, output_load, residual_output, undamped_modes
 from femgear.system.fourier import phase_of
 from femgear.system.system import Law, NonlinearSystem, external_force, tabulated_law
 
@@ -198,7 +198,7 @@ class ModalScheme:
     """Exact steps of modes with the reference stiffnesses of the columns; the state is (y, v), (2, m).
 
     See `Scheme`. Damping that couples the modes, gyroscopic terms and negative reference stiffnesses are
-    refused, see `solve_modes`.
+    refused, see `undamped_modes`.
     """
 
     factorisations = 1
@@ -213,7 +213,7 @@ class ModalScheme:
                 remedy='take method "average acceleration" or "generalised alpha"',
             )
         system = replace(system, gyroscopic=None)
-        modes = solve_modes(system, problem.reference, count=count)
+        modes = undamped_modes(system, problem.reference, count=count)
         natural, every = 2.0 * np.pi * modes.frequency, np.eye(len(system.M))
         transition, first, last = step_matrices(natural, modes.damping_ratio, step)
         self.problem, self.step, self.modes, self.rows = problem, step, modes, modes.mesh_deflection

@@ -15,7 +15,7 @@ from scipy import linalg
 from femgear.case.quantities import FREQUENCY, RPM, SPEED, TIME
 from femgear.errors import CaseError
 from femgear.findings import Finding
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.system.fourier import FourierSeries
 from femgear.trains.drivetrain.case_file import (
     FASTEST_RATE,
@@ -147,7 +147,7 @@ def mesh_mode(model: DrivetrainModel, limit: float) -> float:
     Modes above the limit, the highest line of the mesh stiffness [Hz], answer it as springs do, not by
     resonance.
     """
-    modes, stiffness = solve_modes(model.still, model.mean_stiffness), model.mean_stiffness
+    modes, stiffness = undamped_modes(model.still, model.mean_stiffness), model.mean_stiffness
     driven = stiffness @ modes.mesh_deflection**2 > _MESH_SHARE * (2.0 * math.pi * modes.frequency) ** 2
     return float(modes.frequency[driven & (modes.frequency <= limit)].max(initial=0.0))
 

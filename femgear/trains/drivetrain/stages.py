@@ -16,7 +16,7 @@ import numpy as np
 
 from femgear.curves import not_a_knot
 from femgear.errors import ConvergenceError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.tracking import campbell_data
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.drivetrain.case_file import DrivetrainCase, settle_time, torque_histories
@@ -63,7 +63,7 @@ _GROWN, _WILD = 1e3, 100.0
 def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
     """Solve for natural frequencies and modes, and the Campbell diagram with the mesh lines."""
     model, speed = check_drivetrain(case), case.operation.speed
-    modes = solve_modes(model.still, model.mean_stiffness)
+    modes = undamped_modes(model.still, model.mean_stiffness)
     still = replace(model.still, gyroscopic=model.system.gyroscopic)
     orders = model.base_ratio[np.unique(model.mesh_base)]
     top = _HIGHEST * speed * orders.max(initial=1.0) / (2.0 * np.pi)

@@ -26,7 +26,7 @@ from femgear.housing.two_way.carrier_orders import MeshPaths, mean_excitation
 from femgear.housing.two_way.response import TwoWayResponse, solve_two_way, structure_lines
 from femgear.housing.two_way.set_damping import with_set_damping
 from femgear.housing.two_way.structure import FixedStructure, equal_sectors, supported_ring
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from femgear.stages.lumped_set import member_speeds
 from femgear.trains.elastic.checks import (
     fixed_diameters,
@@ -169,7 +169,7 @@ class HousingModel:
         (excitation, flexibility), ratio = springs, self.case.dynamics.damping_ratio
         mean, system = self._even(excitation).stiffness.mean(axis=1), self.modes.model.system
         alone = gears_alone(self.modes.model, flexibility)
-        gears = solve_modes(alone, mean, damping_ratio=ratio, max_frequency=self.highest)
+        gears = undamped_modes(alone, mean, damping_ratio=ratio, max_frequency=self.highest)
         damping = None
         if len(structure.wave_order):
             damping = modal_damping(system, mean, ratio)

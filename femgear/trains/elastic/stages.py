@@ -46,7 +46,7 @@ from femgear.housing.sensor import component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound
 from femgear.remembered import remembered
 from femgear.report.tables import RESPONSE_DOUBTS, describe_modes, describe_response
-from femgear.solvers.linear.modal import solve_modes as solve_eigenproblem
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.resonances import (
     ONE_FREQUENCY,
     crossings,
@@ -235,7 +235,7 @@ def solve_modes(
     springs = steps.kept("mesh springs", known)
     excitation, flexibility = springs or steps.keep("mesh springs", known, mesh_springs(gears, ring, state))
     model = elastic_set(case, gears, ring, sun_torque=torque, flexibility=flexibility)
-    modes = solve_eigenproblem(
+    modes = undamped_modes(
         model.system,
         excitation.stiffness.mean(axis=1),
         damping_ratio=case.dynamics.damping_ratio,

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 
 from femgear.case.dependencies import Steps
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.tracking import CampbellData, campbell_data
 from femgear.system.assembly import Assembly, Beam
 from femgear.system.system import MechanicalSystem, Modes
@@ -123,7 +123,7 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     carriers = [carrier.below(math.inf if top is None else _REACH * top) for carrier in carriers]
     system = with_carriers(system, assembly, carriers)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
-    modes = solve_modes(still, stiffness, damping_ratio=case.modes.damping_ratio, count=_kept(still, stiffness, top))
+    modes = undamped_modes(still, stiffness, damping_ratio=case.modes.damping_ratio, count=_kept(still, stiffness, top))
     count = assembly.motions.shape[1]
     motion, waves = assembly.motions @ modes.shape[:count], modes.shape[count:]
     squares = {ring.name: ring.stiffness for ring in rings} | {one.name: one.frequency**2 for one in carriers}
@@ -174,7 +174,7 @@ def _mesh_energies(system: MechanicalSystem, stiffness: np.ndarray, modes: Modes
 def _in_modes(still: MechanicalSystem, stiffness, gyroscopic, speed: float, count: int) -> MechanicalSystem:
     """System on its lowest modes at rest, `_BASIS` for each that is followed; gyroscopic terms couple them."""
     kept = min(len(still.dofs), _BASIS * count + _LEAST)
-    basis = solve_modes(still, stiffness, damping_ratio=0.0, count=kept)
+    basis = undamped_modes(still, stiffness, damping_ratio=0.0, count=kept)
     size = len(basis.frequency)
     coupling = (
         basis.shape.T @ np.asarray(gyroscopic) @ basis.shape / speed if speed and gyroscopic is not None else None
@@ -194,7 +194,7 @@ def _kept(system: MechanicalSystem, stiffness: np.ndarray, top: float | None) ->
     """Number of modes up to a frequency [Hz], `_LEAST` or more; all without one."""
     if top is None:
         return len(system.dofs)
-    whole = solve_modes(system, stiffness, damping_ratio=0.0)
+    whole = undamped_modes(system, stiffness, damping_ratio=0.0)
     return int(np.clip(np.count_nonzero(whole.frequency <= top), min(_LEAST, len(system.dofs)), len(system.dofs)))
 
 

@@ -35,7 +35,7 @@ from femgear.gears import profile
 from femgear.gears.iso6336 import material_factor
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import virtual_set
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.lumped_set import check_one_period, driving_torque, mesh_stiffnesses, needed, torsional_support
 from femgear.stages.protocol import one_blas_thread
 from femgear.system.mesh_directions import gear_set_system
@@ -466,7 +466,7 @@ def _refuse_hidden(case: HelicalCase) -> NoReturn:
 def _balanced(case: HelicalCase, data: HelicalSet) -> bool:
     """Whether supports take up what the torque asks of them."""
     try:
-        solve_modes(gear_set_system(data, torque=driving_torque(case)), data.column_stiffness)
+        undamped_modes(gear_set_system(data, torque=driving_torque(case)), data.column_stiffness)
     except CaseError as error:
         if error.code != "E-LOAD-BALANCE":
             raise

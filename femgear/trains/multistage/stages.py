@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from femgear.solvers.linear.modal import solve_modes, viscous_damping
+from femgear.solvers.linear.modal import undamped_modes, viscous_damping
 from femgear.solvers.linear.receptance import MeshErrorResponse, modal_error_response
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.stages.lumped_set import mixed_modes
@@ -57,7 +57,7 @@ def multistage_modes(data: MultistageSet, *, damping_ratio: float | Sequence[flo
     ``damping_ratio`` is that of all modes, or one a mode (m,).
     """
     system = multistage_system(data)
-    modes = solve_modes(system, mean_mesh_stiffness(data), damping_ratio=damping_ratio)
+    modes = undamped_modes(system, mean_mesh_stiffness(data), damping_ratio=damping_ratio)
     # mass matrices of the stages in the coordinates of the train
     Z, parts = joined_motions(data), zip(data.stages, stage_slices(data))
     masses = np.array([Z[rows].T @ gear_set_system(stage.data).M @ Z[rows] for stage, rows in parts])
@@ -210,7 +210,7 @@ def multistage_problem(
     turned = tuple(_turning_elements(data, turning, bases))
     still = multistage_system(data, torque=torque)
     # refuses a load that nothing takes up before a solver drifts away with it
-    solve_modes(still, NonlinearSystem(still, elements).reference)
+    undamped_modes(still, NonlinearSystem(still, elements).reference)
     system = multistage_system(data, torque=torque, speed=speed)
     problem = NonlinearSystem(system, elements + turned, speed=speed)
     if damping is None:

@@ -31,7 +31,7 @@ from femgear.gears.pair import GearPair
 from femgear.report.tables import Block, chosen, describe_modes, tabulate
 from femgear.solvers.continuation.branches import frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
-from femgear.solvers.linear.modal import output_load, output_response, residual_output, solve_modes
+from femgear.solvers.linear.modal import output_load, output_response, residual_output, undamped_modes
 from femgear.solvers.linear.resonances import (
     crossings,
     merged_speeds,
@@ -200,7 +200,7 @@ def solve_pair_modes(case: PairCase, static: StaticResult) -> PairModesResult:
     gears: GearPair = static.planetary_set
     model, excitation = pair_model(case, gears), pair_excitation(case, static)
     mean, ratio = excitation.stiffness.mean(axis=1), case.dynamics.damping_ratio
-    modes = solve_modes(model.system, mean, damping_ratio=ratio)
+    modes = undamped_modes(model.system, mean, damping_ratio=ratio)
     modes = replace(modes, kind=pair_kinds(modes, model.system.M))
     return PairModesResult(gears, model, excitation, modes, modal_entries(case))
 

@@ -17,7 +17,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.stages.lumped_set import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
 from femgear.stages.protocol import (
@@ -139,7 +139,7 @@ def _check_damping(case: PlanarCase, model: PlanarModel, spans: Iterable[tuple[f
         return
     system = model.problem.system
     plain = replace(system, C=np.zeros_like(system.C), gyroscopic=None)
-    hertz = solve_modes(plain, model.springs).frequency
+    hertz = undamped_modes(plain, model.springs).frequency
     bare = hertz[(hertz > 0.0) & (mode_ratios(hertz, ratios) == 0.0)]
     key = "planar.damping_ratios" if case.planar.damping_ratios else "dynamics.damping_ratio"
     for lowest, highest, words in spans:

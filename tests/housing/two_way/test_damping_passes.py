@@ -7,7 +7,7 @@ from femgear.housing.two_way import damping_passes
 from femgear.housing.two_way.damping_passes import _largest, _shares
 from femgear.housing.two_way.response import MeshPaths, solve_two_way
 from femgear.housing.two_way.structure import supported_ring
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 
 
@@ -18,7 +18,7 @@ def solved(symmetry):
     drive = excitation(paths)
     mean = drive.stiffness.mean(axis=1)
     damping = modal_damping(joined(paths, ring, 4), mean, 0.04)
-    modes = solve_modes(gears(EQUAL), mean, damping_ratio=0.04)
+    modes = undamped_modes(gears(EQUAL), mean, damping_ratio=0.04)
     known = {"harmonics": (2, 4), "damping": damping}
     return solve_two_way(modes, drive, structure, paths, np.array([8.0, 30.0]), **known)
 

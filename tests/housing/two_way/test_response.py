@@ -8,7 +8,7 @@ import pytest
 from femgear.errors import CaseError
 from femgear.housing.two_way.carrier_orders import MeshPaths
 from femgear.housing.two_way.response import solve_two_way, structure_lines
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.protocol import one_blas_thread
 from validation.fixed_housing import EQUAL, excitation, feet, gears, rigid_modes, shaken
 from validation.reference.two_way_direct import direct_forces, farthest_apart
@@ -47,7 +47,7 @@ def test_a_record_over_more_periods_than_it_needs_changes_nothing(symmetry):
 
 def test_refusals():
     drive = shaken(paths(1), 3, planet=1, sense=-1)
-    unequal = solve_modes(gears(EQUAL), [5e6, 5.1e6, *[5e6] * 4], damping_ratio=0.04)
+    unequal = undamped_modes(gears(EQUAL), [5e6, 5.1e6, *[5e6] * 4], damping_ratio=0.04)
     with pytest.raises(CaseError, match=r"E-SYMMETRY.*mean stiffness"):
         solve_two_way(unequal, drive, STRUCTURE, paths(3), SPEEDS, **FEW)
 
@@ -56,7 +56,7 @@ def test_errors_that_are_not_small_are_solved():
     """A mesh that is gone for a third of the turns of a gear, hardly damped: the same equations."""
     drive, half = shaken(paths(1), 3, planet=1, sense=-1), np.repeat([1.9, 0.1, 1.0], 64)
     wild = replace(drive, stiffness=5e6 * np.tile(half, (6, 1)))
-    modes = solve_modes(gears(EQUAL), np.full(6, 5e6), damping_ratio=1e-3)
+    modes = undamped_modes(gears(EQUAL), np.full(6, 5e6), damping_ratio=1e-3)
     found = solve_two_way(modes, wild, STRUCTURE, paths(3), SPEEDS[:1], **FEW, tolerance=1e-7)
     assert found.residual.max() < 1e-6 and found.spectral_radius[0] > 1.0 and found.products[0] > 100
 

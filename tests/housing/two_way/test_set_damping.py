@@ -8,7 +8,7 @@ import pytest
 from femgear.errors import CaseError
 from femgear.housing.two_way.response import MeshPaths, solve_two_way, structure_lines
 from femgear.housing.two_way.structure import Support, circumferential, equal_sectors, ring_waves, supported_ring
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from validation.fixed_housing import EQUAL, FEET, excitation, gears, joined, thin_ring
 
 RING = thin_ring(4, foundation=2e10)
@@ -20,7 +20,7 @@ def solved(symmetry, *, damped=True, structure=STRUCTURE, speeds=(8.0, 30.0), **
     drive = excitation(paths)
     mean = drive.stiffness.mean(axis=1)
     damping = modal_damping(joined(paths, RING, 4), mean, 0.04) if damped else None
-    modes = solve_modes(gears(EQUAL), mean, damping_ratio=0.04)
+    modes = undamped_modes(gears(EQUAL), mean, damping_ratio=0.04)
     known = {"harmonics": (2, 4), "damping": damping} | changed
     return solve_two_way(modes, drive, structure, paths, np.array(speeds), **known)
 

@@ -7,7 +7,7 @@ import pytest
 from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import complex_modes, solve_modes, whirl
+from femgear.solvers.linear.modal import complex_modes, undamped_modes, whirl
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.system import MechanicalSystem, damping_matrix
 from validation.reference.mode_energy import motion_planes
@@ -78,7 +78,7 @@ def test_proportional_damping_gives_the_real_modes(geared_chain):
     k = np.array([1.0, 1.4])
     total = geared_chain.K + (geared_chain.W * k) @ geared_chain.W.T
     system = replace(geared_chain, C=0.02 * geared_chain.M + 0.05 * total)
-    real, modes = solve_modes(system, k), complex_modes(system, k)
+    real, modes = undamped_modes(system, k), complex_modes(system, k)
     assert modes.frequency == pytest.approx(real.frequency, rel=1e-12)
     assert modes.damping_ratio == pytest.approx(real.damping_ratio, rel=1e-10)
     same = np.abs(np.einsum("ip,ij,jp->p", modes.right.conj(), system.M, real.shape))
@@ -149,7 +149,7 @@ def test_planar_set_at_rest_and_with_small_speed():
     data = lin_parker_set(4)
     k, speed = data.mesh_stiffness, 20.0
     rest = complex_modes(gear_set_system(data), k)
-    real = solve_modes(gear_set_system(data), k, damping_ratio=0.0)
+    real = undamped_modes(gear_set_system(data), k, damping_ratio=0.0)
     assert rest.frequency == pytest.approx(real.frequency, rel=1e-9, abs=1e-6)
     system = gear_set_system(data, carrier_speed=speed)
     turning = complex_modes(system, k, speed=speed)

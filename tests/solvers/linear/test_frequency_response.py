@@ -8,7 +8,7 @@ import pytest
 from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import complex_modes, solve_modes
+from femgear.solvers.linear.modal import complex_modes, undamped_modes
 from femgear.solvers.linear.receptance import modal_response
 from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.mesh_directions import gear_set_system
@@ -50,7 +50,7 @@ def test_single_mass_in_closed_form():
 
 def test_superposition_agrees_with_the_direct_solution(geared_chain):
     k, f = np.array([1.0, 1.4]), np.linspace(0.0, 0.6, 400)
-    modes = solve_modes(geared_chain, k, damping_ratio=np.array([0.01, 0.02, 0.03, 0.05]))
+    modes = undamped_modes(geared_chain, k, damping_ratio=np.array([0.01, 0.02, 0.03, 0.05]))
     inputs = np.column_stack([geared_chain.W, unit_force(geared_chain, "a", "d")])
     outputs = np.vstack([np.eye(4), geared_chain.W.T])
     direct = direct_response(geared_chain, f, inputs, outputs, mesh_stiffness=k, damping_ratio=modes.damping_ratio)
@@ -73,7 +73,7 @@ def test_planar_set_by_both_routes_in_time():
     """18 coordinates with a rigid rotation, 2000 frequencies, all six meshes as inputs and outputs."""
     data = lin_parker_set(3)
     system, k = gear_set_system(data), data.mesh_stiffness
-    modes = solve_modes(system, k, damping_ratio=0.02)
+    modes = undamped_modes(system, k, damping_ratio=0.02)
     f = np.linspace(20.0, 12000.0, 2000)
     began = time.perf_counter()
     modal = modal_response(system, modes, f, system.W, system.W.T)
@@ -100,7 +100,7 @@ def test_modes_left_out_leave_their_static_flexibility():
     system, k = gear_set_system(data), data.mesh_stiffness
     f = np.array([50.0, 200.0])
     exact = direct_response(system, f, system.W, system.W.T, mesh_stiffness=k, damping_ratio=0.02)
-    few = solve_modes(system, k, damping_ratio=0.02, count=8)
+    few = undamped_modes(system, k, damping_ratio=0.02, count=8)
     with_rest = modal_response(system, few, f, system.W, system.W.T)
     assert difference(with_rest, exact) < 0.02
     # the error of the static rest grows with the square of the frequency
@@ -155,13 +155,13 @@ def test_planet_phasing_selects_the_kind_of_mode(harmonic, kind):
 
 def test_undamped_resonance_is_refused():
     system = single(zeta=0.0)
-    modes = solve_modes(system, NO_MESH, damping_ratio=0.0)
+    modes = undamped_modes(system, NO_MESH, damping_ratio=0.0)
     with pytest.raises(ConvergenceError, match="E-RESONANCE"):
         modal_response(system, modes, modes.frequency, np.ones(1), np.ones((1, 1)))
     data = lin_parker_set(3)
     free = gear_set_system(data)
     with pytest.raises(ConvergenceError, match="E-RESONANCE"):
-        modes = solve_modes(free, data.mesh_stiffness, damping_ratio=0.02)
+        modes = undamped_modes(free, data.mesh_stiffness, damping_ratio=0.02)
         modal_response(free, modes, [0.0], np.eye(18), np.eye(18))
 
 
@@ -225,7 +225,7 @@ def test_planar_set_resonances():
     """Driving-point response of the sun: where modes stand alone the given damping comes back."""
     data, zeta = lin_parker_set(3), 0.01
     system, k = gear_set_system(data), data.mesh_stiffness
-    modes = solve_modes(system, k, damping_ratio=zeta)
+    modes = undamped_modes(system, k, damping_ratio=zeta)
     f = np.linspace(300.0, 13000.0, 30000)
     force = unit_force(system, "sun: u")
     found = modal_response(system, modes, f, force, force.T)[:, 0, 0]

@@ -5,7 +5,7 @@ import pytest
 from published.planetary_sets import lin_parker_set
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import output_load, output_response, residual_output, solve_modes
+from femgear.solvers.linear.modal import output_load, output_response, residual_output, undamped_modes
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.system import MechanicalSystem
@@ -19,7 +19,7 @@ def pair(m1=2.0, m2=3.0, load=(5.0, 5.0)):
 
 
 def test_free_pair_closed_form():
-    modes = solve_modes(pair(), [30.0], damping_ratio=0.05)
+    modes = undamped_modes(pair(), [30.0], damping_ratio=0.05)
     assert modes.kind == ("rigid", "elastic")
     assert modes.frequency[0] == 0.0 and modes.damping_ratio[0] == 0.0
     assert modes.frequency[1] == pytest.approx(np.sqrt(30.0 * (1 / 2 + 1 / 3)) / (2 * np.pi), rel=1e-12)
@@ -29,13 +29,13 @@ def test_free_pair_closed_form():
 
 
 def test_modes_left_out_leave_their_flexibility():
-    only_rigid = solve_modes(pair(), [30.0], damping_ratio=0.05, count=1)
+    only_rigid = undamped_modes(pair(), [30.0], damping_ratio=0.05, count=1)
     assert only_rigid.residual[0, 0] == pytest.approx(1 / 30.0, rel=1e-12)
     assert only_rigid.load_deflection[0] == pytest.approx(5.0 / 30.0, rel=1e-12)
 
 
 def test_shapes_are_mass_normalised(geared_chain):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0)
     stiffness = geared_chain.K + (geared_chain.W * [1.0, 1.4]) @ geared_chain.W.T
     omega = 2 * np.pi * modes.frequency
     np.testing.assert_allclose(modes.shape.T @ geared_chain.M @ modes.shape, np.eye(4), atol=1e-12)
@@ -47,7 +47,7 @@ def test_shapes_are_mass_normalised(geared_chain):
 
 @pytest.mark.parametrize("kept", [1, 2, 3])
 def test_static_flexibility_is_the_same_for_any_number_of_modes(geared_chain, kept):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0, count=kept)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0, count=kept)
     omega = 2 * np.pi * modes.frequency
     total = modes.residual + (modes.mesh_deflection / omega**2) @ modes.mesh_deflection.T
     stiffness = geared_chain.K + (geared_chain.W * [1.0, 1.4]) @ geared_chain.W.T
@@ -63,18 +63,18 @@ def test_rigid_mode_is_found_beside_very_stiff_parts():
     W[1, 0], W[2, 0] = 1.0, 2.0
     load = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 2.0])
     system = MechanicalSystem(np.eye(n), np.zeros((n, n)), K, W, load, tuple("abcdef"))
-    modes = solve_modes(system, [1e6], damping_ratio=0.02)
+    modes = undamped_modes(system, [1e6], damping_ratio=0.02)
     assert modes.kind.count("rigid") == 1
     np.testing.assert_allclose(modes.load_deflection, [1e-6], rtol=1e-8)
 
 
 def test_multiple_eigenvalue_is_not_cut(planet_set):
     system = planet_set()
-    everything = solve_modes(system, np.ones(6), damping_ratio=0.0).frequency
+    everything = undamped_modes(system, np.ones(6), damping_ratio=0.0).frequency
     first = int(np.argmax(np.diff(everything) < 1e-9 * everything[1:]))
-    kept = solve_modes(system, np.ones(6), damping_ratio=0.0, count=first + 1)
+    kept = undamped_modes(system, np.ones(6), damping_ratio=0.0, count=first + 1)
     assert len(kept.frequency) == first + 2
-    kept = solve_modes(system, np.ones(6), damping_ratio=0.0, max_frequency=everything[first + 1])
+    kept = undamped_modes(system, np.ones(6), damping_ratio=0.0, max_frequency=everything[first + 1])
     assert len(kept.frequency) == first + 2
 
 
@@ -88,11 +88,11 @@ def test_damping_from_a_proportional_matrix(geared_chain):
         geared_chain.load,
         geared_chain.dofs,
     )
-    modes = solve_modes(system, [1.0, 1.4])
+    modes = undamped_modes(system, [1.0, 1.4])
     omega = 2 * np.pi * modes.frequency
     np.testing.assert_allclose(modes.damping_ratio, 0.005 / omega + 0.01 * omega, rtol=1e-10)
     with pytest.raises(CaseError, match="damping matrix"):
-        solve_modes(system, [1.0, 1.4], damping_ratio=0.05)
+        undamped_modes(system, [1.0, 1.4], damping_ratio=0.05)
 
 
 def test_outputs_of_few_modes_follow_those_of_all(planet_set, planet_excitation):
@@ -101,7 +101,7 @@ def test_outputs_of_few_modes_follow_those_of_all(planet_set, planet_excitation)
     rows = np.random.default_rng(1).standard_normal((3, len(system.M)))
     outputs = []
     for count in (None, 8):
-        modes = solve_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05, count=count)
+        modes = undamped_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05, count=count)
         response = solve_spectral(modes, excitation, 1e-4, method="direct")
         residual, load = residual_output(system, modes, rows), output_load(system, modes, rows)
         outputs.append(output_response(modes, response, rows @ modes.shape, residual=residual, load=load))
@@ -113,14 +113,14 @@ def test_outputs_of_few_modes_follow_those_of_all(planet_set, planet_excitation)
 
 def test_load_that_nothing_holds_is_refused():
     with pytest.raises(CaseError, match="rigid-body") as caught:
-        solve_modes(pair(load=(5.0, 4.0)), [30.0], damping_ratio=0.05)
+        undamped_modes(pair(load=(5.0, 4.0)), [30.0], damping_ratio=0.05)
     assert caught.value.code == "E-LOAD-BALANCE"
 
 
 def test_open_mesh_is_refused():
     system = pair()
     with pytest.raises(ConvergenceError, match="strains column 1 of W"):
-        solve_modes(system, [0.0], damping_ratio=0.05)
+        undamped_modes(system, [0.0], damping_ratio=0.05)
 
 
 @pytest.mark.parametrize(
@@ -136,13 +136,13 @@ def test_open_mesh_is_refused():
 )
 def test_bad_systems_are_refused(change, match):
     with pytest.raises((CaseError, ConvergenceError), match=match):
-        solve_modes(replace(pair(), **change), [30.0], damping_ratio=0.05)
+        undamped_modes(replace(pair(), **change), [30.0], damping_ratio=0.05)
 
 
 @pytest.mark.parametrize("damping", [-0.1, np.nan, [0.1, 0.1, 0.1]])
 def test_bad_damping_is_refused(damping):
     with pytest.raises(CaseError, match="damping"):
-        solve_modes(pair(), [30.0], damping_ratio=damping)
+        undamped_modes(pair(), [30.0], damping_ratio=damping)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_bad_damping_is_refused(damping):
 )
 def test_bad_requests_are_refused(stiffness, options):
     with pytest.raises(CaseError):
-        solve_modes(pair(), stiffness, damping_ratio=0.05, **options)
+        undamped_modes(pair(), stiffness, damping_ratio=0.05, **options)
 
 
 def test_load_on_a_part_that_the_rigid_mode_leaves_at_rest():
@@ -167,7 +167,7 @@ def test_load_on_a_part_that_the_rigid_mode_leaves_at_rest():
     load = np.zeros(len(system.M))
     load[sun] = 50.0
     stiffness = lin_parker_set(3).mesh_stiffness
-    modes = solve_modes(replace(system, load=load), stiffness, damping_ratio=0.0)
+    modes = undamped_modes(replace(system, load=load), stiffness, damping_ratio=0.0)
     assert modes.kind.count("rigid") == 1
     # reactions of the supports carry the weight: least squares of the singular equations
     total = system.K + (system.W * stiffness) @ system.W.T
@@ -176,14 +176,14 @@ def test_load_on_a_part_that_the_rigid_mode_leaves_at_rest():
     np.testing.assert_allclose(modes.load_deflection, system.W.T @ exact, rtol=1e-7, atol=1e-16)
     load[system.dofs.index("sun: u")] = 1e-3
     with pytest.raises(CaseError, match="E-LOAD-BALANCE"):
-        solve_modes(replace(system, load=load), stiffness, damping_ratio=0.0)
+        undamped_modes(replace(system, load=load), stiffness, damping_ratio=0.0)
 
 
 def test_weak_strain_of_a_rigid_mode_is_still_refused():
     """A column that takes a millionth of the free motion is strained, and without stiffness it is refused."""
     system = replace(pair(), W=np.array([[1.0, 1e-6], [1.0, 0.0]]))
     with pytest.raises(ConvergenceError, match="strains column 2 of W"):
-        solve_modes(system, [30.0, 0.0], damping_ratio=0.05)
+        undamped_modes(system, [30.0, 0.0], damping_ratio=0.05)
 
 
 @pytest.mark.parametrize("size", [1e-6, 1.0, 1e6])
@@ -192,7 +192,7 @@ def test_no_multiple_frequency_is_cut(size, apart, kept):
     """Squares 1, 2, 2 (1 + apart) and 5 times a size: two modes are asked for."""
     stiffness = size * np.diag([5.0, 2.0, 1.0, 2.0 * (1.0 + apart)])
     system = MechanicalSystem(np.eye(4), np.zeros((4, 4)), stiffness, np.eye(4, 1), np.zeros(4), ("a", "b", "c", "d"))
-    modes = solve_modes(system, [0.0], damping_ratio=0.0, count=2)
+    modes = undamped_modes(system, [0.0], damping_ratio=0.0, count=2)
     wanted = size * np.array([1.0, 2.0, 2.0])[:kept]
     np.testing.assert_allclose((2.0 * np.pi * modes.frequency) ** 2, wanted, rtol=2e-6)
 
@@ -213,7 +213,7 @@ def test_rounding_chooses_neither_sign_nor_pair():
             load=np.zeros(n),
             dofs=tuple(map(str, range(n))),
         )
-        shape = solve_modes(system, np.ones(1), damping_ratio=0.0).shape
+        shape = undamped_modes(system, np.ones(1), damping_ratio=0.0).shape
         for pair in ([0], [1, 2], [3], [4, 5, 6]):
             # the projector on the space of the modes knows nothing of their choice
             projector = turn[:, pair] @ turn[:, pair].T

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.resonances import EXCITED, crossings, merged_speeds, modal_forces, refined_speeds
 from femgear.solvers.periodic.spectral import solve_spectral
 
@@ -20,7 +20,7 @@ def phases(n: int, sun_teeth: int, lag: float = 0.1) -> np.ndarray:
 
 
 def basis(system, excitation, damping=0.02):
-    return solve_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=damping)
+    return undamped_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=damping)
 
 
 def at_rest(system, excitation):

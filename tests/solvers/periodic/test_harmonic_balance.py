@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq, root
 from scipy.special import ellipk
 
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from femgear.solvers.periodic import harmonic_balance as newton
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
@@ -142,7 +142,7 @@ def test_linear_limit_is_the_spectral_solution(planet_set, planet_excitation):
     mean = excitation.stiffness.mean(axis=1)
     frequency = np.array([0.0, 0.05, 0.2, 0.35])
     wanted = solve_spectral(
-        solve_modes(system, mean, damping_ratio=0.03),
+        undamped_modes(system, mean, damping_ratio=0.03),
         excitation,
         frequency,
         excitation_harmonics=4,

@@ -7,7 +7,7 @@ import pytest
 
 from femgear.errors import CaseError
 from femgear.solvers.continuation.branches import frequency_response_curve, parameter_curve
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from femgear.solvers.periodic.equations import harmonic_balance
 from femgear.solvers.periodic.harmonic_balance import periodic_response, solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
@@ -67,7 +67,7 @@ def test_radius_of_two_coupled_meshes_equals_that_of_the_linear_solver(geared_ch
         geared_chain.dofs,
     )
     problem = NonlinearSystem(system, (gear_meshes(excitation, harmonics=3, separates=False),))
-    modes = solve_modes(geared_chain, mean, damping_ratio=0.04)
+    modes = undamped_modes(geared_chain, mean, damping_ratio=0.04)
     frequency = np.array([0.05, 0.12, 0.2, 0.31])
     linear = solve_spectral(modes, excitation, frequency, excitation_harmonics=3, response_harmonics=10)
     found = [solve_harmonic_balance(problem, 2.0 * np.pi * f, harmonics=10).spectral_radius for f in frequency]

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic import spectral
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.system.fourier import Product, harmonics_of, pad, sample
@@ -65,7 +65,7 @@ def test_harmonics_need_enough_positions():
 
 def test_quasi_static_response_is_the_static_state(geared_chain, chain_excitation):
     excitation = chain_excitation(0.2)
-    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05, count=2)
+    modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05, count=2)
     for method in ("direct", "fixed point"):
         response = solve_spectral(modes, excitation, [0.0, 1e-7], method=method, tolerance=1e-12)
         for h in range(7):
@@ -78,7 +78,7 @@ def test_quasi_static_response_is_the_static_state(geared_chain, chain_excitatio
 
 def test_quasi_static_state_does_not_depend_on_the_stiffness_in_the_modes(geared_chain, chain_excitation):
     excitation = chain_excitation(0.2)
-    modes = solve_modes(geared_chain, [1.2, 1.1], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.2, 1.1], damping_ratio=0.05)
     response = solve_spectral(modes, excitation, 0.0, tolerance=1e-12)
     np.testing.assert_allclose(response.deflection[0, :, :7], harmonics_of(excitation.deflection, 6), atol=1e-9)
 
@@ -106,7 +106,7 @@ def test_tail_is_the_amplitude_above_half_of_the_harmonics(lines, share):
 @pytest.mark.parametrize("depth", [0.1, 0.3])
 def test_fixed_point_equals_direct_solution_where_it_contracts(geared_chain, chain_excitation, depth):
     excitation = chain_excitation(depth)
-    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
     frequency = np.linspace(0.01, 0.6, 60)
     direct = solve_spectral(modes, excitation, frequency, method="direct")
     fixed = solve_spectral(modes, excitation, frequency, method="fixed point", tolerance=1e-11, max_iterations=3000)
@@ -120,7 +120,7 @@ def test_fixed_point_equals_direct_solution_where_it_contracts(geared_chain, cha
 def test_response_equals_time_integration(geared_chain, chain_excitation):
     """Three speeds: a low one, one at a resonance, one where the fixed point diverges."""
     excitation = chain_excitation(0.35)
-    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.02, count=4)
+    modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.02, count=4)
     frequency = np.array([0.03, modes.frequency[3], modes.frequency[3] / 2])
     response = solve_spectral(modes, excitation, frequency, response_harmonics=30, tolerance=1e-9)
     assert response.spectral_radius[1:].max() > 1.0 and "direct" in response.method
@@ -134,7 +134,7 @@ def test_single_mass_equals_time_integration():
     system = MechanicalSystem(np.eye(1), np.zeros((1, 1)), np.zeros((1, 1)), np.ones((1, 1)), np.ones(1), ("x",))
     stiffness = (1.0 + 0.3 * np.cos(2 * np.pi * np.arange(32) / 32))[None]
     excitation = MeshExcitation(stiffness, 1 / stiffness, np.ones_like(stiffness), np.zeros(1))
-    modes = solve_modes(system, [1.0], damping_ratio=0.1)
+    modes = undamped_modes(system, [1.0], damping_ratio=0.1)
     frequency = np.array([0.03, 0.155, 0.3])
     response = solve_spectral(modes, excitation, frequency, response_harmonics=16, tolerance=1e-10)
     for i, f in enumerate(frequency):
@@ -144,7 +144,7 @@ def test_single_mass_equals_time_integration():
 
 def test_modal_coordinates_give_back_the_deflection(geared_chain, chain_excitation):
     excitation = chain_excitation(0.3)
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     response = solve_spectral(modes, excitation, [0.1, 0.2, 0.3], method="direct")
     rebuilt = np.einsum("jk,skh->sjh", modes.mesh_deflection, response.modal)
     np.testing.assert_allclose(rebuilt, response.deflection, atol=1e-12 * np.abs(rebuilt).max())
@@ -155,7 +155,7 @@ def test_few_modes_with_residual_flexibility_follow_all_modes(geared_chain, chai
     mean = excitation.stiffness.mean(axis=1)
     responses = []
     for count in (4, 3):
-        modes = solve_modes(geared_chain, mean, damping_ratio=0.05, count=count)
+        modes = undamped_modes(geared_chain, mean, damping_ratio=0.05, count=count)
         responses.append(solve_spectral(modes, excitation, 0.0002, method="direct").deflection)
     error = np.abs(responses[1] - responses[0])[..., 1:].max() / np.abs(responses[0])[..., 1:].max()
     assert error < 1e-4
@@ -169,7 +169,7 @@ def test_identical_planets_repeat_each_other_in_time(planet_set, planet_excitati
     system = planet_set()
     phase = step * np.arange(3)
     excitation = planet_excitation(np.concatenate([phase, phase + 0.25]))
-    modes = solve_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    modes = undamped_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
     response = solve_spectral(modes, excitation, np.linspace(0.05, 0.5, 7), method="direct")
     shift = np.exp(-2j * np.pi * np.arange(13) * phase[:, None])
     scale = np.abs(response.deflection).max()
@@ -224,7 +224,7 @@ def test_reduction_to_one_planet_equals_the_full_equations(planet_set, planet_ex
         system = replace(system, M=mass)
     phase = np.arange(3) / 3
     excitation = planet_excitation(np.concatenate([phase, phase + 0.25]))
-    modes = solve_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    modes = undamped_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
     frequency = np.linspace(0.05, 0.5, 5)
     problem = full_problem(modes, excitation, frequency)
     twins = spectral.find_twins((pad(harmonics_of(excitation.stiffness, 6), 12),))
@@ -241,7 +241,7 @@ def test_reduction_to_one_planet_equals_the_full_equations(planet_set, planet_ex
 def test_krylov_steps_give_what_elimination_gives(planet_set, planet_excitation, monkeypatch, steps):
     """Also in several cycles; every speed as if it were alone."""
     excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
-    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
+    modes = undamped_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
     problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
     monkeypatch.setattr(spectral, "_KRYLOV", steps)
     monkeypatch.setattr(spectral, "_CYCLES", 100)
@@ -257,7 +257,7 @@ def test_krylov_steps_give_what_elimination_gives(planet_set, planet_excitation,
 def test_krylov_steps_in_single_precision_are_as_exact_as_asked(planet_set, planet_excitation, accuracy):
     """The residual is that of the equations in double precision, near resonances too."""
     excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
-    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
+    modes = undamped_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
     problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
     found = spectral.solve_direct(problem, accuracy)
     rest = spectral._norm(problem.source - found - spectral._apply(problem, found))
@@ -272,7 +272,7 @@ def test_nearly_identical_planets_meet_the_full_equations(planet_set, planet_exc
     mass = system.M.copy()
     mass[6, 6] *= 1.0 + 1e-9
     excitation = planet_excitation(np.zeros(6))
-    modes = solve_modes(replace(system, M=mass), excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    modes = undamped_modes(replace(system, M=mass), excitation.stiffness.mean(axis=1), damping_ratio=0.05)
     frequency = np.linspace(0.05, 0.5, 5)
     for method in ("auto", "direct"):
         response = solve_spectral(modes, excitation, frequency, method=method, tolerance=1e-12)
@@ -286,7 +286,7 @@ def test_rounding_of_natural_frequencies_keeps_planets_equal(planet_set, planet_
     mass = system.M.copy()
     mass[6, 6] *= 1.0 + apart
     excitation = planet_excitation(np.zeros(6))
-    modes = solve_modes(replace(system, M=mass), excitation.stiffness.mean(axis=1), damping_ratio=ratio)
+    modes = undamped_modes(replace(system, M=mass), excitation.stiffness.mean(axis=1), damping_ratio=ratio)
     for frequency in modes.frequency[modes.frequency > 1e-3]:
         data = spectral._Data.build(modes, excitation, 4, 8, float(frequency))
         assert len(data.twins.leaders) == count
@@ -294,7 +294,7 @@ def test_rounding_of_natural_frequencies_keeps_planets_equal(planet_set, planet_
 
 def test_arnoldi_finds_the_spectral_radius(planet_set, planet_excitation):
     excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
-    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
+    modes = undamped_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
     problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
     np.testing.assert_allclose(spectral.spectral_radius(problem), exact_radius(problem), rtol=0.02)
 
@@ -302,7 +302,7 @@ def test_arnoldi_finds_the_spectral_radius(planet_set, planet_excitation):
 def test_a_fixed_point_without_promise_is_given_up(planet_set, planet_excitation):
     """The speeds at which it ends are those of all iterations; none that would have converged is far."""
     excitation = planet_excitation(np.array([0.0, 0.3, 0.5, 0.1, 0.7, 0.2]), depth=0.3)
-    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
+    modes = undamped_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.02)
     problem = full_problem(modes, excitation, np.linspace(0.02, 0.6, 30))
     radius = exact_radius(problem)
     _, long, converged = spectral._fixed_point(problem, 1e-10, 100, patient=True)
@@ -316,7 +316,7 @@ def test_a_fixed_point_without_promise_is_given_up(planet_set, planet_excitation
 
 def test_many_speeds_equal_one_at_a_time(geared_chain, chain_excitation):
     excitation = chain_excitation(0.2)
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     frequency = np.linspace(0.01, 0.5, 95)
     together = solve_spectral(modes, excitation, frequency, tolerance=1e-11)
     for i in (0, 39, 40, 94):
@@ -331,7 +331,7 @@ def test_record_of_two_periods_has_every_second_line(geared_chain, chain_excitat
         np.zeros(2),
         periods=2,
     )
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     one = solve_spectral(modes, single, [0.1, 0.2], method="direct")
     two = solve_spectral(modes, double, [0.1, 0.2], method="direct")
     assert two.periods == 2 and two.deflection.shape[-1] == 25
@@ -341,7 +341,7 @@ def test_record_of_two_periods_has_every_second_line(geared_chain, chain_excitat
 
 def test_divergence_is_flagged_and_the_direct_solution_takes_over(geared_chain, chain_excitation):
     excitation = chain_excitation(0.35)
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.005)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.005)
     at = modes.frequency[3]
     failed = solve_spectral(modes, excitation, at, method="fixed point")
     assert not failed.converged[0] and np.all(np.isnan(failed.deflection)) and failed.spectral_radius[0] > 1
@@ -352,7 +352,7 @@ def test_divergence_is_flagged_and_the_direct_solution_takes_over(geared_chain, 
 
 def test_truncation_is_reported(geared_chain, chain_excitation):
     excitation = chain_excitation(0.35)
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.005)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.005)
     rough = solve_spectral(modes, excitation, modes.frequency[3] / 5, response_harmonics=6)
     fine = solve_spectral(modes, excitation, modes.frequency[3] / 5, response_harmonics=40)
     assert "Too few response harmonics" in rough.message and "Too few" not in fine.message
@@ -361,7 +361,7 @@ def test_truncation_is_reported(geared_chain, chain_excitation):
 
 def test_undamped_resonance_is_refused_with_its_frequency(geared_chain, chain_excitation):
     excitation = chain_excitation(0.2)
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0)
     with pytest.raises(ConvergenceError, match=f"{modes.frequency[1]:.6g} Hz") as caught:
         solve_spectral(modes, excitation, [0.3, modes.frequency[1]])
     assert caught.value.code == "E-RESONANCE"
@@ -382,13 +382,13 @@ def test_undamped_resonance_is_refused_with_its_frequency(geared_chain, chain_ex
     ],
 )
 def test_bad_requests_are_refused(geared_chain, chain_excitation, frequency, options):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     with pytest.raises(CaseError):
         solve_spectral(modes, chain_excitation(0.2), frequency, **options)
 
 
 def test_bad_excitation_is_refused(geared_chain, chain_excitation):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     good = chain_excitation(0.2)
     stiffness = good.stiffness.copy()
     stiffness[0, 3] = np.nan
@@ -399,7 +399,7 @@ def test_bad_excitation_is_refused(geared_chain, chain_excitation):
 
 def test_the_radius_is_left_out_where_it_is_not_wanted(geared_chain, chain_excitation):
     excitation = chain_excitation(0.3)
-    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.05)
     frequency = np.linspace(0.05, 0.5, 7)
     whole, without = (solve_spectral(modes, excitation, frequency, radius=radius) for radius in (True, False))
     np.testing.assert_array_equal(without.deflection, whole.deflection)
@@ -427,7 +427,7 @@ def test_too_few_harmonics_are_told_of_converged_speeds_only():
 def test_radius_of_few_unknowns_is_exact(geared_chain, chain_excitation, count):
     """As many steps as there are real unknowns: 2 (2 H + 1) of two meshes."""
     excitation = chain_excitation(0.3)
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     problem = full_problem(modes, excitation, np.linspace(0.02, 0.4, 25))
     few = spectral.HarmonicProblem(
         problem.receptance[..., : count + 1],
@@ -469,7 +469,7 @@ def test_speeds_of_different_harmonics_together_equal_those_alone(planet_set, pl
     """Excitation and response end at each speed's own harmonics; identical planets in phase or in turn."""
     phase = step * np.arange(3)
     excitation = planet_excitation(np.concatenate([phase, phase + 0.25]), depth=0.3)
-    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.05)
+    modes = undamped_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.05)
     frequency, excited = np.linspace(0.05, 0.5, 7), np.array([9, 3, 5, 5, 2, 9, 4])
     options = {"tolerance": 1e-11}
     together = solve_spectral(

@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.stability import floquet
 from femgear.solvers.stability.floquet import frame_of_modes, monodromy, passage
 from femgear.solvers.stability.parametric import stability
@@ -32,7 +32,7 @@ def reference_multipliers(modes, excitation, frequency, harmonics=6):
 @pytest.mark.parametrize("damping", [0.0, 0.01, 0.05])
 def test_multipliers_equal_time_integration(geared_chain, chain_excitation, damping):
     excitation = chain_excitation(0.4)
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=damping)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=damping)
     top = modes.frequency
     for frequency in (0.05, top[3], 2 * top[3], top[2] + top[3]):
         exact = np.abs(reference_multipliers(modes, excitation, frequency)).max()
@@ -45,7 +45,7 @@ def test_multipliers_equal_time_integration(geared_chain, chain_excitation, damp
 def test_modes_that_creep_back_equal_time_integration(geared_chain, chain_excitation, ratio):
     """Beyond critical damping a mode does not turn; just below it is followed as the others."""
     excitation, damping = chain_excitation(0.4), np.array([0.0, 0.02, ratio, 0.02])
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=damping)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=damping)
     frequency = 2.0 * modes.frequency[1]
     exact = np.abs(reference_multipliers(modes, excitation, frequency)).max()
     found = stability(modes, excitation, frequency, frequency_ratio=1e3, steps=400).modulus[0]
@@ -54,7 +54,7 @@ def test_modes_that_creep_back_equal_time_integration(geared_chain, chain_excita
 
 def test_splitting_is_of_fourth_order(geared_chain, chain_excitation):
     excitation = chain_excitation(0.4)
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03)
     frequency = 2 * modes.frequency[3]
     exact = np.abs(reference_multipliers(modes, excitation, frequency)).max()
     error = [
@@ -66,7 +66,7 @@ def test_splitting_is_of_fourth_order(geared_chain, chain_excitation):
 
 @pytest.mark.parametrize("coupling", [0.0, 0.01])
 def test_pieces_of_a_period_side_by_side_equal_one_after_the_other(geared_chain, coupling, monkeypatch):
-    frame = frame_of_modes(solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03))
+    frame = frame_of_modes(undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03))
     frame = replace(frame, damping=frame.damping + coupling)
     assert frame.diagonal == (coupling == 0.0)
 
@@ -84,7 +84,7 @@ def test_pieces_of_a_period_side_by_side_equal_one_after_the_other(geared_chain,
 
 def test_speeds_in_one_call_equal_single_calls(planet_set, planet_excitation):
     excitation = planet_excitation(np.array([0.0, 1 / 3, 2 / 3, 0.1, 0.1 + 1 / 3, 0.1 + 2 / 3]), depth=0.3)
-    modes = solve_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.005)
+    modes = undamped_modes(planet_set(), excitation.stiffness.mean(axis=1), damping_ratio=0.005)
     frequency = np.linspace(0.02, 1.0, 80)
     together = stability(modes, excitation, frequency)
     alone = [stability(modes, excitation, f).modulus[0] for f in frequency[::20]]
@@ -106,7 +106,7 @@ def test_meshes_in_phase_sequential_and_uneven(planet_set, planet_excitation, ph
     system = planet_set()
     M = system.M.copy()
     M[[6, 9], [6, 9]] *= mass, 1.0 / mass
-    modes = solve_modes(replace(system, M=M), excitation.stiffness.mean(axis=1), damping_ratio=0.01)
+    modes = undamped_modes(replace(system, M=M), excitation.stiffness.mean(axis=1), damping_ratio=0.01)
 
     def counted(rows, **options):
         found = svd(rows, **options)
@@ -122,7 +122,7 @@ def test_meshes_in_phase_sequential_and_uneven(planet_set, planet_excitation, ph
 
 
 def test_constant_stiffness_only_decays(geared_chain, chain_excitation):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.03)
     verdict = stability(modes, chain_excitation(0.0), [0.05, 0.3])
     slowest = 2 * np.pi * 0.03 * modes.frequency[0]
     np.testing.assert_allclose(np.abs(verdict.multiplier), np.exp(-slowest / verdict.mesh_frequency))
@@ -130,7 +130,7 @@ def test_constant_stiffness_only_decays(geared_chain, chain_excitation):
 
 
 def test_undamped_multipliers_stay_on_the_circle_outside_the_tongues(geared_chain, chain_excitation):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.0)
     verdict = stability(modes, chain_excitation(0.2), 5.0 * modes.frequency[3])
     assert verdict.stable[0] and abs(verdict.multiplier[0]) == pytest.approx(1.0, abs=1e-10)
 
@@ -138,8 +138,8 @@ def test_undamped_multipliers_stay_on_the_circle_outside_the_tongues(geared_chai
 def test_residual_flexibility_takes_part(geared_chain, chain_excitation):
     """Modes cut by the basis or by the frequency limit give the same verdict."""
     excitation = chain_excitation(0.3)
-    everything = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.01)
-    few = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.01, count=3)
+    everything = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.01)
+    few = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.01, count=3)
     frequency = 0.02
     exact = np.abs(reference_multipliers(everything, excitation, frequency)).max()
     assert stability(few, excitation, frequency).modulus[0] == pytest.approx(exact, rel=1e-4)
@@ -153,7 +153,7 @@ def test_rigid_modes_are_left_out():
     system = MechanicalSystem(np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), np.ones((2, 1)), np.ones(2), ())
     stiffness = np.full((1, 16), 2.0)
     excitation = MeshExcitation(stiffness, stiffness, stiffness, np.zeros(1))
-    modes = solve_modes(system, [2.0], damping_ratio=0.1)
+    modes = undamped_modes(system, [2.0], damping_ratio=0.1)
     verdict = stability(modes, excitation, 0.5)
     assert verdict.modes_kept[0] == 1 and verdict.stable[0] and abs(verdict.multiplier[0]) < 0.9
 
@@ -165,20 +165,20 @@ def test_monodromy_multiplies_in_the_order_of_time():
 
 @pytest.mark.parametrize("options", [{"steps": 3}, {"frequency_ratio": 0.5}, {"excitation_harmonics": 0}])
 def test_bad_options_are_refused(geared_chain, chain_excitation, options):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     with pytest.raises(CaseError):
         stability(modes, chain_excitation(0.2), 0.1, **options)
 
 
 @pytest.mark.parametrize("frequency", [0.0, -1.0, np.nan])
 def test_bad_frequencies_are_refused(geared_chain, chain_excitation, frequency):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     with pytest.raises(CaseError, match="positive"):
         stability(modes, chain_excitation(0.2), frequency)
 
 
 def test_unphysical_flexibility_is_refused(geared_chain, chain_excitation):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05, count=1)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05, count=1)
     with pytest.raises(ConvergenceError, match="keep more modes"):
         stability(replace(modes, residual=20 * np.eye(2)), chain_excitation(0.4), 0.1)
 

@@ -6,7 +6,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from femgear.solvers.linear.modal import modal_damping, solve_modes
+from femgear.solvers.linear.modal import modal_damping, undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.solution import loss_of
 from femgear.solvers.stability.floquet import (
@@ -152,7 +152,7 @@ def test_verdicts_of_the_planet_set_equal_the_linear_solver(planet_set, planet_e
     excitation = planet_excitation(np.array([0.0, 1 / 3, 2 / 3, 0.1, 0.1 + 1 / 3, 0.1 + 2 / 3]), depth=0.3)
     mean = excitation.stiffness.mean(axis=1)
     system = planet_set()
-    modes = solve_modes(system, mean, damping_ratio=0.01)
+    modes = undamped_modes(system, mean, damping_ratio=0.01)
     system = replace(system, C=modal_damping(system, mean, 0.01))
     problem = NonlinearSystem(system, (gear_meshes(excitation, harmonics=3, separates=False),))
     frequency = np.array([0.9, 1.68, 2.7, 3.75])

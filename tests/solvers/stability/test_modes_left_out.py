@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.solvers.stability.floquet import Frame, frame_of
 from femgear.solvers.stability.parametric import Stability, StabilityChart, stability, stability_chart
@@ -39,7 +39,7 @@ def test_free_motions_drift_by_their_own_damping_or_take_part_by_a_coupling():
 
 def test_modes_beyond_the_excitation_count_as_flexibility(geared_chain, chain_excitation):
     """Two of four modes are followed; the verdict is that of all to 1e-3, 4 % off without the others."""
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.01)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.01)
     every = stability(modes, chain_excitation(0.6), 0.2, excitation_harmonics=1, frequency_ratio=50.0)
     few = stability(modes, chain_excitation(0.6), 0.2, excitation_harmonics=1, frequency_ratio=1.0)
     assert (every.modes_kept[0], few.modes_kept[0]) == (4, 2)
@@ -47,7 +47,7 @@ def test_modes_beyond_the_excitation_count_as_flexibility(geared_chain, chain_ex
 
 
 def test_the_fewest_steps_follow_the_highest_line(geared_chain, chain_excitation):
-    modes = solve_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
+    modes = undamped_modes(geared_chain, [1.0, 1.4], damping_ratio=0.05)
     options = {"excitation_harmonics": 6, "frequency_ratio": 1.0}
     assert stability(modes, chain_excitation(0.2), 0.01, steps=7, **options).steps[0] == 7
     with pytest.raises(CaseError, match="12 instants cannot show 6 harmonics"):

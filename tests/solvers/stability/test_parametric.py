@@ -5,7 +5,7 @@ import pytest
 from scipy.special import mathieu_a, mathieu_b
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.stability import parametric
 from femgear.solvers.stability.parametric import stability, stability_chart
 from femgear.system.fourier import FourierSeries, StepSeries
@@ -68,7 +68,7 @@ def test_chart_of_the_rectangular_stiffness_equals_exponentials():
 
 def test_chart_of_a_modal_basis_equals_the_linear_solver(geared_chain, chain_excitation):
     excitation = chain_excitation(0.6)
-    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.005)
+    modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.005)
     frequency = np.array([0.2, 2 * modes.frequency[3], modes.frequency[2] + modes.frequency[3]])
     chart = stability_chart(modes, excitation, 2 * np.pi * frequency, [0.5, 1.0])
     for column, depth in enumerate((0.3, 0.6)):
@@ -79,7 +79,7 @@ def test_chart_of_a_modal_basis_equals_the_linear_solver(geared_chain, chain_exc
 def test_modes_left_out_keep_their_own_decay(geared_chain, chain_excitation):
     """Constant stiffness: the largest multiplier is exp(-zeta omega T) of the slowest decay."""
     excitation = chain_excitation(0.0)
-    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.1)
+    modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.1)
     frequency = 1.5 * modes.frequency[1] * np.array([1.0, 1.01])
     natural = 2 * np.pi * modes.frequency
     options = {"frequency_ratio": 1.0, "excitation_harmonics": 1}
@@ -93,7 +93,7 @@ def test_modes_left_out_keep_their_own_decay(geared_chain, chain_excitation):
 
 def test_slow_speeds_of_a_batch_get_the_steps_that_they_need(geared_chain, chain_excitation):
     excitation = chain_excitation(0.6)
-    modes = solve_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.005)
+    modes = undamped_modes(geared_chain, excitation.stiffness.mean(axis=1), damping_ratio=0.005)
     frequency = np.array([0.01, 0.5])
     found = stability(modes, excitation, frequency, excitation_harmonics=3, frequency_ratio=1e3)
     assert found.steps[0] == found.steps[1] >= 2 * np.pi * modes.frequency.max() / 0.01

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from scipy.special import mathieu_a, mathieu_b
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.stability.parametric import stability
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.system import MeshExcitation
@@ -334,7 +334,7 @@ def pair(*, harmonics=HARMONICS, **options):
 
 
 def natural(model) -> float:
-    return 2.0 * math.pi * float(solve_modes(model.still, model.mean_stiffness).frequency[-1])
+    return 2.0 * math.pi * float(undamped_modes(model.still, model.mean_stiffness).frequency[-1])
 
 
 def run_at(model, ratio, *, periods=100, steps=100, torques=(), **options):
@@ -365,7 +365,7 @@ def test_growth_is_the_floquet_exponent(ratio, damping):
     model = pair(damping=damping)
     growth = run_at(model, ratio, periods=150, steps=200, start="zero").growth
     assert growth == pytest.approx(exponent(model, ratio, damping), rel=1e-3)
-    modes = solve_modes(model.still, model.mean_stiffness)
+    modes = undamped_modes(model.still, model.mean_stiffness)
     modes = replace(modes, damping_ratio=np.array([0.0, damping]))
     k = (model.stiffness @ np.exp(2j * np.pi * np.outer(np.arange(HARMONICS + 1), np.arange(64)) / 64)).real
     excitation = MeshExcitation(k, 0.0 * k, 0.0 * k, np.array([np.inf]))
@@ -400,7 +400,7 @@ def test_borders_of_the_principal_instability():
 def test_constant_stiffness_decays_with_the_slowest_mode():
     train = replace(wind_turbine_drivetrain(), damping_ratio=0.05)
     model = torsional_model(train, harmonics=0)
-    modes = solve_modes(model.still, model.mean_stiffness)
+    modes = undamped_modes(model.still, model.mean_stiffness)
     slowest = 0.05 * 2.0 * math.pi * modes.frequency[1]
     run = march_drivetrain(model, (), duration=60.0, step=2e-3, speed=0.6, outputs=())
     assert run.growth == pytest.approx(-slowest, rel=1e-3)

@@ -16,7 +16,7 @@ from femgear.fe.grid import copy_nodes, rotated_copies
 from femgear.fe.reduction import CyclicModes
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles
-from femgear.solvers.linear.modal import complex_modes, solve_modes
+from femgear.solvers.linear.modal import complex_modes, undamped_modes
 from femgear.system.mesh_directions import gear_set_system
 from femgear.system.rigid_bodies import PlanarBody, planar_from_set
 from femgear.trains.elastic.model import (
@@ -131,7 +131,7 @@ def test_rotation_of_the_mechanism_is_the_zero_mode(ring, back_ring, planets, to
     assert np.abs(system.W.T @ q).max() < 1e-12 * gears.sun.base_radius
     assert np.abs(system.K @ q).max() < 1e-12 * np.abs(system.K).max()
     assert abs(system.load @ q) < 1e-12 * np.abs(system.load) @ np.abs(q)
-    modes = solve_modes(system, np.full(2 * planets, 5e8), damping_ratio=0.0, count=4)
+    modes = undamped_modes(system, np.full(2 * planets, 5e8), damping_ratio=0.0, count=4)
     assert list(modes.frequency[:4] == 0) == [True, False, False, False]
     found = modes.shape[:, 0]
     assert found == pytest.approx(q * found[place(model, "sun: rotation")], abs=1e-8 * np.abs(found).max())
@@ -146,7 +146,7 @@ def test_sets_without_motor_or_brake_keep_one_zero_mode_and_a_balanced_load(ring
     assert len(model.system.dofs) == len(model.system.M) == len(model.system.load)
     assert ("motor: rotation" in model.system.dofs) == (motor is not None)
     assert ("brake: rotation" in model.system.dofs) == (brake is not None)
-    modes = solve_modes(model.system, np.full(6, 5e8), damping_ratio=0.0, count=3)
+    modes = undamped_modes(model.system, np.full(6, 5e8), damping_ratio=0.0, count=3)
     assert np.count_nonzero(modes.frequency == 0) == 1
     # constant load alone presses every mesh with the torque's force over the base radius
     force = 5e8 * modes.load_deflection
@@ -264,7 +264,7 @@ def test_back_flanks_have_the_same_frequencies(ring, back_ring):
     front = make(gears, ring)
     back = make(gears, back_ring, torque=-TORQUE)
     spring = np.repeat([5e8, 7e8], 3)
-    one, other = (solve_modes(m.system, spring, damping_ratio=0.0, max_frequency=12e3) for m in (front, back))
+    one, other = (undamped_modes(m.system, spring, damping_ratio=0.0, max_frequency=12e3) for m in (front, back))
     assert other.frequency == pytest.approx(one.frequency, rel=1e-7, abs=1e-3)
     assert other.load_deflection == pytest.approx(one.load_deflection, rel=1e-8)
 

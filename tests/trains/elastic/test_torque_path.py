@@ -25,7 +25,7 @@ from femgear.case.quantities import to_si
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.housing.sensor import component_lines
 from femgear.run import run_case
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.trains.elastic.results import DynamicsResult, HousingResult
 from femgear.trains.reading import parse_case, read_case
@@ -35,7 +35,7 @@ pytestmark = pytest.mark.usefixtures("coarse_states")
 ROOT = Path(__file__).parents[3]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 TORQUE = "100 N m"
-USES = (to_si, walk_mesh_cycle, solve_modes, solve_spectral, component_lines)
+USES = (to_si, walk_mesh_cycle, undamped_modes, solve_spectral, component_lines)
 CHAIN = (
     "trains.reading.read_case",
     "trains.reading.parse_case",
@@ -46,7 +46,7 @@ CHAIN = (
     "contact.cycle.walk_mesh_cycle",
     "trains.elastic.stages.solve_modes",
     "contact.loaded_period.loaded_period",
-    "solvers.linear.modal.solve_modes",
+    "solvers.linear.modal.undamped_modes",
     "trains.elastic.stages.dynamics_parts",
     "solvers.periodic.spectral.solve_spectral",
     "trains.elastic.stages.solve_housing",

@@ -21,7 +21,7 @@ from random_gearboxes import (
     turned,
 )
 
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.system.assembly import GROUND
 from femgear.trains.gearbox.case_file import CASING
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
@@ -127,7 +127,7 @@ def answer(found: Deflection) -> dict[str, np.ndarray]:
     motion = np.where(slack_bearings(found)[order, :3].any(axis=1, keepdims=True), 0.0, motion)
     _, system, stiffness = linear_system(found)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
-    frequency = solve_modes(still, stiffness, damping_ratio=0.03, count=min(MODES, len(system.dofs))).frequency
+    frequency = undamped_modes(still, stiffness, damping_ratio=0.03, count=min(MODES, len(system.dofs))).frequency
 
     def sizes(vectors):
         return np.column_stack([np.hypot(vectors[:, 0], vectors[:, 1]), np.abs(vectors[:, 2])])
@@ -195,7 +195,7 @@ def test_bearings_that_are_named_are_those_of_the_rigid_modes(seed):
     check_meshes(found)
     _, system, stiffness = linear_system(found)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
-    modes = solve_modes(still, stiffness, damping_ratio=0.03, count=min(MODES, len(system.dofs)))
+    modes = undamped_modes(still, stiffness, damping_ratio=0.03, count=min(MODES, len(system.dofs)))
     rigid = sum(kind == "rigid" for kind in modes.kind)
     assert rigid == len(found.model.turns) + unheld_motions(found).shape[1]
     assert slack_bearings(found).any() == (rigid > len(found.model.turns))

@@ -11,7 +11,7 @@ from scipy.optimize import root
 from uneven_set import ANGLES, UNEVEN
 
 from femgear.errors import CaseError
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.system.mesh_directions import (
     dof_names,
     free_motions,
@@ -182,7 +182,7 @@ def test_modes_of_a_pair_are_those_of_its_published_matrices():
     K = np.diag([1e8, 1e8, 3e7, 2e4, 2e4, 5e3, 2e8, 2e8, 4e7, 1e4, 1e4, 6e3]) + 2e8 * np.outer(h, h)
     inertias = [[b.mass] * 3 + [b.diametral_inertia] * 2 + [b.inertia] for b in (data.sun, data.planet)]
     expected = np.sqrt(eigh(K, np.diag(np.ravel(inertias)), eigvals_only=True)) / (2 * math.pi)
-    modes = solve_modes(system, data.column_stiffness, damping_ratio=0.0)
+    modes = undamped_modes(system, data.column_stiffness, damping_ratio=0.0)
     assert modes.frequency == pytest.approx(expected, rel=1e-10)
 
 
@@ -233,7 +233,7 @@ def test_without_helix_the_plane_motions_are_those_of_the_planar_set(torque, con
     assert np.abs(system.W[rest]).max() == 0.0
     assert system.load[plane] == pytest.approx(flat.load, rel=1e-12)
     k = planar.mesh_stiffness
-    one, two = (solve_modes(s, k, damping_ratio=0.0).frequency for s in (flat, system))
+    one, two = (undamped_modes(s, k, damping_ratio=0.0).frequency for s in (flat, system))
     missing = [np.abs(two / f - 1.0).min() for f in one[one > 0.0]]
     assert max(missing) < 1e-9
 
@@ -272,7 +272,7 @@ def test_infinite_supports_and_pins_are_constraints():
     basis = null_space(np.array(rows) / np.linalg.norm(rows, axis=1)[:, None])
     K = loose.K + (loose.W * data.column_stiffness) @ loose.W.T
     expected = np.sqrt(np.abs(eigh(basis.T @ K @ basis, basis.T @ loose.M @ basis, eigvals_only=True)))
-    found = solve_modes(system, data.column_stiffness, damping_ratio=0.0).frequency
+    found = undamped_modes(system, data.column_stiffness, damping_ratio=0.0).frequency
     assert found[1:] == pytest.approx(expected[1:] / (2 * math.pi), rel=1e-8)
     assert np.abs(np.array(rows) @ free_motions(held)).max() < 1e-12
 
@@ -291,7 +291,7 @@ def test_torque_is_carried_by_meshes_and_pins_in_equilibrium():
     """Mesh forces from equilibrium of moments; axial forces on each planet cancel."""
     data = kahraman_set(contact_points="pitch_point")
     system = gear_set_system(data, torque=PlanarTorque(100.0))
-    modes = solve_modes(system, data.column_stiffness, damping_ratio=0.0)
+    modes = undamped_modes(system, data.column_stiffness, damping_ratio=0.0)
     force = data.column_stiffness * modes.load_deflection
     around = 100.0 / 4 / 0.024 / math.cos(math.radians(20.0))
     assert force == pytest.approx(np.full(8, around), rel=1e-6)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from trains.pair.test_stages import BEARINGS, gears, pair_case, solved
 
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.time.transient import solve_transient
@@ -26,7 +26,7 @@ def one_mass(wave, load=200.0, play=0.0):
     k = STIFFNESS * (1.0 + wave * np.cos(2.0 * np.pi * TAU))[None]
     force = np.full_like(k, load / radii[0])
     excitation = MeshExcitation(k, force / k, force, backlash=np.array([play]))
-    return model, mass, solve_modes(model.system, [STIFFNESS], damping_ratio=0.05), excitation
+    return model, mass, undamped_modes(model.system, [STIFFNESS], damping_ratio=0.05), excitation
 
 
 def test_natural_frequency_in_closed_form():
@@ -38,7 +38,7 @@ def test_natural_frequency_in_closed_form():
 def test_bearings_that_hardly_give_way_leave_the_torsional_mode():
     stiff = {key: "1e14 N/m" for key in BEARINGS}
     found = [
-        solve_modes(pair_model(c, gears()).system, [STIFFNESS], damping_ratio=0.05)
+        undamped_modes(pair_model(c, gears()).system, [STIFFNESS], damping_ratio=0.05)
         for c in (pair_case(), pair_case(**stiff))
     ]
     assert found[1].frequency[1] == pytest.approx(found[0].frequency[1], rel=1e-4)
