@@ -116,6 +116,8 @@ CODES = {
 SURROUNDINGS = frozenset({"E-CLUSTER", "E-LIBRARY", "E-SYSTEM-LIBRARY"})
 """Codes of what is missing or fails around femgear, whatever the case: they end the command line with 5."""
 SURROUNDINGS_EXIT = 5
+LESS_TORQUE = "reduce operation.torque"
+"""Remedy of contacts that the load makes too large; what has its load elsewhere puts its own in its place."""
 MOST_SHOWN = 10
 """Mistakes of a case file that one message lists."""
 

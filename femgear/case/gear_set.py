@@ -27,6 +27,7 @@ from femgear.gears.deviations import (
     body_separation,
     check_deviations,
 )
+from femgear.gears.gear import largest_allowance
 from femgear.gears.planetary import PlanetarySet
 from femgear.remembered import remembered
 
@@ -97,19 +98,22 @@ def _refusal(case: Case) -> str:
 
 
 def _name_backlash(error: GeometryError, case: Case) -> None:
-    """Let a refusal of teeth that the backlash thins too far name it, and its largest value in whole um."""
+    """Let a refusal of teeth that the backlash thins too far name it, and what leaves every gear a tip, in um."""
 
-    def code(steps: int) -> str:
-        less = case.set.model_copy(update={"backlash": 1e-6 * steps})
-        return _refusal(case.model_copy(update={"set": less}))
+    def with_backlash(backlash: float) -> Case:
+        return case.model_copy(update={"set": case.set.model_copy(update={"backlash": backlash})})
 
-    without = code(0)
-    if error.code != without:
-        steps = range(math.ceil(1e6 * case.set.backlash))
-        first = bisect_left(steps, True, key=lambda one: code(one) != without)
-        error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
-        error.limit = f"up to {LENGTH.show(1e-6 * (first - 1))} for these gears, each of which takes half of it"
-        error.remedy, error.file = "reduce the backlash, or check its unit", case.location("set.backlash")
+    try:
+        thinnest = min(map(largest_allowance, with_backlash(0.0).closed_gears().gears))
+    except GeometryError as refused:
+        if refused.code == error.code:
+            return
+        thinnest = 0.0
+    error.key, error.value, error.limit = "set.backlash", LENGTH.show(case.set.backlash), None
+    error.remedy, error.file = "reduce the backlash, or check its unit", case.location("set.backlash")
+    most = 1e-6 * (math.ceil(2e6 * thinnest) - 1)
+    if most >= 0.0 and not _refusal(with_backlash(most)):
+        error.limit = f"up to {LENGTH.show(most)} for these gears, each of which takes half of it"
 
 
 def _name_root_radius(error: GeometryError, case: Case) -> None:

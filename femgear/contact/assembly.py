@@ -30,7 +30,7 @@ from femgear.contact.flank_pairs import (
 )
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
 from femgear.contact.supports import MovingMembers
-from femgear.errors import ContactError
+from femgear.errors import LESS_TORQUE, ContactError
 from femgear.gears.deviations import SetDeviations
 from femgear.gears.pair import GearSet
 
@@ -476,7 +476,7 @@ def not_contained() -> ContactError:
     return ContactError(
         "the contact windows do not contain the contact after eleven enlargements",
         code="E-CONTACT",
-        remedy="reduce operation.torque or the errors",
+        remedy=(LESS_TORQUE, "smaller errors of the teeth"),
     )
 
 

@@ -17,7 +17,7 @@ from femgear.contact.bodies import Bodies
 from femgear.contact.slices import SliceState, solve_slices
 from femgear.contact.supports import MovingMembers, TiltingMembers
 from femgear.contact.width_waves import WidthWaves
-from femgear.errors import ContactError
+from femgear.errors import LESS_TORQUE, ContactError
 from femgear.gears.deviations import SetDeviations, lead_separation
 from femgear.gears.modifications import FlankTwist
 
@@ -274,7 +274,7 @@ def _check_lines(force: np.ndarray | None, contact: np.ndarray, width: float, sl
             key="static.slices",
             value=slices,
             limit=f"at most {int(width / thinnest)}",
-            remedy="use fewer slices or reduce operation.torque",
+            remedy=("use fewer slices", LESS_TORQUE),
         )
     if force is None:
         return

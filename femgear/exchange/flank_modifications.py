@@ -271,7 +271,7 @@ class _Reader:
 def written_modifications(
     case: Any, gear: Gear, side: str
 ) -> tuple[list[tuple[str, dict[str, tuple[str, str]]]], list[str]]:
-    """Make types and attributes of the components of a flank, and list in words what REXS cannot hold.
+    """Make types and attributes of the components of a flank, and list the kinds that REXS cannot hold.
 
     The datum face is the end z < 0; ``side`` is "both" of sun or ring, or the side of a planet.
     """
@@ -287,7 +287,7 @@ def written_modifications(
                 attributes["shape_of_relief"] = ("parabolic", "none")
         found += parts
         if not parts:
-            left_out.append(f"{gear.name}: a {_words(one)}")
+            left_out.append(_words(one))
     return found, left_out
 
 

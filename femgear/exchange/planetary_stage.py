@@ -910,8 +910,8 @@ def _add_modifications(w: ModelWriter, case: Case, gear: Any, flanks: Mapping[st
             if key not in known:
                 known[key] = w.add(kind, "", **attributes)
             w.relate("reference", origin=flank, referenced=known[key])
-        for one in left_out:
-            model.remark(f"{gear.name}.modifications", f"REXS has no {one.partition(': a ')[2]}: left out")
+        for kind in left_out:
+            model.remark(f"{gear.name}.modifications", f"REXS has no {kind}: left out")
 
 
 def _stiffness(case: Case, member: str, key: str) -> tuple[str, str] | None:

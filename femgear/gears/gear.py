@@ -227,6 +227,14 @@ def tooth_thickness(gear: Gear, radius):
     return 2.0 * radius * half_thickness_angle(gear, radius)
 
 
+def largest_allowance(gear: Gear) -> float:
+    """Compute the thickness allowance [m] at which the tooth would be pointed at its tip circle.
+
+    The allowance is an arc of the reference circle: the tooth is thinner by the same angle at every radius.
+    """
+    return gear.thickness_allowance + 2.0 * gear.reference_radius * float(half_thickness_angle(gear, gear.tip_radius))
+
+
 def working_half_angles(one: Gear, two: Gear, angle: float) -> tuple[float, float]:
     """Compute the half-thickness angles [rad] of two gears on their working pitch circles.
 

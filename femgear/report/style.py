@@ -262,11 +262,14 @@ def family(name: str) -> str:
     return "planet-ring" if "ring" in name else name if name.startswith("gear 1") else "sun-planet"
 
 
-def drawn_lines(names, values, *, partly: bool = False, within: float = _IDENTICAL) -> list[tuple[str, int]]:
+def drawn_lines(
+    names, values, *, partly: bool = False, within: float = _IDENTICAL, whole: str = ""
+) -> list[tuple[str, int]]:
     """Choose the rows of `values` to draw, with their legend texts: one for a family of meshes, else each.
 
     The family is drawn as one where its rows (n, ...) differ by less than a millionth of the largest value,
-    or another share ``within`` of it; ``partly`` does so for some meshes of a family, too.
+    or another share ``within`` of it; ``partly`` does so for some meshes of a family, too; ``whole`` is what all
+    of one are called, by default by their kind.
     """
     values, names = np.asarray(values), [str(name) for name in names]
     largest = np.abs(values).max(initial=0.0)
@@ -285,8 +288,9 @@ def drawn_lines(names, values, *, partly: bool = False, within: float = _IDENTIC
         for group in groups:
             same = np.abs(values[group] - values[group[0]]).max() <= _IDENTICAL * largest
             word = "identical" if same else "alike"
-            whole = f"all {kind} meshes" if len(group) == len(rows) else ", ".join(names[i] for i in group)
-            lines.append((f"{whole} ({word})" if len(group) > 1 else names[group[0]], group[0]))
+            everyone = whole or f"all {kind} meshes"
+            called = everyone if len(group) == len(rows) else ", ".join(names[i] for i in group)
+            lines.append((f"{called} ({word})" if len(group) > 1 else names[group[0]], group[0]))
     return lines
 
 

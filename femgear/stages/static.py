@@ -64,7 +64,7 @@ from femgear.contact.width_waves import (
     waves_of_gears,
     with_ring_waves,
 )
-from femgear.errors import CaseError, ContactError, GeometryError
+from femgear.errors import LESS_TORQUE, CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import Material, foundation, material_of_each
 from femgear.gears.deviations import SetDeviations, common_period
 from femgear.gears.iso6336 import (
@@ -184,14 +184,14 @@ def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:
             cycle.deflection - (0.0 if cycle.lead_offset is None else cycle.lead_offset),
             "operation.torque",
             LARGEST_APPROACH,
-            "reduce operation.torque or the errors",
+            (LESS_TORQUE, "smaller errors of the teeth"),
         ),
         (
             f"the {member} moves",
             cycle.member_motion,
             support.get(member, "planet.bearing_stiffness"),
             LARGEST_MOTION,
-            "stiffen the supports and bearings, reduce the clearance or operation.torque",
+            ("stiffen the supports and bearings, or reduce the clearance", LESS_TORQUE),
         ),
     ):
         largest = float(np.abs(motion).max(initial=0.0))

@@ -279,8 +279,7 @@ def _over_flank(static: xr.Dataset, name: str, scale: float, words: str, title: 
 def _of_planets(static: xr.Dataset, rows) -> list[tuple[str, int]]:
     """Choose the lines to draw of the rows of all planets, with their texts: one of those that are alike."""
     names = [f"planet {planet}" for planet in static["planet"].values]
-    found = drawn_lines(names, rows, partly=True, within=ALIKE)
-    return [(text.replace("all sun-planet meshes", "every planet"), row) for text, row in found]
+    return drawn_lines(names, rows, partly=True, within=ALIKE, whole="every planet")
 
 
 def _kinds(data: xr.Dataset) -> tuple[str, ...]:
@@ -683,8 +682,8 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
         bodies.append(placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=moved))
     grid = assemble_set(bodies)
     write_vtu(grid, folder / "deformed_set.vtu")
-    title = f"{static.sun_torque:.4g} N m on {gears.gears[0].name.replace('_', ' ')}".replace("-", "−")
-    title = f"deflection under {title.replace('on ', 'on the ')}" if gears.members else title
+    torque, name = f"{static.sun_torque:.4g} N m".replace("-", "−"), gears.gears[0].name.replace("_", " ")
+    title = f"deflection under {torque} on the {name}" if gears.members else f"{torque} on {name}"
     deformed_picture(
         grid,
         folder / "deformed_set.png",

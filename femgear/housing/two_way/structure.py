@@ -177,14 +177,14 @@ _OPTIONAL = ("ring_compliance", "sensor_compliance", "sensor_area")
 ARRAY_NAMES = (*_ARRAYS, *_OPTIONAL)
 """Arrays that `from_arrays` takes."""
 _DIMENSIONS = {
-    "natural_frequency": "(modes,)",
-    "damping_ratio": "() or (modes,)",
-    "ring_angle": "(points,)",
-    "ring_shape": "(modes, points, 2)",
-    "sensor_shape": "(modes, sensors)",
-    "ring_compliance": "(points, points)",
-    "sensor_compliance": "(sensors, points)",
-    "sensor_area": "(sensors,)",
+    "natural_frequency": [("modes",)],
+    "damping_ratio": [(), ("modes",)],
+    "ring_angle": [("points",)],
+    "ring_shape": [("modes", "points", "2")],
+    "sensor_shape": [("modes", "sensors")],
+    "ring_compliance": [("points", "points")],
+    "sensor_compliance": [("sensors", "points")],
+    "sensor_area": [("sensors",)],
 }
 _LARGEST = 1e30
 """Entry of an array in SI units, at most: squares of larger ones overflow, and no casing has them."""
@@ -195,14 +195,13 @@ _SLOWEST, _FASTEST = 2e-3 * np.pi, 2e9 * np.pi
 def _check_arrays(values: Mapping[str, np.ndarray]) -> None:
     """Refuse arrays of other dimensions, entries that are not finite and frequencies that no casing has."""
     for name, array in values.items():
-        shape = _DIMENSIONS[name]
-        dimensions = {len(one.strip("()").replace(",", " ").split()) for one in shape.split(" or ")}
-        if array.ndim not in dimensions:
+        shapes = _DIMENSIONS[name]
+        if array.ndim not in map(len, shapes):
             raise CaseError(
                 f"{name} has the shape {array.shape}",
                 code="E-SHAPE",
                 key=name,
-                limit=shape,
+                limit=" or ".join(f"({', '.join(shape)}{',' * (len(shape) == 1)})" for shape in shapes),
                 remedy="export the array with these dimensions",
             )
         if not (np.abs(array) <= _LARGEST).all():

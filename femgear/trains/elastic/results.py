@@ -109,7 +109,8 @@ _FIRST, _STRONGEST = 6, 4
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
 _PARTS = ("sun", "planet, sun side", "planet, ring side", "ring")
-"""Flanks in the order of their meshes."""
+"""Flanks in the order of their meshes, below their gears."""
+_GEARS = ("sun", "planet", "planet", "ring")
 _FORMS = ("sun", "planet_sun_side", "planet_ring_side", "ring")
 _OF_LEVEL = "dynamics", "housing"
 """Stages whose findings concern what is heard at operating speeds."""
@@ -419,13 +420,15 @@ class DynamicsResult(StageResult):
     def contents(self) -> Contents:
         """Collect the contents of dynamics.nc."""
         response, lines, field = self.response, "speed mesh harmonic", "harmonic circumferential"
-        words = "outer tangential displacement of the ring at the last speed"
+        radial, tangential = (
+            f"outer {way} displacement of the ring at the last speed" for way in ("radial", "tangential")
+        )
         n_max = self.ring_radial.shape[-1] // 2
         entries = (
             ("dte", lines, self.dte, "m", "dynamic transmission error"),
             ("mesh_force", lines, response.force, "N", "dynamic mesh force"),
-            ("ring", field, self.ring_radial[-1], "m", words.replace("tangential", "radial")),
-            ("ring_tangential", field, self.ring_tangential[-1], "m", words),
+            ("ring", field, self.ring_radial[-1], "m", radial),
+            ("ring_tangential", field, self.ring_tangential[-1], "m", tangential),
         )
         reach = {
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
@@ -726,20 +729,19 @@ def _strength(
         for kind, one in zip(KINDS, contact)
     ]
     yield f"largest contact pressure{where}", ", ".join(pressures)
-    for name, text in _safeties(results.case, nominal, nominals, factors, " ".join(known), notes):
+    for name, text in _safeties(results.case, nominal, nominals, factors, tuple(known), notes):
         yield name, marks(text, *doubts, "W-FACE-LOAD", "W-THRUST", of=("static", *_OF_LEVEL))
 
 
 def _safeties(
-    case: Case, root: np.ndarray, contact: np.ndarray, factors: np.ndarray, over: str, notes: list[str]
+    case: Case, root: np.ndarray, contact: np.ndarray, factors: np.ndarray, names: tuple[str, ...], notes: list[str]
 ) -> Iterator[tuple[str, str]]:
     """Rows of S_F and S_H of ISO 6336, each gear with the limits of its own material.
 
     Of sigma_F0 (4,) of `_PARTS` and sigma_H0 (2,) of both kinds of mesh [Pa], with the products (2,) of the
-    load factors, which ``over`` names.
+    load factors of these ``names``.
     """
-    limits = {name: gear_material(case, name) for name in case.gear_names}
-    of_parts = [limits[part.split(",")[0]] for part in _PARTS]
+    of_parts, over = [gear_material(case, gear) for gear in _GEARS], " ".join(names)
     flims, hlims = ([getattr(one, f"{kind}_stress_limit") for one in of_parts] for kind in ("root", "contact"))
     safe = [
         None if limit is None else root_safety(limit, root[i], factors[i // 2], reversed_bending=i in (1, 2))
@@ -772,8 +774,8 @@ def _safeties(
         which = "" if not any((*flims, *hlims)) else " of all gears"
         notes.append(f"material.root_stress_limit and contact_stress_limit{which} would give safeties")
     if any((*flims, *hlims)):
-        missing = "" if "K_v" in over.split() else "; K_gamma and K_v were not computed"
-        wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "K_Hβ" in over.split() else ""
+        missing = "" if "K_v" in names else "; K_gamma and K_v were not computed"
+        wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "K_Hβ" in names else ""
         notes.append(f"long life, every other factor of ISO 6336-2 and -3 is 1{missing}{wide}")
 
 
@@ -786,7 +788,7 @@ def _limits(limits: list[float | None]) -> str:
     """Write the limits of the materials [Pa] of `_PARTS`, one where they are the same for all gears."""
     if len(set(limits)) == 1:
         return f"{1e-6 * (limits[0] or 0.0):g} MPa"
-    of_gears = {part.split(",")[0]: limit for part, limit in zip(_PARTS, limits)}
+    of_gears = dict(zip(_GEARS, limits))
     return ", ".join(
         f"{'none' if limit is None else f'{1e-6 * limit:g} MPa'} ({gear})" for gear, limit in of_gears.items()
     )

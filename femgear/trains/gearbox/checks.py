@@ -36,6 +36,8 @@ from femgear.trains.gearbox.power import gearbox_flow
 
 # Entries that speeds and torques hang on.
 _OF_THE_FLOW = ("pair", "planetary", "coupling", "operation", "load")
+_OR_BODY = ", or a shaft that is one rigid body"
+"""What a torque may act on beside a load."""
 _ROLLER = ("rolling_elements", "element_diameter", "pitch_diameter")
 _SPRINGS = ("radial", "axial", "tilt", "torsional")
 # Positions on a shaft that are off it by less are on it [m].
@@ -150,17 +152,15 @@ def _references(case: GearboxCase) -> Iterator[CaseError]:
     for key, name in used:
         if name == CASING and key.startswith(casing_allowed):
             continue
-        yield from _unknown(key, name, shafts, "a [[shaft]]")
+        yield from _unknown(key, name, shafts, "[[shaft]]")
     ports = [*port_names(case)]
     for key, name in [("operation.output", name) for name in case.operation.output]:
-        yield from _unknown(key, name, ports, "a [[load]], or a shaft that is one rigid body")
+        yield from _unknown(key, name, ports, "[[load]]", _OR_BODY)
     for i, load_case in enumerate(case.operation.load_case):
         for name in load_case.torque:
-            yield from _unknown(
-                f"operation.load_case[{i}].torque", name, ports, "a [[load]], or a shaft that is one rigid body"
-            )
+            yield from _unknown(f"operation.load_case[{i}].torque", name, ports, "[[load]]", _OR_BODY)
         for name in load_case.speed:
-            yield from _unknown(f"operation.load_case[{i}].speed", name, shafts, "a [[shaft]]")
+            yield from _unknown(f"operation.load_case[{i}].speed", name, shafts, "[[shaft]]")
 
 
 def port_names(case: GearboxCase) -> list[str]:
@@ -168,10 +168,10 @@ def port_names(case: GearboxCase) -> list[str]:
     return [load.name for load in case.load] + [shaft.name for shaft in case.shaft if not shaft.part]
 
 
-def _unknown(key: str, name: str, known: list[str], what: str) -> Iterator[CaseError]:
+def _unknown(key: str, name: str, known: list[str], table: str, others: str = "") -> Iterator[CaseError]:
     if name not in known:
-        limit = ", ".join(known[:20]) or f"none: the case has no {what.split()[-1]}"
-        yield no_such("part", key, name, known, f"name {what}", limit=limit)
+        limit = ", ".join(known[:20]) or f"none: the case has no {table}"
+        yield no_such("part", key, name, known, f"name a {table}{others}", limit=limit)
 
 
 def _known(case: GearboxCase, *names: str) -> bool:

@@ -17,7 +17,7 @@ import numpy as np
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import planetary_set, set_deviations
-from femgear.errors import ContactError, FemgearError
+from femgear.errors import LESS_TORQUE, ContactError, FemgearError
 from femgear.gears.deviations import SetDeviations, body_separation, misaligned_approach, no_deviations
 from femgear.gears.pair import GearSet
 from femgear.gears.profile import base_helix_angle
@@ -210,10 +210,8 @@ def locate_contact_error(
     line = f", {1e-3 * abs(torque) / width:.4g} N m per mm of its width" if width else ""
     error.message = f"stage {stage.name} with {torque:.6g} N m{line}: {error.message}"
     less = "less torque in the load case"
-    remedies = [less if "operation.torque" in one else one for one in error.remedies]
-    if error.code == "E-SLICES":
-        remedies = ["use fewer slices", less] if any(one == less for one in remedies) else remedies
-    elif isinstance(error, ContactError) and less not in remedies:
+    remedies = [less if one == LESS_TORQUE else one for one in error.remedies]
+    if error.code != "E-SLICES" and isinstance(error, ContactError) and less not in remedies:
         remedies = [less, *remedies]
     error.remedies = tuple(remedies)
 

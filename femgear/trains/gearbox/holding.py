@@ -20,7 +20,7 @@ from femgear.trains.gearbox.case_file import CASING, FORCE, BoxBearingSection, G
 from femgear.trains.gearbox.geometry import pair_sizes, set_sizes
 from femgear.trains.gearbox.power import BoxFlow
 
-WAYS = ("along x", "along y", "along its axis", "against tilting about x", "against tilting about y", "against turning")
+_MOTIONS = ("along x", "along y", "along its axis", "tilting about x", "tilting about y", "turning")
 """Of the motions of a shaft, in the order of `femgear.system.assembly.MOTIONS`."""
 _LEVER = 0.05
 """Length by which tilts and rotations are compared with shifts [m]."""
@@ -32,7 +32,7 @@ _UNTAKEN = 1e-6
 """Thrust that nothing takes, over the largest one, that is rounding."""
 LARGEST_CLEARANCE = 0.1
 """Of a bearing of a shaft with a gear of a pair, over the module: the shaft moves so far before the bearing carries."""
-ALONG = 'give a bearing of it axial = "rigid" or a stiffness, or a kind that takes thrust'
+_ALONG = 'axial = "rigid" or a stiffness, or a kind that takes thrust'
 ACROSS = "give it two bearings across its axis, apart from one another, or one with a tilt stiffness"
 
 
@@ -97,7 +97,7 @@ def _floating(case: GearboxCase, numbers: Sequence[int]) -> CaseError:
         key=f"shaft[{numbers[0]}].name",
         value=f"{', '.join(own)} without axial stiffness" if own else "no bearing",
         limit="one bearing or coupling that holds it along its axis",
-        remedy=ALONG.replace("of it", f"of {names[0]}"),
+        remedy=f"give a bearing of {names[0]} {_ALONG}",
     )
 
 
@@ -252,9 +252,12 @@ def _loose(case: GearboxCase, owner: str, ways: Sequence[int]) -> CaseError:
         stages = [f"planets of {stage.name}" for stage in case.planetary]
         key = f"planetary[{stages.index(owner)}].planet.bearing" if owner in stages else "bearing"
         what, value = owner, None
-    remedies = [*([ALONG] if 2 in ways else []), *([ACROSS] if {*ways} & {0, 1, 3, 4} else [])]
+    remedies = [
+        *([f"give a bearing of it {_ALONG}"] if 2 in ways else []),
+        *([ACROSS] if {*ways} & {0, 1, 3, 4} else []),
+    ]
     return CaseError(
-        f"nothing holds {what} {', '.join(WAYS[i] for i in ways)}",
+        f"nothing holds {what} {', '.join(('' if i < 3 else 'against ') + _MOTIONS[i] for i in ways)}",
         code="E-MECHANISM",
         key=key,
         value=value,
@@ -266,7 +269,7 @@ def _loose(case: GearboxCase, owner: str, ways: Sequence[int]) -> CaseError:
 def without_balance(case: GearboxCase, owner: str, way: int, left: float) -> ConvergenceError:
     """Make the refusal of a load that finds no balance.
 
-    ``owner`` moves the farthest, along or about the ``way`` of `WAYS`; ``left`` is the force out of balance [N].
+    ``owner`` moves the farthest, along or about the ``way`` of `_MOTIONS`; ``left`` is the force out of balance [N].
     """
     bearings = {i: one for i, one in enumerate(case.bearing) if one.shaft == owner and one.nonlinear}
     key, value = "bearing", None
@@ -281,7 +284,7 @@ def without_balance(case: GearboxCase, owner: str, way: int, left: float) -> Con
     )
     return ConvergenceError(
         f"the loads of the gearbox find no balance: {FORCE.show(left)} are left, and {owner} moves the farthest, "
-        f"{WAYS[way].removeprefix('against ')}",
+        f"{_MOTIONS[way]}",
         code="E-CONVERGENCE",
         key=key,
         value=value,

@@ -179,14 +179,14 @@ def _weight_bearing_forces(branch: xr.Dataset) -> Figure:
     lines = stored_harmonics(branch, "planet_bearing_force")[branch["shown_point"].values[-1]]
     wave = _wave(branch)
     curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
-    return bearing_forces(branch["phase"].values, curves, title=_top(branch))
+    return bearing_forces(branch["phase"].values, curves, title="".join(_top(branch)))
 
 
-def _top(branch: xr.Dataset) -> str:
-    """The last shown point in words, for figures of forces."""
+def _top(branch: xr.Dataset) -> tuple[str, str]:
+    """The last shown point in words, for figures of forces, and on a line of its own what is doubted."""
     point = int(branch["shown_point"].values[-1])
     words = f"{branch['weight_frequency'].values[point]:.1f} Hz, {branch['shown_as'].values[-1]!s}"
-    return words + _doubt(_tails(branch)[point])
+    return words, _doubt(_tails(branch)[point])
 
 
 def _flank_forces(branch: xr.Dataset) -> Figure:
@@ -199,9 +199,8 @@ def _flank_forces(branch: xr.Dataset) -> Figure:
             ax.plot(degrees, 1e-3 * force, label=names[mesh], **line_style(number))
         label(ax, y="force [kN]", title=words)
     _turn_axis(axes[-1])
-    # what is doubted stands on a line of its own, below
-    words, *doubt = _top(branch).split("\n")
-    label(axes[0], title="\n".join([f"{words}: drive flanks", *doubt]))
+    words, doubt = _top(branch)
+    label(axes[0], title=f"{words}: drive flanks{doubt}")
     legend_below(figure, axes[0])
     return figure
 
