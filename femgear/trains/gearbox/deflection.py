@@ -27,6 +27,7 @@ from femgear.trains.gearbox.contact import (
 from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.holding import loose_shafts, without_balance
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model, member_of_stations
+from femgear.trains.gearbox.passes import ContactPass, MeshPositions, forces_agree, next_start, slopes_agree
 
 _STEPS = 200
 LEVERS = (1.0, 1.0, 1.0, 0.05, 0.05, 0.05)
@@ -215,42 +216,48 @@ def solve_deflection(
     found = solve_state(model, gap)
     if not (staged and case.deflection.contact):
         return replace(found, slopes=(found.mesh_slope,))
-    history = [np.asarray(slopes, float) if slopes is not None else found.mesh_slope]
     apart = mesh_separation(model.assembly, found.motion)
+    start = MeshPositions(np.asarray(slopes, float) if slopes is not None else found.mesh_slope, apart)
+    history, passes = [start.slopes], []
     contacts: dict[str, StageContact] = {}
     settled, coarse = False, True
     for _ in range(case.deflection.passes):
-        positions = _COARSE if coarse else None
-        contacts = {stage.name: _contact(model, stage, history[-1], apart, steps, positions) for stage in staged}
+        contacts = {stage.name: _contact(model, stage, start, steps, _COARSE if coarse else None) for stage in staged}
         stiffness = {name: contact.stiffness for name, contact in contacts.items()}
         model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate)
-        gap = _gaps(model, staged, contacts, history[-1])
+        gap = _gaps(model, staged, contacts, start.slopes)
         found = solve_state(model, gap, start=found)
-        apart = mesh_separation(model.assembly, found.motion)
-        history.append(found.mesh_slope)
+        end = MeshPositions(found.mesh_slope, mesh_separation(model.assembly, found.motion))
+        passes.append(ContactPass(start, end))
+        history.append(end.slopes)
+        before, start = start, next_start(model, passes)
         tolerance = max(case.deflection.tolerance, _NEAR) if coarse else case.deflection.tolerance
         least = _NEARLY_UPRIGHT if coarse else _UPRIGHT
-        alike = _agree(model, history[-1], history[-2], tolerance, least) and _forces_agree(found, contacts, tolerance)
-        if coarse:
-            coarse = not alike
-        elif alike:
+        alike = slopes_agree(model, end.slopes, before.slopes, tolerance, least)
+        if coarse and len(passes) > 1:
+            # what is left of the change after this pass
+            alike = alike or slopes_agree(model, start.slopes, end.slopes, tolerance, least)
+        alike = alike and forces_agree(model, found.mesh_force, contacts, tolerance)
+        if alike and not coarse:
             settled = True
             break
+        if alike:
+            coarse, passes = False, []
     return replace(found, contacts=contacts, slopes=tuple(history), settled=settled)
 
 
 def _contact(
-    model: GearboxModel, stage: StageModel, slopes: np.ndarray, apart: np.ndarray, steps, positions: int | None
+    model: GearboxModel, stage: StageModel, start: MeshPositions, steps, positions: int | None
 ) -> StageContact:
-    """Contact of the teeth of a stage with slopes and separations of its meshes, few positions until they settle."""
+    """Contact of the teeth of a stage with the positions of its meshes, at few angles until they settle."""
     torque, own = -model.flow.first_torque(stage.section), list(stage.meshes)
     slices = model.case.deflection.slices if model.case.motions == "space" else 0
     try:
         return stage_contact(
             stage.section,
             torque,
-            slopes[own],
-            separation=apart[own],
+            start.slopes[own],
+            separation=start.separations[own],
             slices=slices,
             positions=positions,
             steps=steps,
@@ -282,29 +289,6 @@ def _gaps(model, staged, contacts, slopes) -> np.ndarray:
             # slope and approach are those with which the contact was solved
             gap[part] = slopes[mesh] * one.heights + contact.approach[place] - force / one.stiffness
     return gap
-
-
-def _forces_agree(found: Deflection, contacts: Mapping[str, StageContact], tolerance: float) -> bool:
-    """Whether all meshes have the forces of the contact of their teeth, against the largest one of their stage."""
-    for stage in found.model.stages:
-        if stage.name in contacts:
-            force = contacts[stage.name].normal_force
-            apart = np.abs(found.mesh_force[list(stage.meshes)] - force)
-            if apart.max() > tolerance * force.max():
-                return False
-    return True
-
-
-def _agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: float, least: float) -> bool:
-    """Whether slopes agree: their difference over the width against the misalignment, or a least one [m]."""
-    for stage in model.stages:
-        for mesh in stage.meshes:
-            contact = model.assembly.contacts[mesh]
-            width = stage.width
-            size = max(abs(new[mesh]) * width, least)
-            if abs(new[mesh] - old[mesh]) * width > tolerance * size and len(contact.heights) > 1:
-                return False
-    return True
 
 
 def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | None = None) -> Deflection:
