@@ -569,7 +569,7 @@ class _ToothForm:
     centre_distance
         Default: that at which the shifts close the gears.
     helix
-        Helix angle of planetary sets, pairs and helical cases. Default: none, of helical cases 20 deg.
+        Helix angle of planetary sets, pairs, gearboxes and helical cases. Default: none, of helical ones 20 deg.
     addendum
         Of the basic rack, in modules. Default: 1, or what leaves less to warn of.
     """
@@ -600,7 +600,7 @@ def new(
     Parameters
     ----------
     kind
-        planetary, pair, planar, helical or drivetrain.
+        planetary, pair, planar, helical, drivetrain or gearbox.
     output
         Case file to write. Default: KIND.toml.
     module

@@ -40,6 +40,7 @@ from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_
 from femgear.gears.profile import BasicRack, overlap_ratio, transverse_rack, transverse_tool
 from femgear.gears.shifts import SharedShifts, share_shifts
 from femgear.gears.tips import SEEN, typed_diameter
+from femgear.trains.gearbox_draft import gearbox_tables
 from femgear.trains.reading import parse_case
 from femgear.trains.registry import train_of
 
@@ -95,6 +96,7 @@ KINDS = {
     "planar": (27, 40, 108),
     "helical": (30, 20, 70),
     "drivetrain": (23, 71),
+    "gearbox": (24, 36),
 }
 """Kinds of cases that `new_case` writes, with the teeth of their gears."""
 ADDENDA = (1.0, 1.1, 1.2, 0.9, 0.8)
@@ -104,6 +106,7 @@ BACKLASH = 0.04
 Angle = Annotated[float, Quantity(ANGLE, -LARGEST_HELIX, LARGEST_HELIX)]
 CentreDistance = Annotated[float, Quantity(LENGTH, 1e-4, 20.0)]
 _HEAD = "Written by femgear new {}. What is estimated says so: give what is known instead."
+_STANDS = " The casing stands still: [casing] and its feet let it move (docs/gearbox.md)."
 _LEAVE = " Masses and inertias stay when teeth change: delete their lines to have them estimated anew."
 _USUAL = {
     "W-BACKLASH": "the same backlash in all meshes",
@@ -128,7 +131,7 @@ class ToothForm:
     centre_distance : str, optional
         With its unit, as ``"91.5 mm"``; by default it follows from teeth and shifts.
     helix : str, optional
-        Helix angle of planetary sets, pairs and helical cases, of these by default 20 deg.
+        Helix angle of planetary sets, pairs, gearboxes and helical cases, of these by default 20 deg.
     addendum : float, optional
         Of the basic rack [modules], by default the first of `ADDENDA` that leaves nothing to warn of; the
         dedendum is a quarter more.
@@ -214,7 +217,8 @@ def new_case(
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
-    tables = _chain(tables, notes) if kind == "drivetrain" else tables
+    shape = {"drivetrain": _chain, "gearbox": gearbox_tables}.get(kind)
+    tables = tables if shape is None else shape(tables, notes)
     return draft_text(tables, notes, word="estimated", head=_head(kind, left, lacks, form))
 
 
@@ -240,7 +244,7 @@ def _has_normal_section(tables: dict[str, Any], beta: float) -> bool:
 
 def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm) -> list[str]:
     """Paragraphs before the first entry: what is assumed, and what teeth lack whatever their shifts."""
-    head = [_HEAD.format(kind) + ("" if kind == "drivetrain" else _LEAVE)]
+    head = [_HEAD.format(kind) + {"drivetrain": "", "gearbox": _STANDS}.get(kind, _LEAVE)]
     head += [f"Assumed: {' '.join(left)}"] if left else []
     if lacks:
         place = "" if form.centre_distance is None else " at this centre distance"

@@ -159,8 +159,9 @@ def test_what_was_not_given_heads_the_case():
 def test_masses_follow_other_teeth_once_their_lines_are_deleted(kind):
     """The head says so of cases for which it is true."""
     text = new_case(kind)
-    assert ("delete their lines" in text) == (kind != "drivetrain")
-    if kind != "drivetrain":
+    of_gears = kind not in ("drivetrain", "gearbox")
+    assert ("delete their lines" in text) == of_gears
+    if of_gears:
         kept = [line for line in text.splitlines() if not line.startswith(("mass =", "inertia ="))]
         first = "gear_1" if kind == "pair" else "sun"
         case = read_case("\n".join(kept))
@@ -230,6 +231,8 @@ def test_all_drafts_with_teeth_left_over(teeth):
         ("pair", {"teeth": (12, 34)}),
         ("planetary", {"teeth": (40, 14, 67)}),
         ("pair", {"form": ToothForm(shifts=(0.3, 0.1), helix="-15 deg")}),
+        ("gearbox", {"teeth": (9, 74), "module": "25 mm"}),
+        ("gearbox", {"teeth": (12, 34), "form": ToothForm(helix="20 deg")}),
     ],
 )
 def test_drafts_of_other_kinds_never_warn_of_themselves(kind, numbers):
@@ -315,6 +318,7 @@ def test_the_response_of_a_planar_draft_leaves_nothing_to_warn_of():
     [
         ("pair", (20, -60), "gear_2.outer_radius in place of its bore_radius"),
         ("drivetrain", (20, -60), "leave the sign out"),
+        ("gearbox", (20, -60), "leave the sign out"),
         ("pair", (5, 7), "take more teeth"),
     ],
 )
