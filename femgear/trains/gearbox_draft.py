@@ -17,8 +17,8 @@ from femgear.trains.reading import parse_case
 
 SHAFT_STRESS = 25e6
 """Torsional stress for which shafts are sized [Pa]."""
-FACE_WIDTHS = 4.0
-"""Length of the shafts over the face width: bearings half a face width from their ends, the gear in the middle."""
+FACE_WIDTHS, GEAR_AT = 4.0, 1.5
+"""Length of the shafts, and position of the gears, over the face width: bearings are half a face width from the ends."""
 # Of a bearing over the mesh stiffness, as the supports of other new cases.
 _BEARING = 0.2
 _NAMES = "input", "output"
@@ -57,6 +57,7 @@ def gearbox_tables(pair: Mapping[str, Any], notes: dict[str, str]) -> dict[str, 
         how = "the bore of a usual rim" if diameter == bore else f"{1e-6 * SHAFT_STRESS:g} N/mm^2 of torsional stress"
         notes[f"shaft[{number}].part[0].outer_diameter"] = f"estimated: {how}"
         notes[f"shaft[{number}].part[0].length"] = f"estimated: {FACE_WIDTHS:g} face widths"
+    notes["pair[0].positions"] = f"estimated: {GEAR_AT:g} face widths"
     torque_key = "operation.load_case[0].torque.motor"
     if "pair[0].teeth.operation.torque" in notes:
         notes[torque_key] = notes.pop("pair[0].teeth.operation.torque")
@@ -73,7 +74,7 @@ def gearbox_tables(pair: Mapping[str, Any], notes: dict[str, str]) -> dict[str, 
             {
                 "name": "stage",
                 "shafts": list(_NAMES),
-                "positions": [LENGTH.show(0.5 * FACE_WIDTHS * width)] * 2,
+                "positions": [LENGTH.show(GEAR_AT * width)] * 2,
                 "teeth": teeth | {"operation": {"torque": pair["operation"]["torque"]}},
             }
         ],
