@@ -18,7 +18,7 @@ from femgear.trains.reading import parse_case
 SHAFT_STRESS = 25e6
 """Torsional stress for which shafts are sized [Pa]."""
 FACE_WIDTHS, GEAR_AT = 4.0, 1.5
-"""Length of the shafts, and position of the gears, over the face width: bearings are half a face width from the ends."""
+"""Length of the shafts, and position of the gears, over the face width; bearings are half of it from the ends."""
 # Of a bearing over the mesh stiffness, as the supports of other new cases.
 _BEARING = 0.2
 _NAMES = "input", "output"
