@@ -40,7 +40,7 @@ from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_
 from femgear.gears.profile import BasicRack, overlap_ratio, transverse_rack, transverse_tool
 from femgear.gears.shifts import SharedShifts, share_shifts
 from femgear.gears.tips import SEEN, typed_diameter
-from femgear.trains.gearbox_draft import gearbox_tables
+from femgear.trains.gearbox_draft import pair_in_gearbox
 from femgear.trains.reading import parse_case
 from femgear.trains.registry import train_of
 
@@ -217,7 +217,7 @@ def new_case(
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
-    shape = {"drivetrain": _chain, "gearbox": gearbox_tables}.get(kind)
+    shape = {"drivetrain": _chain, "gearbox": pair_in_gearbox}.get(kind)
     tables = tables if shape is None else shape(tables, notes)
     return draft_text(tables, notes, word="estimated", head=_head(kind, left, lacks, form))
 

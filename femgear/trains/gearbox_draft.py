@@ -24,7 +24,7 @@ _BEARING = 0.2
 _NAMES = "input", "output"
 
 
-def gearbox_tables(pair: Mapping[str, Any], notes: dict[str, str]) -> dict[str, Any]:
+def pair_in_gearbox(pair: Mapping[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     """Make the tables of a gearbox of those of a pair, whose remarks move with its entries.
 
     Parameters
