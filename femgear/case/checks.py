@@ -57,7 +57,7 @@ def check_face_widths(case: Any) -> Iterator[CaseError]:
         ("helical.slices", helical_slices > 1),
     ):
         if given:
-            shown = [LENGTH.show(one) for one in common]
+            shown = [LENGTH.show(width) for width in common]
             yield CaseError(
                 f"sun and planets have {shown[0]} of their faces in common, planets and ring {shown[1]}",
                 code="E-CHOICE",
@@ -253,7 +253,7 @@ def check_gear_deviations(case: Any, more: Iterable[tuple[str, float]] = ()) -> 
         gear = getattr(case, name)
         tables = [] if gear.errors is None else [(f"{name}.errors", gear.errors)]
         if name == "planet":
-            tables += [(f"planet.individual[{i}]", one) for i, one in enumerate(gear.individual)]
+            tables += [(f"planet.individual[{i}]", planet) for i, planet in enumerate(gear.individual)]
         for key, table in tables:
             yield from _check_pitch(key, table, gear.teeth, most)
     for key, value in (*_gear_amounts(case), *more):
@@ -336,16 +336,16 @@ def _gear_amounts(case: Case):
     """Keys and values [m] of the deviations of all gears."""
     for name in case.gear_names:
         gear = getattr(case, name)
-        for i, one in enumerate(gear.modifications):
+        for i, modification in enumerate(gear.modifications):
             for entry in ("amount", "deviations"):
-                yield f"{name}.modifications[{i}].{entry}", _largest(getattr(one, entry))
+                yield f"{name}.modifications[{i}].{entry}", _largest(getattr(modification, entry))
         yield from _error_amounts(f"{name}.errors", gear.errors)
 
 
 def _amounts(case: Case):
     """Keys and values [m] of what only planetary sets have."""
-    for i, one in enumerate(case.planet.individual):
-        yield from _error_amounts(f"planet.individual[{i}]", one)
+    for i, planet in enumerate(case.planet.individual):
+        yield from _error_amounts(f"planet.individual[{i}]", planet)
     yield from _error_amounts("carrier.errors", case.carrier.errors)
     if case.ring.errors is not None and case.ring.errors.ovality is not None:
         yield "ring.errors.ovality", case.ring.errors.ovality.amplitude

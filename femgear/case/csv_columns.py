@@ -130,21 +130,21 @@ def _cells(line: str, divider: str) -> list[str]:
 
 def _heading(cells, dimensions, problem: Callable[..., CaseError], remedy: str) -> dict[str, float]:
     """Titles of the columns and the SI values of their units."""
-    found = {}
+    units = {}
     for cell in cells[:3]:
         match = _HEADING.fullmatch(cell) if len(cell) < _LONGEST_TITLE else None
         title = " ".join(match["name"].lower().replace("_", " ").split()) if match else ""
         if match is None or title not in dimensions:
             raise problem("a column has no known name with its unit", value=cell, remedy=remedy)
         try:
-            found[title] = to_si(f"1 {match['unit']}", dimensions[title])
+            units[title] = to_si(f"1 {match['unit']}", dimensions[title])
         except CaseError as error:
             swapped = any(_has(match["unit"], d) for d in dimensions.values() if d is not dimensions[title])
             words = "the units of the two columns seem to be swapped" if swapped else remedy
             raise problem(error.message, value=cell, remedy=words) from None
-    if len(cells) != 2 or len(found) != 2:
+    if len(cells) != 2 or len(units) != 2:
         raise problem(f"the columns are {', '.join(cells[:3])}", limit="two", remedy=remedy)
-    return found
+    return units
 
 
 def _has(unit: str, dimension: Dimension) -> bool:
@@ -224,19 +224,19 @@ def embed_points(
         A path that leads out of the folder (E-FILE), and what `read` raises, with the key.
     """
     section, _, last = entry.partition(".")
-    tables, found, known = data.get(section), {}, {}
+    tables, points_of_files, points_of_path = data.get(section), {}, {}
     tables = tables.get(last) if isinstance(tables, dict) else None
     for i, table in enumerate(tables if isinstance(tables, list) else ()):
         if isinstance(table, dict) and isinstance(table.get("file"), str) and plain(table):
             key, file = f"{entry}[{i}]", table.pop("file")
-            if (path := PurePath(file)) not in known:
+            if (path := PurePath(file)) not in points_of_path:
                 points = embedded(file, name, f"{key}.file", read)
-                known[path] = {
-                    one: [f"{value:.13g} {units[one]}" for value in values] for one, values in points.items()
+                points_of_path[path] = {
+                    column: [f"{value:.13g} {units[column]}" for value in values] for column, values in points.items()
                 }
-            table |= known[path]
-            found[key] = text.printable(file)
-    return found
+            table |= points_of_path[path]
+            points_of_files[key] = text.printable(file)
+    return points_of_files
 
 
 def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
@@ -267,11 +267,11 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
     def plain(table: dict, kind: str) -> bool:
         return table.get("kind") == kind and "deviations" not in table
 
-    found, kinds = {}, (("measured profile", read_profile), ("measured lead", read_lead))
+    files, kinds = {}, (("measured profile", read_profile), ("measured lead", read_lead))
     for gear, (kind, read) in product(("sun", "planet", "ring", "gear_1", "gear_2"), kinds):
         options = {"read": read, "units": _PROFILE_UNITS, "plain": partial(plain, kind=kind)}
-        found |= embed_points(data, f"{gear}.modifications", name, **options)
-    return found
+        files |= embed_points(data, f"{gear}.modifications", name, **options)
+    return files
 
 
 def embed_checksum(data: dict, name: str) -> dict[str, str]:
@@ -290,8 +290,8 @@ def add_checksum(holder: dict, entry: str, name: str, key: str) -> dict[str, str
         return {}
     names = {part: table[part] for part in ("file", "nodes") if isinstance(table.get(part), str)}
     del holder[entry]  # a file that cannot be read is refused for that alone
-    found = [embedded(file, name, f"{key}.{part}", input_checksum) for part, file in names.items()]
-    holder[entry] = table | {"sha256": checksum_of_all(found)}
+    checksums = [embedded(file, name, f"{key}.{part}", input_checksum) for part, file in names.items()]
+    holder[entry] = table | {"sha256": checksum_of_all(checksums)}
     return {key: text.printable(names["file"])}
 
 
@@ -302,7 +302,7 @@ def checksum_of_all(checksums: Iterable[str]) -> str:
 
 def refuse_other_files(files: Iterable[str | os.PathLike], name: str, sha256: str | None) -> None:
     """Refuse (E-OTHER-CASE) files, under the ``name`` of the first, that are not those of a checksum."""
-    if checksum_of_all(input_checksum(one) for one in files) != sha256:
+    if checksum_of_all(input_checksum(file) for file in files) != sha256:
         raise CaseError(
             "these are not the files that the case was read with",
             code="E-OTHER-CASE",
@@ -344,18 +344,18 @@ def read_lead(path: str | os.PathLike) -> dict[str, list[float]]:
 
 def _read_deviations(path, dimensions: Mapping[str, Dimension], heading: str) -> dict[str, list[float]]:
     """Read deviations over places of one kind, and refuse places that neither ascend nor descend."""
-    found = read_columns(path, dimensions, least=2, most=MOST_POINTS, remedy=heading)
-    if "deviation" not in found.values:
-        words = f"the columns are {' and '.join(found.values)}"
-        raise found.problem(words, found.heading, limit="one of them deviations", remedy=heading)
-    (places,) = (values for title, values in found.values.items() if title != "deviation")
+    columns = read_columns(path, dimensions, least=2, most=MOST_POINTS, remedy=heading)
+    if "deviation" not in columns.values:
+        words = f"the columns are {' and '.join(columns.values)}"
+        raise columns.problem(words, columns.heading, limit="one of them deviations", remedy=heading)
+    (places,) = (values for title, values in columns.values.items() if title != "deviation")
     rising = places[1] > places[0]
-    for (before, after), line in zip(pairwise(places), found.lines[1:], strict=True):
+    for (before, after), line in zip(pairwise(places), columns.lines[1:], strict=True):
         if before == after or (after > before) is not rising:
-            raise found.problem(
+            raise columns.problem(
                 "the points are neither ascending nor descending",
                 line,
                 value=after,
                 remedy="sort the lines, and keep one line of every point",
             )
-    return {_PROFILE_ENTRIES[title]: values for title, values in found.values.items()}
+    return {_PROFILE_ENTRIES[title]: values for title, values in columns.values.items()}

@@ -121,19 +121,19 @@ def _entries(case: Case, left_out: Set[str], parts: Set[str] = frozenset(), *, k
     """Entries without tables and keys that are left out, but for those kept, and without parts of keys."""
     return {
         key: value
-        for key, value, within, own in _entries_of(case)
-        if (key in kept or left_out.isdisjoint(within)) and parts.isdisjoint(own)
+        for key, value, within, parts_of_key in _entries_of(case)
+        if (key in kept or left_out.isdisjoint(within)) and parts.isdisjoint(parts_of_key)
     }
 
 
 @remembered(latest=16)
 def _entries_of(case: Any) -> list[tuple[str, object, list[str], list[str]]]:
     """Dotted keys and values, with the keys of the tables around each and its own, and its parts."""
-    found = []
+    entries = []
     for key, value in _flat(case.model_dump()):
         parts = key.split(".")
-        found.append((key, value, [*accumulate(parts, "{}.{}".format)], parts))
-    return found
+        entries.append((key, value, [*accumulate(parts, "{}.{}".format)], parts))
+    return entries
 
 
 def check_entries(result: Any, kind: type, case_entries: Entries, words: str) -> None:
@@ -174,18 +174,18 @@ class Steps:
 
     def kept(self, step: str, entries: Entries) -> Any:
         """Give the result of a step for these entries, all that decide it; None where it is not kept."""
-        key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
-        if key in found:
-            found.move_to_end(key)
-        return found.get(key)
+        key, results = fingerprint(entries), self._found.setdefault(step, OrderedDict())
+        if key in results:
+            results.move_to_end(key)
+        return results.get(key)
 
     def keep(self, step: str, entries: Entries, result: Result) -> Result:
         """Keep the result of a step for these entries, and return it."""
-        key, found = fingerprint(entries), self._found.setdefault(step, OrderedDict())
-        found[key] = result
-        found.move_to_end(key)
-        while len(found) > 1 and (len(found) > _KEPT or sum(map(_size, found.values())) > _ROOM):
-            found.popitem(last=False)
+        key, results = fingerprint(entries), self._found.setdefault(step, OrderedDict())
+        results[key] = result
+        results.move_to_end(key)
+        while len(results) > 1 and (len(results) > _KEPT or sum(map(_size, results.values())) > _ROOM):
+            results.popitem(last=False)
         return result
 
 

@@ -112,13 +112,13 @@ def estimates(case: Any) -> dict[str, Estimate]:
         radius = gears.centre_distance + gears.planet.rim_radius
         how = "two discs of half the planets' face width, out to the far side of their bores"
         bodies["carrier"] = cylinder(0.0, radius, gears.planet.face_width, case.material.density), how
-    found = {}
+    estimates_ = {}
     for name, ((mass, polar, diametral), how) in bodies.items():
         stiffness, width, share = _support(gears, materials, name)
-        own = {"mass": Estimate(mass, MASS, how), "inertia": Estimate(polar, INERTIA, how)}
+        of_gear = {"mass": Estimate(mass, MASS, how), "inertia": Estimate(polar, INERTIA, how)}
         support = "support" if name in ("sun", "ring", "carrier") else "bearing"
-        own[f"{support}_stiffness"] = Estimate(stiffness, STIFFNESS, share)
-        found |= {f"{place}.{key}": one for key, one in own.items() for place in _places(name)}
+        of_gear[f"{support}_stiffness"] = Estimate(stiffness, STIFFNESS, share)
+        estimates_ |= {f"{place}.{key}": estimate for key, estimate in of_gear.items() for place in _places(name)}
         spatial = {
             "diametral_inertia": Estimate(diametral, INERTIA, how),
             "axial_stiffness": Estimate(stiffness, STIFFNESS, f"as radially: {share}"),
@@ -126,14 +126,14 @@ def estimates(case: Any) -> dict[str, Estimate]:
                 stiffness * width**2 / 12.0, TORSION, "the radial stiffness, even over the face width"
             ),
         }
-        found |= {f"helical.{name}.{key}": one for key, one in spatial.items()}
+        estimates_ |= {f"helical.{name}.{key}": estimate for key, estimate in spatial.items()}
     if "ring" in bodies:
         stiffness, _, share = _support(gears, materials, "ring")
         area = 2.0 * math.pi * gears.ring.rim_radius * gears.ring.face_width
         how = f"over the outer surface {share}"
         foundation = Estimate(stiffness / area, FOUNDATION, how)
-        found |= {f"ring.foundation_{name}": foundation for name in ("radial", "tangential")}
-    return found
+        estimates_ |= {f"ring.foundation_{name}": foundation for name in ("radial", "tangential")}
+    return estimates_
 
 
 def _support(gears: Any, materials: dict[str, Any], name: str) -> tuple[float, float, str]:
@@ -141,12 +141,14 @@ def _support(gears: Any, materials: dict[str, Any], name: str) -> tuple[float, f
 
     A mean over the meshes of the member; the carrier has those of its planets.
     """
-    moduli = [one.youngs_modulus for one in materials.values()]
+    moduli = [material.youngs_modulus for material in materials.values()]
     meshes = [*zip(pairwise(materials), pairwise(moduli), gears.mesh_widths, strict=True)]
     name = "planet" if name == "carrier" else name
-    own = [(pair, width) for names, pair, width in meshes if name in names]
-    stiffness = SUPPORT_SHARE * sum(estimated_mesh_stiffness(*pair, width) for pair, width in own) / len(own)
-    width = sum(width for _, width in own) / len(own)
+    meshes_there = [(pair, width) for names, pair, width in meshes if name in names]
+    stiffness = (
+        SUPPORT_SHARE * sum(estimated_mesh_stiffness(*pair, width) for pair, width in meshes_there) / len(meshes_there)
+    )
+    width = sum(width for _, width in meshes_there) / len(meshes_there)
     line = 1e-9 * stiffness / (SUPPORT_SHARE * width)
     share = f"{SUPPORT_SHARE:g} of a mesh stiffness of {line:.3g} N/(mm um) times the face width"
     return stiffness, width, share
@@ -185,10 +187,10 @@ def with_estimates(case: Any) -> tuple[Any, tuple[Finding, ...]]:
     missing = [key for key in _KEYS if _left_out(case, key.split(".")) and not _on_shaft(case, key)]
     if not missing:
         return case, ()
-    known = estimates(case)
+    estimated = estimates(case)
     for key in missing:
-        case = _with(case, key.split("."), known[key].value)
-    shown = ", ".join(f"{key} = {known[key]}" for key in missing)
+        case = _with(case, key.split("."), estimated[key].value)
+    shown = ", ".join(f"{key} = {estimated[key]}" for key in missing)
     text = f"left out and estimated from the gears: {shown}"
     remedy = "give what is known: modes and vibration depend on it, a static solution of fixed members does not"
     return case, (Finding("W-ESTIMATED", missing[0], text, remedy=remedy),)

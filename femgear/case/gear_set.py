@@ -159,13 +159,13 @@ def set_deviations(case: Any) -> SetDeviations:
     `planetary_set` refuses.
     """
     s = planetary_set(case)
-    found = case.made_deviations(s)
+    deviations = case.made_deviations(s)
     try:
-        check_deviations(found, s)
+        check_deviations(deviations, s)
     except GeometryError as error:
         error.file = case.location(error.key or "")
         raise
-    return found
+    return deviations
 
 
 def line_play(case: GearCase) -> float:

@@ -48,7 +48,7 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
     problems = []
     details: Any = error.errors(include_url=False)
     # a list whose entries are refused has too few left
-    inside = {one["loc"][:length] for one in details for length in range(len(one["loc"]))}
+    inside = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
     for item in details[:_MOST]:
         if item["type"] == "too_short" and item["loc"] in inside:
             continue
@@ -117,7 +117,7 @@ def no_such(what: str, key: str, name: str, names: Sequence[str], otherwise: str
     limit : str
         What is allowed.
     """
-    spelt = {one.lower(): one for one in names}
+    spelt = {known_name.lower(): known_name for known_name in names}
     near = difflib.get_close_matches(name.lower(), spelt, n=1, cutoff=0.6)
     remedy = f"did you mean {spelt[near[0]]}?" if near else otherwise
     return CaseError(f"there is no such {what}", code="E-CHOICE", key=key, value=name, limit=limit, remedy=remedy)
@@ -240,8 +240,8 @@ def _shift_left_out(error: GeometryError, case: Case) -> None:
         other = others[gear]
         error.key, given = f"{other}.profile_shift", sections[other].profile_shift
         remedy = f"change the {other}'s profile shift or the tooth numbers"
-    found = f"{error.value:.5g}" if isinstance(error.value, float) else error.value
-    error.message += f" (the {gear}'s profile shift of {found} is what closes the set)"
+    shift = f"{error.value:.5g}" if isinstance(error.value, float) else error.value
+    error.message += f" (the {gear}'s profile shift of {shift} is what closes the set)"
     if error.code == "E-SHIFT":
         error.limit = f"such that the {gear}'s shift is {error.limit}"
     error.value, error.remedy = given, remedy
@@ -261,12 +261,12 @@ def _in_transverse_section(error: GeometryError, case: Case) -> None:
 def added_material(case: Any) -> Iterator[Finding]:
     """Find reliefs and crownings with a negative amount [m]: most are slips of the sign."""
     for gear in case.gear_names:
-        for i, one in enumerate(getattr(case, gear).modifications):
-            if one.kind in ("tip relief", "root relief", "profile crowning") and one.amount < 0.0:
+        for i, modification in enumerate(getattr(case, gear).modifications):
+            if modification.kind in ("tip relief", "root relief", "profile crowning") and modification.amount < 0.0:
                 yield Finding(
                     "W-RELIEF-SIGN",
                     f"{gear}.modifications[{i}].amount",
-                    f"a {one.kind} of {one.amount * 1e6:.6g} um adds material",
+                    f"a {modification.kind} of {modification.amount * 1e6:.6g} um adds material",
                     remedy="a positive amount takes it off (usual: 0 um or above)",
                 )
 

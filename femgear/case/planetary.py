@@ -94,8 +94,8 @@ class Case(GearCase):
     @property
     def response_harmonics(self) -> int | None:
         """Harmonics of the response: as given, or three times those of the mesh; None as there."""
-        found = self.mesh_harmonics
-        return self.dynamics.response_harmonics or (None if found is None else 3 * found)
+        kept = self.mesh_harmonics
+        return self.dynamics.response_harmonics or (None if kept is None else 3 * kept)
 
     def closed_gears(self) -> PlanetarySet:
         """Make sun, planet and ring, closed on their centre distance and checked.
@@ -202,8 +202,8 @@ def pin_errors(case: Case, gears: PlanetarySet) -> np.ndarray:
 def _planet_errors(case: Case, number: int) -> GearErrors:
     """Errors of one planet: those of all planets, replaced by what is given for this one."""
     common = case.planet.errors or GearErrors()
-    own = next((one for one in case.planet.individual if one.planet == number), None)
-    given = {} if own is None else own.model_dump(exclude_unset=True, exclude={"planet"})
+    individual = next((planet for planet in case.planet.individual if planet.planet == number), None)
+    given = {} if individual is None else individual.model_dump(exclude_unset=True, exclude={"planet"})
     if "pitch" in given or "cumulative_pitch" in given:
         given = {"pitch": None, "cumulative_pitch": None} | given
     return common.model_copy(update=given)

@@ -241,27 +241,27 @@ def _factor(unit: str, dimension: Dimension, text: str, example: str) -> float:
             remedy=_near(unit[:60], dimension, example),
         )
     usual = re.sub(r" ?/ ?", "/", " ".join(unit.replace("**", "^").translate(_SPELLING).split()))
-    known, words = _FACTORS.get(dimension.si, {}), _WORDS.get(dimension.si, {})
+    factors, words = _FACTORS.get(dimension.si, {}), _WORDS.get(dimension.si, {})
     usual = words.get(usual, usual)
-    if (factor := known.get(usual)) is not None:
+    if (factor := factors.get(usual)) is not None:
         return factor
-    found, expected = _root(usual), _root(dimension.si)
-    if found is None or expected is None or found[1] != expected[1]:
+    root, expected = _root(usual), _root(dimension.si)
+    if root is None or expected is None or root[1] != expected[1]:
         what = f"{unit!a} is not a unit of {dimension.name.split(' ', 1)[1]}"
         raise CaseError(
-            what if found else f"unknown unit {unit!a}",
+            what if root else f"unknown unit {unit!a}",
             code="E-UNIT",
             value=text,
             limit=f"units convertible to {dimension.si}",
             remedy=_near(usual, dimension, example),
         )
-    return found[0] / expected[0]
+    return root[0] / expected[0]
 
 
 def _near(unit: str, dimension: Dimension, example: str) -> str:
     """How a unit is written that none is read from: units with similar names, an example."""
-    spelt = {one.lower(): one for names in (_WORDS, _FACTORS) for one in names.get(dimension.si, ())}
-    near = [spelt[one] for one in difflib.get_close_matches(unit.lower(), spelt, n=2)]
+    spelt = {unit_name.lower(): unit_name for names in (_WORDS, _FACTORS) for unit_name in names.get(dimension.si, ())}
+    near = [spelt[spelling] for spelling in difflib.get_close_matches(unit.lower(), spelt, n=2)]
     return f"did you mean {' or '.join(near)}? {example}" if near else example
 
 

@@ -596,7 +596,7 @@ class HousingSection(Section):
         if self.sensor and self.structure:
             message, remedy = "a casing has the sensors of its table of nodes", "leave housing.sensor out"
             raise CaseError(message, code="E-CHOICE", remedy=remedy)
-        if len({one.name for one in self.sensor}) < len(self.sensor):
+        if len({sensor.name for sensor in self.sensor}) < len(self.sensor):
             message, remedy = "two sensors have one name", "give each a name of its own"
             raise CaseError(message, code="E-DUPLICATE", remedy=remedy)
         return self
@@ -632,6 +632,6 @@ def face_width(case: Any, gear: str) -> float:
 
 def gear_material(case: Any, gear: str) -> MaterialSection:
     """Find the material of a gear of a case: its own entries, and for others those of ``material``."""
-    own = getattr(case, gear).material
-    given = {} if own is None else own.model_dump(exclude_none=True)
+    material = getattr(case, gear).material
+    given = {} if material is None else material.model_dump(exclude_none=True)
     return case.material.model_copy(update=given)

@@ -129,22 +129,22 @@ def runout_of(errors: CarrierErrors) -> Runout:
 
 def flank_form(case: Any, gear: Gear, side: str = "both") -> FlankForm:
     """Form of both flanks of sun or ring, or of a planet's flank on the "sun side" or the "ring side"."""
-    found = []
+    modifications = []
     for i, section in enumerate(getattr(case, gear.name).modifications):
         if getattr(section, "flank", "both") not in (side, "both"):
             continue
         try:
-            found.append(_modification(section, gear))
-            check_form(FlankForm((found[-1],)), gear)
-            if isinstance(found[-1], MeasuredProfile):
-                _check_reach(found[-1], gear, f"{gear.name}.modifications[{i}]")
+            modifications.append(_modification(section, gear))
+            check_form(FlankForm((modifications[-1],)), gear)
+            if isinstance(modifications[-1], MeasuredProfile):
+                _check_reach(modifications[-1], gear, f"{gear.name}.modifications[{i}]")
         except GeometryError as error:
             error.key = f"{gear.name}.modifications[{i}]"
             if source := case.profile_files.get(error.key):
                 error.message += f" (points of {source})"
             error.file = case.location(error.key)
             raise
-    return FlankForm(tuple(found))
+    return FlankForm(tuple(modifications))
 
 
 def _modification(section: ModificationSection, gear: Gear) -> Modification:

@@ -146,7 +146,7 @@ def check_tree(data: dict, name: str) -> list[tuple[tuple[str | int, ...], float
         if len(path) + bool(value) >= _MAX_DEPTH:
             raise _too_deep(name)
         count += len(value)
-        tables = isinstance(value, dict) or any(isinstance(one, dict) for one in value)
+        tables = isinstance(value, dict) or any(isinstance(entry, dict) for entry in value)
         if count > _MOST_ENTRIES or (tables and len(value) > _MOST_TABLES):
             raise CaseError(
                 f"{len(value)} entries are too many",
@@ -234,11 +234,11 @@ def line_of(text: str, key: str) -> int | None:
     lines = _lines(text)
     table = key.rpartition("]")
     wanted = (key, re.sub(r"(\[\d+\])+$", "", key), table[0] + table[1], key.split("[")[0], f"{key}[0]")
-    found = next((lines[name] for name in wanted if name in lines), None)
-    if found is None and "." in key:  # an entry of a table in braces stands in the line of the table
+    line = next((lines[name] for name in wanted if name in lines), None)
+    if line is None and "." in key:  # an entry of a table in braces stands in the line of the table
         above = line_of(text, key.rpartition(".")[0])
-        found = above if above and "=" in text.splitlines()[above - 1] else None
-    return found
+        line = above if above and "=" in text.splitlines()[above - 1] else None
+    return line
 
 
 @lru_cache(maxsize=2)
@@ -332,14 +332,14 @@ def _write_table(table: dict, header: str, lines: list[str], remarks: Mapping[st
         lines.append(f"{_key(key)} = {written}" + (f"  # {printable(remark)}" if remark else ""))
     for key, value in table.items():
         name = f"{header.strip('[]')}.{_key(key)}".lstrip(".")
-        for i, one in enumerate(listed.get(key, ())):
-            _write_table(one, f"[[{name}]]", lines, remarks, f"{path}{key}[{i}].")
+        for i, subtable in enumerate(listed.get(key, ())):
+            _write_table(subtable, f"[[{name}]]", lines, remarks, f"{path}{key}[{i}].")
         if isinstance(value, dict):
             _write_table(value, f"[{name}]", lines, remarks, f"{path}{key}.")
 
 
 def _is_tables(value: object) -> bool:
-    return isinstance(value, list) and all(isinstance(one, dict) for one in value)
+    return isinstance(value, list) and all(isinstance(entry, dict) for entry in value)
 
 
 def _key(key: str) -> str:
@@ -410,8 +410,8 @@ class ReadCase(BaseModel):
 
     def location(self, key: str) -> str | None:
         """Find file, and line where the file gives it, of a dotted key; of ``rack.x`` for ``sun.rack.x``."""
-        found = (line_of(self._lines, name) for name in (key, key.partition(".")[2]) if name)
-        line = next((number for number in found if number), None)
+        numbers = (line_of(self._lines, name) for name in (key, key.partition(".")[2]) if name)
+        line = next((number for number in numbers if number), None)
         return f"{self._name}:{line}" if self._name and line else self._name or None
 
     @property

@@ -307,15 +307,15 @@ class Candidates:
     def by_pairs(self, values: np.ndarray) -> np.ndarray:
         """Values (P, W, ...) of the windows as (meshes, pairs, ..., P), zero where there is no window."""
         P, (meshes, _, pairs) = len(self.position), self.setup.near.shape
-        found = np.zeros((P, meshes, pairs, *values.shape[2:]), values.dtype)
-        found[np.arange(P)[:, None], self.mesh, self.pair] = values
-        return np.moveaxis(found, 0, -1)
+        values_of_pairs = np.zeros((P, meshes, pairs, *values.shape[2:]), values.dtype)
+        values_of_pairs[np.arange(P)[:, None], self.mesh, self.pair] = values
+        return np.moveaxis(values_of_pairs, 0, -1)
 
     def images_of(self, bodies: Bodies) -> np.ndarray:
         """`images` of other bodies with the same flanks: what differs, of which little is computed anew."""
         parts = [
-            None if own is other else replace(other, regular=other.regular - own.regular)
-            for own, other in zip(self.bodies.gears, bodies.gears, strict=True)
+            None if compliance is other else replace(other, regular=other.regular - compliance.regular)
+            for compliance, other in zip(self.bodies.gears, bodies.gears, strict=True)
         ]
         differing = replace(bodies, gears=tuple(parts))
         return self.images + body_compliance(self.setup, differing, self.position, self.mesh, self.pair)
@@ -397,7 +397,7 @@ def mesh_windows(
         WIDTH * _contact_half_width(pair, share / width, modulus)
         for pair, width, modulus in zip(pairs, bodies.widths, bodies.contact_moduli, strict=True)
     ]
-    found, teeth = [], []
+    windows_of_meshes, teeth = [], []
     for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
         phase, clearance = flank_side(planetary_set, direction)
         zeta, tooth = _tooth_pairs(planetary_set, pairs, phase, direction, tau - turns)
@@ -411,19 +411,19 @@ def mesh_windows(
                 "line_of_action": contact == "line_of_action",
                 "form": profile_form(planetary_set, deviations, kind, direction < 0),
             }
-            found.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
+            windows_of_meshes.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
         teeth.append(tooth)
-    return _gathered(found, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
+    return _gathered(windows_of_meshes, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
 
 
 def pair_paths(planetary_set: GearSet, positions, *, both_flanks: bool) -> tuple[np.ndarray, np.ndarray]:
     """Compute path coordinates (meshes, P, pairs) [m] and teeth (2, meshes, pairs) of `mesh_windows`."""
     tau, turns = _in_periods(cycle_positions(positions))
-    found = list[tuple[np.ndarray, np.ndarray]]()
+    paths = list[tuple[np.ndarray, np.ndarray]]()
     for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
         phase = flank_side(planetary_set, direction)[0]
-        found.append(_tooth_pairs(planetary_set, mesh_pairs(planetary_set), phase, direction, tau - turns))
-    zeta, tooth = zip(*found)
+        paths.append(_tooth_pairs(planetary_set, mesh_pairs(planetary_set), phase, direction, tau - turns))
+    zeta, tooth = zip(*paths)
     return np.concatenate(zeta), np.concatenate(tooth, axis=1)
 
 
@@ -464,9 +464,9 @@ def in_windows(
         Of the first windows, as `mesh_windows` takes them [N], [m].
     """
     for _ in range(MOST_ENLARGEMENTS + 1):
-        found, *wider = attempt(share, nearest)
-        if found is not None and wider == [share, nearest]:
-            return found
+        contacts, *wider = attempt(share, nearest)
+        if contacts is not None and wider == [share, nearest]:
+            return contacts
         share, nearest = wider
     raise not_contained()
 
@@ -666,14 +666,14 @@ def windows_of_bodies(gears: GearSet, mesh: np.ndarray) -> list[tuple]:
     Number of the gear, windows (w,), which gear of its mesh the body is in each (w,), and the flanks (w,).
     """
     # on the back side every gear carries on its other flank
-    found, (back, front) = [], np.divmod(mesh, len(gears.meshes))
+    windows_of, (back, front) = [], np.divmod(mesh, len(gears.meshes))
     for number, acting in acting_flanks(gears):
         place, side = np.full((2, len(gears.meshes)), -1)
-        for one, gear, flank in acting:
-            place[one], side[one] = gear, flank
+        for mesh_number, gear, flank in acting:
+            place[mesh_number], side[mesh_number] = gear, flank
         on = np.flatnonzero(place[front] >= 0)
-        found.append((number, on, place[front[on]], np.abs(side[front[on]] - back[on])))
-    return found
+        windows_of.append((number, on, place[front[on]], np.abs(side[front[on]] - back[on])))
+    return windows_of
 
 
 def _tooth_pairs(planetary_set, pairs, phase, direction, passed) -> tuple[np.ndarray, np.ndarray]:
@@ -720,27 +720,29 @@ def _window_compliance(
         # of both cells of a pair: reciprocal between cells of different widths
         loaded = surface_displacement(distance, half[:, :, None], *constants)
         yielding.append(0.5 * (loaded + surface_displacement(distance, half[:, None, :], *constants)))
-    found = (yielding[0] + yielding[1]) / common
-    found.setflags(write=False)
-    return found
+    compliance = (yielding[0] + yielding[1]) / common
+    compliance.setflags(write=False)
+    return compliance
 
 
-def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int) -> MeshWindows:
+def _gathered(
+    windows_of_meshes: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies, cells: int
+) -> MeshWindows:
     """Join all meshes; leading and trailing pairs that never come near are listed, but have no windows."""
-    take = kept_pairs(np.concatenate([w.near.any(axis=1) for w in found]))
+    take = kept_pairs(np.concatenate([w.near.any(axis=1) for w in windows_of_meshes]))
     first, mesh = take[:, 0], np.arange(len(take))
     places = mesh[:, None, None], np.arange(len(turns))[:, None], take[:, None, :]
     parts = {}
     for name in (f.name for f in fields(Windows)):
         of_gears = name in ("roll", "at_edge")
-        whole = np.concatenate([getattr(w, name) for w in found], axis=int(of_gears))
+        whole = np.concatenate([getattr(w, name) for w in windows_of_meshes], axis=int(of_gears))
         parts[name] = whole if name == "cell" else whole[:, *places] if of_gears else whole[places]
     area = parts["cell"] * cells * np.array(bodies.widths)[gears.mesh_kind[mesh % len(gears.meshes)]]
     listed = ListedPairs(
-        near=np.concatenate([w.near for w in found]),
-        gap=np.concatenate([w.gap.min(axis=-1) for w in found]),
-        roll=np.concatenate([w.roll[..., 1] for w in found], axis=1),
-        centre=np.concatenate([w.centre for w in found]),
+        near=np.concatenate([w.near for w in windows_of_meshes]),
+        gap=np.concatenate([w.gap.min(axis=-1) for w in windows_of_meshes]),
+        roll=np.concatenate([w.roll[..., 1] for w in windows_of_meshes], axis=1),
+        centre=np.concatenate([w.centre for w in windows_of_meshes]),
         tooth=tooth,
         first=first,
     )
@@ -757,7 +759,7 @@ def _gathered(found: list[Windows], gears: GearSet, tooth, turns, bodies: Bodies
                     tuple((flank.corner.shear_modulus, flank.corner.poisson_ratio) for flank in flanks),
                     common,
                 )
-                for w, flanks, common in zip(found, bodies.mates, bodies.widths, strict=False)
+                for w, flanks, common in zip(windows_of_meshes, bodies.mates, bodies.widths, strict=False)
             ]
         ),
         cell_area=area[:, None, None] * np.diff(cell_edges(cells)),
@@ -786,16 +788,16 @@ def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):
     for image, sector in enumerate(smooth[: len(smooth) // 2 + 1]):
         # what an image does to its original, the original does to the image on the other side
         alone = 2 * image % len(smooth) == 0
-        one, two = np.triu_indices(len(members)) if alone else np.indices((len(members),) * 2).reshape(2, -1)
-        lag = (tooth[:, one] - tooth[:, two] - image * count // len(smooth)) % count
-        row = (lag[..., None, None] * stations + index[:, one]) * stations
-        values = body.regular.reshape(-1)[row[..., None, None] + index[:, two][:, :, None, None]]
-        half = weight[:, one][..., None, :] @ values.reshape(*row.shape, -1)
+        first, second = np.triu_indices(len(members)) if alone else np.indices((len(members),) * 2).reshape(2, -1)
+        lag = (tooth[:, first] - tooth[:, second] - image * count // len(smooth)) % count
+        row = (lag[..., None, None] * stations + index[:, first]) * stations
+        values = body.regular.reshape(-1)[row[..., None, None] + index[:, second][:, :, None, None]]
+        half = weight[:, first][..., None, :] @ values.reshape(*row.shape, -1)
         half = half.reshape(*row.shape[:3], *weight.shape[2:])
-        block = np.einsum("pwabq,pwbq->pwab", half, weight[:, two])
-        sector[:, members[one], :, members[two]] += np.moveaxis(block, 1, 0)
-        other = one != two if alone else one >= 0
-        images = members[two[other]], slice(None), members[one[other]]
+        block = np.einsum("pwabq,pwbq->pwab", half, weight[:, second])
+        sector[:, members[first], :, members[second]] += np.moveaxis(block, 1, 0)
+        other = first != second if alone else first >= 0
+        images = members[second[other]], slice(None), members[first[other]]
         smooth[-image][:, *images] += block[:, other].transpose(1, 0, 3, 2)
 
 

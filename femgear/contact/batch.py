@@ -65,7 +65,7 @@ class BatchState:
 
 
 def solve_batch(
-    found: Candidates,
+    candidates: Candidates,
     load,
     springs: BearingSprings | None = None,
     *,
@@ -87,18 +87,18 @@ def solve_batch(
     refined : bool
         Solve once more for what rounding left out; without it only where that is more than `_ROUNDED`.
     """
-    batch = _ActiveSets(found, np.asarray(load, float), springs, start)
+    batch = _ActiveSets(candidates, np.asarray(load, float), springs, start)
     batch.solve(refined)
     state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
     return BatchState(*state)
 
 
-def check_residual(found: Candidates, state: BatchState) -> None:
+def check_residual(candidates: Candidates, state: BatchState) -> None:
     """Refuse (E-CONTACT) a solution that violates its conditions by more than `LARGEST_RESIDUAL`."""
     if not (state.residual <= LARGEST_RESIDUAL).all():
         worst = int(np.argmax(~(state.residual <= LARGEST_RESIDUAL)))
         raise ContactError(
-            f"the contact solution at position {found.position[worst]} violates its conditions by "
+            f"the contact solution at position {candidates.position[worst]} violates its conditions by "
             f"{state.residual[worst]:.2g}",
             code="E-CONTACT",
             limit=f"{LARGEST_RESIDUAL:g} of the largest load and displacement",
@@ -106,22 +106,24 @@ def check_residual(found: Candidates, state: BatchState) -> None:
         )
 
 
-def check_definite(found: Candidates) -> None:
+def check_definite(candidates: Candidates) -> None:
     """Refuse bodies whose compliance between all candidates at the first position is not positive definite.
 
     That of ``L + Pi S Pi^T`` is where ``L`` and ``I + Q^(1/2) S Q^(1/2)`` are, ``Q = Pi^T L^-1 Pi``.
 
     ContactError: E-CONTACT-COMPLIANCE.
     """
-    filled = np.flatnonzero(found.candidate[0].any(axis=-1))
-    local, some = found.local[0, filled], found.candidate[0, filled]
-    for matrix, cells in zip(local, some, strict=True):
+    filled = np.flatnonzero(candidates.candidate[0].any(axis=-1))
+    local, candidate_cells = candidates.local[0, filled], candidates.candidate[0, filled]
+    for matrix, cells in zip(local, candidate_cells, strict=True):
         factor(matrix[np.ix_(cells, cells)])
-    values = found.polynomials[0, filled] * some[..., None]
-    size, axes = np.linalg.eigh(values.swapaxes(1, 2) @ _local_solution(local, (np.arange(len(local)),), some, values))
+    values = candidates.polynomials[0, filled] * candidate_cells[..., None]
+    size, axes = np.linalg.eigh(
+        values.swapaxes(1, 2) @ _local_solution(local, (np.arange(len(local)),), candidate_cells, values)
+    )
     root = axes * np.sqrt(np.maximum(size, 0.0))[:, None] @ axes.swapaxes(1, 2)
     W, size = len(filled), 3 * len(filled)
-    for smooth in cyclic_harmonics(found.images[:, 0, filled][:, :, :, filled]):
+    for smooth in cyclic_harmonics(candidates.images[:, 0, filled][:, :, :, filled]):
         half = (root @ smooth.reshape(W, 3, size)).reshape(W * 3, W, 3).swapaxes(0, 1)
         coupled = (half @ root).swapaxes(0, 1).reshape(size, size)
         whole = np.block([[coupled.real, -coupled.imag], [coupled.imag, coupled.real]])
@@ -140,7 +142,7 @@ class ContactTangents:
     ``M = S (I + Q S)^-1``.
     """
 
-    def __init__(self, found: Candidates, state: BatchState):
+    def __init__(self, candidates: Candidates, state: BatchState):
         active, cells = state.active, state.active.shape[-1]
         loaded = np.asarray(active.any(axis=-1))
         # of every window the first and the last touching cell, and the open candidates beside them, (P, W, 2)
@@ -150,23 +152,23 @@ class ContactTangents:
         def at(values, cell):
             return np.take_along_axis(values, cell, axis=2)
 
-        rows, self.mesh = np.nonzero(loaded), found.mesh
-        self.open = at(found.candidate, beside) & loaded[..., None]
+        rows, self.mesh = np.nonzero(loaded), candidates.mesh
+        self.open = at(candidates.candidate, beside) & loaded[..., None]
         self.open &= beside != ends
         self.alone = np.repeat(ends[..., :1] == ends[..., 1:], 2, axis=-1)
         self.load, self.gap = at(state.loads, ends), at(state.gaps, beside)
         right, columns = np.zeros((2, *active.shape, 7))
-        right[..., :3] = found.polynomials
+        right[..., :3] = candidates.polynomials
         np.put_along_axis(right[..., 3:5], ends[:, :, None], 1.0, axis=2)
-        right[..., 5:] = np.take_along_axis(found.local, beside[:, :, None], axis=3)
+        right[..., 5:] = np.take_along_axis(candidates.local, beside[:, :, None], axis=3)
         right *= active[..., None]
-        columns[rows] = _local_solution(found.local, rows, active[rows], right[rows])
-        moments = found.polynomials.swapaxes(-1, -2) @ columns
+        columns[rows] = _local_solution(candidates.local, rows, active[rows], right[rows])
+        moments = candidates.polynomials.swapaxes(-1, -2) @ columns
         self.Q, self.unit, self.reach = np.split(moments, [3, 5], axis=-1)
         # products of unit loads on the last cells, and of the columns of L beside them, within the window
         self.unit_2, self.reach_2 = np.split((right * columns).sum(axis=2)[..., 3:], 2, axis=-1)
-        self.beside = at(found.polynomials, beside[..., None]).swapaxes(-1, -2)
-        self.own = at(np.diagonal(found.local, axis1=2, axis2=3), beside)
+        self.beside = at(candidates.polynomials, beside[..., None]).swapaxes(-1, -2)
+        self.own = at(np.diagonal(candidates.local, axis1=2, axis2=3), beside)
 
     def of_meshes(self, smooth: np.ndarray) -> np.ndarray:
         """Tangent stiffness of every mesh (P, meshes) at constant loads of the other meshes [N/m].
@@ -193,16 +195,16 @@ class ContactTangents:
             spread[:, :, window, :, window] = each.transpose(2, 0, 1, 3, 4)
             return spread.reshape(P, meshes, n, -1)
 
-        def product(one, other):
-            return (one * other).sum(axis=-2)
+        def product(first_factor, other):
+            return (first_factor * other).sum(axis=-2)
 
         Q, unit, reach, beside = (of_mesh(a) for a in (self.Q, self.unit, self.reach, self.beside))
         ends = (a.reshape(P, meshes, -1) for a in (self.unit_2, self.reach_2, self.own, self.load, self.gap))
-        unit_2, reach_2, own, load, gap = ends
+        unit_2, reach_2, square_2, load, gap = ends
         M = S @ np.linalg.inv(np.eye(n) + Q @ S)
         total, through = Q.sum(axis=-1, keepdims=True), S @ beside
-        one, moments = 1.0 - M @ total, reach + Q @ through
-        rate, closing = product(unit, one), 1.0 - product(moments, one)
+        along, moments = 1.0 - M @ total, reach + Q @ through
+        rate, closing = product(unit, along), 1.0 - product(moments, along)
         # what the slope loses without the last cell, and gains with the next one
         unit_2 = unit_2 - product(unit, M @ unit)
         reach_2 = reach_2 + product(through, reach + moments) - product(moments, M @ moments)
@@ -214,10 +216,10 @@ class ContactTangents:
             return np.divide(above, below, out=np.zeros(rate.shape), where=where)
 
         lost = over(rate**2, unit_2, usable & ~alone)
-        gained = over(closing**2, own + product(beside, through) - reach_2, usable)
+        gained = over(closing**2, square_2 + product(beside, through) - reach_2, usable)
         share = over(come, come + left, usable)
         change = 0.5 * (share * gained - (1.0 - share) * lost)
-        return product(total, one)[..., 0] + change.sum(axis=-1)
+        return product(total, along)[..., 0] + change.sum(axis=-1)
 
     def between_meshes(self, images: np.ndarray, meshes: int) -> np.ndarray:
         """Tangent stiffness of the first meshes together, (I // 2 + 1, P, meshes, meshes) [N/m].
@@ -238,23 +240,23 @@ class _ActiveSets:
 
     def __init__(
         self,
-        found: Candidates,
+        candidates: Candidates,
         load: np.ndarray,
         springs: BearingSprings | None,
         start: np.ndarray | None = None,
     ):
-        P, W, C = found.gap.shape
-        self.found, self.bearings, self.given = found, springs, load
+        P, W, C = candidates.gap.shape
+        self.found, self.bearings, self.given = candidates, springs, load
         # problems at one position, which differ in their separations alone
-        self.alike = P > 1 and found.local.strides[0] == 0
-        G, arms = found.approach[found.mesh], np.zeros((0, len(load)))
+        self.alike = P > 1 and candidates.local.strides[0] == 0
+        G, arms = candidates.approach[candidates.mesh], np.zeros((0, len(load)))
         if springs is not None:
             arms = np.pad(springs.arms, ((0, 0), (len(load) - springs.arms.shape[1], 0)))
         self.arm = np.abs(np.vstack([G, arms])).max(axis=0)
         self.G, self.arms, self.load = G / self.arm, arms / self.arm, load / self.arm
         self.clearance, self.softness = (springs.clearance, springs.compliance) if springs else (0.0, 1.0)
-        smooth = found.smooth[:1] if self.alike else found.smooth
-        self.S = smooth + found.supports[np.ix_(found.mesh, found.mesh)][:, None, :, None]
+        smooth = candidates.smooth[:1] if self.alike else candidates.smooth
+        self.S = smooth + candidates.supports[np.ix_(candidates.mesh, candidates.mesh)][:, None, :, None]
         # L^-1 of the separations and of the polynomials
         self.offset, self.columns = np.zeros((P, W, C)), np.zeros((P, W, C, 3))
         self.loads, self.gaps = np.zeros((2, P, W, C))
@@ -269,16 +271,16 @@ class _ActiveSets:
 
         Within Hertz's half width ``b`` the separation grows by less than ``b^2 / 2 R = 2 F / (pi E*)``.
         """
-        found, meshes = self.found, self.found.setup.meshes
-        pushed = -self.arms @ (found.approach[:meshes] / self.arm).sum(axis=0)
-        springs = np.tile(pushed > 0.8 * pushed.max(initial=0.0), (len(found.gap), 1))
+        candidates, meshes = self.found, self.found.setup.meshes
+        pushed = -self.arms @ (candidates.approach[:meshes] / self.arm).sum(axis=0)
+        springs = np.tile(pushed > 0.8 * pushed.max(initial=0.0), (len(candidates.gap), 1))
         if start is not None:
-            return start & found.candidate, springs
-        kind = found.setup.kind(np.arange(len(found.approach)))[:, None]
-        width, modulus = np.array(found.bodies.widths)[kind], found.bodies.contact_moduli[kind]
-        share = self.given.sum() / found.setup.n_planets
-        gap = np.where(found.candidate, found.gap, np.inf)
-        smallest = gap.min(axis=-1).reshape(len(gap), len(found.approach), -1)
+            return start & candidates.candidate, springs
+        kind = candidates.setup.kind(np.arange(len(candidates.approach)))[:, None]
+        width, modulus = np.array(candidates.bodies.widths)[kind], candidates.bodies.contact_moduli[kind]
+        share = self.given.sum() / candidates.setup.n_planets
+        gap = np.where(candidates.candidate, candidates.gap, np.inf)
+        smallest = gap.min(axis=-1).reshape(len(gap), len(candidates.approach), -1)
         reached = smallest < smallest.min(axis=-1, keepdims=True) + share / (ROUGH_STIFFNESS * width)
         # back flanks carry nothing unless the solution says so
         reached[:, meshes:] = False
@@ -319,15 +321,15 @@ class _ActiveSets:
 
     def _pivot(self, todo, steps: int, solved) -> None:
         """Change the sides of all violating cells and springs of some positions; mark the `solved` ones."""
-        found, changed = self.found, np.ones((len(todo), self.active.shape[1]), bool)
+        candidates, changed = self.found, np.ones((len(todo), self.active.shape[1]), bool)
         for _ in range(steps if len(todo) else 0):
             rows, window = np.nonzero(changed)
             place = todo[rows], window
             self.offset[place], self.columns[place] = 0.0, 0.0
             touching = self.active[place].any(axis=-1)
             place = place[0][touching], place[1][touching]
-            right = np.dstack([found.gap[place], found.polynomials[place]])
-            columns = _local_solution(found.local, place, self.active[place], right)
+            right = np.dstack([candidates.gap[place], candidates.polynomials[place]])
+            columns = _local_solution(candidates.local, place, self.active[place], right)
             self.offset[place], self.columns[place] = columns[..., 0], columns[..., 1:]
             step = self._linear(todo, self.offset[todo], self.load, self.clearance)
             flips, spring_flips = self._conditions(todo, *step)
@@ -356,15 +358,15 @@ class _ActiveSets:
         solved, touching = np.zeros((T, n // 3, *right.shape[2:])), np.asarray(self.active[todo].any(axis=-1))
         count = touching.sum(axis=1)
         for most in np.unique(count[count > 0]):
-            some = np.flatnonzero(count == most)
-            windows = np.reshape(np.nonzero(touching[some])[1], (-1, most))
-            some = some[:, None]
-            row = (some % len(S))[..., None]
+            alike = np.flatnonzero(count == most)
+            windows = np.reshape(np.nonzero(touching[alike])[1], (-1, most))
+            alike = alike[:, None]
+            row = (alike % len(S))[..., None]
             between = S[row, windows[..., None], :, windows[:, None]]
-            matrix = Q[some, windows, None] @ between
-            matrix = matrix.swapaxes(2, 3).reshape(len(some), 3 * most, -1) + np.eye(3 * most)
-            moments = right[some, windows].reshape(len(some), 3 * most, -1)
-            solved[some, windows] = np.linalg.solve(matrix, moments).reshape(len(some), most, 3, -1)
+            matrix = Q[alike, windows, None] @ between
+            matrix = matrix.swapaxes(2, 3).reshape(len(alike), 3 * most, -1) + np.eye(3 * most)
+            moments = right[alike, windows].reshape(len(alike), 3 * most, -1)
+            solved[alike, windows] = np.linalg.solve(matrix, moments).reshape(len(alike), most, 3, -1)
         solved = solved.reshape(T, n, -1)
         springs = self.springs[todo] / self.softness
         stiffness = G.T @ solved[..., :-1] + np.swapaxes(self.arms * springs[..., None], -1, -2) @ self.arms
@@ -384,25 +386,25 @@ class _ActiveSets:
 
     def _yielding(self, todo: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """What the bodies yield in all cells under loads (t, W, C) of some problems [m]."""
-        found, values = self.found, self._rows(self.found.polynomials, todo)
+        candidates, values = self.found, self._rows(self.found.polynomials, todo)
         T, n = len(todo), 3 * loads.shape[1]
         if self.alike:
             by_window, values = loads.swapaxes(0, 1), values[0]
             moments = (by_window @ values).swapaxes(0, 1).reshape(T, n)
             bodies = (moments @ self.S.reshape(n, n)).reshape(T, -1, 3).swapaxes(0, 1)
-            elastic = bodies @ values.swapaxes(1, 2) + by_window @ found.local[0]
+            elastic = bodies @ values.swapaxes(1, 2) + by_window @ candidates.local[0]
             return np.ascontiguousarray(elastic.swapaxes(0, 1))
         moments = (values.swapaxes(-1, -2) @ loads[..., None]).reshape(T, n, 1)
         bodies = (self.S[todo].reshape(T, n, n) @ moments).reshape(T, -1, 3, 1)
         elastic = (values @ bodies)[..., 0]
         rows = np.nonzero(loads.any(axis=-1))
-        elastic[rows] += (found.local[todo[rows[0]], rows[1]] @ loads[rows][..., None])[..., 0]
+        elastic[rows] += (candidates.local[todo[rows[0]], rows[1]] @ loads[rows][..., None])[..., 0]
         return elastic
 
     def _conditions(self, todo, loads, motions, null):
         """Keep a linear solution; find the cells and springs that violate the other conditions."""
-        found, active, springs = self.found, self.active[todo], self.springs[todo]
-        candidate, gap = found.candidate[todo], found.gap[todo]
+        candidates, active, springs = self.found, self.active[todo], self.springs[todo]
+        candidate, gap = candidates.candidate[todo], candidates.gap[todo]
         elastic = np.where(candidate, self._yielding(todo, loads), 0.0)
         separation = np.where(candidate, gap + elastic, np.inf)
         motions, turned, blocked, forced = self._settled(todo, separation, motions, null)
@@ -452,9 +454,9 @@ class _ActiveSets:
             turned[at] = np.abs(arms @ (free @ shift)).max(initial=0.0)
             for (cells, springs), chosen in zip((blocked, forced), numbers, strict=True):
                 if len(chosen):
-                    told = np.zeros(len(gaps), bool)
-                    told[chosen] = True
-                    cells[at][candidate], springs[at] = np.split(told, [candidate.sum()])
+                    chosen_gaps = np.zeros(len(gaps), bool)
+                    chosen_gaps[chosen] = True
+                    cells[at][candidate], springs[at] = np.split(chosen_gaps, [candidate.sum()])
         return motions, turned, blocked, forced
 
     def _refined(self, done) -> np.ndarray:
@@ -599,39 +601,39 @@ class PairLaws:
         interval, x = self._between(force)
         share = (x / self.step)[..., None]
         place = np.arange(force.shape[-2])[:, None], np.arange(force.shape[-1])
-        low, high = (curves[*place, interval + one] for one in (0, 1))
+        low, high = (curves[*place, interval + shift] for shift in (0, 1))
         return low + share * (high - low)
 
 
-def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLaws:
+def pair_laws(candidates: Candidates, state: BatchState, force: np.ndarray) -> PairLaws:
     """Compute the load over approach of every tooth pair by itself, in the field of a solved state.
 
     ``force`` (K,) are those of the curves [N], in equal ratios.
     """
-    (P, W, C), own = found.gap.shape, np.arange(found.gap.shape[1])
-    smooth, supports = found.smooth.copy(), found.supports[np.ix_(found.mesh, found.mesh)]
-    Pi, onto = found.polynomials, found.polynomials.swapaxes(-1, -2)
-    own_window = found.images[0][:, own, :, own]
-    local = found.local + Pi @ np.moveaxis(own_window, 0, 1) @ onto
+    (P, W, C), diagonal = candidates.gap.shape, np.arange(candidates.gap.shape[1])
+    smooth, supports = candidates.smooth.copy(), candidates.supports[np.ix_(candidates.mesh, candidates.mesh)]
+    Pi, onto = candidates.polynomials, candidates.polynomials.swapaxes(-1, -2)
+    own_window = candidates.images[0][:, diagonal, :, diagonal]
+    local = candidates.local + Pi @ np.moveaxis(own_window, 0, 1) @ onto
     # what is left are the images of the window
-    smooth[:, own, :, own] -= own_window
+    smooth[:, diagonal, :, diagonal] -= own_window
     loads = (onto @ state.loads[..., None])[..., 0]
     field = (smooth.reshape(P, 3 * W, 3 * W) @ loads.reshape(P, -1, 1)).reshape(P, W, 3, 1)
     field += (loads.sum(axis=-1) @ supports)[..., None, None]
-    gap = np.where(found.candidate, found.gap + (Pi @ field)[..., 0], np.inf)
+    gap = np.where(candidates.candidate, candidates.gap + (Pi @ field)[..., 0], np.inf)
     separation = gap.min(axis=-1)
     rows = np.nonzero(np.isfinite(separation))
     beyond = gap[rows] - separation[rows][:, None]
-    approach, pressed = _single_pairs(local[rows], beyond, found.candidate[rows], force)
+    approach, pressed = _single_pairs(local[rows], beyond, candidates.candidate[rows], force)
     yields, moments = np.ones((len(force), P, W)), np.zeros((len(force), P, W, 3))
     pressure, carried = np.zeros((len(force), P, W)), np.zeros((P, W, C))
     touching = np.full((P, W, C), np.inf)
-    for k, one in enumerate(force):
-        yields[k][rows] = approach[:, k] / one
-        moments[k][rows] = (onto[rows] @ pressed[:, k, :, None])[..., 0] / one
+    for k, force_level in enumerate(force):
+        yields[k][rows] = approach[:, k] / force_level
+        moments[k][rows] = (onto[rows] @ pressed[:, k, :, None])[..., 0] / force_level
         carried[rows] = pressed[:, k]
-        pressure[k] = found.equal_cell_pressure(carried).max(axis=-1) / np.sqrt(one)
-        touching[rows] = np.where((pressed[:, k] != 0.0) & np.isinf(touching[rows]), one, touching[rows])
+        pressure[k] = candidates.equal_cell_pressure(carried).max(axis=-1) / np.sqrt(force_level)
+        touching[rows] = np.where((pressed[:, k] != 0.0) & np.isinf(touching[rows]), force_level, touching[rows])
     return PairLaws(
         force=force,
         yields=np.moveaxis(yields, 0, -1),
@@ -640,8 +642,8 @@ def pair_laws(found: Candidates, state: BatchState, force: np.ndarray) -> PairLa
         smooth=smooth,
         supports=supports,
         separation=separation,
-        mesh=found.mesh,
-        approach=found.approach[found.mesh],
+        mesh=candidates.mesh,
+        approach=candidates.approach[candidates.mesh],
         loads=loads,
         motions=state.motions,
         pressure=np.moveaxis(pressure, 0, -1),
@@ -655,10 +657,10 @@ def _single_pairs(local, beyond, cells, force) -> tuple[np.ndarray, np.ndarray]:
     of them may touch. Cells that touch carry a load.
     """
     parts = [slice(first, first + _TOGETHER) for first in range(0, len(beyond), _TOGETHER)]
-    found = [_growing_contacts(local[one], beyond[one], cells[one], force) for one in parts]
+    of_parts = [_growing_contacts(local[part], beyond[part], cells[part], force) for part in parts]
     K, C = len(force), beyond.shape[1]
-    approach = np.concatenate([np.zeros((0, K)), *(one[0] for one in found)])
-    loads = np.concatenate([np.zeros((0, K, C)), *(one[1] for one in found)])
+    approach = np.concatenate([np.zeros((0, K)), *(of_part[0] for of_part in of_parts)])
+    loads = np.concatenate([np.zeros((0, K, C)), *(of_part[1] for of_part in of_parts)])
     # contacts that let go of cells under a rising load
     again = np.flatnonzero((loads < -10 * ROUNDING * force[:, None]).any(axis=(1, 2)))
     approach[again], loads[again] = _single_active_sets(local[again], beyond[again], cells[again], force)
@@ -705,9 +707,11 @@ def _growing_contacts(local, beyond, cells, force) -> tuple[np.ndarray, np.ndarr
     touching = begins[:, None, : n + 1] <= force[:, None]
     count = touching.sum(axis=-1)
     at = row[:, None], count
-    found = (force - offset[at]) / total[at]
-    carried = (found[..., None] * slope[:, None, : n + 1] + apart[:, None, : n + 1]) / size[:, None, : n + 1]
-    return found, np.where(touching, -carried, 0.0) @ fields[:, : n + 1, C:]
+    approach_of_count = (force - offset[at]) / total[at]
+    carried = (approach_of_count[..., None] * slope[:, None, : n + 1] + apart[:, None, : n + 1]) / size[
+        :, None, : n + 1
+    ]
+    return approach_of_count, np.where(touching, -carried, 0.0) @ fields[:, : n + 1, C:]
 
 
 def _single_active_sets(local, beyond, cells, force) -> tuple[np.ndarray, np.ndarray]:
@@ -720,21 +724,25 @@ def _single_active_sets(local, beyond, cells, force) -> tuple[np.ndarray, np.nda
     approach = np.zeros(R)
     # solutions last until cells of their window change sides
     changed = np.ones(len(active), bool)
-    for k, one in enumerate(force):
-        some: Any = slice(None)
+    for k, force_level in enumerate(force):
+        pairs_left: Any = slice(None)
         for _ in range(_MOST_STEPS):
             again = np.flatnonzero(changed)
             solved = _local_solution(local, (again,), active[again], right[again])
             per[again], offset[again] = np.moveaxis(solved, -1, 0)
-            approach[some] = (one + offset[some].sum(axis=1)) / per[some].sum(axis=1)
-            pressed[some] = per[some] * approach[some, None] - offset[some]
-            gaps = beyond[some] + (local[some] @ pressed[some, :, None])[..., 0] - approach[some, None]
-            overlap = cells[some] & (gaps < -ROUNDING * approach[some, None])
-            flips = np.where(active[some], pressed[some] < 0.0, overlap)
-            changed[some] = flips.any(axis=1)
+            approach[pairs_left] = (force_level + offset[pairs_left].sum(axis=1)) / per[pairs_left].sum(axis=1)
+            pressed[pairs_left] = per[pairs_left] * approach[pairs_left, None] - offset[pairs_left]
+            gaps = (
+                beyond[pairs_left]
+                + (local[pairs_left] @ pressed[pairs_left, :, None])[..., 0]
+                - approach[pairs_left, None]
+            )
+            overlap = cells[pairs_left] & (gaps < -ROUNDING * approach[pairs_left, None])
+            flips = np.where(active[pairs_left], pressed[pairs_left] < 0.0, overlap)
+            changed[pairs_left] = flips.any(axis=1)
             if not changed.any():
                 break
-            active[some] ^= flips
-            some = np.flatnonzero(changed)
+            active[pairs_left] ^= flips
+            pairs_left = np.flatnonzero(changed)
         approaches[:, k], loads[:, k] = approach, pressed
     return approaches, loads

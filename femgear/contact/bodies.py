@@ -150,8 +150,8 @@ class FlankCompliance:
         """Most negative compliance between flanks that a pair which is left out may share [m/N], or zero."""
         regular, n = self.regular, len(self.roll)
         # a pair that is left out shares no flank with one that carries
-        own = regular[0, :n, n:].min(), regular[0, n:, :n].min()
-        return float(min(0.0, regular[1:].min(), *own))
+        least_of_halves = regular[0, :n, n:].min(), regular[0, n:, :n].min()
+        return float(min(0.0, regular[1:].min(), *least_of_halves))
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,7 @@ def make_sectors(
     None stands for the others.
     """
     gears, known = planetary_set.gears, known or [None] * len(planetary_set.gears)
-    new = [gear for gear, one in zip(gears, known, strict=True) if one is None]
+    new = [gear for gear, sector in zip(gears, known, strict=True) if sector is None]
     halves = [half_sector(gear, flank_elements=flank_elements, refine=refine) for gear in new]
     try:
         grids = mesh_outlines(halves, cache=cache)
@@ -254,16 +254,16 @@ def make_sectors(
         raise
     sectors, materials, grids = [], material_of_each(material, len(gears)), iter(grids)
     widths = flank_widths([gear.face_width for gear in gears])
-    for gear, one, own, teeth in zip(gears, known, materials, widths, strict=True):
-        if one is not None:
-            sectors.append(one)
+    for gear, sector_given, material_of_gear, teeth in zip(gears, known, materials, widths, strict=True):
+        if sector_given is not None:
+            sectors.append(sector_given)
             continue
         whole = mirror(next(grids))
         state: Any = RING_STATE if gear.internal else TEETH_STATE
         thickness: Any = gear.face_width
         if max(teeth) < thickness:
             thickness = {"tooth": max(teeth), "body": thickness}
-        matrix = stiffness(whole, own, state=state, thickness=thickness)
+        matrix = stiffness(whole, material_of_gear, state=state, thickness=thickness)
         sectors.append(Sector(gear, whole, matrix))
     return Sectors(tuple(sectors))
 
@@ -301,9 +301,9 @@ def make_bodies(
     """
     known = known or [None] * len(sectors.gears)
     # roots of sectors of two plane states or widths need a solution of their own, see `root_stress`
-    own = [s.gear.face_width for s in sectors.gears]
-    widths = flank_widths(own)
-    found, materials = list(known), material_of_each(material, len(sectors.gears))
+    face_widths = [s.gear.face_width for s in sectors.gears]
+    widths = flank_widths(face_widths)
+    compliances, materials = list(known), material_of_each(material, len(sectors.gears))
     missing = [number for number, before in enumerate(known) if before is None]
     tasks = [
         partial(
@@ -317,8 +317,8 @@ def make_bodies(
         for number in missing
     ]
     for number, compliance in zip(missing, second_process.shared(tasks), strict=True):
-        found[number] = compliance
-    return Bodies(tuple(found), tuple(min(pair) for pair in pairwise(own)))
+        compliances[number] = compliance
+    return Bodies(tuple(compliances), tuple(min(pair) for pair in pairwise(face_widths)))
 
 
 def _of_sector(sector: Sector, material: Material, teeth: tuple[float, float], *, depth, foundation) -> FlankCompliance:
@@ -380,12 +380,12 @@ def flank_compliance(
     observations = np.hstack([observations, loads if along is None else along.columns])
     free = condense_sector(grid, stiffness, count=gear.teeth, rim="rim", loads=loads, observations=observations)
     compliance, further = _seen(free.supported(foundation), len(stations.roll))
-    found = _without_half_plane(
+    flank = _without_half_plane(
         gear, material, stations, depths, compliance, len(grid.points), widths or (gear.face_width,) * 2
     )
     if along is None:
-        return replace(found, surface=further, free=free)
-    return replace(found, root=ObservedRoot(along, stations, further))
+        return replace(flank, surface=further, free=free)
+    return replace(flank, root=ObservedRoot(along, stations, further))
 
 
 def _seen(schur: SectorSchur, stations: int) -> tuple[np.ndarray, SectorSchur]:

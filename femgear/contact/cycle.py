@@ -478,10 +478,10 @@ def walk_mesh_cycle(
         position, options = -position[::-1], options.mirrored(order)
     record = cycle_without_load(solved, position, periods=periods, contact=contact, options=options)
     if sun_torque or options.both_flanks:
-        found = _under_load(
+        loaded = _under_load(
             solved, bodies, abs(sun_torque), deviations, supports, record, options, not np.ndim(positions)
         )
-        record = found if found.force.any() else record
+        record = loaded if loaded.force.any() else record
     if options.ahead is not None and not np.ndim(positions):
         record = replace(record, **over_slices(record, options.ahead, periods=periods))
         pins = pin_forces(solved, record.force, record.back_force)
@@ -579,7 +579,7 @@ def planet_symmetry(planetary_set: GearSet, deviations: SetDeviations | None = N
     turning = (d.sun_runout, d.ring_runout, d.carrier_runout, d.ovality)
     if d.sun_misalignment.any() or d.carrier_misalignment.any():
         return 1
-    if d.sun_pitch.any() or d.ring_pitch.any() or any(one.amplitude for one in turning):
+    if d.sun_pitch.any() or d.ring_pitch.any() or any(runout.amplitude for runout in turning):
         return 1
     runouts = np.array([[r.amplitude, r.phase if r.amplitude else 0.0] for r in d.planet_runout])
     pitches = d.planet_pitch, d.planet_ring_side_pitch
@@ -731,12 +731,12 @@ class _Walk:
             if solved[-1].nearest > 0.0:
                 return None, share, solved[-1].nearest
         solved += second_process.shared(parts[alone:])
-        for one in solved:
-            if one.nearest > 0.0:
-                return None, share, one.nearest
-        unknowns = self.images * max(one.candidates for one in solved)
-        overflow, found = any(one.overflow for one in solved), [one.values for one in solved]
-        record = self._record(found, setup, tau, unknowns)
+        for block in solved:
+            if block.nearest > 0.0:
+                return None, share, block.nearest
+        unknowns = self.images * max(block.candidates for block in solved)
+        overflow, values = any(block.overflow for block in solved), [block.values for block in solved]
+        record = self._record(values, setup, tau, unknowns)
         if overflow:
             largest = 0.0 if record.slice_load is None else record.slice_load.max()
             share = enlarged(share, max(record.force.max(), record.back_force.max(), largest))
@@ -777,12 +777,12 @@ class _Walk:
             return record, wider, further
         equidistant, doubt = len(record.position), 0.0
         records: list[MeshCycle] = []
-        known, places = self._curves(record), self._in_first_part(self._first_places(record.position))
+        curves, places = self._curves(record), self._in_first_part(self._first_places(record.position))
         for _ in range(MOST_ROUNDS + 1):
             if not len(places):
-                places, doubt = self._open_places(known)
+                places, doubt = self._open_places(curves)
                 places = self._in_first_part(places)
-            added = (len(known["position"]) - equidistant) // self.repeats
+            added = (len(curves["position"]) - equidistant) // self.repeats
             if not len(places) or added + len(places) > MOST_PLACES:
                 doubt = max(doubt, 1.0) if len(places) else doubt
                 break
@@ -791,14 +791,14 @@ class _Walk:
                 return None, wider, further
             records.append(between)
             more = self._curves(between)
-            known = {name: np.concatenate([known[name], more[name]], axis=-1) for name in known}
+            curves = {name: np.concatenate([curves[name], more[name]], axis=-1) for name in curves}
             if len(records) == 1:
-                known = self._without_end(known)
+                curves = self._without_end(curves)
             places = np.zeros(0)
-        order = equidistant + np.argsort(known["position"][equidistant:])
+        order = equidistant + np.argsort(curves["position"][equidistant:])
         looked = np.arange(self.planetary_set.n_planets) < self.planetary_set.n_planets // self.alike
         between = Between(
-            **{name: known[name][..., order] for name in _BETWEEN},
+            **{name: curves[name][..., order] for name in _BETWEEN},
             looked=looked,
             records=tuple(records),
             doubt=doubt,
@@ -813,14 +813,14 @@ class _Walk:
         sign = -1.0 if position[-1] <= 0.0 else 1.0
         return np.append((position[:, None] + sign * between).ravel(), sign * periods)
 
-    def _without_end(self, known: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    def _without_end(self, curves: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Leave out the end of a record that closes: it is its beginning again."""
-        position, deflection = known["position"], known["deflection"]
+        position, deflection = curves["position"], curves["deflection"]
         end = np.abs(position) > self.empty.periods - 1e-9
         start = np.abs(position) < 1e-9
         if not np.allclose(deflection[:, end], deflection[:, start], rtol=1e-6, atol=0.0):
-            return known
-        return {name: values[..., ~end] for name, values in known.items()}
+            return curves
+        return {name: values[..., ~end] for name, values in curves.items()}
 
     def _in_first_part(self, places: np.ndarray) -> np.ndarray:
         """Positions in the first of the parts that repeat one another, with the same states of the set."""
@@ -848,37 +848,37 @@ class _Walk:
                 curves[f"slice_{name}"] = tooth_pair_codes(place[0], record.slice_load, place[1], pitch)
         return curves
 
-    def _open_places(self, known: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
+    def _open_places(self, known_curves: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
         """Find open peaks, see `open_places`; the first of planets that are alike stands for all."""
-        order, N = np.argsort(known["position"]), self.planetary_set.n_planets
-        deflection, stiffness = known["deflection"], known["stiffness"]
+        order, N = np.argsort(known_curves["position"]), self.planetary_set.n_planets
+        deflection, stiffness = known_curves["deflection"], known_curves["stiffness"]
         first = np.flatnonzero(np.arange(len(deflection)) % N < N // self.alike)
-        arc, share = known["sun_arc"][None], known["load_share"][: N // self.alike]
+        arc, share = known_curves["sun_arc"][None], known_curves["load_share"][: N // self.alike]
         codes, later = (
             np.concatenate([numbers.sum(axis=0)[None], numbers[first]])
-            for numbers in (known["codes"], known["later_codes"][:, order[:1]])
+            for numbers in (known_curves["codes"], known_curves["later_codes"][:, order[:1]])
         )
         # which pairs carry bends deflections; stiffnesses jump there, and are equal on both sides
         # but for those of slices that begin to carry one after the other
         same = np.zeros((len(first) + len(share), len(order)), np.int64)
         later_same = np.zeros(len(same), np.int64)
-        if "slice_codes" in known:
-            same[: len(first)] = known["slice_codes"][first]
-            later_same[: len(first)] = known["slice_later_codes"][first, order[0]]
+        if "slice_codes" in known_curves:
+            same[: len(first)] = known_curves["slice_codes"][first]
+            later_same[: len(first)] = known_curves["slice_later_codes"][first, order[0]]
         curves = np.concatenate([arc, deflection[first], stiffness[first], share])
         still = [1e-3] * (1 + len(first)) + [0.1] * len(same)
         least = np.array(still) * np.abs(curves).max(axis=1)
         codes, later = np.concatenate([codes, same]), np.append(later[:, 0], later_same)
-        position, curves, codes = known["position"][order], curves[:, order], codes[:, order]
+        position, curves, codes = known_curves["position"][order], curves[:, order], codes[:, order]
         jumps = np.arange(len(curves)) > len(first)
         return open_places(position, curves, codes, least, self.empty.periods, later, jumps)
 
-    def _at_positions(self, found: Candidates, state: BatchState) -> dict[str, Any]:
+    def _at_positions(self, candidates: Candidates, state: BatchState) -> dict[str, Any]:
         """What `MeshCycle` keeps of some positions, by the names of its fields; of the planets solved."""
-        setup, P, members, options = found.setup, len(found.position), self.members, self.options
+        setup, P, members, options = candidates.setup, len(candidates.position), self.members, self.options
         meshes, turns = setup.meshes, setup.gears.rotation_approach
         driver, rotations = setup.driver, turns.shape[1]
-        tooth_load = found.by_pairs(state.loads.sum(axis=-1))
+        tooth_load = candidates.by_pairs(state.loads.sum(axis=-1))
         force = np.zeros((2 * meshes, P))
         force[: len(tooth_load)] = tooth_load.sum(axis=1)
         # sprung members yield under the mesh forces, free ones are unknowns of the problem
@@ -887,36 +887,36 @@ class _Walk:
         whole = force if self.images == 1 else force[setup.places[0]]
         pulled = members.approach[:, sprung].T @ whole[: len(members.approach)]
         motion[sprung] = -pulled / members.stiffness[sprung, None]
-        at_edge = found.at_flank_end(state.active)
-        pressure = found.equal_cell_pressure(state.loads)
+        at_edge = candidates.at_flank_end(state.active)
+        pressure = candidates.equal_cell_pressure(state.loads)
         inner = np.where(at_edge, 0.0, pressure.max(axis=2))
-        tangents = ContactTangents(found, state)
+        tangents = ContactTangents(candidates, state)
         values = {
             "deflection": turns @ state.motions.T[:rotations]
             + members.approach[: meshes * self.images][setup.places[1] == 0] @ motion,
             "sun_arc": state.motions[:, driver],
             "force": force[:meshes],
             "back_force": force[meshes:],
-            "stiffness": _both_flanks(tangents, found.images, meshes),
+            "stiffness": _both_flanks(tangents, candidates.images, meshes),
             "tooth_load": tooth_load[:meshes],
             "member_motion": motion,
-            "edge_contact": found.by_pairs(at_edge)[:meshes].any(axis=1),
-            "max_pressure": found.by_pairs(inner).max(axis=1)[:meshes],
-            "pressed": found.by_pairs(inner).argmax(axis=1)[:meshes],
+            "edge_contact": candidates.by_pairs(at_edge)[:meshes].any(axis=1),
+            "max_pressure": candidates.by_pairs(inner).max(axis=1)[:meshes],
+            "pressed": candidates.by_pairs(inner).argmax(axis=1)[:meshes],
             "residual": state.residual,
             "iterations": state.iterations,
         }
         looked = options.both_flanks
         values["back_tooth_load"] = tooth_load[meshes:] if looked else np.zeros(tooth_load.shape)
         if options.pressures:
-            values["pressure"] = found.by_pairs(pressure)[:meshes]
+            values["pressure"] = candidates.by_pairs(pressure)[:meshes]
         if options.held_bodies is not None:
-            held = found.images_of(options.held_bodies)
+            held = candidates.images_of(options.held_bodies)
             values["held_stiffness"] = _both_flanks(tangents, held, meshes)
             values["held_tangents"] = tangents.between_meshes(held, meshes)
         return values
 
-    def _record(self, found: list[dict], setup: MeshWindows, tau: np.ndarray, unknowns: int) -> MeshCycle:
+    def _record(self, blocks: list[dict], setup: MeshWindows, tau: np.ndarray, unknowns: int) -> MeshCycle:
         """The record from what was found at its positions: with places of the tooth pairs, pins, message.
 
         ``tau`` are all positions, of every slice.
@@ -924,7 +924,7 @@ class _Walk:
         cells, every, driven = setup.cells, setup.places[0], self.planetary_set.kind_rows[0]
         meshes = len(self.planetary_set.meshes)
         drive, back = slice(0, meshes), slice(meshes, 2 * meshes)
-        values = {name: np.concatenate([some[name] for some in found], axis=-1) for name in found[0]}
+        values = {name: np.concatenate([block[name] for block in blocks], axis=-1) for name in blocks[0]}
         path, tooth = np.moveaxis(setup.zeta, 2, 1), setup.tooth
         if self.repeats > 1:
             values, path, tooth = self._with_all_pairs(values, setup, tau)
@@ -1016,11 +1016,11 @@ class _Walk:
             for name in names
             if name in values
         }
-        for name, (some, places) in wide.items():
-            values[name] = np.zeros((M, T, *some.shape[2:]), some.dtype)
+        for name, (windowed, places) in wide.items():
+            values[name] = np.zeros((M, T, *windowed.shape[2:]), windowed.dtype)
             inside = (places >= 0) & (places < T)
             mesh, slot = np.nonzero(inside)
-            values[name][mesh, places[inside]] = some[mesh, slot]
+            values[name][mesh, places[inside]] = windowed[mesh, slot]
         return values, np.moveaxis(zeta, 2, 1), tooth
 
     def _with_near_pairs(self, values: dict[str, Any]) -> dict[str, Any]:
@@ -1044,14 +1044,14 @@ class _Walk:
         part, phase = P // self.repeats, np.asarray(self.planetary_set.mesh_phases)
         step = N // self.turns
         later = np.arange(self.turns) * (phase[step] - phase[0]) * self.repeats
-        found = {name: list[np.ndarray]() for name in values}
+        repeated = {name: list[np.ndarray]() for name in values}
         pitch = self.planetary_set.base_pitch
         for number in range(self.repeats):
             away = np.abs(np.mod(later - number + 0.5 * self.repeats, self.repeats) - 0.5 * self.repeats)
             turns = int(np.argmin(away))
             planet = (np.arange(N) + turns * step) % N
             mesh = self.planetary_set.moved_meshes(planet)
-            known = {"m": mesh, "n": planet}
+            index_of = {"m": mesh, "n": planet}
             slots = {back: _same_pairs(values[f"{back}path"], mesh, number * part, pitch) for back in ("", "back_")}
             for axes, names in _AXES.items():
                 names = (*names, "near") if axes == "mst" else names
@@ -1059,15 +1059,15 @@ class _Walk:
                 for name in (name for name in over_positions if values[name].shape[-1] == part):
                     here = values[name]
                     for place, axis in enumerate(axes[:2]):
-                        here = here.take(known[axis], axis=place) if axis in known else here
+                        here = here.take(index_of[axis], axis=place) if axis in index_of else here
                     if axes[:2] == "ms":
                         here = _in_slots(here, slots["back_" if name.startswith("back_") else ""])
-                    found[name].append(here)
+                    repeated[name].append(here)
             angle = -2.0 * math.pi * turns / self.turns
             moved = {"member_motion": self.members.names, "member_tilt": self._tilt_names}
             for name in (name for name in moved if name in values):
-                found[name].append(np.concatenate(_mapped(moved[name], values[name], planet, _turn(angle))))
-        return {name: np.concatenate(parts, axis=-1) for name, parts in found.items() if parts}
+                repeated[name].append(np.concatenate(_mapped(moved[name], values[name], planet, _turn(angle))))
+        return {name: np.concatenate(parts, axis=-1) for name, parts in repeated.items() if parts}
 
 
 def _over_positions(values: np.ndarray, slices: int) -> np.ndarray:
@@ -1103,11 +1103,11 @@ def _mapped(
     """
     pairs = [name for name in names if name.endswith((": x", ": y"))][::2]
     vectors, rest = np.split(values, [2 * len(pairs)])
-    found = np.einsum("ij,mjp->mip", matrix, vectors.reshape(-1, 2, vectors.shape[1]))
+    turned_vectors = np.einsum("ij,mjp->mip", matrix, vectors.reshape(-1, 2, vectors.shape[1]))
     planets = [i for i, name in enumerate(pairs) if name.startswith("planet")]
     if planets:
-        found[planets] = found[planets][planet]
-    return found.reshape(vectors.shape), rest
+        turned_vectors[planets] = turned_vectors[planets][planet]
+    return turned_vectors.reshape(vectors.shape), rest
 
 
 def _turn(angle: float) -> np.ndarray:
@@ -1134,49 +1134,49 @@ def _between_meshes(setup: MeshWindows, tangents: np.ndarray, force: np.ndarray)
 
 def _both_flanks(tangents: ContactTangents, images, meshes: int) -> np.ndarray:
     """Tangent stiffness of every mesh (M, P), both flanks together [N/m]."""
-    found = tangents.of_meshes(images[0])
-    return found.reshape(len(found), -1, meshes).sum(axis=1).T
+    of_images = tangents.of_meshes(images[0])
+    return of_images.reshape(len(of_images), -1, meshes).sum(axis=1).T
 
 
 def _seen_from_front(cycle: MeshCycle, planetary_set: GearSet, order) -> MeshCycle:
     """Results of the mirror image in the order of planets and positions of the original."""
     planet, angle = np.argsort(order), planetary_set.planet_angles[0]
-    own: dict[str, Any] = {"m": planetary_set.moved_meshes(planet), "n": planet}
-    own["g"] = np.arange(2)
-    own["w"] = slice(None)
-    found = {}
+    index_of: dict[str, Any] = {"m": planetary_set.moved_meshes(planet), "n": planet}
+    index_of["g"] = np.arange(2)
+    index_of["w"] = slice(None)
+    mirrored = {}
     for name, axes in ((name, axes) for axes, names in _AXES.items() for name in names):
         values = getattr(cycle, name)
         if values is None:
             continue
         for number, axis in enumerate(axes):
             # the pair that comes first along the path leaves first when the rotation is seen from behind
-            place = own[axis] if axis in own else slice(None, None, -1)
+            place = index_of[axis] if axis in index_of else slice(None, None, -1)
             values = values[(slice(None),) * number + (place,)]
-        found[name] = -values if name in _ODD else values
+        mirrored[name] = -values if name in _ODD else values
     if cycle.between is not None:
-        one, mesh = cycle.between, own["m"]
-        found["between"] = replace(
-            one,
-            position=0.0 - one.position[::-1],
-            deflection=one.deflection[mesh, ::-1],
-            stiffness=one.stiffness[mesh, ::-1],
-            sun_arc=one.sun_arc[::-1],
-            load_share=one.load_share[planet, ::-1],
-            max_pressure=one.max_pressure[mesh, ::-1],
-            pressed_path=-one.pressed_path[mesh, ::-1],
-            pressed_load=one.pressed_load[mesh, ::-1],
-            looked=one.looked[planet],
-            records=tuple(_seen_from_front(record, planetary_set, order) for record in one.records),
+        between, mesh = cycle.between, index_of["m"]
+        mirrored["between"] = replace(
+            between,
+            position=0.0 - between.position[::-1],
+            deflection=between.deflection[mesh, ::-1],
+            stiffness=between.stiffness[mesh, ::-1],
+            sun_arc=between.sun_arc[::-1],
+            load_share=between.load_share[planet, ::-1],
+            max_pressure=between.max_pressure[mesh, ::-1],
+            pressed_path=-between.pressed_path[mesh, ::-1],
+            pressed_load=between.pressed_load[mesh, ::-1],
+            looked=between.looked[planet],
+            records=tuple(_seen_from_front(record, planetary_set, order) for record in between.records),
         )
-    found["member_motion"] = _in_mirror(cycle.member_names, cycle.member_motion, planet, angle)
+    mirrored["member_motion"] = _in_mirror(cycle.member_names, cycle.member_motion, planet, angle)
     if cycle.member_tilt is not None:
-        found["member_tilt"] = _in_mirror(cycle.tilt_names, cycle.member_tilt, planet, angle)
+        mirrored["member_tilt"] = _in_mirror(cycle.tilt_names, cycle.member_tilt, planet, angle)
     return replace(
         cycle,
         position=0.0 - cycle.position[::-1],
         bearing_force=np.einsum("ij,njp->nip", _reflection(angle), cycle.bearing_force)[planet][:, :, ::-1],
-        **found,
+        **mirrored,
     )
 
 

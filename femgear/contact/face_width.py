@@ -56,7 +56,7 @@ class FaceWidth:
 
 def contact_over_width(
     over: FaceWidth,
-    found: Candidates,
+    candidates: Candidates,
     state: BatchState,
     load,
     plane: dict[str, Any],
@@ -67,7 +67,7 @@ def contact_over_width(
 
     Parameters
     ----------
-    found, state : Candidates, BatchState
+    candidates, state : Candidates, BatchState
         The plane contact at all positions, or, of helical teeth, in all slices at each of them.
     load : (m,) array
         External load on the motions [N].
@@ -82,14 +82,14 @@ def contact_over_width(
         With ``pair_approach`` (meshes, rows, pairs) of all listed pairs in the slice that comes nearest [m],
         ``pair_force`` (rows, W) of the windows [N], and ``overflow``, whether a contact leaves its window.
     """
-    W, driver, turns = len(found.mesh), found.setup.driver, found.setup.gears.rotation_approach
-    S, rows, places = over.slices, len(found.position), found.setup.places
+    W, driver, turns = len(candidates.mesh), candidates.setup.driver, candidates.setup.gears.rotation_approach
+    S, rows, places = over.slices, len(candidates.position), candidates.setup.places
     P = rows // S if over.helical else rows
-    lead, apart, every = lead_separations(found, deviations, S, P)
-    laws, sliced = _solve(over, found, state, load, apart)
+    lead, apart, every = lead_separations(candidates, deviations, S, P)
+    laws, sliced = _solve(over, candidates, state, load, apart)
     force, sprung = sliced.of_meshes().mean(axis=1).T, ~members.free
     motion = np.zeros((len(members.names), P))
-    motion[members.free] = sliced.motions.T[driver + 1 : len(load)] if found.setup.images == 1 else 0.0
+    motion[members.free] = sliced.motions.T[driver + 1 : len(load)] if candidates.setup.images == 1 else 0.0
     angles, turned, twisted = _by_tilts(over.tilting, sliced, sliced.motions.T[len(load) :])
     pulled = members.approach[:, sprung].T @ force[places[0]]
     motion[sprung] = -pulled / members.stiffness[sprung, None]
@@ -97,13 +97,13 @@ def contact_over_width(
     # of the least-squares lines through the slices, from one end of the width to the other
     place = 2.0 * (np.arange(S) + 0.5) / S - 1.0
     rise = 2.0 * np.einsum("s,msp->mp", place, twisted - lead[..., None]) / (place @ place)
-    values = _of_pairs(found, state, laws, sliced) | {
+    values = _of_pairs(candidates, state, laws, sliced) | {
         "deflection": base + turned.mean(axis=1),
         "sun_arc": sliced.motions[:, driver],
         "force": force,
         "member_motion": motion,
         "mesh_misalignment": rise,
-        "lead_offset": _smallest(apart, found.candidate.any(axis=-1).reshape(P, -1, W), len(force)),
+        "lead_offset": _smallest(apart, candidates.candidate.any(axis=-1).reshape(P, -1, W), len(force)),
         "member_tilt": angles,
     }
     # the slice that comes nearest decides which pairs may touch; a row of helical teeth is a slice
@@ -122,28 +122,28 @@ def contact_over_width(
 
 def _smallest(apart: np.ndarray, near: np.ndarray, meshes: int) -> np.ndarray:
     """Smallest separation (meshes, P) of slices (P, S, W) in windows that may touch; zero where none."""
-    found = np.where(near, apart, np.inf).reshape(len(apart), -1, meshes, apart.shape[2] // meshes)
-    found = found.min(axis=(1, 3)).T
-    return np.where(np.isfinite(found), found, 0.0)
+    smallest = np.where(near, apart, np.inf).reshape(len(apart), -1, meshes, apart.shape[2] // meshes)
+    smallest = smallest.min(axis=(1, 3)).T
+    return np.where(np.isfinite(smallest), smallest, 0.0)
 
 
 def _solve(
-    over: FaceWidth, found: Candidates, state: BatchState, load, apart: np.ndarray
+    over: FaceWidth, candidates: Candidates, state: BatchState, load, apart: np.ndarray
 ) -> tuple[PairLaws, SliceState]:
     """Solve the slices that separations part (P, S, W) [m], with curves of pairs as far as their forces."""
-    driven, held = load[found.setup.driver], None
+    driven, held = load[candidates.setup.driver], None
     if over.held is not None:
-        held = found.images_of(over.held[0]), over.held[1]
-    whole = found.setup.images * driven
-    curves = curve_forces(driven, found.setup.n_planets, whole)
-    laws = pair_laws(found, state, curves)
-    sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
+        held = candidates.images_of(over.held[0]), over.held[1]
+    whole = candidates.setup.images * driven
+    curves = curve_forces(driven, candidates.setup.n_planets, whole)
+    laws = pair_laws(candidates, state, curves)
+    sliced = solve_slices(candidates, laws, load, over.waves, apart, held, over.tilting)
     if sliced.force.max() > curves[-1]:
         # by equilibrium no slice carries more than all of them
         step = np.log(curves[1] / curves[0])
         curves = np.exp(np.arange(np.log(curves[0]), np.log(over.slices * whole) + step, step))
-        laws = pair_laws(found, state, curves)
-        sliced = solve_slices(found, laws, load, over.waves, apart, held, over.tilting)
+        laws = pair_laws(candidates, state, curves)
+        sliced = solve_slices(candidates, laws, load, over.waves, apart, held, over.tilting)
     return laws, sliced
 
 
@@ -165,59 +165,63 @@ def _by_tilts(tilting: TiltingMembers | None, sliced: SliceState, tilts: np.ndar
     return tilting.angle[:, None] * tilts, turned, twisted
 
 
-def _of_pairs(found: Candidates, state: BatchState, laws: PairLaws, sliced: SliceState) -> dict[str, Any]:
+def _of_pairs(candidates: Candidates, state: BatchState, laws: PairLaws, sliced: SliceState) -> dict[str, Any]:
     """Loads and pressures of tooth pairs in slices, by the names of `MeshCycle`."""
-    (P, S, W), rows, width = sliced.force.shape, len(found.position), found.bodies.widths[0]
-    contact, spur = sliced.contact_width(found, laws), P == rows
+    (P, S, W), rows, width = sliced.force.shape, len(candidates.position), candidates.bodies.widths[0]
+    contact, spur = sliced.contact_width(candidates, laws), P == rows
     _check_lines(sliced.force if spur else None, contact, width, S)
     # pressures are those of the laws, which fall between their forces beside the plane state
-    pressure, before = found.equal_cell_pressure(state.loads).max(axis=2), state.loads.sum(axis=-1)
+    pressure, before = candidates.equal_cell_pressure(state.loads).max(axis=2), state.loads.sum(axis=-1)
     by_law = laws.pressure_under(before)
     right = np.divide(pressure, by_law, out=np.ones(by_law.shape), where=by_law > 0)
-    right *= found.bodies.normal_pressure(found.setup.kind(found.mesh))
-    at_edge, of_rows = sliced.reaches_ends(found, laws), sliced.force.reshape(rows, -1, W)
+    right *= candidates.bodies.normal_pressure(candidates.setup.kind(candidates.mesh))
+    at_edge, of_rows = sliced.reaches_ends(candidates, laws), sliced.force.reshape(rows, -1, W)
 
     def pressed(force):
         return np.where(at_edge, 0.0, right * laws.pressure_under(force))
 
     def over_width(values):
         """Springs (rows, slices of each, W) stand for all slices of spur teeth, for one of helical."""
-        by_pair = found.by_pairs(np.moveaxis(values, 1, 2))
+        by_pair = candidates.by_pairs(np.moveaxis(values, 1, 2))
         by_pair = by_pair.reshape(*by_pair.shape[:3], P, -1).swapaxes(3, 4)
         return by_pair.reshape(*by_pair.shape[:2], S, P)
 
-    inner = found.by_pairs(pressed(sliced.largest() if spur else sliced.of_laws(laws))).max(axis=1)
+    inner = candidates.by_pairs(pressed(sliced.largest() if spur else sliced.of_laws(laws))).max(axis=1)
     slice_load = over_width(of_rows)
     return {
         "tooth_load": slice_load.mean(axis=2),
         "slice_load": slice_load,
         "slice_pressure": over_width(pressed(of_rows.swapaxes(0, 1)).swapaxes(0, 1)),
         "max_pressure": inner.reshape(len(inner), P, -1).max(axis=-1),
-        "edge_contact": found.by_pairs(at_edge).any(axis=1).reshape(len(inner), P, -1).any(axis=-1),
+        "edge_contact": candidates.by_pairs(at_edge).any(axis=1).reshape(len(inner), P, -1).any(axis=-1),
         "residual": np.maximum(state.residual.reshape(P, -1).max(axis=1), sliced.residual),
         "iterations": state.iterations.reshape(P, -1).sum(axis=1) + sliced.iterations,
-        "overflow": sliced.overflows(found, laws),
+        "overflow": sliced.overflows(candidates, laws),
     }
 
 
 def lead_separations(
-    found: Candidates, d: SetDeviations | None, S: int, P: int
+    candidates: Candidates, d: SetDeviations | None, S: int, P: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Compute separations by leads and misalignments [m].
 
     Of meshes (2N, S), of windows (P, S, W), and of all listed pairs in all slices (2N, rows, pairs, S), which
     may be the same for all rows and pairs.
     """
-    rows, mesh, lead = np.arange(len(found.position))[:, None], found.mesh, np.zeros((found.setup.meshes, S))
+    rows, mesh, lead = (
+        np.arange(len(candidates.position))[:, None],
+        candidates.mesh,
+        np.zeros((candidates.setup.meshes, S)),
+    )
     if d is not None:
-        lead = lead_separation(d, found.setup.gears, S)
+        lead = lead_separation(d, candidates.setup.gears, S)
     apart, every = np.broadcast_to(lead[mesh].T, (P, S, len(mesh))), lead[:, None, None]
     forms = () if d is None else (d.sun, d.planet_sun_side, d.planet_ring_side, d.ring)
-    if d is not None and any(isinstance(one, FlankTwist) for form in forms for one in form.lead):
+    if d is not None and any(isinstance(modification, FlankTwist) for form in forms for modification in form.lead):
         # a twist by the places of the pairs on the flanks, of helical teeth a row a slice
-        listed = found.setup.listed
-        every = lead_separation(d, found.setup.gears, S, listed.roll[:, : len(lead), found.position])
-        of_windows = every[mesh, rows, found.pair + listed.first[mesh]]
+        listed = candidates.setup.listed
+        every = lead_separation(d, candidates.setup.gears, S, listed.roll[:, : len(lead), candidates.position])
+        of_windows = every[mesh, rows, candidates.pair + listed.first[mesh]]
         helical = len(rows) != P
         apart = of_windows[rows[:, 0], :, rows[:, 0] % S] if helical else of_windows.swapaxes(1, 2)
         apart = apart.reshape(P, S, len(mesh))
@@ -233,19 +237,19 @@ def over_slices(record, ahead: np.ndarray, *, periods: int = 1) -> dict[str, np.
     its slices [mesh periods]. Tooth pairs share the mean force of their mesh as they did that of the place:
     they stay in equilibrium with it.
     """
-    step, found = np.ptp(ahead) / (len(ahead) - 1), {}
+    step, averaged = np.ptp(ahead) / (len(ahead) - 1), {}
     for name in _EVEN:
         values = getattr(record, name, None)
         if values is not None:
             count = values.shape[-1]
             mean = np.sinc(np.fft.rfftfreq(count, periods / count) * step)
-            found[name] = np.fft.irfft(mean * np.fft.rfft(values), n=count)
+            averaged[name] = np.fft.irfft(mean * np.fft.rfft(values), n=count)
     carried = np.asarray(record.force)
-    share = np.divide(found["force"], carried, out=np.ones(carried.shape), where=carried > 0.0)
+    share = np.divide(averaged["force"], carried, out=np.ones(carried.shape), where=carried > 0.0)
     for name in (name for name in _OF_PAIRS if getattr(record, name, None) is not None):
         values = getattr(record, name)
-        found[name] = values * share.reshape(len(share), *np.ones(values.ndim - 2, int), -1)
-    return found
+        averaged[name] = values * share.reshape(len(share), *np.ones(values.ndim - 2, int), -1)
+    return averaged
 
 
 def contacts_are_lines(

@@ -156,7 +156,7 @@ def mesh_pairs(planetary_set: GearSet) -> tuple[FlankPair, ...]:
 
 def acting_flanks(planetary_set: GearSet) -> list[tuple[int, list[tuple[int, int, int]]]]:
     """List all bodies of a set: number of the gear, and drive flanks (mesh, gear of the pair, side)."""
-    found = []
+    flanks = []
     for number, body in enumerate(planetary_set.bodies):
         ahead = planetary_set.senses[body.gear] > 0
         # gear 1 pushes with the flank that goes ahead, gear 2 is pushed on the one behind
@@ -166,8 +166,8 @@ def acting_flanks(planetary_set: GearSet) -> list[tuple[int, list[tuple[int, int
             for place in (0, 1)
             if mesh.bodies[place] == number
         ]
-        found.append((body.gear, acting))
-    return found
+        flanks.append((body.gear, acting))
+    return flanks
 
 
 def tooth_numbers(planetary_set: GearSet, index: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -78,11 +78,11 @@ class LoadedPeriod:
         make harmonics of their own, images of the low ones beside the number of positions. They are linear in
         the values: deflections remain those by the forces, and a response at rest is the static solution.
         """
-        known = self._resampled
-        if (name, count) not in known:
-            known[name, count] = self._curves(name, count)
-            known[name, count].setflags(write=False)
-        return known[name, count]
+        cache = self._resampled
+        if (name, count) not in cache:
+            cache[name, count] = self._curves(name, count)
+            cache[name, count].setflags(write=False)
+        return cache[name, count]
 
     @cached_property
     def _resampled(self) -> dict[tuple[str, int], np.ndarray]:
@@ -92,13 +92,13 @@ class LoadedPeriod:
     def _curves(self, name: str, count: int) -> np.ndarray:
         whole = self.periods
         at, values, tau = np.arange(count) / count * whole, getattr(self, name), self.position
-        found = np.array([np.interp(at, tau, row, period=whole) for row in values])
+        curves = np.array([np.interp(at, tau, row, period=whole) for row in values])
         for piece, place, ends in self._smooth_pieces():
             for turn in (-whole, 0, whole):
                 first, last = np.searchsorted(at + turn, ends, side="left")
                 inside = slice(first, last + (last < count and at[last % count] + turn == ends[1]))
-                found[:, inside] = parabolas(place, values[:, piece].T, at[inside] + turn).T
-        return found
+                curves[:, inside] = parabolas(place, values[:, piece].T, at[inside] + turn).T
+        return curves
 
     def _smooth_pieces(self):
         """Positions without a jump between them: their numbers, and their places counted on past the end.
@@ -153,22 +153,22 @@ def loaded_period(
     looked = first + (options.ahead is None)
     wanted, record, helical = np.arange(looked) / (first * parts) * periods, {}, False
     while len(wanted):
-        for some in np.array_split(wanted, -(-len(wanted) // _WALK)):
+        for positions_of_block in np.array_split(wanted, -(-len(wanted) // _WALK)):
             cycle = walk_mesh_cycle(
                 planetary_set,
                 bodies,
                 sun_torque=sun_torque,
-                positions=some,
+                positions=positions_of_block,
                 contact=contact,
                 deviations=deviations,
                 supports=supports,
                 periods=periods,
                 options=options,
             )
-            found = _record(cycle, planetary_set.base_pitch)
+            added = _record(cycle, planetary_set.base_pitch)
             if record:
-                found = {name: np.concatenate([record[name], found[name]], axis=-1) for name in found}
-            record, helical = found, cycle.helical
+                added = {name: np.concatenate([record[name], added[name]], axis=-1) for name in added}
+            record, helical = added, cycle.helical
         order = np.argsort(record["position"], kind="stable")
         record = {name: values[..., order] for name, values in record.items()}
         if helical:
@@ -178,11 +178,11 @@ def loaded_period(
         tau, gap = record["position"], np.diff(record["position"])
         # jumps in quarters: half as many walks to enclose them
         shares = (smooth, 0.5), (jumps, 0.25), (jumps, 0.5), (jumps, 0.75)
-        wanted = np.concatenate([tau[some] + share * gap[some] for some, share in shares])
-    found = _whole_period(planetary_set, record, symmetry, shift, periods)
+        wanted = np.concatenate([tau[gaps_there] + share * gap[gaps_there] for gaps_there, share in shares])
+    added = _whole_period(planetary_set, record, symmetry, shift, periods)
     if options.ahead is None:
-        return found
-    return replace(found, **over_slices(found, options.ahead, periods=periods))
+        return added
+    return replace(added, **over_slices(added, options.ahead, periods=periods))
 
 
 def _repetition(
@@ -261,13 +261,13 @@ def _whole_period(planetary_set: GearSet, record: dict, symmetry: int, shift: Fr
     values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
         moved = (np.arange(N) - ahead * (step * part % parts)) % N
-        meshes, own = (
+        meshes, rows = (
             planetary_set.moved_meshes(planets)
             # planets that are alike at all times are one
             for planets in (moved, moved % (ahead * parts))
         )
         for name in names:
-            values[name].append(record[name][own][:, shown])
+            values[name].append(record[name][rows][:, shown])
         mean += compliance[np.ix_(meshes, meshes)] / parts
     return LoadedPeriod(
         position=np.concatenate([tau + part / parts * periods for part in range(parts)]),

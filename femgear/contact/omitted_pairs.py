@@ -14,53 +14,53 @@ from femgear.contact.assembly import Candidates, windows_of_bodies
 from femgear.contact.bodies import station_weights
 
 
-def needed_nearest(found: Candidates, approach, force) -> np.ndarray:
+def needed_nearest(candidates: Candidates, approach, force) -> np.ndarray:
     """Find the limit ``nearest`` (P,) [m] with which pairs that penetrate are candidates; zero without any.
 
     Parameters
     ----------
-    found : Candidates
+    candidates : Candidates
         Solved at P positions.
     approach : (meshes, P) or (meshes, P, pairs) array
         Of the drive flanks by the motions, of meshes or of all listed pairs [m]; back flanks part by it.
     force : (P, W) array
         Loads of the windows [N].
     """
-    listed, approach = found.setup.listed, np.asarray(approach, float)
+    listed, approach = candidates.setup.listed, np.asarray(approach, float)
     approach = approach if approach.ndim == 3 else approach[..., None]
-    gap, near = listed.gap[:, found.position], listed.near[:, found.position]
+    gap, near = listed.gap[:, candidates.position], listed.near[:, candidates.position]
     limit = np.concatenate([approach, -approach])[: len(gap)]
-    closing = _largest_closing(found) * found.setup.images * force.sum(axis=1)
+    closing = _largest_closing(candidates) * candidates.setup.images * force.sum(axis=1)
     mesh, row, pair = np.nonzero(~near & np.isfinite(gap) & (gap < limit + closing[:, None]))
     limit = np.broadcast_to(limit, gap.shape)[mesh, row, pair]
-    limit = limit - np.minimum(yielding(found, force, mesh, row, pair), 0.0)
+    limit = limit - np.minimum(yielding(candidates, force, mesh, row, pair), 0.0)
     needed, smallest = np.zeros(len(force)), gap.min(axis=-1)
     penetrates = gap[mesh, row, pair] < limit
     np.maximum.at(needed, row[penetrates], (limit - smallest[mesh, row])[penetrates])
     return needed
 
 
-def _largest_closing(found: Candidates) -> float:
+def _largest_closing(candidates: Candidates) -> float:
     """How far flanks of both gears of a mesh come nearer to one another at most, per load elsewhere [m/N]."""
-    return -2.0 * min(body.least for body in found.bodies.gears)
+    return -2.0 * min(body.least for body in candidates.bodies.gears)
 
 
-def yielding(found: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarray:
+def yielding(pairs_there: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarray:
     """Compute by how much bodies part the flanks of listed pairs (n,) under the loads of all windows [m].
 
     Of meshes, rows of positions and pairs (n,); loads are (P, W) [N], taken at the middle of their windows.
     """
-    setup, listed = found.setup, found.setup.listed
-    total, softness = np.zeros(len(mesh)), np.sqrt(found.bodies.of_kinds(setup.kind(found.mesh)))
-    loads, position = (force / softness)[row], found.position[row]
-    candidates = windows_of_bodies(setup.gears, found.mesh)
-    for (number, own, gear, side), (_, these, gear_of, side_of) in zip(
+    setup, listed = pairs_there.setup, pairs_there.setup.listed
+    total, softness = np.zeros(len(mesh)), np.sqrt(pairs_there.bodies.of_kinds(setup.kind(pairs_there.mesh)))
+    loads, position = (force / softness)[row], pairs_there.position[row]
+    candidates = windows_of_bodies(setup.gears, pairs_there.mesh)
+    for (number, windows_there, gear, side), (_, these, gear_of, side_of) in zip(
         candidates, windows_of_bodies(setup.gears, mesh), strict=True
     ):
-        body = found.bodies.gears[number]
+        body = pairs_there.bodies.gears[number]
         if not len(these):
             continue
-        j, i, at = found.mesh[own], found.pair[row[these]][:, own], position[these]
+        j, i, at = pairs_there.mesh[windows_there], pairs_there.pair[row[these]][:, windows_there], position[these]
         index, weight = station_weights(setup.roll[gear, j, at[:, None], i, 1], body.roll)
         index = index + (side * len(body.roll))[:, None]
         place, share = station_weights(listed.roll[gear_of, mesh[these], at, pair[these]], body.roll)
@@ -71,5 +71,5 @@ def yielding(found: Candidates, force: np.ndarray, mesh, row, pair) -> np.ndarra
             lag = (away - image * count // images) % count
             values = body.regular[lag[..., None, None], place[:, None, :, None], index[:, :, None, :]]
             moved = (share[:, None, None] @ values @ weight[..., None])[..., 0, 0]
-            total[these] += (moved * loads[these][:, own]).sum(axis=1)
-    return total / np.sqrt(found.bodies.of_kinds(setup.kind(mesh)))
+            total[these] += (moved * loads[these][:, windows_there]).sum(axis=1)
+    return total / np.sqrt(pairs_there.bodies.of_kinds(setup.kind(mesh)))

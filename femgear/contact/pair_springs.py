@@ -121,16 +121,16 @@ class PairSprings:
     def moments_under(self, force: np.ndarray, place: np.ndarray) -> np.ndarray:
         """Compute the moments ``mu`` (U, 3, N) under forces at positions (N,)."""
         interval, x = self.intervals(force, place)
-        found = np.empty((len(force), 3, force.shape[1]))
+        moments = np.empty((len(force), 3, force.shape[1]))
         for node, (low, rise) in enumerate(zip(self.moments, self.rises, strict=True)):
-            found[:, node] = low.take(interval) + x * rise.take(interval)
-        return found
+            moments[:, node] = low.take(interval) + x * rise.take(interval)
+        return moments
 
     def between(self, moments: np.ndarray, place: np.ndarray) -> np.ndarray:
         """Compute what every slot yields under a force on another (U, U, N), moments (U, 3, N) given."""
         U, N, P = self.count, moments.shape[-1], len(self.window)
         whole = N % P == 0 and np.array_equal(place, np.repeat(np.arange(P), N // P))
-        found = np.empty((U, U, N))
+        compliance = np.empty((U, U, N))
         for w in range(U):
             smooth = self.smooth[:, w:, :, w].reshape(P, -1, 3)
             if whole:
@@ -140,10 +140,10 @@ class PairSprings:
                 half = np.einsum("nva,an->vn", smooth[place], moments[w]).reshape(U - w, 3, N)
             others = moments[w:].reshape(half.shape)
             row = np.einsum("vb...,vb...->v...", half, others).reshape(U - w, N)
-            found[w, w:] = found[w:, w] = row
+            compliance[w, w:] = compliance[w:, w] = row
         if self.supports.any():
-            found += self.supports.transpose(1, 2, 0)[..., place]
-        return found
+            compliance += self.supports.transpose(1, 2, 0)[..., place]
+        return compliance
 
 
 class _SpringNewton:
@@ -175,9 +175,9 @@ class _SpringNewton:
         self._restart(late)
         left = self._iterate(late, _MOST_STEPS, careful=True)
         # once more with the moments of the forces that were found
-        found = np.setdiff1d(late, left)
-        self.solved[found] = False
-        self._iterate(found, _MOST_STEPS, careful=True)
+        resumed = np.setdiff1d(late, left)
+        self.solved[resumed] = False
+        self._iterate(resumed, _MOST_STEPS, careful=True)
         # what is no number has no forces, and settles
         arms = self.springs.arms.transpose(1, 2, 0)[..., self.place]
         balance = self.load[:, None] - np.einsum("wmn,wn->mn", arms, self.force)
@@ -233,8 +233,8 @@ class _Problems:
 
     def compressed(self) -> _Problems:
         """Leave out the problems that have ended."""
-        live, found = self.live, object.__new__(_Problems)
-        found.newton, found.springs = self.newton, self.springs
+        live, compressed = self.live, object.__new__(_Problems)
+        compressed.newton, compressed.springs = self.newton, self.springs
         for name in (
             "number",
             "place",
@@ -247,8 +247,8 @@ class _Problems:
             "between",
             "bent",
         ):
-            setattr(found, name, getattr(self, name)[..., live])
-        return found
+            setattr(compressed, name, getattr(self, name)[..., live])
+        return compressed
 
     def refresh(self) -> None:
         """Take the moments of the pressures from the forces as they are."""
@@ -272,8 +272,8 @@ class _Problems:
         counts = np.where(self.live, on.sum(axis=0), U + 1)
         order = np.argsort(counts, kind="stable")[: np.count_nonzero(self.live)]
         for first in range(0, len(order), _SIDE_BY_SIDE):
-            some = order[first : first + _SIDE_BY_SIDE]
-            self._eliminate(some, on, slope, gap, balance, change, moved)
+            problems = order[first : first + _SIDE_BY_SIDE]
+            self._eliminate(problems, on, slope, gap, balance, change, moved)
         length = np.ones(len(self.number))
         if careful:
             falls = on & (change < 0.0)
@@ -294,13 +294,13 @@ class _Problems:
             self.closed[overlap[:, more].argmin(axis=0), more] = True
         return ended
 
-    def _eliminate(self, some, on, slope, gap, balance, change, moved) -> None:
+    def _eliminate(self, problems, on, slope, gap, balance, change, moved) -> None:
         """Solve the linear equations of some problems: forces of the slots that are on, and motions.
 
         ``[[H, G], [G^T, -soft]]`` is symmetric, and definite in either block: elimination needs no exchange.
         """
-        (m, n), N = (len(balance), len(some)), self.between.shape[-1]
-        problem, slot = np.nonzero(on[:, some].T)
+        (m, n), N = (len(balance), len(problems)), self.between.shape[-1]
+        problem, slot = np.nonzero(on[:, problems].T)
         count = np.bincount(problem, minlength=n)
         size = int(count.max(initial=0))
         slots, rank = (
@@ -310,13 +310,13 @@ class _Problems:
         slots[rank, problem] = slot
         # problems of fewer slots than others have equations of nothing
         absent = np.arange(size)[:, None] >= count
-        cells, rows = slots * N + some, slots * (self.springs.count * N)
+        cells, rows = slots * N + problems, slots * (self.springs.count * N)
         system, between = np.empty((size + m, size + m + 1, n)), self.between.ravel()
         for k in range(size):
             between.take(rows[k] + cells[k:], out=system[k, k:size], mode="clip")
-        own = np.arange(size)
-        system[own, own] += slope.ravel().take(cells)
-        place = slots + self.place[some] * self.springs.count
+        diagonal = np.arange(size)
+        system[diagonal, diagonal] += slope.ravel().take(cells)
+        place = slots + self.place[problems] * self.springs.count
         for motion in range(m):
             self.springs.arms[..., motion].ravel().take(place, out=system[:size, size + motion], mode="clip")
         np.negative(gap.ravel().take(cells), out=system[:size, -1])
@@ -326,10 +326,10 @@ class _Problems:
             system[k, k] += absent[k]
         system[size:, size:-1] = 0.0
         system[range(size, size + m), range(size, size + m)] = -_SOFTEST
-        system[size:, -1] = balance[:, some]
+        system[size:, -1] = balance[:, problems]
         solution = solved_side_by_side(system)
-        change[slot, some[problem]] = solution[rank, problem]
-        moved[:, some] = -solution[size:]
+        change[slot, problems[problem]] = solution[rank, problem]
+        moved[:, problems] = -solution[size:]
 
     def mesh_stiffness(self, force: np.ndarray, ended: np.ndarray) -> np.ndarray:
         """Tangent stiffness (meshes, n) of every mesh at constant loads of the others; forces (U, n)."""
@@ -343,8 +343,8 @@ class _Problems:
         both = (slot[:, None] * springs.count + slot) * N + ended
         supports = springs.supports[place, slot[:, None], slot]
         system[:, :-1] = (self.between.ravel().take(both) - supports) * (loaded[:, None] & loaded)
-        own = np.arange(pairs)
-        system[own, own] = np.where(loaded, slope[slot, here], 1.0)
+        diagonal = np.arange(pairs)
+        system[diagonal, diagonal] = np.where(loaded, slope[slot, here], 1.0)
         system[:, -1] = loaded
         flat = system.reshape(pairs, pairs + 1, -1)
         return (loaded * solved_side_by_side(flat).reshape(loaded.shape)).sum(axis=0)

@@ -125,7 +125,7 @@ def _beyond(
     size = np.maximum(high - low, least[:, None])
     # what is zero throughout, as of planets that carry nothing, has no peaks
     size = np.where(size > 0.0, size, 1.0)
-    steepest = own = np.abs(slope)
+    steepest = steepness = np.abs(slope)
     steepest = np.maximum(steepest, np.maximum(np.roll(steepest, 1, axis=1), np.roll(steepest, -1, axis=1)))
     beyond = np.zeros(values.shape)
     for sign, extreme in ((1.0, high), (-1.0, -low)):
@@ -141,7 +141,7 @@ def _beyond(
         # each side goes on as a line up to a jump, which may lie anywhere; a mean slope beyond that of both
         # neighbours hides a steeper one as a jump does
         to_jump = np.maximum(begin + np.maximum(rising, 0.0) * length, end + np.maximum(falling, 0.0) * length)
-        most = np.where(jump | (other & (own >= steepest)), np.maximum(most, to_jump), most)
+        most = np.where(jump | (other & (steepness >= steepest)), np.maximum(most, to_jump), most)
         # stiffnesses and shares that are zero go on no lower
         bounded = (sign < 0.0) & (low == 0.0)
         beyond = np.maximum(beyond, np.where(bounded, 0.0, (most - extreme) / size))

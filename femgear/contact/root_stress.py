@@ -216,7 +216,7 @@ class RootCycle:
         slot = np.repeat(np.arange(slots), each)
         position = (start + slot) % self.periods * each + np.tile(np.arange(each), slots)
         values = self.path, self.load, self.stress, self.over_width
-        return _RootHistory(*(one[slot, position] for one in values))
+        return _RootHistory(*(value[slot, position] for value in values))
 
 
 @dataclass(frozen=True)
@@ -325,23 +325,23 @@ def root_waves(grid: Grid, gear: Gear, material: Material, wave_number: np.ndarr
     """
     along, stations = root_functionals(grid, gear, material, state="plane strain"), flank_stations(grid, gear)
     loads, columns = (
-        np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0)
-        for one in (flank_load_columns(grid, stations), along.columns)
+        np.insert(load_columns, range(2, len(load_columns) + 1, 2), 0.0, axis=0)
+        for load_columns in (flank_load_columns(grid, stations), along.columns)
     )
     if foundation is not None:
         rests = coo_array(foundation)
-        place = tuple(3 * (one // 2) + one % 2 for one in rests.coords)
+        place = tuple(3 * (coord // 2) + coord % 2 for coord in rests.coords)
         foundation = csc_array((rests.data, place), shape=(3 * grid.n_nodes,) * 2)
-    parts = [gear.face_width * one for one in wave_stiffness(grid, material)]
+    parts = [gear.face_width * width_matrix for width_matrix in wave_stiffness(grid, material)]
     axial = plane_modulus(material, "plane strain") * material.poisson_ratio
-    options, found = {"count": gear.teeth, "rim": "rim", "loads": loads}, []
+    options, influences = {"count": gear.teeth, "rim": "rim", "loads": loads}, []
     for k in wave_number:
         observed = columns.copy()
         observed[3 * along.nodes + 2, np.arange(len(along.nodes))] += axial * k
         matrix = (parts[0] + k * parts[1] + k**2 * parts[2]).tocsc()
         sector = condense_sector(grid, matrix, observations=observed, **options).supported(foundation)
-        found.append(observed_root_stress(gear, ObservedRoot(along, stations, sector)).influence)
-    return np.array(found)
+        influences.append(observed_root_stress(gear, ObservedRoot(along, stations, sector)).influence)
+    return np.array(influences)
 
 
 def computed_waves(slices: int) -> np.ndarray:
@@ -354,8 +354,8 @@ def _between_slices(slices: int) -> np.ndarray:
     """Parts (1 + K, N, N) of a slice's load in the stress of a slice, of the plane response and of waves."""
     if slices == 1:
         return np.ones((1, 1, 1))
-    T, known = cosines(slices), computed_waves(slices)
-    weights = not_a_knot(np.log(known), np.eye(len(known)), np.log(np.arange(1, slices)))
+    T, wave_numbers = cosines(slices), computed_waves(slices)
+    weights = not_a_knot(np.log(wave_numbers), np.eye(len(wave_numbers)), np.log(np.arange(1, slices)))
     waves = np.einsum("mk,ms,mt->kst", weights, T[1:], T[1:])
     return np.concatenate([np.full((1, slices, slices), 1.0 / slices), waves])
 
@@ -373,17 +373,17 @@ def root_stress_cycle(
     s = planetary_set
     slices = roots.loads(s, cycle, reverse=reverse)
     samples = np.arange(len(cycle.position))
-    found = {}
+    cycle_of = {}
     for number, root, acting in roots.of_bodies(s):
         teeth, step = [cycle.tooth[gear, mesh] for mesh, gear, _ in acting], s.senses[number]
         # one slot more at either end: the sun's teeth come one after another, the others the other way round
-        slots = [np.concatenate([one[:1] - step, one, one[-1:] + step]) for one in teeth]
+        slots = [np.concatenate([history[:1] - step, history, history[-1:] + step]) for history in teeth]
         # seen from behind the teeth are counted the other way round
         numbers = np.concatenate(slots) * (-1 if reverse else 1)
         field = body_stress(planetary_set, root, acting, slices, samples, numbers)
         for target, stress in zip(acting, np.split(field, len(acting)), strict=True):
-            found[target[:2]] = _root_cycle(s, s.gears[number].name, root, cycle, target, stress)
-    return tuple(found[mesh, gear] for mesh in range(len(planetary_set.meshes)) for gear in (0, 1))
+            cycle_of[target[:2]] = _root_cycle(s, s.gears[number].name, root, cycle, target, stress)
+    return tuple(cycle_of[mesh, gear] for mesh in range(len(planetary_set.meshes)) for gear in (0, 1))
 
 
 def root_ranges(
@@ -401,11 +401,11 @@ def root_ranges(
     state that tooth numbers and periods without a common divisor allow; otherwise each tooth has what the
     record shows of it. Largest and smallest stresses are those at the positions ``between`` too.
     """
-    found = {}
+    range_of = {}
     for number, root, acting in roots.of_bodies(planetary_set):
-        for one in _body_ranges(planetary_set, number, root, acting, (slices, *between), closes):
-            found[one.mesh, one.gear] = one
-    return tuple(found[mesh, gear] for mesh in range(len(planetary_set.meshes)) for gear in (0, 1))
+        for body_range in _body_ranges(planetary_set, number, root, acting, (slices, *between), closes):
+            range_of[body_range.mesh, body_range.gear] = body_range
+    return tuple(range_of[mesh, gear] for mesh in range(len(planetary_set.meshes)) for gear in (0, 1))
 
 
 def body_stress(
@@ -425,17 +425,17 @@ def body_stress(
     z, n, shape = len(root.influence), len(root.roll), (len(slices), len(samples))
     forces = {}
     for i, teeth in enumerate(slices):
-        for one in teeth.on_body(planetary_set, acting):
-            if one.load[samples].any():
-                own = forces.setdefault((one.tooth, one.flank), np.zeros((n, *shape)))
-                own[:, i] += _station_forces(one.roll[samples], one.load[samples], root.roll)
+        for tooth_load in teeth.on_body(planetary_set, acting):
+            if tooth_load.load[samples].any():
+                station_forces = forces.setdefault((tooth_load.tooth, tooth_load.flank), np.zeros((n, *shape)))
+                station_forces[:, i] += _station_forces(tooth_load.roll[samples], tooth_load.load[samples], root.roll)
     between = _between_slices(len(slices))
     waves = root.influence[None] if root.waves is None else np.array([root.influence, *root.waves])
     total = np.zeros((len(numbers) * root.influence.shape[1], math.prod(shape)))
-    for (tooth, flank), own in forces.items():
+    for (tooth, flank), station_forces in forces.items():
         columns = waves[:, (numbers - tooth) % z, :, flank * n : (flank + 1) * n]
         columns = np.moveaxis(columns, 0, -2).reshape(len(total), -1)
-        total += columns @ (between[:, None] @ own).reshape(-1, total.shape[1])
+        total += columns @ (between[:, None] @ station_forces).reshape(-1, total.shape[1])
     return total.reshape(len(numbers), -1, *shape)
 
 
@@ -476,22 +476,22 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, records, clos
     """Ranges of the roots of the acting flanks of one body under the loads of all slices of some records."""
     slices, *between = records
     z, m, S = len(root.influence), len(root.arc), len(slices)
-    teeth = replace(slices[0], path=np.mean([one.path for one in slices], axis=0))
+    teeth = replace(slices[0], path=np.mean([slice_teeth.path for slice_teeth in slices], axis=0))
     # with every period the sun's teeth go on to the next higher place, those of planets and ring back
     step = planetary_set.senses[number]
     alike = math.gcd(z, teeth.periods) if closes else z
     high, low = np.full((alike, 2 * m, S), -np.inf), np.full((alike, 2 * m, S), np.inf)
     worst = {}
-    one = closes and teeth.periods == 1
+    whole_turn = closes and teeth.periods == 1
     by_turn = (np.flatnonzero(teeth.turn == turn) for turn in np.unique(teeth.turn))
-    for samples in [_one_turn(teeth)] if one else by_turn:
+    for samples in [_one_turn(teeth)] if whole_turn else by_turn:
         field = body_stress(planetary_set, root, acting, slices, samples, np.arange(z))
         of_tooth = (np.arange(z) - step * teeth.turn[samples[0]]) % alike
         np.maximum.at(high, of_tooth, field.max(axis=-1))
         np.minimum.at(low, of_tooth, field.min(axis=-1))
         for target in acting:
-            found = _largest_tension(field, teeth, target, m, samples)
-            worst[target] = max(worst.get(target, found), found)
+            tension = _largest_tension(field, teeth, target, m, samples)
+            worst[target] = max(worst.get(target, tension), tension)
     for more in between:
         for turn in np.unique(more[0].turn):
             samples = np.flatnonzero(more[0].turn == turn)
@@ -501,10 +501,10 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, records, clos
             np.minimum.at(low, of_tooth, others.min(axis=-1))
     for target in acting:
         rows = slice(target[2] * m, (target[2] + 1) * m)
-        top, bottom = (one[:, rows].reshape(alike, -1) for one in (high, low))
+        top, bottom = (extreme[:, rows].reshape(alike, -1) for extreme in (high, low))
         widest = (top - bottom).argmax(axis=1)
-        own = np.arange(alike), widest
-        tooth = int((top - bottom)[own].argmax())
+        point_of = np.arange(alike), widest
+        tooth = int((top - bottom)[point_of].argmax())
         point, piece = divmod(int(widest[tooth]), S)
         # seen from behind the teeth are counted the other way round
         counted = (-1 if teeth.reverse else 1) * np.arange(z) % alike
@@ -517,10 +517,10 @@ def _body_ranges(planetary_set, number, root: _RootStress, acting, records, clos
             piece=piece,
             maximum=float(top[tooth, widest[tooth]]),
             minimum=float(bottom[tooth, widest[tooth]]),
-            tooth_maximum=top[own][counted],
-            tooth_minimum=bottom[own][counted],
+            tooth_maximum=top[point_of][counted],
+            tooth_minimum=bottom[point_of][counted],
             worst=worst[target][1:],
-            history=_history(field[:, rows][:, point, piece], teeth, start[:2], step) if one else None,
+            history=_history(field[:, rows][:, point, piece], teeth, start[:2], step) if whole_turn else None,
         )
 
 

@@ -51,7 +51,7 @@ class SliceSprings:
 
     Parameters
     ----------
-    found : Candidates
+    candidates : Candidates
         All windows, of spur teeth, with the pairs that the laws are of.
     tilting : TiltingMembers, optional
         Motions that differ from slice to slice; they follow the others.
@@ -59,7 +59,7 @@ class SliceSprings:
 
     def __init__(
         self,
-        found: Candidates,
+        candidates: Candidates,
         laws: PairLaws,
         waves: WidthWaves,
         slices: int,
@@ -68,11 +68,11 @@ class SliceSprings:
         self.pairs = pairs = PairSprings(laws)
         self.slices, self.T = slices, cosines(slices)[:WAVES]
         P, place, mesh = len(pairs.window), np.arange(len(pairs.window))[:, None], pairs.mesh[pairs.window]
-        self.mesh, pair = mesh, found.pair[place, pairs.window]
+        self.mesh, pair = mesh, candidates.pair[place, pairs.window]
         # the slot of every window at the position before, of those that were there
         same = (mesh[1:, :, None] == mesh[:-1, None]) & (pair[1:, :, None] == pair[:-1, None])
         self.before, self.new = same.argmax(axis=2), ~same.any(axis=2)
-        across = slice_compliance(found, place, (waves,), slices)[0][0]
+        across = slice_compliance(candidates, place, (waves,), slices)[0][0]
         self.tilts, self.soft = None, np.zeros(laws.approach.shape[1])
         if tilting is not None:
             window = np.arange(slices)[:, None]
@@ -94,14 +94,14 @@ class SliceSprings:
 
         ``between`` (P, U, U) is that between tooth pairs, the same in all slices, at the given state.
         """
-        S, T, own, M = self.slices, cosines(self.slices), np.arange(self.pairs.count), len(self.T)
+        S, T, same_pair, M = self.slices, cosines(self.slices), np.arange(self.pairs.count), len(self.T)
         X = across + between[..., None, None] * np.eye(S)
-        alone = np.einsum("ms,pust,mt->pum", T, X[:, own, own], T, optimize=True)
+        alone = np.einsum("ms,pust,mt->pum", T, X[:, same_pair, same_pair], T, optimize=True)
         # displacements fall as loads do, with the square of the wave number beside a kink
         weights = 1.0 / np.arange(M, S) ** 2
         self.h = alone[..., M:] @ weights / weights.sum() if M < S else 0.0 * alone[..., 0]
         diagonal = np.zeros(X.shape[:3])
-        diagonal[:, own, own] = self.h
+        diagonal[:, same_pair, same_pair] = self.h
         self.C = np.einsum("ms,puvst,kt->pumvk", self.T, X, self.T, optimize=True)
         self.C -= diagonal[:, :, None, :, None] * np.eye(M)[:, None]
         kept = np.einsum("ms,pumvk,kt->puvst", self.T, self.C, self.T, optimize=True)
@@ -115,7 +115,7 @@ class SliceSprings:
 
         pairs, place = self.pairs, np.arange(P)
         force = np.geomspace(pairs.forces[0], pairs.forces[-1], 8 * _STATIONS)
-        x = np.array([pairs.approaches(np.full((pairs.count, P), one), place)[0].T for one in force])
+        x = np.array([pairs.approaches(np.full((pairs.count, P), force_level), place)[0].T for force_level in force])
         x = np.maximum.accumulate(x + self.h * force[:, None, None], axis=0)
         self.ends = float(x[0].min()), float(x[-1].max())
         stations = np.linspace(np.log(self.ends[0]), np.log(self.ends[1]), _STATIONS)
@@ -228,10 +228,10 @@ class _SliceSpringNewton:
         self.motions[:, : self.shared] = pairs.motions[at]
         self.solved, self.slope = np.zeros(n, bool), np.zeros((U, n, S))
         # products of two waves, and which of them stands in every place of a matrix (M, M)
-        one, two = np.triu_indices(len(springs.T))
-        self.products = (springs.T[one] * springs.T[two]).T.copy()
+        row, column = np.triu_indices(len(springs.T))
+        self.products = (springs.T[row] * springs.T[column]).T.copy()
         self.place = np.zeros((len(springs.T),) * 2, int)
-        self.place[one, two] = self.place[two, one] = np.arange(len(one))
+        self.place[row, column] = self.place[column, row] = np.arange(len(row))
 
     def solve(self, start: tuple[np.ndarray, np.ndarray] | None) -> None:
         """Iterate from the given state, or from forces (U, n, S) and motions (n, m).
@@ -283,19 +283,19 @@ class _SliceSpringNewton:
 
     def _approach(self, motions: np.ndarray, slots: np.ndarray) -> np.ndarray:
         """Approach (u, n, S or 1) of some slots by motions (n, m)."""
-        found = (self.arms[slots] @ motions[:, : self.shared].T)[..., None]
+        approach = (self.arms[slots] @ motions[:, : self.shared].T)[..., None]
         if self.springs.tilts is not None:
             tilts = self.springs.tilts[self.at][slots]
-            found = found + np.einsum("nk,usk->uns", motions[:, self.shared :], tilts)
-        return found
+            approach = approach + np.einsum("nk,usk->uns", motions[:, self.shared :], tilts)
+        return approach
 
     def _carried(self, force: np.ndarray, slots: np.ndarray) -> np.ndarray:
         """Loads (n, m) on the motions by forces (u, n, S) of some slots."""
-        found = force.mean(axis=2).T @ self.arms[slots]
+        load = force.mean(axis=2).T @ self.arms[slots]
         if self.springs.tilts is not None:
             tilts = self.springs.tilts[self.at][slots]
-            found = np.hstack([found, np.einsum("uns,usk->nk", force, tilts) / force.shape[2]])
-        return found
+            load = np.hstack([load, np.einsum("uns,usk->nk", force, tilts) / force.shape[2]])
+        return load
 
     def _iterate(self, sets: np.ndarray, slots: np.ndarray) -> None:
         """Take steps for some sets, with some slots alone, until they have ended; keep what they end at."""
@@ -309,8 +309,8 @@ class _SliceSpringNewton:
         def by_all(values, matrix):
             """Products of a matrix (u k, u k) with values (u, n, k)."""
             shape = values.shape
-            found = values.swapaxes(0, 1).reshape(shape[1], -1) @ matrix
-            return found.reshape(shape[1], shape[0], -1).swapaxes(0, 1)
+            product = values.swapaxes(0, 1).reshape(shape[1], -1) @ matrix
+            return product.reshape(shape[1], shape[0], -1).swapaxes(0, 1)
 
         bent = between = beyond = np.zeros(0)
         for step in range(_MOST):
@@ -406,7 +406,7 @@ class _SliceSpringNewton:
         Tilts and twists follow; sprung members are left out, as in `femgear.contact.slices`.
         """
         springs, pairs = self.springs, self.springs.pairs
-        (_, n, S), M, found = self.force.shape, len(springs.T), np.zeros((self.force.shape[1], pairs.meshes))
+        (_, n, S), M, stiffness = self.force.shape, len(springs.T), np.zeros((self.force.shape[1], pairs.meshes))
         faint, C = FAINT * np.abs(self.load).max(), springs.C[self.at].copy()
         C[:, 0, :, 0] -= pairs.supports[self.at]
         slopes = np.where(self.force > faint, self.slope, 0.0)
@@ -422,8 +422,8 @@ class _SliceSpringNewton:
             if springs.tilts is not None:
                 right[:, size:, 0] -= np.einsum("uns,usk->nk", slopes[slots], springs.tilts[self.at][slots]) / S
             answer = np.linalg.solve(system, right)[:, :size, 0].reshape(n, len(slots), M)
-            found[:, mesh] = answer[..., 0].sum(axis=1) / np.sqrt(S)
-        return found
+            stiffness[:, mesh] = answer[..., 0].sum(axis=1) / np.sqrt(S)
+        return stiffness
 
 
 def _parted(bent: np.ndarray, between: np.ndarray, mean: np.ndarray) -> np.ndarray:

@@ -73,20 +73,20 @@ class SliceState:
         """Largest force of every spring in the slices that it stands for, (rows, W) [N]."""
         return self.force.reshape(len(laws.separation), -1, len(self.mesh)).max(axis=1)
 
-    def contact_width(self, found: Candidates, laws: PairLaws) -> np.ndarray:
+    def contact_width(self, candidates: Candidates, laws: PairLaws) -> np.ndarray:
         """Largest width of the contact of every spring along the profile, (rows, W) [m]."""
         touched = (laws.touching <= self.of_laws(laws)[..., None]).sum(axis=-1)
-        return touched * found.setup.cell[found.mesh]
+        return touched * candidates.setup.cell[candidates.mesh]
 
-    def overflows(self, found: Candidates, laws: PairLaws) -> bool:
+    def overflows(self, candidates: Candidates, laws: PairLaws) -> bool:
         """Whether a slice presses cells at the end of a window that is not the end of a flank."""
         reached = laws.touching[..., [0, -1]] <= self.of_laws(laws)[..., None]
-        return bool((reached & ~np.moveaxis(found.at_edge, 0, -1)).any())
+        return bool((reached & ~np.moveaxis(candidates.at_edge, 0, -1)).any())
 
-    def reaches_ends(self, found: Candidates, laws: PairLaws) -> np.ndarray:
+    def reaches_ends(self, candidates: Candidates, laws: PairLaws) -> np.ndarray:
         """Whether a contact reaches an end of a flank, (rows, W)."""
-        touched = (laws.touching <= self.of_laws(laws)[..., None]) & found.candidate
-        return found.at_flank_end(touched)
+        touched = (laws.touching <= self.of_laws(laws)[..., None]) & candidates.candidate
+        return candidates.at_flank_end(touched)
 
     def of_meshes(self) -> np.ndarray:
         """Force of every mesh per slice over the whole width [N], (P, N, meshes)."""
@@ -106,7 +106,7 @@ def largest_mean(load, *, axis: int) -> np.ndarray:
     # the mean is largest where one of its ends is that of a slice
     edges = np.arange(count + 1) / count
     start = np.unique(np.clip(np.concatenate([edges, edges - part]), 0.0, 1.0 - part).round(12))
-    first, last = (_between(total, one * count) for one in (start, start + part))
+    first, last = (_between(total, part_of_turn * count) for part_of_turn in (start, start + part))
     return (last - first).max(axis=-1) / part
 
 
@@ -117,7 +117,7 @@ def _between(values: np.ndarray, place: np.ndarray) -> np.ndarray:
 
 
 def solve_slices(
-    found: Candidates,
+    candidates: Candidates,
     laws: PairLaws,
     load,
     waves: WidthWaves,
@@ -134,7 +134,7 @@ def solve_slices(
 
     Parameters
     ----------
-    found : Candidates
+    candidates : Candidates
         All windows, with the pairs that the laws are of: at P positions, or, of helical teeth, in all N
         slices at each of them, (P N) rows.
     load : (m,) array
@@ -147,31 +147,33 @@ def solve_slices(
         Motions that differ from slice to slice; they follow the others.
     """
     parts, load, (P, N, _) = [], np.asarray(load, float), separations.shape
-    each = len(found.position) // P
+    each = len(candidates.position) // P
     for first in range(0, P, _TOGETHER):
-        some = np.arange(first, min(first + _TOGETHER, P))
-        rows = some[:, None] * each + np.arange(each)
-        smooth = found.images[:, rows]
-        across, *of_held = slice_compliance(found, rows, (waves,) if held is None else (waves, held[1]), N)
+        block = np.arange(first, min(first + _TOGETHER, P))
+        rows = block[:, None] * each + np.arange(each)
+        smooth = candidates.images[:, rows]
+        across, *of_held = slice_compliance(candidates, rows, (waves,) if held is None else (waves, held[1]), N)
         bodies = [(smooth, across)]
         if held is not None:
             bodies.append((held[0][:, rows], of_held[0]))
-        newton = _SliceNewton(laws, rows, load, across.sum(axis=0), separations[some], smooth[0], tilting)
+        newton = _SliceNewton(laws, rows, load, across.sum(axis=0), separations[block], smooth[0], tilting)
         # in the plane nothing tilts or winds up
         before = _of_one_slice(laws, rows, load, bodies) if each == 1 else []
         if tilting is not None:
             mesh, window = laws.mesh, np.arange(N)[:, None]
             coupling = tilting.coupling[mesh, window][:, :, mesh, window]
             newton.across = newton.across + coupling / newton.unit
-            bodies = [(one, change + coupling) for one, change in bodies]
+            bodies = [(body, change + coupling) for body, change in bodies]
         # a sector settles as its whole set does
-        solved = newton.solve(found.setup.images)
+        solved = newton.solve(candidates.setup.images)
         after = newton.tangents(bodies)
         after = [b - a for a, b in zip(before, after, strict=True)] if before else after
         # positions come first
         parts.append((*solved, after[0].swapaxes(0, 1), *after[1:]))
-    force, motions, iterations, residual, joint, *own = (np.concatenate(part) for part in zip(*parts, strict=True))
-    return SliceState(force, motions, laws.mesh, iterations, residual, tuple(own), joint.swapaxes(0, 1))
+    force, motions, iterations, residual, joint, *joint_motions = (
+        np.concatenate(part) for part in zip(*parts, strict=True)
+    )
+    return SliceState(force, motions, laws.mesh, iterations, residual, tuple(joint_motions), joint.swapaxes(0, 1))
 
 
 def _of_one_slice(laws: PairLaws, rows, load, bodies) -> list[np.ndarray]:
@@ -204,21 +206,23 @@ class _SliceNewton:
         plane = laws.loads[rows]
         field = (self.S @ plane.swapaxes(2, 3).reshape(P, L, 1, -1, 1))[..., 0]
         self.field = field + (plane.sum(axis=-1) @ laws.supports)[..., None]
-        self.plane, own = plane.sum(axis=-1), laws.motions[rows] / self.unit
-        self.motions = np.hstack([own.mean(axis=1), np.zeros((P, k))])
+        self.plane, motions = plane.sum(axis=-1), laws.motions[rows] / self.unit
+        self.motions = np.hstack([motions.mean(axis=1), np.zeros((P, k))])
         # of springs on the motions, over the unit
         self.springs = np.full(len(self.load), _SOFTEST)
         if tilting is not None:
             self.springs[len(load) :] += tilting.stiffness * self.unit
         there = np.isfinite(laws.separation[rows])
         self.apart = np.where(there, laws.separation[rows], 1.0)
-        there, self.apart, self.force = (np.repeat(one, self.each, axis=1) for one in (there, self.apart, self.plane))
+        there, self.apart, self.force = (
+            np.repeat(values, self.each, axis=1) for values in (there, self.apart, self.plane)
+        )
         self.widest = float(np.abs(np.where(there, self.apart + separations, 0.0)).max())
         self.closed, self.carrying = self.force > 0.0, None
         # at the given state the curves miss their own points by their interpolation
         self.refresh()
         missed = self.by_laws(self.force)[0] + self.force @ laws.supports / self.unit
-        missed -= np.repeat(own @ laws.approach.T, self.each, axis=1)
+        missed -= np.repeat(motions @ laws.approach.T, self.each, axis=1)
         self.apart = self.apart - np.where(self.force > 0.0, missed, 0.0) * self.unit + separations
         self.refresh()
 
@@ -305,7 +309,7 @@ class _SliceNewton:
         c, k, rows = at.shape[1], self.tilts.shape[-1], np.arange(P)[:, None]
         ones = (np.tile(self.laws.mesh, N)[at][..., None] == meshes) * on[..., None].astype(float)
         ones = np.concatenate([ones, np.zeros((P, k, len(meshes)))], axis=1)
-        found, A, slope = [], np.zeros((1, P, c + k, c + k)), self.gaps(self.force)[1]
+        blocks, A, slope = [], np.zeros((1, P, c + k, c + k)), self.gaps(self.force)[1]
         # a border of tilts is not symmetric
         solve = np.linalg.solve if k else _symmetric_solution
         moments = self._moments(self.force)
@@ -314,22 +318,22 @@ class _SliceNewton:
             images = len(across) if number == len(bodies) else 1
             A, alone = self._bordered(smooth[:images], across[:images], moments, slope, carrying), []
             for j in meshes:
-                own, some = _first(ones[:, :c, j] > 0.0)
-                own = np.hstack([own, np.ones((P, k), bool)])
-                some = np.hstack([some, np.tile(np.arange(c, c + k), (P, 1))])
+                carries, columns = _first(ones[:, :c, j] > 0.0)
+                carries = np.hstack([carries, np.ones((P, k), bool)])
+                columns = np.hstack([columns, np.tile(np.arange(c, c + k), (P, 1))])
                 part = np.where(
-                    own[:, :, None] & own[:, None],
-                    A[0, rows[..., None], some[:, :, None], some[:, None]],
-                    np.eye(own.shape[1]),
+                    carries[:, :, None] & carries[:, None],
+                    A[0, rows[..., None], columns[:, :, None], columns[:, None]],
+                    np.eye(carries.shape[1]),
                 )
-                own = np.where(some < c, own, False)
-                alone.append((own * solve(part, own[..., None].astype(float))[..., 0]).sum(axis=1))
-            found.append(np.stack(alone, axis=1) / (N * self.unit))
+                carries = np.where(columns < c, carries, False)
+                alone.append((carries * solve(part, carries[..., None].astype(float))[..., 0]).sum(axis=1))
+            blocks.append(np.stack(alone, axis=1) / (N * self.unit))
         if len(bodies) == 1:
-            return [np.zeros((1, P, 0, 0)), *found]
+            return [np.zeros((1, P, 0, 0)), *blocks]
         harmonics = cyclic_harmonics(A)
-        answers = [solve(harmonics[0].real, ones), *(solve(one, ones) for one in harmonics[1:])]
-        return [ones.swapaxes(1, 2) @ np.array(answers) / (N * self.unit), *found]
+        answers = [solve(harmonics[0].real, ones), *(solve(harmonic, ones) for harmonic in harmonics[1:])]
+        return [ones.swapaxes(1, 2) @ np.array(answers) / (N * self.unit), *blocks]
 
     def _bordered(self, smooth, across, moments, slope, carrying: _Carrying) -> np.ndarray:
         """Compliance between the loaded slices and to their images, (I, P, c + k, c + k), over the unit."""
@@ -339,20 +343,20 @@ class _SliceNewton:
         between = half.reshape(-1, P, L, W, self.each, 3, W) * mu.transpose(0, 1, 3, 4, 2)[:, :, None]
         between = between.sum(axis=-2).swapaxes(3, 4)
         # the springs contain what bodies yield under their own window
-        own = np.diagonal(self.smooth, axis1=2, axis2=4).transpose(0, 1, 4, 2, 3)
-        between[0][..., range(W), range(W)] -= np.einsum("plwsa,plwab,plwsb->plsw", mu, own, mu)
+        diagonal = np.diagonal(self.smooth, axis1=2, axis2=4).transpose(0, 1, 4, 2, 3)
+        between[0][..., range(W), range(W)] -= np.einsum("plwsa,plwab,plwsb->plsw", mu, diagonal, mu)
         between = between.reshape(-1, P, N, W, W) / self.unit
         between[0][..., range(W), range(W)] += slope
         across, on, at = across.reshape(-1, P, n, n), carrying.on, carrying.at
         c, k, tilts = at.shape[1], self.tilts.shape[-1], self.tilts.reshape(n, -1)[at] * on[..., None]
-        found = np.zeros((len(across), P, c + k, c + k))
-        for one, part, beside in zip(found, across, between, strict=True):
-            self._gather(one, part, beside, carrying, 1.0 / self.unit)
-        found[0][:, range(c), range(c)] += ~on
+        matrices = np.zeros((len(across), P, c + k, c + k))
+        for matrix, part, beside in zip(matrices, across, between, strict=True):
+            self._gather(matrix, part, beside, carrying, 1.0 / self.unit)
+        matrices[0][:, range(c), range(c)] += ~on
         # tilts follow the increments: the border of the rows that carry
-        found[..., :c, c:], found[..., c:, :c] = -tilts, tilts.swapaxes(1, 2) / N
-        found[..., range(c, c + k), range(c, c + k)] = self.springs[len(self.load) - k :]
-        return found
+        matrices[..., :c, c:], matrices[..., c:, :c] = -tilts, tilts.swapaxes(1, 2) / N
+        matrices[..., range(c, c + k), range(c, c + k)] = self.springs[len(self.load) - k :]
+        return matrices
 
     def _gather(self, system, across, between, carrying: _Carrying, factor=1.0) -> None:
         """Put compliances of the slices that carry into the first rows and columns of systems (P, ., .).
@@ -365,8 +369,8 @@ class _SliceNewton:
             np.multiply(whole.take(at, axis=0).take(at, axis=1), factor, out=part)
         if not carrying.on.all():
             block *= carrying.on[:, :, None] & carrying.on[:, None]
-        p, i, j, own, window, w = carrying.beside
-        block[p, i, j] += between[p, own, window, w]
+        p, i, j, other_window, window, w = carrying.beside
+        block[p, i, j] += between[p, other_window, window, w]
 
     def step(self, todo: np.ndarray, *, single: bool) -> np.ndarray:
         """Take a step where one is to do; how much forces change at most [N], endless while sides change."""
@@ -396,11 +400,16 @@ class _SliceNewton:
         gap, change = np.take_along_axis(gap.reshape(P, n), at, axis=1), np.zeros((P, n + m))
         for place in np.flatnonzero(todo | changed):
             # what is closed comes first
-            some = slice(int(on[place].sum()))
-            found = _bordered_solution(
-                block[place, some, some], G[place, some], self.springs, -gap[place, some], balance[place], N
+            carrying = slice(int(on[place].sum()))
+            solution = _bordered_solution(
+                block[place, carrying, carrying],
+                G[place, carrying],
+                self.springs,
+                -gap[place, carrying],
+                balance[place],
+                N,
             )
-            change[place, at[place, some]], change[place, n:] = found
+            change[place, at[place, carrying]], change[place, n:] = solution
         # pulls stay until the next step: motions belong to them
         self.force = np.where(self.closed, self.force + change[:, :n].reshape(P, N, W), 0.0)
         self.motions = self.motions + change[:, n:]
@@ -431,13 +440,13 @@ def _bordered_solution(
 
 def _symmetric_solution(matrices: np.ndarray, right: np.ndarray) -> np.ndarray:
     """Solve systems (..., n, n) that are Hermitian and mostly definite for right sides (..., n, k)."""
-    found = np.empty(right.shape, matrices.dtype)
+    solution = np.empty(right.shape, matrices.dtype)
     solver = _POSV[complex if np.iscomplexobj(matrices) else float]
     for place in np.ndindex(matrices.shape[:-2]):
-        _, found[place], failed = solver(matrices[place], right[place])
+        _, solution[place], failed = solver(matrices[place], right[place])
         if failed:
-            found[place] = np.linalg.solve(matrices[place], right[place])
-    return found
+            solution[place] = np.linalg.solve(matrices[place], right[place])
+    return solution
 
 
 @dataclass(frozen=True)

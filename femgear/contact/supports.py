@@ -287,9 +287,9 @@ def _one_side(planetary_set: GearSet, supports: Supports, back: bool) -> MovingM
     bearing = 0.0 if supports.planet_clearance else supports.planet
     branch = np.array([mesh.copy for mesh in s.meshes])[:, None]
     moved += [(f"planet {n + 1}", bearing, np.where(branch == n, motions["carrier"], 0.0)) for n in range(s.n_planets)]
-    found = [(name, value, effect) for name, value, effect in moved if value is not None]
+    yielding = [(name, value, effect) for name, value, effect in moved if value is not None]
     return MovingMembers(
-        names=tuple(f"{name}: {axis}" for name, _, _ in found for axis in "xy"),
-        approach=np.hstack([np.zeros((len(s.meshes), 0)), *(effect for _, _, effect in found)]),
-        stiffness=np.array([value for _, value, _ in found for _ in "xy"], float),
+        names=tuple(f"{name}: {axis}" for name, _, _ in yielding for axis in "xy"),
+        approach=np.hstack([np.zeros((len(s.meshes), 0)), *(effect for _, _, effect in yielding)]),
+        stiffness=np.array([value for _, value, _ in yielding for _ in "xy"], float),
     )

@@ -191,15 +191,15 @@ def deformed_set(
     tenths of a micrometre deep, is not part of the field. The torque is on the left flanks of the sun (mirror
     the set otherwise); ``position`` is an index into ``cycle.position``.
     """
-    s, found = planetary_set, []
+    s, deformed = planetary_set, []
     at = orientations(s, float(cycle.position[position]))
     teeth, bodies = loaded_teeth(cycle, reverse=False), acting_flanks(s)
     for body, (number, acting) in zip(s.bodies, bodies, strict=True):
         moved = _displacement(teeth, s, sectors.gears[number], acting, position)
         centre, angle = s.centres[number][body.copy], at.gears[number][body.copy]
         place = np.array([centre.real, centre.imag])
-        found.append(DeformedBody(body.name, s.gears[number].name, place, float(angle), moved))
-    return tuple(found)
+        deformed.append(DeformedBody(body.name, s.gears[number].name, place, float(angle), moved))
+    return tuple(deformed)
 
 
 def _engagement_peaks(teeth: LoadedTeeth, closes: bool) -> np.ndarray:
@@ -228,11 +228,11 @@ def _displacement(teeth: LoadedTeeth, planetary_set, sector: Sector, acting, pos
     left = flank_load_columns(sector.grid, stations)
     columns = (left, mirrored_columns(left, mirror_nodes(sector.grid)))
     loads = np.zeros((sector.gear.teeth, left.shape[0]))
-    for one in teeth.on_body(planetary_set, acting):
-        if one.load[position] > 0.0:
-            number = (one.tooth + one.step * teeth.turn[position]) % sector.gear.teeth
-            hat = _hat(one.roll[position], stations.roll)
-            loads[number] += one.load[position] * (columns[one.flank] @ hat)
+    for tooth_load in teeth.on_body(planetary_set, acting):
+        if tooth_load.load[position] > 0.0:
+            number = (tooth_load.tooth + tooth_load.step * teeth.turn[position]) % sector.gear.teeth
+            hat = _hat(tooth_load.roll[position], stations.roll)
+            loads[number] += tooth_load.load[position] * (columns[tooth_load.flank] @ hat)
     return cyclic_displacement(sector.grid, sector.stiffness, loads, held="rim")
 
 

@@ -149,11 +149,11 @@ class CondensedWaves:
         support = None
         if foundation is not None:
             entries = coo_array(foundation / gear.face_width)
-            place = tuple(3 * (one // 2) + one % 2 for one in entries.coords)
+            place = tuple(3 * (coord // 2) + coord % 2 for coord in entries.coords)
             support = csc_array((entries.data, place), shape=(3 * grid.n_nodes,) * 2)
         corner = tip_corner(gear, material)
         arc = stations.roll**2 / (2 * gear.base_radius)
-        offset, found = arc[:, None] - arc[None, :], []
+        offset, compliances = arc[:, None] - arc[None, :], []
         for k, free in zip(self.wave_number, self.waves, strict=True):
             change = tooth_compliance(free.supported(support)) - uniform
             once, twice = (
@@ -163,8 +163,10 @@ class CondensedWaves:
             )
             local = np.tile((2 * once - twice) / self.width, (2, 1, 1))
             regular = regular_compliance(change / self.width, local)
-            found.append(FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0))
-        return found
+            compliances.append(
+                FlankCompliance(stations.roll, gear.base_radius, regular, depths[:, 0], corner, local, 0)
+            )
+        return compliances
 
 
 def condensed_waves(sector: Sector, material: Material, slices: int, width: float) -> CondensedWaves:
@@ -177,18 +179,20 @@ def condensed_waves(sector: Sector, material: Material, slices: int, width: floa
     thickness: Any = {"tooth": 1.0, "body": gear.face_width / width} if gear.face_width > width else 1.0
     plane = stiffness(grid, material, state=state, thickness=thickness)
     uniform = condense_sector(grid, plane, loads=loads, observations=observations, **options)
-    loads, observations = (np.insert(one, range(2, len(one) + 1, 2), 0.0, axis=0) for one in (loads, observations))
+    loads, observations = (
+        np.insert(columns, range(2, len(columns) + 1, 2), 0.0, axis=0) for columns in (loads, observations)
+    )
     k = np.pi / width * np.geomspace(1.0, max(slices - 1, 2), min(_WAVES, max(slices - 1, 2)))
     parts, powers = wave_stiffness(grid, material), k[:, None] ** np.arange(3)
     waves = condense_sums(grid, parts, powers, loads=loads, observations=observations, **options)
-    found = CondensedWaves(sector, material, k, width, uniform, tuple(waves))
-    _ = found.held  # every set needs it, if only beside that on a foundation
-    return found
+    condensed = CondensedWaves(sector, material, k, width, uniform, tuple(waves))
+    _ = condensed.held  # every set needs it, if only beside that on a foundation
+    return condensed
 
 
 def common_width(gears: Sequence[Gear]) -> tuple[float, ...]:
     """Find the face width that both gears of every kind of mesh have in common [m]."""
-    return tuple(min(pair) for pair in pairwise(one.face_width for one in gears))
+    return tuple(min(pair) for pair in pairwise(gear.face_width for gear in gears))
 
 
 def width_waves(
@@ -203,9 +207,9 @@ def width_waves(
     ``material`` is that of the sectors, or one for each; ``ring_foundation`` and ``helical`` as in
     `waves_of_gears`.
     """
-    width, gears = common_width([one.gear for one in sectors.gears])[0], sectors.gears
+    width, gears = common_width([sector.gear for sector in sectors.gears])[0], sectors.gears
     materials = material_of_each(material, len(gears))
-    condensed = [condensed_waves(one, of, slices, width) for one, of in zip(gears, materials, strict=True)]
+    condensed = [condensed_waves(sector, of, slices, width) for sector, of in zip(gears, materials, strict=True)]
     return waves_of_gears(condensed, ring_foundation, helical)
 
 
@@ -215,9 +219,11 @@ def waves_of_gears(gears: Sequence[CondensedWaves], ring_foundation=None, helica
     ``ring_foundation`` (2n, 2n) [N/m] is that of the ring over its face width, which otherwise is held;
     ``helical`` as in `Bodies`.
     """
-    common, ring = common_width([one.sector.gear for one in gears]), gears[-1] if len(gears) > 2 else None
-    bodies = zip(*(one.held for one in gears), strict=True)
-    waves = WidthWaves(gears[0].wave_number, tuple(Bodies(one, common, helical) for one in bodies), ring)
+    common, ring = common_width([gear_waves.sector.gear for gear_waves in gears]), gears[-1] if len(gears) > 2 else None
+    bodies = zip(*(gear_waves.held for gear_waves in gears), strict=True)
+    waves = WidthWaves(
+        gears[0].wave_number, tuple(Bodies(gear_bodies, common, helical) for gear_bodies in bodies), ring
+    )
     return waves if ring_foundation is None else with_ring_waves(waves, ring_foundation)
 
 
@@ -226,7 +232,9 @@ def with_ring_waves(waves: WidthWaves, foundation=None) -> WidthWaves:
     ring = waves.ring
     assert ring is not None
     rings = ring.held if foundation is None else ring.supported(foundation)
-    bodies = (one.with_gear(-1, of_wave) for one, of_wave in zip(waves.bodies, rings, strict=True))
+    bodies = (
+        bodies_of_wave.with_gear(-1, of_wave) for bodies_of_wave, of_wave in zip(waves.bodies, rings, strict=True)
+    )
     return replace(waves, bodies=tuple(bodies))
 
 
@@ -236,13 +244,15 @@ def cosines(slices: int) -> np.ndarray:
     return np.sqrt(np.where(m == 0, 1.0, 2.0) / slices) * np.cos(np.pi * m * z)
 
 
-def slice_compliance(found: Candidates, rows: np.ndarray, waves: Sequence[WidthWaves], slices: int) -> list[np.ndarray]:
+def slice_compliance(
+    candidates: Candidates, rows: np.ndarray, waves: Sequence[WidthWaves], slices: int
+) -> list[np.ndarray]:
     """Compute the compliance between the slices of all windows beyond the plane one [m/N].
 
     For each of several ``waves`` of the same material, whose gears may be the same ones. (I, P, N, W, N, W),
     images as of `Candidates`; ``rows`` are positions (P, 1), of helical teeth (P, N).
     """
-    setup, W, (P, each) = found.setup, len(found.mesh), rows.shape
+    setup, W, (P, each) = candidates.setup, len(candidates.mesh), rows.shape
     if slices == 1:
         return [np.zeros((setup.images, P, 1, W, 1, W)) for _ in waves]
     wave_number = waves[0].wave_number
@@ -250,10 +260,10 @@ def slice_compliance(found: Candidates, rows: np.ndarray, waves: Sequence[WidthW
     # weights of the waves that were computed in those of the slices, which are cubics between them
     between = not_a_knot(np.log(wave_number), np.eye(len(wave_number)), np.log(wanted))
     if each > 1:
-        return _along_helix(found, rows, waves, wanted, between)
-    place, kind = rows[:, 0], setup.kind(found.mesh)
-    there = np.asarray(found.candidate.any(axis=-1))
-    windows = found.mesh, found.pair[place], there[place], found.position[place]
+        return _along_helix(candidates, rows, waves, wanted, between)
+    place, kind = rows[:, 0], setup.kind(candidates.mesh)
+    there = np.asarray(candidates.candidate.any(axis=-1))
+    windows = candidates.mesh, candidates.pair[place], there[place], candidates.position[place]
     T = cosines(slices)[1:]
     alone = T[:, :, None] * T[:, None, :]
     shapes = np.tensordot(between, alone, (0, 0)).reshape(len(wave_number), -1)
@@ -266,7 +276,7 @@ def slice_compliance(found: Candidates, rows: np.ndarray, waves: Sequence[WidthW
         _add_between(across, setup, bodies[0], table, windows, *on_body)
 
     result = []
-    for change in _over_bodies(found, windows, waves, add, (len(wave_number),)):
+    for change in _over_bodies(candidates, windows, waves, add, (len(wave_number),)):
         change = change / np.sqrt(softer[:, None] * softer)[..., None]
         across = (change @ shapes).reshape(*change.shape[:-1], slices, slices)
         across[0][:, range(W), range(W)] += local
@@ -274,40 +284,40 @@ def slice_compliance(found: Candidates, rows: np.ndarray, waves: Sequence[WidthW
     return result
 
 
-def _over_bodies(found: Candidates, windows, waves: Sequence[WidthWaves], add, further=()) -> list[np.ndarray]:
+def _over_bodies(candidates: Candidates, windows, waves: Sequence[WidthWaves], add, further=()) -> list[np.ndarray]:
     """Sum up what all bodies yield between windows and their images under each waves, (I, P, W, W, *further).
 
     ``add(across, bodies, members, gear, side)`` adds one gear by its compliances under all waves. Gears that
     are the same in all are added once.
     """
-    setup, count = found.setup, windows[1].shape[1]
+    setup, count = candidates.setup, windows[1].shape[1]
     shape = setup.images, len(windows[1]), count, count, *further
-    shared, own = np.zeros(shape), [np.zeros(shape) for _ in waves[1:]]
-    own = [np.zeros(shape if own else 1), *own]
+    shared, per_set = np.zeros(shape), [np.zeros(shape) for _ in waves[1:]]
+    per_set = [np.zeros(shape if per_set else 1), *per_set]
     for number, *on_body in windows_of_bodies(setup.gears, windows[0]):
-        of_waves = [[one.gears[number] for one in of_set.bodies] for of_set in waves]
+        of_waves = [[set_bodies.gears[number] for set_bodies in of_set.bodies] for of_set in waves]
         if of_waves[0][0] is None:
             continue
         sectors = slice(1) if setup.gears.repeated[number] else slice(None)
         if all(bodies[0] is of_waves[0][0] for bodies in of_waves):
             add(shared[sectors], of_waves[0], *on_body)
             continue
-        for across, bodies in zip(own, of_waves, strict=True):
+        for across, bodies in zip(per_set, of_waves, strict=True):
             add(across[sectors], bodies, *on_body)
-    return [shared + one for one in own]
+    return [shared + part for part in per_set]
 
 
-def _along_helix(found: Candidates, rows, waves: Sequence[WidthWaves], wave_number, between) -> list[np.ndarray]:
+def _along_helix(candidates: Candidates, rows, waves: Sequence[WidthWaves], wave_number, between) -> list[np.ndarray]:
     """`slice_compliance` of helical teeth, whose slices are at positions of their own.
 
     ``between`` (N - 1, K) are the weights of the waves that were computed in those of ``wave_number``.
     """
-    setup, W, (P, N) = found.setup, len(found.mesh), rows.shape
+    setup, W, (P, N) = candidates.setup, len(candidates.mesh), rows.shape
     windows = (
-        np.tile(found.mesh, N),
-        found.pair[rows].reshape(P, N * W),
-        np.asarray(found.candidate.any(axis=-1))[rows].reshape(P, N * W),
-        np.repeat(found.position[rows], W, axis=1),
+        np.tile(candidates.mesh, N),
+        candidates.pair[rows].reshape(P, N * W),
+        np.asarray(candidates.candidate.any(axis=-1))[rows].reshape(P, N * W),
+        np.repeat(candidates.position[rows], W, axis=1),
         np.repeat(np.arange(N), W),
     )
     # 2 cos(a z) cos(a z') = cos(a (z - z')) + cos(a (z + z')): of the distance of slices, and of images
@@ -319,20 +329,20 @@ def _along_helix(found: Candidates, rows, waves: Sequence[WidthWaves], wave_numb
     def add(across, bodies: list[FlankCompliance], *on_body) -> None:
         """Add one body, by its compliance between slices; of sun and ring one flank carries."""
         (members, gear, side), n = on_body, len(bodies[0].roll)
-        known = id(bodies[0])
-        if known not in tables:
+        body_key = id(bodies[0])
+        if body_key not in tables:
             first = side[0] * n if (side == side[0]).all() else 0
             part = slice(first, first + n if (side == side[0]).all() else None)
-            regular = np.array([one.regular[:, part, part] for one in bodies])
+            regular = np.array([body.regular[:, part, part] for body in bodies])
             table = ((between.T @ over).T @ regular.reshape(len(bodies), -1)).reshape(-1, *regular.shape[1:])
-            tables[known] = table[apart] + table[images], side - first // n
-        table, side = tables[known]
+            tables[body_key] = table[apart] + table[images], side - first // n
+        table, side = tables[body_key]
         _add_between(across, setup, bodies[0], table, windows, members, gear, side)
 
     beside = np.zeros((P, N * W, N * W))
     _add_beside(beside, setup, waves[0], windows, wave_number, over)
     root, result = np.sqrt(waves[0].bodies[0].of_kinds(setup.kind(windows[0]))), []
-    for across in _over_bodies(found, windows, waves, add):
+    for across in _over_bodies(candidates, windows, waves, add):
         across[0] += beside
         across /= root[:, None] * root
         result.append(across.reshape(-1, P, N, W, N, W))
@@ -359,20 +369,20 @@ def _add_between(across, setup, body: FlankCompliance, table, windows, members, 
         # what an image does to its original, the original does to the image on the other side
         alone = 2 * image % len(across) == 0
         for p in range(len(pair)):
-            some = np.flatnonzero(there[p])
-            every = np.triu_indices(len(some)) if alone else np.indices((len(some),) * 2).reshape(2, -1)
-            one, two = some[every[0]], some[every[1]]
-            lag = (tooth[p, one] - tooth[p, two] - image * count // len(across)) % count
-            places = first[p, one], first[p, two]
-            weights = weight[p, one][:, :, None] * weight[p, two][:, None, :]
+            windows_here = np.flatnonzero(there[p])
+            every = np.triu_indices(len(windows_here)) if alone else np.indices((len(windows_here),) * 2).reshape(2, -1)
+            window_1, window_2 = windows_here[every[0]], windows_here[every[1]]
+            lag = (tooth[p, window_1] - tooth[p, window_2] - image * count // len(across)) % count
+            places = first[p, window_1], first[p, window_2]
+            weights = weight[p, window_1][:, :, None] * weight[p, window_2][:, None, :]
             if piece:
-                slices = piece[0][members[one]], piece[0][members[two]]
+                slices = piece[0][members[window_1]], piece[0][members[window_2]]
                 values = np.einsum("nab,nab->n", blocks[*slices, lag, *places], weights)
             else:
                 values = np.einsum("nkab,nab->nk", blocks[lag, :, *places], weights)
-            other = one != two if alone else slice(None)
-            across[image, p, members[one], members[two]] += values
-            across[-image, p, members[two[other]], members[one[other]]] += values[other]
+            other = window_1 != window_2 if alone else slice(None)
+            across[image, p, members[window_1], members[window_2]] += values
+            across[-image, p, members[window_2[other]], members[window_1[other]]] += values[other]
 
 
 def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) -> None:
@@ -380,20 +390,20 @@ def _add_beside(across, setup, waves: WidthWaves, windows, wave_number, over) ->
     mesh, pair, there, position, piece = windows
     for number in np.unique(mesh):
         members = np.flatnonzero(mesh == number)
-        one, two = (members[rows] for rows in np.triu_indices(len(members)))
-        p, same = np.nonzero((pair[:, one] == pair[:, two]) & there[:, one] & there[:, two])
-        one, two, local = one[same], two[same], np.zeros(len(p))
-        shape = over[:, np.abs(piece[one] - piece[two])] + over[:, piece[one] + piece[two] + 1]
+        window_1, window_2 = (members[rows] for rows in np.triu_indices(len(members)))
+        p, same = np.nonzero((pair[:, window_1] == pair[:, window_2]) & there[:, window_1] & there[:, window_2])
+        window_1, window_2, local = window_1[same], window_2[same], np.zeros(len(p))
+        shape = over[:, np.abs(piece[window_1] - piece[window_2])] + over[:, piece[window_1] + piece[window_2] + 1]
         for gear, body in enumerate(setup.gears.mates[setup.kind(number)]):
             flank = waves.bodies[0].gears[body]
-            rolls = (setup.roll[gear, number, position[p, w], pair[p, w], 1] for w in (one, two))
+            rolls = (setup.roll[gear, number, position[p, w], pair[p, w], 1] for w in (window_1, window_2))
             arcs = [roll**2 / (2 * flank.base_radius) for roll in rolls]
             factor = (1 - flank.corner.poisson_ratio) / (np.pi * flank.corner.shear_modulus * waves.width)
             beside = _beside(np.abs(arcs[0] - arcs[1]), wave_number[:, None])
             local += factor * (shape * beside).sum(axis=0)
-        across[p, one, two] += local
-        off = one != two
-        across[p[off], two[off], one[off]] += local[off]
+        across[p, window_1, window_2] += local
+        off = window_1 != window_2
+        across[p[off], window_2[off], window_1[off]] += local[off]
 
 
 def _beside(distance, wave_number) -> np.ndarray:
@@ -401,5 +411,7 @@ def _beside(distance, wave_number) -> np.ndarray:
     from scipy.special import k0
 
     near = wave_number * distance < 1e-6
-    some = np.where(near, 1.0, distance)
-    return np.where(near, -np.log(wave_number / 2) - np.euler_gamma, k0(wave_number * some) + np.log(some))
+    regular_distance = np.where(near, 1.0, distance)
+    return np.where(
+        near, -np.log(wave_number / 2) - np.euler_gamma, k0(wave_number * regular_distance) + np.log(regular_distance)
+    )

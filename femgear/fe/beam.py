@@ -253,12 +253,12 @@ def beam_shaft(
     stations, elements = [0.0], []
     for number, part in enumerate(parts):
         left, right = edges[number], edges[number + 1]
-        own = cuts[(cuts >= left) & (cuts <= right)]
-        for start, end in pairwise(own):
+        cuts_inside = cuts[(cuts >= left) & (cuts <= right)]
+        for start, end in pairwise(cuts_inside):
             count = max(math.ceil((end - start) / longest * (1.0 - 1e-9)), _taper_count(part, start - left, end - left))
             inner = start + (end - start) * np.arange(count + 1) / count
             inner[-1] = end
-            elements += [(part, one - left, two - left) for one, two in pairwise(inner)]
+            elements += [(part, near_end - left, far_end - left) for near_end, far_end in pairwise(inner)]
             stations += inner[1:].tolist()
     size = 6 * len(stations)
     total = np.zeros((3, size, size))
@@ -482,9 +482,9 @@ def _conical_element(part: ShaftPart, start: float, end: float) -> tuple[np.ndar
     stiffness = np.linalg.inv(flexibility)
     # deflection and tilt of the right end beyond those of the rigid body that moves with the left end
     beyond = np.array([[-1.0, -length, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]])
-    forces, one, zero = stiffness @ beyond, np.ones_like(x), np.zeros_like(x)
-    w = np.column_stack([one, x, zero, zero]) + deflection @ forces
-    psi = np.column_stack([zero, one, zero, zero]) + tilt @ forces
+    forces, ones, zero = stiffness @ beyond, np.ones_like(x), np.zeros_like(x)
+    w = np.column_stack([ones, x, zero, zero]) + deflection @ forces
+    psi = np.column_stack([zero, ones, zero, zero]) + tilt @ forces
     tilting = (psi.T * (weights * rotary)) @ psi
     plane = (w.T * (weights * area)) @ w + tilting
     along, along_mass = _two_ended(stretch / part.young, area, weights, integral)

@@ -61,12 +61,12 @@ class SectorSchur:
     observation_cut: np.ndarray
     components: int = 2
 
-    def observed(self, some: slice) -> SectorSchur:
+    def observed(self, observations: slice) -> SectorSchur:
         """Give the same sector with some of the observations."""
         return replace(
             self,
-            compliance=self.compliance[:, some],
-            observation_cut=self.observation_cut[..., some],
+            compliance=self.compliance[:, observations],
+            observation_cut=self.observation_cut[..., observations],
         )
 
     def packed(self) -> SectorSchur:
@@ -351,13 +351,13 @@ def _half_sector_fields(
     # of a node on the centre line both are one displacement, and the other one is zero
     once = diags_array(1.0 / np.repeat(1.0 + on_axis, components))
     mirrored = np.array([1.0, -1.0, 1.0])[:components]
-    found = []
+    of_halves = []
     for sign in (1.0, -1.0):
         reflected = diags_array(np.tile(sign * mirrored, len(points))) @ half[node_dofs(image, components)]
         fields = csc_array(once @ (half + reflected))
         moved = np.flatnonzero(abs(fields).sum(axis=0))
-        found.append((fields[:, moved], int((moved < len(at) - components * len(rim)).sum())))
-    return found
+        of_halves.append((fields[:, moved], int((moved < len(at) - components * len(rim)).sum())))
+    return of_halves
 
 
 def _sparse_order(triangles, nodes, count: int) -> np.ndarray:
@@ -384,7 +384,7 @@ def _schur_complements(parts, factors, columns, inner: int) -> list[np.ndarray]:
     border = block_array([[diags_array(signs[:size]), columns], [columns.T, diags_array(signs[size:])]])
     of_diagonal = [part.diagonal()[:inner].mean() for part in parts]
     whole, values = _one_pattern([*parts, border], size + count)
-    last, found = slice(inner, None), []
+    last, complements = slice(inner, None), []
     right = np.zeros(size + count)
     right[last] = np.random.default_rng(0).standard_normal(size + count - inner)
     for row in np.asarray(factors, float):
@@ -398,8 +398,8 @@ def _schur_complements(parts, factors, columns, inner: int) -> list[np.ndarray]:
         _check_residual(max(np.abs(residual).max() for residual in missed))
         schur -= np.diag(diagonal * signs[last])
         unscale = np.append(np.ones(size - inner), length / diagonal)
-        found.append(unscale[:, None] * schur * unscale)
-    return found
+        complements.append(unscale[:, None] * schur * unscale)
+    return complements
 
 
 def _one_pattern(parts, size: int) -> tuple[csc_array, np.ndarray]:
@@ -407,13 +407,13 @@ def _one_pattern(parts, size: int) -> tuple[csc_array, np.ndarray]:
     entries = [csc_array(part) for part in parts]
     for part in entries:
         part.sum_duplicates()
-    ones = [_enlarged(one, size) for one in entries]
+    ones = [_enlarged(entry, size) for entry in entries]
     whole = csc_array(sum(ones[1:], start=ones[0]))
     # entries by their numbers, of which every part picks its own
     whole.data = np.arange(1.0, whole.nnz + 1.0)
     values = np.zeros((len(parts), whole.nnz))
-    for row, one, part in zip(values, ones, entries, strict=True):
-        row[one.multiply(whole).tocsc().data.astype(int) - 1] = part.data
+    for row, pattern, part in zip(values, ones, entries, strict=True):
+        row[pattern.multiply(whole).tocsc().data.astype(int) - 1] = part.data
     return whole, values
 
 
@@ -427,11 +427,11 @@ def _enlarged(matrix: csc_array, size: int) -> csc_array:
 def _last_columns(matrix: csc_array, inner: int) -> np.ndarray:
     """Entries of a sparse matrix beyond its first `inner` rows and columns, dense."""
     start, count = matrix.indptr[inner], matrix.indptr.size - 1 - inner
-    rows, found = matrix.indices[start:], np.zeros((count, count))
+    rows, corner = matrix.indices[start:], np.zeros((count, count))
     columns = np.repeat(np.arange(count), np.diff(matrix.indptr[inner:]))
     beyond = rows >= inner
-    found[rows[beyond] - inner, columns[beyond]] = matrix.data[start:][beyond]
-    return found
+    corner[rows[beyond] - inner, columns[beyond]] = matrix.data[start:][beyond]
+    return corner
 
 
 @dataclass(frozen=True)
@@ -514,11 +514,11 @@ def static_cut_shapes(schur: SectorSchur, harmonics) -> np.ndarray:
 
     Of the symmetric and the antisymmetric part of every load in each cyclic harmonic.
     """
-    found = []
+    shapes = []
     for n in harmonics:
         ties, A = _tied(schur, n)
-        found.append(np.linalg.solve(A, np.concatenate(ties * schur.load_cut, axis=1)))
-    return np.hstack([np.hstack([shape[0::2], shape[1::2]]) for shape in found])
+        shapes.append(np.linalg.solve(A, np.concatenate(ties * schur.load_cut, axis=1)))
+    return np.hstack([np.hstack([shape[0::2], shape[1::2]]) for shape in shapes])
 
 
 def sector_harmonics(schur: SectorSchur, harmonics) -> np.ndarray:
@@ -589,9 +589,9 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
     for sector in sectors:
         on_sector = sector.fields.T @ forces
         parts = on_sector[: sector.inner]
-        found = sector.held(np.hstack([parts.real, parts.imag]))
+        solution = sector.held(np.hstack([parts.real, parts.imag]))
         interior, schur = sector.on_cut(np.eye(len(on_sector) - sector.inner))
-        solved.append((interior, found[:, :n_h] + 1j * found[:, n_h:]))
+        solved.append((interior, solution[:, :n_h] + 1j * solution[:, n_h:]))
         pulls.append(on_sector[sector.inner :] + interior.T @ parts)
         schurs.append(schur)
     on_cut = np.empty((2, len(schurs[0]), n_h), complex)
@@ -601,8 +601,8 @@ def cyclic_displacement(grid: Grid, stiffness, loads: np.ndarray, *, held: str |
         w = np.linalg.solve(tied, ties[0] * pulls[0][:, n] - 1j * ties[1] * pulls[1][:, n])
         on_cut[:, :, n] = ties[0] * w, 1j * ties[1] * w
     field = sum(
-        sector.fields @ np.vstack([own + interior @ cut, cut])
-        for sector, (interior, own), cut in zip(sectors, solved, on_cut, strict=True)
+        sector.fields @ np.vstack([interior_solution + interior @ cut, cut])
+        for sector, (interior, interior_solution), cut in zip(sectors, solved, on_cut, strict=True)
     )
     return np.fft.irfft(field, n=count, axis=1).T.reshape(count, -1, 2)
 
@@ -636,7 +636,7 @@ def rim_compliance(grid: Grid, stiffness, *, count: int, orders) -> np.ndarray:
     right = np.kron(np.eye(len(cuts[0])), [[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
     polar = block_array([[right, None, None], [None, right.T, None], [None, None, eye_array(2 * len(inside))]])
     polar = polar.toarray()
-    schur, found = polar.T @ _condensed(stiffness, kept) @ polar, np.empty((len(orders), 2, 2), complex)
+    schur, compliance = polar.T @ _condensed(stiffness, kept) @ polar, np.empty((len(orders), 2, 2), complex)
     rest = np.r_[:size, 2 * size : len(kept)]
     for i, order in enumerate(orders):
         lag = np.exp(2j * turn * order)
@@ -645,8 +645,8 @@ def rim_compliance(grid: Grid, stiffness, *, count: int, orders) -> np.ndarray:
         both[:, :size] += lag * schur[:, size : 2 * size]
         load[:size] += lag.conjugate() * load[size : 2 * size]
         both[:size] += lag.conjugate() * both[size : 2 * size]
-        found[i] = load[rest].conj().T @ np.linalg.solve(both[rest], load[rest])
-    return found * count / (4.0 * np.pi**2)
+        compliance[i] = load[rest].conj().T @ np.linalg.solve(both[rest], load[rest])
+    return compliance * count / (4.0 * np.pi**2)
 
 
 def _by_radius(grid: Grid, nodes: np.ndarray) -> np.ndarray:
@@ -672,9 +672,9 @@ def _wave(grid: Grid, order: int) -> np.ndarray:
     angle, turned = np.arctan2(y, x), np.abs(x * dy - y * dx) / (x**2 + y**2)
     wave = np.exp(1j * order * angle) * turned * weight
     out = np.stack([np.cos(angle), np.sin(angle)]), np.stack([-np.sin(angle), np.cos(angle)])
-    found = np.zeros((2 * grid.n_nodes, 2), complex)
+    edge_load = np.zeros((2 * grid.n_nodes, 2), complex)
     for column, direction in enumerate(out):
         for axis in range(2):
             forces = np.einsum("aq,eq->ea", shape, wave * direction[axis])
-            np.add.at(found[:, column], 2 * edges + axis, forces)
-    return found
+            np.add.at(edge_load[:, column], 2 * edges + axis, forces)
+    return edge_load

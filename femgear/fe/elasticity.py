@@ -53,7 +53,7 @@ class Material:
 
         K. L. Johnson, Contact Mechanics, 1985, eq. 4.20.
         """
-        return 1.0 / sum((1.0 - one.poisson_ratio**2) / one.youngs_modulus for one in (self, mate))
+        return 1.0 / sum((1.0 - body.poisson_ratio**2) / body.youngs_modulus for body in (self, mate))
 
     def lame(self, state: str) -> tuple[float, float]:
         """Lame constants [Pa] that make ``sigma = lambda tr(eps) I + 2 mu eps`` hold in the plane.
@@ -100,11 +100,11 @@ def _quadrature(grid: Grid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     values, along, across = shape_functions(first, second)
     nodes = grid.points[grid.triangles].transpose(0, 2, 1)
     nodes = nodes - nodes[:, :, :1]  # far from the origin differences of coordinates would lose digits
-    one, other = nodes @ along, nodes @ across
-    area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    tangent_1, other = nodes @ along, nodes @ across
+    area = tangent_1[:, 0] * other[:, 1] - tangent_1[:, 1] * other[:, 0]
     slopes = np.empty((len(nodes), 6, 2, len(first)))
-    slopes[:, :, 0] = along * other[:, None, 1] - across * one[:, None, 1]
-    slopes[:, :, 1] = across * one[:, None, 0] - along * other[:, None, 0]
+    slopes[:, :, 0] = along * other[:, None, 1] - across * tangent_1[:, None, 1]
+    slopes[:, :, 1] = across * tangent_1[:, None, 0] - along * other[:, None, 0]
     slopes /= area[:, None, None]
     return values, slopes, area * weight
 
@@ -165,8 +165,8 @@ def wave_stiffness(grid: Grid, material: Material, *, state="plane strain") -> t
             turned = -mu if power == 1 else mu
             local[power, :, :, a, :, b] += turned * products[:, :, b, :, a]
             local[2 * (b == 2), :, :, a, :, a] += mu * products[:, :, b, :, b]
-    found = (_assembled(grid, one.reshape(m, 18, 18), 3) for one in local)
-    return tuple(0.5 * (K + K.T).tocsc() for K in found)
+    assembled = (_assembled(grid, element_matrices.reshape(m, 18, 18), 3) for element_matrices in local)
+    return tuple(0.5 * (K + K.T).tocsc() for K in assembled)
 
 
 def mass(grid: Grid, material: Material, thickness=1.0):
@@ -302,16 +302,16 @@ def _length(nodes, t, w):
     return np.hypot(derivative[..., 0], derivative[..., 1]) @ w
 
 
-def _cubic(known, wanted) -> np.ndarray:
+def _cubic(given, wanted) -> np.ndarray:
     """Weights (wanted, known) of the cubic through the four known abscissae nearest to each wanted one."""
-    first = np.clip(np.searchsorted(known, wanted) - 2, 0, len(known) - 4)
+    first = np.clip(np.searchsorted(given, wanted) - 2, 0, len(given) - 4)
     index = first[:, None] + np.arange(4)
-    x = known[index]
+    x = given[index]
     weight = np.ones_like(x)
     for i in range(4):
         for j in range(4):
             if i != j:
                 weight[:, i] *= (wanted - x[:, j]) / (x[:, i] - x[:, j])
-    result = np.zeros((len(wanted), len(known)))
+    result = np.zeros((len(wanted), len(given)))
     np.put_along_axis(result, index, weight, axis=1)
     return result

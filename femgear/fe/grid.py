@@ -123,9 +123,9 @@ def copy_nodes(grid: Grid, count: int) -> np.ndarray:
     left, right = ordered_nodes(grid, "cut_left"), ordered_nodes(grid, "cut_right")[::-1]
     free = np.ones(grid.n_nodes, dtype=bool)
     free[right] = False
-    own = np.full(grid.n_nodes, -1)
-    own[free] = np.arange(np.count_nonzero(free))
-    numbers = own + np.count_nonzero(free) * np.arange(count)[:, None]
+    number_of = np.full(grid.n_nodes, -1)
+    number_of[free] = np.arange(np.count_nonzero(free))
+    numbers = number_of + np.count_nonzero(free) * np.arange(count)[:, None]
     # the right cut of sector k is the left cut of sector k - 1
     numbers[:, right] = np.roll(numbers[:, left], 1, axis=0)
     return numbers
@@ -164,10 +164,10 @@ def rotated_copies(grid: Grid, count: int) -> Grid:
 def shape_functions(b1, b2):
     """Quadratic shape functions (6, m) at reference coordinates (m,), and their derivatives along both."""
     b0 = 1.0 - b1 - b2
-    one, zero = np.ones_like(b0), np.zeros_like(b0)
+    ones, zero = np.ones_like(b0), np.zeros_like(b0)
     value = np.stack([b0 * (2 * b0 - 1), b1 * (2 * b1 - 1), b2 * (2 * b2 - 1), 4 * b0 * b1, 4 * b1 * b2, 4 * b2 * b0])
-    first = np.stack([one - 4 * b0, 4 * b1 - 1, zero, 4 * (b0 - b1), 4 * b2, -4 * b2])
-    second = np.stack([one - 4 * b0, zero, 4 * b2 - 1, -4 * b1, 4 * b1, 4 * (b0 - b2)])
+    first = np.stack([ones - 4 * b0, 4 * b1 - 1, zero, 4 * (b0 - b1), 4 * b2, -4 * b2])
+    second = np.stack([ones - 4 * b0, zero, 4 * b2 - 1, -4 * b1, 4 * b1, 4 * (b0 - b2)])
     return value, first, second
 
 
@@ -260,8 +260,8 @@ def read_grid(path: Path) -> Grid:
         # O_NONBLOCK: opening a FIFO must not wait for a writer
         flags = os.O_RDONLY | sum(getattr(os, name, 0) for name in ("O_NOFOLLOW", "O_NONBLOCK", "O_BINARY"))
         with open(os.open(path, flags), "rb") as stream:
-            found = os.fstat(stream.fileno())
-            if not stat.S_ISREG(found.st_mode) or found.st_size > _LARGEST_FILE:
+            status = os.fstat(stream.fileno())
+            if not stat.S_ISREG(status.st_mode) or status.st_size > _LARGEST_FILE:
                 raise ValueError("no regular file of reasonable size")
             data = stream.read()
         start = data.rfind(b"$Comments\n")
@@ -313,9 +313,9 @@ def _grid_in(data: bytes) -> Grid:
 
     def numbers(kind: np.dtype, count: int) -> np.ndarray:
         nonlocal place
-        found = np.frombuffer(data, kind, count, place)
-        place += found.nbytes
-        return found
+        numbers_read = np.frombuffer(data, kind, count, place)
+        place += numbers_read.nbytes
+        return numbers_read
 
     expect(b"$MeshFormat\n2.2 1 8\n" + np.int32(1).tobytes() + b"\n$EndMeshFormat\n$PhysicalNames\n")
     groups = [line().split(" ", 2) for _ in range(int(line()))]
@@ -334,7 +334,7 @@ def _grid_in(data: bytes) -> Grid:
         np.split(np.concatenate(kinds[name]), [1], axis=1) for name in ("line3", "triangle6")
     )
     named = [(name.strip('"'), int(number), int(dim)) for dim, number, name in groups]
-    wrong = [one for one in (edges, triangles) if one.size and not 0 <= one.min() <= one.max() < len(nodes)]
+    wrong = [array for array in (edges, triangles) if array.size and not 0 <= array.min() <= array.max() < len(nodes)]
     if wrong or left or place != len(data) or np.any(nodes["number"] != np.arange(1, len(nodes) + 1)):
         raise ValueError("nodes or elements are numbered otherwise")
     boundaries = {name: edges[edge_tag[:, 0] == number] for name, number, dim in named if dim == 1}

@@ -149,12 +149,12 @@ def _check_distinct(points, size):
     """Refuse corners that coincide."""
     order, pairs = np.argsort(points[:, 0], kind="stable"), np.zeros((0, 2), int)
     for after in range(1, len(points)):
-        one, other = order[:-after], order[after:]
-        near = points[other, 0] - points[one, 0] <= CLOSE * size
+        left, other = order[:-after], order[after:]
+        near = points[other, 0] - points[left, 0] <= CLOSE * size
         if not near.any():  # nor are any further apart in this order
             break
-        same = near & (np.hypot(*(points[one] - points[other]).T) <= CLOSE * size)
-        pairs = np.concatenate([pairs, np.stack([one[same], other[same]], axis=1)])
+        same = near & (np.hypot(*(points[left] - points[other]).T) <= CLOSE * size)
+        pairs = np.concatenate([pairs, np.stack([left[same], other[same]], axis=1)])
     if len(pairs):
         a, b = points[np.sort(pairs[0])]
         raise GridError(
@@ -247,8 +247,8 @@ def _name_faces(points, segments, loops, regions):
         return ("body",)
     faces = []
     for loop in loops:
-        own = segments[np.abs(loop) - 1]
-        names = [name for name, point in regions if _contains(points, own, np.array([point]))[0]]
+        loop_segments = segments[np.abs(loop) - 1]
+        names = [name for name, point in regions if _contains(points, loop_segments, np.array([point]))[0]]
         if len(names) != 1:
             message = f"a part of the outline holds the points of the regions {names}"
             remedy = "give each part a region with a point inside it"
@@ -354,20 +354,23 @@ def _mesh_cached(plan: Plan, folder: Path) -> Grid:
     return grid
 
 
-def _grid_of_plan(plan: Plan, found: Grid, path: Path) -> Grid:
+def _grid_of_plan(plan: Plan, triangulated: Grid, path: Path) -> Grid:
     """The grid of a plan from what a file holds, refused (E-GRID-FILE) where it is none of this plan."""
     try:
-        corners, n = found.triangles[:, :3], len(plan.points)
+        corners, n = triangulated.triangles[:, :3], len(plan.points)
         used, face = np.unique(corners), np.full(len(corners), -1)
         for k, name in enumerate(plan.faces):
-            face[found.regions[name]] = k
-        points = np.vstack([plan.points, found.points[n : len(used)]])
+            face[triangulated.regions[name]] = k
+        points = np.vstack([plan.points, triangulated.points[n : len(used)]])
         if used[0] != 0 or used[-1] != len(used) - 1 or len(used) < n or not np.isfinite(points).all():
             raise ValueError("it has other nodes")
         grid = _second_order(plan, points, corners, face)
         check_grid(grid)
-        same = [np.array_equal(grid.points, found.points), np.array_equal(grid.triangles, found.triangles)]
-        for mine, other in ((grid.boundaries, found.boundaries), (grid.regions, found.regions)):
+        same = [
+            np.array_equal(grid.points, triangulated.points),
+            np.array_equal(grid.triangles, triangulated.triangles),
+        ]
+        for mine, other in ((grid.boundaries, triangulated.boundaries), (grid.regions, triangulated.regions)):
             same += [mine.keys() == other.keys(), *(np.array_equal(mine[key], other[key]) for key in mine)]
         if not all(same):
             raise ValueError("it has other points or boundaries")

@@ -95,8 +95,8 @@ class _SectorBasis:
     def tied(self, n: int) -> list[tuple[slice, np.ndarray]]:
         """For both kinds: where ``eta`` stands behind ``w``, and the factors of ``(w, eta)`` in the basis."""
         ties, places, first = cut_ties(n, self.count, self.cut), [], self.cut
-        for tie, own in zip(ties, self.stiffness, strict=True):
-            more = len(own) - self.cut
+        for tie, per_tie in zip(ties, self.stiffness, strict=True):
+            more = len(per_tie) - self.cut
             places.append((slice(first, first + more), np.append(tie, np.ones(more))))
             first += more
         return places
@@ -210,12 +210,12 @@ def cyclic_modes(
         Append the part of the static response to the loads that the kept modes miss.
     """
     on_basis = [vectors.T @ loads for vectors in basis.vectors]
-    found = [_one_diameter(basis, int(n), on_basis, max_frequency, static_correction) for n in nodal_diameters]
-    reduced, recovery = np.hstack([vectors for _, vectors in found]), np.hstack(basis.vectors)
+    of_diameters = [_one_diameter(basis, int(n), on_basis, max_frequency, static_correction) for n in nodal_diameters]
+    reduced, recovery = np.hstack([vectors for _, vectors in of_diameters]), np.hstack(basis.vectors)
     return CyclicModes(
         count=basis.count,
-        nodal_diameter=np.concatenate([np.full(len(f), n) for (f, _), n in zip(found, nodal_diameters)]),
-        frequency=np.concatenate([f for f, _ in found]),
+        nodal_diameter=np.concatenate([np.full(len(f), n) for (f, _), n in zip(of_diameters, nodal_diameters)]),
+        frequency=np.concatenate([f for f, _ in of_diameters]),
         load=reduced.T @ np.concatenate(on_basis),
         output=reduced.T @ (recovery.T @ outputs),
         reduced=reduced,
@@ -231,8 +231,8 @@ def _one_diameter(basis: _SectorBasis, n, loads, max_frequency, static_correctio
     # antisymmetric fields lag by a quarter of a turn; where no turn is seen both are real
     lags = (1.0, 1.0 if n == 0 or 2 * n == basis.count else 1j)
     force = np.zeros((size, loads[0].shape[1]), complex)
-    for (own, tie), stiffness, mass, load, lag in zip(places, basis.stiffness, basis.mass, loads, lags, strict=True):
-        at = np.r_[:nb, own]
+    for (modal, tie), stiffness, mass, load, lag in zip(places, basis.stiffness, basis.mass, loads, lags, strict=True):
+        at = np.r_[:nb, modal]
         K[np.ix_(at, at)] += tie[:, None] * stiffness * tie
         M[np.ix_(at, at)] += tie[:, None] * mass * tie
         force[at] += np.conj(lag) * tie[:, None] * load
@@ -256,6 +256,6 @@ def _one_diameter(basis: _SectorBasis, n, loads, max_frequency, static_correctio
     largest = np.argmax(size >= (1.0 - 1e-6) * size.max(axis=0), axis=0)
     chosen = chosen * np.sign(chosen[largest, np.arange(chosen.shape[1])])
     shapes = np.concatenate(
-        [lag * tie[:, None] * chosen[np.r_[:nb, own]] for (own, tie), lag in zip(places, lags, strict=True)]
+        [lag * tie[:, None] * chosen[np.r_[:nb, modal]] for (modal, tie), lag in zip(places, lags, strict=True)]
     )
     return np.sqrt(omega2) / (2 * np.pi), shapes

@@ -63,20 +63,20 @@ def check_set(planetary: PlanetarySet, *, overlap: float = 0.0) -> tuple[Finding
         E-ASSEMBLY, E-NEIGHBOURS, E-BACKLASH, E-INTERFERENCE, E-FILLET, E-CLEARANCE,
         E-CONTACT-RATIO: code and key of the first fault, the message has all.
     """
-    found = [*_planets(planetary), *_neighbours(planetary)]
+    findings = [*_planets(planetary), *_neighbours(planetary)]
     _assembly(planetary)
-    return *found, *check_meshes(planetary, overlap=overlap)
+    return *findings, *check_meshes(planetary, overlap=overlap)
 
 
 def check_meshes(planetary: GearSet, *, overlap: float = 0.0) -> tuple[Finding, ...]:
     """Check the meshes and gears of a set or a pair; see `check_set`, from W-BACKLASH and E-BACKLASH on."""
-    found = list(_meshes(planetary, overlap))
-    if faults := [one for one in found if isinstance(one, GeometryError)]:
+    problems = list(_meshes(planetary, overlap))
+    if faults := [problem for problem in problems if isinstance(problem, GeometryError)]:
         error = combined_fault(faults)
         if any(fault.code in _OF_TIPS for fault in faults) and (tips := _free_tips(planetary)):
             error.remedy = f"{error.remedy}; {tips}"
         raise error
-    return tuple(one for one in found if isinstance(one, Finding))
+    return tuple(problem for problem in problems if isinstance(problem, Finding))
 
 
 def _meshes(s: GearSet, overlap: float = 0.0) -> Iterator[GeometryError | Finding]:
@@ -96,26 +96,26 @@ def _free_tips(s: GearSet) -> str:
         freed = settled_tips(s.with_gears(opened), free=[gear.name for gear in s.gears])
     except GeometryError:
         return ""
-    if any(isinstance(one, GeometryError) for one in _meshes(freed)):
+    if any(isinstance(problem, GeometryError) for problem in _meshes(freed)):
         return ""
-    found = [
+    diameters = [
         f"{new.name}.tip_diameter = {typed_diameter(new, new.tip_radius) * 1e3:.4f} mm"
         for new, old in zip(freed.gears, s.gears, strict=True)
         if abs(new.tip_radius - old.tip_radius) > SEEN
     ]
-    return f'free of all mates: {", ".join(found)}; or tip_diameter = "free"' if found else ""
+    return f'free of all mates: {", ".join(diameters)}; or tip_diameter = "free"' if diameters else ""
 
 
 def tip_clearances(planetary: GearSet) -> dict[str, float]:
     """Compute the radial clearances [m] between tip and root circles, by the gears of tip and root."""
-    found = {}
+    clearances = {}
     for pair in planetary.kinds:
-        (one, two), a = pair.gears, pair.centre_distance
-        inner, outer = f"{one.name} tip to {two.name} root", f"{two.name} tip to {one.name} root"
-        sense = -1.0 if two.internal else 1.0
-        found[inner] = sense * (a - two.root_radius) - one.tip_radius
-        found[outer] = sense * (a - two.tip_radius) - one.root_radius
-    return found
+        (gear_1, gear_2), a = pair.gears, pair.centre_distance
+        inner, outer = f"{gear_1.name} tip to {gear_2.name} root", f"{gear_2.name} tip to {gear_1.name} root"
+        sense = -1.0 if gear_2.internal else 1.0
+        clearances[inner] = sense * (a - gear_2.root_radius) - gear_1.tip_radius
+        clearances[outer] = sense * (a - gear_2.tip_radius) - gear_1.root_radius
+    return clearances
 
 
 def _planets(s: PlanetarySet):
@@ -222,11 +222,11 @@ def _asked_play(pair: GearPair) -> float:
 
 def _closing(pair: GearPair) -> str:
     """Centre distance that suits the profile shifts of a mesh, and profile shifts that suit its own."""
-    (one, two), a = pair.gears, pair.centre_distance
-    shifts = f"x_{two.name} - x_{one.name}" if two.internal else f"x_{one.name} + x_{two.name}"
-    needed = f"{shifts} = {zero_backlash_shift(one, two, a):.4f} in modules of {one.module * 1e3:.6g} mm"
+    (gear_1, gear_2), a = pair.gears, pair.centre_distance
+    shifts = f"x_{gear_2.name} - x_{gear_1.name}" if gear_2.internal else f"x_{gear_1.name} + x_{gear_2.name}"
+    needed = f"{shifts} = {zero_backlash_shift(gear_1, gear_2, a):.4f} in modules of {gear_1.module * 1e3:.6g} mm"
     try:
-        suits = f"a centre distance of {zero_backlash_distance(one, two) * 1e3:.3f} mm"
+        suits = f"a centre distance of {zero_backlash_distance(gear_1, gear_2) * 1e3:.3f} mm"
     except GeometryError:
         suits = "no centre distance"
     return f"the profile shifts suit {suits}; {a * 1e3:.6g} mm needs {needed}"
@@ -262,10 +262,10 @@ def _longer_contact(pair: GearPair) -> str:
         for gear in pair.gears
         if gear.undercut or (gear.teeth < FEW_TEETH and not gear.internal)
     ]
-    found = [f"leave {' and '.join(given)} out: tips are then as long as can be"] if given else []
+    remedies = [f"leave {' and '.join(given)} out: tips are then as long as can be"] if given else []
     if few:
-        found.append(f"take more teeth, or a larger profile shift where undercut cuts the flank: {', '.join(few)}")
-    return "; ".join([*found, "lengthen the tips or reduce the working pressure angle"])
+        remedies.append(f"take more teeth, or a larger profile shift where undercut cuts the flank: {', '.join(few)}")
+    return "; ".join([*remedies, "lengthen the tips or reduce the working pressure angle"])
 
 
 def _contact_ratios(s: GearSet, overlap: float):

@@ -173,7 +173,7 @@ def rotational_symmetry(d: SetDeviations, s: GearSet) -> int:
     forms = {name: getattr(even, name) for name in ("sun", "planet_sun_side", "planet_ring_side", "ring")}
     most = s.n_planets if replace(d, **forms).ideal else 1
     turned = {g: places[:, None] * np.exp(2j * np.pi / g) for g in range(1, most + 1)}
-    return max(g for g, one in turned.items() if np.abs(one - places).min(axis=1).max() < 1e-6)
+    return max(g for g, turned_places in turned.items() if np.abs(turned_places - places).min(axis=1).max() < 1e-6)
 
 
 def no_deviations(planetary_set: GearSet) -> SetDeviations:
@@ -224,9 +224,9 @@ def profile_separation(
     is the sun), 1 for planet-ring (gear 1 is the planet). With ``back`` the other flanks of the teeth; those
     of a planet are its ring side in the mesh with the sun.
     """
-    one, two = deviations.mesh_forms(kind, back)
+    form_1, form_2 = deviations.mesh_forms(kind, back)
     gear_1, gear_2 = planetary_set.kinds[kind].gears
-    return form_deviation(one, gear_1, roll_1) + form_deviation(two, gear_2, roll_2)
+    return form_deviation(form_1, gear_1, roll_1) + form_deviation(form_2, gear_2, roll_2)
 
 
 def lead_separation(
@@ -247,7 +247,7 @@ def lead_separation(
     d, s, fine = deviations, planetary_set, 16
     place_over_width = (np.arange(slices * fine) + 0.5) / (slices * fine) - 0.5
     apart = -misaligned_approach(d, s, back=back)
-    found = []
+    per_form = []
     for mesh, kind in enumerate(s.mesh_kind.tolist()):
         place = s.mesh_widths[kind] * place_over_width
         removed = apart[mesh] * place
@@ -255,14 +255,16 @@ def lead_separation(
             gear = s.kinds[kind].gears[i]
             height = 0.0 if rolls is None else profile_height(gear, rolls[i][mesh])[..., None]
             removed = removed + lead_deviation(form, gear.face_width, place, height)
-        found.append(removed)
-    found = np.array(found)
-    return found.reshape(*found.shape[:-1], slices, fine).mean(axis=-1)
+        per_form.append(removed)
+    per_form = np.array(per_form)
+    return per_form.reshape(*per_form.shape[:-1], slices, fine).mean(axis=-1)
 
 
 def misaligned_approach(d: SetDeviations, s: GearSet, *, back: bool = False) -> np.ndarray:
     """Compute the approach (2N,) of the flanks of every mesh by axes askew, per place over the width [1]."""
-    if not any(np.any(one) for one in (d.planet_misalignment, d.sun_misalignment, d.carrier_misalignment)):
+    if not any(
+        np.any(misalignment) for misalignment in (d.planet_misalignment, d.sun_misalignment, d.carrier_misalignment)
+    ):
         return np.zeros(len(s.mesh_names))
     effect, radial = body_approach(s, back=back)[..., :2], unit_vectors(np.asarray(s.planet_angles))
     number = np.array([body.gear for body in s.bodies])
@@ -283,8 +285,8 @@ def tooth_separation(deviations: SetDeviations, mesh: int, tooth_1, tooth_2, *, 
     d, N = deviations, len(deviations.planet_pitch)
     planets = d.planet_pitch if (mesh < N) != back else d.planet_ring_side_pitch
     planet, whole = planets[mesh % N], -1.0 if back else 1.0
-    one, two = (whole * d.sun_pitch, planet) if mesh < N else (planet, whole * d.ring_pitch)
-    return one[np.asarray(tooth_1) % len(one)] + two[np.asarray(tooth_2) % len(two)]
+    errors_1, errors_2 = (whole * d.sun_pitch, planet) if mesh < N else (planet, whole * d.ring_pitch)
+    return errors_1[np.asarray(tooth_1) % len(errors_1)] + errors_2[np.asarray(tooth_2) % len(errors_2)]
 
 
 def body_separation(deviations: SetDeviations, planetary_set: GearSet, position, *, back: bool = False) -> np.ndarray:
@@ -314,14 +316,14 @@ def _relative_displacements(d: SetDeviations, s: GearSet, position: np.ndarray) 
         for gear, sense, start in zip(s.gears, s.senses, orientations(s).gears, strict=True)
     ]
     moved = [
-        np.array([_turning(*one) for one in zip(found, turned, strict=True)])
-        for found, turned in zip(runouts, angles, strict=False)
+        np.array([_turning(*motion) for motion in zip(runout, turned, strict=True)])
+        for runout, turned in zip(runouts, angles, strict=False)
     ]
     # pin errors and the eccentric pin circle
     pins = d.pin_errors @ np.array([1.0, 1.0j]) * np.exp(1j * psi)
     moved[BRANCH] = (pins + _turning(d.carrier_runout, 0.0))[:, None] + moved[BRANCH]
     moved[-1] = moved[-1] + _oval(d.ovality, psi, angles[-1][0])
-    return np.concatenate([moved[two] - moved[one] for one, two in s.mates])
+    return np.concatenate([moved[body_2] - moved[body_1] for body_1, body_2 in s.mates])
 
 
 def _turning(runout: Runout, tooth_zero) -> np.ndarray:
@@ -381,8 +383,8 @@ def _own_periods(d: SetDeviations, s: GearSet):
     first, each, last = s.gears[0], s.gears[BRANCH], s.gears[-1]
     yield first.name, math.lcm(_repeat(d.sun_pitch), first.teeth if d.sun_runout.amplitude else 1)
     planets = [
-        math.lcm(_repeat(one), _repeat(two), each.teeth if runout.amplitude else 1)
-        for one, two, runout in zip(d.planet_pitch, d.planet_ring_side_pitch, d.planet_runout, strict=True)
+        math.lcm(_repeat(sun_side), _repeat(two), each.teeth if runout.amplitude else 1)
+        for sun_side, two, runout in zip(d.planet_pitch, d.planet_ring_side_pitch, d.planet_runout, strict=True)
     ]
     yield "planets" if s.repeated[BRANCH] else each.name, math.lcm(*planets)
     oval = last.teeth // math.gcd(last.teeth, d.ovality.nodal_diameter) if d.ovality.amplitude else 1
@@ -425,7 +427,7 @@ def planet_shift(d: SetDeviations, s: GearSet, symmetry: int, periods: int) -> F
             continue
         turned = step * np.rint(float(shift) + phases - phases[behind]).astype(int)
         pitches = d.planet_pitch, d.planet_ring_side_pitch
-        alike = (np.array_equal(np.roll(one[n], -turned[n]), one[behind[n]]) for one in pitches for n in range(N))
+        alike = (np.array_equal(np.roll(pitch[n], -turned[n]), pitch[behind[n]]) for pitch in pitches for n in range(N))
         if all(alike):
             here = body_separation(d, s, position + float(shift))
             if np.abs(here - there[meshes]).max() <= close:
@@ -446,11 +448,11 @@ def mirrored_deviations(deviations: SetDeviations, planetary_set: GearSet, mirro
     axis = 2.0 * s.planet_angles[0]
     image = orientations(mirrored)
     # at this position the right flank of tooth 0 of the sun is where its left flank is at position 0
-    found = orientations(s, 2.0 * (s.planet_angles[0] - orientations(s).sun) / s.gears[0].pitch_angle)
+    oriented = orientations(s, 2.0 * (s.planet_angles[0] - orientations(s).sun) / s.gears[0].pitch_angle)
     last = s.gears[-1].pitch_angle
-    ring = round((axis - image.gears[-1][0] - found.gears[-1][0]) / last)
+    ring = round((axis - image.gears[-1][0] - oriented.gears[-1][0]) / last)
     planets = [
-        round((axis - angle - found.planets[n]) / s.gears[BRANCH].pitch_angle)
+        round((axis - angle - oriented.planets[n]) / s.gears[BRANCH].pitch_angle)
         for n, angle in zip(order, image.planets, strict=True)
     ]
     runouts = [_reflected(d.planet_runout[n], k * s.gears[BRANCH].pitch_angle) for n, k in zip(order, planets)]
@@ -493,12 +495,12 @@ def _reflected(runout: Runout, axis: float) -> Runout:
 
 def loaded_flanks(d: SetDeviations, s: GearSet) -> tuple[tuple[str, FlankForm, Gear], ...]:
     """Name the kinds of loaded flanks, with their forms and gears: gear 1 and 2 of every kind of mesh."""
-    found = []
+    flanks = []
     for kind, pair in enumerate(s.kinds):
         forms = zip(s.mates[kind], pair.gears, pair.gears[::-1], d.mesh_forms(kind, back=False), strict=True)
         for number, gear, mate, form in forms:
-            found.append((f"{gear.name}, {mate.name} side" if s.repeated[number] else gear.name, form, gear))
-    return tuple(found)
+            flanks.append((f"{gear.name}, {mate.name} side" if s.repeated[number] else gear.name, form, gear))
+    return tuple(flanks)
 
 
 def check_deviations(deviations: SetDeviations, planetary_set: GearSet) -> tuple[GeometryWarning, ...]:
@@ -515,10 +517,10 @@ def check_deviations(deviations: SetDeviations, planetary_set: GearSet) -> tuple
     GeometryError
         E-MODIFICATION: modifications of a flank that together exceed 0.2 modules.
     """
-    found: list[GeometryWarning] = []
+    problems: list[GeometryWarning] = []
     for flank, form, gear in loaded_flanks(deviations, planetary_set):
-        found += check_flank(flank, form, gear)
-    return (*found, *_wedging(deviations, planetary_set))
+        problems += check_flank(flank, form, gear)
+    return (*problems, *_wedging(deviations, planetary_set))
 
 
 def least_play(deviations: SetDeviations, planetary_set: GearSet) -> tuple[float, float]:
@@ -557,12 +559,12 @@ def _worst(d: SetDeviations, s: GearSet, *, back: bool) -> np.ndarray:
     pitch = [(side * d.sun_pitch).min() + sun_side, ring_side + (side * d.ring_pitch).min()]
     rolls = [np.linspace(g.form_roll, g.tip_roll, 101) for g in s.gears]
     profile = [
-        profile_separation(d, s, kind, rolls[one][:, None], rolls[two], back=back).min()
-        for kind, (one, two) in enumerate(s.mates)
+        profile_separation(d, s, kind, rolls[body_1][:, None], rolls[body_2], back=back).min()
+        for kind, (body_1, body_2) in enumerate(s.mates)
     ]
     # of leads the ends of profiles, between which a twist is linear
     corners = [[g.form_roll, g.tip_roll] for g in s.gears]
-    ends = [(np.tile(corners[one], 2), np.repeat(corners[two], 2)) for one, two in s.mates]
+    ends = [(np.tile(corners[body_1], 2), np.repeat(corners[body_2], 2)) for body_1, body_2 in s.mates]
     lead = lead_separation(d, s, 64, s.of_kinds(ends).swapaxes(0, 1), back=back).min(axis=(1, 2))
     return np.concatenate(pitch[: len(profile)]) + s.of_kinds(profile) + lead
 
@@ -573,17 +575,17 @@ def _causes(d: SetDeviations) -> list[str]:
     runouts = d.sun_runout, d.ring_runout, d.carrier_runout, *d.planet_runout
     pitches = d.sun_pitch, d.ring_pitch, d.planet_pitch, d.planet_ring_side_pitch
     slopes = d.planet_misalignment, d.sun_misalignment, d.carrier_misalignment
-    found = {
+    causes = {
         "pin errors": d.pin_errors.any(),
         "pitch errors": any(pitch.any() for pitch in pitches),
-        "runout": any(one.amplitude for one in runouts),
+        "runout": any(runout.amplitude for runout in runouts),
         "ovality": bool(d.ovality.amplitude),
         "misaligned axes": any(slope.any() for slope in slopes),
         "tooth thickness": bool(d.sun_thickness or d.ring_thickness or d.planet_thickness.any()),
         "profile modifications": any(form.profile for form in forms),
         "lead modifications such as crowning": any(form.lead for form in forms),
     }
-    return [name for name, there in found.items() if there]
+    return [name for name, there in causes.items() if there]
 
 
 def _wedging(d: SetDeviations, s: GearSet):

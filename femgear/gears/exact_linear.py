@@ -86,10 +86,10 @@ def solve_exactly(
     wanted = {*unknown, *given}
     cut = [{column: value for column, value in row.items() if column in wanted} for row in rows]
     pivots, rest = reduce_rows(cut, unknown)
-    known, ratio, free = set(given), {}, {}
+    determined, ratio, free = set(given), {}, {}
     for column in unknown:
         row = pivots.get(column, {column: Fraction(1)})
-        others = tuple(other for other in row if other != column and other not in known)
+        others = tuple(other for other in row if other != column and other not in determined)
         if others or column not in pivots:
             free[column] = others
         else:

@@ -67,14 +67,14 @@ def orientations(planetary: GearSet, position: float = 0.0) -> Orientations:
     ``-2 pi tau / z_p`` and the ring by ``-2 pi tau / z_r``; gears of a pair as their senses say.
     """
     s, phase = planetary, planetary.mesh_phases.tolist()
-    found: list[list[float]] = [[] for _ in s.gears]
+    angles: list[list[float]] = [[] for _ in s.gears]
     for number, body in enumerate(s.bodies):
         # every body by the first mesh in which it takes part
         first, mesh = next((j, mesh) for j, mesh in enumerate(s.meshes) if number in mesh.bodies)
         start, lean = pitch_tooth(s, mesh.kind, mesh.bodies.index(number))
         turn = (position + phase[first]) * s.gears[body.gear].pitch_angle
-        found[body.gear].append(mesh.angle + start + lean + s.senses[body.gear] * turn)
-    return Orientations(tuple(map(tuple, found)))
+        angles[body.gear].append(mesh.angle + start + lean + s.senses[body.gear] * turn)
+    return Orientations(tuple(map(tuple, angles)))
 
 
 def pitch_tooth(gears: GearSet, kind: int, place: int) -> tuple[float, float]:
@@ -105,13 +105,13 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
             remedy='for example input = "sun", fixed = "ring"',
         )
     zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
-    known = {input: speed, fixed: 0.0}
+    speed_of = {input: speed, fixed: 0.0}
     # z_s w_s + z_r w_r - (z_s + z_r) w_c = 0
     weight = {"sun": zs, "ring": zr, "carrier": -(zs + zr)}
-    (free,) = (member for member in MEMBERS if member not in known)
-    known[free] = -sum(weight[member] * value for member, value in known.items()) / weight[free]
-    planet, mesh_frequency = planet_motion(known["sun"], known["carrier"], zs, zp)
-    return Speeds(planet=planet, mesh_frequency=mesh_frequency, **known)
+    (free,) = (member for member in MEMBERS if member not in speed_of)
+    speed_of[free] = -sum(weight[member] * value for member, value in speed_of.items()) / weight[free]
+    planet, mesh_frequency = planet_motion(speed_of["sun"], speed_of["carrier"], zs, zp)
+    return Speeds(planet=planet, mesh_frequency=mesh_frequency, **speed_of)
 
 
 def planet_motion(sun: Any, carrier: Any, sun_teeth: Any, planet_teeth: Any) -> tuple[Any, Any]:
@@ -151,7 +151,7 @@ def mesh_normals(planetary_set: GearSet, *, back: bool = False) -> np.ndarray:
     (carrier frame); the back flanks, with `back`, at ``psi - pi/2 + alpha_w`` and ``psi + pi/2 - alpha_w``.
     """
     s = planetary_set
-    sides = [-s.senses[one] if back else s.senses[one] for one, _ in s.mates]
+    sides = [-s.senses[body_1] if back else s.senses[body_1] for body_1, _ in s.mates]
     leans = [side * (0.5 * np.pi - kind.working_pressure_angle) for side, kind in zip(sides, s.kinds, strict=True)]
     return unit_vectors(s.mesh_angles + s.of_kinds(leans))
 
@@ -173,14 +173,14 @@ def body_approach(gears: GearSet, *, back: bool = False) -> np.ndarray:
     ``n . (u_1 - u_2)`` with the normal n of `mesh_normals`, and the base radius of a gear that turns as the loaded
     flanks drive it, minus that of one that turns against it. `back` is for the back flanks.
     """
-    found, side = np.zeros((len(gears.meshes), len(gears.bodies), 3)), -1.0 if back else 1.0
-    for mesh, normal, effect in zip(gears.meshes, mesh_normals(gears, back=back), found, strict=True):
+    approach, side = np.zeros((len(gears.meshes), len(gears.bodies), 3)), -1.0 if back else 1.0
+    for mesh, normal, effect in zip(gears.meshes, mesh_normals(gears, back=back), approach, strict=True):
         # gear 1 moves along the normal into gear 2, gear 2 away
         for body, push in zip(mesh.bodies, (1.0, -1.0), strict=True):
             number = gears.bodies[body].gear
             effect[body, :2] = push * normal
             effect[body, 2] = push * side * gears.senses[number] * gears.gears[number].base_radius
-    return found
+    return approach
 
 
 def member_approach(planetary_set: GearSet, *, back: bool = False) -> dict[str, np.ndarray]:

@@ -165,12 +165,14 @@ class FlankForm:
     @property
     def profile(self) -> tuple[ProfileModification, ...]:
         """Modifications of the profile, the same over the width."""
-        return tuple(one for one in self.modifications if isinstance(one, ProfileModification))
+        return tuple(
+            modification for modification in self.modifications if isinstance(modification, ProfileModification)
+        )
 
     @property
     def lead(self) -> tuple[LeadModification, ...]:
         """Modifications over the width; but for a twist the same all over the profile."""
-        return tuple(one for one in self.modifications if isinstance(one, LeadModification))
+        return tuple(modification for modification in self.modifications if isinstance(modification, LeadModification))
 
 
 def lead_deviation(form: FlankForm, width: float, place, height: Any = 0.0) -> np.ndarray:
@@ -180,18 +182,18 @@ def lead_deviation(form: FlankForm, width: float, place, height: Any = 0.0) -> n
     """
     place = np.asarray(place, float)
     total, along = np.zeros(np.broadcast(place, height).shape), 2.0 * place / width
-    for one in form.lead:
-        if isinstance(one, LeadSlope):
-            total = total - 0.5 * one.amount * along
-        elif isinstance(one, LeadCrowning):
-            total = total + one.amount * along**2
-        elif isinstance(one, FlankTwist):
-            total = total - 0.5 * one.amount * along * height
-        elif isinstance(one, MeasuredLead):
-            total = total + np.interp(place, one.place, one.removed)
+    for modification in form.lead:
+        if isinstance(modification, LeadSlope):
+            total = total - 0.5 * modification.amount * along
+        elif isinstance(modification, LeadCrowning):
+            total = total + modification.amount * along**2
+        elif isinstance(modification, FlankTwist):
+            total = total - 0.5 * modification.amount * along * height
+        elif isinstance(modification, MeasuredLead):
+            total = total + np.interp(place, modification.place, modification.removed)
         else:
-            inside = (0.5 * width - np.abs(place)) / one.length
-            total = total + one.amount * np.maximum(1.0 - inside, 0.0) ** 2
+            inside = (0.5 * width - np.abs(place)) / modification.length
+            total = total + modification.amount * np.maximum(1.0 - inside, 0.0) ** 2
     return total
 
 
@@ -313,8 +315,8 @@ def _problem(modification: ProfileModification, gear: Gear):
     outwards = (end > start) == (gear.tip_roll > gear.form_roll)
     if abs(end - start) < 1e-3 * (high - low) or outwards == isinstance(modification, RootRelief):
         wanted = "root" if isinstance(modification, RootRelief) else "tip"
-        found = f"from {_place(gear, start)} to {_place(gear, end)}"
-        return "start and end coincide or are exchanged", found, f"from the start towards the {wanted}"
+        range_given = f"from {_place(gear, start)} to {_place(gear, end)}"
+        return "start and end coincide or are exchanged", range_given, f"from the start towards the {wanted}"
     return None
 
 
@@ -331,15 +333,15 @@ def check_flank(flank: str, form: FlankForm, gear: Gear) -> Iterator[GeometryWar
     less than `LEAST_COVERAGE` of its flank, a measured lead less than `LEAST_OF_WIDTH` of the width.
     """
     _check_sum(flank, form, gear)
-    for one in form.modifications:
-        if isinstance(one, MeasuredProfile):
+    for modification in form.modifications:
+        if isinstance(modification, MeasuredProfile):
             (low, high), least = sorted((gear.form_roll, gear.tip_roll)), LEAST_COVERAGE
-            points, shown = one.roll, math.degrees(1.0 / gear.base_radius)
+            points, shown = modification.roll, math.degrees(1.0 / gear.base_radius)
             words = "profile over roll angles {:.4g} to {:.4g} deg covers {:.0f} % of the flank,"
             words += " {:.4g} to {:.4g} deg"
-        elif isinstance(one, MeasuredLead):
+        elif isinstance(modification, MeasuredLead):
             low, high, least = -0.5 * gear.face_width, 0.5 * gear.face_width, LEAST_OF_WIDTH
-            points, shown = one.place, 1e3
+            points, shown = modification.place, 1e3
             words = "lead over places {:.4g} to {:.4g} mm covers {:.0f} % of the width, {:.4g} to {:.4g} mm"
         else:
             continue
@@ -369,12 +371,12 @@ def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
         return
     low, high = sorted((gear.form_roll, gear.tip_roll))
     angle = math.degrees(min(max(roll[i], low), high) / gear.base_radius)
-    found = f"{abs(removed[i]) * 1e6:.6g} um at a roll angle of {angle:.4g} deg"
+    amount_there = f"{abs(removed[i]) * 1e6:.6g} um at a roll angle of {angle:.4g} deg"
     count, verb = len(form.modifications), "take off" if removed[i] > 0 else "add"
-    message = f"{count} modifications together {verb} {found}"
+    message = f"{count} modifications together {verb} {amount_there}"
     remedy = "check the units, and whether a section stands there twice"
     if count == 1:
-        message = f"the modification goes on beyond its end and reaches {found}"
+        message = f"the modification goes on beyond its end and reaches {amount_there}"
         remedy = "let it end nearer to the end of the flank"
     raise GeometryError(
         f"{flank}: {message}",

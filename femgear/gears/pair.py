@@ -119,19 +119,24 @@ class GearSet:
     @cached_property
     def bodies(self) -> tuple[Body, ...]:
         """All bodies, in the order of the gears."""
-        found = list[Body]()
+        bodies = list[Body]()
         for number, (gear, repeated) in enumerate(zip(self.gears, self.repeated, strict=True)):
             copies = range(self.n_planets if repeated else 1)
-            found += [Body(number, copy, f"{gear.name} {copy + 1}" if repeated else gear.name) for copy in copies]
-        return tuple(found)
+            bodies += [Body(number, copy, f"{gear.name} {copy + 1}" if repeated else gear.name) for copy in copies]
+        return tuple(bodies)
 
     @cached_property
     def meshes(self) -> tuple[Mesh, ...]:
         """All M meshes, in the order of the kinds and, in each of them, of the branches."""
         place = {(body.gear, body.copy): number for number, body in enumerate(self.bodies)}
         return tuple(
-            Mesh(kind, copy, (place[one, copy * self.repeated[one]], place[two, copy * self.repeated[two]]), angle)
-            for kind, (one, two) in enumerate(self.mates)
+            Mesh(
+                kind,
+                copy,
+                (place[gear_1, copy * self.repeated[gear_1]], place[gear_2, copy * self.repeated[gear_2]]),
+                angle,
+            )
+            for kind, (gear_1, gear_2) in enumerate(self.mates)
             for copy, angle in enumerate(self.planet_angles)
         )
 
@@ -159,12 +164,12 @@ class GearSet:
         """
         turning = [number for number, body in enumerate(self.bodies) if 0 < body.gear < len(self.gears) - 1]
         turning += [number for number, body in enumerate(self.bodies) if body.gear == 0]
-        found = np.zeros((len(self.meshes), len(turning)))
-        for row, mesh in zip(found, self.meshes, strict=True):
+        approach = np.zeros((len(self.meshes), len(turning)))
+        for row, mesh in zip(approach, self.meshes, strict=True):
             for number, push in zip(mesh.bodies, (1.0, -1.0), strict=True):
                 if number in turning:
                     row[turning.index(number)] = push
-        return found
+        return approach
 
     def moved_meshes(self, planets: Sequence[int] | np.ndarray) -> np.ndarray:
         """List the meshes (M,) of planets (N,) that stand in the places of planets 0 to N - 1."""
@@ -286,11 +291,11 @@ class GearPair(GearSet):
         The path ends where an involute ends: undercut shortens it, and so does a tip that reaches into the
         fillet of its mate.
         """
-        one, two = (gear.base_radius * math.tan(self.working_pressure_angle) for gear in self.gears)
-        start, end = self.gear_1.form_roll - one, self.gear_1.tip_roll - one
+        length_1, length_2 = (gear.base_radius * math.tan(self.working_pressure_angle) for gear in self.gears)
+        start, end = self.gear_1.form_roll - length_1, self.gear_1.tip_roll - length_1
         if self.gear_2.internal:
-            return max(self.gear_2.tip_roll - two, start), min(end, self.gear_2.form_roll - two)
-        return max(two - self.gear_2.tip_roll, start), min(end, two - self.gear_2.form_roll)
+            return max(self.gear_2.tip_roll - length_2, start), min(end, self.gear_2.form_roll - length_2)
+        return max(length_2 - self.gear_2.tip_roll, start), min(end, length_2 - self.gear_2.form_roll)
 
     @property
     def face_width(self) -> float:
@@ -314,10 +319,10 @@ class GearPair(GearSet):
             return ()
         (start, end), pitch = self.path, self.base_pitch
         sense = 1.0 if self.gear_2.internal else -1.0
-        one, two = (gear.base_radius * math.tan(self.working_pressure_angle) for gear in self.gears)
+        length_1, length_2 = (gear.base_radius * math.tan(self.working_pressure_angle) for gear in self.gears)
         rolls = (
-            (one + end - pitch, one + start + pitch),
-            (two + sense * (start + pitch), two + sense * (end - pitch)),
+            (length_1 + end - pitch, length_1 + start + pitch),
+            (length_2 + sense * (start + pitch), length_2 + sense * (end - pitch)),
         )
         return tuple(
             (2.0 * math.hypot(gear.base_radius, low), 2.0 * math.hypot(gear.base_radius, high))
@@ -349,11 +354,11 @@ def close_pair(
         centre_distance = zero_backlash_distance(gear_1, gear_2)
     shift = zero_backlash_shift(gear_1, gear_2, centre_distance)
     if gear_1.name in find:
-        own = gear_2.profile_shift - shift if gear_2.internal else shift - gear_2.profile_shift
-        gear_1 = replace(gear_1, profile_shift=own)
+        shift_found = gear_2.profile_shift - shift if gear_2.internal else shift - gear_2.profile_shift
+        gear_1 = replace(gear_1, profile_shift=shift_found)
     elif gear_2.name in find:
-        own = shift + gear_1.profile_shift if gear_2.internal else shift - gear_1.profile_shift
-        gear_2 = replace(gear_2, profile_shift=own)
+        shift_found = shift + gear_1.profile_shift if gear_2.internal else shift - gear_1.profile_shift
+        gear_2 = replace(gear_2, profile_shift=shift_found)
     return GearPair(gear_1, gear_2, centre_distance)
 
 

@@ -267,13 +267,13 @@ class PhasingTable:
 
         Where rotational and translational modes do not exist apart they are named together.
         """
-        found = []
+        excited = []
         for row in self.modes > ZERO:
             names = [name for name, on in zip(MODES, row) if on]
             if not self.separate and (row[0] or row[1]):
                 names = ["rotational-translational"] + (["planet"] if row[2] else [])
-            found.append(tuple(names))
-        return tuple(found)
+            excited.append(tuple(names))
+        return tuple(excited)
 
 
 def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) -> PhasingTable:
@@ -312,11 +312,11 @@ def phasing_table(phasing: MeshPhasing, harmonics: Sequence[int] = range(1, 7)) 
 
 def check_harmonics(harmonics) -> np.ndarray:
     """Check harmonics (H,) of the mesh frequency: whole numbers from 1, others are refused (E-HARMONICS)."""
-    found = np.atleast_1d(np.asarray(harmonics))
-    if found.ndim != 1 or not len(found) or found.dtype.kind not in "iu" or found.min() < 1:
+    checked = np.atleast_1d(np.asarray(harmonics))
+    if checked.ndim != 1 or not len(checked) or checked.dtype.kind not in "iu" or checked.min() < 1:
         message = f"harmonics {harmonics!r} of the mesh frequency"
         raise GeometryError(message, code="E-HARMONICS", limit="whole numbers from 1")
-    return found.astype(np.int64)
+    return checked.astype(np.int64)
 
 
 def _planet_resultants(phasing: MeshPhasing, harmonics: np.ndarray) -> np.ndarray:
@@ -483,8 +483,8 @@ def neighbouring_teeth(
     near = np.abs(change) <= ratio_tolerance + 1e-12
     teeth, ratio, change = teeth[near], ratio[near], change[near]
     order = np.lexsort((*teeth.T[::-1], np.abs(teeth - wanted).sum(axis=1), np.round(np.abs(change), 12)))
-    found = _described(teeth[order], ratio[order], change[order], planets, np.arange(1, harmonics + 1))
-    return found.only(found.room > 0.0) if fitting else found
+    phasing = _described(teeth[order], ratio[order], change[order], planets, np.arange(1, harmonics + 1))
+    return phasing.only(phasing.room > 0.0) if fitting else phasing
 
 
 def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
@@ -500,14 +500,14 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
         overlap (E-NEIGHBOURS).
     """
     standard_lag(planet_teeth)
-    sun, ring, found = phasing.sun_teeth, phasing.ring_teeth, []
+    sun, ring, problems = phasing.sun_teeth, phasing.ring_teeth, []
     teeth, misfit = f"{sun}/{planet_teeth}/{ring}", ring - sun - 2 * planet_teeth
     if abs(misfit) > _CLOSURE * (sun + planet_teeth):
         message = f"{teeth}: z_r - z_s - 2 z_p = {misfit}, more than profile shifts can take up"
         limit, remedy = f"{_CLOSURE:.0%} of z_s + z_p", f"{(ring - sun) // 2} teeth close this set"
         raise GeometryError(message, code="E-CHOICE", key="planet teeth", limit=limit, remedy=remedy)
     if abs(misfit) > 1:
-        found.append(f"z_r - z_s - 2 z_p = {misfit}: profile shifts of about {abs(misfit) / 2:g} times the module")
+        problems.append(f"z_r - z_s - 2 z_p = {misfit}: profile shifts of about {abs(misfit) / 2:g} times the module")
     places = np.array([phasing.positions])
     room = float(_room(np.array([[sun, planet_teeth, ring]]), places, np.array([sun + ring]))[0])
     if room < -_OVERLAP:
@@ -515,8 +515,8 @@ def check_teeth(phasing: MeshPhasing, planet_teeth: int) -> tuple[str, ...]:
         remedy = "use fewer planets, or fewer teeth on the planets"
         raise GeometryError(message, code="E-NEIGHBOURS", remedy=remedy)
     if room <= 0.0:
-        found.append(f"unshifted planets overlap by {-room:.3g} modules")
-    return tuple(found)
+        problems.append(f"unshifted planets overlap by {-room:.3g} modules")
+    return tuple(problems)
 
 
 def _described(teeth, ratio, change, planets: int, harmonics) -> ToothChoices:

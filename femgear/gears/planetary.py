@@ -227,8 +227,8 @@ def close_set(
         centre_distance = _free_distance(sun, planet, ring, find)
     total = zero_backlash_shift(sun, planet, centre_distance)  # x_sun + x_planet
     difference = zero_backlash_shift(planet, ring, centre_distance)  # x_ring - x_planet
-    found = {"sun": total - planet.profile_shift, "ring": difference + planet.profile_shift}
-    sun, ring = (replace(g, profile_shift=found[g.name]) if g.name in find else g for g in (sun, ring))
+    shift_of = {"sun": total - planet.profile_shift, "ring": difference + planet.profile_shift}
+    sun, ring = (replace(g, profile_shift=shift_of[g.name]) if g.name in find else g for g in (sun, ring))
     return PlanetarySet(sun, planet, ring, centre_distance, planet_angles)
 
 

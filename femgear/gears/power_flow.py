@@ -318,19 +318,19 @@ def _wrong_entries(shafts, conditions, speeds, torques, held, outputs, joined) -
         "outputs": [*outputs],
         "joined": [shaft for group in joined for shaft in group],
     }
-    uses |= {f"stage {one.name!r}": [*one.weights] for one in conditions}
+    uses |= {f"stage {condition.name!r}": [*condition.weights] for condition in conditions}
     for place, names in uses.items():
         for shaft in dict.fromkeys(names):
             if shaft not in shafts:
                 remedy = f"one of {', '.join(map(repr, shafts))}" if shafts else "name the shafts"
                 text = f"{place}: there is no shaft {shaft!r}"
                 problems.append(CaseError(text, code="E-CHOICE", value=shaft, remedy=remedy))
-    stages = [one.name for one in conditions]
+    stages = [condition.name for condition in conditions]
     lists = {"shaft": [*shafts], "stage": stages, "held shaft": [*held], "output": [*outputs]}
     lists |= {"shaft both held and output": [*{*held}, *{*outputs}]}
     lists |= {"shaft with a given torque that is an output": [*torques, *{*outputs}]}
     for what, names in lists.items():
-        for name in dict.fromkeys(one for one in names if names.count(one) > 1):
+        for name in dict.fromkeys(again for again in names if names.count(again) > 1):
             text = f"{what} {name!r} stands twice" if " " not in what or what == "held shaft" else f"{what}: {name!r}"
             problems.append(CaseError(text, code="E-DUPLICATE", value=name, remedy="leave one of them out"))
     for what, values, unit in (("speed", speeds, "rad/s"), ("torque", torques, "N m")):
@@ -346,7 +346,7 @@ def _locks(graph: ShaftGraph) -> tuple[list[CaseError], set[int]]:
     problems, locked = [], set()
     loops = {group: stages for group, (stages, held) in _stopped(graph, set()).items() if not held}
     for cluster in connected_sets(loops.values()):
-        loop = min((one for one in loops.values() if one & cluster), key=len)
+        loop = min((members for members in loops.values() if members & cluster), key=len)
         groups = {group for group, stages in loops.items() if stages & cluster}
         locked |= groups | {group for stage in cluster for group in graph.rows[stage]}
         text = f"{_stages(graph, loop)} lock{'s' * (len(loop) == 1)}: {_shafts(graph.names(groups))} cannot turn"
@@ -377,13 +377,13 @@ def _stopped(graph: ShaftGraph, standing: Collection[int]) -> dict[int, tuple[fr
     # the columns behind those of the groups tell of which stages an equation is made
     marked = [{**row, graph.count + number: Fraction(1)} for number, row in enumerate(graph.rows)]
     pivots, _ = reduce_rows(marked, [group for group in range(graph.count) if group not in standing])
-    found = {}
+    stopped = {}
     for group, row in pivots.items():
         others = {column for column in row if column < graph.count and column != group}
         if others <= {*standing}:
             stages = frozenset(column - graph.count for column in row if column >= graph.count)
-            found[group] = (stages, frozenset(others))
-    return found
+            stopped[group] = (stages, frozenset(others))
+    return stopped
 
 
 def _free(graph: ShaftGraph, turning: ExactSolution) -> list[CaseError]:
@@ -413,7 +413,7 @@ def _contradictions(
         group = graph.group[shaft]
         first = giver.setdefault(group, shaft)
         if group in graph.standing and speed:
-            holder = next(one for one in graph.held if graph.group[one] == group)
+            holder = next(held for held in graph.held if graph.group[held] == group)
             problems.append(_speed_problem(shaft, speed, 0.0, f"that of {holder!r}, which is held"))
         elif abs(speed - speeds[first]) > AGREEMENT * abs(speeds[first]):
             problems.append(_speed_problem(shaft, speed, speeds[first], f"that of {first!r}, which is joined with it"))
@@ -422,8 +422,12 @@ def _contradictions(
         if {*relation} & {*locked} or not disagree(terms.values()):
             continue
         last = max(relation, key=[*giver].index)
-        fits = float(-_total({giver[one]: share for one, share in relation.items() if one != last}, speeds))
-        others = [giver[one] for one in giver if one in relation and one != last]
+        fits = float(
+            -_total(
+                {giver[group_there]: share for group_there, share in relation.items() if group_there != last}, speeds
+            )
+        )
+        others = [giver[group_there] for group_there in giver if group_there in relation and group_there != last]
         against = f"{'those' if len(others) > 1 else 'that'} of {_shafts(others)}" if others else "what is held"
         problems.append(_speed_problem(giver[last], speeds[giver[last]], fits, against))
     return problems
@@ -447,7 +451,7 @@ def _undetermined(
     for cluster in connected_sets([{column, *others} for column, others in balance.open.items()]):
         stages = [number for number in sorted(cluster) if number < count]
         outside = [([*held, *outputs])[column - count] for column in sorted(cluster) if column >= count]
-        groups = {group for stage in stages for group in graph.rows[stage]} | {graph.group[one] for one in outside}
+        groups = {group for stage in stages for group in graph.rows[stage]} | {graph.group[shaft] for shaft in outside}
         if groups & {*locked}:
             continue
         free = [shaft for shaft in outside if shaft in outputs]

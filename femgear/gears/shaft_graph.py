@@ -99,7 +99,8 @@ class ShaftGraph:
         """Numbers of the stages of every part of the graph: stages that hang together by groups."""
         marked = [{("stage", number), *row} for number, row in enumerate(self.rows)]
         return sorted(
-            tuple(sorted(one[1] for one in part if isinstance(one, tuple))) for part in connected_sets(marked)
+            tuple(sorted(element[1] for element in part if isinstance(element, tuple)))
+            for part in connected_sets(marked)
         )
 
     def names(self, groups: Collection[int]) -> list[str]:
@@ -108,7 +109,7 @@ class ShaftGraph:
 
     def speeds(self, given: Sequence[str] = ()) -> ExactSolution:
         """Solve for the speeds of all groups in terms of those of shafts whose speed is given."""
-        columns = [group for group in dict.fromkeys(self.group[one] for one in given) if group not in self.standing]
+        columns = [group for group in dict.fromkeys(self.group[shaft] for shaft in given) if group not in self.standing]
         unknown = [group for group in range(self.count) if group not in self.standing and group not in columns]
         return solve_exactly(self.rows, unknown, columns)
 
@@ -142,10 +143,10 @@ def connected_sets(sets: Iterable[Iterable]) -> list[set]:
     """Unite sets that share elements, in the order of their first ones."""
     merged: list[set] = []
     for elements in map(set, sets):
-        touched = [one for one in merged if one & elements]
+        touched = [part for part in merged if part & elements]
         if touched:
             touched[0].update(elements, *touched[1:])
-            merged = [one for one in merged if not any(one is other for other in touched[1:])]
+            merged = [part for part in merged if not any(part is other for other in touched[1:])]
         else:
             merged.append(elements)
     return merged

@@ -108,7 +108,7 @@ def share_shifts(
                 continue
             try:
                 gears = _closed(teeth, pressure_angle, (rack, rack, ring_rack), a, shift, backlash)
-                said = [one.code for one in check_meshes(gears) if one.code not in ("W-TIP", "W-RIM")]
+                said = [finding.code for finding in check_meshes(gears) if finding.code not in ("W-TIP", "W-RIM")]
             except GeometryError as error:
                 fault = fault or error
                 if error.code == "E-ROOT-RADIUS" and error.gear == "ring":
@@ -181,7 +181,7 @@ def _candidates(
         distances = np.array([centre_distance])
         preferred = centre_distance
     else:
-        grid = [_stepped(one, step) for one in np.arange(low - 0.3, high + 1.5, 0.05)]
+        grid = [_stepped(shift_1, step) for shift_1 in np.arange(low - 0.3, high + 1.5, 0.05)]
         distances = np.array(sorted({preferred, *grid}))
     distances = distances[distances >= least * (1.0 + 1e-9)]
     shifts = np.round(np.arange(-0.7, 1.41, 0.02), 9)
@@ -206,10 +206,10 @@ def _stepped(distance: float, step: float) -> float:
 def _closing_shifts(teeth, alpha: float, a, shift) -> list[np.ndarray]:
     """Shifts of all gears without play at centre distances, from that of the first gear (ISO 21771)."""
     total = teeth[0] + teeth[1]
-    found = [shift, _total_shift(total, alpha, a) - shift]
+    shifts = [shift, _total_shift(total, alpha, a) - shift]
     if len(teeth) == 3:
-        found += [_total_shift(teeth[2] - teeth[1], alpha, a) + found[1]]
-    return found
+        shifts += [_total_shift(teeth[2] - teeth[1], alpha, a) + shifts[1]]
+    return shifts
 
 
 def _total_shift(teeth: int, alpha: float, a):
@@ -226,18 +226,18 @@ def _judged(teeth, alpha: float, rack: BasicRack, a, shift, preferred: float) ->
     base = [0.5 * z * math.cos(alpha) for z in teeth]
     length = a * np.sin(_working(teeth[0] + teeth[1], alpha, a))
     shortened = np.maximum(0.5 * (teeth[0] + teeth[1]) + x[0] + x[1] - a, 0.0)
-    form = [_form_roll(z, one, alpha, rack) for z, one in zip(teeth[:2], x[:2], strict=True)]
+    form = [_form_roll(z, shift_here, alpha, rack) for z, shift_here in zip(teeth[:2], x[:2], strict=True)]
     tip = [
-        np.sqrt(np.maximum((0.5 * z + rack.addendum + one - shortened) ** 2 - rb**2, 1e-12))
-        for z, one, rb in zip(teeth[:2], x[:2], base, strict=False)
+        np.sqrt(np.maximum((0.5 * z + rack.addendum + shift_here - shortened) ** 2 - rb**2, 1e-12))
+        for z, shift_here, rb in zip(teeth[:2], x[:2], base, strict=False)
     ]
     tip = [np.minimum(roll, length - other) for roll, other in zip(tip, form[::-1], strict=True)]
     pitch = math.pi * math.cos(alpha)
-    lacking = [np.maximum(-one, 0.0) for one in form]
+    lacking = [np.maximum(-roll, 0.0) for roll in form]
     lacking += [_short_contact((tip[0] + tip[1] - length) / pitch)]
     lacking += [
-        np.maximum(LEAST_LAND - _land(z, one, alpha, roll, rb, 1.0), 0.0)
-        for z, one, roll, rb in zip(teeth[:2], x[:2], tip, base, strict=False)
+        np.maximum(LEAST_LAND - _land(z, shift_here, alpha, roll, rb, 1.0), 0.0)
+        for z, shift_here, roll, rb in zip(teeth[:2], x[:2], tip, base, strict=False)
     ]
     if len(teeth) == 3:
         lacking += _ring_lacks(teeth, alpha, rack, a, x, form[1], tip[1])

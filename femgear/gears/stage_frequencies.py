@@ -87,7 +87,7 @@ def stage_frequencies(
     rates = _tooth_rates(gears, teeth, {gear: turns(gear) - carrier for gear in gears.shafts if gear != "carrier"})
     mesh = {f"{first}-{second}": abs(rates[first]) for first, second, _ in gears.meshes}
     spin = {gear: 2.0 * math.pi * rates[gear] / teeth[gear] for gear in rates if _is_planet(gears, gear, teeth)}
-    known = [(f"{a}-{b}", teeth[a], teeth[b]) for a, b, _ in gears.meshes if a in teeth and b in teeth]
+    meshing = [(f"{a}-{b}", teeth[a], teeth[b]) for a, b, _ in gears.meshes if a in teeth and b in teeth]
     passing = {"casing": carrier, "sun": turns("sun") - carrier, "ring": turns("ring") - carrier} if planets else {}
     return StageFrequencies(
         condition.name,
@@ -95,8 +95,8 @@ def stage_frequencies(
         {gear: carrier + value for gear, value in spin.items()},
         spin,
         {place: planets * abs(value) / (2.0 * math.pi) for place, value in passing.items()},
-        {name: (b // math.gcd(a, b), a // math.gcd(a, b)) for name, a, b in known},
-        {name: math.lcm(a, b) / mesh[name] if mesh[name] else math.inf for name, a, b in known},
+        {name: (b // math.gcd(a, b), a // math.gcd(a, b)) for name, a, b in meshing},
+        {name: math.lcm(a, b) / mesh[name] if mesh[name] else math.inf for name, a, b in meshing},
     )
 
 
@@ -109,7 +109,7 @@ def _tooth_rates(gears: StageGears, teeth: Mapping[str, int], relative: Mapping[
     rates = {gear: teeth[gear] * value / (2.0 * math.pi) for gear, value in relative.items()}
     for first, second, sense in gears.meshes:
         if first not in rates:  # a second gear on a body that turns already
-            partner = next(one for pair in gears.bodies if first in pair for one in pair if one != first)
+            partner = next(body for pair in gears.bodies if first in pair for body in pair if body != first)
             rates[first] = rates[partner] * teeth[first] / teeth[partner]
         rates.setdefault(second, sense * rates[first])
     return rates

@@ -40,20 +40,20 @@ def clearance_shortening(pair: GearPair) -> float:
     ``-k m = m ((z1 + z2)/2 + x1 + x2) - a`` (ISO 21771, section 5.3; DIN 3960), where that is positive.
     Profile shifts make the clearances of internal pairs larger: none.
     """
-    one, two = pair.gears
-    if two.internal:
+    gear_1, gear_2 = pair.gears
+    if gear_2.internal:
         return 0.0
-    shifts = (one.profile_shift + two.profile_shift) * one.module
-    missing = one.reference_radius + two.reference_radius + shifts - pair.centre_distance
+    shifts = (gear_1.profile_shift + gear_2.profile_shift) * gear_1.module
+    missing = gear_1.reference_radius + gear_2.reference_radius + shifts - pair.centre_distance
     return missing if missing > SEEN else 0.0
 
 
 def active_limits(pair: GearPair):
     """Find gear, partner and roll length [m] on the gear's flank that the partner's tip reaches, twice."""
-    (one, two), length = pair.gears, pair.centre_distance * math.sin(pair.working_pressure_angle)
-    if two.internal:
-        return (one, two, two.tip_roll - length), (two, one, one.tip_roll + length)
-    return (one, two, length - two.tip_roll), (two, one, length - one.tip_roll)
+    (gear_1, gear_2), length = pair.gears, pair.centre_distance * math.sin(pair.working_pressure_angle)
+    if gear_2.internal:
+        return (gear_1, gear_2, gear_2.tip_roll - length), (gear_2, gear_1, gear_1.tip_roll + length)
+    return (gear_1, gear_2, length - gear_2.tip_roll), (gear_2, gear_1, length - gear_1.tip_roll)
 
 
 def allowed_overlap(pair: GearPair) -> float:

@@ -86,7 +86,8 @@ def half_sector(gear: Gear, *, flank_elements: int = 24, refine: float = 1.0) ->
         _outline(gear, *size)  # refuses its own lengths
         raise
     curves, interfaces = (
-        tuple((name, _read_only(scale * points)) for name, points in some) for some in (curves, interfaces)
+        tuple((name, _read_only(scale * points)) for name, points in named_points)
+        for named_points in (curves, interfaces)
     )
     rolls = _flank_rolls(gear, *size)[:: -1 if gear.internal else 1]
     inside = tuple((name, (scale * x, scale * y)) for name, (x, y) in regions)
@@ -286,8 +287,8 @@ def root_notches(gear: Gear) -> tuple[np.ndarray, float]:
     # equal steps: what is shorter than one counts as a corner
     even = np.linspace(0.0, length[-1], max(8, math.ceil(length[-1] / step)))
     points = np.column_stack([np.interp(even, length, column) for column in points.T])
-    found = notch_radius(gear, points)
-    return points[found < limit], float(found.min())
+    radius_there = notch_radius(gear, points)
+    return points[radius_there < limit], float(radius_there.min())
 
 
 def _base_row(points: np.ndarray) -> int:

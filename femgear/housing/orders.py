@@ -171,7 +171,7 @@ def spacing_symmetry(planet_angles) -> int:
     """Find the largest g for which turns by ``2 pi/g`` map the planet angles [rad] on one another."""
     place = np.exp(1j * np.asarray(planet_angles, float))
     turned = (place[:, None] * np.exp(2j * np.pi / g) - place for g in range(len(place), 0, -1))
-    return next(len(place) - i for i, one in enumerate(turned) if np.abs(one).min(axis=1).max() < 1e-5)
+    return next(len(place) - i for i, difference in enumerate(turned) if np.abs(difference).min(axis=1).max() < 1e-5)
 
 
 def classify_line(
@@ -207,8 +207,8 @@ def classify_line(
     if whole and nearest % g == 0:
         shared = "factor zero: by sun and ring, which unequally spaced planets share"
         return LineVerdict(nearest, factor, NORMAL, "" if factor > _ZERO else shared)
-    found = [one for one in _turns(order, teeth, g, tolerance) if not (whole and one[1])]
-    turned = min(found, key=lambda one: one[0] + one[1])[2] if found else ""
+    turns = [turn for turn in _turns(order, teeth, g, tolerance) if not (whole and turn[1])]
+    turned = min(turns, key=lambda one: one[0] + one[1])[2] if turns else ""
     if whole:
         words = f"no multiple of {g}" + (f"; {turned}" if turned else "")
         return LineVerdict(nearest, factor, UNEQUAL, words)
@@ -219,7 +219,7 @@ def _turns(order: float, teeth, symmetry: int, tolerance: float) -> Iterator[tup
     """Turns of sun and planet that give an order: how many, carrier orders beside a mesh harmonic, words."""
     ring, sun, planet = teeth
     parts = (("the sun", sun and sun_ratio(sun, ring), symmetry), ("a planet", planet and ring / planet, 1))
-    for (name, rate, step), k in product(parts, [one for n in range(1, _MOST_TURNS + 1) for one in (n, -n)]):
+    for (name, rate, step), k in product(parts, [turn for n in range(1, _MOST_TURNS + 1) for turn in (n, -n)]):
         if not rate:
             continue
         rest = order - k * rate
@@ -314,14 +314,14 @@ def _prominent(values: np.ndarray, least: float) -> np.ndarray:
     level, last = values[first], np.append(first[1:], len(values)) - 1
     top = 1 + np.flatnonzero((level[1:-1] > level[:-2]) & (level[1:-1] > level[2:]))
     height, valley = level[top], np.minimum.reduceat(level, np.append(0, top))
-    found = []
+    places = []
     for k, high in enumerate(height):
         before, after = np.flatnonzero(height[:k] > high), np.flatnonzero(height[k + 1 :] > high)
         left = valley[before[-1] + 1 if len(before) else 0 : k + 1].min()
         right = valley[k + 1 : k + 2 + after[0] if len(after) else None].min()
         if high - max(left, right) >= least:
-            found.append((first[top[k]] + last[top[k]]) // 2)
-    return np.array(found, int)
+            places.append((first[top[k]] + last[top[k]]) // 2)
+    return np.array(places, int)
 
 
 def dominant_lines(spectrum: OrderSpectrum, *, low: float, high: float, count: int = 6) -> tuple[Line, ...]:

@@ -49,11 +49,11 @@ class ReadOnlyArrays:
     """Frozen dataclass that keeps read-only copies of its arrays."""
 
     def __post_init__(self):
-        for one in fields(self):  # type: ignore[arg-type]
-            if one.type == "np.ndarray":
-                array = np.array(getattr(self, one.name))
+        for field in fields(self):  # type: ignore[arg-type]
+            if field.type == "np.ndarray":
+                array = np.array(getattr(self, field.name))
                 array.setflags(write=False)
-                object.__setattr__(self, one.name, array)
+                object.__setattr__(self, field.name, array)
 
 
 @dataclass(frozen=True)
@@ -239,19 +239,19 @@ def stored_lines(housing: Any, *, form: str | None = None) -> SensorLines:
     The dataset has one or some speeds, as ``results.housing.sel(speed=250, method="nearest")``. The form is
     "exact" or "linear", that of the case when left out.
     """
-    known, order = housing.attrs, housing["order"].values
+    attributes, order = housing.attrs, housing["order"].values
     exact = housing["lines_real"].values + 1j * housing["lines_imag"].values
     end = np.flatnonzero(exact.any(axis=tuple(range(exact.ndim - 1)))).max(initial=1) + 1
-    place = float(known["sensor_angle"]), int(known["ring_teeth"])
+    place = float(attributes["sensor_angle"]), int(attributes["ring_teeth"])
     lines = SensorLines(
         order[:end],
         exact[..., :end],
         housing["carrier_speed"].values,
         *place,
-        known.get("method", "exact"),
-        int(known.get("turns", 1)),
+        attributes.get("method", "exact"),
+        int(attributes.get("turns", 1)),
     )
-    return lines_in_form(lines, form or known["form"], int(known["points"]), round(order[-1] / place[1]))
+    return lines_in_form(lines, form or attributes["form"], int(attributes["points"]), round(order[-1] / place[1]))
 
 
 def lines_in_form(exact: SensorLines, form: str, points: int, harmonics: int) -> SensorLines:
@@ -269,9 +269,9 @@ def lines_in_form(exact: SensorLines, form: str, points: int, harmonics: int) ->
     n_max, moving = int(np.abs(n).max()), h > 0
     field = np.zeros((*speed.shape, h.max() + 1, 2 * n_max + 1), complex)
     field[..., h[moving], n_max + n[moving]] = (exact.displacement * np.exp(-1j * n * angle))[..., moving]
-    found = heaviside_linear_lines(field, z, speed, angle, points=points, max_order=top)
+    lines = heaviside_linear_lines(field, z, speed, angle, points=points, max_order=top)
     still = _spread(np.where(moving, 0.0, exact.displacement), order, top + 1)
-    return replace(found, displacement=found.displacement + still)
+    return replace(lines, displacement=lines.displacement + still)
 
 
 def heaviside_linear_lines(

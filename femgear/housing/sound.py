@@ -36,7 +36,9 @@ NO_AREAS = "no sound: the file of the casing has no sensor_area, the areas of su
 REFERENCE_ACCELERATION = 1e-6  # m/s^2 (ISO 1683)
 _UNITS = {"m/s^2": (0, 1.0), "g": (0, 1 / 9.80665), "mm/s": (1, 1e3), "um": (2, 1e6), "dB": (0, None)}
 """Times that the acceleration is integrated, and units in the SI one, by unit of levels."""
-LEVELS = tuple(f"{unit} {one}" for unit in _UNITS for one in ("rms", "peak") if (unit, one) != ("dB", "peak"))
+LEVELS = tuple(
+    f"{unit} {measure}" for unit in _UNITS for measure in ("rms", "peak") if (unit, measure) != ("dB", "peak")
+)
 RATE = 48e3  # samples a second of a signal
 _WIDTH, _OVERSAMPLING = 14, 2
 """Of the kernel that interpolates between the samples of a turn: 1e-12 of the sum of the amplitudes."""
@@ -143,7 +145,7 @@ def _ring_efficiencies(ka: np.ndarray, slenderness: float, points: int) -> Itera
     angle, weights = np.pi / 4 * (1 + nodes), np.pi / 2 * weights
     width = ka[:, None] * slenderness
     share = width / (2 * np.pi) * np.sinc(width * np.sin(angle) / (2 * np.pi)) ** 2 * weights
-    return ((share * one).sum(axis=1) for one in _efficiencies(ka[:, None] * np.cos(angle)))
+    return ((share * efficiency).sum(axis=1) for efficiency in _efficiencies(ka[:, None] * np.cos(angle)))
 
 
 def _over_frequency(n: np.ndarray, x: np.ndarray, computed, *given, most: float = np.inf) -> np.ndarray:
@@ -155,16 +157,16 @@ def _over_frequency(n: np.ndarray, x: np.ndarray, computed, *given, most: float 
     n, x = n[moving], x[moving]
     if not len(x):
         return values
-    found, orders = np.zeros(len(x), complex), int(n.max()) + 1
+    interpolated, orders = np.zeros(len(x), complex), int(n.max()) + 1
     if len(x) > most:
         nodes, logarithms = _logarithms(float(x.min()), float(x.max()), int(most), orders, computed, *given)
         for m in np.unique(n):
-            found[n == m] = np.exp(not_a_knot(np.log(nodes), logarithms[m], np.log(x[n == m])))
+            interpolated[n == m] = np.exp(not_a_knot(np.log(nodes), logarithms[m], np.log(x[n == m])))
     else:
         nodes, places = np.unique(x, return_inverse=True)
         for m, row in zip(range(orders), computed(nodes, *given)):
-            found[n == m] = row[places[n == m]]
-    values[moving] = found
+            interpolated[n == m] = row[places[n == m]]
+    values[moving] = interpolated
     return values
 
 
@@ -292,7 +294,7 @@ def component_sound(
     velocity = 2j * np.pi * number * base * waves
     parts = surface_sound(velocity[..., None], n[:, None], number * base, cylinder, microphone)
     lines = np.unique(number, return_index=True)[1]
-    return tuple(np.add.reduceat(one, lines, axis=-1) for one in parts)
+    return tuple(np.add.reduceat(part, lines, axis=-1) for part in parts)
 
 
 def _velocity(lines: SensorLines) -> np.ndarray:
@@ -357,11 +359,11 @@ def stored_sound(housing: Any) -> tuple[SensorLines, np.ndarray]:
     return lines, microphone_lines(lines, housing.attrs)
 
 
-def microphone_lines(lines: SensorLines, known: Mapping[str, Any]) -> np.ndarray:
+def microphone_lines(lines: SensorLines, attributes: Mapping[str, Any]) -> np.ndarray:
     """Compute the lines of the sound pressure [Pa] by the attributes of housing.nc, as `sound_pressure`."""
-    air = known["air_density"], known["sound_speed"]
-    cylinder = Cylinder(known["outer_radius"], known["face_width"], *air)
-    microphone = Microphone(known["microphone_distance"], known["microphone_angle"])
+    air = attributes["air_density"], attributes["sound_speed"]
+    cylinder = Cylinder(attributes["outer_radius"], attributes["face_width"], *air)
+    microphone = Microphone(attributes["microphone_distance"], attributes["microphone_angle"])
     return sound_pressure(lines, cylinder, microphone)
 
 
@@ -447,16 +449,16 @@ def run_up_signal(order, values, speeds, *, duration: float, start=None, stop=No
             remedy="compute the lines at the first and the last speed of the run, too",
         )
     heard, count = _heard(order, values, nodes, rate), int(np.ceil(duration * rate * (1 - 1e-15)))
-    slope, times, found = (ends[1] - ends[0]) / duration, np.arange(count) / rate, np.empty(count)
+    slope, times, pressure = (ends[1] - ends[0]) / duration, np.arange(count) / rate, np.empty(count)
     speed, turns = ends[0] + slope * times, (ends[0] + 0.5 * slope * times) * times / (2 * np.pi)
     place = np.clip(np.searchsorted(nodes, speed, side="right") - 1, 0, len(nodes) - 2)
     # between them the speed passes none of those of the lines
     for first, last in pairwise(np.flatnonzero(np.diff(place, prepend=-1, append=-1)).tolist()):
-        low, some = int(place[first]), slice(first, last)
-        below, above = _between(_turn(order, heard[low : low + 2]), turns[some])
-        share = (speed[some] - nodes[low]) / (nodes[low + 1] - nodes[low])
-        found[some] = below + share * (above - below)
-    return found
+        low, samples = int(place[first]), slice(first, last)
+        below, above = _between(_turn(order, heard[low : low + 2]), turns[samples])
+        share = (speed[samples] - nodes[low]) / (nodes[low + 1] - nodes[low])
+        pressure[samples] = below + share * (above - below)
+    return pressure
 
 
 def _checked_lines(order, values, speeds, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -511,15 +513,15 @@ def _between(grid: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Values (n, n_places) between the samples (n, M) of `_turn` after any number of turns (n_places,)."""
     from scipy.special import i0
 
-    periodic, found = np.pad(grid, ((0, 0), (_WIDTH, _WIDTH)), mode="wrap"), np.zeros((len(grid), len(turns)))
+    periodic, interpolated = np.pad(grid, ((0, 0), (_WIDTH, _WIDTH)), mode="wrap"), np.zeros((len(grid), len(turns)))
     for begin in range(0, len(turns), _BLOCK):
-        some = slice(begin, begin + _BLOCK)
-        place = (turns[some] % 1.0) * grid.shape[-1]
+        samples = slice(begin, begin + _BLOCK)
+        place = (turns[samples] % 1.0) * grid.shape[-1]
         first = np.ceil(place - _WIDTH / 2).astype(int)
         for m in range(_WIDTH):
             kernel = i0(_BETA * np.sqrt(np.maximum(1 - (2 / _WIDTH * (place - first - m)) ** 2, 0.0)))
-            found[:, some] += kernel * periodic[:, first + (_WIDTH + m)]
-    return found
+            interpolated[:, samples] += kernel * periodic[:, first + (_WIDTH + m)]
+    return interpolated
 
 
 @dataclass(frozen=True)
@@ -547,7 +549,7 @@ def sound_quality(pressure: np.ndarray, rate: float = RATE) -> SoundQuality:
     with nvh_library("loudness and tones"):
         from mosqito import loudness_zwst, pr_ecma_st, tnr_ecma_st
     loudness = float(loudness_zwst(pressure, rate, field_type="free")[0])
-    found = [one(pressure, rate, prominence=False) for one in (tnr_ecma_st, pr_ecma_st)]
+    results = [method(pressure, rate, prominence=False) for method in (tnr_ecma_st, pr_ecma_st)]
     # the library gives 0 dB where it finds no tone
-    noise, ratio = (float(np.max(one[0])) if np.size(one[3]) else np.nan for one in found)
-    return SoundQuality(loudness, noise, ratio, np.asarray(found[0][3], float))
+    noise, ratio = (float(np.max(result[0])) if np.size(result[3]) else np.nan for result in results)
+    return SoundQuality(loudness, noise, ratio, np.asarray(results[0][3], float))

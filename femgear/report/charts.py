@@ -60,14 +60,14 @@ def chart(figure: Figure) -> dict[str, Any] | None:
         axes and traces, named as plotly.js names them; None where a part of the figure is neither a line, an
         area, a bar, a field nor a text.
     """
-    bars = {id(found.colorbar.ax) for found in _fields(figure)}
+    bars = {id(coloured.colorbar.ax) for coloured in _fields(figure)}
     panels = [ax for ax in figure.axes if id(ax) not in bars]
     try:
-        found = [_panel(ax, number, panels) for number, ax in enumerate(panels)]
+        drawn = [_panel(ax, number, panels) for number, ax in enumerate(panels)]
     except _PictureOnly:
         return None
     grids: list[Any] = [ax.get_gridspec() for ax in panels if ax.get_subplotspec() is not None]
-    if len(grids) != len(panels) or not found:
+    if len(grids) != len(panels) or not drawn:
         return None
     title = figure.get_suptitle()
     width, height = figure.get_size_inches()
@@ -76,13 +76,18 @@ def chart(figure: Figure) -> dict[str, Any] | None:
         "size": [float(width), float(height)],
         "rows": grids[0].nrows,
         "columns": grids[0].ncols,
-        "panels": found,
+        "panels": drawn,
     }
 
 
 def _fields(figure: Figure) -> list[Any]:
     """List what has a colour bar."""
-    return [one for ax in figure.axes for one in ax.collections if getattr(one, "colorbar", None) is not None]
+    return [
+        collection
+        for ax in figure.axes
+        for collection in ax.collections
+        if getattr(collection, "colorbar", None) is not None
+    ]
 
 
 def _panel(ax: Any, number: int, panels: list[Any]) -> dict[str, Any]:
@@ -123,15 +128,15 @@ def _circles(ax: Any) -> list[dict[str, Any]]:
     radii = [r for r in ax.get_yticks() if low < r <= outer]
     label_at = np.radians(ax.get_rlabel_position())
     grid = {"mode": "lines", "line": {"color": "#d0d0d0", "width": 1}, "hoverinfo": "skip"}
-    found = [{**grid, **_plane(turn, np.full_like(turn, r), origin)} for r in (*radii, outer)]
+    circles = [{**grid, **_plane(turn, np.full_like(turn, r), origin)} for r in (*radii, outer)]
     angles = np.arange(8) * np.pi / 4
-    found += [{**grid, **_plane(np.array([a, a]), np.array([low, outer]), origin)} for a in angles]
+    circles += [{**grid, **_plane(np.array([a, a]), np.array([low, outer]), origin)} for a in angles]
     text = {"mode": "text", "hoverinfo": "skip", "line": {"color": "#606060"}}
     rim = outer + 0.07 * (outer - origin)
     degrees = {"text": [f"{np.degrees(a):.0f}°" for a in angles]}
-    found.append({**text, **degrees, **_plane(angles, np.full(8, rim), origin)})
+    circles.append({**text, **degrees, **_plane(angles, np.full(8, rim), origin)})
     numbers = {"text": [f"{r:g}".replace("-", "−") for r in radii]}
-    return [*found, {**text, **numbers, **_plane(np.full(len(radii), label_at), np.array(radii), origin)}]
+    return [*circles, {**text, **numbers, **_plane(np.full(len(radii), label_at), np.array(radii), origin)}]
 
 
 def _plane(angle: np.ndarray, radius: np.ndarray, origin: float) -> dict[str, Any]:
@@ -147,11 +152,11 @@ def _axis(axis, limits) -> dict[str, Any]:
     scale = axis.get_scale()
     if scale not in ("linear", "log"):
         raise _PictureOnly
-    found = {"title": axis.get_label_text(), "log": scale == "log", "range": [float(end) for end in limits]}
+    described = {"title": axis.get_label_text(), "log": scale == "log", "range": [float(end) for end in limits]}
     if isinstance(axis.get_major_formatter(), FixedFormatter):
         texts = [text.get_text() for text in axis.get_ticklabels()]
-        found |= {"ticks": _numbers(axis.get_majorticklocs()), "texts": texts}
-    return found
+        described |= {"ticks": _numbers(axis.get_majorticklocs()), "texts": texts}
+    return described
 
 
 def _lines(ax: Any) -> list[dict[str, Any]]:
@@ -167,26 +172,26 @@ def _curve(line, ax: Any) -> dict[str, Any]:
     style, marker = line.get_linestyle(), line.get_marker()
     drawn, marked = style not in ("None", "none", " ", ""), marker not in ("None", "none", None, " ", "")
     colour = to_hex(line.get_color())
-    found: dict[str, Any] = {
+    trace: dict[str, Any] = {
         "mode": "+".join(["lines"] * drawn + ["markers"] * marked) or "none",
         "line": {"color": colour, "width": _width(line.get_linewidth()), "dash": _DASHES.get(style, "dash")},
         "opacity": float(line.get_alpha() or 1.0),
     }
     if line.get_drawstyle().startswith("steps"):
-        found["line"]["shape"] = {"steps-mid": "hvh", "steps-post": "hv"}.get(line.get_drawstyle(), "vh")
+        trace["line"]["shape"] = {"steps-mid": "hvh", "steps-post": "hv"}.get(line.get_drawstyle(), "vh")
     if marked:
         open_face = str(line.get_markerfacecolor()).lower() in ("none", "white")
         symbol = _MARKERS.get(marker, "circle") + "-open" * open_face
         edge = to_hex(line.get_markeredgecolor()) if open_face else to_hex(line.get_markerfacecolor())
-        found["marker"] = {
+        trace["marker"] = {
             "symbol": symbol,
             "size": _PIXELS_OF_A_POINT * line.get_markersize(),
             "color": edge,
         }
     across = _across(line.get_transform(), ax)
     if across:
-        return {**found, **_spread(x, y, across, ax), **_name(line), "hoverinfo": "skip"}
-    return {**found, **_coordinates(x, y, ax), **_name(line)}
+        return {**trace, **_spread(x, y, across, ax), **_name(line), "hoverinfo": "skip"}
+    return {**trace, **_coordinates(x, y, ax), **_name(line)}
 
 
 def _across(transform, ax: Any) -> str:
@@ -232,71 +237,71 @@ def _areas(ax: Any) -> list[dict[str, Any]]:
     """Read filled areas, bundles of lines, and fields."""
     from matplotlib.collections import LineCollection, PathCollection, PolyCollection, QuadMesh
 
-    found = []
-    for one in ax.collections:
-        if isinstance(one, QuadMesh):
-            found.append(_field(one))
-        elif isinstance(one, LineCollection):
-            found.append(_bundle(one.get_segments(), one, ax))
-        elif isinstance(one, PolyCollection):
-            found += [_area(path.vertices, one, ax) for path in one.get_paths()]
-        elif isinstance(one, PathCollection):
-            found += [_points(one, ax)] if np.size(one.get_offsets()) else []
+    traces = []
+    for collection in ax.collections:
+        if isinstance(collection, QuadMesh):
+            traces.append(_field(collection))
+        elif isinstance(collection, LineCollection):
+            traces.append(_bundle(collection.get_segments(), collection, ax))
+        elif isinstance(collection, PolyCollection):
+            traces += [_area(path.vertices, collection, ax) for path in collection.get_paths()]
+        elif isinstance(collection, PathCollection):
+            traces += [_points(collection, ax)] if np.size(collection.get_offsets()) else []
         else:
             raise _PictureOnly
-    return found
+    return traces
 
 
-def _points(one, ax: Any) -> dict[str, Any]:
+def _points(collection, ax: Any) -> dict[str, Any]:
     """Read scattered points, each of its size, which is that of an area [pt^2]."""
-    x, y = np.asarray(one.get_offsets(), float).T
-    if one.get_array() is not None or len(one.get_facecolors()) > 1:
+    x, y = np.asarray(collection.get_offsets(), float).T
+    if collection.get_array() is not None or len(collection.get_facecolors()) > 1:
         raise _PictureOnly
-    filled = len(one.get_facecolors()) > 0
-    colours = one.get_facecolors() if filled else one.get_edgecolors()
-    sizes = _PIXELS_OF_A_POINT * np.sqrt(np.resize(one.get_sizes(), len(x)))
+    filled = len(collection.get_facecolors()) > 0
+    colours = collection.get_facecolors() if filled else collection.get_edgecolors()
+    sizes = _PIXELS_OF_A_POINT * np.sqrt(np.resize(collection.get_sizes(), len(x)))
     marker: dict[str, Any] = {"size": _numbers(sizes), "color": _colour(colours)}
     marker["symbol"] = "circle" if filled else "circle-open"
     if not filled:
-        marker["line"] = {"width": _width(one.get_linewidths()[0])}
-    return {"mode": "markers", "marker": marker, **_coordinates(x, y, ax), **_name(one)}
+        marker["line"] = {"width": _width(collection.get_linewidths()[0])}
+    return {"mode": "markers", "marker": marker, **_coordinates(x, y, ax), **_name(collection)}
 
 
-def _bundle(segments, one, ax: Any) -> dict[str, Any]:
+def _bundle(segments, collection, ax: Any) -> dict[str, Any]:
     """Read many straight lines as one curve with gaps."""
     gap = np.full((1, 2), np.nan)
     joined = np.concatenate([np.concatenate([segment, gap]) for segment in segments] or [gap])
-    line = {"color": _colour(one.get_colors()), "width": _width(one.get_linewidths()[0])}
-    return {"mode": "lines", "line": line, **_coordinates(joined[:, 0], joined[:, 1], ax), **_name(one)}
+    line = {"color": _colour(collection.get_colors()), "width": _width(collection.get_linewidths()[0])}
+    return {"mode": "lines", "line": line, **_coordinates(joined[:, 0], joined[:, 1], ax), **_name(collection)}
 
 
-def _area(corners, one, ax: Any) -> dict[str, Any]:
+def _area(corners, collection, ax: Any) -> dict[str, Any]:
     """Read one filled area."""
-    if len(one.get_facecolors()) > 1:
+    if len(collection.get_facecolors()) > 1:
         raise _PictureOnly
     corners = np.asarray(corners, float)[:: 1 + len(corners) // _MOST_CORNERS]
-    faces = one.get_facecolors()
+    faces = collection.get_facecolors()
     fill = {"fill": "toself", "fillcolor": _colour(faces), "fillopacity": float(faces[0][3])} if len(faces) else {}
     return {
         "mode": "none" if fill else "lines",
         "hoverinfo": "skip",
         **fill,
         **_coordinates(corners[:, 0], corners[:, 1], ax),
-        **_name(one),
+        **_name(collection),
     }
 
 
-def _field(one) -> dict[str, Any]:
+def _field(mesh) -> dict[str, Any]:
     """Read a field of coloured cells on straight lines."""
-    corners = one.get_coordinates()
+    corners = mesh.get_coordinates()
     x, y = corners[0, :, 0], corners[:, 0, 1]
     straight = np.array_equal(corners[..., 0], np.broadcast_to(x, corners.shape[:2]))
     if not straight or not np.array_equal(corners[..., 1], np.broadcast_to(y[:, None], corners.shape[:2])):
         raise _PictureOnly
-    values = np.ma.filled(np.ma.asarray(one.get_array(), float), np.nan).reshape(len(y) - 1, len(x) - 1)
-    low, high = one.get_clim()
-    colours = [[float(s), _colour([one.cmap(s)])] for s in np.linspace(0.0, 1.0, 17)]
-    bar = one.colorbar
+    values = np.ma.filled(np.ma.asarray(mesh.get_array(), float), np.nan).reshape(len(y) - 1, len(x) - 1)
+    low, high = mesh.get_clim()
+    colours = [[float(s), _colour([mesh.cmap(s)])] for s in np.linspace(0.0, 1.0, 17)]
+    bar = mesh.colorbar
     return {
         "type": "heatmap",
         **{"x": _numbers(x), "y": _numbers(y), "z": [_numbers(row) for row in values]},
@@ -309,45 +314,45 @@ def _patches(ax: Any) -> list[dict[str, Any]]:
     """Read bars, bands across the panel, stairs and polygons."""
     from matplotlib.patches import Polygon, Rectangle, StepPatch
 
-    found: list[dict[str, Any]] = []
-    one: Any
-    for one in ax.patches:
-        if isinstance(one, StepPatch):
-            values, edges, _ = one.get_data()
+    traces: list[dict[str, Any]] = []
+    patch: Any
+    for patch in ax.patches:
+        if isinstance(patch, StepPatch):
+            values, edges, _ = patch.get_data()
             x, y = np.repeat(edges, 2)[1:-1], np.repeat(values, 2)
-            line = {"color": _colour([one.get_edgecolor()]), "width": _width(one.get_linewidth())}
-            line["dash"] = _DASHES.get(str(one.get_linestyle()), "solid")
-            step = {"mode": "lines", "line": line, **_coordinates(x, y, ax), **_name(one)}
-            if one.get_fill():
+            line = {"color": _colour([patch.get_edgecolor()]), "width": _width(patch.get_linewidth())}
+            line["dash"] = _DASHES.get(str(patch.get_linestyle()), "solid")
+            step = {"mode": "lines", "line": line, **_coordinates(x, y, ax), **_name(patch)}
+            if patch.get_fill():
                 x, y = [x[0], *x, x[-1]], [0.0, *y, 0.0]
-                step |= {"fill": "toself", "fillcolor": _colour([one.get_facecolor()]), "fillopacity": 1.0}
+                step |= {"fill": "toself", "fillcolor": _colour([patch.get_facecolor()]), "fillopacity": 1.0}
                 step |= _coordinates(x, y, ax)
-            found.append(step)
+            traces.append(step)
             continue
-        if isinstance(one, Rectangle):
-            corners = one.get_patch_transform().transform(one.get_path().vertices)
-        elif isinstance(one, Polygon):
-            corners = one.get_xy()
+        if isinstance(patch, Rectangle):
+            corners = patch.get_patch_transform().transform(patch.get_path().vertices)
+        elif isinstance(patch, Polygon):
+            corners = patch.get_xy()
         else:
             raise _PictureOnly
         x, y = corners[:, 0], corners[:, 1]
-        across = _across(one.get_data_transform() if one.is_transform_set() else ax.transData, ax)
+        across = _across(patch.get_data_transform() if patch.is_transform_set() else ax.transData, ax)
         place = _spread(x, y, across, ax) if across else _coordinates(x, y, ax)
-        face: Any = one.get_facecolor()
+        face: Any = patch.get_facecolor()
         fill = {"fill": "toself", "fillcolor": _colour([face]), "fillopacity": float(face[3])}
-        found.append({"mode": "none", "hoverinfo": "skip", **fill, **place, **_bar_name(one, ax)})
-    return found
+        traces.append({"mode": "none", "hoverinfo": "skip", **fill, **place, **_bar_name(patch, ax)})
+    return traces
 
 
-def _bar_name(one, ax: Any) -> dict[str, Any]:
+def _bar_name(patch, ax: Any) -> dict[str, Any]:
     """Name a bar as its group is named."""
-    group = next((bars for bars in ax.containers if one in list(bars)), one)
+    group = next((bars for bars in ax.containers if patch in list(bars)), patch)
     return _name(group)
 
 
 def _words(ax: Any) -> list[dict[str, Any]]:
     """Read texts within the panel."""
-    found = []
+    texts_drawn = []
     text: Any
     for text in ax.texts:
         if not text.get_text():
@@ -355,7 +360,7 @@ def _words(ax: Any) -> list[dict[str, Any]]:
         x, y = getattr(text, "xy", None) or text.get_position()
         place = _place_of(text, x, y, ax)
         shift = text.xyann if hasattr(text, "xyann") and getattr(text, "xycoords", "") == "data" else (0.0, 0.0)
-        found.append(
+        texts_drawn.append(
             place
             | {
                 "text": text.get_text(),
@@ -366,7 +371,7 @@ def _words(ax: Any) -> list[dict[str, Any]]:
                 "ground": text.get_bbox_patch() is not None,
             }
         )
-    return found
+    return texts_drawn
 
 
 def _place_of(text: Any, x, y, ax: Any) -> dict[str, Any]:

@@ -33,19 +33,19 @@ def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]
     rows = tuple(_entries(*cases))
     entries = Block("Cases", ("entry", "first", "second") if rows else (), rows, () if rows else ("the same",))
     others = {block.title: block for block in train.describe_results(second)}
-    found = [entries]
+    blocks = [entries]
     for block in train.describe_results(first):
         if block.title in others and block.title not in ("Time", WARNINGS):
-            found.append(_differences(block, others[block.title]))
-    return (*found, _findings(first, second))
+            blocks.append(_differences(block, others[block.title]))
+    return (*blocks, _findings(first, second))
 
 
 def _findings(first: Results, second: Results) -> Block:
     """Tabulate the warnings that one of two runs alone has, by code and stage."""
-    a, b = ({(one.code, one.stage): one for one in run.findings} for run in (first, second))
+    a, b = ({(finding.code, finding.stage): finding for finding in run.findings} for run in (first, second))
     rows = tuple(
-        (f"{one.severity} {one.code}", one.stage or "the case", *(("yes", "-") if key in a else ("-", "yes")))
-        for key, one in (a | b).items()
+        (f"{value.severity} {value.code}", value.stage or "the case", *(("yes", "-") if key in a else ("-", "yes")))
+        for key, value in (a | b).items()
         if (key in a) != (key in b)
     )
     return Block(WARNINGS, ("", "of", "first", "second") if rows else (), rows, () if rows else ("the same",))
@@ -85,7 +85,7 @@ def _flat(entries: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     if isinstance(entries, dict):
         for key, value in entries.items():
             yield from _flat(value, f"{path}.{key}" if path else key)
-    elif isinstance(entries, list) and any(isinstance(one, dict) for one in entries):
+    elif isinstance(entries, list) and any(isinstance(entry, dict) for entry in entries):
         for i, value in enumerate(entries):
             yield from _flat(value, f"{path}[{i}]")
     else:
@@ -97,20 +97,20 @@ def _differences(first: Block, second: Block) -> Block:
     if first.header != second.header:  # as of a set with supports and one without
         first, second = _shared(first, second.header), _shared(second, first.header)
     names = [name for name in _MEETING if "mesh harmonic" in first.header and name in first.header]
-    own = [first.header.index(name) for name in names] or [0]
-    a, b = ({tuple(row[i] for i in own): row for row in block.rows} for block in (first, second))
+    key_columns = [first.header.index(name) for name in names] or [0]
+    a, b = ({tuple(row[i] for i in key_columns): row for row in block.rows} for block in (first, second))
     alone = [key for key in [*a, *b] if (key in a) != (key in b)]
     whole = (len(a), len(b)) == (len(first.rows), len(second.rows))
     if first.header != second.header or not whole or (alone and not names):
         return Block(first.title, notes=("the tables have other rows; see the reports",))
     rows, columns = [], first.header or [""] * max(map(len, first.rows), default=0)
     for key in dict.fromkeys([*a, *b]):
-        what = ", ".join(f"{columns[i]} {text}".strip() for i, text in zip(own, key))
+        what = ", ".join(f"{columns[i]} {text}".strip() for i, text in zip(key_columns, key))
         if key in alone:
             rows.append((what, "", *(("listed", "-") if key in a else ("-", "listed")), ""))
             continue
         for i, (x, y) in enumerate(zip(a[key], b[key])):
-            if x != y and i not in own:
+            if x != y and i not in key_columns:
                 unit = f"{first.title} {what} {columns[i]}"
                 rows.append((what, columns[i], x, y, _change(x, y, decibels="dB" in unit)))
     header = ("row", "column", "first", "second", "change") if rows else ()
@@ -139,7 +139,7 @@ def _shared(block: Block, header: tuple[str, ...]) -> Block:
 def _change(first: str, second: str, *, decibels: bool) -> str:
     """Change in per cent, of levels in dB, nothing where a cell is no number, `NO_CHANGE` of a bound."""
     try:
-        x, y = (float(unmarked(one)) for one in (first, second))
+        x, y = (float(unmarked(text)) for text in (first, second))
     except ValueError:
         return ""
     if is_bound(first) or is_bound(second):
@@ -154,11 +154,11 @@ def compare_page(train: Train, first: Results, second: Results) -> str:
     data = [shown_data(run) for run in (first, second)]
     charts = {
         name: both
-        for name, one in data[0].get("charts", {}).items()
-        if name in data[1].get("charts", {}) and (both := _overlaid(one, data[1]["charts"][name])) is not None
+        for name, value in data[0].get("charts", {}).items()
+        if name in data[1].get("charts", {}) and (both := _overlaid(value, data[1]["charts"][name])) is not None
     }
     title = f"{first.folder.name} and {second.folder.name}"
-    runs = {f"runup {i}": one["runup"] for i, one in enumerate(data, 1) if "runup" in one}
+    runs = {f"runup {i}": run_data["runup"] for i, run_data in enumerate(data, 1) if "runup" in run_data}
     main = [f"<h1>{escape(title)}</h1>\n"]
     for block in compared(train, first, second):
         words = table(block, heading=False)
@@ -176,16 +176,16 @@ def _overlaid(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any] |
     if len(first["panels"]) != len(second["panels"]):
         return None
     panels = []
-    for one, other in zip(first["panels"], second["panels"]):
-        if any(trace.get("type") == "heatmap" for trace in one["traces"]):
+    for panel, other in zip(first["panels"], second["panels"]):
+        if any(trace.get("type") == "heatmap" for trace in panel["traces"]):
             return None
         faded = [
             trace | {"name": f"{trace['name']}, second" if trace.get("name") else "", "opacity": _FADED}
             for trace in other["traces"]
             if trace.get("hoverinfo") != "skip"
         ]
-        ranges = {axis: one[axis] | _joint(one[axis], other[axis]) for axis in ("x", "y")}
-        panels.append(one | ranges | {"traces": [*one["traces"], *faded], "words": []})
+        ranges = {axis: panel[axis] | _joint(panel[axis], other[axis]) for axis in ("x", "y")}
+        panels.append(panel | ranges | {"traces": [*panel["traces"], *faded], "words": []})
     return first | {"panels": panels}
 
 

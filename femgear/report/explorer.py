@@ -49,7 +49,7 @@ def explorer(runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None =
     if pressure is not None:
         strength = strength / strength.max() + np.abs(pressure).max(axis=0) / np.abs(pressure).max()
     kept = np.sort(np.argsort(-strength, kind="stable")[:_ORDERS])
-    power, part = (np.sum(np.abs(one) ** 2, axis=1) for one in (lines, lines[:, kept]))
+    power, part = (np.sum(np.abs(spectrum) ** 2, axis=1) for spectrum in (lines, lines[:, kept]))
     top = float(runup["mesh_frequency"].values.max()) * (_HARMONICS + 0.5)
     kinds = [str(kind) for kind in modes["kind"].values]
     colours = {kind: KIND_COLOURS.get(kind.removeprefix("ring, "), GREY) for kind in kinds}

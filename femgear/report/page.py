@@ -54,7 +54,7 @@ _PARTS = {"solid": ("three.min.js", "solid.js"), "runup": ("explorer.js",)}
 
 
 def write_figures(
-    folder: Path, train: Train, drawn: Drawn, beside: _Call = lambda: None, told: _Call = lambda: None
+    folder: Path, train: Train, drawn: Drawn, beside: _Call = lambda: None, tell_others: _Call = lambda: None
 ) -> list[str]:
     """Write the figures of the stages whose data are there, and of the case; returns the file names.
 
@@ -65,19 +65,19 @@ def write_figures(
     import matplotlib.backends.backend_agg  # noqa: F401  before the process is copied
 
     def pictures(stage: Figures) -> dict[str, tuple[bytes, Any]]:
-        found = {name: (png_bytes(figure), chart(figure)) for name, figure in stage.draw(drawn).items()}
-        told()  # to nobody from a second process
-        return found
+        drawings = {name: (png_bytes(figure), chart(figure)) for name, figure in stage.draw(drawn).items()}
+        tell_others()  # to nobody from a second process
+        return drawings
 
     tasks = [partial(pictures, stage) for stage in _drawn(train, drawn)]
-    found = {name: both for part in shared(tasks, beside) for name, both in part.items()}
-    if not found:
+    drawings = {name: both for part in shared(tasks, beside) for name, both in part.items()}
+    if not drawings:
         return []
-    for name, (data, _) in found.items():
+    for name, (data, _) in drawings.items():
         write_bytes(data, folder / f"{name}.png")
-    charts = {name: one for name, (_, one) in found.items() if one is not None}
+    charts = {name: value for name, (_, value) in drawings.items() if value is not None}
     write_text(json.dumps(charts, allow_nan=False, separators=(",", ":")), folder / _CHARTS)
-    return [*(f"{name}.png" for name in found), _CHARTS]
+    return [*(f"{name}.png" for name in drawings), _CHARTS]
 
 
 def _drawn(train: Train, drawn: Drawn) -> list[Figures]:
@@ -146,18 +146,18 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     pictures, skipped = _pictures(train, results)
     data = {} if static else shown_data(results)
     if "runup" in data:
-        pictures = [one for one in pictures if one.name not in DRAWN]
-        data["charts"] = {name: one for name, one in data.get("charts", {}).items() if name not in DRAWN}
+        pictures = [picture for picture in pictures if picture.name not in DRAWN]
+        data["charts"] = {name: value for name, value in data.get("charts", {}).items() if name not in DRAWN}
     warnings = [*by_severity(results.findings), *skipped]
     numbers = {block.title: block for block in train.describe_results(results)}
     sections = [*(stage.title for stage in train.stages), _OTHER]
-    known = f'<p class="warn"><a href="#warnings">Warnings: {_counted(warnings)}</a></p>\n' if warnings else ""
+    notice = f'<p class="warn"><a href="#warnings">Warnings: {_counted(warnings)}</a></p>\n' if warnings else ""
     head = "".join(
         (
             f"<h1>{escape(case.title)}</h1>\n",
             f'<p class="lead">{escape(_lead(results))}</p>\n',
             _contents(sections, numbers, pictures),
-            known,
+            notice,
             _gears(train.describe(case), tuple(train.verdict(results)), "solid" in data, static),
         )
     )
@@ -171,7 +171,7 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
 def document(title: str, main: str, data: dict[str, Any] | None) -> str:
     """Make an HTML file of its title, its contents and what scripts draw; none where it is None."""
     scripts = "" if data is None else _scripts(data)
-    main, title = (_CONTROLS.sub(lambda found: printable(found[0]), text) for text in (main, escape(title)))
+    main, title = (_CONTROLS.sub(lambda match: printable(match[0]), text) for text in (main, escape(title)))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta http-equiv="Content-Security-Policy" content="{_policy(scripts)}">\n'
@@ -186,7 +186,7 @@ def _counted(warnings: Sequence[Finding]) -> str:
     severe = [
         f"{count} {severity}{'s' * (count > 1)}"
         for severity in reversed(SEVERITIES[1:])
-        if (count := sum(one.severity == severity for one in warnings))
+        if (count := sum(warning.severity == severity for warning in warnings))
     ]
     return f"{len(warnings)}{' (' + ', '.join(severe) + ')' if severe else ''}"
 
@@ -207,8 +207,8 @@ def _scripts(data: dict[str, Any]) -> str:
 
 def _policy(scripts: str) -> str:
     """Allow the page its own scripts, by their checksums, and nothing from anywhere."""
-    found = re.findall(r"<script>(.*?)</script>", scripts, re.DOTALL)
-    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in found]
+    texts = re.findall(r"<script>(.*?)</script>", scripts, re.DOTALL)
+    digests = [base64.b64encode(hashlib.sha256(text.encode()).digest()).decode() for text in texts]
     allowed = " ".join(f"'sha256-{digest}'" for digest in digests) or "'none'"
     return (
         f"default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; script-src {allowed}; "
@@ -272,7 +272,7 @@ def _section(name: str, numbers, pictures, charts, train: Train, results: Result
         f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n'
         + part
         + tables
-        + "".join(_figure(one, charts) for one in figures)
+        + "".join(_figure(figure, charts) for figure in figures)
     )
 
 
@@ -327,15 +327,15 @@ def _lean(picture: _Picture) -> bytes:
 
     stream = io.BytesIO()
     with Image.open(io.BytesIO(picture.data)) as image:
-        found = image.convert("RGB").quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    found.save(stream, "PNG", optimize=True)
+        reduced = image.convert("RGB").quantize(256, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    reduced.save(stream, "PNG", optimize=True)
     return min(stream.getvalue(), picture.data, key=len)
 
 
 def shown_data(results: Results) -> dict[str, Any]:
     """Read what scripts draw of a run, by the name they know it by; nothing of files that were changed."""
-    found = {key: _own_bytes(results, name) for name, key in _DATA.items()}
-    return {key: json.loads(data) for key, data in found.items() if data is not None}
+    contents = {key: _own_bytes(results, name) for name, key in _DATA.items()}
+    return {key: json.loads(data) for key, data in contents.items() if data is not None}
 
 
 def _own_bytes(results: Results, name: str) -> bytes | None:
@@ -350,7 +350,7 @@ def _own_bytes(results: Results, name: str) -> bytes | None:
 
 def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[Finding]]:
     """Read the pictures that the manifest names, in the order of the captions, and what was left out."""
-    found, skipped = [], []
+    pictures, skipped = [], []
     for name in results.manifest.files:
         kind = _KINDS.get(Path(name).suffix)
         if kind is None and name not in _DATA:
@@ -364,18 +364,18 @@ def _pictures(train: Train, results: Results) -> tuple[list[_Picture], list[Find
             stem = Path(name).stem
             rank, section, caption = caption_of(train, stem)
             caption = " ".join((caption, *train.remarks(results, stem)))
-            found.append((rank, _Picture(stem, section, caption, kind, data)))
-    found.sort(key=lambda item: item[0])
-    return [picture for _, picture in found], skipped
+            pictures.append((rank, _Picture(stem, section, caption, kind, data)))
+    pictures.sort(key=lambda item: item[0])
+    return [picture for _, picture in pictures], skipped
 
 
 def caption_of(train: Train, stem: str) -> tuple[int, str, str]:
     """Find place in the order, section and caption of a picture from its file name."""
     captions = [
-        (stage.title, *one)
+        (stage.title, *captioned)
         for stage in train.stages
         if stage.name in train.figures
-        for one in train.figures[stage.name].captions.items()
+        for captioned in train.figures[stage.name].captions.items()
     ]
     for rank, (section, prefix, caption) in enumerate(captions):
         if stem == prefix or stem.startswith(prefix + "_"):
@@ -401,7 +401,7 @@ def _value(value: Any) -> str:
 def _trust(results: Results, numbers, warnings: Sequence[Finding], static: bool) -> str:
     """Show warnings, what the solvers say of their results, time, versions, checksums, the case as run."""
     manifest = results.manifest
-    items = "".join(f'<li class="{one.severity}">{escape(_said(one))}</li>\n' for one in warnings)
+    items = "".join(f'<li class="{warning.severity}">{escape(_said(warning))}</li>\n' for warning in warnings)
     items = f'<ul class="warnings">\n{items}</ul>\n' if items else '<p class="note">none</p>\n'
     said = tuple(
         (stage, name.replace("_", " "), _value(value))

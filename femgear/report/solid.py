@@ -73,11 +73,11 @@ def solid(
         width, counter-clockwise towards the viewer.
     """
     sectors = {kind: _Sector(grid) for kind, grid in grids.items()}
-    found = []
+    moved_bodies = []
     for body in bodies:
         sector, moved = sectors[body.kind], np.asarray(body.displacement)
-        stress = np.stack([von_mises(grids[body.kind], one, materials[body.kind]) for one in moved])
-        found.append(
+        stress = np.stack([von_mises(grids[body.kind], displacement, materials[body.kind]) for displacement in moved])
+        moved_bodies.append(
             {
                 "name": body.name,
                 "kind": body.kind,
@@ -93,10 +93,10 @@ def solid(
         "radius": 1e3 * planetary_set.ring.rim_radius,
         "pins": {
             "radius": 1e3 * _PIN * float(np.hypot(*sectors["planet"].points.T).min()),
-            "centres": [body["centre"] for body in found if body["kind"] == "planet"],
+            "centres": [body["centre"] for body in moved_bodies if body["kind"] == "planet"],
         },
         "sectors": {kind: sectors[kind].packed(gear, helix_angle) for kind, gear in gears.items()},
-        "bodies": found,
+        "bodies": moved_bodies,
         "modes": [] if modes is None else _modes(modes),
         "paths": _paths(planetary_set, backwards=backwards),
     }
@@ -107,7 +107,7 @@ def _paths(s: PlanetarySet, *, backwards: bool = False) -> list[list[float]]:
 
     The line of action stands at the working pressure angle to the common tangent of the pitch circles.
     """
-    found, side = [], -1.0 if backwards else 1.0
+    paths, side = [], -1.0 if backwards else 1.0
     for gear, angle, path, sense in (
         (s.sun, s.working_pressure_angle_sun_planet, s.path_sun_planet, side),
         (s.ring, s.working_pressure_angle_planet_ring, s.path_planet_ring, -side),
@@ -116,8 +116,8 @@ def _paths(s: PlanetarySet, *, backwards: bool = False) -> list[list[float]]:
         ends = np.array([[pitch, 0.0]]) + np.array(path)[:, None] * np.array([math.sin(angle), cosine])
         for psi in s.planet_angles:
             turn = np.array([[math.cos(psi), math.sin(psi)], [-math.sin(psi), math.cos(psi)]])
-            found.append([round(1e3 * float(x), 4) for x in (ends @ turn).ravel()])
-    return found
+            paths.append([round(1e3 * float(x), 4) for x in (ends @ turn).ravel()])
+    return paths
 
 
 class _Sector:
@@ -164,9 +164,9 @@ def von_mises(grid: Grid, displacement: np.ndarray, material: Material) -> np.nd
     first, shear = material.lame("plane stress")
     mean = first * (xx + yy)
     sx, sy, t = mean + 2 * shear * xx, mean + 2 * shear * yy, shear * xy
-    found = np.sqrt(sx**2 - sx * sy + sy**2 + 3 * t**2).ravel()
+    element_stress = np.sqrt(sx**2 - sx * sy + sy**2 + 3 * t**2).ravel()
     nodes = grid.triangles.ravel()
-    return np.bincount(nodes, found, grid.n_nodes) / np.maximum(np.bincount(nodes, minlength=grid.n_nodes), 1)
+    return np.bincount(nodes, element_stress, grid.n_nodes) / np.maximum(np.bincount(nodes, minlength=grid.n_nodes), 1)
 
 
 def _modes(modes: xr.Dataset) -> list[dict[str, Any]]:
@@ -176,7 +176,7 @@ def _modes(modes: xr.Dataset) -> list[dict[str, Any]]:
     """
     frequency, names = modes["frequency"].values, [str(name) for name in modes["dof"].values]
     elastic = np.flatnonzero(frequency > 1e-3 * frequency.max(initial=0.0) / max(len(frequency), 1))[:_MODES]
-    found = []
+    shapes = []
     for mode in elastic:
         shape = dict(zip(names, modes["shape"].values[:, mode]))
         bodies = dict.fromkeys(name.split(":")[0] for name in names if ": " in name)
@@ -185,8 +185,8 @@ def _modes(modes: xr.Dataset) -> list[dict[str, Any]]:
             for body in bodies
         }
         title = f"{mode + 1}: {frequency[mode]:.5g} Hz, {modes['kind'].values[mode]}"
-        found.append({"title": title, "bodies": moved, "ring": _waves(modes, mode)})
-    return found
+        shapes.append({"title": title, "bodies": moved, "ring": _waves(modes, mode)})
+    return shapes
 
 
 def _waves(modes: xr.Dataset, mode: int) -> list[list[float]]:

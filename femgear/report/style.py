@@ -87,8 +87,8 @@ def legend_below(figure: Figure, ax=None, *, columns: int = 3) -> None:
     The figure grows by the rows beyond the third, so that many entries leave the axes their size.
     """
     entries = {}
-    for one in figure.axes if ax is None else [ax]:
-        for handle, text in zip(*one.get_legend_handles_labels()):
+    for drawn_axes in figure.axes if ax is None else [ax]:
+        for handle, text in zip(*drawn_axes.get_legend_handles_labels()):
             entries.setdefault(text, handle)
     if entries:
         rows = -(-len(entries) // columns)
@@ -168,10 +168,10 @@ def thinned(x, y) -> tuple[np.ndarray, np.ndarray]:
     backwards stay as they are.
     """
     x, y = np.asarray(x, float), np.asarray(y, float)
-    known = np.isfinite(x) & np.isfinite(y)
-    if len(x) <= POINTS or np.any(np.diff(x[known]) < 0.0):
+    finite = np.isfinite(x) & np.isfinite(y)
+    if len(x) <= POINTS or np.any(np.diff(x[finite]) < 0.0):
         return x, y
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], finite, [False]]).astype(int)))
     parts = list(zip(edges[::2].tolist(), edges[1::2].tolist()))
     if len(parts) > STEMS:
         first = np.array([x[start] for start, _ in parts])
@@ -278,7 +278,9 @@ def drawn_lines(
         rows = [i for i, name in enumerate(names) if family(name) == kind]
         groups: list[list[int]] = []
         for row in rows:
-            alike = (one for one in groups if np.abs(values[row] - values[one[0]]).max() <= within * largest)
+            alike = (
+                members for members in groups if np.abs(values[row] - values[members[0]]).max() <= within * largest
+            )
             if (group := next(alike, None)) is None:
                 groups.append([row])
             else:

@@ -50,16 +50,16 @@ class Block:
 
 def merged(rows: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
     """Join rows in succession that differ in a running number of their name alone: "sun-planet 1..3"."""
-    found = list[tuple[tuple[str, ...], str, int, int, str]]()
+    groups = list[tuple[tuple[str, ...], str, int, int, str]]()
     for row in map(tuple, rows):
         head, number, tail = _NUMBERED.fullmatch(row[0] if row else "").groups()  # type: ignore[union-attr]
-        last, value = found[-1] if found else None, int(number or -1)
+        last, value = groups[-1] if groups else None, int(number or -1)
         if last and number and last[1:] == (head, last[2], value - 1, tail) and last[0][1:] == row[1:]:
-            found[-1] = (*last[:3], value, tail)
+            groups[-1] = (*last[:3], value, tail)
         else:
-            found.append((row, head, value, value, tail))
+            groups.append((row, head, value, value, tail))
     return [
-        row if first == last else (f"{head}{first}..{last}{tail}", *row[1:]) for row, head, first, last, tail in found
+        row if first == last else (f"{head}{first}..{last}{tail}", *row[1:]) for row, head, first, last, tail in groups
     ]
 
 
@@ -84,9 +84,9 @@ def listed(findings: Iterable[Finding]) -> tuple[Block, ...]:
     Their texts, with the numbers, stand on standard error and on the page.
     """
     columns = {
-        "": lambda one: f"{one.severity} {one.code}".strip(),
-        "of": lambda one: one.stage or "the case",
-        "meaning": lambda one: CATALOGUE[one.code][1] if one.code else one.text,
+        "": lambda finding: f"{finding.severity} {finding.code}".strip(),
+        "of": lambda finding: finding.stage or "the case",
+        "meaning": lambda finding: CATALOGUE[finding.code][1] if finding.code else finding.text,
     }
     block = tabulate(WARNINGS, by_severity(findings), columns)
     return (replace(block, rows=tuple(dict.fromkeys(block.rows))),) if block.rows else ()
@@ -114,8 +114,8 @@ class Marks:
 
     def raised(self, *codes: str, of: tuple[str, ...] = ()) -> bool:
         """Tell whether one of some findings was raised, by the case, or by the stages ``of`` if given."""
-        known = (finding for code in codes for finding in self._known.get(code, ()))
-        return any(not of or finding.stage in ("", *of) for finding in known)
+        findings = (finding for code in codes for finding in self._known.get(code, ()))
+        return any(not of or finding.stage in ("", *of) for finding in findings)
 
     def __call__(self, text: str, *codes: str, of: tuple[str, ...] = ()) -> str:
         """Mark the text of a number that findings of these codes concern; a dash needs no mark.
@@ -157,10 +157,10 @@ def level_change_at(data: xr.Dataset, speed) -> np.ndarray:
     Between the speeds that were looked at on a straight line.
     """
     change = data["level_change"].values if "level_change" in data else np.full(data.sizes["speed"], np.nan)
-    known = np.isfinite(change)
-    if not known.any():
+    finite = np.isfinite(change)
+    if not finite.any():
         return np.full(np.shape(speed), np.nan)
-    return np.interp(speed, data["speed"].values[known], change[known])
+    return np.interp(speed, data["speed"].values[finite], change[finite])
 
 
 def shown_level(value: float, change: float, marks: Marks, *codes: str, of: tuple[str, ...] = ()) -> str:
@@ -214,8 +214,8 @@ def describe_modes(
     }
     for name, text in (more or {"nodal diameters": _nodal_diameters}).items():
         columns[name] = lambda i, text=text: text(data.isel(mode=i))
-    found = f"{count} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown"
-    return tabulate("Modes", range(shown), columns, (found + note,))
+    note_ = f"{count} modes up to {float(data.frequency.max()):.0f} Hz, the first {shown} shown"
+    return tabulate("Modes", range(shown), columns, (note_ + note,))
 
 
 def _nodal_diameters(mode: xr.Dataset) -> str:
@@ -232,9 +232,9 @@ def describe_response(data: xr.Dataset) -> Block:
     largest, marks = np.abs(data.floquet_multiplier.values), Marks(findings_in(data.attrs))
 
     def dte(i: int) -> str:
-        one = data.isel(speed=i)
-        doubts = response_doubts(one) if marks.raised(*RESPONSE_DOUBTS) else ()
-        return marks(f"{fluctuation(stored_harmonics(one, 'dte')).max() * 1e6:.4f}", *doubts, "W-DAMPING")
+        of_speed = data.isel(speed=i)
+        doubts = response_doubts(of_speed) if marks.raised(*RESPONSE_DOUBTS) else ()
+        return marks(f"{fluctuation(stored_harmonics(of_speed, 'dte')).max() * 1e6:.4f}", *doubts, "W-DAMPING")
 
     stable = data.stable.values.astype(bool)
     columns = {
@@ -282,7 +282,7 @@ def chosen(count: int) -> Iterator[int]:
 def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """Name the speeds [rpm] of dynamics.nc at which meshes pull, and those not converged or not stable."""
     speed = data["speed"].values
-    pulls = [pulls_of(stored_harmonics(one, "mesh_force")) for one in some_at_a_time(data)]
+    pulls = [pulls_of(stored_harmonics(block, "mesh_force")) for block in some_at_a_time(data)]
     yield from pulling_meshes(speed, data["mesh"].values, pulls)
     for code, bad, text in (
         ("W-CONVERGENCE", ~data["converged"].values.astype(bool), "did not converge at"),

@@ -204,8 +204,8 @@ def parts_of_speeds(case: AnyCase, sizes, most: float) -> Iterator[tuple[np.ndar
 
 def rotation_sense(case: RigidCase, gears: PlanetarySet) -> int:
     """Tell the sense of the sun against the carrier: 1 counter-clockwise, -1 clockwise."""
-    found = member_speeds(case, gears)
-    return 1 if found.sun > found.carrier else -1
+    turning = member_speeds(case, gears)
+    return 1 if turning.sun > turning.carrier else -1
 
 
 # natural frequencies closer than this, relative to the frequency, count as one
@@ -278,23 +278,25 @@ class Bearings:
     def join(self, data: RigidSet, system: MechanicalSystem) -> MechanicalSystem:
         """Add the columns of the members to ``W`` of the system of a set."""
         T, columns = free_motions(data), [system.W]
-        for one in self.members:
+        for member in self.members:
             first, *other = (
-                T[len(data.axes) * CENTRAL.index(name) :][:2].T for name in (one.inner, one.outer) if name in CENTRAL
+                T[len(data.axes) * CENTRAL.index(name) :][:2].T
+                for name in (member.inner, member.outer)
+                if name in CENTRAL
             )
             columns.append(first - sum(other))
         return replace(system, W=np.hstack(columns))
 
     def elements(self, data: RigidSet, groups: dict[str, np.ndarray]) -> tuple[RadialBearings, ...]:
         """Make the bearings of a set on their places, ``groups`` of `columns`."""
-        found = []
+        elements = []
         if self.planet_clearance is not None:
             stiffness = data.pin_stiffness[:, 0]
-            found.append(RadialBearings(groups["planets"], stiffness, self.planet_clearance))
-        for place, one in zip(groups["members"], self.members):
-            if one.clearance is not None:
-                found.append(RadialBearings(place[None], one.stiffness, one.clearance))
-        return tuple(found)
+            elements.append(RadialBearings(groups["planets"], stiffness, self.planet_clearance))
+        for place, member in zip(groups["members"], self.members):
+            if member.clearance is not None:
+                elements.append(RadialBearings(place[None], member.stiffness, member.clearance))
+        return tuple(elements)
 
 
 def gear_set_modes(
@@ -425,8 +427,8 @@ def working_springs(problem: NonlinearSystem, members: Sequence[MemberBearing] =
     for element in problem.elements[1:]:
         if isinstance(element, GearMeshes):
             springs[element.columns] = 0.0
-    for number, one in enumerate(members, -len(members)):
-        springs[[2 * number, 2 * number + 1]] = one.stiffness
+    for number, member in enumerate(members, -len(members)):
+        springs[[2 * number, 2 * number + 1]] = member.stiffness
     return springs
 
 
@@ -502,7 +504,7 @@ def _unloaded(meshes: GearMeshes) -> Series:
     deflection, force = meshes.state
     if isinstance(force, FourierSeries) and not np.any(force.amplitudes):
         return deflection
-    series = [one for one in (meshes.stiffness, deflection, force) if isinstance(one, FourierSeries)]
+    series = [series_ for series_ in (meshes.stiffness, deflection, force) if isinstance(series_, FourierSeries)]
     if len(series) < 3:
         raise CaseError(
             "back flanks cannot follow a stepwise record that holds mesh forces",
@@ -510,9 +512,9 @@ def _unloaded(meshes: GearMeshes) -> Series:
             remedy="give Fourier series, or the unloaded deflection with no force",
         )
     # the quotient of two series has no last harmonic: sample finely, keep what the samples resolve
-    count = max(one.amplitudes.shape[1] for one in series)
+    count = max(series_.amplitudes.shape[1] for series_ in series)
     phase = 2.0 * np.pi * np.arange(16 * count)[:, None] / (16 * count)
-    k, deflection, force = (replace(one, orders=(1,)).at(phase) for one in series)
+    k, deflection, force = (replace(series_, orders=(1,)).at(phase) for series_ in series)
     return series_of((deflection - force / k).T, 4 * count, orders=series[0].orders)
 
 
@@ -522,8 +524,8 @@ def _raised(series: Series, offset, *, sign: float = 1.0) -> Series:
         return replace(series, values=sign * series.values + offset[:, None])
     if isinstance(series, SummedSeries):
         offsets = [offset] + [np.zeros_like(offset)] * (len(series.parts) - 1)
-        parts = (_raised(one, part, sign=sign) for one, part in zip(series.parts, offsets))
-        return SummedSeries(tuple(one for one in parts if isinstance(one, FourierSeries)))
+        parts = (_raised(series_part, part, sign=sign) for series_part, part in zip(series.parts, offsets))
+        return SummedSeries(tuple(part for part in parts if isinstance(part, FourierSeries)))
     amplitudes = sign * series.amplitudes
     amplitudes[:, 0] += offset
     return replace(series, amplitudes=amplitudes)
@@ -564,9 +566,9 @@ def _pins(data: RigidSet, pin_errors) -> np.ndarray:
 
 def _of_planets(data: RigidSet, values: np.ndarray) -> np.ndarray:
     """Radial and tangential values (N, 2) of the planets in all coordinates (n_all,)."""
-    found = np.zeros((data.n_planets + 3, len(data.axes)))
-    found[3:, :2] = values
-    return found.ravel()
+    vectors = np.zeros((data.n_planets + 3, len(data.axes)))
+    vectors[3:, :2] = values
+    return vectors.ravel()
 
 
 def modes_dataset(

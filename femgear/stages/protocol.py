@@ -246,8 +246,8 @@ class Stage:
     def convergence(self, result: StageResult) -> dict[str, Any]:
         """Tell how a result was found, and what its verdict is, for the manifest."""
         said = result if isinstance(result, StageResult) else StageResult()  # of trains without the base
-        known = {"converged": said.converged, "residual": said.residual, "message": said.message}
-        return known | self.verdict(result)
+        told_of_run = {"converged": said.converged, "residual": said.residual, "message": said.message}
+        return told_of_run | self.verdict(result)
 
     def findings(self, data: Any) -> tuple[Finding, ...]:
         """List what the contents of the stage's file say against themselves, each once."""
@@ -352,7 +352,7 @@ class Train:
 
     def result_warnings(self, results: Results) -> tuple[Finding, ...]:
         """List what the solvers say against their own results, each once."""
-        return tuple(one for one in results.findings if one.stage)
+        return tuple(finding for finding in results.findings if finding.stage)
 
     def _in(self, results: Results) -> list[Stage]:
         """Stages whose results there are."""
@@ -367,11 +367,11 @@ def modes_verdict(result: Any) -> dict:
 def joint_verdict(verdicts: Sequence[dict]) -> dict:
     """Join the verdicts of the parts of a stage: all of them, the largest number, the latest text."""
     joins = {bool: all, float: lambda values: float(np.fmax.reduce(values)), int: max}
-    found = {}
+    joined = {}
     for name, latest in verdicts[-1].items():
-        values = [one[name] for one in verdicts]
-        found[name] = joins.get(type(latest), lambda values: values[-1])(values)
-    return found
+        values = [verdict[name] for verdict in verdicts]
+        joined[name] = joins.get(type(latest), lambda values: values[-1])(values)
+    return joined
 
 
 def response_verdict(result: Any) -> dict:

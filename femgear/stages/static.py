@@ -167,8 +167,8 @@ def solve_static(
     _check_motions(case, cycle, gears.gears[0].module)
     overlap = _overlap(case, gears) if cycle.helical else 0.0
     base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
-    found = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
-    return StaticResult(*found, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"))
+    parts = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
+    return StaticResult(*parts, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"))
 
 
 def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:
@@ -211,9 +211,9 @@ def known_compliances(
     case: Case, gears: PlanetarySet, steps: Steps, *, cache: Path | None = None
 ) -> tuple[Sectors, Bodies]:
     """Take sector grids and flank compliances of a case from what others have left, or make them."""
-    known = compliance_entries(case)
-    return steps.kept("flank compliances", known) or steps.keep(
-        "flank compliances", known, flank_compliances(case, gears, cache=cache, steps=steps)
+    entries = compliance_entries(case)
+    return steps.kept("flank compliances", entries) or steps.keep(
+        "flank compliances", entries, flank_compliances(case, gears, cache=cache, steps=steps)
     )
 
 
@@ -233,10 +233,10 @@ def flank_compliances(
         materials,
         flank_elements=case.static.flank_elements,
         cache=cache,
-        known=[steps.kept(f"sector of the {name}", one) for name, one in zip(names, entries)],
+        known=[steps.kept(f"sector of the {name}", entry) for name, entry in zip(names, entries)],
     )
-    for name, one, sector in zip(names, entries, sectors.gears, strict=True):
-        steps.keep(f"sector of the {name}", one, sector)
+    for name, entry, sector in zip(names, entries, sectors.gears, strict=True):
+        steps.keep(f"sector of the {name}", entry, sector)
     elastic = case.static.members == "elastic"
     foundation = ring_foundation(case, sectors.ring) if elastic else None
     if elastic:
@@ -246,10 +246,10 @@ def flank_compliances(
         materials,
         depth=case.static.depth,
         ring_foundation=foundation,
-        known=[steps.kept(f"flanks of the {name}", one) for name, one in zip(names, entries)],
+        known=[steps.kept(f"flanks of the {name}", entry) for name, entry in zip(names, entries)],
     )
-    for name, one, body in zip(names, entries, bodies.gears):
-        steps.keep(f"flanks of the {name}", one, body)
+    for name, entry, body in zip(names, entries, bodies.gears):
+        steps.keep(f"flanks of the {name}", entry, body)
     base, softer = _helical(case, gears)
     return sectors, replace(bodies, helical=softer, base_helix_angle=base)
 
@@ -260,7 +260,7 @@ def gear_entries(case: Any, gears: GearSet, number: int) -> Entries:
     return {
         "gear": repr(gear),
         "material": repr(materials_of(case)[number]),
-        "widths": flank_widths([one.face_width for one in gears.gears])[number],
+        "widths": flank_widths([one_gear.face_width for one_gear in gears.gears])[number],
         "static.flank_elements": case.static.flank_elements,
         "static.depth": case.static.depth,
     }
@@ -307,11 +307,11 @@ def check_slices(case: Any, gears: GearSet) -> None:
     _check_width_entries(case, needed, helical=bool(overlap))
     if count < 2:
         for gear in case.gear_names:
-            for i, one in enumerate(getattr(case, gear).modifications):
-                if one.kind in OVER_WIDTH:
+            for i, modification in enumerate(getattr(case, gear).modifications):
+                if modification.kind in OVER_WIDTH:
                     key = f"{gear}.modifications[{i}]"
                     raise CaseError(
-                        f"a {one.kind} needs slices over the width",
+                        f"a {modification.kind} needs slices over the width",
                         code="E-SLICES",
                         key=key,
                         file=case.location(key),
@@ -375,10 +375,10 @@ def over_width(
         return {}
     if waves is None:
         waves = _waves_of_case(case, gears, steps or Steps(), cache)
-    found: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": width_supports(case, gears)}
+    options: dict[str, Any] = {"waves": waves, "slices": count, "width_supports": width_supports(case, gears)}
     if overlap := _overlap(case, gears):
-        found["ahead"] = slices_ahead(overlap, count)
-    return found
+        options["ahead"] = slices_ahead(overlap, count)
+    return options
 
 
 def _waves_of_case(case: Any, gears: GearSet, steps: Steps, cache: Path | None) -> WidthWaves:
@@ -388,7 +388,7 @@ def _waves_of_case(case: Any, gears: GearSet, steps: Steps, cache: Path | None) 
     for gear, material in zip(gears.gears, materials, strict=True):
         entries = {"gear": repr(gear), "material": repr(material), "width": width}
         kept.append((f"waves of the {gear.name}", {**entries, "static.slices": case.static.slices}))
-    known = [steps.kept(*one) for one in kept]
+    sectors_kept = [steps.kept(*entry) for entry in kept]
     # half as fine as in the plane: K_H-beta changes by less than 2e-3
     sectors = make_sectors(
         gears,
@@ -396,17 +396,17 @@ def _waves_of_case(case: Any, gears: GearSet, steps: Steps, cache: Path | None) 
         flank_elements=6,
         refine=0.5,
         cache=cache,
-        known=[one and one.sector for one in known],
+        known=[waves_kept and waves_kept.sector for waves_kept in sectors_kept],
     )
-    missing = [number for number, before in enumerate(known) if before is None]
+    missing = [number for number, before in enumerate(sectors_kept) if before is None]
     tasks = [
         partial(condensed_waves, sectors.gears[number], materials[number], case.static.slices, width)
         for number in missing
     ]
     for number, condensed in zip(missing, second_process.shared(tasks), strict=True):
-        known[number] = steps.keep(*kept[number], condensed)
+        sectors_kept[number] = steps.keep(*kept[number], condensed)
     foundation = ring_foundation(case, sectors.ring) if case.static.members == "elastic" else None
-    return waves_of_gears(known, foundation, _helical(case, gears)[1])
+    return waves_of_gears(sectors_kept, foundation, _helical(case, gears)[1])
 
 
 def loaded_over_width(case: Case, gears: PlanetarySet, waves: WidthWaves | None, steps: Steps) -> dict[str, Any]:
@@ -414,20 +414,20 @@ def loaded_over_width(case: Case, gears: PlanetarySet, waves: WidthWaves | None,
 
     ``waves`` are those of the static solution, whose ring is the one or the other.
     """
-    found = over_width(case, gears, waves=waves, steps=steps)
-    if not found:
+    options = over_width(case, gears, waves=waves, steps=steps)
+    if not options:
         return {}
-    own: Any = found["waves"]
+    set_waves: Any = options["waves"]
     fixed = case.static.members == "fixed"
-    known = {"ring": repr(gears.gears[-1]), "material": repr(materials_of(case)[-1]), "width": own.width}
-    known |= {"static.slices": case.static.slices, **(foundation_entries(case) if fixed else {})}
-    rings = steps.kept("waves of the other ring", known)
+    entries = {"ring": repr(gears.gears[-1]), "material": repr(materials_of(case)[-1]), "width": set_waves.width}
+    entries |= {"static.slices": case.static.slices, **(foundation_entries(case) if fixed else {})}
+    rings = steps.kept("waves of the other ring", entries)
     if rings is None:
-        other = with_ring_waves(own, ring_foundation(case, own.ring.sector) if fixed else None)
-        rings = steps.keep("waves of the other ring", known, [one.gears[-1] for one in other.bodies])
-    bodies = (one.with_gear(-1, ring) for one, ring in zip(own.bodies, rings, strict=True))
-    other = replace(own, bodies=tuple(bodies))
-    return found | dict(zip(("waves", "held_waves"), (other, own) if fixed else (own, other)))
+        other = with_ring_waves(set_waves, ring_foundation(case, set_waves.ring.sector) if fixed else None)
+        rings = steps.keep("waves of the other ring", entries, [body.gears[-1] for body in other.bodies])
+    bodies = (body.with_gear(-1, ring) for body, ring in zip(set_waves.bodies, rings, strict=True))
+    other = replace(set_waves, bodies=tuple(bodies))
+    return options | dict(zip(("waves", "held_waves"), (other, set_waves) if fixed else (set_waves, other)))
 
 
 def record_positions(case: Any, gears: GearSet) -> int:
@@ -523,12 +523,15 @@ def nominal_stresses(
     s = planetary_set
     # torque over reference radius: the same at all gears
     force = abs(sun_torque) / (s.n_planets * s.gears[0].reference_radius)
-    elastic = [(one.youngs_modulus, one.poisson_ratio) for one in material_of_each(material, len(s.gears))]
+    elastic = [
+        (material_of_gear.youngs_modulus, material_of_gear.poisson_ratio)
+        for material_of_gear in material_of_each(material, len(s.gears))
+    ]
     contact, root, messages = np.full(len(s.kinds), math.nan), np.full((len(s.kinds), 2), math.nan), []
     ratio_factor = contact.copy()
     for i, pair in enumerate(s.kinds):
-        one, two = pair.gears
-        small, large = (one, two) if two.internal or one.teeth <= two.teeth else (two, one)
+        gear_1, gear_2 = pair.gears
+        small, large = (gear_1, gear_2) if gear_2.internal or gear_1.teeth <= gear_2.teeth else (gear_2, gear_1)
         load = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
         (modulus, ratio), mate = (elastic[number] for number in s.mates[i])
         try:
@@ -543,12 +546,12 @@ def nominal_stresses(
             )
             ratio_factor[i] = contact_ratio_factor(pair.contact_ratio, overlap_of(small, pair.face_width))
         except GeometryError as error:
-            messages.append(f"{one.name}-{two.name}: {error.message}")
-        for j, gear in enumerate((one, two)):
+            messages.append(f"{gear_1.name}-{gear_2.name}: {error.message}")
+        for j, gear in enumerate((gear_1, gear_2)):
             try:
                 root[i, j] = nominal_root_stress(gear, common_width=pair.face_width, **load).stress
             except GeometryError as error:
-                messages.append(f"{gear.name} in {one.name}-{two.name}: {error.message}")
+                messages.append(f"{gear.name} in {gear_1.name}-{gear_2.name}: {error.message}")
     return NominalStresses(contact, root, ratio_factor, "; ".join(dict.fromkeys(messages)))
 
 
@@ -619,8 +622,8 @@ def _influences(case: Case, static: StaticResult, progress: Progress = silent) -
     one that is wider than its mates are solved again. The tooth of the latter is at its root as wide as
     ISO 6336-3 takes it, and stresses of a plane body under given forces go by its width.
     """
-    found, loads, ahead, width = [], static.cycle.slice_load, None, min(static.planetary_set.mesh_widths)
-    common = flank_widths([one.gear.face_width for one in static.sectors.gears])
+    influences, loads, ahead, width = [], static.cycle.slice_load, None, min(static.planetary_set.mesh_widths)
+    common = flank_widths([gear_sector.gear.face_width for gear_sector in static.sectors.gears])
     parts = zip(static.sectors.gears, static.bodies.gears, materials_of(case), common, strict=False)
     for i, (sector, body, material, of_flanks) in enumerate(parts):
         progress("stress", i, len(static.sectors.gears) + 1)
@@ -628,23 +631,26 @@ def _influences(case: Case, static: StaticResult, progress: Progress = silent) -
         if gear.internal:
             support = ring_foundation(case, sector) if case.static.members == "elastic" else None
         if body.root is None:
-            found.append(root_stress_influence(sector.grid, gear, material, foundation=support))
+            influences.append(root_stress_influence(sector.grid, gear, material, foundation=support))
         else:
-            found.append(observed_root_stress(gear, body.root))
-        narrower = [gear.face_width / root_face_width(gear.face_width, one, case.module) for one in of_flanks]
+            influences.append(observed_root_stress(gear, body.root))
+        narrower = [
+            gear.face_width / root_face_width(gear.face_width, width_of_flank, case.module)
+            for width_of_flank in of_flanks
+        ]
         if max(narrower) > 1.0:
-            loaded = np.repeat(narrower, len(found[-1].roll))
-            found[-1] = replace(found[-1], influence=found[-1].influence * loaded)
+            loaded = np.repeat(narrower, len(influences[-1].roll))
+            influences[-1] = replace(influences[-1], influence=influences[-1].influence * loaded)
         if loads is not None:
             waves = computed_waves(loads.shape[2]) * np.pi / width
             waves = max(narrower) * root_waves(sector.grid, gear, material, waves, foundation=support)
             # helical teeth are weaker than straight ones as they are softer: within 1 %
             weaker = 1.0 / helical_stiffness(static.base_helix_angle, internal=gear.internal)
-            one = found[-1]
-            found[-1] = replace(one, influence=weaker * one.influence, waves=weaker * waves)
+            influence = influences[-1]
+            influences[-1] = replace(influence, influence=weaker * influence.influence, waves=weaker * waves)
     if loads is not None:
         ahead = slices_ahead(static.overlap_ratio, loads.shape[2])
-    return RootStresses(tuple(found), ahead=ahead)
+    return RootStresses(tuple(influences), ahead=ahead)
 
 
 def slices_ahead(overlap: float, slices: int) -> np.ndarray:
@@ -661,8 +667,8 @@ def _root_cycles(gears, influences, cycle: MeshCycle, ranges, reverse):
     # one slot more at either end, and a period before and after
     length = min(slots + 4, cycle.periods)
     done, roots, first = {}, [], []
-    for number, one in enumerate(ranges):
-        slot, position = one.worst
+    for number, root_range in enumerate(ranges):
+        slot, position = root_range.worst
         start = (position // each - slot - 2) % cycle.periods
         if start not in done:
             part = _excerpt(cycle, start, length)
@@ -678,7 +684,7 @@ def _excerpt(cycle: MeshCycle, start: int, length: int) -> MeshCycle:
     take = (start * each + np.arange(length * each)) % len(cycle.position)
     names = ("tooth_load", "slice_load", "path", "back_tooth_load", "back_path", "back_force")
     values = {name: getattr(cycle, name) for name in names}
-    parts = {name: one[..., take] for name, one in values.items() if one is not None}
+    parts = {name: value[..., take] for name, value in values.items() if value is not None}
     return replace(cycle, position=np.arange(len(take)) / each, periods=length, **parts)
 
 

@@ -217,7 +217,7 @@ def face_load(static: xr.Dataset) -> Figure:
         "slice_load",
         scale,
         "load per width [N/mm]",
-        lambda one: f"K_Hβ = {float(one['face_load_factor']):.3f}",
+        lambda row: f"K_Hβ = {float(row['face_load_factor']):.3f}",
     )
 
 
@@ -231,7 +231,7 @@ def contact_pattern(static: xr.Dataset) -> Figure:
         "slice_pressure",
         1e-6,
         "contact pressure [MPa]",
-        lambda one: f"up to {float(one['max_pressure'].max()) * 1e-6:.4g} MPa",
+        lambda row: f"up to {float(row['max_pressure'].max()) * 1e-6:.4g} MPa",
     )
 
 
@@ -242,15 +242,15 @@ def _over_flank(static: xr.Dataset, name: str, scale: float, words: str, title: 
     figure, axes = new_figure(columns=len(_kinds(static)), sharey=True)
     names, place = [str(name) for name in static["mesh"].values], 1e3 * static["slice"].values
     position = static["position"].values
-    rows = [next(i for i, one in enumerate(names) if family(one) == kind) for kind in _kinds(static)]
+    rows = [next(i for i, other in enumerate(names) if family(other) == kind) for kind in _kinds(static)]
     periods = int(static.attrs.get("mesh_periods", 1))
-    largest, most = (static[one].values[rows].max() for one in (name, "slice_load"))
+    largest, most = (static[variable].values[rows].max() for variable in (name, "slice_load"))
     for ax, row in zip(axes, rows):
-        values, load = (static[one].values[row].swapaxes(0, 1) for one in (name, "slice_load"))
+        values, load = (static[variable].values[row].swapaxes(0, 1) for variable in (name, "slice_load"))
         slot = np.arange(load.shape[1])[:, None]
         each = np.arange(len(position)).reshape(periods, -1)[slot.ravel() % periods]
         path = (slot + position[each] % 1.0).ravel()
-        values, load = (one[:, slot, each].reshape(len(place), -1) for one in (values, load))
+        values, load = (array[:, slot, each].reshape(len(place), -1) for array in (values, load))
         carries = load > 1e-9 * most
         shown = _while_loaded(carries.any(axis=0))
         along = path[shown] - path[shown][0]
@@ -289,8 +289,8 @@ def _kinds(data: xr.Dataset) -> tuple[str, ...]:
 
 def _while_loaded(loaded: np.ndarray) -> slice:
     """Range of samples (n,) from one before the first loaded one to one behind the last."""
-    found = np.flatnonzero(loaded)
-    first, last = (found[0], found[-1]) if len(found) else (0, len(loaded) - 1)
+    loaded_places = np.flatnonzero(loaded)
+    first, last = (loaded_places[0], loaded_places[-1]) if len(loaded_places) else (0, len(loaded) - 1)
     return slice(max(first - 1, 0), last + 2)
 
 
@@ -327,8 +327,8 @@ def root_stress_profile(stress: xr.Dataset) -> Figure:
             values, text = row["root_profile"].sel(root=side).values * 1e-6, f"root of the {side} flank"
             ax.plot(arc, values, dash, color=colour, marker="o", markersize=3, label=text)
         ax.axhline(0.0, color="0.4", linewidth=0.8)
-        known = np.isfinite(arc)
-        place = _crossing(slope[known], arc[known], _CRITICAL_SLOPE[title == "ring"])
+        given = np.isfinite(arc)
+        place = _crossing(slope[given], arc[given], _CRITICAL_SLOPE[title == "ring"])
         if place is not None:
             text = "critical section of ISO 6336-3 (tangent 30°, internal gears 60°)"
             ax.axvline(place, color=GREY, linewidth=1.2, linestyle=":", label=text)
@@ -466,9 +466,9 @@ def _worst_planet(stress: xr.Dataset, *measures: np.ndarray) -> int:
     ]
     left = np.arange(len(of_planets[0]))
     for values in of_planets:
-        known = np.nan_to_num(values[left])
+        sizes = np.nan_to_num(values[left])
         # equal planets differ by rounding
-        left = left[known >= known.max() - 1e-6 * np.abs(known).max()]
+        left = left[sizes >= sizes.max() - 1e-6 * np.abs(sizes).max()]
     return int(left[0])
 
 
@@ -557,7 +557,7 @@ def pitch_chart(deviations: SetDeviations, planetary_set: GearSet) -> Figure:
     )
     if not planetary_set.members:
         names = [gear.name.replace("_", " ") for gear in planetary_set.gears]
-        rows = tuple((name, [(name, one)]) for name, one in zip(names, (d.sun_pitch, d.planet_pitch[0])))
+        rows = tuple((name, [(name, pitch)]) for name, pitch in zip(names, (d.sun_pitch, d.planet_pitch[0])))
 
     def draw(number: int, ax) -> str:
         title, lines = rows[number]
@@ -585,13 +585,13 @@ def active_rolls(planetary_set: GearSet) -> tuple[tuple[float, float], ...]:
     From the path of contact: ``r_b tan(alpha_w)`` and the path coordinate, which runs down the flank of a
     driven external gear.
     """
-    found = []
+    rolls = []
     for pair in planetary_set.kinds:
-        (one, two), tangent, (a, b) = pair.gears, math.tan(pair.working_pressure_angle), pair.path
-        first, second = one.base_radius * tangent, two.base_radius * tangent
-        found += [(first + a, first + b)]
-        found += [(second + a, second + b) if two.internal else (second - b, second - a)]
-    return tuple(found)
+        (gear_1, gear_2), tangent, (a, b) = pair.gears, math.tan(pair.working_pressure_angle), pair.path
+        first, second = gear_1.base_radius * tangent, gear_2.base_radius * tangent
+        rolls += [(first + a, first + b)]
+        rolls += [(second + a, second + b) if gear_2.internal else (second - b, second - a)]
+    return tuple(rolls)
 
 
 def _stations(form, gear: Gear) -> np.ndarray:

@@ -358,7 +358,7 @@ class StaticResult(StageResult):
         """Extremes and means of the record, and what was solved between its positions."""
         cycle, planets = self.cycle, np.ones(self.planetary_set.n_planets)
         share = cycle.extremes("load_share")
-        found = {
+        peaks = {
             "ste_mean": cycle.mean("deflection"),
             "mesh_stiffness_mean": cycle.mean("stiffness"),
             "largest_pressure": cycle.extremes("max_pressure")[1],
@@ -369,10 +369,10 @@ class StaticResult(StageResult):
             "largest_load_share": share[1],
         }
         if (between := cycle.between) is not None:
-            found["ste_between"] = between.deflection
-            found["ste_overall_between"] = planets[:, None] * between.sun_arc
-            found["mesh_stiffness_between"] = between.stiffness
-        return found
+            peaks["ste_between"] = between.deflection
+            peaks["ste_overall_between"] = planets[:, None] * between.sun_arc
+            peaks["mesh_stiffness_between"] = between.stiffness
+        return peaks
 
     def _cut_off(self) -> float:
         """Find the largest share that equidistant positions cut off a transmission error's peak to peak."""
@@ -548,9 +548,9 @@ class StressResult(StageResult):
                 rows = [max(pair, key=itemgetter(0)) for pair in zip(rows, others, strict=True)]
         parts = ("arc", "slope", "position", "path", "load")
         names = ("root_worst", *(f"root_worst_{name}" for name in parts), "root_profile")
-        found = dict(zip(names, map(_by_gear, zip(*self._largest_of_alike(rows))), strict=True))
+        largest = dict(zip(names, map(_by_gear, zip(*self._largest_of_alike(rows))), strict=True))
         notches = [[root_notches(gear)[1] for gear in pair.gears] for pair in self.planetary_set.kinds]
-        return found | {"root_notch_radius": self.planetary_set.of_kinds(notches)}
+        return largest | {"root_notch_radius": self.planetary_set.of_kinds(notches)}
 
     def _largest_of_alike(self, rows: list[tuple]) -> list[tuple]:
         """Give all planets that go through the same states the row, gear by gear, whose first is largest.
@@ -581,8 +581,8 @@ class StressResult(StageResult):
                 for path in (float(np.clip(place, low, high)), 0.0)
             )
             rows.append((position, place, load, at / pitch, min(place - low, high - place)))
-            one, two = (gear.base_radius * math.tan(angle) for gear in pair.gears)
-            rolls = one + low, (two + low if pair.gear_2.internal else two - high)
+            length_1, length_2 = (gear.base_radius * math.tan(angle) for gear in pair.gears)
+            rolls = length_1 + low, (length_2 + low if pair.gear_2.internal else length_2 - high)
             starts.append(
                 [
                     math.hypot(gear.base_radius, roll) - gear.base_radius
@@ -604,32 +604,35 @@ class StressResult(StageResult):
         records = [cycle] if between is None else [cycle, between]
         # of planets that go through the same states the pair of that which the positions between enclose
         meshes = _alike(mesh, self.planetary_set.n_planets, cycle.alike)
-        one, mesh = max(
+        walked, mesh = max(
             ((record, n) for n in meshes for record in records),
             key=lambda place: float(place[0].max_pressure[place[1]].max(initial=0.0)),
         )
-        at = int(one.max_pressure[mesh].argmax())
+        at = int(walked.max_pressure[mesh].argmax())
         # the cycle counts paths in the direction of motion, towards the root of gear 1 where that is turned
         sense = -1.0 if self.sun_torque < 0.0 else 1.0
         return (
-            float(one.position[at]),
-            sense * float(one.pressed_path[mesh, at]),
-            float(one.pressed_load[mesh, at]),
+            float(walked.position[at]),
+            sense * float(walked.pressed_path[mesh, at]),
+            float(walked.pressed_load[mesh, at]),
         )
 
     def _ranges(self) -> dict[str, np.ndarray]:
         """Stress ranges over a turn, of single teeth where they differ, and the history of planets' roots."""
         ranges = self.ranges
-        rows = [(one.maximum, one.minimum, r.arc[one.point]) for r, one in zip(self.roots, ranges, strict=True)]
+        rows = [
+            (range_of_root.maximum, range_of_root.minimum, r.arc[range_of_root.point])
+            for r, range_of_root in zip(self.roots, ranges, strict=True)
+        ]
         names = "root_range_maximum", "root_range_minimum", "root_range_arc"
         columns = zip(*self._largest_of_alike(rows))
         values: dict[str, np.ndarray] = dict(zip(names, map(_by_gear, columns), strict=True))
-        planets = [one.history for one in ranges if one.kind == "planet"]
+        planets = [range_of_root.history for range_of_root in ranges if range_of_root.kind == "planet"]
         if planets and planets[0] is not None:
             values["planet_root_stress"] = np.array(planets)
         if self.cycle.periods > 1:
-            values["tooth_root_maximum"] = _by_gear([one.tooth_maximum for one in ranges])
-            values["tooth_root_minimum"] = _by_gear([one.tooth_minimum for one in ranges])
+            values["tooth_root_maximum"] = _by_gear([range_of_root.tooth_maximum for range_of_root in ranges])
+            values["tooth_root_minimum"] = _by_gear([range_of_root.tooth_minimum for range_of_root in ranges])
         return values
 
     def _over_width(self) -> dict[str, np.ndarray]:
@@ -684,10 +687,10 @@ def root_values(roots: tuple[RootCycle, ...]) -> dict[str, np.ndarray]:
     """
     histories = [root.history() for root in roots]
     return {
-        "root_tension": _by_gear([one.stress[:, LOADED].max(axis=-1) for one in histories]),
-        "root_compression": _by_gear([one.stress[:, BACK].min(axis=-1) for one in histories]),
-        "root_path": _by_gear([one.path for one in histories]),
-        "root_load": _by_gear([one.load for one in histories]),
+        "root_tension": _by_gear([history.stress[:, LOADED].max(axis=-1) for history in histories]),
+        "root_compression": _by_gear([history.stress[:, BACK].min(axis=-1) for history in histories]),
+        "root_path": _by_gear([history.path for history in histories]),
+        "root_load": _by_gear([history.load for history in histories]),
         "root_profile": _by_gear([root.stress[root.worst[:2]] for root in roots]),
         "root_arc": _by_gear([root.arc for root in roots]),
         "root_slope": _by_gear([root.slope for root in roots]),
@@ -749,9 +752,9 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield from _helical(data)
     unloaded = (force + back)[: data.sizes["planet"]] <= 0.0
     always = unloaded.all(axis=1)
-    for word, one in (("all", always), ("some", unloaded.any(axis=1) & ~always)):
-        if one.any() and force.any():
-            planets = ", ".join(str(n + 1) for n in np.flatnonzero(one))
+    for word, unloaded_planets in (("all", always), ("some", unloaded.any(axis=1) & ~always)):
+        if unloaded_planets.any() and force.any():
+            planets = ", ".join(str(n + 1) for n in np.flatnonzero(unloaded_planets))
             text = (
                 f"planet {planets} carries nothing at {word} positions: its place and transmission error (*, "
                 "a dash where it never carries) are not determined there; the smallest motion without "
@@ -771,9 +774,9 @@ def stress_warnings(data: xr.Dataset) -> Iterator[Finding]:
     for mesh, name in enumerate(data["mesh"].values):
         titles = SIDES.get(family(name), tuple(str(name).split("-")))
         for number, title in enumerate(titles):
-            one = data.isel(mesh=mesh, gear=number)
+            flank = data.isel(mesh=mesh, gear=number)
             gear = title.split(",")[0].replace(" ", "_")
-            radius, worst = float(one["root_notch_radius"]), float(one["root_worst"])
+            radius, worst = float(flank["root_notch_radius"]), float(flank["root_worst"])
             if radius < ROOT_RADIUS_LIMIT * module and gear not in seen:
                 seen.add(gear)
                 yield Finding(
@@ -786,7 +789,7 @@ def stress_warnings(data: xr.Dataset) -> Iterator[Finding]:
                     remedy="give the rounding of the tool as root_radius",
                     concerns=gear.replace("_", " "),
                 )
-            elif worst > 0.0 and float(one["root_worst_arc"]) <= 0.0 and title not in seen:
+            elif worst > 0.0 and float(flank["root_worst_arc"]) <= 0.0 and title not in seen:
                 seen.add(title)
                 yield Finding(
                     "W-KINK",
@@ -808,7 +811,7 @@ def _kinked_reliefs(data: xr.Dataset) -> Iterator[Finding]:
     excess = _over_hertz(data)
     names = [family(str(name)) for name in data["mesh"].values]
     for kind in dict.fromkeys(names):
-        largest = max(one for one, name in zip(excess, names, strict=True) if name == kind)
+        largest = max(ratio for ratio, name in zip(excess, names, strict=True) if name == kind)
         kinked = any(data["relief_kink"].values[[name == kind for name in names]])
         if kinked and largest > _KINKED:
             yield Finding(
@@ -960,34 +963,34 @@ def describe_static(data: xr.Dataset) -> Block:
     lowest, highest = (data.get(f"{end}_load_share", data.load_share) for end in ("smallest", "largest"))
     marks = Marks(findings_in(data.attrs))
 
-    def error(one: xr.Dataset, value: float) -> str:
+    def error(row: xr.Dataset, value: float) -> str:
         """Write a transmission error, marked where the mesh of a loaded set carries nothing at times."""
-        carries = (one.mesh_force + one.back_force).values > 0.0
-        text = significant(value * 1e6, 4) if abs(one.ste.values.mean()) < 1e-8 else f"{value * 1e6:.4f}"
+        carries = (row.mesh_force + row.back_force).values > 0.0
+        text = significant(value * 1e6, 4) if abs(row.ste.values.mean()) < 1e-8 else f"{value * 1e6:.4f}"
         if not data.mesh_force.values.any() or carries.all():
             return text
         return f"{text}*" if carries.any() else "-"
 
     columns = {
-        "mesh": lambda one: str(one.mesh.item()),
-        "STE mean [um]": lambda one: marks(error(one, float(mean_over_period(one, "ste"))), *LARGE),
-        "STE p-p [um]": lambda one: marks(error(one, float(peak_to_peak(one, "ste"))), *LARGE, "W-POSITIONS"),
-        "k mean [N/um]": lambda one: marks(
-            significant(float(mean_over_period(one, "mesh_stiffness")) / 1e6, 3), *LARGE
+        "mesh": lambda row: str(row.mesh.item()),
+        "STE mean [um]": lambda row: marks(error(row, float(mean_over_period(row, "ste"))), *LARGE),
+        "STE p-p [um]": lambda row: marks(error(row, float(peak_to_peak(row, "ste"))), *LARGE, "W-POSITIONS"),
+        "k mean [N/um]": lambda row: marks(
+            significant(float(mean_over_period(row, "mesh_stiffness")) / 1e6, 3), *LARGE
         ),
-        "k p-p [N/um]": lambda one: marks(
-            significant(float(peak_to_peak(one, "mesh_stiffness")) / 1e6, 3), *LARGE, "W-POSITIONS"
+        "k p-p [N/um]": lambda row: marks(
+            significant(float(peak_to_peak(row, "mesh_stiffness")) / 1e6, 3), *LARGE, "W-POSITIONS"
         ),
-        "force [N]": lambda one: significant(one.mesh_force.values.mean(), 3),
-        "p max [MPa]": lambda one: _pressure(float(largest_pressure(one)), marks),
+        "force [N]": lambda row: significant(row.mesh_force.values.mean(), 3),
+        "p max [MPa]": lambda row: _pressure(float(largest_pressure(row)), marks),
     }
     if "face_load_factor" in data:
-        columns["K_Hbeta"] = lambda one: (
-            marks(f"{float(one.face_load_factor):.3f}", "W-FACE-LOAD", "W-THRUST")
-            if one.mesh_force.values.any()
+        columns["K_Hbeta"] = lambda row: (
+            marks(f"{float(row.face_load_factor):.3f}", "W-FACE-LOAD", "W-THRUST")
+            if row.mesh_force.values.any()
             else "-"
         )
-        columns["misaligned [um]"] = lambda one: f"{float(one.mesh_misalignment.mean()) * 1e6:+.2f}"
+        columns["misaligned [um]"] = lambda row: f"{float(row.mesh_misalignment.mean()) * 1e6:+.2f}"
     contact = f"contact: {data.attrs.get('contact', 'unknown')}"
     sharing = (
         f"load share of a planet {float(lowest.min()):.4f} to {float(highest.max()):.4f} "
@@ -1046,13 +1049,13 @@ def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block
     for kind in dict.fromkeys(map(family, names)):
         meshes = [i for i, name in enumerate(names) if family(name) == kind]
         titles = SIDES.get(kind, tuple(kind.split("-")))
-        one = data.isel(mesh=meshes)
-        doubts = pressure_doubts(findings, kind, float(largest_pressure(one).max()))
-        contact.append(_contact_row(kind, one, partial(_marked, marks, doubts)))
+        of_kind = data.isel(mesh=meshes)
+        doubts = pressure_doubts(findings, kind, float(largest_pressure(of_kind).max()))
+        contact.append(_contact_row(kind, of_kind, partial(_marked, marks, doubts)))
         for number, title in enumerate(titles):
             doubts = root_doubts(findings, title, titles[1 - number])
-            one = data.isel(mesh=meshes, gear=number)
-            roots.append(_root_row(title, one, partial(_marked, marks, doubts)))
+            of_kind = data.isel(mesh=meshes, gear=number)
+            roots.append(_root_row(title, of_kind, partial(_marked, marks, doubts)))
     equal, against = ("", "") if len(names) == 1 else ("equal load on all planets and ", " against the carrier")
     header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [deg]", "range", "cycles"
     notes = [
@@ -1080,13 +1083,13 @@ def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block
 
 def pressure_doubts(findings: Iterable[Finding], kind: str, pressure: float) -> list[str]:
     """Codes of findings that concern the largest contact pressure [Pa] of a kind of mesh."""
-    kinked = [one.code for one in findings if one.code == "W-KINK" and one.concerns == kind]
+    kinked = [finding.code for finding in findings if finding.code == "W-KINK" and finding.concerns == kind]
     return [*kinked, *(["W-PRESSURE"] if pressure > LARGEST_PRESSURE else []), "W-EDGE"]
 
 
 def root_doubts(findings: Iterable[Finding], title: str, mate: str) -> list[str]:
     """Codes of findings that concern the root stress of a flank, such as "planet, sun side", with a mate."""
-    return [one.code for one in findings if _concerns(one, title, mate)]
+    return [finding.code for finding in findings if _concerns(finding, title, mate)]
 
 
 def _marked(marks: Marks, codes: list[str], text: str) -> str:
@@ -1113,11 +1116,11 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
     for kind in dict.fromkeys(map(family, names)):
         meshes = [i for i, name in enumerate(names) if family(name) == kind]
         mesh = meshes[int(largest_pressure(data)[meshes].argmax())]
-        one = data.isel(mesh=mesh)
-        ratio = float(largest_pressure(one) / one["iso_contact_stress"])
+        worst = data.isel(mesh=mesh)
+        ratio = float(largest_pressure(worst) / worst["iso_contact_stress"])
         if ratio > DIFFERS or 0.0 < ratio < 1.0 / DIFFERS:
-            curvature, load = float(one["contact_worst_curvature"]), float(one["contact_worst_load"])
-            ends = sorted(zip(one["contact_start"].values, kind.split("-")))
+            curvature, load = float(worst["contact_worst_curvature"]), float(worst["contact_worst_load"])
+            ends = sorted(zip(worst["contact_start"].values, kind.split("-")))
             flank = ends[0][1] if ends[0][1].startswith("gear") else f"the {ends[0][1]}"
             near = f"; on {flank} contact begins {1e3 * ends[0][0]:.2g} mm above the base circle"
             yield (
@@ -1126,16 +1129,16 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
                 f"{near if curvature > DIFFERS else ''}; x {math.sqrt(load / nominal_load):.2f} by the load "
                 f"of the tooth pair, {load / nominal_load:.2f} of the nominal one; x "
                 f"{1.0 / _nominal_over_hertz(data)[mesh]:.2f}: sigma_H0 has {factors}; x "
-                f"{excess[mesh]:.2f} {_beside_hertz(one, float(excess[mesh]), curvature)}"
+                f"{excess[mesh]:.2f} {_beside_hertz(worst, float(excess[mesh]), curvature)}"
             )
         for number, title in enumerate(SIDES.get(kind, tuple(kind.split("-")))):
             mesh = meshes[int(data["root_worst"].values[meshes, number].argmax())]
-            one = data.isel(mesh=mesh, gear=number)
-            ratio = float(one["root_worst"] / one["iso_root_stress"])
+            worst = data.isel(mesh=mesh, gear=number)
+            ratio = float(worst["root_worst"] / worst["iso_root_stress"])
             if ratio > DIFFERS or 0.0 < ratio < 1.0 / DIFFERS:
-                share = float(one["root_worst_load"]) / nominal_load
+                share = float(worst["root_worst_load"]) / nominal_load
                 rest = f"x {ratio / share:.2f} by all else" if share > 0.0 else "the tooth itself is not loaded"
-                radius = float(one["root_notch_radius"]) / data.attrs["module"]
+                radius = float(worst["root_notch_radius"]) / data.attrs["module"]
                 yield (
                     f"root {title}, FE/ISO = {ratio:.2f}: x {share:.2f} by the load of the tooth pair; "
                     f"{rest}: its place, rim and neighbouring teeth, which ISO 6336-3 takes in part, the "
@@ -1143,12 +1146,12 @@ def _reasons(data: xr.Dataset) -> Iterator[str]:
                 )
 
 
-def _beside_hertz(one: xr.Dataset, excess: float, curvature: float) -> str:
+def _beside_hertz(flank: xr.Dataset, excess: float, curvature: float) -> str:
     """Say why the largest pressure of a mesh is not that of Hertz for its load and curvature."""
     if 1.0 / _AS_HERTZ < excess < _AS_HERTZ:
         return "by all else: cells, and teeth that deform"
-    margin = float(one.get("contact_worst_margin", 0.0))
-    if excess > 1.0 and int(one["relief_kink"]):
+    margin = float(flank.get("contact_worst_margin", 0.0))
+    if excess > 1.0 and int(flank["relief_kink"]):
         return "by the kink with which a linear relief begins: under it pressure has no limit"
     if excess > 1.0 and margin < 0.0:
         return f"by the tip corner: loaded teeth touch {-1e3 * margin:.2g} mm beyond the end of the path"
@@ -1163,42 +1166,42 @@ def _contact_row(kind: str, data: xr.Dataset, marked: Callable[[str], str]) -> t
     """Write the largest contact pressure of a kind of mesh, marked where it is doubtful."""
     pressure = largest_pressure(data)
     mesh = int(pressure.argmax())
-    found, nominal = float(pressure[mesh]), float(data["iso_contact_stress"][mesh])
+    pressure_there, nominal = float(pressure[mesh]), float(data["iso_contact_stress"][mesh])
     if "contact_worst_position" in data:
         position = float(data["contact_worst_position"][mesh])
     else:
         position = float(data["position"][int(data["contact_pressure"].values[mesh].argmax())])
-    place = f"{position:.3f}" if found else "-"
-    largest, *compared = _compared(found, nominal)
+    place = f"{position:.3f}" if pressure_there else "-"
+    largest, *compared = _compared(pressure_there, nominal)
     return (f"contact {kind}", marked(largest), *compared, place, *["-"] * 4)
 
 
 def _root_row(title: str, data: xr.Dataset, marked: Callable[[str], str]) -> tuple[str, ...]:
     """Write the largest root stress of a gear in its worst mesh, marked where it is doubtful."""
     mesh = int(data["root_worst"].values.argmax())
-    one = {name: float(values) for name, values in data.isel(mesh=mesh).items() if not values.dims}
-    found, place = one["root_worst"], ["-"] * 3
-    if found:
-        arc, slope = one["root_worst_arc"] * 1e3, np.degrees(one["root_worst_slope"])
-        place = [f"{one['root_worst_position']:.3f}", f"{arc:.3f}", f"{slope:.1f}"]
-    low, high = one["root_range_minimum"] * 1e-6, one["root_range_maximum"] * 1e-6
-    largest, *compared = _compared(found, one["iso_root_stress"])
+    values_there = {name: float(values) for name, values in data.isel(mesh=mesh).items() if not values.dims}
+    stress_there, place = values_there["root_worst"], ["-"] * 3
+    if stress_there:
+        arc, slope = values_there["root_worst_arc"] * 1e3, np.degrees(values_there["root_worst_slope"])
+        place = [f"{values_there['root_worst_position']:.3f}", f"{arc:.3f}", f"{slope:.1f}"]
+    low, high = values_there["root_range_minimum"] * 1e-6, values_there["root_range_maximum"] * 1e-6
+    largest, *compared = _compared(stress_there, values_there["iso_root_stress"])
     return (
         f"root {title}",
         marked(largest),
         *compared,
         *place,
         f"{significant(low, 1)} to {significant(high, 1)}",
-        f"{one['load_cycles']:g}",
-        *[f"{one[name]:.3f}" for name in ("root_face_factor", "iso_face_factor") if name in one],
+        f"{values_there['load_cycles']:g}",
+        *[f"{values_there[name]:.3f}" for name in ("root_face_factor", "iso_face_factor") if name in values_there],
     )
 
 
-def _compared(found: float, nominal: float) -> tuple[str, str, str]:
+def _compared(value: float, nominal: float) -> tuple[str, str, str]:
     """Write both values in MPa and their ratio; a dash where there is none."""
-    known = np.isfinite(nominal)
-    ratio = f"{found / nominal:.2f}" if known and nominal else "-"
-    return significant(found * 1e-6, 1), significant(nominal * 1e-6, 1) if known else "-", ratio
+    comparable = np.isfinite(nominal)
+    ratio = f"{value / nominal:.2f}" if comparable and nominal else "-"
+    return significant(value * 1e-6, 1), significant(nominal * 1e-6, 1) if comparable else "-", ratio
 
 
 def describe_set(case: Case) -> tuple[Block, ...]:
@@ -1259,7 +1262,7 @@ def width_warnings(case: Any) -> Iterator[Finding]:
 def describe_materials(case: Any) -> Iterator[Block]:
     """Tabulate materials and face widths of the gears, where one has others than the rest."""
     sections = [getattr(case, name) for name in case.gear_names]
-    if all(one.material is None and one.face_width is None for one in sections):
+    if all(section.material is None and section.face_width is None for section in sections):
         return
 
     def limit(value: float | None) -> str:
@@ -1373,7 +1376,7 @@ def describe_meshes(s: GearSet, helix_angle: float | None = None) -> Block:
             *(f"{math.degrees(pair.working_pressure_angle):.4f}" for pair in s.kinds),
         ),
         *_contact_ratio_rows(s, helix_angle),
-        ("normal backlash [um]", *(f"{round(normal * one.backlash * 1e6, 2) + 0.0:.2f}" for one in s.kinds)),
+        ("normal backlash [um]", *(f"{round(normal * kind.backlash * 1e6, 2) + 0.0:.2f}" for kind in s.kinds)),
         ("tip clearances [mm]", *(f"{next(clearance)}, {next(clearance)}" for _ in s.kinds)),
         ("single contact, first gear [mm]", *(first for first, _ in alone)),
         ("single contact, second gear [mm]", *(second for _, second in alone)),
@@ -1387,7 +1390,7 @@ def describe_meshes(s: GearSet, helix_angle: float | None = None) -> Block:
 def _operation(case: Case, s: PlanetarySet) -> Block:
     """Tabulate the speeds of all members."""
     operation = case.operation
-    found = [
+    entries = [
         speeds(s, input=operation.input, fixed=operation.fixed, speed=operation.speeds[i])
         for i in chosen(len(operation.speeds))
     ]
@@ -1403,9 +1406,9 @@ def _operation(case: Case, s: PlanetarySet) -> Block:
         f"input {operation.input}, fixed {operation.fixed}; torque on sun {load.sun:.6g} N m, "
         f"carrier {load.carrier:.6g} N m, ring {load.ring:.6g} N m"
     ]
-    if len(operation.speeds) > len(found):
+    if len(operation.speeds) > len(entries):
         notes.append(f"{len(operation.speeds)} speeds, of which the first and the last are shown")
-    return tabulate("Operation", found, columns, (*notes, *shaft_lines(case)))
+    return tabulate("Operation", entries, columns, (*notes, *shaft_lines(case)))
 
 
 def _harmonics(s: PlanetarySet) -> Block:
@@ -1438,29 +1441,29 @@ def _neighbours(s: PlanetarySet) -> Block:
     """Tabulate tooth numbers near those of the set, and what they would change."""
     wanted = (s.sun.teeth, s.planet.teeth, s.ring.teeth)
     closure = max(1, abs(wanted[2] - wanted[0] - 2 * wanted[1]))
-    found = neighbouring_teeth(
+    neighbours = neighbouring_teeth(
         *wanted, s.n_planets, distance=_DISTANCE, ratio_tolerance=_TOLERANCE, closure=min(closure, 10)
     )
-    found = found.only(np.any(found.teeth != np.array(wanted), axis=1))
+    neighbours = neighbours.only(np.any(neighbours.teeth != np.array(wanted), axis=1))
     # sets with equal spacing first, each group by its ratio
-    found = found.only(np.argsort(~found.equally_spaced, kind="stable"))
+    neighbours = neighbours.only(np.argsort(~neighbours.equally_spaced, kind="stable"))
 
     def spacing(i: int) -> str:
-        off = math.degrees(found.spacing_error[i])
-        return "equal" if found.equally_spaced[i] else f"off by {off:.2f} deg"
+        off = math.degrees(neighbours.spacing_error[i])
+        return "equal" if neighbours.equally_spaced[i] else f"off by {off:.2f} deg"
 
     columns = {
-        "teeth": lambda i: "/".join(str(z) for z in found.teeth[i]),
-        "ratio": lambda i: f"{found.ratio[i]:.4f}",
-        "change": lambda i: f"{100.0 * found.ratio_change[i]:+.2f} %",
+        "teeth": lambda i: "/".join(str(z) for z in neighbours.teeth[i]),
+        "ratio": lambda i: f"{neighbours.ratio[i]:.4f}",
+        "change": lambda i: f"{100.0 * neighbours.ratio_change[i]:+.2f} %",
         "spacing": spacing,
-        "harmonics 1 to 4": lambda i: _kinds([_SHORT[name] for name in found.kind_names[i]]),
-        "hunting": lambda i: "yes" if found.hunting[i] else "no",
-        "room [modules]": lambda i: f"{found.room[i]:.2f}",
+        "harmonics 1 to 4": lambda i: _kinds([_SHORT[name] for name in neighbours.kind_names[i]]),
+        "hunting": lambda i: "yes" if neighbours.hunting[i] else "no",
+        "room [modules]": lambda i: f"{neighbours.room[i]:.2f}",
     }
-    near = f"{len(found)} within {_DISTANCE} teeth and {100 * _TOLERANCE:g} % of the ratio"
+    near = f"{len(neighbours)} within {_DISTANCE} teeth and {100 * _TOLERANCE:g} % of the ratio"
     notes = (f"{near}; room: unshifted tips",)
-    block = tabulate("Neighbouring tooth numbers", range(min(len(found), _ROWS)), columns, notes)
+    block = tabulate("Neighbouring tooth numbers", range(min(len(neighbours), _ROWS)), columns, notes)
     return replace(block, beside=True)
 
 

@@ -75,7 +75,7 @@ class Labelled:
 
     def __getitem__(self, place: Any) -> Labelled:
         parts = place if isinstance(place, tuple) else (place,)
-        simple = all(_is_one(one) or isinstance(one, slice) for one in parts)
+        simple = all(_is_one(part) or isinstance(part, slice) for part in parts)
         if not simple and (len(parts) > 1 or np.ndim(place) != 1):
             return self.to_xarray()[place]  # type: ignore[return-value]
         return self.isel(**dict(zip(self.dims, parts)))
@@ -119,7 +119,7 @@ class Labelled:
         if options or not isinstance(dim, str | None) or (number == "f" and np.isnan(self.values).any()):
             return getattr(self.to_xarray(), name)(*([] if dim is None else [dim]), **options)
         axis = None if dim is None else self.dims.index(dim)
-        left = () if dim is None else tuple(one for one in self.dims if one != dim)
+        left = () if dim is None else tuple(kept_dim for kept_dim in self.dims if kept_dim != dim)
         return self._like(getattr(np, name)(self.values, axis=axis), left, self._parent)
 
     def max(self, dim: Any = None, **options: Any) -> Any:
@@ -147,12 +147,12 @@ class Labelled:
         return self._reduced("all", dim, **options)
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
-        others = [one for one in inputs if isinstance(one, Labelled)]
-        if method != "__call__" or options or any(one.dims != self.dims for one in others):
-            inputs = tuple(one.to_xarray() if isinstance(one, Labelled) else one for one in inputs)
+        others = [operand for operand in inputs if isinstance(operand, Labelled)]
+        if method != "__call__" or options or any(other.dims != self.dims for other in others):
+            inputs = tuple(operand.to_xarray() if isinstance(operand, Labelled) else operand for operand in inputs)
             return getattr(ufunc, method)(*inputs, **options)
-        found = ufunc(*(one.values if isinstance(one, Labelled) else one for one in inputs))
-        return self._like(found) if np.shape(found) == self.shape else found
+        result = ufunc(*(operand.values if isinstance(operand, Labelled) else operand for operand in inputs))
+        return self._like(result) if np.shape(result) == self.shape else result
 
 
 def _operation(apply: Callable[..., Any], *, swapped: bool = False) -> Callable[..., Any]:
@@ -203,17 +203,17 @@ class Contents:
     def _check(self) -> None:
         """Collect the sizes of the dimensions; ValueError where two variables do not agree."""
         sizes = self.sizes = dict[str, int]()
-        for name, one in self.variables.items():
-            if len(one.dims) != one.ndim:
-                raise ValueError(f"{name} has {one.ndim} dimensions, not {one.dims}")
-            for dim, size in one.sizes.items():
+        for name, variable in self.variables.items():
+            if len(variable.dims) != variable.ndim:
+                raise ValueError(f"{name} has {variable.ndim} dimensions, not {variable.dims}")
+            for dim, size in variable.sizes.items():
                 if sizes.setdefault(dim, size) != size:
                     raise ValueError(f"{name} has {size} along {dim}, others {sizes[dim]}")
 
     data_vars = property(lambda self: self._entered[0])
     coords = property(lambda self: self._entered[1])
     dims = property(lambda self: self.sizes)
-    nbytes = property(lambda self: sum(one.nbytes for one in self.variables.values()))
+    nbytes = property(lambda self: sum(variable.nbytes for variable in self.variables.values()))
 
     @property
     def variables(self) -> dict[str, Labelled]:
@@ -224,18 +224,18 @@ class Contents:
         """Make the dataset of xarray that has the same variables, coordinates and attributes."""
         import xarray as xr
 
-        made = [{n: (one.dims, one.values, one.attrs) for n, one in part.items()} for part in self._entered]
+        made = [{n: (value.dims, value.values, value.attrs) for n, value in part.items()} for part in self._entered]
         return xr.Dataset(made[0], coords=made[1], attrs=self.attrs)
 
     def coordinates_along(self, dims: tuple[str, ...]) -> dict[str, Any]:
         """List the coordinates that stand over some dimensions, or over none, as xarray takes them."""
-        found = {name: one for name, one in self.coords.items() if {*one.dims} <= {*dims}}
-        return {name: (one.dims, one.values, one.attrs) for name, one in found.items()}
+        along = {name: coord for name, coord in self.coords.items() if {*coord.dims} <= {*dims}}
+        return {name: (value.dims, value.values, value.attrs) for name, value in along.items()}
 
     def __getitem__(self, name: Any) -> Any:
         if isinstance(name, str):
-            if (found := self.variables.get(name)) is not None:
-                return found
+            if (variable := self.variables.get(name)) is not None:
+                return variable
             if name in self.sizes:
                 return Labelled(np.arange(self.sizes[name]), (name,), {}, self._itself)
         return self.to_xarray()[name]
@@ -269,12 +269,12 @@ class Contents:
 
     def assign(self, **entries: Any) -> Contents:
         """Add variables ``(dims, values)`` to those that there are, in contents of their own."""
-        found = self._chosen(lambda one: (one.values, one.dims))
+        copy_ = self._chosen(lambda labelled: (labelled.values, labelled.dims))
         for name, (dims, values) in entries.items():
             dims = tuple(dims.split() if isinstance(dims, str) else dims)
-            found.data_vars[name] = Labelled(values, dims, {}, found._itself)
-        found._check()
-        return found
+            copy_.data_vars[name] = Labelled(values, dims, {}, copy_._itself)
+        copy_._check()
+        return copy_
 
     def sel(self, **labels: Any) -> Contents:
         """Choose by one label of every dimension; KeyError where none has it."""
@@ -283,22 +283,22 @@ class Contents:
             axis = self.coords.get(dim)
             if axis is None or axis.dims != (dim,) or np.ndim(label) or isinstance(label, slice):
                 return self.to_xarray().sel(**labels)  # type: ignore[return-value]
-            found = np.flatnonzero(axis.values == label)
-            if len(found) != 1:
+            places_there = np.flatnonzero(axis.values == label)
+            if len(places_there) != 1:
                 raise KeyError(label)
-            places[dim] = int(found[0])
+            places[dim] = int(places_there[0])
         return self.isel(**places)
 
     def _chosen(self, choose: Callable[[Labelled], tuple[Any, tuple[str, ...]]]) -> Contents:
         """Contents of parts of all variables."""
-        found = Contents.__new__(Contents)
-        found.attrs = dict(self.attrs)
-        found._entered = tuple(
-            {name: Labelled(*choose(one), one.attrs, found._itself) for name, one in part.items()}
+        copy_ = Contents.__new__(Contents)
+        copy_.attrs = dict(self.attrs)
+        copy_._entered = tuple(
+            {name: Labelled(*choose(value), value.attrs, copy_._itself) for name, value in part.items()}
             for part in self._entered
         )  # type: ignore[assignment]
-        found._check()
-        return found
+        copy_._check()
+        return copy_
 
     def isel(self, **places: Any) -> Contents:
         """Choose by numbers along dimensions: one, which ends the dimension, a slice, or several.
@@ -308,8 +308,8 @@ class Contents:
         if absent := places.keys() - self.sizes.keys():
             raise ValueError(f"no dimension {', '.join(map(str, absent))}: there are {', '.join(self.sizes)}")
 
-        def choose(one: Labelled) -> tuple[Any, tuple[str, ...]]:
-            values, dims = one.values, one.dims
+        def choose(labelled: Labelled) -> tuple[Any, tuple[str, ...]]:
+            values, dims = labelled.values, labelled.dims
             for dim, place in places.items():
                 if dim in dims:
                     axis = dims.index(dim)
@@ -326,11 +326,13 @@ class Contents:
         """
         if both := self.data_vars.keys() & other.data_vars.keys():
             raise ValueError(f"both have {', '.join(sorted(both))}")
-        found = self._chosen(lambda one: (one.values, one.dims))
-        for made, more in zip(found._entered, other._entered, strict=True):
-            made.update({n: Labelled(one.values, one.dims, one.attrs, found._itself) for n, one in more.items()})
-        found._check()
-        return found
+        copy_ = self._chosen(lambda labelled: (labelled.values, labelled.dims))
+        for made, more in zip(copy_._entered, other._entered, strict=True):
+            made.update(
+                {n: Labelled(value.values, value.dims, value.attrs, copy_._itself) for n, value in more.items()}
+            )
+        copy_._check()
+        return copy_
 
 
 def as_dataset(data: Contents | xr.Dataset) -> xr.Dataset:
@@ -345,8 +347,8 @@ class Datasets(Mapping[str, Any]):
         self._contents = dict(contents)
 
     def __getitem__(self, stage: str) -> xr.Dataset:
-        found = self._contents[stage] = as_dataset(self._contents[stage])
-        return found
+        dataset = self._contents[stage] = as_dataset(self._contents[stage])
+        return dataset
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._contents)

@@ -88,7 +88,7 @@ def write_dataset(dataset: Contents | xr.Dataset, path: str | os.PathLike) -> No
 
 def _to_netcdf(dataset: Contents | xr.Dataset, path: Path, *, growing: bool = False) -> None:
     """Write a dataset as `write_dataset` does, under the name itself; its numbers may have to grow."""
-    free = [name for name, one in dataset.coords.items() if growing and one.dtype.kind not in "OUS"]
+    free = [name for name, coord in dataset.coords.items() if growing and coord.dtype.kind not in "OUS"]
     for name, variable in dataset.variables.items():
         _check_variable(str(name), variable, coordinate=name in dataset.coords, path=path)
     write_hdf5(path, lambda stream: _create(dataset, stream, free))
@@ -107,15 +107,15 @@ def _create(dataset: Contents | xr.Dataset, stream: io.RawIOBase, free: Sequence
         if beside := [str(name) for name in dataset.coords if name not in sizes]:
             file.attrs["coordinates"] = " ".join(beside)
         made: dict[Any, h5py.Dataset] = {}
-        for name, one in dataset.variables.items():
-            kind = stored.get(one.dtype.kind, one.dtype)
-            options = {"maxshape": [longest[dim] for dim in one.dims], "fletcher32": kind.kind != "O"}
-            if one.dims and (free or one.nbytes > _COMPRESSED) and one.dtype.kind not in "OUS":
-                pieces = _chunk(one, free) if free else True
+        for name, variable in dataset.variables.items():
+            kind = stored.get(variable.dtype.kind, variable.dtype)
+            options = {"maxshape": [longest[dim] for dim in variable.dims], "fletcher32": kind.kind != "O"}
+            if variable.dims and (free or variable.nbytes > _COMPRESSED) and variable.dtype.kind not in "OUS":
+                pieces = _chunk(variable, free) if free else True
                 options |= {"chunks": pieces, "compression": 1, "shuffle": True}
-            values = one.values.astype(kind, copy=False)
-            made[name] = file.create_dataset(str(name), data=values, **(options if one.dims else {}))
-            made[name].attrs.update(one.attrs, **({"dtype": "bool"} if one.dtype.kind == "b" else {}))
+            values = variable.values.astype(kind, copy=False)
+            made[name] = file.create_dataset(str(name), data=values, **(options if variable.dims else {}))
+            made[name].attrs.update(variable.attrs, **({"dtype": "bool"} if variable.dtype.kind == "b" else {}))
         for number, (dim, size) in enumerate(sizes.items()):
             text = str(dim)
             if dim not in made:
@@ -123,8 +123,8 @@ def _create(dataset: Contents | xr.Dataset, stream: io.RawIOBase, free: Sequence
                 text = f"This is a netCDF dimension but not a netCDF variable.{size:10d}"
             made[dim].make_scale(text)
             made[dim].attrs["_Netcdf4Dimid"] = np.int32(number)
-        for name, one in dataset.variables.items():
-            for axis, dim in enumerate(() if name in sizes else one.dims):
+        for name, variable in dataset.variables.items():
+            for axis, dim in enumerate(() if name in sizes else variable.dims):
                 made[name].dims[axis].attach_scale(made[dim])
 
 
@@ -162,7 +162,7 @@ def _append(dataset: Contents | xr.Dataset, stream: io.RawIOBase, along: str) ->
                 if name in dataset.coords and variable.shape <= stored.shape:
                     continue
                 stored[...] = np.zeros(stored.shape, stored.dtype)
-            start = [size if one == along else 0 for one, size in zip(variable.dims, stored.shape)]
+            start = [size if dim_there == along else 0 for dim_there, size in zip(variable.dims, stored.shape)]
             end = [first + size for first, size in zip(start, variable.shape)]
             if end != list(stored.shape):
                 stored.resize(np.maximum(stored.shape, end))
@@ -266,11 +266,11 @@ def _loaded(path: str | os.PathLike) -> xr.Dataset:
             raise StorageError(hostile, code="E-FORMAT", file=os.fspath(path), remedy="do not use this file")
     options = {"engine": "h5netcdf", "decode_times": False, "decode_timedelta": False}
     with contextlib.ExitStack() as opened:
-        found = opened.enter_context(xr.open_dataset(path, cache=False, **options))
-        if found.nbytes <= _LARGE:
-            return found.load()
+        dataset = opened.enter_context(xr.open_dataset(path, cache=False, **options))
+        if dataset.nbytes <= _LARGE:
+            return dataset.load()
         opened.pop_all()
-    return found
+    return dataset
 
 
 def write_result(result: object, path: str | os.PathLike, *, fingerprint: str) -> None:
@@ -303,15 +303,15 @@ def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
     raise StorageError("no result of this case", code="E-FORMAT", file=os.fspath(path), remedy="run the case again")
 
 
-def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, Any]]) -> Any:
+def _encoded(value: Any, arrays: list[np.ndarray], numbers: dict[int, tuple[int, Any]]) -> Any:
     """Turn a value into JSON that numbers its arrays; what was met before is named by its number."""
     if value is None or type(value) in (bool, int, float, str):
         return value
-    if id(value) in known:
-        return ["known", known[id(value)][0]]
-    number = len(known)
+    if id(value) in numbers:
+        return ["known", numbers[id(value)][0]]
+    number = len(numbers)
     # the value itself is kept, so that no other one gets its id
-    known[id(value)] = number, value
+    numbers[id(value)] = number, value
     if type(value) is np.ndarray and value.dtype != object:
         # axes as they lie in memory: products of arrays in another order round differently
         axes = np.argsort([-abs(stride) for stride in value.strides], kind="stable").tolist()
@@ -321,7 +321,7 @@ def _encoded(value: Any, arrays: list[np.ndarray], known: dict[int, tuple[int, A
         arrays.append(np.asarray(value))
         return ["generic", number, len(arrays) - 1]
     kind, parts = _parts(value)
-    return [kind, number, *(_encoded(part, arrays, known) for part in parts)]
+    return [kind, number, *(_encoded(part, arrays, numbers) for part in parts)]
 
 
 def _parts(value: Any) -> tuple[str, Sequence]:
@@ -338,7 +338,7 @@ def _parts(value: Any) -> tuple[str, Sequence]:
     if kind.__module__.startswith("scipy.sparse") and value.format in ("csc", "csr"):
         return kind.__name__, (value.data, value.indices, value.indptr, value.shape)
     if is_dataclass(value):  # its fields alone, without what it has computed from them
-        state = {one.name: getattr(value, one.name) for one in fields(value)}
+        state = {field.name: getattr(value, field.name) for field in fields(value)}
     elif kind.__module__.startswith(_PACKAGE):
         state = value.__getstate__()
     else:
@@ -346,14 +346,14 @@ def _parts(value: Any) -> tuple[str, Sequence]:
     return "own", (kind.__module__, kind.__qualname__, state)
 
 
-def _decoded(node: Any, arrays: list[np.ndarray], known: dict[int, Any]) -> Any:
+def _decoded(node: Any, arrays: list[np.ndarray], objects: dict[int, Any]) -> Any:
     """Turn JSON of `_encoded` into the value again."""
     if not isinstance(node, list | dict):
         return node
     kind, number, *parts = node
     if kind != "known":
-        known[number] = _made(kind, [_decoded(part, arrays, known) for part in parts], arrays)
-    return known[number]
+        objects[number] = _made(kind, [_decoded(part, arrays, objects) for part in parts], arrays)
+    return objects[number]
 
 
 def _made(kind: str, parts: list, arrays: list[np.ndarray]) -> Any:
@@ -378,11 +378,11 @@ def _made(kind: str, parts: list, arrays: list[np.ndarray]) -> Any:
 def _own_object(module: str, name: str, state: dict) -> Any:
     """Make an object of a dataclass or of femgear as it was; its checks have been passed before."""
     place = importlib.import_module(module) if module.startswith(_PACKAGE) else sys.modules[module]
-    found = getattr(place, name)
-    if not isinstance(found, type) or not (is_dataclass(found) or module.startswith(_PACKAGE)):
+    kind_ = getattr(place, name)
+    if not isinstance(kind_, type) or not (is_dataclass(kind_) or module.startswith(_PACKAGE)):
         raise TypeError(f"{module} has no such class {name}")
-    made = object.__new__(found)
-    if is_dataclass(found):
+    made = object.__new__(kind_)
+    if is_dataclass(kind_):
         vars(made).update(state)
     else:
         made.__setstate__(state)  # type: ignore[attr-defined]
@@ -538,8 +538,8 @@ def remove_own(folder: Path) -> None:
 def _list_own(path: Path, digest: str) -> None:
     """Put the checksum of a file on the list of its folder before the file has its name."""
     written, entry = path.with_name(WRITTEN), _entry(path, digest)
-    for one in (path, written):
-        _refuse_foreign(one)
+    for place in (path, written):
+        _refuse_foreign(place)
     listed = written.read_bytes() if written.exists() else b""
     if entry not in listed.splitlines():
         with open(written, "ab") as stream:
@@ -630,8 +630,8 @@ def exclusive_lock(path: str | os.PathLike) -> Iterator[None]:
     finally:
         # on Windows the library removes it, after the release
         with contextlib.suppress(OSError):
-            found = path.lstat()
-            if stat.S_ISREG(found.st_mode) and not found.st_size:
+            status = path.lstat()
+            if stat.S_ISREG(status.st_mode) and not status.st_size:
                 path.unlink()
         lock.release()
 
@@ -655,10 +655,10 @@ def noted_interrupts() -> Iterator[Callable[[int, object], None]]:
     except Exception as error:
         if not is_interrupt(error):
             raise
-        found = KeyboardInterrupt()
+        stopped = KeyboardInterrupt()
         for note in getattr(error, "__notes__", []):
-            found.add_note(note)
-        raise found from error
+            stopped.add_note(note)
+        raise stopped from error
     finally:
         _signals.clear()
 

@@ -131,12 +131,12 @@ def tables_of(data: xr.Dataset, stage: str) -> Iterator[tuple[str, Any]]:
 
     flat = data.reset_coords()
     single = [
-        *((str(name), one.item(), _unit(one)) for name, one in flat.items() if not one.dims),
+        *((str(name), value.item(), _unit(value)) for name, value in flat.items() if not value.dims),
         *(_attribute(str(name), value) for name, value in data.attrs.items()),
     ]
-    for dims in dict.fromkeys([(), *(one.dims for one in flat.values())]):
+    for dims in dict.fromkeys([(), *(array.dims for array in flat.values())]):
         if dims:
-            chosen = [name for name, one in flat.items() if one.dims == dims]
+            chosen = [name for name, value in flat.items() if value.dims == dims]
             frame = flat[chosen].to_dataframe(dim_order=list(dims)).reset_index()
             frame = frame.rename(columns={name: _header(flat, str(name)) for name in frame})
         else:
@@ -162,9 +162,9 @@ def _attribute(name: str, value: Any) -> tuple[str, Any, str]:
     return name, value if np.isscalar(value) else str(value), _ATTRIBUTES.get(name, "1") if number else ""
 
 
-def _unit(one: xr.DataArray) -> str:
+def _unit(array: xr.DataArray) -> str:
     """Tell the unit of a number, nothing for text."""
-    return "" if one.dtype.kind in "OUSb" else str(one.attrs.get("units", "1"))
+    return "" if array.dtype.kind in "OUSb" else str(array.attrs.get("units", "1"))
 
 
 def _header(data: xr.Dataset, name: str) -> str:
@@ -178,12 +178,12 @@ def complex_entries(entries, *, single: bool = False) -> dict[str, tuple]:
 
     In single precision where that is finer than the tolerance of what they come from.
     """
-    found = {}
+    parts = {}
     for name, dims, values, units, words in entries:
         values = values.astype(np.complex64) if single else values
-        found[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
-        found[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
-    return found
+        parts[f"{name}_real"] = (dims, values.real, units, f"{words}, real part")
+        parts[f"{name}_imag"] = (dims, values.imag, units, f"{words}, imaginary part")
+    return parts
 
 
 def mode_entries(modes: Any) -> dict[str, tuple]:
@@ -213,7 +213,7 @@ def response_variables(result: Any) -> dict[str, tuple]:
     Of any result with a response, its stability and, where there is a carrier, the speeds of the members.
     """
     response, stability, speed = result.response, result.stability, ("speed",)
-    carrier = [one.carrier for one in getattr(result, "speeds", ())]
+    carrier = [at_speed.carrier for at_speed in getattr(result, "speeds", ())]
     return {
         "mesh_frequency": (speed, response.mesh_frequency, "Hz", "mesh frequency"),
         **({"carrier_speed": (speed, carrier, "rad/s", "speed of the carrier")} if carrier else {}),
@@ -280,8 +280,8 @@ class Results:
         """Contents of the file of a stage: ``results.modes``, as ``results["modes"]``."""
         if name.startswith("_"):
             raise AttributeError(name)
-        found = self.__dict__[name] = read_dataset(self._checked(f"{name}.nc"))
-        return found
+        opened = self.__dict__[name] = read_dataset(self._checked(f"{name}.nc"))
+        return opened
 
     def __getitem__(self, name: str) -> xr.Dataset:
         return getattr(self, name)
@@ -401,8 +401,8 @@ def completed_since_now(folder: str | os.PathLike) -> Callable[[], bool]:
 
     def written() -> tuple[int, int] | None:
         with suppress(OSError):
-            found = os.stat(Path(folder) / MANIFEST)
-            return found.st_ino, found.st_mtime_ns
+            status = os.stat(Path(folder) / MANIFEST)
+            return status.st_ino, status.st_mtime_ns
         return None
 
     before = written()
@@ -533,8 +533,8 @@ _version = cache(version)
 
 def versions() -> dict[str, str]:
     """List the versions of femgear and of the libraries that compute."""
-    found = {"femgear": __version__, "python": platform.python_version()}
-    return found | {name: _version(name) for name in _LIBRARIES}
+    versions_of = {"femgear": __version__, "python": platform.python_version()}
+    return versions_of | {name: _version(name) for name in _LIBRARIES}
 
 
 def read_manifest(folder: str | os.PathLike) -> Manifest:
@@ -637,8 +637,8 @@ def _refuse_incomplete(results: Results) -> None:
 
 def _refuse_changed(folder: Path, manifest: Manifest) -> None:
     """Refuse to replace results in which somebody has changed a file."""
-    found = [name for name in manifest.files if os.path.lexists(folder / name)]
-    changed = [name for name in found if not _is_unchanged(folder, name, manifest.files[name])]
+    present = [name for name in manifest.files if os.path.lexists(folder / name)]
+    changed = [name for name in present if not _is_unchanged(folder, name, manifest.files[name])]
     if changed:
         raise StorageError(
             f"{', '.join(changed)} changed since the run wrote {'it' if len(changed) == 1 else 'them'}",
@@ -696,9 +696,9 @@ def _movable(source: Path, folder: Path, files: Mapping[str, str], owned: Mappin
     for name in moved:
         if not _is_unchanged(source, name, files[name]):
             raise foreign(source / name)
-        place, known = folder / name, owned.get(name, files[name])
+        place, expected = folder / name, owned.get(name, files[name])
         led_away = place.parent.resolve() != folder.resolve() / Path(name).parent
-        if led_away or (os.path.lexists(place) and not _is_unchanged(folder, name, known)):
+        if led_away or (os.path.lexists(place) and not _is_unchanged(folder, name, expected)):
             raise foreign(place)
     return moved
 

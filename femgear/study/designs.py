@@ -86,10 +86,10 @@ class Journal(dict[str, dict]):
         if lines or not self._header.startswith(text):
             _check_header(path, lines[0] if lines else text, header)
         for place, line in enumerate(lines[1:], 2):
-            found = _unsealed(line, self._header)
+            entry = _unsealed(line, self._header)
             # numbers rise, but where lines were copied or moved
-            if _is_entry(found, fits) and found["number"] > self._number:
-                self._number, self[found["key"]] = found["number"], found["record"]
+            if _is_entry(entry, fits) and entry["number"] > self._number:
+                self._number, self[entry["key"]] = entry["number"], entry["record"]
             else:
                 bad.append(str(place))
         missing = self._number - len(lines[1:])
@@ -164,10 +164,10 @@ def _unsealed(line: bytes, header: bytes = b"") -> dict:
     if check != _check(header + text) + b'"}':
         return {}
     try:
-        found = json.loads(text + b"}")
+        entry = json.loads(text + b"}")
     except (ValueError, RecursionError):
         return {}
-    return found if isinstance(found, dict) else {}
+    return entry if isinstance(entry, dict) else {}
 
 
 def _check(text: bytes) -> bytes:
@@ -179,14 +179,14 @@ def _check_header(path: Path, line: bytes, header: dict) -> None:
     """Refuse the journal whose first line is another one."""
     if line + b"\n" == _sealed(header):
         return
-    found = _unsealed(line)
+    entry = _unsealed(line)
     for name, expected in header.items():
-        if found and found.get(name) != expected:
+        if entry and entry.get(name) != expected:
             raise StorageError(
                 f"the journal was written {_WRITTEN[name]}",
                 code="E-JOURNAL",
                 file=str(path),
-                value=found.get(name),
+                value=entry.get(name),
                 limit=str(expected),
                 remedy="name a new place, or move this file away",
             )
@@ -312,15 +312,15 @@ class Designs:
         if self._lacks(key, ask):
             self._store(key, self.record(ask, (point, self._known(key))), 1)
         # what was known before it failed still holds
-        found = self._known(key)
-        if any(quantity.name not in found for quantity in quantities):
+        values = self._known(key)
+        if any(quantity.name not in values for quantity in quantities):
             raise Failure(self.journal[key]["error"])
-        return {q.name: found[q.name] for q in quantities}
+        return {q.name: values[q.name] for q in quantities}
 
     def doubts(self, point: Point, quantities: Sequence[StudyQuantity]) -> dict[str, list[str]]:
         """Codes of the doubts and faults that concern quantities at a point that was computed, by name."""
-        known = self.journal.get(json.dumps(point), {}).get("doubts", {})
-        return {quantity.name: known.get(quantity.name, []) for quantity in quantities}
+        doubts = self.journal.get(json.dumps(point), {}).get("doubts", {})
+        return {quantity.name: doubts.get(quantity.name, []) for quantity in quantities}
 
     def findings(self, quantities: Sequence[StudyQuantity], point: Point) -> tuple[Finding, ...]:
         """List the doubts and faults of a design that can be computed, each once.
@@ -328,12 +328,12 @@ class Designs:
         Those that concern the quantities, and those of the contact and of the stresses that they come from.
         """
         answer, stages = self.answer(point), {quantity.stage for quantity in quantities}
-        found = [one for quantity in quantities for one in quantity.findings(answer)]
+        findings = [finding for quantity in quantities for finding in quantity.findings(answer)]
         if stages - {"gears"}:
-            found += answer.static.findings
+            findings += answer.static.findings
         if "stress" in stages:
-            found += answer.stress.findings
-        return once(one for one in found if one.severity != NOTE)
+            findings += answer.stress.findings
+        return once(finding for finding in findings if finding.severity != NOTE)
 
     def ahead(
         self, points: Iterable[Point], quantities: Sequence[StudyQuantity], limits: Sequence[Limit] = ()
@@ -355,18 +355,18 @@ class Designs:
 
     def record(self, ask: Callable[[_Values], None], task: tuple[Point, Mapping[str, float]]) -> dict:
         """Record of a point of which some values are known, with what is asked or the reason why not."""
-        (point, known), start = task, time.perf_counter()
-        found, doubts = dict(known), dict[str, list[str]]()
+        (point, known_values), start = task, time.perf_counter()
+        numbers, doubts = dict(known_values), dict[str, list[str]]()
 
         def values(quantities: Sequence[StudyQuantity]) -> dict[str, float]:
-            missing = [quantity for quantity in quantities if quantity.name not in found]
+            missing = [quantity for quantity in quantities if quantity.name not in numbers]
             for quantity in sorted(missing, key=lambda q: STAGES.index(q.stage)):
-                found[quantity.name] = float(_finite(quantity, quantity.compute(self.answer(point))))
+                numbers[quantity.name] = float(_finite(quantity, quantity.compute(self.answer(point))))
             for quantity in quantities if self.telling else ():
                 doubts[quantity.name] = quantity.doubts(self.answer(point))
-            return found
+            return numbers
 
-        record: dict = {"values": found}
+        record: dict = {"values": numbers}
         try:
             ask(values)
         except StorageError:
@@ -383,13 +383,13 @@ class Designs:
 
     def _lacks(self, key: str, ask: Callable[[_Values], None]) -> bool:
         """Tell whether a point that has not failed lacks what is asked."""
-        known, record = self._known(key), self.journal.get(key, {})
+        numbers, record = self._known(key), self.journal.get(key, {})
         doubts = record.get("doubts", {})
 
         def values(quantities: Sequence[StudyQuantity]) -> dict[str, float]:
             if self.telling and not all(quantity.name in doubts for quantity in quantities):
                 raise KeyError
-            return {quantity.name: known[quantity.name] for quantity in quantities}
+            return {quantity.name: numbers[quantity.name] for quantity in quantities}
 
         try:
             ask(values)
@@ -429,8 +429,8 @@ def _violation(limits: Sequence[Limit], values: _Values) -> float:
     """Sum the relative violations of limits of the first stage that breaks any."""
     for stage in STAGES:
         here = [limit for limit in limits if limit.quantity.stage == stage]
-        found = values([limit.quantity for limit in here]) if here else {}
-        if total := sum(limit.violation(found[limit.quantity.name]) for limit in here):
+        values_of = values([limit.quantity for limit in here]) if here else {}
+        if total := sum(limit.violation(values_of[limit.quantity.name]) for limit in here):
             return total
     return 0.0
 
@@ -503,9 +503,9 @@ class Evaluations:
 
     def towards(self, objective: StudyQuantity) -> Evaluations:
         """Give the same designs, counted together, another objective."""
-        found = Evaluations(replace(self.problem, objective=objective), self.designs, max_designs=self._most)
-        found._asked = self._asked
-        return found
+        alike = Evaluations(replace(self.problem, objective=objective), self.designs, max_designs=self._most)
+        alike._asked = self._asked
+        return alike
 
     @property
     def asked(self) -> int:
@@ -533,12 +533,12 @@ class Evaluations:
         """
         new = self.count(x)
         objective, scale = self.problem.objective, self.scale(self.problem.objective)
-        found = self.penalised(x, lambda: self.values(x, [objective])[objective.name] / scale)
+        cost = self.penalised(x, lambda: self.values(x, [objective])[objective.name] / scale)
         if new:
-            self.course.append(found * scale if found < OUTSIDE else math.nan)
-        if found < self.best[1]:
-            self.best = np.array(x, float), found
-        return found
+            self.course.append(cost * scale if cost < OUTSIDE else math.nan)
+        if cost < self.best[1]:
+            self.best = np.array(x, float), cost
+        return cost
 
     def ahead(self, places: Iterable[Vector], also: Sequence[StudyQuantity] = ()) -> None:
         """Compute at once what `cost` will ask of many points, and further quantities."""
@@ -618,19 +618,19 @@ def tolerances(
     first quantity says which side of a variable is the worse one; the last result holds the quantities [SI]
     by name with all variables off to their worse sides, NaN where they have none.
     """
-    x, found, problem = np.array(x, float), [], evaluations.problem
+    x, spread, problem = np.array(x, float), [], evaluations.problem
     worse = x.copy()
     widths = [variable.tolerance_at(float(value)) for variable, value in zip(problem.variables, x)]
     places = x + np.array([sign * row for row in np.diag(widths) for sign in (-1.0, 1.0)])
     deque(evaluations.designs.ahead(map(problem.point, places), quantities), 0)
     for i, (variable, tolerance) in enumerate(zip(problem.variables, widths)):
         sides = [_values(evaluations, off, quantities) for off in places[2 * i : 2 * i + 2]]
-        found.append(Tolerance(variable, tolerance, *sides))
+        spread.append(Tolerance(variable, tolerance, *sides))
         objective = [side[quantities[0].name] for side in sides]
         # a side that cannot be computed is no place to go
         if np.isfinite(objective).any():
             worse[i] += (-tolerance, tolerance)[int(np.nanargmax(objective))]
-    return tuple(found), _values(evaluations, worse, quantities)
+    return tuple(spread), _values(evaluations, worse, quantities)
 
 
 def _values(evaluations: Evaluations, x, quantities) -> dict[str, float]:

@@ -149,12 +149,12 @@ def pareto_front(
         best = non_dominated(values)
         order = best[np.argsort(values[best, 0], kind="stable")]
         rest, designs = np.setdiff1d(np.arange(len(values)), best), run.designs
-        asked = map(problem.point, x[order] if options.telling else ())
-        doubts = dict(designs.runner.map(partial(designs.findings, both), asked))
+        points_asked = map(problem.point, x[order] if options.telling else ())
+        doubts = dict(designs.runner.map(partial(designs.findings, both), points_asked))
         for outcome in doubts.values():
             if isinstance(outcome, FemgearError):
                 raise outcome
-        found = ParetoFront(
+        front = ParetoFront(
             problem=problem,
             second=second,
             x=x[order],
@@ -166,14 +166,14 @@ def pareto_front(
             failures=len(designs.failures),
             complete=complete,
         )
-    _tell_of(found)
-    return found
+    _tell_of(front)
+    return front
 
 
 def _tell_of(front: ParetoFront) -> None:
     """Tell each code of the findings of a front once, with how many of its designs have it."""
-    codes = [{one.code: one for one in findings} for findings in front.findings]
-    for code, finding in {code: one for design in codes for code, one in design.items()}.items():
+    codes = [{told_finding.code: told_finding for told_finding in findings} for findings in front.findings]
+    for code, finding in {code: value for design in codes for code, value in design.items()}.items():
         count = sum(code in design for design in codes)
         tell(replace(finding, text=f"{count} of {len(codes)} designs of the front, such as: {finding.text}"))
 
@@ -196,8 +196,8 @@ def _search(run: Evaluations, second: StudyQuantity, points: int, places) -> Non
     for x in places:
         run.cost(x)
         run.penalised(x, lambda x=x: sum(run.values(x, both).values()))
-    for own in (run, run.towards(second)):
-        end = _end(run, own)
+    for of_objective in (run, run.towards(second)):
+        end = _end(run, of_objective)
         if end is not None:
             run.penalised(end, lambda x=end: sum(run.values(x, both).values()))
     _, values = _known(run, both)
@@ -206,8 +206,8 @@ def _search(run: Evaluations, second: StudyQuantity, points: int, places) -> Non
     low, high = values.min(axis=0), values[non_dominated(values)].max(axis=0)
     span = np.where(high > low, high - low, 1.0)
 
-    def distance(found: np.ndarray, weight: float) -> np.ndarray:
-        scaled = (found - low) / span
+    def distance(place: np.ndarray, weight: float) -> np.ndarray:
+        scaled = (place - low) / span
         return (np.array([weight, 1.0 - weight]) * scaled).max(axis=-1) + _SMALL * scaled.sum(axis=-1)
 
     for weight in np.linspace(0.0, 1.0, points)[1:-1]:
@@ -220,17 +220,17 @@ def _search(run: Evaluations, second: StudyQuantity, points: int, places) -> Non
         polish(run, cost, x[distance(values, float(weight)).argmin()], size=0.1, rounds=1)
 
 
-def _end(run: Evaluations, own: Evaluations) -> np.ndarray | None:
-    """Minimum of the objective of ``own`` alone, from the best design known."""
-    x, values = _known(run, (own.problem.objective,))
+def _end(run: Evaluations, of_objective: Evaluations) -> np.ndarray | None:
+    """Minimum of the objective of ``of_objective`` alone, from the best design known."""
+    x, values = _known(run, (of_objective.problem.objective,))
     if not len(x):
         return None
     start = x[values[:, 0].argmin()]
-    if has_derivatives(own.problem):
-        descend(own, start)
+    if has_derivatives(of_objective.problem):
+        descend(of_objective, start)
     else:
-        polish(own, own.cost, start, size=0.1)
-    return own.best[0] if np.isfinite(own.best[1]) else start
+        polish(of_objective, of_objective.cost, start, size=0.1)
+    return of_objective.best[0] if np.isfinite(of_objective.best[1]) else start
 
 
 def _known(run: Evaluations, quantities) -> tuple[np.ndarray, np.ndarray]:
@@ -241,8 +241,8 @@ def _known(run: Evaluations, quantities) -> tuple[np.ndarray, np.ndarray]:
     problem, points, values = run.problem, [], []
     low, high = problem.bounds.T
     for point in run.asked_points:
-        known = (run.designs.journal.get(json.dumps(point)) or {}).get("values", {})
-        if any(q.name not in known for q in quantities):
+        values_known = (run.designs.journal.get(json.dumps(point)) or {}).get("values", {})
+        if any(q.name not in values_known for q in quantities):
             continue
         x = numbers(problem, point)
         try:
@@ -251,5 +251,5 @@ def _known(run: Evaluations, quantities) -> tuple[np.ndarray, np.ndarray]:
             continue
         if inside:
             points.append(x)
-            values.append([known[q.name] for q in quantities])
+            values.append([values_known[q.name] for q in quantities])
     return np.array(points).reshape(-1, len(low)), np.array(values).reshape(-1, len(quantities))

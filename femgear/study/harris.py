@@ -82,7 +82,7 @@ def harris_into(
         progress("compliance", 1, 1)
         power = POWERS[request.shape]
         relief: dict[str, Any] = {"length": request.length, "power": power, "back": loads_back(on_sun)}
-        found = harris_map(
+        harris = harris_map(
             basis,
             torques=on_sun,
             deviations=[with_tip_relief(basis.deviations, basis.gears, amount=a, **relief) for a in amounts],
@@ -92,11 +92,11 @@ def harris_into(
         )
         kinds = tuple(dict.fromkeys(map(family, basis.gears.mesh_names)))
         columns = [f"{kind} STE peak to peak [m]" for kind in (*kinds, "sun-ring")[: 2 * len(kinds) - 1]]
-        write_csv(folder / _TABLE, ("relief [m]", "torque [N m]", *columns), _records(amounts, inputs, found))
+        write_csv(folder / _TABLE, ("relief [m]", "torque [N m]", *columns), _records(amounts, inputs, harris))
         names = [f"relief {1e6 * amount:g} µm" for amount in amounts]
-        curves = harris_curves(inputs, found.peak_to_peak, names, design=case.operation.torque, kinds=kinds)
+        curves = harris_curves(inputs, harris.peak_to_peak, names, design=case.operation.torque, kinds=kinds)
         save_figure(curves, folder / _FIGURE)
-    return [_described(amounts, inputs, found, kinds[0])], [_TABLE, _FIGURE, _JOURNAL]
+    return [_described(amounts, inputs, harris, kinds[0])], [_TABLE, _FIGURE, _JOURNAL]
 
 
 def checked_amount(text: str, option: str, module: float, *, least: float = 0.0) -> float:
@@ -154,21 +154,21 @@ def _checked(case: Case, request: HarrisRequest) -> tuple[Case, list[float], np.
     return case, amounts, inputs, np.array([sun_torque(case, gears, float(value)) for value in inputs])
 
 
-def _records(amounts: Sequence[float], inputs: np.ndarray, found: HarrisMap) -> Iterator[tuple[float, ...]]:
+def _records(amounts: Sequence[float], inputs: np.ndarray, harris: HarrisMap) -> Iterator[tuple[float, ...]]:
     """Rows of the table in SI units; of a pair alone without the error over both kinds of mesh."""
-    several = found.peak_to_peak.shape[1] > 1
+    several = harris.peak_to_peak.shape[1] > 1
     for v, amount in enumerate(amounts):
         for t, torque in enumerate(inputs):
-            overall = [float(found.overall[v, t])] if several else []
-            yield float(amount), float(torque), *map(float, found.peak_to_peak[v, :, t]), *overall
+            overall = [float(harris.overall[v, t])] if several else []
+            yield float(amount), float(torque), *map(float, harris.peak_to_peak[v, :, t]), *overall
 
 
-def _described(amounts: Sequence[float], inputs: np.ndarray, found: HarrisMap, kind: str) -> Block:
+def _described(amounts: Sequence[float], inputs: np.ndarray, harris: HarrisMap, kind: str) -> Block:
     """Tabulate where every relief has its least transmission error; of one torque, that under it."""
     title = f"Transmission error of the {kind} meshes, peak to peak"
-    curves = found.peak_to_peak[:, 0] * 1e6
+    curves = harris.peak_to_peak[:, 0] * 1e6
     names, first = [f"{1e6 * amount:g}" for amount in amounts], f"at {inputs[0]:g} N m"
-    note = (f"largest residual of all contact problems: {found.residual:.1e}",)
+    note = (f"largest residual of all contact problems: {harris.residual:.1e}",)
     if len(inputs) == 1:  # no torque is the best of one
         rows = tuple((name, f"{curve[0]:.3f}") for name, curve in zip(names, curves, strict=True))
         return Block(title, ("relief [um]", f"STE p-p {first} [um]"), rows, note)

@@ -95,28 +95,28 @@ def _no_findings(answer: Answer) -> Iterable[Finding]:
 
 def _of_static(codes: tuple[str, ...], torque: float | None, answer: Answer) -> Iterator[Finding]:
     """Findings of some codes of the static solution."""
-    return (one for one in under_torque(answer, torque).static.findings if one.code in codes)
+    return (finding for finding in under_torque(answer, torque).static.findings if finding.code in codes)
 
 
 def _of_stresses(answer: Answer) -> Iterator[Finding]:
     """Findings of stresses at kinks."""
-    return (one for one in (*answer.static.findings, *answer.stress.findings) if one.code == "W-KINK")
+    return (finding for finding in (*answer.static.findings, *answer.stress.findings) if finding.code == "W-KINK")
 
 
 def _of_response(at: Range, answer: Answer) -> Iterator[Finding]:
     """Findings of the response over speeds, and of its damping."""
     there = answer.of(at_speeds(answer.case, at))
-    yield from (one for one in case_warnings(there.case) if one.code == "W-DAMPING")
+    yield from (warning for warning in case_warnings(there.case) if warning.code == "W-DAMPING")
     yield from elastic_stages.findings_of_response(there.case, there.modes, response_at(answer, at))
 
 
 def _of_level(at: Range, answer: Answer) -> Iterator[Finding]:
     """Findings of the level of the housing over speeds, and of its damping."""
     there = answer.of(at_speeds(answer.case, at))
-    yield from (one for one in case_warnings(there.case) if one.code == "W-DAMPING")
+    yield from (warning for warning in case_warnings(there.case) if warning.code == "W-DAMPING")
     dynamics = there.dynamics
-    known = dynamics.level_change, dynamics.excitation_limit, dynamics.compared_to
-    yield from response_findings(there.case, dynamics.response, *known)
+    limits = dynamics.level_change, dynamics.excitation_limit, dynamics.compared_to
+    yield from response_findings(there.case, dynamics.response, *limits)
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class StudyQuantity:
 
     def doubts(self, answer: Answer) -> list[str]:
         """Codes of the doubts and faults that concern the number, each once."""
-        return list(dict.fromkeys(one.code for one in self.findings(answer) if one.severity != NOTE))
+        return list(dict.fromkeys(finding.code for finding in self.findings(answer) if finding.severity != NOTE))
 
     def show(self, value: float) -> str:
         """Write an SI value in the unit of tables."""
@@ -264,16 +264,16 @@ def natural_frequency(mode: int) -> StudyQuantity:
 
 
 def _frequency(mode: int, answer: Answer) -> float:
-    found = answer.modes.modes.frequency
-    if mode > len(found):
+    frequencies = answer.modes.modes.frequency
+    if mode > len(frequencies):
         raise CaseError(
-            f"the modal basis ends before this mode, with number {len(found)} at {found[-1]:.5g} Hz",
+            f"the modal basis ends before this mode, with number {len(frequencies)} at {frequencies[-1]:.5g} Hz",
             code="E-MODES",
             key="mode",
             value=mode,
-            limit=f"1 to {len(found)}",
+            limit=f"1 to {len(frequencies)}",
         )
-    return float(found[mode - 1])
+    return float(frequencies[mode - 1])
 
 
 def contact_ratio(mesh: _MeshKind) -> StudyQuantity:
@@ -300,8 +300,8 @@ def tip_thickness(gear: _GearName) -> StudyQuantity:
 
 
 def _tip_thickness(name: str, answer: Answer) -> float:
-    found = getattr(planetary_set(answer.case), name)
-    return float(tooth_thickness(found, found.tip_radius)) / found.module
+    gear = getattr(planetary_set(answer.case), name)
+    return float(tooth_thickness(gear, gear.tip_radius)) / gear.module
 
 
 def contact_pressure() -> StudyQuantity:

@@ -163,15 +163,15 @@ def optimise_into(
     counts = SearchOptions(seed=effort.seed, samples=effort.samples, max_designs=effort.max_designs)
     options = {"options": counts, "cache": cache, "runner": runner}
     with resumable(folder):
-        rough, found = _searched(data, problem, effort.method, folder, options, progress)
-        tell(_write(found, data, folder, rough))
+        rough, best = _searched(data, problem, effort.method, folder, options, progress)
+        tell(_write(best, data, folder, rough))
         if second is not None:
             coarsely = options | {"journal": folder / _JOURNALS[0], "start": rough.x, "progress": progress}
             front = pareto_front(problem, second, **coarsely)
             tell([_write_front(front, problem, second, folder)])
         if effort.check:
             speeds = None if data.rigid else request.speeds
-            tell([_check(found, data, folder, speeds, rough, run)])
+            tell([_check(best, data, folder, speeds, rough, run)])
     return [*names, *_JOURNALS, *runs]
 
 
@@ -288,9 +288,9 @@ def _searched(
     quiet = options | {"options": replace(options["options"], telling=False), "journal": folder / _JOURNALS[0]}
     rough = minimise(problem, method=method, sensitivity=False, progress=progress, **quiet)
     progress("refinement", 0, 1)
-    found = _refined(rough, with_values(data, _QUIET), folder, options, method)
+    best = _refined(rough, with_values(data, _QUIET), folder, options, method)
     progress("refinement", 1, 1)
-    return rough, found
+    return rough, best
 
 
 def _refined(rough: Optimum, case: Case, folder: Path, options: dict[str, Any], method: Method) -> Optimum:
@@ -304,62 +304,67 @@ def _refined(rough: Optimum, case: Case, folder: Path, options: dict[str, Any], 
     return minimise(problem, method=local, start=rough.x, **options)
 
 
-def _write(found: Optimum, data: Case, folder: Path, rough: Optimum) -> list[Block]:
+def _write(best_found: Optimum, data: Case, folder: Path, rough: Optimum) -> list[Block]:
     """Write the files of the search, and tabulate it."""
-    best, name, dimension = found.values, found.problem.objective.name, found.problem.objective.dimension
+    best, name, dimension = best_found.values, best_found.problem.objective.name, best_found.problem.objective.dimension
     write_text(to_toml(with_values(data, best)), folder / _FILES[0])
-    si = [(q.name, q.dimension.si, found.before[q.name], found.after[q.name]) for q in found.problem.reported]
+    si = [
+        (q.name, q.dimension.si, best_found.before[q.name], best_found.after[q.name])
+        for q in best_found.problem.reported
+    ]
     write_csv(folder / _FILES[1], ("quantity", "unit", "before", "optimum"), si)
-    off = [[t.less[name], t.more[name]] for t in found.tolerances]
+    off = [[t.less[name], t.more[name]] for t in best_found.tolerances]
     less, more = (np.array(off).T / dimension.scale).reshape(2, -1)
-    units = [str(t.variable.unit).replace("um", "µm") for t in found.tolerances]
-    labels = [f"{t.variable.name}\n± {t.tolerance:.4g} {unit}" for t, unit in zip(found.tolerances, units, strict=True)]
-    value, shown = found.after[name] / dimension.scale, dimension.shown.replace("um", "µm")
+    units = [str(t.variable.unit).replace("um", "µm") for t in best_found.tolerances]
+    labels = [
+        f"{t.variable.name}\n± {t.tolerance:.4g} {unit}" for t, unit in zip(best_found.tolerances, units, strict=True)
+    ]
+    value, shown = best_found.after[name] / dimension.scale, dimension.shown.replace("um", "µm")
     bars = tolerance_bars(labels, less, more, value, quantity=name, unit=shown)
     save_figure(bars, folder / _FILES[2])
     blocks = [
-        Block("At the positions and on the grid of the case", _COLUMNS, tuple(comparison_rows(found))),
+        Block("At the positions and on the grid of the case", _COLUMNS, tuple(comparison_rows(best_found))),
         Block("Optimum", ("entry", "value"), tuple((key, str(value)) for key, value in best.items())),
     ]
-    if found.tolerances:
+    if best_found.tolerances:
         header = ("variable", "off by", "less", "more")
-        blocks.append(Block(f"{name} with tolerances", header, tuple(tolerance_rows(found))))
-    notes = [f"at a bound: {variable}" for variable in found.at_bounds]
-    ended = f"search: {search_verdict(rough)}", f"refinement: {search_verdict(found)}"
+        blocks.append(Block(f"{name} with tolerances", header, tuple(tolerance_rows(best_found))))
+    notes = [f"at a bound: {variable}" for variable in best_found.at_bounds]
+    ended = f"search: {search_verdict(rough)}", f"refinement: {search_verdict(best_found)}"
     return [*blocks, Block("How it was found", notes=(*notes, *ended))]
 
 
-def _write_front(found: ParetoFront, problem: Problem, second: StudyQuantity, folder: Path) -> Block:
+def _write_front(front: ParetoFront, problem: Problem, second: StudyQuantity, folder: Path) -> Block:
     """Write the files of a Pareto front, and tell its ends and its compromise."""
     both = (problem.objective, second)
     scale = np.array([q.dimension.scale for q in both])
     titles = [f"{q.name} [{q.dimension.shown}]".replace("um]", "µm]") for q in both]
     figure = front_figure(
-        found.values / scale,
-        found.dominated / scale,
-        found.before / scale,
+        front.values / scale,
+        front.dominated / scale,
+        front.before / scale,
         names=titles,
-        compromise=found.compromise,
+        compromise=front.compromise,
     )
     save_figure(figure, folder / _FRONT[1])
     header = [f"{v.name} [{v.unit or 1}]" for v in problem.variables]
     header += [*(f"{q.name} [{q.dimension.si}]" for q in both), "findings"]
-    codes = [", ".join(dict.fromkeys(one.code for one in findings)) for findings in found.findings]
-    rows = np.hstack([found.x, found.values]).tolist()
+    codes = [", ".join(dict.fromkeys(finding.code for finding in findings)) for findings in front.findings]
+    rows = np.hstack([front.x, front.values]).tolist()
     write_csv(folder / _FRONT[0], header, [[*row, code] for row, code in zip(rows, codes, strict=True)])
-    ends = found.values[0], found.values[found.compromise], found.values[-1]
+    ends = front.values[0], front.values[front.compromise], front.values[-1]
     rows = [tuple(q.show(value) for q, value in zip(both, end, strict=True)) for end in ends]
-    title = f"Pareto front, {len(found.values)} designs of {found.designs}: ends and compromise"
+    title = f"Pareto front, {len(front.values)} designs of {front.designs}: ends and compromise"
     return Block(title, tuple(q.name for q in both), tuple(rows))
 
 
-def _check(found: Optimum, data: Case, folder: Path, speeds: Any, rough: Optimum, run: Run) -> Block:
+def _check(best_found: Optimum, data: Case, folder: Path, speeds: Any, rough: Optimum, run: Run) -> Block:
     """Run case and optimum anew on a finer grid, and read both back from their files."""
     fine: dict[str, Any] = _FINE | _QUIET
     if speeds is not None:
         fine["operation.speeds"] = {"from": speeds[0], "to": speeds[1], "count": 126}
     only = "static" if speeds is None else "housing"
-    cases = (with_values(data, values | fine) for values in ({}, found.values))
+    cases = (with_values(data, values | fine) for values in ({}, best_found.values))
     runs = [run(case, folder / name, only) for name, case in zip(_RUNS, cases, strict=True)]
     numbers = [_numbers(results, only) for results in runs]
     rows = [(name, before, numbers[1][name][0], unit) for name, (before, unit) in numbers[0].items()]
@@ -382,17 +387,17 @@ def _check(found: Optimum, data: Case, folder: Path, speeds: Any, rough: Optimum
 def _numbers(results: Any, only: str) -> dict[str, tuple[float, str]]:
     """Largest values of a run by name, with their units."""
     static = results.static
-    found = {"STE peak to peak, overall": (1e6 * static["ste_overall_peak_to_peak"].values.max(), "um")}
+    numbers = {"STE peak to peak, overall": (1e6 * static["ste_overall_peak_to_peak"].values.max(), "um")}
     for kind in ("sun-planet", "planet-ring"):
         rows = ["ring" in name if kind == "planet-ring" else "sun" in name for name in static["mesh"].values]
-        found[f"STE peak to peak, {kind}"] = (1e6 * static["ste_peak_to_peak"].values[rows].max(), "um")
+        numbers[f"STE peak to peak, {kind}"] = (1e6 * static["ste_peak_to_peak"].values[rows].max(), "um")
     if only == "housing":
         dynamics = results.dynamics
-        found["dynamic mesh force"] = (_forces(dynamics).max(), "N")
-        found["peak mesh force"] = (_forces(dynamics, dynamic=False).max(), "N")
+        numbers["dynamic mesh force"] = (_forces(dynamics).max(), "N")
+        numbers["peak mesh force"] = (_forces(dynamics, dynamic=False).max(), "N")
         lines = stored_lines(results.housing, form="exact")
-        found["housing level"] = (np.abs(lines.acceleration).max(), "m/s^2")
-    return found
+        numbers["housing level"] = (np.abs(lines.acceleration).max(), "m/s^2")
+    return numbers
 
 
 def _forces(dynamics: xr.Dataset, *, dynamic: bool = True) -> np.ndarray:

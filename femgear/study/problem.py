@@ -203,12 +203,12 @@ def _current(case: Case, variable: Variable) -> float | None:
 
 def start_point(case: Case, variables: Sequence[Variable]) -> np.ndarray:
     """Find the values (n,) of the case, within the bounds; the middle for entries that it leaves out."""
-    found = []
+    start = []
     for variable in variables:
         low, high = variable.bounds
         value = _current(case, variable)
-        found.append(0.5 * (low + high) if value is None else min(max(value, low), high))
-    return np.array(found)
+        start.append(0.5 * (low + high) if value is None else min(max(value, low), high))
+    return np.array(start)
 
 
 def _check_variables(case: Case, variables: Sequence[Variable]) -> None:

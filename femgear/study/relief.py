@@ -230,14 +230,14 @@ def with_tip_relief(
     back : bool
         The flanks of the planets that touch the sun under a negative torque.
     """
-    found = no_deviations(planetary_set) if deviations is None else deviations
+    deviations_given = no_deviations(planetary_set) if deviations is None else deviations
     if amount == 0:
-        return found
+        return deviations_given
     sun, planet = relief_starts(planetary_set, length=length)
     side = "planet_ring_side" if back else "planet_sun_side"
     new = {"sun": TipRelief(amount, sun, power=power), side: TipRelief(amount, planet, power=power)}
-    forms = {n: FlankForm((*getattr(found, n).modifications, relief)) for n, relief in new.items()}
-    return replace(found, **forms)
+    forms = {n: FlankForm((*getattr(deviations_given, n).modifications, relief)) for n, relief in new.items()}
+    return replace(deviations_given, **forms)
 
 
 @dataclass(frozen=True, eq=False)
@@ -396,9 +396,9 @@ def relief_grid(
     ]
     names = [relief_name(0.0, 1.0, power), *(relief_name(*place, power) for place in places)]
     kept = {"progress": progress, "journal": journal, "names": names}
-    found = harris_map(basis, torques=torques, deviations=variants, **kept).peak_to_peak[:, 0]
-    peaks = found[1:].T.reshape(len(torques), len(amounts), len(lengths))
-    return ReliefGrid(amounts, lengths, torques, peaks, found[0])
+    all_peaks = harris_map(basis, torques=torques, deviations=variants, **kept).peak_to_peak[:, 0]
+    peaks = all_peaks[1:].T.reshape(len(torques), len(amounts), len(lengths))
+    return ReliefGrid(amounts, lengths, torques, peaks, all_peaks[0])
 
 
 def loads_back(torques: np.ndarray) -> bool:
@@ -483,24 +483,24 @@ def optimise_relief(
         As for `harris_map`.
     """
     t = int(np.abs(grid.torques - torque).argmin())
-    known: dict[tuple[float, float], float] = {}
+    peak_of: dict[tuple[float, float], float] = {}
 
     def peak(point) -> float:
         place = float(point[0]), float(point[1])
-        if place not in known:
+        if place not in peak_of:
             relief = {"amount": place[0] * 1e-6, "length": place[1], "power": power, "back": torque < 0}
             variant = with_tip_relief(basis.deviations, basis.gears, **relief)
             names = [relief_name(relief["amount"], relief["length"], power)]
-            found = harris_map(basis, torques=[torque], deviations=[variant], journal=journal, names=names)
-            known[place] = float(found.peak_to_peak[0, 0, 0]) * 1e6
-        return known[place]
+            there = harris_map(basis, torques=[torque], deviations=[variant], journal=journal, names=names)
+            peak_of[place] = float(there.peak_to_peak[0, 0, 0]) * 1e6
+        return peak_of[place]
 
     unit = two_pair_length(basis.gears)
     step = np.array([AMOUNT_STEP * 1e6, LENGTH_STEP / unit])
     (first, *others), bounds, sizes = _frame(grid, t)
 
     def left() -> int:
-        return max_evaluations - len(known)
+        return max_evaluations - len(peak_of)
 
     ends = [_descend(peak, first, bounds, sizes, step, left)]
     ends += [_descend(peak, start, bounds, sizes, step, left) for start in others if left() > 0]
@@ -512,7 +512,7 @@ def optimise_relief(
         length=float(point[1]),
         peak_to_peak=value * 1e-6,
         unmodified=float(grid.unmodified[t]),
-        evaluations=len(known),
+        evaluations=len(peak_of),
         amount_slopes=slopes[0],
         length_slopes=(slopes[1][0] * 1e-6 / unit, slopes[1][1] * 1e-6 / unit),
         minimum=min(around.values()) >= value - _SMALLEST_GAIN,
@@ -543,17 +543,17 @@ def _descend(peak: Callable, start, bounds, sizes, step, left: Callable[[], int]
         size = np.minimum(size, 0.5 * (bounds[1] - bounds[0]))
         inwards = np.where(point + size > bounds[1], -size, size)
         simplex = point + np.vstack([np.zeros(2), np.diag(inwards)])
-        found = minimize(
+        ended = minimize(
             peak,
             point,
             method="Nelder-Mead",
             bounds=list(zip(*bounds)),
             options={"initial_simplex": simplex, "maxfev": max(left(), 3), "xatol": 0.01, "fatol": 1e-3},
         )
-        around = {place: peak(place) for place in _neighbours(found.x, bounds, step)}
+        around = {place: peak(place) for place in _neighbours(ended.x, bounds, step)}
         best = min(around, key=around.__getitem__)
-        if around[best] >= found.fun - _SMALLEST_GAIN or left() <= 0:
-            return found.x, float(found.fun), around
+        if around[best] >= ended.fun - _SMALLEST_GAIN or left() <= 0:
+            return ended.x, float(ended.fun), around
         point, size = np.array(best), 2.0 * step
 
 
@@ -570,10 +570,10 @@ def _neighbours(point, bounds, step):
 def _slopes(point, value: float, around) -> tuple[tuple[float, float], tuple[float, float]]:
     """Rises per unit of the first and of the second parameter, (less, more) each; NaN without a neighbour."""
     rises = [[np.nan, np.nan], [np.nan, np.nan]]
-    for place, found in around.items():
+    for place, neighbour in around.items():
         away = np.array(place) - point
         (moved,) = np.nonzero(away)
         if len(moved) == 1:
-            rises[moved[0]][int(away[moved[0]] > 0)] = float((found - value) / abs(away[moved[0]]))
+            rises[moved[0]][int(away[moved[0]] > 0)] = float((neighbour - value) / abs(away[moved[0]]))
     (a, b), (c, d) = rises
     return (a, b), (c, d)

@@ -80,9 +80,9 @@ class Runner(AbstractContextManager):
                     suspects.append((index, item))
                     continue
                 outcome, said = reply or (_deadly(), ())
-                for one in {*said} - self._told:
-                    self._told.add(one)
-                    warnings.warn_explicit(*one)
+                for warning_told in {*said} - self._told:
+                    self._told.add(warning_told)
+                    warnings.warn_explicit(*warning_told)
                 yield index, outcome
         finally:
             self._drop()
@@ -110,7 +110,10 @@ def _call(function: Callable, item: Any) -> tuple[Any, list[tuple]]:
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         value = function(item)
-    return value, [(str(one.message), one.category, one.filename, one.lineno) for one in said]
+    return value, [
+        (str(warning_told.message), warning_told.category, warning_told.filename, warning_told.lineno)
+        for warning_told in said
+    ]
 
 
 def _deadly() -> FemgearError:

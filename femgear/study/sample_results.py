@@ -222,8 +222,8 @@ class _Tasks:
         solve = partial(_every_way, self.model, self.seed)
         self._map(solve, keys, chosen.tolist(), "samples again, in every way", kept, keep)
         records = [self._journal[key] for key in keys]
-        exact = joined([{name: np.array(part) for name, part in one["exact"].items()} for one in records])
-        ways = np.array([one["ways"] for one in records])
+        exact = joined([{name: np.array(part) for name, part in record["exact"].items()} for record in records])
+        ways = np.array([record["ways"] for record in records])
         return exact, [dict(zip(SHOWN, ways[:, way].T)) for way in (0, 1)]
 
     def _map(self, function, keys: list[str], items: list, stage: str, kept, keep) -> None:
@@ -297,9 +297,9 @@ def _checks(columns: Columns, chosen: np.ndarray, exact, more: dict[str, dict]) 
         error = np.abs(_at(columns, name, chosen) - exact[name]).max() / np.abs(exact[name]).max()
         entries[f"{name}_exact"] = ("check", exact[name], unit, f"{words}, whole contact problem")
         entries[f"{name}_error"] = ("", error, "1", f"{words}: largest error of the checked samples")
-        for where, told in (("turn", "over a turn of the carrier"), ("between", "with the peaks between")):
+        for where, where_in_words in (("turn", "over a turn of the carrier"), ("between", "with the peaks between")):
             if name in more[where]:
-                entries[f"{name}_{where}"] = ("check", more[where][name], unit, f"{words}, {told}")
+                entries[f"{name}_{where}"] = ("check", more[where][name], unit, f"{words}, {where_in_words}")
     return entries
 
 
@@ -310,10 +310,10 @@ def _differences(columns: Columns, drawn: np.ndarray, exact: dict[str, np.ndarra
         _, unit, words = NUMBERS[name]
         difference = _at(columns, name, drawn) / exact[name] - 1.0
         entries[f"{name}_drawn"] = ("drawn", exact[name], unit, f"{words}, whole contact problem")
-        told = f"{words}: what springs are above the whole contact problem, over it"
-        entries[f"{name}_difference"] = ("drawn", difference, "1", told)
+        meaning = f"{words}: what springs are above the whole contact problem, over it"
+        entries[f"{name}_difference"] = ("drawn", difference, "1", meaning)
         quantiles = np.quantile(difference, QUANTILES)
-        entries[f"{name}_difference_quantile"] = ("quantile", quantiles, "1", f"{told}, quantiles")
+        entries[f"{name}_difference_quantile"] = ("quantile", quantiles, "1", f"{meaning}, quantiles")
     return entries
 
 
@@ -370,12 +370,12 @@ def figure(data: xr.Dataset, columns: Columns):
     count = data.attrs["samples"]
     # beyond so many, points of a fine grid that weigh as many samples as lie there
     share, ste, weight = (_points if count <= _DRAWN else _grid)(columns, count)
-    found, axes = new_figure(columns=3, width=12.0, height=4.2)
+    figure_, axes = new_figure(columns=3, width=12.0, height=4.2)
     names = "transmission error, peak to peak [µm]", "largest share of a planet [1]"
     # points of tens of thousands of samples would hide one another
     cells = {"gridsize": 50, "bins": "log", "mincnt": 1, "cmap": "cividis", "linewidths": 0.2}
     counts = axes[0].hexbin(share, ste, C=weight, reduce_C_function=np.sum, **cells)
-    found.colorbar(counts, ax=axes[0], label="samples in a cell", pad=0.02, format="%d").minorticks_off()
+    figure_.colorbar(counts, ax=axes[0], label="samples in a cell", pad=0.02, format="%d").minorticks_off()
     worst = int(data.attrs["worst"])
     at = columns.rows(worst, worst + 1)
     point = at["largest_share"][0], 1e6 * at["transmission_error"][0]
@@ -392,8 +392,8 @@ def figure(data: xr.Dataset, columns: Columns):
             at = float(of_all.sel(quantile=part))
             ax.axvline(at, color=VERMILION, linestyle=dash, label=f"{part:.0%} of the samples below")
         label(ax, name, "samples [%]")
-    legend_below(found, columns=4)
-    return found
+    legend_below(figure_, columns=4)
+    return figure_
 
 
 def _points(columns: Columns, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -428,10 +428,10 @@ def _described(data: xr.Dataset, ideal: dict[str, np.ndarray], limits: Iterable[
         texts = (marks(f"{scale * value:.5g}", *codes) for value in values)
         rows.append((f"{words}{shown}", f"{scale * ideal[name][0]:.5g}", *texts))
         errors.append(f"{float(data[f'{name}_error']):.1e} ({name.replace('_', ' ')})")
-        for where, told in (("turn", turns), ("between", between)):
+        for where, lines in (("turn", turns), ("between", between)):
             if (compared := data.get(f"{name}_{where}")) is not None:
                 low, high = _ratios(compared.values, data[f"{name}_exact"].values)
-                told.append(f"{low:.3g} to {high:.3g} times the {name.replace('_', ' ')}")
+                lines.append(f"{low:.3g} to {high:.3g} times the {name.replace('_', ' ')}")
         if (difference := data.get(f"{name}_difference")) is not None:
             of_drawn = [*data[f"{name}_difference_quantile"].values, np.abs(difference.values).max()]
             missed.append((words, *(f"{100.0 * value:.2g}" for value in of_drawn)))
@@ -504,10 +504,10 @@ class Columns:
     def column(self, name: str, count: int) -> np.ndarray:
         """One number of the first ``count`` samples."""
         width = self._widths[name]
-        found = np.empty((count, width) if width else count)
+        column_ = np.empty((count, width) if width else count)
         for first, rows in self.blocks(count):
-            found[first : first + _ROWS] = rows[name]
-        return found
+            column_[first : first + _ROWS] = rows[name]
+        return column_
 
     def _read(self, first: int, end: int) -> bytes:
         with storage_errors(self._path):

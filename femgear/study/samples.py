@@ -281,7 +281,7 @@ def read_tolerances(path: str | os.PathLike, module: float) -> tuple[Tolerances,
     """
     text, name = case_text.read_text(path), os.fsdecode(path)
     try:
-        found = Tolerances.model_validate(case_text.parse(text, name), context={"module": module})
+        read = Tolerances.model_validate(case_text.parse(text, name), context={"module": module})
     except ValidationError as error:
         problems = translate(error, Tolerances)
         for problem in problems:
@@ -290,7 +290,7 @@ def read_tolerances(path: str | os.PathLike, module: float) -> tuple[Tolerances,
             line = case_text.line_of(text, key) or case_text.line_of(text, key.rpartition(".")[0])
             problem.file = f"{name}:{line}" if line else name
         raise combine(problems, text, name) from None
-    return found, text
+    return read, text
 
 
 @dataclass(frozen=True, eq=False)
@@ -423,25 +423,25 @@ class SampleModel:
         """
         checked(seed, "--seed", 0, 2**32)
         generators = [np.random.default_rng([seed, first + i]) for i in range(count)]
-        found = self._by_key(np.stack([generator.random(self.size) for generator in generators]))
+        uniform = self._by_key(np.stack([generator.random(self.size) for generator in generators]))
         for key, law, _ in self.errors:
-            part = law.at(found[key])
+            part = law.at(uniform[key])
             if key.endswith("runout_amplitude"):
-                angle = 2.0 * np.pi * found[key][..., 1:]
+                angle = 2.0 * np.pi * uniform[key][..., 1:]
                 part = part[..., :1] * np.concatenate([np.cos(angle), np.sin(angle)], axis=-1)
             if key.endswith(".pitch"):
                 steps = part - part.mean(axis=-1, keepdims=True)
                 part = np.cumsum(steps, axis=-1) - steps[..., :1]
-            found[key] = part.reshape(count, -1)
-        return np.concatenate([*found.values()], axis=1)
+            uniform[key] = part.reshape(count, -1)
+        return np.concatenate([*uniform.values()], axis=1)
 
     def deviations(self, errors: np.ndarray, base: SetDeviations | None = None) -> SetDeviations:
         """Add the errors (K,) of a sample to deviations, by default those of the case."""
         gears, d = self.basis.gears, base or self.basis.deviations or no_deviations(self.basis.gears)
-        found = {key.replace(".pitch", ".cumulative_pitch"): part for key, part in self._by_key(errors).items()}
+        errors_by_key = {key.replace(".pitch", ".cumulative_pitch"): part for key, part in self._by_key(errors).items()}
 
         def of(key: str) -> np.ndarray:
-            return found.get(key, np.zeros((1, 1)))
+            return errors_by_key.get(key, np.zeros((1, 1)))
 
         def moved(name: str, *runouts: Runout) -> tuple[Runout, ...]:
             away = np.broadcast_to(of(f"{name}.runout_amplitude"), (len(runouts), 2))
@@ -502,36 +502,36 @@ class SampleModel:
         s, N = self.solved, self.solved.gears.n_planets
         sizes = {"share": share, "nearest": nearest, "positions": self.position, "contact": s.contact}
         setup = mesh_windows(s.gears, s.bodies, **sizes, deviations=s.deviations)
-        found = contact_candidates(setup, s.bodies, np.arange(len(self.position)), self.members)
-        state = solve_batch(found, self.load)
+        candidates = contact_candidates(setup, s.bodies, np.arange(len(self.position)), self.members)
+        state = solve_batch(candidates, self.load)
         curves = np.geomspace(_LEAST * self.load[N] / N, self.load[N], _FORCES)
         if s.over:
             curves = curve_forces(self.load[N], N, self.load[N])
-        laws = pair_laws(found, state, curves)
+        laws = pair_laws(candidates, state, curves)
         # where contacts end decides how soon their cells are found
         finer = np.geomspace(curves[0], curves[-1], _FINER * (len(curves) - 1) + 1)
-        touching = laws.touching if s.over else pair_laws(found, state, finer).touching
-        rolls = setup.roll[:, found.mesh, found.position[:, None], found.pair]
+        touching = laws.touching if s.over else pair_laws(candidates, state, finer).touching
+        rolls = setup.roll[:, candidates.mesh, candidates.position[:, None], candidates.pair]
         tilted = any(key.endswith("profile_slope") for key, *_ in self.errors)
         shifts, tilts, leads, unit, ideal = [], [], [], 1e-6, no_deviations(self.basis.gears)
-        for one in np.eye(self.size):
-            own = self.image(self.deviations(unit * one, ideal))
+        for unit_error in np.eye(self.size):
+            separations = self.image(self.deviations(unit * unit_error, ideal))
             where = setup.listed.tooth, setup.turns, self.position
-            shifts.append(pair_separations(s.gears, own, *where, back=False) / unit)
+            shifts.append(pair_separations(s.gears, separations, *where, back=False) / unit)
             if s.over:
-                leads.append(lead_separation(own, s.gears, s.over["slices"]) / unit)
+                leads.append(lead_separation(separations, s.gears, s.over["slices"]) / unit)
             if tilted:
-                kinds = [profile_separation(own, s.gears, kind, *rolls) / unit for kind in (0, 1)]
-                tilts.append(np.where((found.mesh < N)[:, None], *kinds))
-        overflows, listed = found.touches_window_end(state.active), setup.listed
-        of_windows = found.mesh, found.position[:, None], found.pair + listed.first[found.mesh]
+                kinds = [profile_separation(separations, s.gears, kind, *rolls) / unit for kind in (0, 1)]
+                tilts.append(np.where((candidates.mesh < N)[:, None], *kinds))
+        overflows, listed = candidates.touches_window_end(state.active), setup.listed
+        of_windows = candidates.mesh, candidates.position[:, None], candidates.pair + listed.first[candidates.mesh]
         # errors move few pairs each
         mesh, at, pair = np.nonzero(np.isfinite(listed.gap) & ~listed.near & (s.contact == "profile"))
         by_pairs = np.moveaxis(np.array(shifts), 0, -1)
         at_nodes = _sparse(np.moveaxis(np.array(tilts), 0, -1)) if tilted else None
-        over = _over_width(s, found, laws, np.moveaxis(np.array(leads), 0, -1)) if s.over else None
+        over = _over_width(s, candidates, laws, np.moveaxis(np.array(leads), 0, -1)) if s.over else None
         made = _Level(
-            found,
+            candidates,
             PairSprings(laws),
             touching,
             _sparse(by_pairs[of_windows]),
@@ -546,12 +546,12 @@ class SampleModel:
         return made
 
 
-def _over_width(s: DesignBasis, found: Candidates, laws: PairLaws, leads: np.ndarray) -> _OverWidth:
+def _over_width(s: DesignBasis, candidates: Candidates, laws: PairLaws, leads: np.ndarray) -> _OverWidth:
     """What samples of a solved set share over its width; ``leads`` (2N, S, K) are separations per error."""
     slices, waves = s.over["slices"], s.over["waves"]
     tilting = tilting_members(s.gears, s.over["width_supports"], slices)
-    lead, apart, _ = lead_separations(found, s.deviations, slices, len(found.position))
-    springs = SliceSprings(found, laws, waves, slices, tilting)
+    lead, apart, _ = lead_separations(candidates, s.deviations, slices, len(candidates.position))
+    springs = SliceSprings(candidates, laws, waves, slices, tilting)
     return _OverWidth(springs, tilting, apart, lead, _sparse(leads))
 
 
@@ -728,7 +728,7 @@ def _solved(
     Springs do not solve those whose iteration does not end, windows those whose contact they do not contain.
     Pairs overlap under so many times the approach of the flanks.
     """
-    found, N = level.found, model.solved.gears.n_planets
+    candidates, N = level.found, model.solved.gears.n_planets
     (n, P), back, by_error = (len(errors), len(model.position)), np.argsort(model.order), errors.T.copy()
     separations, tilts = _separations(model, level, by_error)
     force, motions, stiffness, ended = solve_laws(level.springs, model.load, separations, tilts)
@@ -736,7 +736,7 @@ def _solved(
     if exact:
         force, motions, stiffness, unsolved = _contacts(model, level, separations, tilts, force)
     of_mesh = force.reshape(P, 2 * N, -1, n).sum(axis=2)
-    approach = found.approach @ motions - found.supports.T @ of_mesh
+    approach = candidates.approach @ motions - candidates.supports.T @ of_mesh
     others = level.other_gap[:, None] + level.other_shifts @ by_error
     missed = (others < margin * approach[level.other_place]).any(axis=0)
     share = of_mesh[:, :N][:, back] / model.load[N]
@@ -751,9 +751,9 @@ def _numbers(position: np.ndarray, arc: np.ndarray, share: np.ndarray, stiffness
     """
     (P, N, n), weights = share.shape, mean_weights(position, 1)
     of_kinds = np.einsum("p,pkn->kn", weights, stiffness.reshape(P, 2, N, n).mean(axis=2))
-    found = np.ptp(arc, axis=0), share.max(axis=(0, 1)), *of_kinds
+    numbers = np.ptp(arc, axis=0), share.max(axis=(0, 1)), *of_kinds
     planets = share.max(axis=0).T, np.any(share <= 0.0, axis=0).T
-    return {name: np.array(values) for name, values in zip(NUMBERS, (*found, *planets), strict=True)}
+    return {name: np.array(values) for name, values in zip(NUMBERS, (*numbers, *planets), strict=True)}
 
 
 def _in_slices(model: SampleModel, level: _Level, errors: np.ndarray) -> SliceSolutions:
@@ -782,11 +782,11 @@ def _of_slices(
     Not solved are those whose iteration does not end, that windows do not hold, and whose contacts are
     points. Pairs overlap under so many times the approach of the flanks.
     """
-    over, found, N = level.over, level.found, model.solved.gears.n_planets
+    over, candidates, N = level.over, level.found, model.solved.gears.n_planets
     assert over is not None
-    width, slices, shared = found.bodies.widths[0], over.springs.slices, len(model.load)
+    width, slices, shared = candidates.bodies.widths[0], over.springs.slices, len(model.load)
     contact = (level.touching[..., None] <= state.largest[:, :, None]).sum(axis=2)
-    contact = contact * found.setup.cell[found.mesh][:, None]
+    contact = contact * candidates.setup.cell[candidates.mesh][:, None]
     lines = contacts_are_lines(state.force, width * state.length, state.at_end, contact, width / slices)
     holds = (lines & (contact <= width / slices)).all(axis=(0, 1)) & ~_overflows(level, state.largest)
     of_mesh = state.force.reshape(*state.force.shape[:1], 2 * N, -1, len(errors)).sum(axis=2)
@@ -795,7 +795,7 @@ def _of_slices(
     if over.tilting is not None:
         tilts = state.motions[:, shared:]
         closer = closer + np.einsum("jsk,pkn->pjsn", over.tilting.approach, tilts)
-    approach = found.approach @ state.motions[:, :shared] - found.supports.T @ of_mesh
+    approach = candidates.approach @ state.motions[:, :shared] - candidates.supports.T @ of_mesh
     approach = margin * (approach + closer.max(axis=-2))
     others = level.other_gap[:, None] + level.other_shifts @ errors.T
     missed = (others < approach[level.other_place]).any(axis=0)
@@ -843,17 +843,17 @@ def _contacts(model: SampleModel, level: _Level, separations: np.ndarray, tilts,
     forces, motions = np.zeros((P, W, n)), np.zeros((P, len(model.load), n))
     stiffness, overflows = np.zeros((P, 2 * N, n)), np.zeros(n, bool)
     for at in range(P):
-        found, gap = _at_position(level, at, n), separations[at].T[..., None]
+        candidates, gap = _at_position(level, at, n), separations[at].T[..., None]
         if tilts is not None:
-            gap = gap + (found.polynomials[0] @ tilts[at].transpose(2, 0, 1)[..., None])[..., 0]
-        found = replace(found, gap=np.where(found.candidate, found.gap + gap, 0.0))
+            gap = gap + (candidates.polynomials[0] @ tilts[at].transpose(2, 0, 1)[..., None])[..., 0]
+        candidates = replace(candidates, gap=np.where(candidates.candidate, candidates.gap + gap, 0.0))
         pressed = force[at].T[..., None]
         start = (pressed > 0.0) & (pressed >= level.touching[at])
-        state = solve_batch(found, model.load, start=start, refined=False)
-        check_residual(found, state)
+        state = solve_batch(candidates, model.load, start=start, refined=False)
+        check_residual(candidates, state)
         forces[at], motions[at] = state.loads.sum(axis=-1).T, state.motions.T
-        stiffness[at] = ContactTangents(found, state).of_meshes(found.smooth).T
-        ends = state.active[..., [0, -1]] & ~np.moveaxis(found.at_edge, 0, -1)
+        stiffness[at] = ContactTangents(candidates, state).of_meshes(candidates.smooth).T
+        ends = state.active[..., [0, -1]] & ~np.moveaxis(candidates.at_edge, 0, -1)
         overflows |= ends.any(axis=(1, 2))
     return forces, motions, stiffness, overflows
 
@@ -940,11 +940,11 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
     turns = np.repeat(-periods if s.gears is not model.basis.gears else periods, P)
     tau = np.tile(model.position, len(periods)) + turns
     where = setup.tooth, np.tile(setup.turns, len(periods)) + turns, tau
-    own = pair_separations(s.gears, model.image(model.deviations(errors)), *where, back=False)
+    apart = pair_separations(s.gears, model.image(model.deviations(errors)), *where, back=False)
     case = pair_separations(s.gears, s.deviations, setup.tooth, setup.turns, model.position, back=False)
-    own = np.moveaxis(own.reshape(len(own), len(periods), P, -1) - case[:, None], 1, -1)
-    found, N = level.found, s.gears.n_planets
-    separations = own[found.mesh, found.position[:, None], found.pair]
+    apart = np.moveaxis(apart.reshape(len(apart), len(periods), P, -1) - case[:, None], 1, -1)
+    candidates, N = level.found, s.gears.n_planets
+    separations = apart[candidates.mesh, candidates.position[:, None], candidates.pair]
     tilts = None
     if level.tilts is not None:
         of_nodes = (level.tilts @ errors).reshape(P, -1, 3, 1)
@@ -953,7 +953,7 @@ def over_a_turn(model: SampleModel, errors: np.ndarray) -> tuple[float, float]:
         force, motions, _, _ = solve_laws(level.springs, model.load, separations, tilts)
     else:
         over = level.over
-        leads = over.apart.swapaxes(1, 2) + (over.shifts @ errors).reshape(2 * N, -1)[found.mesh]
+        leads = over.apart.swapaxes(1, 2) + (over.shifts @ errors).reshape(2 * N, -1)[candidates.mesh]
         leads = np.repeat(leads[..., None], len(periods), axis=-1)
         state = solve_slice_springs(over.springs, model.load, separations, leads, tilts)
         force, motions = state.force, state.motions
@@ -981,16 +981,16 @@ def prepared(
     Refused is (CaseError) what `read_tolerances` and `sample_model` refuse.
     """
     need_set(case)
-    found, text = read_tolerances(tolerances, case.sun.module)
+    law, text = read_tolerances(tolerances, case.sun.module)
     checked(positions, "--positions", 8, 4096)
     # of helical teeth more than those asked for, so that slices are met alike
     basis = design_basis(with_value(case, "static.positions", positions), cache=cache, steps=steps)
     torque = sun_torque(case, basis.gears)
     if is_walked(basis):
-        model = sample_model(basis, found, sun_torque=torque, positions=basis.positions)
+        model = sample_model(basis, law, sun_torque=torque, positions=basis.positions)
         return replace(model, equidistant=positions), text
     places = sample_positions(basis, torque, positions)
-    model = sample_model(basis, found, sun_torque=torque, positions=places)
+    model = sample_model(basis, law, sun_torque=torque, positions=places)
     return replace(model, equidistant=basis.gears.equal_positions(positions)), text
 
 

@@ -240,10 +240,10 @@ def minimise(
                 converged, message = polish(run, run.cost, x0, method=method)
         except Enough:
             converged, message = False, f"ended after {most} designs"
-        found = _optimum(run, before, sensitivity, options.telling, (method, message, converged))
-    for finding in found.findings:
+        best = _optimum(run, before, sensitivity, options.telling, (method, message, converged))
+    for finding in best.findings:
         tell(finding)
-    return found
+    return best
 
 
 def _method(problem: Problem, method: Method) -> Method:
@@ -299,7 +299,7 @@ def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tupl
         run.ahead(places := [*places])
         return [cost(x) for x in places]
 
-    found = differential_evolution(
+    ended = differential_evolution(
         run.cost,
         problem.bounds,
         init=population,  # type: ignore[arg-type]  # SciPy takes arrays as well
@@ -312,7 +312,7 @@ def _evolution(run: Evaluations, x0: np.ndarray, options: SearchOptions) -> tupl
         workers=generation,  # type: ignore[arg-type]  # and a map
     )
     if integral.any():
-        return bool(found.success), str(found.message)
+        return bool(ended.success), str(ended.message)
     return polish(run, run.cost, run.best[0], size=0.05)
 
 
@@ -420,16 +420,16 @@ def polish(
         return cost(np.clip(low + width * v, low, high))
 
     if method == "powell":
-        found = minimize(scaled, u, method="Powell", bounds=unit, options={"xtol": 1e-4, "ftol": 1e-4})
-        return bool(found.success), str(found.message)
+        ended = minimize(scaled, u, method="Powell", bounds=unit, options={"xtol": 1e-4, "ftol": 1e-4})
+        return bool(ended.success), str(ended.message)
     for _ in range(rounds):
         steps = np.where(u + size > 1.0, -size, size)
         simplex = u + np.vstack([np.zeros(n), np.diag(steps)])
         options = {"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-4, "adaptive": n > 4}
         options["maxfev"] = 15 * (n + 1)
-        found = minimize(scaled, u, method="Nelder-Mead", bounds=unit, options=options)
-        u, size = found.x, 0.5 * size
-    return bool(found.success), str(found.message)
+        ended = minimize(scaled, u, method="Nelder-Mead", bounds=unit, options=options)
+        u, size = ended.x, 0.5 * size
+    return bool(ended.success), str(ended.message)
 
 
 def numbers(problem: Problem, point: Point) -> np.ndarray:
@@ -515,10 +515,10 @@ def _linear_program(value, slopes, x, low, high, radius: float) -> tuple[np.ndar
     limits = [(max(-radius, lo), min(radius, hi)) for lo, hi in zip((low - x) / width, (high - x) / width)]
     cost = np.zeros(n + 2 * K + 1)
     cost[-1] = 1.0
-    found = linprog(cost, A, b, bounds=[*limits, *[(None, None)] * (2 * K), (0, None)], method="highs")
-    if found.x is None:
+    ended = linprog(cost, A, b, bounds=[*limits, *[(None, None)] * (2 * K), (0, None)], method="highs")
+    if ended.x is None:
         return np.zeros(n), float(np.ptp(value, axis=1).max())
-    return found.x[:n] * width, float(found.fun)
+    return ended.x[:n] * width, float(ended.fun)
 
 
 def signals(evaluations: Evaluations, x: Vector) -> tuple[np.ndarray, np.ndarray]:
@@ -560,8 +560,8 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
         low, high = variable.bounds
         step = _STEP * (high - low)
         inside = min(max(float(number), low + step), high - step)
-        found = sensitivity(linear, _deviations(case, variable), inside, step=step)
-        slopes.append(signal(found.sun_arc, found.deflection, n))
+        sensitivities = sensitivity(linear, _deviations(case, variable), inside, step=step)
+        slopes.append(signal(sensitivities.sun_arc, sensitivities.deflection, n))
     if not np.isfinite(slopes).all():
         remedy = "raise operation.torque, or narrow the bounds of the variables"
         raise ContactError("a planet that carries nothing has no derivative", code="E-NO-LOAD", remedy=remedy)
@@ -578,34 +578,34 @@ def _deviations(case: Case, variable: Variable):
     return variant
 
 
-def comparison_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:
+def comparison_rows(optimum: Optimum) -> Iterator[tuple[str, str, str, str]]:
     """Write name, before, after and change of every reported quantity."""
-    for quantity in found.problem.reported:
-        before, after = found.before[quantity.name], found.after[quantity.name]
+    for quantity in optimum.problem.reported:
+        before, after = optimum.before[quantity.name], optimum.after[quantity.name]
         change = f"{after / before - 1.0:+.1%}" if before else ""
         yield quantity.name, quantity.show(before), quantity.show(after), change
 
 
-def tolerance_rows(found: Optimum) -> Iterator[tuple[str, str, str, str]]:
+def tolerance_rows(optimum: Optimum) -> Iterator[tuple[str, str, str, str]]:
     """Write variable, tolerance, and the objective with the variable lower and higher."""
-    objective = found.problem.objective
+    objective = optimum.problem.objective
 
     def show(value: float) -> str:
         return "cannot be computed" if math.isnan(value) else objective.show(value)
 
-    for one in found.tolerances:
-        sides = (show(one.less[objective.name]), show(one.more[objective.name]))
-        yield one.variable.name, f"{one.tolerance:.4g} {one.variable.unit}".strip(), *sides
-    if found.all_off:
-        worst = show(found.all_off[objective.name])
+    for tolerance in optimum.tolerances:
+        sides = (show(tolerance.less[objective.name]), show(tolerance.more[objective.name]))
+        yield tolerance.variable.name, f"{tolerance.tolerance:.4g} {tolerance.variable.unit}".strip(), *sides
+    if optimum.all_off:
+        worst = show(optimum.all_off[objective.name])
         yield "all at once, each to its worse side", "", worst, worst
 
 
-def search_verdict(found: Optimum) -> str:
+def search_verdict(optimum: Optimum) -> str:
     """Tell how the optimum was found, and what to think of it."""
-    each = f" ({found.seconds:.2g} s each)" if found.computed else ""
+    each = f" ({optimum.seconds:.2g} s each)" if optimum.computed else ""
     text = (
-        f"method {found.method}: {found.designs} designs, {found.computed} computed now{each}, "
-        f"{found.failures} cannot be computed; {found.message}"
+        f"method {optimum.method}: {optimum.designs} designs, {optimum.computed} computed now{each}, "
+        f"{optimum.failures} cannot be computed; {optimum.message}"
     )
-    return text if found.converged else f"{text}; NOT CONVERGED"
+    return text if optimum.converged else f"{text}; NOT CONVERGED"

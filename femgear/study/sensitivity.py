@@ -213,16 +213,16 @@ def _solve(solved: DesignBasis, load: float, position: np.ndarray, numbers):
         )
         answers, overflow, outside, previous = [], False, False, None
         for p in numbers:
-            found = contact_candidates(setup, bodies, [p], members)
-            problem = found.problem(0)
+            candidates = contact_candidates(setup, bodies, [p], members)
+            problem = candidates.problem(0)
             start = None if previous is None else problem.warm_start(*previous)
             state = solve_contact(problem.compliance, problem.gap, problem.G, right, start=start)
             previous = (problem, state.active)
             answers.append(_answer(problem, state, setup.gears.rotation_approach, members))
             overflow |= problem.touches_window_end(state.active, setup)
-            force = np.zeros((1, len(found.mesh)))
-            np.add.at(force[0], found.candidate[0].nonzero()[0], state.loads)
-            missed = needed_nearest(found, answers[-1]["deflection"][:, None], force)
+            force = np.zeros((1, len(candidates.mesh)))
+            np.add.at(force[0], candidates.candidate[0].nonzero()[0], state.loads)
+            missed = needed_nearest(candidates, answers[-1]["deflection"][:, None], force)
             outside |= solved.contact == "profile" and bool(missed.any())
         return (setup, answers), share * (4.0 if overflow else 1.0), nearest * (2.0 if outside else 1.0)
 
@@ -363,14 +363,14 @@ def pin_sensitivities(linear: LinearContact) -> np.ndarray:
     so these derivatives hold beside any other deviations.
     """
     ideal, N = no_deviations(linear.original), linear.original.n_planets
-    found = []
+    shares = []
     for unit in np.eye(2 * N).reshape(2 * N, N, 2):
 
         def variant(value: float, unit=unit) -> SetDeviations:
             return replace(ideal, pin_errors=value * unit)
 
-        found.append(sensitivity(linear, variant, 0.0, step=1e-6).share)
-    return np.moveaxis(np.array(found).reshape(N, 2, N, -1), 2, 0)
+        shares.append(sensitivity(linear, variant, 0.0, step=1e-6).share)
+    return np.moveaxis(np.array(shares).reshape(N, 2, N, -1), 2, 0)
 
 
 def pin_differences(basis: DesignBasis, *, sun_torque: float, position: float, step: float = 0.1e-6) -> np.ndarray:
@@ -380,10 +380,13 @@ def pin_differences(basis: DesignBasis, *, sun_torque: float, position: float, s
     way: of every kind of contact that `femgear.contact.cycle.walk_mesh_cycle` solves.
     """
     N, at = basis.gears.n_planets, np.array([position])
-    own = no_deviations(basis.gears) if basis.deviations is None else basis.deviations
-    found = []
+    given = no_deviations(basis.gears) if basis.deviations is None else basis.deviations
+    slopes = []
     for unit in np.eye(2 * N).reshape(2 * N, N, 2):
-        moved = (replace(own, pin_errors=own.pin_errors + sign * step * unit) for sign in (1, -1))
-        shares = [replace(basis, deviations=one, positions=at).walk(sun_torque).load_share[:, 0] for one in moved]
-        found.append((shares[0] - shares[1]) / (2.0 * step))
-    return np.moveaxis(np.array(found).reshape(N, 2, N), 2, 0)
+        moved = (replace(given, pin_errors=given.pin_errors + sign * step * unit) for sign in (1, -1))
+        shares = [
+            replace(basis, deviations=deviations, positions=at).walk(sun_torque).load_share[:, 0]
+            for deviations in moved
+        ]
+        slopes.append((shares[0] - shares[1]) / (2.0 * step))
+    return np.moveaxis(np.array(slopes).reshape(N, 2, N), 2, 0)

@@ -138,28 +138,28 @@ def sweep(
                 _warn_of_time(count - done, designs.seconds / _TIMED, designs.runner.workers)
         for i, point in enumerate(points):
             try:
-                found = designs.values(point, quantities)
-                table[i] = [found[quantity.name] for quantity in quantities]
+                values_there = designs.values(point, quantities)
+                table[i] = [values_there[quantity.name] for quantity in quantities]
                 errors.append("")
             except Failure as failure:
                 errors.append(f"[{failure.error['code']}] {failure}")
             doubts.append({} if errors[-1] else designs.doubts(point, quantities))
-        found = Sweep(keys, points, quantities, table, tuple(errors), designs.computed, tuple(doubts))
-    _tell_of_doubts(found)
-    return found
+        values_there = Sweep(keys, points, quantities, table, tuple(errors), designs.computed, tuple(doubts))
+    _tell_of_doubts(values_there)
+    return values_there
 
 
-def _tell_of_doubts(found: Sweep) -> None:
+def _tell_of_doubts(swept: Sweep) -> None:
     """Tell once each finding that makes numbers of a sweep doubtful: which quantities, how many cases."""
     concerned = dict[str, dict[str, set[int]]]()
-    for point, doubts in enumerate(found.doubts):
+    for point, doubts in enumerate(swept.doubts):
         for name, codes in doubts.items():
             for code in codes:
                 concerned.setdefault(code, {}).setdefault(name, set()).add(point)
     for code, quantities in concerned.items():
         cases = len(set.union(*quantities.values()))
         text = (
-            f"{cases} of {len(found.points)} cases (column findings), {' and '.join(quantities)}: "
+            f"{cases} of {len(swept.points)} cases (column findings), {' and '.join(quantities)}: "
             f"{CATALOGUE[code][1][:1].lower()}{CATALOGUE[code][1][1:].rstrip('.')}"
         )
         tell(Finding(code, "", text, remedy="femgear run of such a case says more"), stacklevel=3)
@@ -278,14 +278,14 @@ def parse_over(text: str) -> tuple[str | tuple[str, ...], Sequence[object]]:
     if not (all(keys) and equals and values):
         raise _not_over(text)
     if match := _RANGE.fullmatch(values):
-        found = _spread(keys[0], match, text)
-        return (key, found) if len(keys) == 1 else (keys, [(value,) * len(keys) for value in found])
+        values_given = _spread(keys[0], match, text)
+        return (key, values_given) if len(keys) == 1 else (keys, [(value,) * len(keys) for value in values_given])
     if len(keys) > 1:
         return keys, [_together(part, keys) for part in values.split(",")]
-    found = [_value(part) for part in values.split(",")]
-    if any(value == "" for value in found):
+    values_given = [_value(part) for part in values.split(",")]
+    if any(value == "" for value in values_given):
         raise _not_over(text)
-    return key, found
+    return key, values_given
 
 
 def _spread(key: str, match: re.Match[str], text: str) -> list[object]:
@@ -376,53 +376,53 @@ def sweep_into(
                 quantities.append(named_quantity(words, speeds=speeds))
     values = dict(parsed)
     if len(values) < len(parsed):
-        twice = next(key for key, _ in parsed if [one for one, _ in parsed].count(key) > 1)
+        twice = next(key for key, _ in parsed if [name for name, _ in parsed].count(key) > 1)
         _check_effect(twice if isinstance(twice, str) else ",".join(twice), 2)
     axes = _axes(values)
     _check_sweep(case, axes, quantities)
     own_files(folder, (_TABLE, _FIGURE))
     options = {"journal": folder / _JOURNAL, "cache": cache, "progress": progress, "runner": runner}
     with resumable(folder):
-        found = sweep(case, values, quantities, **options)
-        write_csv(folder / _TABLE, found.header, found.records())
-        _draw(found, axes, folder / _FIGURE)
-    return found, [_TABLE, _JOURNAL, _FIGURE]
+        swept = sweep(case, values, quantities, **options)
+        write_csv(folder / _TABLE, swept.header, swept.records())
+        _draw(swept, axes, folder / _FIGURE)
+    return swept, [_TABLE, _JOURNAL, _FIGURE]
 
 
-def describe_sweep(found: Sweep) -> Block:
+def describe_sweep(swept: Sweep) -> Block:
     """Tabulate a sweep in the units of messages; of many cases the first and the last ones."""
-    units = [quantity.dimension for quantity in found.quantities]
-    header = (*found.keys, *(f"{q.name} [{q.dimension.shown}]" for q in found.quantities))
+    units = [quantity.dimension for quantity in swept.quantities]
+    header = (*swept.keys, *(f"{q.name} [{q.dimension.shown}]" for q in swept.quantities))
     rows = [
         (*map(str, point), *(f"{value / unit.scale:.5g}" for value, unit in zip(values, units)))
-        for point, values in zip(found.points, found.values)
+        for point, values in zip(swept.points, swept.values)
     ]
-    if any(map(found.codes, range(len(rows)))):
-        header, rows = (*header, "findings"), [(*row, found.codes(i) or "-") for i, row in enumerate(rows)]
+    if any(map(swept.codes, range(len(rows)))):
+        header, rows = (*header, "findings"), [(*row, swept.codes(i) or "-") for i, row in enumerate(rows)]
     if len(rows) > 2 * _SHOWN:
         gap = ("...", *("" for _ in header[1:]))
         rows = [*rows[:_SHOWN], gap, *rows[-_SHOWN:]]
-    notes = tuple(dict.fromkeys(f"cannot be computed: {error}" for error in found.errors if error))
+    notes = tuple(dict.fromkeys(f"cannot be computed: {error}" for error in swept.errors if error))
     return Block("Sweep", header, tuple(rows), notes[:_SHOWN])
 
 
-def _draw(found: Sweep, axes_of: Mapping[tuple[str, ...], Sequence[tuple[object, ...]]], path: Path) -> None:
+def _draw(swept: Sweep, axes_of: Mapping[tuple[str, ...], Sequence[tuple[object, ...]]], path: Path) -> None:
     """Curves over the last axis, one panel a quantity, one curve for every combination of the others.
 
     Of at most twelve combinations; a case that cannot be computed leaves a gap.
     """
     keys, along = list(axes_of.items())[-1]
-    last, count = len(along), len(found.quantities)
-    scale = np.array([quantity.dimension.scale for quantity in found.quantities])
-    curves = (found.values / scale).reshape(-1, last, count)
+    last, count = len(along), len(swept.quantities)
+    scale = np.array([quantity.dimension.scale for quantity in swept.quantities])
+    curves = (swept.values / scale).reshape(-1, last, count)
     x, unit = _axis([value[0] if len(keys) == 1 else _joined(value) for value in along])
     name_of_axis = ", ".join(keys)
     columns = min(count, 3)
     rows = -(-count // columns)
     figure, axes = new_figure(rows=rows, columns=columns, width=4.4 * columns + 0.6, height=3.6 * rows + 0.6)
-    for q, quantity in enumerate(found.quantities):
-        for k, (point, curve) in enumerate(zip(found.points[::last], curves[:12])):
-            name = ", ".join(f"{key} = {value}" for key, value in zip(found.keys, point[: -len(keys)], strict=False))
+    for q, quantity in enumerate(swept.quantities):
+        for k, (point, curve) in enumerate(zip(swept.points[::last], curves[:12])):
+            name = ", ".join(f"{key} = {value}" for key, value in zip(swept.keys, point[: -len(keys)], strict=False))
             legend = {"label": name} if name else {}
             axes[q].plot(x, curve[:, q], marker="o", markersize=4, **line_style(k), **legend)
         if not np.isfinite(curves[..., q]).any():

@@ -175,31 +175,31 @@ class Assembly:
     @cached_property
     def mass(self) -> np.ndarray:
         """Mass matrix (6n, 6n) of all motions [kg, kg m^2]."""
-        return self._sum((one.stations, one.mass) for one in self.inertias)
+        return self._sum((inertia.stations, inertia.mass) for inertia in self.inertias)
 
     @cached_property
     def gyroscopic(self) -> np.ndarray:
         """Gyroscopic matrix (6n, 6n) of all motions [kg m^2]."""
-        return self._sum((one.stations, one.gyroscopic) for one in self.inertias)
+        return self._sum((inertia.stations, inertia.gyroscopic) for inertia in self.inertias)
 
     @cached_property
     def stiffness(self) -> np.ndarray:
         """Stiffness (6n, 6n) of beams and springs, without meshes and without what is rigid [N/m, N m/rad]."""
-        matrices = [(one.stations, one.stiffness) for one in self.beams]
-        matrices += [(one.stations, stiffness_matrix(one.rows.T, one.stiffness)) for one in self.springs]
+        matrices = [(beam.stations, beam.stiffness) for beam in self.beams]
+        matrices += [(spring.stations, stiffness_matrix(spring.rows.T, spring.stiffness)) for spring in self.springs]
         return self._sum(matrices)
 
     @cached_property
     def columns(self) -> np.ndarray:
         """Approach (6n, g) of the flanks of all slices of all meshes, in their order, per unit of all motions."""
-        found = [np.zeros((self.count, 0))]
+        blocks = [np.zeros((self.count, 0))]
         for contact in self.contacts:
             columns = np.zeros((self.count, len(contact.heights)))
             for station, approach in zip(contact.stations, contact.approach):
                 if station != GROUND:
                     columns[6 * station : 6 * station + 6] += approach.T
-            found.append(columns)
-        return np.hstack(found)
+            blocks.append(columns)
+        return np.hstack(blocks)
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:
@@ -226,15 +226,15 @@ class Assembly:
             return solved_conditions(np.vstack(rows), self.held)
         led, held = np.eye(self.count), self.held.copy()
         for follower in self.followers:
-            own = slice(6 * follower.station, 6 * follower.station + 6)
-            led[own, own] = 0.0
+            led_motions = slice(6 * follower.station, 6 * follower.station + 6)
+            led[led_motions, led_motions] = 0.0
             for at, leader in enumerate(follower.leaders):
                 # motions that do not take place are no one's
-                part = np.where(self.held[own, None], 0.0, follower.rows[:, 6 * at : 6 * at + 6])
-                led[own, 6 * leader : 6 * leader + 6] += part
-            held[own] = True
-        found, free = solved_conditions(np.vstack(rows) @ led, held)
-        return led @ found, free
+                part = np.where(self.held[led_motions, None], 0.0, follower.rows[:, 6 * at : 6 * at + 6])
+                led[led_motions, 6 * leader : 6 * leader + 6] += part
+            held[led_motions] = True
+        solution, free = solved_conditions(np.vstack(rows) @ led, held)
+        return led @ solution, free
 
     @property
     def motions(self) -> np.ndarray:
@@ -467,7 +467,7 @@ def planetary_contacts(
         Of the meshes with the sun and with the ring [N/m]; zero where not given.
     """
     sun, planets, ring = stations
-    known = {"heights": heights, "on_base_circles": on_base_circles}
+    options = {"heights": heights, "on_base_circles": on_base_circles}
     contacts = list[Contact]()
     for internal, alpha in enumerate(pressure_angles):
         # planets turn against the sun, and have the other hand
@@ -484,7 +484,7 @@ def planetary_contacts(
                     internal=bool(internal),
                     base_helix=sense * base_helix,
                     stiffness=0.0 if stiffness is None else stiffness[internal][n],
-                    **known,
+                    **options,
                 )
             )
     return contacts
@@ -515,10 +515,10 @@ def solved_conditions(rows: np.ndarray, held: np.ndarray) -> tuple[np.ndarray, n
     bound, rest = backwards[order[:rank]], np.sort(backwards[order[rank:]])
     column = {int(c): i for i, c in enumerate(backwards[order])}
     tied = -linalg.solve_triangular(triangle[:rank, :rank], triangle[:rank, [column[int(c)] for c in rest]])
-    found = np.zeros((count, len(rest)))
-    found[rest, np.arange(len(rest))] = 1.0
-    found[bound] = tied
-    return found, rest
+    motions = np.zeros((count, len(rest)))
+    motions[rest, np.arange(len(rest))] = 1.0
+    motions[bound] = tied
+    return motions, rest
 
 
 def joint(
@@ -547,7 +547,9 @@ def joint(
     rows = np.hstack([-rigid_link(offsets[0]), rigid_link(offsets[1])])
     if axes is not None:
         turned = np.broadcast_to(np.asarray(axes, float), (2, 3, 3))
-        rows = np.hstack([np.kron(np.eye(2), one) @ half for one, half in zip(turned, np.hsplit(rows, 2), strict=True)])
+        rows = np.hstack(
+            [np.kron(np.eye(2), rotation) @ half for rotation, half in zip(turned, np.hsplit(rows, 2), strict=True)]
+        )
     stiffness = np.asarray(stiffness, float)
     used = stiffness > 0.0
     return StationSprings(name, stations, rows[used], stiffness[used])

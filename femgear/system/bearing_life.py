@@ -303,8 +303,8 @@ def oil_viscosity(at_40: float, at_100: float, temperature: float) -> float:
     ``lg lg (nu + 0.7) = A - B lg T`` [mm^2/s, K] through those at 40 and 100 degrees.
     """
     if not (at_40 > at_100 > 0.3e-6 and temperature > -273.0):
-        found = f"{1e6 * at_40:g} mm^2/s at 40, {1e6 * at_100:g} at 100, asked at {temperature:g} degrees"
-        raise CaseError(found, code="E-RANGE", limit="an oil that is thinner when it is hot, above 0.3 mm^2/s")
+        message = f"{1e6 * at_40:g} mm^2/s at 40, {1e6 * at_100:g} at 100, asked at {temperature:g} degrees"
+        raise CaseError(message, code="E-RANGE", limit="an oil that is thinner when it is hot, above 0.3 mm^2/s")
     low, high = (math.log10(math.log10(1e6 * value + 0.7)) for value in (at_40, at_100))
     cold, hot = math.log10(313.15), math.log10(373.15)
     place = low + (high - low) * (math.log10(temperature + 273.15) - cold) / (hot - cold)

@@ -415,15 +415,15 @@ def tangent_jumps(tangents: Callable[..., np.ndarray], states: np.ndarray) -> li
     states = np.asarray(states)
     nodes = (np.arange(-1, _INTERVALS + 3) - 0.5) / _INTERVALS
     # one interval more on both sides, for the neighbours
-    known = tangents(np.broadcast_to(nodes[1:-2], (len(states), _INTERVALS + 1)), states)
-    size = np.abs(known).max(axis=(1, 2, 3), initial=0.0)
-    change = np.diff(known, axis=1)
+    at_nodes = tangents(np.broadcast_to(nodes[1:-2], (len(states), _INTERVALS + 1)), states)
+    size = np.abs(at_nodes).max(axis=(1, 2, 3), initial=0.0)
+    change = np.diff(at_nodes, axis=1)
     around = 0.5 * (np.roll(change, 1, axis=1) + np.roll(change, -1, axis=1))
     unlike, change = (np.abs(a).max(axis=(2, 3), initial=0.0) for a in (change - around, change))
     suspect = (unlike > _UNLIKE * change) & (change > _SMALL * size[:, None])
     row: np.ndarray
     row, column = np.nonzero(suspect)
-    found = [[] for _ in states]
+    jumps = [[] for _ in states]
     low: np.ndarray = nodes[1:-2][column]
     high: np.ndarray = nodes[2:-1][column]
     for _ in range(_ROUNDS):
@@ -431,11 +431,11 @@ def tangent_jumps(tangents: Callable[..., np.ndarray], states: np.ndarray) -> li
         if not len(row):
             break
         for i, fraction in zip(row, where % 1.0):
-            found[i].append(fraction)
+            jumps[i].append(fraction)
         gap = 4.0 * np.finfo(float).eps
         low, high = np.concatenate([low, where + gap]), np.concatenate([where - gap, high])
         row = np.concatenate([row, row])
-    return [_sorted(fractions) for fractions in found]
+    return [_sorted(fractions) for fractions in jumps]
 
 
 def _halved(tangents, states, size, row, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, ...]:

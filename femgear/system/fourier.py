@@ -104,10 +104,10 @@ class Product:
     def take(self, speeds: Any = slice(None), kind: Any = complex) -> Product:
         """Take the factors at some of the speeds, indices or a mask, complex or np.complex64."""
         every = self.factor.ndim == 2
-        found = Product((self.factor if every else self.factor[:, speeds]).astype(kind, copy=False))
+        product = Product((self.factor if every else self.factor[:, speeds]).astype(kind, copy=False))
         samples = self._samples if every else self._samples[:, speeds]
-        vars(found)["_samples"] = samples.astype(np.float32 if kind is np.complex64 else float, copy=False)
-        return found
+        vars(product)["_samples"] = samples.astype(np.float32 if kind is np.complex64 else float, copy=False)
+        return product
 
     @cached_property
     def _samples(self) -> np.ndarray:
@@ -228,14 +228,14 @@ class StepSeries:
 def phase_of(theta, orders) -> np.ndarray:
     """Compute the phase ``orders . theta`` (...) [rad]; a base that theta lacks must have order zero."""
     theta = np.asarray(theta, float)
-    known = theta.shape[-1]
-    if any(orders[known:]):
+    given = theta.shape[-1]
+    if any(orders[given:]):
         raise CaseError(
-            f"orders {tuple(orders)} name more base frequencies than the {known} that are given",
+            f"orders {tuple(orders)} name more base frequencies than the {given} that are given",
             code="E-HARMONICS",
             limit="one order a base frequency",
         )
-    used = np.asarray(orders[:known], float)
+    used = np.asarray(orders[:given], float)
     return theta[..., : len(used)] @ used
 
 
@@ -442,8 +442,8 @@ def coincidence_note(orders: np.ndarray, frequency) -> str:
     near = np.flatnonzero(np.diff(size[along]) <= _COINCIDE * size.max())
     if not len(near):
         return ""
-    one, other = orders[np.sort(along[near[0] : near[0] + 2])].tolist()
+    line_1, line_2 = orders[np.sort(along[near[0] : near[0] + 2])].tolist()
     return (
-        f" Lines {one} and {other} have one frequency: only their sum is an amplitude, and its split, as of "
+        f" Lines {line_1} and {line_2} have one frequency: only their sum is an amplitude, and its split, as of "
         "phases that are independent, converges slowly; take one base frequency and multiply the orders."
     )

@@ -101,7 +101,7 @@ def gear_set_system(
         columns.append(mesh_directions(data, -flank))
     if planet_bearings:
         columns.append(pin_directions(data)[..., :2].reshape(kept.size, -1))
-        whole = replace(whole, springs=tuple(one for one in whole.springs if GROUND in one.stations))
+        whole = replace(whole, springs=tuple(spring for spring in whole.springs if GROUND in spring.stations))
     stiffness, load = motions.T @ whole.stiffness @ motions, torque_load(data, torque, kept)
     gyroscopic = None
     if carrier_speed:
@@ -304,7 +304,7 @@ def free_motions(data: RigidSet) -> np.ndarray:
 def support_diagonal(data: RigidSet) -> np.ndarray:
     """Collect the finite stiffnesses (N + 3, axes) [N/m] of the supports in all coordinates."""
     whole = set_assembly(data)
-    supports = replace(whole, springs=tuple(one for one in whole.springs if GROUND in one.stations))
+    supports = replace(whole, springs=tuple(spring for spring in whole.springs if GROUND in spring.stations))
     motions = station_motions(data)
     return np.diag(motions.T @ supports.stiffness @ motions).reshape(data.n_planets + 3, -1)
 

@@ -116,10 +116,10 @@ def set_motions(shape, mass, dofs: Sequence[str], planet_angles) -> SetMotions:
     planet_angles = np.asarray(planet_angles, float)
 
     def rows(bodies, *axes):
-        found = [[next((place[k] for a in axis if (k := f"{b}: {a}") in place), -1) for axis in axes] for b in bodies]
-        found = np.array(found)
-        there = found >= 0
-        return np.where(there[..., None], shape[found], 0.0), np.where(there, np.asarray(mass)[found], 0.0)
+        dof = [[next((place[k] for a in axis if (k := f"{b}: {a}") in place), -1) for axis in axes] for b in bodies]
+        dof = np.array(dof)
+        there = dof >= 0
+        return np.where(there[..., None], shape[dof], 0.0), np.where(there, np.asarray(mass)[dof], 0.0)
 
     planets = [f"planet {n + 1}" for n in range(len(planet_angles))]
     turn = ("rotation", "u")
@@ -184,15 +184,15 @@ def phasing(motions: SetMotions) -> tuple[str, ...]:
     names = ["in phase", *(f"sequentially phased {j}" for j in range(1, N // 2 + 1))]
     if N % 2 == 0:
         names[-1] = "counter-phased"
-    found = []
-    for one in share.T:
-        if np.isnan(one[0]):
-            found.append("at rest")
+    kinds = []
+    for shares in share.T:
+        if np.isnan(shares[0]):
+            kinds.append("at rest")
             continue
-        best = int(one.argmax())
-        pure = one[best] >= _PURE and np.all(np.delete(one, best) <= 1.0 - _PURE)
-        found.append(names[best] if pure else "mixed")
-    return tuple(found)
+        best = int(shares.argmax())
+        pure = shares[best] >= _PURE and np.all(np.delete(shares, best) <= 1.0 - _PURE)
+        kinds.append(names[best] if pure else "mixed")
+    return tuple(kinds)
 
 
 def mixture(frequency, energy: Callable[[np.ndarray], np.ndarray], *, tolerance: float = 1e-7) -> np.ndarray:
@@ -222,17 +222,17 @@ def fixed_basis(values, vectors, *, tolerance: float = 1e-8) -> np.ndarray:
     left: QR with row pivoting (G. Golub and C. Van Loan, Matrix Computations, 4th ed., section 5.4.2).
     Ascending ``values`` (m,) are equal that differ by less than the relative tolerance.
     """
-    values, found = np.asarray(values), np.array(vectors)
+    values, fixed = np.asarray(values), np.array(vectors)
     starts = np.flatnonzero(np.diff(values) > tolerance * np.abs(values[1:])) + 1
     for group in np.split(np.arange(len(values)), starts):
         for first in group:
-            rest = found[:, first : group[-1] + 1]
+            rest = fixed[:, first : group[-1] + 1]
             size = np.linalg.norm(rest, axis=1)
             row = rest[np.argmax(size >= (1.0 - 1e-6) * size.max())]
             mirror = row + np.copysign(np.linalg.norm(row), row[0]) * np.eye(len(row))[0]
             turned = rest - np.outer(rest @ mirror, 2.0 / (mirror @ mirror) * mirror)
-            found[:, first : group[-1] + 1] = -np.copysign(1.0, row[0]) * turned
-    return found
+            fixed[:, first : group[-1] + 1] = -np.copysign(1.0, row[0]) * turned
+    return fixed
 
 
 def phase_basis(motions: SetMotions, frequency, *, tolerance: float = 1e-7) -> np.ndarray:

@@ -441,12 +441,12 @@ def check_support(key: str, support: HelicalSupport, *, count: int | None = None
 def checked_array(key: str, values, dimensions: int | None = None) -> np.ndarray:
     """Check values: an array of floats, of so many dimensions where they are given."""
     try:
-        found = np.array(values, float)
+        array = np.array(values, float)
     except (TypeError, ValueError):
         refuse(key, repr(values), "", "a number" if dimensions == 0 else "numbers")
-    if dimensions is not None and found.ndim != dimensions:
-        refuse(key, f"{found.size} values", "", "one number")
-    return found
+    if dimensions is not None and array.ndim != dimensions:
+        refuse(key, f"{array.size} values", "", "one number")
+    return array
 
 
 def refuse(key: str, value, unit: str, limit: str, *, remedy: str | None = None) -> NoReturn:

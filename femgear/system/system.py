@@ -25,15 +25,15 @@ _HELD, _BALANCED = 1e-12, 1e-6
 
 def freeze(obj):
     """Turn the array fields of a frozen dataclass into read-only arrays of its own."""
-    for one in fields(obj):
-        value = getattr(obj, one.name)
+    for field_ in fields(obj):
+        value = getattr(obj, field_.name)
         # the annotations np.ndarray and NDArray[...]
-        if value is not None and "ndarray" in str(one.type).lower():
+        if value is not None and "ndarray" in str(field_.type).lower():
             # one that nobody can write to is as good as a copy
             shared = isinstance(value, np.ndarray) and value.flags.owndata and not value.flags.writeable
             array = np.array(value, copy=None if shared else True)
             array.setflags(write=False)
-            object.__setattr__(obj, one.name, array)
+            object.__setattr__(obj, field_.name, array)
 
 
 @dataclass(frozen=True)
@@ -280,7 +280,9 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
     most = (excitation.stiffness.shape[1] - 1) // 2
     if lines > most:
         harmonics_of(excitation.stiffness, lines)  # says so
-    stiffness, deflection, force = (found[:, : lines + 1].copy() for found in excitation.every_harmonic)
+    stiffness, deflection, force = (
+        lines_of_series[:, : lines + 1].copy() for lines_of_series in excitation.every_harmonic
+    )
     return stiffness, deflection, force
 
 

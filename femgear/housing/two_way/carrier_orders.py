@@ -144,7 +144,7 @@ class CarrierOrders:
     @cached_property
     def structure_order(self) -> np.ndarray:
         """Orders (B, S) of the structure, some of them beyond what any wave reaches."""
-        bands = np.array([self.structure_bands(one) for one in range(self.paths.symmetry)])
+        bands = np.array([self.structure_bands(residue) for residue in range(self.paths.symmetry)])
         return self.base[:, None] + bands[self.residue] + self.seed[:, None]
 
     def structure_bands(self, residue: int) -> np.ndarray:
@@ -158,10 +158,10 @@ class CarrierOrders:
 
         In blocks of a residue; the number of these orders where there are none.
         """
-        N, known, waves = self.paths.symmetry, self.structure_bands(residue), self.sense * self.diameters
-        apart = self.bands[:, None] - waves - known[0]
-        inside = (apart % N == 0) & (apart >= 0) & (apart // N < len(known))
-        return np.where(inside, apart // N, len(known)), self.place(known[:, None] + waves)
+        N, in_structure, waves = self.paths.symmetry, self.structure_bands(residue), self.sense * self.diameters
+        apart = self.bands[:, None] - waves - in_structure[0]
+        inside = (apart % N == 0) & (apart >= 0) & (apart // N < len(in_structure))
+        return np.where(inside, apart // N, len(in_structure)), self.place(in_structure[:, None] + waves)
 
     def place(self, band: np.ndarray) -> np.ndarray:
         """Places of side bands r of any shape, their number R where there is none."""
@@ -242,11 +242,11 @@ def mean_excitation(excitation: MeshExcitation, paths: MeshPaths, sense: int) ->
     count = excitation.stiffness.shape[1] // excitation.periods
     whole = sense * turn[:, None] * np.arange(count // 2 + 1) * (paths.z_ring % paths.symmetry)
     phase = np.exp(2j * np.pi * (whole % paths.symmetry) / paths.symmetry)
-    alike, found = owner[:, None] == owner, list[np.ndarray]()
+    alike, averaged = owner[:, None] == owner, list[np.ndarray]()
     for values in (excitation.stiffness, excitation.deflection, excitation.force):
         lines = np.fft.rfft(values.reshape(len(values), -1, count).mean(axis=1)) / phase
-        found.append(np.fft.irfft(phase * (alike @ lines) / alike.sum(axis=1)[:, None], count))
-    return replace(excitation, stiffness=found[0], deflection=found[1], force=found[2], periods=1)
+        averaged.append(np.fft.irfft(phase * (alike @ lines) / alike.sum(axis=1)[:, None], count))
+    return replace(excitation, stiffness=averaged[0], deflection=averaged[1], force=averaged[2], periods=1)
 
 
 def _meshes(groups) -> tuple[np.ndarray, np.ndarray]:
@@ -263,6 +263,6 @@ def receptance(structure: FixedStructure, omega: np.ndarray) -> np.ndarray:
 def modal_receptance(natural: np.ndarray, ratio: np.ndarray, omega: np.ndarray) -> np.ndarray:
     """Compute receptances (..., m) [s^2] of modes (m,) [rad/s] at angular frequencies (...) [rad/s]."""
     omega = np.asarray(omega)[..., None]
-    found = np.empty((*omega.shape[:-1], len(natural)), complex)
-    found.real, found.imag = natural**2 - omega**2, 2.0 * ratio * natural * omega
-    return np.reciprocal(found, out=found)
+    stiffness = np.empty((*omega.shape[:-1], len(natural)), complex)
+    stiffness.real, stiffness.imag = natural**2 - omega**2, 2.0 * ratio * natural * omega
+    return np.reciprocal(stiffness, out=stiffness)

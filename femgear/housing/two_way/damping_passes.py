@@ -70,33 +70,33 @@ class DampingPasses:
         force = motion[2]
         moved = _of_blocks(force - self._seen)
         expected = self._left + self._ratio * moved
-        some = _largest(expected, _WAITING * max(float(np.linalg.norm(expected)), enough))
+        changed = _largest(expected, _WAITING * max(float(np.linalg.norm(expected)), enough))
         first = not self._made
         whole = first or self._together or np.linalg.norm(expected) <= enough
         if whole:
-            some = np.arange(len(expected))
+            changed = np.arange(len(expected))
         if not self._together:
             self._count[:] = 0
-        self._seen[:, some] = force[:, some]
-        expected[some] = changes = self._sweep(motion, some)
+        self._seen[:, changed] = force[:, changed]
+        expected[changed] = changes = self._sweep(motion, changed)
         # blocks whose forces stood still tell nothing of what a change of them makes
-        known = moved[some] > _STILL * changes
-        ratio = np.divide(changes, moved[some], out=np.zeros(len(some)), where=known)
-        self._ratio[some] = np.maximum(self._ratio[some], ratio)
+        moving = moved[changed] > _STILL * changes
+        ratio = np.divide(changes, moved[changed], out=np.zeros(len(changed)), where=moving)
+        self._ratio[changed] = np.maximum(self._ratio[changed], ratio)
         change = float(np.linalg.norm(expected))
         if first and enough > _SINGLE * change:
             self._be_single()
         self._together |= change > _SLOW * self._before and not first
         self._before = change
         if not self._together and not (whole and change <= enough):
-            self._settle(motion, some, _UNSETTLED * max(change, enough))
+            self._settle(motion, changed, _UNSETTLED * max(change, enough))
         return change, bool(whole)
 
-    def _settle(self, motion, some: np.ndarray, limit: float) -> None:
+    def _settle(self, motion, numbers: np.ndarray, limit: float) -> None:
         """Sweep through those of some blocks that have more than a limit left, e being held."""
         extra, way, force = motion[0], motion[1].copy(), motion[2].copy()
         for _ in range(_SWEEPS):
-            now = some[_largest(self._left[some], limit)]
+            now = numbers[_largest(self._left[numbers], limit)]
             if not len(now):
                 break
             part, (load, given) = self.blocks.part(now), self.moved
@@ -104,33 +104,33 @@ class DampingPasses:
             force[:, now] = part.forces(extra[:, now], deflection, way[:, now])
             self._sweep((extra, way, force), now)
 
-    def _sweep(self, motion, some: np.ndarray) -> np.ndarray:
+    def _sweep(self, motion, numbers: np.ndarray) -> np.ndarray:
         """Answer a motion in some blocks, and extrapolate; norms (b,) of the changes of mesh forces."""
-        at: Any = slice(None) if len(some) == len(self._left) else some
+        at: Any = slice(None) if len(numbers) == len(self._left) else numbers
         if not self._made:
             self._made = [self.damping.none(len(self.blocks.place)) for _ in range(_MIXED)]
-        if self._count[some].any():
+        if self._count[numbers].any():
             for newer, older in ((1, 2), (0, 1)):
                 _put(self._made[older], self._made[newer], at)
                 self._changes[older][:, at] = self._changes[newer][:, at]
         made, G = self._made[0], len(self.blocks.place)
-        self.damping.answer(self.blocks, self._answers, motion, self.forces, made, at if at is some else None)
+        self.damping.answer(self.blocks, self._answers, motion, self.forces, made, at if at is numbers else None)
         changes = (made.still[:, at] - self.forces.still[:, at]).astype(complex)
         changes[G:] -= made.way[:, at] - self.forces.way[:, at]
         changes *= self.blocks.gears.mean[:, None, None]
         self._changes[0][:, at] = changes
-        self._count[some] += 1
-        self._blend(at, _shares(self._changes[:, :, at], self._count[some], self._together))
+        self._count[numbers] += 1
+        self._blend(at, _shares(self._changes[:, :, at], self._count[numbers], self._together))
         norms = _of_blocks(changes)
-        again = self._count[some] > 1
-        rate = norms[again] / np.maximum(self._left[some][again], _TINY) * self._rate[some][again]
-        self._rate[some[again]] = np.clip(rate, _LEAST, 1.0)
-        self._left[some] = self._rate[some] * norms
+        again = self._count[numbers] > 1
+        rate = norms[again] / np.maximum(self._left[numbers][again], _TINY) * self._rate[numbers][again]
+        self._rate[numbers[again]] = np.clip(rate, _LEAST, 1.0)
+        self._left[numbers] = self._rate[numbers] * norms
         return norms
 
     def _blend(self, at, shares: np.ndarray) -> None:
         """Blend sweeps of blocks by shares (n, b) of them."""
-        for axis, total, *parts in zip(_AXES, self.forces.parts, *(one.parts for one in self._made)):
+        for axis, total, *parts in zip(_AXES, self.forces.parts, *(pass_.parts for pass_ in self._made)):
             index, real = (slice(None),) * axis + (at,), total.real.dtype
             blended = parts[0][index]
             if shares[1:].any():
@@ -142,7 +142,7 @@ class DampingPasses:
     def _be_single(self) -> None:
         """Go on in single precision."""
         self.damping = self.damping.single()
-        self._answers = tuple(one.astype(np.complex64) for one in self._answers)
+        self._answers = tuple(answer.astype(np.complex64) for answer in self._answers)
         self.forces, first = self.forces.single(), self._made[0].single()
         self._made = [first, *(_nothing_like(first) for _ in self._made[1:])]
 
@@ -179,17 +179,17 @@ def _shares(changes: np.ndarray, count: np.ndarray, together: bool) -> np.ndarra
     """
     share = np.zeros((len(changes) - 1, len(count)))
     if (count > 1).any():
-        known = [i for i in range(1, len(changes)) if (count > i).any()]
-        steps = [(changes[0] - changes[i]) * (count > i)[:, None] for i in known]
-        product = np.array([[_products(one, other) for other in steps] for one in steps])
-        wanted = np.array([_products(one, changes[0]) for one in steps])
+        with_more = [i for i in range(1, len(changes)) if (count > i).any()]
+        steps = [(changes[0] - changes[i]) * (count > i)[:, None] for i in with_more]
+        product = np.array([[_products(step, other) for other in steps] for step in steps])
+        wanted = np.array([_products(step, changes[0]) for step in steps])
         if together:
             product, wanted = product.sum(axis=2, keepdims=True), wanted.sum(axis=1, keepdims=True)
         inverse = np.linalg.pinv(np.moveaxis(product, 2, 0), rcond=1e-13, hermitian=True)
-        share[: len(known)] = (inverse @ wanted.T[..., None])[..., 0].T
+        share[: len(with_more)] = (inverse @ wanted.T[..., None])[..., 0].T
     return np.concatenate([1.0 - share.sum(axis=0)[None], share])
 
 
-def _products(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _products(first: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Real inner products (B,) of the blocks of values (J, B, R)."""
-    return np.sum(np.real(one) * np.real(other) + np.imag(one) * np.imag(other), axis=(0, 2))
+    return np.sum(np.real(first) * np.real(other) + np.imag(first) * np.imag(other), axis=(0, 2))

@@ -77,10 +77,10 @@ class HarmonicBlocks:
             way = way + given
         return still + _times(self.compliance[:, G:], mean[G:] * way), way
 
-    def part(self, some: np.ndarray) -> HarmonicBlocks:
+    def part(self, numbers: np.ndarray) -> HarmonicBlocks:
         """Some of the blocks by their numbers, for deflections and forces."""
-        compliance, spring = self.compliance[:, :, some], self.spring[:, :, some]
-        return replace(self, compliance=compliance, spring=spring, yielding=self.yielding[some])
+        compliance, spring = self.compliance[:, :, numbers], self.spring[:, :, numbers]
+        return replace(self, compliance=compliance, spring=spring, yielding=self.yielding[numbers])
 
     def forces(self, extra: np.ndarray, deflection: np.ndarray, way: np.ndarray) -> np.ndarray:
         """Forces f (J, B, R) of the meshes by the forces e beyond k0, deflections and u."""
@@ -90,9 +90,9 @@ class HarmonicBlocks:
 
     def load(self) -> np.ndarray:
         """Deflections (J, B, R) by the constant load [m]."""
-        found = np.zeros(self.compliance.shape[1:], complex)
-        found[:, 0, self.orders.middle] = self.gears.load
-        return found
+        load = np.zeros(self.compliance.shape[1:], complex)
+        load[:, 0, self.orders.middle] = self.gears.load
+        return load
 
 
 def blocks_of_speed(
@@ -108,22 +108,22 @@ def blocks_of_speed(
     Waves up to ``coupled`` nodal diameters act on one another.
     """
     T, G, mean = _gears_compliance(gears, orders, speed), len(place), gears.mean[len(place) :]
-    own = T[G:, G:]
+    residual = T[G:, G:]
     spring = np.eye(G)[..., None, None] * mean[:, None, None, None]
-    spring = spring - (mean[:, None] * mean)[..., None, None] * own
+    spring = spring - (mean[:, None] * mean)[..., None, None] * residual
     yielding = np.empty((len(orders.base), G * len(orders.bands), G * len(orders.bands)), complex)
     for residue in range(orders.paths.symmetry):
         size = 16 * len(orders.structure_bands(residue)) * (len(structure.natural_frequency) + 4 * (coupled + 1) ** 2)
-        for some in _parts(orders.blocks(residue), size):
-            R = _ring(structure, orders, place, speed, residue, some, coupled)
+        for part in _parts(orders.blocks(residue), size):
+            R = _ring(structure, orders, place, speed, residue, part, coupled)
             nb, _, n_r = R.shape[:3]
             RA = np.zeros_like(R)
             for g in range(G):
                 for k in range(G):
-                    RA[:, :, :, k] += R[:, :, :, g] * spring[g, k, some][:, None, None]
+                    RA[:, :, :, k] += R[:, :, :, g] * spring[g, k, part][:, None, None]
             RA = RA.reshape(nb, G * n_r, G * n_r)
             RA[:, range(G * n_r), range(G * n_r)] += 1.0
-            yielding[some] = np.linalg.solve(RA, R.reshape(RA.shape))
+            yielding[part] = np.linalg.solve(RA, R.reshape(RA.shape))
     return HarmonicBlocks(gears, structure, orders, place, speed, T, spring, yielding)
 
 
@@ -149,41 +149,41 @@ def _ring(
 ) -> np.ndarray:
     """What the ring gives way at the leaders per force, in blocks of a residue: (b, G, R, G, R) [m/N]."""
     P, n, bands, G = structure.ring_shape, orders.diameters, len(orders.bands), len(place)
-    known, N = orders.structure_bands(residue), orders.paths.symmetry
-    order = orders.base[blocks][:, None] + known + orders.seed[blocks][:, None]
+    in_structure, N = orders.structure_bands(residue), orders.paths.symmetry
+    order = orders.base[blocks][:, None] + in_structure + orders.seed[blocks][:, None]
     modal = receptance(structure, speed * order)
     wave, near = np.exp(1j * np.outer(place, n)), np.abs(n) <= coupled
-    found = np.zeros((len(blocks), G, bands, G, bands), complex)
+    ring = np.zeros((len(blocks), G, bands, G, bands), complex)
 
     def add(to, of, values) -> None:
         """Add receptances (b, ...) from waves ``of`` to waves ``to`` at side bands."""
         (r, i), (at, k) = to, of
         for g in range(G):
             for j in range(G):
-                found[:, g, r, j, at] += N * wave[g, i] * wave[j, k].conj() * values
+                ring[:, g, r, j, at] += N * wave[g, i] * wave[j, k].conj() * values
 
     for sector in range(orders.spacing):  # at an order of the structure only every such wave
-        here = (known - sector) % orders.spacing == 0
+        here = (in_structure - sector) % orders.spacing == 0
         waves = (sector + orders.sense * n) % orders.spacing == 0
         if not here.any() or not waves.any():
             continue
         modes = structure.moved_by(waves)
         part = modal[:, here][..., modes]
-        inside = np.abs(known[here]) <= orders.bands[-1] + coupled
+        inside = np.abs(in_structure[here]) <= orders.bands[-1] + coupled
         both = modes, np.flatnonzero(waves & near)
-        _add_coupled(add, structure, orders, known[here][inside], part[:, inside], both)
+        _add_coupled(add, structure, orders, in_structure[here][inside], part[:, inside], both)
         far = np.flatnonzero(waves & ~near)
         alone = complex_times(part, np.abs(P[np.ix_(modes, far)]) ** 2)
         alone += np.real(structure.residual[far, far])
         for i, wave_number in enumerate(far):
-            r = orders.place(known[here] + orders.sense * n[wave_number])
+            r = orders.place(in_structure[here] + orders.sense * n[wave_number])
             met = np.flatnonzero(r < bands)
             add((r[met], wave_number), (r[met], wave_number), alone[:, met, i])
-    return found
+    return ring
 
 
-def _add_coupled(add, structure: FixedStructure, orders: CarrierOrders, known, modal, near) -> None:
-    """Add receptances of waves that act on one another, at side bands ``known`` (k,) of the structure.
+def _add_coupled(add, structure: FixedStructure, orders: CarrierOrders, in_structure, modal, near) -> None:
+    """Add receptances of waves that act on one another, at side bands ``in_structure`` (k,) of the structure.
 
     By receptances (b, k, m) of modes, and ``near``: the numbers of these and of the waves.
     """
@@ -198,7 +198,7 @@ def _add_coupled(add, structure: FixedStructure, orders: CarrierOrders, known, m
     every[..., top, low] = both[..., :count] - 1j * both[..., count:]
     every[..., low, top] = both[..., :count] + 1j * both[..., count:]
     every += structure.residual[np.ix_(waves, waves)]
-    for k, band in enumerate(known):
+    for k, band in enumerate(in_structure):
         r = orders.place(band + orders.sense * n)
         met = np.flatnonzero(r < len(orders.bands))
         r, there = r[met], waves[met]
@@ -212,11 +212,11 @@ def _times(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def complex_times(values: np.ndarray, real: np.ndarray) -> np.ndarray:
     """Multiply a complex matrix (..., k) by a real one (k, m), half the work of a complex one."""
-    found = np.empty((*values.shape[:-1], real.shape[1]), complex)
+    product = np.empty((*values.shape[:-1], real.shape[1]), complex)
     # BLAS does not take the parts of complex numbers as they lie
-    found.real = rows_times(np.ascontiguousarray(np.real(values)), real)
-    found.imag = rows_times(np.ascontiguousarray(np.imag(values)), real)
-    return found
+    product.real = rows_times(np.ascontiguousarray(np.real(values)), real)
+    product.imag = rows_times(np.ascontiguousarray(np.imag(values)), real)
+    return product
 
 
 def rows_times(values: np.ndarray, matrix: np.ndarray) -> np.ndarray:

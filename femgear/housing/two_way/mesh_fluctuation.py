@@ -64,12 +64,12 @@ class MeshFluctuation:
         time = _fft().ifft(two, norm="forward", overwrite_x=True)
         time *= self.samples
         two = _fft().fft(time, norm="forward", overwrite_x=True)
-        found = np.empty_like(meshes)
-        found[:, :, middle:] = two[..., : lines + 1].swapaxes(1, 2)
+        answer = np.empty_like(meshes)
+        answer[:, :, middle:] = two[..., : lines + 1].swapaxes(1, 2)
         negative = np.concatenate([two[..., :1], two[..., : self.points - lines - 1 : -1]], axis=-1)
-        found[:, :, middle::-1] = negative.swapaxes(1, 2).conj()
-        found[:, 0, middle] = two[:, 0, 0]
-        return self.of_leaders(found)
+        answer[:, :, middle::-1] = negative.swapaxes(1, 2).conj()
+        answer[:, 0, middle] = two[:, 0, 0]
+        return self.of_leaders(answer)
 
     def of_meshes(self, values: np.ndarray) -> np.ndarray:
         """Values (n, Q + 1, R) of every mesh by those of the leaders in all patterns (J, B, R)."""
@@ -95,8 +95,8 @@ def gmres(
 
     The solution, its residual over ``size``, the largest Ritz value of ``answer``, and the products taken.
     """
-    found = right if start is None else start
-    rest, products, radius = right - found + answer(found), 1, 0.0
+    solution = right if start is None else start
+    rest, products, radius = right - solution + answer(solution), 1, 0.0
     for cycle in range(cycles):
         if not float(np.linalg.norm(rest)) > tolerance * size:
             break
@@ -104,9 +104,9 @@ def gmres(
         step, hessenberg = _krylov(answer, rest, 0.5 * tolerance * size, steps)
         few = hessenberg[: min(len(hessenberg), _RITZ), :_RITZ]
         radius = max(radius, float(np.abs(np.linalg.eigvals(few)).max()))
-        found = found + step
-        rest, products = right - found + answer(found), products + len(hessenberg) + 1
-    return found, float(np.linalg.norm(rest)) / size, radius, products
+        solution = solution + step
+        rest, products = right - solution + answer(solution), products + len(hessenberg) + 1
+    return solution, float(np.linalg.norm(rest)) / size, radius, products
 
 
 def _krylov(answer, rest: np.ndarray, limit: float, most: int) -> tuple[np.ndarray, np.ndarray]:
@@ -120,11 +120,11 @@ def _krylov(answer, rest: np.ndarray, limit: float, most: int) -> tuple[np.ndarr
     for k in range(most):
         if k + 1 >= len(basis):  # most corrections take few steps: memory grows with them
             basis = np.concatenate([basis, np.empty((max(k + 1, _ROOM), len(rest)))])
-        image, known, column = answer(basis[k]), basis[: k + 1], np.zeros(k + 2)
+        image, orthonormal, column = answer(basis[k]), basis[: k + 1], np.zeros(k + 2)
         before, length = np.inf, np.linalg.norm(image)
         while length < _TWICE * before:  # what is left is orthogonal only if it is not small
-            share = known @ image
-            image = image - share @ known
+            share = orthonormal @ image
+            image = image - share @ orthonormal
             column[: k + 1] += share
             before, length = length, np.linalg.norm(image)
         column[k + 1] = length
@@ -152,7 +152,7 @@ def _krylov(answer, rest: np.ndarray, limit: float, most: int) -> tuple[np.ndarr
 
 def _square(columns: list[np.ndarray], count: int) -> np.ndarray:
     """Matrix (count, count) of columns, some shorter, one longer."""
-    found = np.zeros((count, count))
+    square = np.zeros((count, count))
     for k, column in enumerate(columns):
-        found[: min(len(column), count), k] = column[:count]
-    return found
+        square[: min(len(column), count), k] = column[:count]
+    return square

@@ -108,11 +108,11 @@ class TwoWayResponse(ReadOnlyArrays):
     drag: np.ndarray | None = None
     turns: int = 1
 
-    def at(self, some) -> TwoWayResponse:
-        """Response at the speeds number ``some`` alone."""
+    def at(self, speeds_chosen) -> TwoWayResponse:
+        """Response at the speeds ``speeds_chosen`` alone."""
         names = ("carrier_speed", "force", "residual", "tail", "spectral_radius", "products", "harmonics")
-        parts = {name: getattr(self, name)[some] for name in names}
-        return replace(self, **parts, drag=None if self.drag is None else self.drag[some])
+        parts = {name: getattr(self, name)[speeds_chosen] for name in names}
+        return replace(self, **parts, drag=None if self.drag is None else self.drag[speeds_chosen])
 
 
 def solve_two_way(  # noqa: PLR0913
@@ -172,19 +172,19 @@ def solve_two_way(  # noqa: PLR0913
         size = int(kept[i]) * periods, n_max, bands, sense, periods, 1 if periods == 1 else paths.symmetry
         return CarrierOrders(paths, *size, structure.sectors)
 
-    widest, known = int(kept.argmax()), (coupled, cycles)
+    widest, shared = int(kept.argmax()), (coupled, cycles)
     turning = _TurningSet(gears, excitation, structure, orders_of(widest), int(excited.max()), damping)
-    found = _Lines(_Problem(turning, orders_of(widest), int(excited[widest]), *known), len(speeds))
+    lines = _Lines(_Problem(turning, orders_of(widest), int(excited[widest]), *shared), len(speeds))
 
     def solve(i: int) -> None:
-        problem = _Problem(turning, orders_of(i), int(excited[i]), *known)
-        found.keep(i, problem, problem.solve(abs(float(speeds[i])), tolerance))
+        problem = _Problem(turning, orders_of(i), int(excited[i]), *shared)
+        lines.keep(i, problem, problem.solve(abs(float(speeds[i])), tolerance))
 
-    room = max(int(_MOST / 4 / found.size), 1)
+    room = max(int(_MOST / 4 / lines.size), 1)
     with ThreadPoolExecutor(min(workers or os.cpu_count() or 1, room)) as pool:  # BLAS lets others run
         list(pool.map(solve, range(len(speeds))))
-    _check_residual(found.figures[0], speeds, max(_RESIDUAL, 10.0 * tolerance))
-    return found.response(speeds, kept, paths if periods == 1 else replace(paths, symmetry=1))
+    _check_residual(lines.figures[0], speeds, max(_RESIDUAL, 10.0 * tolerance))
+    return lines.response(speeds, kept, paths if periods == 1 else replace(paths, symmetry=1))
 
 
 @dataclass(frozen=True)
@@ -245,11 +245,11 @@ class _Problem:
         self.structure, self.orders, self.coupled, self.cycles = turning.structure, orders, coupled, cycles
         self.gears, self.place, mean = turning.gears, turning.place, turning.mean
         lines = excited * turning.periods + 1
-        stiffness, deflection, force = (one[:, :lines] for one in turning.harmonics)
+        stiffness, deflection, force = (harmonics_[:, :lines] for harmonics_ in turning.harmonics)
         leading, owner, turns = turning.leading, turning.owner, turning.turns
         if orders.patterns == 1 and orders.periods == 1:
             _check_repeated((stiffness, deflection, force), orders, *turning.groups)
-            stiffness, deflection, force = (one[leading] for one in (stiffness, deflection, force))
+            stiffness, deflection, force = (values[leading] for values in (stiffness, deflection, force))
             owner, turns, mean = np.arange(len(leading)), np.zeros(len(leading), int), mean[leading]
         elif (apart := np.abs(mean - mean[leading][owner]).max()) > _EQUAL * mean.max():
             message = f"the mean stiffness of planets that repeat one another differs by {apart:.3g} N/m"
@@ -275,9 +275,9 @@ class _Problem:
         """Solve at a speed of the carrier [rad/s], positive."""
         blocks = blocks_of_speed(self.gears, self.structure, self.orders, self.place, speed, self.coupled)
         if self.damping is None:
-            found = self._solved(blocks, blocks.load(), None, None, max(tolerance, _FIRST))
-            found = self._solved(blocks, blocks.load(), None, found, tolerance)
-            return _Answer(found.force, None, found.residual, found.radius, found.products)
+            solved = self._solved(blocks, blocks.load(), None, None, max(tolerance, _FIRST))
+            solved = self._solved(blocks, blocks.load(), None, solved, tolerance)
+            return _Answer(solved.force, None, solved.residual, solved.radius, solved.products)
         return self._damped(blocks, self.damping, tolerance)
 
     def _solved(self, blocks: HarmonicBlocks, moved, given, before: _Solution | None, tolerance: float) -> _Solution:
@@ -304,18 +304,18 @@ class _Problem:
         """Solve with the damping of the set, whose forces follow the motion, pass by pass."""
         passes, accuracy = DampingPasses(damping, blocks), max(0.5 * tolerance, _FIRST)
         products, radius, change = 0, 0.0, 1.0
-        found: Any = None
+        solved: Any = None
         for _ in range(_PASSES):
-            found = self._solved(blocks, *passes.moved, found, accuracy)
-            products, radius = products + found.products, max(radius, found.radius)
-            size = self._fluctuating(found.force)
-            change, whole = passes.follow((found.extra, found.way, found.force), tolerance * size)
+            solved = self._solved(blocks, *passes.moved, solved, accuracy)
+            products, radius = products + solved.products, max(radius, solved.radius)
+            size = self._fluctuating(solved.force)
+            change, whole = passes.follow((solved.extra, solved.way, solved.force), tolerance * size)
             change /= size
             # what GMRES leaves unsolved no further pass will mend
-            if (whole and max(change, found.residual) <= tolerance) or found.residual > accuracy:
+            if (whole and max(change, solved.residual) <= tolerance) or solved.residual > accuracy:
                 break
             accuracy = max(0.5 * tolerance, min(_INNER * change, _FIRST))
-        return _Answer(found.force, passes.drag(), max(found.residual, change), radius, products)
+        return _Answer(solved.force, passes.drag(), max(solved.residual, change), radius, products)
 
     def _fluctuating(self, forces: np.ndarray) -> float:
         """Norm of forces (J, B, R) without those constant in time, which are often a thousand times it."""
@@ -377,11 +377,11 @@ class _Lines:
         # the other half of line 0 is its conjugate
         values[:, 0, :middle] = 0.0
         values[:, 0, middle] = np.real(every[:, 0, middle])
-        found = np.zeros((count, len(every)), complex)
-        _add_at(found, place, np.moveaxis(values, 0, -1))
-        found = found.T
-        found[:, 0] = np.real(found[:, 0])
-        return found
+        lines = np.zeros((count, len(every)), complex)
+        _add_at(lines, place, np.moveaxis(values, 0, -1))
+        lines = lines.T
+        lines[:, 0] = np.real(lines[:, 0])
+        return lines
 
     def _add_drag(self, drag: np.ndarray, orders: CarrierOrders, values: np.ndarray) -> None:
         """Add two-sided modal forces (B, S, m) to those (n_lines, m) at the orders of the structure."""
@@ -476,10 +476,10 @@ def structure_numbers(number: np.ndarray, across: np.ndarray, symmetry: int) -> 
 
 def _checked_harmonics(harmonics, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Mesh harmonics (n_speeds,) of excitation and response."""
-    excited, kept = (np.broadcast_to(one, count).tolist() for one in harmonics)
-    for one, other in dict.fromkeys(zip(excited, kept)):
-        checked_count(one, "excitation harmonics", code="E-HARMONICS")
-        checked_count(other, "response harmonics", code="E-HARMONICS", least=one)
+    excited, kept = (np.broadcast_to(harmonic, count).tolist() for harmonic in harmonics)
+    for excited_count, other in dict.fromkeys(zip(excited, kept)):
+        checked_count(excited_count, "excitation harmonics", code="E-HARMONICS")
+        checked_count(other, "response harmonics", code="E-HARMONICS", least=excited_count)
     return np.array(excited, int), np.array(kept, int)
 
 

@@ -162,11 +162,11 @@ class SetDamping:
     @cached_property
     def most_modes(self) -> int:
         """Modes M of the structure that move at one of its orders, at most."""
-        return max((len(one.modes) for residue in self.residues for one in residue.sectors), default=0)
+        return max((len(sector.modes) for residue in self.residues for sector in residue.sectors), default=0)
 
     def of(self, orders: CarrierOrders) -> SetDamping:
         """Take the same with other lines."""
-        residues = tuple(replace(one, blocks=orders.blocks(one.residue)) for one in self.residues)
+        residues = tuple(replace(residue, blocks=orders.blocks(residue.residue)) for residue in self.residues)
         return replace(self, orders=orders, residues=residues)
 
     def none(self, leaders: int) -> DampingForces:
@@ -178,39 +178,42 @@ class SetDamping:
 
     def on_all_modes(self, values: np.ndarray) -> np.ndarray:
         """Forces (B, S, m) on all modes of the structure by those (B, S, M) of `DampingForces`."""
-        found = np.zeros((*values.shape[:2], len(self.structure.natural_frequency)), values.dtype)
+        amplitudes = np.zeros((*values.shape[:2], len(self.structure.natural_frequency)), values.dtype)
         for residue in self.residues:
-            for one in residue.sectors:
-                at = np.ix_(residue.blocks, one.orders, one.modes)
-                found[at] = one.of_modes(values[residue.blocks])
-        return found
+            for sector in residue.sectors:
+                at = np.ix_(residue.blocks, sector.orders, sector.modes)
+                amplitudes[at] = sector.of_modes(values[residue.blocks])
+        return amplitudes
 
     def receptances(self, blocks: HarmonicBlocks) -> tuple[np.ndarray, np.ndarray]:
         """Receptances of the modes of gears (B, R, n_modes) and structure (B, S, M) at a speed [s^2]."""
         orders = self.orders.structure_order
-        found = np.zeros((*orders.shape, self.most_modes), complex)
+        receptances = np.zeros((*orders.shape, self.most_modes), complex)
         for residue in self.residues:
-            for one in residue.sectors:
-                own = self.structure.natural_frequency[one.modes], self.structure.damping_ratio[one.modes]
-                at = np.ix_(residue.blocks, one.orders, np.arange(len(one.modes)))
-                omega = blocks.speed * orders[np.ix_(residue.blocks, one.orders)]
-                found[at] = modal_receptance(*own, omega)
-        return compliance(blocks.gears.modes, blocks.speed * self.orders.order), found
+            for sector in residue.sectors:
+                modal_numbers = (
+                    self.structure.natural_frequency[sector.modes],
+                    self.structure.damping_ratio[sector.modes],
+                )
+                at = np.ix_(residue.blocks, sector.orders, np.arange(len(sector.modes)))
+                omega = blocks.speed * orders[np.ix_(residue.blocks, sector.orders)]
+                receptances[at] = modal_receptance(*modal_numbers, omega)
+        return compliance(blocks.gears.modes, blocks.speed * self.orders.order), receptances
 
     def single(self) -> SetDamping:
         """The same in single precision."""
         names = "shape", "own", "path"
         residues = tuple(
             replace(
-                one,
+                residue,
                 classes=tuple(
-                    replace(part, matrix=_single(part.matrix), rows=_single(part.rows)) for part in one.classes
+                    replace(part, matrix=_single(part.matrix), rows=_single(part.rows)) for part in residue.classes
                 ),
                 sectors=tuple(
-                    replace(part, **{name: _single(getattr(part, name)) for name in names}) for part in one.sectors
+                    replace(part, **{name: _single(getattr(part, name)) for name in names}) for part in residue.sectors
                 ),
             )
-            for one in self.residues
+            for residue in self.residues
         )
         return replace(self, residues=residues, rows=_single(self.rows))
 
@@ -220,13 +223,13 @@ class SetDamping:
         receptances,
         motion,
         before: DampingForces,
-        found: DampingForces,
-        some: np.ndarray | None = None,
+        forces: DampingForces,
+        numbers: np.ndarray | None = None,
     ) -> None:
         """Compute the forces of the damping by the motion at a speed, part by part of the blocks.
 
         By the `receptances`, in its precision, and by the motion: forces e (J, B, R) beyond k0, u (G, B, R),
-        forces f (J, B, R) of the meshes, and the forces of the damping in that motion. Into ``found``, of
+        forces f (J, B, R) of the meshes, and the forces of the damping in that motion. Into ``forces``, of
         all blocks or of some by their numbers.
         """
         extra, way, force = motion
@@ -236,63 +239,63 @@ class SetDamping:
         turned = np.exp(1j * np.outer(self.orders.diameters, blocks.place))
         if self.rows.dtype == np.complex64:
             excess, ring, turned = _single(excess), _single(ring), _single(turned)
-        size = sum(one[0].nbytes for one in found.parts[:2])
+        size = sum(axis_forces[0].nbytes for axis_forces in forces.parts[:2])
         for residue in self.residues:
-            here = residue.blocks if some is None else np.intersect1d(residue.blocks, some)
+            here = residue.blocks if numbers is None else np.intersect1d(residue.blocks, numbers)
             parts = int(np.ceil(len(here) * size / _TOGETHER))
             for part in np.array_split(here, parts) if parts else ():
                 loads = excess[:, part], ring[:, part], before.on_gears[part], before.on_structure[part]
                 answers = receptances[0][part], receptances[1][part]
-                self._answer_part(blocks, residue, part, (loads, answers), turned, found)
+                self._answer_part(blocks, residue, part, (loads, answers), turned, forces)
 
     def _answer_part(
-        self, blocks: HarmonicBlocks, residue: _Residue, some, loads, turned, found: DampingForces
+        self, blocks: HarmonicBlocks, residue: _Residue, numbers, loads, turned, forces: DampingForces
     ) -> None:
-        """Write the answer of some blocks of a residue to loads on meshes, ring and modes into ``found``."""
+        """Write the answer of some blocks of a residue to loads on meshes, ring and modes into ``forces``."""
         (excess, ring, load, on_modes), (gears, structure) = loads
-        orders, kind = self.orders, found.still.dtype
-        for one in residue.classes:
-            load[:, one.bands] -= rows_times(np.moveaxis(excess[:, :, one.bands], 0, -1), one.rows)
+        orders, kind = self.orders, forces.still.dtype
+        for class_ in residue.classes:
+            load[:, class_.bands] -= rows_times(np.moveaxis(excess[:, :, class_.bands], 0, -1), class_.rows)
         ring, moved, waves = _padded(np.moveaxis(ring, 0, -1)), list[np.ndarray](), list[np.ndarray]()
-        for one in residue.sectors:
-            path = np.sum(ring[:, one.bands] * turned[one.diameters].conj(), axis=-1)
-            motion = rows_times(orders.paths.symmetry * path, one.path.conj().T) + one.of_modes(on_modes)
-            moved.append(motion * one.of_modes(structure))
-            waves.append(rows_times(moved[-1], one.shape))
-        on_gears, on_waves = self._on_waves(residue, blocks.speed, some, load * gears, _joined(waves))
-        order = (1j * blocks.speed * orders.structure_order[some, :, None]).astype(kind)
+        for class_ in residue.sectors:
+            path = np.sum(ring[:, class_.bands] * turned[class_.diameters].conj(), axis=-1)
+            motion = rows_times(orders.paths.symmetry * path, class_.path.conj().T) + class_.of_modes(on_modes)
+            moved.append(motion * class_.of_modes(structure))
+            waves.append(rows_times(moved[-1], class_.shape))
+        on_gears, on_waves = self._on_waves(residue, blocks.speed, numbers, load * gears, _joined(waves))
+        order = (1j * blocks.speed * orders.structure_order[numbers, :, None]).astype(kind)
         on_structure, waves = np.zeros_like(structure), list[np.ndarray]()
-        for one, motion in zip(residue.sectors, moved):
-            made = rows_times(on_waves[:, one.place], one.shape.conj().T)
-            made -= order[:, one.orders] * rows_times(motion, one.own)
-            on_structure[:, one.orders, : len(one.modes)] = made
-            waves.append(rows_times(made * one.of_modes(structure), one.path))
+        for class_, motion in zip(residue.sectors, moved):
+            made = rows_times(on_waves[:, class_.place], class_.shape.conj().T)
+            made -= order[:, class_.orders] * rows_times(motion, class_.own)
+            on_structure[:, class_.orders, : len(class_.modes)] = made
+            waves.append(rows_times(made * class_.of_modes(structure), class_.path))
         path = _joined(waves)
-        for one in residue.classes:
-            moved = rows_times(path[:, one.path_place], turned[one.diameters])
-            found.way[:, some[:, None], one.bands] = np.moveaxis(moved, -1, 0)
-        found.on_gears[some], found.on_structure[some] = on_gears, on_structure
-        found.still[:, some] = np.moveaxis(rows_times(on_gears * gears, self.rows.T), -1, 0)
+        for class_ in residue.classes:
+            moved = rows_times(path[:, class_.path_place], turned[class_.diameters])
+            forces.way[:, numbers[:, None], class_.bands] = np.moveaxis(moved, -1, 0)
+        forces.on_gears[numbers], forces.on_structure[numbers] = on_gears, on_structure
+        forces.still[:, numbers] = np.moveaxis(rows_times(on_gears * gears, self.rows.T), -1, 0)
 
-    def _on_waves(self, residue: _Residue, speed: float, some, gears: np.ndarray, waves: np.ndarray):
+    def _on_waves(self, residue: _Residue, speed: float, numbers, gears: np.ndarray, waves: np.ndarray):
         """Forces on the modes of the gears (b, R, n_modes) and on waves (b, n + 1) by their motions.
 
         Of the waves those of all sectors follow one another, the forces of all classes.
         """
         modes, kind = gears.shape[2], gears.dtype
-        order = -1j * speed * self.orders.order[some][..., None]
+        order = -1j * speed * self.orders.order[numbers][..., None]
         on_gears, on_waves = np.empty_like(gears), list[np.ndarray]()
-        for one in residue.classes:
-            turning = order[:, one.bands]
+        for class_ in residue.classes:
+            turning = order[:, class_.bands]
             motion = np.concatenate(
                 [
-                    turning.astype(kind) * gears[:, one.bands],
-                    (turning + 1j * speed * one.number).astype(kind) * waves[:, one.place],
+                    turning.astype(kind) * gears[:, class_.bands],
+                    (turning + 1j * speed * class_.number).astype(kind) * waves[:, class_.place],
                 ],
                 axis=2,
             )
-            made = rows_times(motion, one.matrix.T)
-            on_gears[:, one.bands] = made[..., :modes]
+            made = rows_times(motion, class_.matrix.T)
+            on_gears[:, class_.bands] = made[..., :modes]
             on_waves.append(made[..., modes:])
         return on_gears, _joined(on_waves)
 
@@ -302,10 +305,10 @@ def _single(values: np.ndarray) -> np.ndarray:
 
     Lines that vanish but for rounding end in numbers that processors are slow with.
     """
-    found = np.asarray(values).astype(np.complex64)
-    size = np.abs(found)
-    found[size < _NOTHING * size.max(initial=0.0)] = 0.0
-    return found
+    single = np.asarray(values).astype(np.complex64)
+    size = np.abs(single)
+    single[size < _NOTHING * size.max(initial=0.0)] = 0.0
+    return single
 
 
 def _joined(parts: list[np.ndarray]) -> np.ndarray:
@@ -376,9 +379,9 @@ def set_damping(matrix, leading: LeadingMeshes, structure: FixedStructure, order
     shape, top, N = structure.wave_shape, orders.max_diameter, orders.paths.symmetry
     modal = 2.0 * structure.damping_ratio * structure.natural_frequency
     near = np.flatnonzero(np.abs(n) <= top)
-    own = np.real((shape.conj() * mean) @ shape.T) - np.diag(modal)
+    in_modes = np.real((shape.conj() * mean) @ shape.T) - np.diag(modal)
     kept = np.append(np.arange(modes), modes + near)
-    waves = _Waves(orders, structure, near, whole[np.ix_(kept, kept)], own)
+    waves = _Waves(orders, structure, near, whole[np.ix_(kept, kept)], in_modes)
     residues = tuple(_residue(waves, leading, residue) for residue in range(N))
     return SetDamping(orders, residues, structure, leading.rows)
 
@@ -413,12 +416,12 @@ def _table(parts, shape: tuple[int, int]) -> np.ndarray:
 
     In the last row, and of pairs that no part has, the number of those that there are.
     """
-    found, count = np.full((shape[0] + 1, shape[1]), -1), 0
+    table, count = np.full((shape[0] + 1, shape[1]), -1), 0
     for rows, columns in parts:
         size = len(rows) * len(columns)
-        found[np.ix_(rows, columns)] = count + np.arange(size).reshape(len(rows), len(columns))
+        table[np.ix_(rows, columns)] = count + np.arange(size).reshape(len(rows), len(columns))
         count += size
-    return np.where(found < 0, count, found)
+    return np.where(table < 0, count, table)
 
 
 def _residue(waves: _Waves, leading: LeadingMeshes, residue: int) -> _Residue:
@@ -429,7 +432,7 @@ def _residue(waves: _Waves, leading: LeadingMeshes, residue: int) -> _Residue:
         waves.orders.paths.symmetry,
         leading.rows.shape[1],
     )
-    known, bands, spacing = orders.structure_bands(residue), orders.bands, orders.spacing
+    in_structure, bands, spacing = orders.structure_bands(residue), orders.bands, orders.spacing
     number, path = waves.number, waves.path_number
     met = [
         [np.flatnonzero(there) for there in ((residue + bands) % N == c, (c - number) % N == 0, (c - path) % N == 0)]
@@ -437,43 +440,43 @@ def _residue(waves: _Waves, leading: LeadingMeshes, residue: int) -> _Residue:
     ]
     here = [
         [
-            np.flatnonzero((known - first) % spacing == 0),
-            *(np.flatnonzero((first + one) % spacing == 0) for one in (number, path)),
+            np.flatnonzero((in_structure - first) % spacing == 0),
+            *(np.flatnonzero((first + offsets) % spacing == 0) for offsets in (number, path)),
             first,
         ]
         for first in range(spacing)
     ]
-    here = [one for one in here if len(one[0]) and len(one[2])]
+    here = [met_ for met_ in here if len(met_[0]) and len(met_[2])]
     to, back = orders.meeting(residue)
     place = np.searchsorted(orders.diameters, structure.wave_order[waves.near])
-    S, R, W, n = len(known), len(bands), len(number), len(path)
-    at_orders = _table([one[:2] for one in here], (S, W))
-    path_at_orders = _table([(one[0], one[2]) for one in here], (S, n))
-    at_bands = _table([one[:2] for one in met], (R, W))
+    S, R, W, n = len(in_structure), len(bands), len(number), len(path)
+    at_orders = _table([met_[:2] for met_ in here], (S, W))
+    path_at_orders = _table([(met_[0], met_[2]) for met_ in here], (S, n))
+    at_bands = _table([met_[:2] for met_ in met], (R, W))
     classes, sectors = list[_Class](), list[_Sector]()
-    for c, (rows, own, on_path) in enumerate(met):
-        kept = np.append(np.arange(modes), modes + own)
+    for c, (rows, waves_there, on_path) in enumerate(met):
+        kept = np.append(np.arange(modes), modes + waves_there)
         classes.append(
             _Class(
                 rows,
                 waves.whole[np.ix_(kept, kept)],
                 leading.folded[c],
-                number[own],
-                at_orders[to[np.ix_(rows, place[own])], own],
+                number[waves_there],
+                at_orders[to[np.ix_(rows, place[waves_there])], waves_there],
                 on_path,
                 path_at_orders[to[np.ix_(rows, on_path)], on_path],
             )
         )
-    for rows, own, on_path, first in here:
+    for rows, waves_there, on_path, first in here:
         moved = structure.moved_by((first + path) % spacing == 0)
-        shape = structure.wave_shape[np.ix_(moved, waves.near[own])]
+        shape = structure.wave_shape[np.ix_(moved, waves.near[waves_there])]
         sectors.append(
             _Sector(
                 rows,
                 moved,
                 shape,
                 waves.own[np.ix_(moved, moved)],
-                at_bands[back[np.ix_(rows, place[own])], own],
+                at_bands[back[np.ix_(rows, place[waves_there])], waves_there],
                 structure.ring_shape[np.ix_(moved, on_path)],
                 on_path,
                 back[np.ix_(rows, on_path)],

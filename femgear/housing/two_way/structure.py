@@ -124,13 +124,13 @@ class FixedStructure(ReadOnlyArrays):
         if not ((self.damping_ratio >= 0) & (self.damping_ratio < 1)).all():
             message, limit = "damping ratios of the structure", "0 or more, below 1"
             raise CaseError(message, code="E-DAMPING", value=self.damping_ratio.tolist(), limit=limit)
-        for name, one, other in (
+        for name, first, second in (
             ("ring_shape", self.ring_shape, self.ring_shape[:, ::-1]),
             ("residual", self.residual, self.residual.T),
             ("residual", self.residual, self.residual[::-1, ::-1]),
             ("sensor_residual", self.sensor_residual, self.sensor_residual[:, ::-1]),
         ):
-            if np.abs(one - other.conj()).max(initial=0.0) > _ROUNDING * np.abs(one).max(initial=0.0):
+            if np.abs(first - second.conj()).max(initial=0.0) > _ROUNDING * np.abs(first).max(initial=0.0):
                 message, limit = "no real displacement has such coefficients", "that of -n conjugate to n"
                 raise CaseError(message, code="E-SYMMETRY", key=name, limit=f"{limit}, compliances Hermitian")
 
@@ -146,8 +146,8 @@ class FixedStructure(ReadOnlyArrays):
         for shape, order in ((self.ring_shape, n), (self.wave_shape, self.wave_order)):
             if len(order):
                 size = np.abs(shape)
-                own = size[:, np.isin(order, n[waves])].max(axis=1, initial=0.0)
-                moved |= own > _NOTHING * size.max(axis=1, initial=0.0)
+                size_of_group = size[:, np.isin(order, n[waves])].max(axis=1, initial=0.0)
+                moved |= size_of_group > _NOTHING * size.max(axis=1, initial=0.0)
         return np.flatnonzero(moved)
 
     def combined(self, weights) -> FixedStructure:
@@ -345,8 +345,8 @@ def circumferential(ring: CyclicModes, values, max_diameter: int) -> np.ndarray:
     n, single = ring.nodal_diameter[mode], ~ring.paired[mode]
     value = np.where(sine, -1j, 1.0) * np.where(single, 1.0, 0.5) * (ring.norm * values)[mode]
     columns = np.zeros((len(mode), 2 * max_diameter + 1), complex)
-    for own, sign in ((n <= max_diameter, 1), ((n <= max_diameter) & ~single, -1)):
-        columns[own, max_diameter + sign * n[own]] = value[own] if sign > 0 else np.conj(value[own])
+    for kept, sign in ((n <= max_diameter, 1), ((n <= max_diameter) & ~single, -1)):
+        columns[kept, max_diameter + sign * n[kept]] = value[kept] if sign > 0 else np.conj(value[kept])
     return columns
 
 
@@ -397,13 +397,13 @@ class _Places:
 def _patches(supports: Sequence[Support], top: int) -> tuple[_Places, np.ndarray, np.ndarray]:
     """Cut supports into patches that waves of an order resolve; their stiffness [N/m] and mass [kg] (p,)."""
     rows = list[tuple[float, ...]]()
-    for one in supports:
-        count = max(int(np.ceil(2 * top * one.width)), 1)
-        width = one.width / count
+    for support in supports:
+        count = max(int(np.ceil(2 * top * support.width)), 1)
+        width = support.width / count
         for i in range(count):
-            angle = one.angle + (i - 0.5 * (count - 1)) * width
-            for turned, stiffness in ((0.0, one.radial_stiffness), (0.5 * np.pi, one.tangential_stiffness)):
-                rows.append((angle, width, turned, stiffness / count, one.mass / count))
+            angle = support.angle + (i - 0.5 * (count - 1)) * width
+            for turned, stiffness in ((0.0, support.radial_stiffness), (0.5 * np.pi, support.tangential_stiffness)):
+                rows.append((angle, width, turned, stiffness / count, support.mass / count))
     angle, width, direction, stiffness, mass = np.array(rows).reshape(-1, 5).T
     return _Places(angle, width, direction, np.full(len(angle), np.inf)), stiffness, mass
 
@@ -414,9 +414,9 @@ def _beyond_modes(rim: np.ndarray, radial, tangential, omega: np.ndarray) -> np.
     Radial and tangential displacement (n_coordinates, 2 top + 1) of the coordinates. Free motions have none.
     """
     top, fields = radial.shape[1] // 2, np.stack([radial, tangential])[:, omega > 0.0]
-    known = np.einsum("icn,jcn,c->nij", fields, fields.conj(), 1.0 / omega[omega > 0.0] ** 2)[top:]
+    of_modes = np.einsum("icn,jcn,c->nij", fields, fields.conj(), 1.0 / omega[omega > 0.0] ** 2)[top:]
     rest = np.array(rim)
-    rest[: top + 1] -= known[: len(rest)]
+    rest[: top + 1] -= of_modes[: len(rest)]
     values, ways = np.linalg.eigh(rest)
     # differences of rounding are no negative compliance
     return (ways * np.maximum(values, 0.0)[:, None]) @ ways.conj().swapaxes(1, 2)
@@ -424,17 +424,17 @@ def _beyond_modes(rim: np.ndarray, radial, tangential, omega: np.ndarray) -> np.
 
 def _compliance(rest: np.ndarray | None, loads: _Places, seen: _Places) -> np.ndarray:
     """Compliance (n_loads, n_seen) of the outer surface beyond its modes between places [m/N]."""
-    found = np.zeros((len(loads.angle), len(seen.angle)))
+    compliance = np.zeros((len(loads.angle), len(seen.angle)))
     if rest is None:
-        return found
+        return compliance
     order = np.arange(len(rest))
     weight = np.where(order == 0, 1.0, 2.0)
     acting, watched = loads.factors(order), seen.factors(order)
     for i, to in enumerate((np.cos(seen.direction), np.sin(seen.direction))):
         for j, of in enumerate((np.cos(loads.direction), np.sin(loads.direction))):
             waves = (acting.conj() * (weight * rest[:, i, j])) @ watched.T
-            found += of[:, None] * np.real(waves) * to
-    return found * (loads.width > 0.0)[:, None]
+            compliance += of[:, None] * np.real(waves) * to
+    return compliance * (loads.width > 0.0)[:, None]
 
 
 def _held(
@@ -456,12 +456,12 @@ def _held(
     rode = at - carried @ between
     K, M = np.diag(omega**2) + (carried - at * stiffness) @ at.T, np.eye(len(omega))
     M = M + (rode * mass) @ rode.T - (at * mass) @ at.T
-    for one in supports:
+    for support in supports:
         apart = n[:, None] - n
-        mean = np.exp(1j * apart * one.angle) * np.sinc(apart * one.width / (2 * np.pi))
-        for spring, felt in zip((one.radial_stiffness, one.tangential_stiffness), fields):
+        mean = np.exp(1j * apart * support.angle) * np.sinc(apart * support.width / (2 * np.pi))
+        for spring, felt in zip((support.radial_stiffness, support.tangential_stiffness), fields):
             both = np.real(felt @ mean @ felt.conj().T)
-            K, M = K + spring * both, M + one.mass * both
+            K, M = K + spring * both, M + support.mass * both
     return K, M, carried
 
 
@@ -470,13 +470,13 @@ def equal_sectors(supports: Sequence[Support], most: int) -> int:
     if not supports:
         return most
     kinds = dict[tuple[float, ...], list[float]]()
-    for one in supports:
-        kind = one.radial_stiffness, one.tangential_stiffness, one.mass, one.width
-        kinds.setdefault(kind, []).append(one.angle)
+    for support in supports:
+        kind = support.radial_stiffness, support.tangential_stiffness, support.mass, support.width
+        kinds.setdefault(kind, []).append(support.angle)
     places = [np.array(angles) for angles in kinds.values()]
-    for sectors in range(min(len(one) for one in places), 1, -1):
-        turned = [np.subtract.outer(one + 2 * np.pi / sectors, one) for one in places]
-        if all((np.abs(np.sin(0.5 * one)).min(axis=1) < _SAME_PLACE).all() for one in turned):
+    for sectors in range(min(len(place) for place in places), 1, -1):
+        turned = [np.subtract.outer(place + 2 * np.pi / sectors, place) for place in places]
+        if all((np.abs(np.sin(0.5 * difference)).min(axis=1) < _SAME_PLACE).all() for difference in turned):
             return sectors
     return 1
 
@@ -543,7 +543,7 @@ def supported_ring(  # noqa: PLR0913
     """
     top = max(int(ring.nodal_diameter.max()), max_diameter)
     path, radial, tangential = (
-        circumferential(ring, one, top) for one in (ring.load[:, 0], ring.output[:, 0], ring.output[:, 1])
+        circumferential(ring, wave_shape, top) for wave_shape in (ring.load[:, 0], ring.output[:, 0], ring.output[:, 1])
     )
     omega = 2 * np.pi * ring.frequency[_coordinates(ring)[0]]
     rest = None if rim is None else _beyond_modes(rim, radial, tangential, omega)
@@ -555,8 +555,8 @@ def supported_ring(  # noqa: PLR0913
     sensors = _Places(
         *np.broadcast_arrays(
             *(
-                np.atleast_1d(one).astype(float)
-                for one in (sensor_angles, sensor_widths, sensor_directions, sensor_waves)
+                np.atleast_1d(values).astype(float)
+                for values in (sensor_angles, sensor_widths, sensor_directions, sensor_waves)
             )
         )
     )

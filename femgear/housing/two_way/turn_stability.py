@@ -66,24 +66,24 @@ def turn_stability(
         np.atleast_1d(np.asarray(carrier_speed, float)),
         carrier_turns(paths.z_ring, excitation.periods),
     )
-    found, kept, taken = np.empty(len(speeds), complex), *np.empty((2, len(speeds)), int)
+    largest, kept, taken = np.empty(len(speeds), complex), *np.empty((2, len(speeds)), int)
     for i, speed in enumerate(speeds):
         reach = harmonics * frequency_ratio
-        one = _Turn(gears, structure, paths, excitation, damping, speed, harmonics, reach)
-        fastest = 2 * np.pi * one.natural.max(initial=0.0) / abs(speed)
+        turn = _Turn(gears, structure, paths, excitation, damping, speed, harmonics, reach)
+        fastest = 2 * np.pi * turn.natural.max(initial=0.0) / abs(speed)
         least = max(fastest / _STEP_ANGLE, _STEPS_PER_HARMONIC * harmonics * paths.z_ring)
-        matrix, taken[i] = _extrapolated(one, int(np.ceil(least * turns)), tolerance)
-        values, kept[i] = np.append(np.linalg.eigvals(matrix), one.static), len(one.natural)
-        found[i] = values[np.abs(values).argmax()]
-    return Stability(np.abs(speeds) * paths.z_ring / (2 * np.pi), found, kept, taken)
+        matrix, taken[i] = _extrapolated(turn, int(np.ceil(least * turns)), tolerance)
+        values, kept[i] = np.append(np.linalg.eigvals(matrix), turn.static), len(turn.natural)
+        largest[i] = values[np.abs(values).argmax()]
+    return Stability(np.abs(speeds) * paths.z_ring / (2 * np.pi), largest, kept, taken)
 
 
-def _extrapolated(one: _Turn, steps: int, tolerance: float) -> tuple[np.ndarray, int]:
+def _extrapolated(turn: _Turn, steps: int, tolerance: float) -> tuple[np.ndarray, int]:
     """Transition matrix over a turn whose largest multiplier has an error, and the steps that it takes."""
-    row, change = [one.monodromy(steps)], np.inf
+    row, change = [turn.monodromy(steps)], np.inf
     for _ in range(_HALVED):
         before, steps = row, 2 * steps
-        row = [one.monodromy(steps)]
+        row = [turn.monodromy(steps)]
         if not _largest(before[0]) < _FAR * max(_largest(row[0]), 1.0):
             continue  # kicks so far apart that the scheme itself grows tell nothing
         for k, coarse in enumerate(before):
@@ -116,10 +116,11 @@ class _Turn:
         cut = reach * paths.z_ring * speed
         frequencies = 2 * np.pi * gears.frequency, structure.natural_frequency
         ratios = gears.damping_ratio, structure.damping_ratio
-        moving = [(one > 0.0) & (one <= cut) for one in frequencies]
-        left = [one > cut for one in frequencies]
+        moving = [(frequency > 0.0) & (frequency <= cut) for frequency in frequencies]
+        left = [frequency > cut for frequency in frequencies]
         self.natural, self.ratio = (
-            np.concatenate([one[own] for one, own in zip(both, moving)]) for both in (frequencies, ratios)
+            np.concatenate([values[followed] for values, followed in zip(both, moving)])
+            for both in (frequencies, ratios)
         )
         slowest = min([(z[o] * w[o]).min() for z, w, o in zip(ratios, frequencies, left) if o.any()] or [np.inf])
         self.speed = speed
@@ -128,9 +129,11 @@ class _Turn:
         self.n = np.arange(-structure.max_diameter, structure.max_diameter + 1)
         self.stiffness, self.mean = mesh_harmonics(excitation, harmonics)[0], gears.mesh_stiffness
         self.base = teeth
-        rows, P, (own, others) = gears.mesh_deflection, structure.ring_shape, left
+        rows, P, (static_modes, others) = gears.mesh_deflection, structure.ring_shape, left
         self.rows, self.path = rows[:, moving[0]], P[moving[1]]
-        self.flexibility = gears.residual + (rows[:, own] / frequencies[0][own] ** 2) @ rows[:, own].T
+        self.flexibility = (
+            gears.residual + (rows[:, static_modes] / frequencies[0][static_modes] ** 2) @ rows[:, static_modes].T
+        )
         self.residual = structure.residual + (P[others] / frequencies[1][others, None] ** 2).T @ P[others].conj()
         # damping matrix of the modes over the angle: real lines, twice the reach of the waves high
         self.drag: Any = None
@@ -167,8 +170,8 @@ class _Turn:
         w, z = self.natural, self.ratio
         damped = np.sqrt(1.0 - z**2)
         c, s, decay = np.cos(damped * w * dt), np.sin(damped * w * dt) / damped, np.exp(-z * w * dt)
-        own = np.concatenate([decay * (c + z * s), decay * (c - z * s)])
-        return own[:, None], np.concatenate([decay * s, -decay * s])[:, None]
+        same = np.concatenate([decay * (c + z * s), decay * (c - z * s)])
+        return same[:, None], np.concatenate([decay * s, -decay * s])[:, None]
 
     def _kicks(self, theta: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
         """Velocity over frequency after a step by displacement and by velocity before, (n, m, m) each."""
@@ -202,6 +205,6 @@ class _Turn:
         return both[..., : len(eye)], both[..., len(eye) :]
 
 
-def _moved(state: np.ndarray, own: np.ndarray, other: np.ndarray) -> np.ndarray:
+def _moved(state: np.ndarray, same: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Displacements and velocities over frequencies (2 m, n) after a free motion."""
-    return own * state + other * np.roll(state, len(state) // 2, axis=0)
+    return same * state + other * np.roll(state, len(state) // 2, axis=0)

@@ -279,8 +279,8 @@ def _at_parameter(curve: ScaledCurve, guess: np.ndarray, bound: float, along: np
     """Point of the curve at the scaled parameter ``bound``, exactly."""
     axis = np.zeros(len(guess))
     axis[-1] = 1.0
-    found = correct(curve, np.append(guess[:-1], bound), axis, along=along)
-    return replace(found, z=np.append(found.z[:-1], bound))
+    corrected = correct(curve, np.append(guess[:-1], bound), axis, along=along)
+    return replace(corrected, z=np.append(corrected.z[:-1], bound))
 
 
 def _until_end(segment: Segment, events):
@@ -305,8 +305,8 @@ def _at_bound(segment: Segment, low, high, bound: float):
     if low[1].z[-1] == bound:
         # the curve starts at the bound and leaves at once
         return low[0] + np.finfo(float).tiny, replace(low[1], kind="end")
-    ends, known = dict((low, high)), {h: point.z[-1] - bound for h, point in (low, high)}
-    h = bracketed_root(lambda h: segment.at(h).z[-1] - bound, known, xtol=1e-13 * segment.length)
+    ends, distance_at = dict((low, high)), {h: point.z[-1] - bound for h, point in (low, high)}
+    h = bracketed_root(lambda h: segment.at(h).z[-1] - bound, distance_at, xtol=1e-13 * segment.length)
     near = ends[h] if h in ends else segment.at(h)
     try:
         exact = _at_parameter(segment.curve, near.z, bound, near.tangent)

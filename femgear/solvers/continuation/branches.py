@@ -36,7 +36,7 @@ def _of_curve(name: str, text: str) -> property:
 
 def _of_solutions(name: str, text: str) -> property:
     """Property of a branch that every solution has, as an array (p,)."""
-    return property(lambda branch: np.array([getattr(one, name) for one in branch.solutions]), doc=text)
+    return property(lambda branch: np.array([getattr(solution, name) for solution in branch.solutions]), doc=text)
 
 
 @dataclass(frozen=True)
@@ -302,15 +302,15 @@ class ContinuationProblem:
 
     def balance_at(self, parameter: float) -> HarmonicBalance:
         """Make the equations at a parameter; modes stay where masses, stiffnesses and loads do."""
-        known = self.balance
+        balance = self.balance
         if self.family is None:
-            return known
+            return balance
         problem = self.family(parameter)
         return harmonic_balance(
             problem,
-            orders=known.orders,
+            orders=balance.orders,
             samples=self.samples,
-            reduction=known.reduction if _same_linear_part(problem, known.problem) else None,
+            reduction=balance.reduction if _same_linear_part(problem, balance.problem) else None,
         )
 
     def evaluate(self, y, parameter: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -435,24 +435,24 @@ def _advice(last: PeriodicSolution, equations: ContinuationProblem) -> str:
     """What to change where a branch was lost."""
     balance = equations.balance
     unsmoothed = any(getattr(element, "smoothing", 1.0) == 0.0 for element in balance.problem.elements)
-    found = ["start from the other end of the range"]
+    advice = ["start from the other end of the range"]
     if last.tail > _LONG_TAIL:
-        found.append(f"take more than {int(np.abs(last.orders).max())} harmonics")
+        advice.append(f"take more than {int(np.abs(last.orders).max())} harmonics")
     if unsmoothed and balance.longest:
-        found.append(f"give the elements a smoothing length, such as {1e-2 * balance.longest:.2g} m")
+        advice.append(f"give the elements a smoothing length, such as {1e-2 * balance.longest:.2g} m")
     elif not unsmoothed:
-        found.append(f"take more samples than {max(balance.grid.samples)}")
-    return ", or ".join([*found, "lower StepOptions(smallest)"])
+        advice.append(f"take more samples than {max(balance.grid.samples)}")
+    return ", or ".join([*advice, "lower StepOptions(smallest)"])
 
 
-def _same_linear_part(one: NonlinearSystem, other: NonlinearSystem) -> bool:
+def _same_linear_part(first: NonlinearSystem, other: NonlinearSystem) -> bool:
     """Whether two problems differ in their elements only."""
-    if one.system is other.system and one.forces is other.forces and one.speed == other.speed:
+    if first.system is other.system and first.forces is other.forces and first.speed == other.speed:
         return True
     arrays = [
         [s.M, s.K, s.W, s.load, problem.damping, *(f.force for f in problem.forces)]
-        for problem in (one, other)
+        for problem in (first, other)
         for s in (problem.system,)
     ]
-    same_orders = [f.orders for f in one.forces] == [f.orders for f in other.forces]
+    same_orders = [f.orders for f in first.forces] == [f.orders for f in other.forces]
     return same_orders and all(np.array_equal(a, b) for a, b in zip(*arrays))

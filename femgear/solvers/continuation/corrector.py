@@ -382,12 +382,12 @@ def folds(segment: Segment) -> list[tuple[float, CurvePoint]]:
     inner = _steepest(segment)
     if inner is not None:
         ends.insert(1, (inner, segment.at(inner).tangent[-1]))
-    found = []
+    points = []
     for low, high in pairwise(ends):
         if low[1] * high[1] < 0.0 and abs(low[1]) > _START:
             h = bracketed_root(lambda h: segment.at(h).tangent[-1], dict((low, high)), xtol=1e-13 * high[0])
-            found.append((h, replace(segment.at(h), kind="fold")))
-    return [(h, point) for h, point in found if h > _START * segment.length]
+            points.append((h, replace(segment.at(h), kind="fold")))
+    return [(h, point) for h, point in points if h > _START * segment.length]
 
 
 def _steepest(segment: Segment) -> float | None:
@@ -437,15 +437,15 @@ def _singular_place(tau, length: float, at_low: float, at_high: float) -> float:
 
     Rounding grows with one over tau, so that points very near the zero cannot be corrected to tolerance.
     """
-    known = {0.0: at_low, length: at_high}
+    value_at = {0.0: at_low, length: at_high}
     try:
-        return bracketed_root(tau, known, xtol=1e-13 * length)
+        return bracketed_root(tau, value_at, xtol=1e-13 * length)
     except _RoundingError:
-        low = max(h for h in known if known[h] * at_low > 0.0)
-        high = min(h for h in known if known[h] * at_high > 0.0)
+        low = max(h for h in value_at if value_at[h] * at_low > 0.0)
+        high = min(h for h in value_at if value_at[h] * at_high > 0.0)
         if high < low:
             raise
-        return low + (high - low) * known[low] / (known[low] - known[high])
+        return low + (high - low) * value_at[low] / (value_at[low] - value_at[high])
 
 
 def _turned(segment: Segment, h: float) -> CurvePoint:
@@ -484,16 +484,16 @@ def _on_both(segment: Segment, h: float) -> CurvePoint:
     return CurvePoint(z, tangent / np.linalg.norm(tangent), derivative, 0.0, 0, 0.0, error, "branch point")
 
 
-def bracketed_root(function: Callable[[float], float], known: dict[float, float], *, xtol: float) -> float:
+def bracketed_root(function: Callable[[float], float], value_at: dict[float, float], *, xtol: float) -> float:
     """Find the zero of a function to ``xtol`` between two places of different sign (Brent).
 
-    ``known`` has the values at both places and collects all others.
+    ``value_at`` has the values at both places and collects all others.
     """
     from scipy.optimize import root_scalar
 
     def value(h: float) -> float:
-        if h not in known:
-            known[h] = function(h)
-        return known[h]
+        if h not in value_at:
+            value_at[h] = function(h)
+        return value_at[h]
 
-    return root_scalar(value, bracket=tuple(known), method="brentq", xtol=xtol, rtol=1e-14).root
+    return root_scalar(value, bracket=tuple(value_at), method="brentq", xtol=xtol, rtol=1e-14).root

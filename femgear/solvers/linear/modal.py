@@ -472,8 +472,8 @@ def _held(mass, stiffness, rigid):
     """Cholesky factor of ``K + a M R R^T M``: the elastic part as it is, rigid motions held by a spring a."""
     carried = mass @ rigid
     # as soft as the softest coordinate: a stiff spring would drown soft couplings in its rounding
-    own = np.diag(stiffness) / np.diag(mass)
-    weight = own[own > 0.0].min(initial=np.inf)
+    ratio_of_diagonals = np.diag(stiffness) / np.diag(mass)
+    weight = ratio_of_diagonals[ratio_of_diagonals > 0.0].min(initial=np.inf)
     weight = weight if np.isfinite(weight) else 1.0
     try:
         return scipy.linalg.cho_factor(stiffness + weight * (carried @ carried.T), lower=True)

@@ -361,10 +361,10 @@ def reduce_directly(problem: NonlinearSystem) -> DirectReduction | None:
     if system.flexibility is not None:
         return None
     stiffness = total_stiffness(system, reference)
-    own = np.diag(stiffness)
-    if not np.all(own > 0.0):
+    diagonal = np.diag(stiffness)
+    if not np.all(diagonal > 0.0):
         return None
-    scale = 1.0 / np.sqrt(own)
+    scale = 1.0 / np.sqrt(diagonal)
     mass, damping, stiffness = (scale[:, None] * a * scale for a in (system.M, problem.damping, stiffness))
     try:
         factor, inertia = linalg.cho_factor(stiffness), linalg.cho_factor(mass)

@@ -354,12 +354,12 @@ def _critical(tracked: TrackedModes, orders) -> tuple[CriticalSpeed, ...]:
 
     rising = np.argsort(tracked.value)
     speed, angular = tracked.value[rising], tracked.eigenvalue.imag[rising]
-    found = []
+    speeds = []
     apart = 1e-9 * np.ptp(speed)
     for order in orders:
-        for branch, one in enumerate(angular.T):
-            roots = np.sort(PchipInterpolator(speed, one - order * speed).roots(extrapolate=False))
+        for branch, frequency in enumerate(angular.T):
+            roots = np.sort(PchipInterpolator(speed, frequency - order * speed).roots(extrapolate=False))
             # a root at a knot is found from both sides
             for s in roots[np.append(True, np.diff(roots) > apart)[: len(roots)]]:
-                found.append(CriticalSpeed(float(s), float(order * s / (2 * np.pi)), branch, float(order)))
-    return tuple(sorted(found, key=lambda one: one.speed))
+                speeds.append(CriticalSpeed(float(s), float(order * s / (2 * np.pi)), branch, float(order)))
+    return tuple(sorted(speeds, key=lambda critical: critical.speed))

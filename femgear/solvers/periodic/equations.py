@@ -136,8 +136,8 @@ class HarmonicBalance:
         """Compute forces (N, n_columns) [N] and tangents (N, n_pairs) [N/m] less the reference springs."""
         reference, x = self.reduction.reference, self.grid.values(lines)
         force, tangent = forces_on_grid(self.elements, self.pairs, x, self.grid.theta)
-        own = self.pairs[:, 0] == self.pairs[:, 1]
-        tangent[:, own] -= reference[self.pairs[own, 0]]
+        of_itself = self.pairs[:, 0] == self.pairs[:, 1]
+        tangent[:, of_itself] -= reference[self.pairs[of_itself, 0]]
         return force - reference * x, tangent
 
     def receptance(self, frequency) -> tuple[np.ndarray, np.ndarray]:
@@ -188,9 +188,9 @@ class HarmonicBalance:
         """
         receptance = self.receptance_at(frequency)
         if self.size > MANY:
-            found = krylov_radius(linearised(self, receptance, np.asarray(y, float))[1])
-            if found is not None:
-                return found
+            radius = krylov_radius(linearised(self, receptance, np.asarray(y, float))[1])
+            if radius is not None:
+                return radius
         products = self.forces(self.lines(y))[1] if products is None else products
         matrix = self.jacobian(products, receptance)
         matrix[np.diag_indices(self.size)] -= 1.0
@@ -209,7 +209,7 @@ class HarmonicBalance:
 
         None where there is no such mesh: between both flanks nothing tells Newton's method the way.
         """
-        lines, found = self.lines(self.linear_start(frequency)), False
+        lines, pulled_across = self.lines(self.linear_start(frequency)), False
         for mesh in self.elements:
             if isinstance(mesh, GearMeshes) and mesh.separates:
                 column, (deflection, force) = mesh.columns.ravel(), mesh.state
@@ -217,8 +217,8 @@ class HarmonicBalance:
                 backlash = np.asarray(mesh.backlash)
                 pulled = (carried < 0.0) & np.isfinite(backlash)
                 lines[column[pulled], 0] -= backlash[pulled]
-                found |= bool(pulled.any())
-        return self.unknowns(lines) if found else None
+                pulled_across |= bool(pulled.any())
+        return self.unknowns(lines) if pulled_across else None
 
     def solution(self, y, frequency, *, radius: bool = False, forces: Any = None, **what_happened) -> PeriodicSolution:
         """Make a solution of unknowns (n_y,) [m]; keywords are fields of `PeriodicSolution` on how it came.
@@ -237,13 +237,13 @@ class HarmonicBalance:
             what_happened["residual"] = relative_residual(self, self.unknowns(residual()), y)
         if radius and np.all(np.isfinite(lines)):
             what_happened["spectral_radius"] = self.spectral_radius(y, frequency, products)
-        told = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
-        if note := _uncarried_note(self, lines, residual, told["converged"]):
+        entries = {"converged": True, "iterations": 0, "factorisations": 0, "message": "", **what_happened}
+        if note := _uncarried_note(self, lines, residual, entries["converged"]):
             # the whole mean load is out of balance, whatever its ratio to a deflection that runs away
-            told |= {"converged": False, "message": f"Not converged: {note}."}
-            told["residual"] = max(told["residual"], 1.0)
+            entries |= {"converged": False, "message": f"Not converged: {note}."}
+            entries["residual"] = max(entries["residual"], 1.0)
         force = beyond + self.reduction.reference[:, None] * lines
-        return PeriodicSolution(frequency, self.orders, lines, force, tail=line_tail(lines, self.orders), **told)
+        return PeriodicSolution(frequency, self.orders, lines, force, tail=line_tail(lines, self.orders), **entries)
 
     def _respond(self, receptance, force) -> np.ndarray:
         """``T force - T_load S`` (n_columns, L)."""
@@ -450,9 +450,9 @@ def _uncarried_note(balance: HarmonicBalance, lines, residual, converged: bool) 
     if converged and not away:
         return ""
     # first by the forces alone: so far away the residual is the rounding of two large numbers
-    found = _beyond_reach(balance)
-    if found is not None:
-        column, wanted, low, high = found
+    unreached = _beyond_reach(balance)
+    if unreached is not None:
+        column, wanted, low, high = unreached
         bound = f"no less than {low:.4g} N" if wanted < low else f"no more than {high:.4g} N"
         why = f"it needs {wanted:.4g} N, the elements there give {bound}"
     elif away and finite and np.abs(residual()[:, 0]).max() > _BALANCED * balance.scale:

@@ -94,18 +94,18 @@ def solve_harmonic_balance(
     frequency = _checked_frequency(balance, frequency)
     wanted = {"tolerance": checked_tolerance(tolerance), "radius": stability if radius is None else radius}
     wanted["max_iterations"] = checked_count(max_iterations, "max_iterations", code="E-RANGE")
-    found = _newton(balance, frequency, _start(balance, frequency, start), **wanted)
-    crossed = balance.crossed_start(frequency) if start is None and not found.converged else None
+    solution = _newton(balance, frequency, _start(balance, frequency, start), **wanted)
+    crossed = balance.crossed_start(frequency) if start is None and not solution.converged else None
     if crossed is not None:
         # the play counts in the deflections, of which the residual is a share, and not in the forces
         finer = max(balance.scale / np.abs(crossed).max(), _FINEST / wanted["tolerance"])
         finer = wanted | {"tolerance": wanted["tolerance"] * min(finer, 1.0)}
-        found = _newton(balance, frequency, crossed, **finer)
-    if start is None and not found.converged:
-        found = _embed(balance, frequency, found, **wanted)
+        solution = _newton(balance, frequency, crossed, **finer)
+    if start is None and not solution.converged:
+        solution = _embed(balance, frequency, solution, **wanted)
     if note := coincidence_note(balance.orders, frequency):
-        found = replace(found, message=found.message + note)
-    return judged(problem, [found], tolerance=stability_tolerance)[0] if stability else found
+        solution = replace(solution, message=solution.message + note)
+    return judged(problem, [solution], tolerance=stability_tolerance)[0] if stability else solution
 
 
 def displacements(
@@ -241,14 +241,14 @@ def _embed(balance: HarmonicBalance, frequency, failed: PeriodicSolution, **want
     if curve is None or curve.parameter[-1] != 1.0:
         note = " The embedding of the reference springs was lost."
         return replace(failed, message=failed.message + note)
-    found = _newton(balance, frequency, curve.points[-1], **wanted)
+    solution = _newton(balance, frequency, curve.points[-1], **wanted)
     note = f" Newton's method alone failed; started from {len(curve.points) - 1} steps of embedding."
-    work = failed.factorisations + int(curve.iterations.sum()) + found.factorisations
+    work = failed.factorisations + int(curve.iterations.sum()) + solution.factorisations
     return replace(
-        found,
+        solution,
         factorisations=work,
-        iterations=failed.iterations + found.iterations,
-        message=found.message + note,
+        iterations=failed.iterations + solution.iterations,
+        message=solution.message + note,
     )
 
 
@@ -289,9 +289,9 @@ def _checked_frequency(balance: HarmonicBalance, frequency) -> np.ndarray:
     near = np.abs(frequency[:, None] - frequency) <= 1e-9 * frequency.max(initial=0.0)
     equal = near & (frequency > 0.0)
     if np.any(same := np.triu(equal, 1)):
-        one, other = np.eye(len(frequency), dtype=int)[np.argwhere(same)[0]].tolist()
+        line_1, other = np.eye(len(frequency), dtype=int)[np.argwhere(same)[0]].tolist()
         raise CaseError(
-            f"base frequencies {frequency.tolist()} rad/s: the lines {one} and {other} are one",
+            f"base frequencies {frequency.tolist()} rad/s: the lines {line_1} and {other} are one",
             code="E-RANGE",
             key="frequency",
             limit="no two base frequencies equal to 1e-9",
@@ -306,10 +306,10 @@ def _start(balance: HarmonicBalance, frequency, start) -> np.ndarray:
         return balance.linear_start(frequency)
     shape = (len(balance.reduction.reference), len(balance.orders))
     if isinstance(start, PeriodicSolution):
-        known = {tuple(-order): line.conj() for order, line in zip(start.orders, start.deflection.T)}
-        known |= {tuple(order): line for order, line in zip(start.orders, start.deflection.T)}
+        line_of = {tuple(-order): line.conj() for order, line in zip(start.orders, start.deflection.T)}
+        line_of |= {tuple(order): line for order, line in zip(start.orders, start.deflection.T)}
         nothing = np.zeros(len(start.deflection), complex)
-        lines = np.stack([known.get(tuple(order), nothing) for order in balance.orders], axis=1)
+        lines = np.stack([line_of.get(tuple(order), nothing) for order in balance.orders], axis=1)
     else:
         lines = checked_numbers(start, "start", code="E-START", unit="m", kind=complex)
     if lines.shape != shape or not np.all(np.isfinite(lines)):

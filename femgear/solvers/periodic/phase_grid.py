@@ -167,7 +167,7 @@ def sample_counts(problem: NonlinearSystem, orders: np.ndarray) -> tuple[int, ..
 def on_grid(element: Element, theta: np.ndarray) -> Element:
     """Evaluate the periodic coefficients of an element once, at phases ``theta`` (N, n_bases) [rad]."""
     return with_coefficients(
-        element, lambda one: _GridSeries(np.ascontiguousarray(one.at(theta)), one.mean, one.orders)
+        element, lambda series: _GridSeries(np.ascontiguousarray(series.at(theta)), series.mean, series.orders)
     )
 
 

@@ -160,8 +160,8 @@ def solve_shooting(
         if stuck:
             break
         y = _improved(moving, y, update, np.abs(defect).max(), period, integrator)
-    found = _result(moving, y, monodromy, period, chosen, integrator, history, stuck=stuck)
-    return _judged(moving, found, chosen)
+    result = _result(moving, y, monodromy, period, chosen, integrator, history, stuck=stuck)
+    return _judged(moving, result, chosen)
 
 
 def _without_free_motions(problem: NonlinearSystem, monodromy: np.ndarray) -> tuple[np.ndarray, int]:
@@ -199,8 +199,8 @@ def _settled(problem, frequency, period, settle):
     if not settle:
         return rest
     times = np.array([0.0, settle * period])
-    found = solve_transient(problem, frequency, times, start=rest, step=period / 200.0)
-    return found.displacement[-1], found.velocity[-1]
+    motion = solve_transient(problem, frequency, times, start=rest, step=period / 200.0)
+    return motion.displacement[-1], motion.velocity[-1]
 
 
 def shoot(moving: Flow, y, period: float, options) -> tuple[np.ndarray, np.ndarray | None]:
@@ -242,8 +242,8 @@ def _result(
     omega = 2.0 * np.pi / period
     period = 2.0 * np.pi / omega
     times = period * np.arange(samples) / samples
-    found, _ = sampled(trajectory(plain, y, 0.0, period, **integrator), times, y)
-    q, v, x = (part.T for part in plain.split(found.T))
+    states, _ = sampled(trajectory(plain, y, 0.0, period, **integrator), times, y)
+    q, v, x = (part.T for part in plain.split(states.T))
     force = element_forces(moving.problem, x, times[:, None] * moving.frequency)[0]
     deflection, forces = harmonics_of(x.T, chosen.harmonics), harmonics_of(force.T, chosen.harmonics)
     converged = history[-1] <= chosen.tolerance
@@ -278,7 +278,7 @@ def _result(
     return ShootingSolution(solution, period, q[0], v[0], monodromy, values[np.argsort(-np.abs(values))], times, q)
 
 
-def _judged(moving: Flow, found: ShootingSolution, chosen: ShootingOptions, *, trivial: int = 0) -> ShootingSolution:
+def _judged(moving: Flow, result: ShootingSolution, chosen: ShootingOptions, *, trivial: int = 0) -> ShootingSolution:
     """The motion with the verdict of its monodromy matrix, without ``trivial`` multipliers one.
 
     Free motions that neither stiffness, damping nor a column feels have a double multiplier one, which
@@ -286,15 +286,15 @@ def _judged(moving: Flow, found: ShootingSolution, chosen: ShootingOptions, *, t
     position has the multiplier one and is left out, the velocity counts.
     """
     verdict = open_verdict("not covered: the solution did not converge")
-    if found.solution.converged:
-        matrix, positions = _without_free_motions(moving.problem, found.monodromy)
+    if result.solution.converged:
+        matrix, positions = _without_free_motions(moving.problem, result.monodromy)
         verdict = verdict_of(
             np.linalg.eigvals(matrix),
-            found.period,
+            result.period,
             "shooting",
             chosen.integration,
             np.inf,
             positions=trivial + positions,
             velocities=positions,
         )
-    return replace(found, solution=replace(found.solution, verdict=verdict))
+    return replace(result, solution=replace(result.solution, verdict=verdict))

@@ -100,16 +100,16 @@ def solve_spectral(
     frequency = _checked(modes, excitation, mesh_frequency, method, tolerance, max_iterations)
     kept = np.stack(np.broadcast_arrays(frequency, excitation_harmonics, response_harmonics)[1:]).astype(int)
     _check_harmonics(*kept)
-    excited, own = (kept := kept * excitation.periods).max(axis=1)
-    data = _Data.build(modes, excitation, excited, own, frequency.max() / excitation.periods)
+    excited, answered = (kept := kept * excitation.periods).max(axis=1)
+    data = _Data.build(modes, excitation, excited, answered, frequency.max() / excitation.periods)
     n, speeds = len(data.stiffness), len(frequency)
-    lines: Any = [np.zeros((speeds, size, own + 1), complex) for size in (n, n, len(modes.frequency))]
+    lines: Any = [np.zeros((speeds, size, answered + 1), complex) for size in (n, n, len(modes.frequency))]
     numbers: Any = [np.zeros(speeds, kind) for kind in (float, float, float, float, int, bool)]
-    found = _Solved(*lines, *numbers)
+    solved = _Solved(*lines, *numbers)
     for part in _batches(frequency, kept[1]):
         how = _How(method, tolerance, max_iterations, radius)
-        _solve_batch(modes, data, part, frequency / excitation.periods, kept, found, how)
-    return _response(frequency, found, method, tolerance, excitation.periods)
+        _solve_batch(modes, data, part, frequency / excitation.periods, kept, solved, how)
+    return _response(frequency, solved, method, tolerance, excitation.periods)
 
 
 def _batches(frequency: np.ndarray, highest: np.ndarray) -> list[np.ndarray]:
@@ -213,10 +213,10 @@ def transfer(receptances: np.ndarray, force: np.ndarray) -> np.ndarray:
     n, speeds, size = force.shape
     # in memory as `_rows` has it
     out = np.empty((speeds, n, size), np.result_type(receptances, force)).transpose(1, 0, 2)
-    for one, row in zip(out, receptances):
-        np.multiply(row[0], force[0], out=one)
+    for response_, row in zip(out, receptances):
+        np.multiply(row[0], force[0], out=response_)
         for part, other in zip(row[1:], force[1:]):
-            one += part * other
+            response_ += part * other
     return out
 
 
@@ -246,19 +246,19 @@ def solve_direct(problem: HarmonicProblem, accuracy: float = _ROUNDING) -> np.nd
     and in E: adaptive simpler GMRES (P. Jiranek and M. Rozloznik, Numer. Algorithms 53, 2010, pp. 93-112),
     all speeds together; but for rounding none depends on the others.
     """
-    found = problem.source.copy()
+    solution = problem.source.copy()
     moving, single = _moving(problem.source), accuracy >= _SINGLE
     for cycle in range(_CYCLES):
-        rest = problem.source - found - _apply(problem, found)
-        size, limit = _norm(rest), accuracy * np.minimum(moving, _moving(found))
+        rest = problem.source - solution - _apply(problem, solution)
+        size, limit = _norm(rest), accuracy * np.minimum(moving, _moving(solution))
         todo = np.flatnonzero(size > limit)
         if not len(todo):
             break
         part = problem.take(todo, np.complex64 if single else complex)
         # the next cycle takes over where rounding would hold this one up
         near = np.maximum(limit, _REACHED * size) if single else limit
-        found[:, todo] += _cycle(part, _rows(rest[:, todo]), near[todo], _KRYLOV * 2**cycle)
-    return found
+        solution[:, todo] += _cycle(part, _rows(rest[:, todo]), near[todo], _KRYLOV * 2**cycle)
+    return solution
 
 
 def _cycle(problem: HarmonicProblem, rest: np.ndarray, limit: np.ndarray, steps_at_most: int) -> np.ndarray:
@@ -314,10 +314,10 @@ def spectral_radius(problem: HarmonicProblem) -> np.ndarray:
     basis[:, 0] = _rows((start / _norm(start)[:, None]).astype(kind))
     for k in range(steps):
         image = _rows(_apply(rough, _lines(basis[:, k], n)))[..., None]
-        known = basis[:, : k + 1]
+        orthonormal = basis[:, : k + 1]
         for _ in range(2 if few else 1):
-            share = np.matmul(known, image)
-            image -= np.matmul(known.transpose(0, 2, 1), share)
+            share = np.matmul(orthonormal, image)
+            image -= np.matmul(orthonormal.transpose(0, 2, 1), share)
             hessenberg[:, : k + 1, k] += share[..., 0]
         length = np.linalg.norm(image[..., 0], axis=1)
         hessenberg[:, k + 1, k] = length
@@ -362,15 +362,15 @@ class _Class:
 def _classes(modes: Modes, twins: Twins) -> list[_Class]:
     """Harmonics in classes of one shift; of meshes without twins all are in one."""
     member = twins.group == np.arange(len(twins.leaders))[:, None]
-    found, period = [], twins.period
+    classes, period = [], twins.period
     for i in range(period):
         shift = member * twins.shift[:, i]
         rows = shift @ modes.mesh_deflection
         used = np.flatnonzero(np.abs(rows).max(axis=0) > _EQUAL * np.abs(modes.mesh_deflection).max())
         pairs = modes.mesh_deflection[twins.leaders][:, None, used] * rows[:, used]
         pairs, residual = pairs.reshape(-1, len(used)).T, modes.residual[twins.leaders] @ shift.T
-        found.append(_Class(slice(i, None, period), used, rows[:, used], pairs, residual.ravel()))
-    return found
+        classes.append(_Class(slice(i, None, period), used, rows[:, used], pairs, residual.ravel()))
+    return classes
 
 
 def _alike(modes: Modes, twins: Twins, omega: float) -> bool:
@@ -414,9 +414,9 @@ class _Solved:
     direct: np.ndarray
 
 
-def _response(frequency, found: _Solved, method: str, tolerance: float, periods: int) -> Response:
+def _response(frequency, solved: _Solved, method: str, tolerance: float, periods: int) -> Response:
     """The speeds together; refuses what even the direct solution does not satisfy."""
-    residual = found.residual
+    residual = solved.residual
     converged = residual <= 10.0 * tolerance
     if method != "fixed point" and not np.all(converged):
         worst = int(np.argmax(np.where(np.isfinite(residual), residual, np.inf)))
@@ -426,21 +426,21 @@ def _response(frequency, found: _Solved, method: str, tolerance: float, periods:
             limit=f"{10.0 * tolerance:.1e}",
             remedy="the equations are nearly singular there: give the modes more damping or move the speed",
         )
-    for array in (found.deflection, found.force, found.modal, found.tail, found.lowest):
+    for array in (solved.deflection, solved.force, solved.modal, solved.tail, solved.lowest):
         array[~converged] = np.nan
         array.setflags(write=False)
     response = Response(
         mesh_frequency=frequency,
-        deflection=found.deflection,
-        force=found.force,
-        modal=found.modal,
+        deflection=solved.deflection,
+        force=solved.force,
+        modal=solved.modal,
         converged=converged,
         residual=residual,
-        iterations=found.iterations,
-        spectral_radius=found.radius,
-        tail=found.tail,
-        method=tuple("direct" if flag else "fixed point" for flag in found.direct),
-        lowest_force=found.lowest,
+        iterations=solved.iterations,
+        spectral_radius=solved.radius,
+        tail=solved.tail,
+        method=tuple("direct" if flag else "fixed point" for flag in solved.direct),
+        lowest_force=solved.lowest,
         message="",
         periods=periods,
     )
@@ -518,7 +518,7 @@ class _Data:
     @classmethod
     def build(cls, modes: Modes, excitation: MeshExcitation, excited: int, count: int, fastest: float) -> _Data:
         excited //= excitation.periods
-        stiffness, deflection, force = (pad(one, count) for one in mesh_harmonics(excitation, excited))
+        stiffness, deflection, force = (pad(harmonics_, count) for harmonics_ in mesh_harmonics(excitation, excited))
         load = pad(modes.load_deflection[:, None], count)
         twins = find_twins((stiffness, deflection, force, load))
         if twins.period > len(twins.group) or not _alike(modes, twins, 2.0 * np.pi * fastest):
@@ -545,52 +545,53 @@ class _How:
     radius: bool
 
 
-def _solve_batch(modes, data: _Data, part, fundamental, kept, found: _Solved, how: _How):
+def _solve_batch(modes, data: _Data, part, fundamental, kept, solved: _Solved, how: _How):
     """Solve at some speeds, numbers ``part``, and write down what is found."""
-    excited, own = kept[:, part]
-    lines, leaders, group = np.arange(own.max() + 1), data.twins.leaders, data.twins.group
+    excited, answered = kept[:, part]
+    lines, leaders, group = np.arange(answered.max() + 1), data.twins.leaders, data.twins.group
     n, size, groups = len(group), len(lines), len(leaders)
-    heard = lines <= own[:, None]
+    heard = lines <= answered[:, None]
     stiffness, deflection, force = (
-        one[leaders, None, :size] * (lines <= excited[:, None]) for one in (data.stiffness, data.deflection, data.force)
+        harmonics_[leaders, None, :size] * (lines <= excited[:, None])
+        for harmonics_ in (data.stiffness, data.deflection, data.force)
     )
     forcing = (force - Product(stiffness)(deflection)) * heard
     stiffness[..., 0] -= modes.mesh_stiffness[leaders, None]
     receptance, modal = np.empty((groups, groups, len(part), size), complex), []
-    for one in data.classes:
-        modal.append(compliance(modes, 2.0 * np.pi * fundamental[part, None] * lines[one.h], one.used))
-        between = np.moveaxis(modal[-1] @ one.pairs + one.residual, -1, 0)
-        receptance[..., one.h] = between.reshape(groups, groups, len(part), -1)
+    for class_ in data.classes:
+        modal.append(compliance(modes, 2.0 * np.pi * fundamental[part, None] * lines[class_.h], class_.used))
+        between = np.moveaxis(modal[-1] @ class_.pairs + class_.residual, -1, 0)
+        receptance[..., class_.h] = between.reshape(groups, groups, len(part), -1)
     receptance *= heard
     source = -transfer(receptance, forcing)
     source[..., 0] += modes.load_deflection[leaders, None]
     problem = HarmonicProblem(receptance, Product(stiffness), source)
-    found.radius[part] = spectral_radius(problem) if how.radius else np.nan
-    solution, found.iterations[part], found.direct[part] = _solve(problem, how)
+    solved.radius[part] = spectral_radius(problem) if how.radius else np.nan
+    solution, solved.iterations[part], solved.direct[part] = _solve(problem, how)
     total = (forcing + problem.product(solution)) * heard
     shift = data.twins.shift[:, None, :size]
     every, deflection = total[group] * shift, solution[group] * shift
     force = every + modes.mesh_stiffness[:, None, None] * deflection
     predicted = -np.tensordot(modes.residual, every, axes=1) * heard
-    for one, response in zip(data.classes, modal):
-        moved = -(np.moveaxis(total[:, :, one.h], 0, -1) @ one.rows) * response
-        predicted[:, :, one.h] += np.moveaxis(moved @ modes.mesh_deflection[:, one.used].T, -1, 0)
-        found.modal[..., :size][part[:, None], one.used, one.h] = moved.transpose(0, 2, 1)
+    for class_, response in zip(data.classes, modal):
+        moved = -(np.moveaxis(total[:, :, class_.h], 0, -1) @ class_.rows) * response
+        predicted[:, :, class_.h] += np.moveaxis(moved @ modes.mesh_deflection[:, class_.used].T, -1, 0)
+        solved.modal[..., :size][part[:, None], class_.used, class_.h] = moved.transpose(0, 2, 1)
     predicted[..., 0] += modes.load_deflection[:, None]
     if modes.modal_load is not None:
-        found.modal[part, :, 0] += modes.modal_load * compliance(modes, np.zeros(()))
-    found.residual[part] = _norm(deflection - predicted) / _moving(deflection)
-    found.deflection[part, :, :size], found.force[part, :, :size] = (
-        one.transpose(1, 0, 2) for one in (deflection, force)
+        solved.modal[part, :, 0] += modes.modal_load * compliance(modes, np.zeros(()))
+    solved.residual[part] = _norm(deflection - predicted) / _moving(deflection)
+    solved.deflection[part, :, :size], solved.force[part, :, :size] = (
+        harmonics_.transpose(1, 0, 2) for harmonics_ in (deflection, force)
     )
-    found.tail[part] = _tail(deflection.transpose(1, 0, 2), own)
-    found.lowest[part] = sample(force[leaders], 4 * size).min(axis=(0, 2))
+    solved.tail[part] = _tail(deflection.transpose(1, 0, 2), answered)
+    solved.lowest[part] = sample(force[leaders], 4 * size).min(axis=(0, 2))
     # the full equations decide: planets equal to 1e-9 only, or a last iteration that grew again
-    rough = ~(found.residual[part] <= how.tolerance)
+    rough = ~(solved.residual[part] <= how.tolerance)
     if rough.any() and (how.method == "auto" or (how.method == "direct" and groups < n)):
         twins = _alone(n, data.stiffness.shape[1] - 1)
         whole = replace(data, twins=twins, classes=_classes(modes, twins))
-        _solve_batch(modes, whole, part[rough], fundamental, kept, found, replace(how, method="direct"))
+        _solve_batch(modes, whole, part[rough], fundamental, kept, solved, replace(how, method="direct"))
 
 
 def _solve(problem: HarmonicProblem, how: _How):
@@ -636,7 +637,7 @@ def _fixed_point(problem: HarmonicProblem, tolerance: float, max_iterations: int
             if not rest.any():
                 break
             active, problem, value = active[rest], problem.take(rest), value[:, rest]
-            history = [one[rest] for one in history]
+            history = [vectors[rest] for vectors in history]
     return values, iterations, done
 
 
@@ -656,9 +657,9 @@ def joint_message(responses: Sequence[Response]) -> str:
     """Write what is to be said of responses, each at some speeds: the method, and everything doubtful."""
     names = ("mesh_frequency", "converged", "spectral_radius", "tail", "lowest_force")
     frequency, converged, radius, tail, lowest = (
-        np.concatenate([getattr(one, name) for one in responses]) for name in names
+        np.concatenate([getattr(response, name) for response in responses]) for name in names
     )
-    direct = np.concatenate([np.array(one.method) == "direct" for one in responses])
+    direct = np.concatenate([np.array(response.method) == "direct" for response in responses])
     largest = ""
     if not np.all(np.isnan(radius)):
         worst = int(np.nanargmax(radius))

@@ -238,8 +238,8 @@ def passage(
     base = int(frame.steps(period.max(initial=0.0)))
     for level in range(_LEVELS):
         start, duration = _steps([breaks[i] for i in open_states], base, level)
-        found = _through(frame, period[open_states], start, duration, tangents, open_states)
-        table, error = _extrapolated(table, found)
+        matrices = _through(frame, period[open_states], start, duration, tangents, open_states)
+        table, error = _extrapolated(table, matrices)
         matrix[open_states], errors[open_states] = table[-1], error
         rest = error > tolerance
         open_states, table = open_states[rest], [entry[rest] for entry in table]
@@ -264,13 +264,13 @@ def _residual(problem, stiffness, rigid, rows, square) -> np.ndarray:
     return 0.5 * (out + out.T)
 
 
-def _extrapolated(table, found):
+def _extrapolated(table, matrices):
     """Next row of Romberg's table for errors of orders 4, 6, 8, ..., and the error of its last entry."""
-    row = [found]
+    row = [matrices]
     for column, before in enumerate(table or []):
         row.append(row[-1] + (row[-1] - before) / (2.0 ** (4 + 2 * column) - 1.0))
     if len(row) == 1:
-        return row, np.full(len(found), np.inf)
+        return row, np.full(len(matrices), np.inf)
     size = np.maximum(np.linalg.norm(row[-1], axis=(1, 2)), 1.0)
     return row, np.linalg.norm(row[-1] - row[-2], axis=(1, 2)) / size
 
@@ -391,7 +391,7 @@ def floquet_verdicts(
     """
     tolerance = checked_tolerance(tolerance)
     frame = frame_of(problem, modes=modes)
-    early = {i: _not_covered(one) or _too_long(frame, one) for i, one in enumerate(solutions)}
+    early = {i: _not_covered(solution) or _too_long(frame, solution) for i, solution in enumerate(solutions)}
     out = {i: verdict for i, verdict in early.items() if verdict is not None}
     covered = [i for i in early if i not in out]
     for first in range(0, len(covered), _STATES_TOGETHER):

@@ -302,13 +302,13 @@ def _largest_at_speeds(modes: Modes, stiffness, number: int, period: np.ndarray,
         index = moving[group]
         ratio = modes.damping_ratio[index]
         if ratio.max() < _TURNING:
-            found = _multipliers(natural[index], ratio, rows[:, index], kicks, period)
+            largest = _multipliers(natural[index], ratio, rows[:, index], kicks, period)
         else:
             damping = np.diag(2.0 * ratio * natural[index])
             frame = Frame(natural[index] ** 2, damping, rows[:, index], np.zeros(len(rows)), flexibility)
             cells = 2.0 * np.pi / period, np.ones(len(period))
-            found, _ = _largest_of_cells(frame, FourierSeries(stiffness), np.zeros(0), *cells, _CREEPING)
-        best = np.where(np.abs(found) > np.abs(best), found, best)
+            largest, _ = _largest_of_cells(frame, FourierSeries(stiffness), np.zeros(0), *cells, _CREEPING)
+        best = np.where(np.abs(largest) > np.abs(best), largest, best)
     if np.any(static):
         slowest = np.exp(-np.min(modes.damping_ratio[static] * natural[static]) * period)
         best = np.where(slowest > np.abs(best), slowest, best)

@@ -210,18 +210,18 @@ def sampled(pieces, times, start) -> tuple[np.ndarray, int]:
     Times ascend; ``pieces`` comes from `trajectory`; instants before its first step have the
     state ``start``.
     """
-    found, filled, steps = np.empty((len(times), len(start))), 0, 0
+    states, filled, steps = np.empty((len(times), len(start))), 0, 0
     for begin, end, dense in pieces:
         early = int(np.searchsorted(times, begin, side="right")) if not steps else filled
-        found[filled:early] = start
+        states[filled:early] = start
         last = int(np.searchsorted(times, end, side="right"))
         if last > early:
-            found[early:last] = dense(times[early:last]).T
+            states[early:last] = dense(times[early:last]).T
         filled, steps = max(last, early), steps + 1
     if filled < len(times):
         # the end of the last step, but for rounding
-        found[filled:] = dense(times[filled:]).T if steps else start
-    return found, steps
+        states[filled:] = dense(times[filled:]).T if steps else start
+    return states, steps
 
 
 def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.ndarray]:
@@ -235,14 +235,14 @@ def checked_start(problem: NonlinearSystem, start=None) -> tuple[np.ndarray, np.
     try:
         q, v = (np.array(part, float) for part in start)
     except (TypeError, ValueError):
-        found = "no pair of lists of numbers"
+        shown = "no pair of lists of numbers"
     else:
         finite = np.all(np.isfinite(q)) and np.all(np.isfinite(v))
         if q.shape == v.shape == (n,) and finite:
             return q, v
-        found = f"shapes {q.shape} and {v.shape}" + ("" if finite else ", not all finite")
+        shown = f"shapes {q.shape} and {v.shape}" + ("" if finite else ", not all finite")
     raise CaseError(
-        f"a start of {found} for {n} degrees of freedom",
+        f"a start of {shown} for {n} degrees of freedom",
         code="E-START",
         key="start",
         limit=f"finite displacements [m] and velocities [m/s], each of shape ({n},)",
@@ -366,11 +366,11 @@ class Contacts:
         """Compute forces (n_c,) [N] and tangents (n_c, n_c) [N/m] of one instant, x (n_c,) in m."""
         total, tangent = np.zeros(self.columns), np.zeros((self.columns, self.columns))
         for number, element in enumerate(self.elements):
-            own = x[element.columns]
+            closing = x[element.columns]
             if self.closed and len(self.closed[number]) and has_corners(element):
-                force, slope = element.frozen(own, theta, self.closed[number])
+                force, slope = element.frozen(closing, theta, self.closed[number])
             else:
-                force, slope = element.evaluate(own, theta)
+                force, slope = element.evaluate(closing, theta)
             columns = element.columns
             np.add.at(total, columns, force)
             np.add.at(tangent, (columns[:, :, None], columns[:, None, :]), slope)
@@ -407,7 +407,7 @@ def _contacts(problem: NonlinearSystem, x, theta, rate, *, events: bool) -> Cont
 
 def _stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, float]]:
     """Breaks (fractions) and repetition rate [1/s] of every step series of the elements."""
-    found = []
+    series_and_rates = []
     for element in problem.elements:
         for series in coefficients_of(element).values():
             if isinstance(series, StepSeries) and len(series.breaks) > 1:
@@ -415,8 +415,8 @@ def _stepped(problem: NonlinearSystem, frequency) -> list[tuple[np.ndarray, floa
                 if rate < 0.0:
                     raise CaseError("a step series runs backwards", code="E-RANGE", limit="rates above 0")
                 if rate:
-                    found.append((series.breaks, rate))
-    return found
+                    series_and_rates.append((series.breaks, rate))
+    return series_and_rates
 
 
 def _next_break(steps, time: float) -> float:
@@ -436,4 +436,4 @@ def _held(problem: NonlinearSystem, theta) -> NonlinearSystem:
     def at_theta(series):
         return constant(series.at(theta)) if isinstance(series, StepSeries) else series
 
-    return replace(problem, elements=tuple(with_coefficients(one, at_theta) for one in problem.elements))
+    return replace(problem, elements=tuple(with_coefficients(element, at_theta) for element in problem.elements))

@@ -273,8 +273,8 @@ class ModalScheme:
         return state - (self.drawn @ g).reshape(state.shape)
 
     def columns(self, states, g, theta):
-        own = self.problem.system.W.T @ self.residual
-        return states[..., 0, :] @ self.rows.T - g @ own + np.real(self._waves(theta) @ self.static_columns)
+        static_answer = self.problem.system.W.T @ self.residual
+        return states[..., 0, :] @ self.rows.T - g @ static_answer + np.real(self._waves(theta) @ self.static_columns)
 
     def motion(self, states, g, theta):
         """Compute displacements and velocities (n, dofs); modes left out count in displacements only."""

@@ -262,8 +262,8 @@ def _stepped(problem, scheme: Scheme, frequency, times, start, number, method, t
         tolerance=tolerance,
         max_iterations=_ITERATIONS,
     ):
-        known = slice(0, block.steps + 1)
-        states, excess, theta = block.states[known], block.excess[known], theta[known]
+        computed = slice(0, block.steps + 1)
+        states, excess, theta = block.states[computed], block.excess[computed], theta[computed]
         inside = (index >= done) & (index < done + block.steps)
         if np.any(inside):
             motion = scheme.motion(states, excess, theta)
@@ -355,8 +355,8 @@ def _adaptive(problem, frequency, times, start, method, tolerance, events) -> Tr
     y = motion.state(*start)
     options = {"tolerance": tolerance, "events": events, "scale": motion_scale(motion, start)}
     pieces = adaptive.trajectory(motion, y, times[0], times[-1], method=method, **options)
-    found, steps = adaptive.sampled(pieces, times, y)
-    q, v, x = (part.T for part in motion.split(found.T))
+    states, steps = adaptive.sampled(pieces, times, y)
+    q, v, x = (part.T for part in motion.split(states.T))
     force = element_forces(problem, x, times[:, None] * frequency)[0]
     return TransientResponse(
         times,
