@@ -248,7 +248,7 @@ class _Problem:
         stiffness, deflection, force = (harmonics_[:, :lines] for harmonics_ in turning.harmonics)
         leading, owner, turns = turning.leading, turning.owner, turning.turns
         if orders.patterns == 1 and orders.periods == 1:
-            _check_repeated((stiffness, deflection, force), orders, *turning.groups)
+            check_repeated((stiffness, deflection, force), orders, *turning.groups)
             stiffness, deflection, force = (values[leading] for values in (stiffness, deflection, force))
             owner, turns, mean = np.arange(len(leading)), np.zeros(len(leading), int), mean[leading]
         elif (apart := np.abs(mean - mean[leading][owner]).max()) > _EQUAL * mean.max():
@@ -510,14 +510,14 @@ def _check_residual(residual: np.ndarray, speeds: np.ndarray, limit: float) -> N
         raise ConvergenceError(message, code="E-RESONANCE", limit=f"{limit:g}", remedy=remedy)
 
 
-def _check_repeated(one_sided, orders: CarrierOrders, leaders, group, turn) -> None:
+def check_repeated(one_sided, orders: CarrierOrders, leaders, group, turn) -> None:
     """Refuse planets whose meshes do not repeat those of their leaders (E-SYMMETRY)."""
     N, harmonic = orders.paths.symmetry, np.arange(one_sided[0].shape[1])
     # whole turns have no rounding
     whole = turn[:, None] * harmonic * (orders.sense * orders.paths.z_ring % N)
     shift = np.exp(2j * np.pi * (whole % N) / N)
     for name, values in zip(("stiffness", "deflection", "force"), one_sided):
-        apart = max(np.abs(half - shift * half[leaders][group]).max() for half in np.split(values, 2))
+        apart = max(np.abs(half - shift * half[leaders][group]).max() for half in np.split(values, len(values) // len(turn)))
         if apart > _EQUAL * np.abs(values).max():
             raise CaseError(
                 f"the {name} of equal planets differs by {apart / np.abs(values).max():.2e} of its largest harmonic",

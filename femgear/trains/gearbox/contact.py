@@ -46,6 +46,10 @@ class StageContact:
     approach : (M,) array
         Mean approach of the flanks of every mesh by all motions of their gears along the normal [m], of a mesh that
         carries nothing that at which it begins to.
+    case : case of a set or a pair
+        Tables of the teeth with their load.
+    deviations : SetDeviations
+        Of the teeth, with the misalignment and the displacements that the gearbox gives them.
     """
 
     result: StaticResult
@@ -53,6 +57,8 @@ class StageContact:
     normal_force: np.ndarray
     shares: np.ndarray
     approach: np.ndarray
+    case: Any
+    deviations: SetDeviations
 
     @property
     def face_load_factor(self) -> np.ndarray:
@@ -121,7 +127,7 @@ def stage_contact(
         kind = number // gears.n_planets * gears.n_planets
         stiffness[number] = stiffness[kind : kind + gears.n_planets].max()
         approach[number] = max(approach[number], _separation(deviations, gears, back=back)[number])
-    return StageContact(found, stiffness, force, shares, cosine * approach - apart)
+    return StageContact(found, stiffness, force, shares, cosine * approach - apart, case, deviations)
 
 
 def _separation(deviations: SetDeviations, gears: GearSet, *, back: bool) -> np.ndarray:

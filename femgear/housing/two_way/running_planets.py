@@ -1,0 +1,500 @@
+"""Planets that run around in one fixed structure, which they meet at their meshes and their pins.
+
+Everything that looks the same from every angle of the carrier stands still: shafts with sun and carrier, ring,
+bearings, casing, other stages. It is a structure of modes m. Planet j at ``phi_j = psi_j + s Omega t`` meets it
+at contact points c, its meshes and the springs of its pin. Per unit of a mode a point approaches by
+``sum_n P[c, n, m] exp(i n phi_j)``: n = 0 of rotations and axial motions, +-1 of lateral ones and tilts. With
+the motions x of the planet in the frame of the carrier, its approaches A, and forces g of the springs
+
+    Delta = A^T x + sum_n sum_m P[n, m] exp(i n phi_j) q_m[K],     g = e + k Delta,       K = L - s n
+    (M (d/dt + s Omega S)^2 + G (d/dt + s Omega S)) x = -A g,      q_m[K] = -H_m sum_j sum_n conj(P exp(i n phi_j)) g
+
+where S turns vectors by 90 degrees: Coriolis and centripetal terms are those of the turning frame. Forces beyond
+the mean stiffness k0 of the meshes, ``e = s + kappa Delta``, have the static part ``s = (F - mean F) - k (ste -
+mean ste)``. For given e every mesh harmonic is a small system of its own; kappa couples them in time, and GMRES
+solves for e (`femgear.housing.two_way.response` has the same structure for a ring alone). All is about the mean
+state, which statics give: motions that nothing holds take up no mean force.
+
+N equal planets move the structure at ``K = 0, N, 2 N, ...`` alone. Where no wave beyond n = +-1 exists and N is 3
+or more, the side bands fall into groups of three that know nothing of one another but for kappa.
+
+A pair is the case without planets: one mesh, n = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from femgear.errors import ConvergenceError
+from femgear.housing.sensor import ReadOnlyArrays
+from femgear.housing.two_way.carrier_orders import CarrierOrders, MeshPaths, planet_groups
+from femgear.housing.two_way.mesh_fluctuation import CYCLES, MeshFluctuation, gmres
+from femgear.housing.two_way.response import check_repeated
+from femgear.system.fourier import Product, pad
+from femgear.system.system import MeshExcitation, mesh_harmonics
+
+_RESIDUAL = 1e-6
+"""Residual that is refused."""
+_STILL = 1e-12
+"""Frequency over the mesh frequency below which it is none."""
+_ROOM = 64e6
+"""Size of the systems that are in memory together [bytes]."""
+
+
+@dataclass(frozen=True)
+class RunningStage(ReadOnlyArrays):
+    """A stage, of N planets or a pair, and the structure that it runs in.
+
+    Parameters
+    ----------
+    natural_frequency : (m,) array
+        Of the mass-normalised modes of the structure without the stage [rad/s]; zero of motions that nothing holds.
+    damping_ratio : (m,) array
+        Of these modes [1].
+    shape : (C, W, m) complex array
+        Approach P of the contact points of a planet at angle 0 by the waves n = -(W-1)/2 .. (W-1)/2 [kg^-1/2, m
+        kg^-1/2 of springs against rotation]; meshes come first.
+    residual : (C, W, C, W) complex array
+        Static compliance of what the modes leave out [m/N].
+    mass, gyroscopic : (p, p) arrays
+        Of one planet [kg, kg m^2], the latter that of its rotation over the mesh frequency [kg, kg m^2]; p = 0 of a
+        pair. Axes: radial, tangential, z.
+    turning : (p, p) array
+        S: time derivative of the axes at unit speed, ``e_r' = e_t``.
+    approach : (p, C) array
+        Approach of the contact points per unit of the motions of a planet [1, m].
+    stiffness : (C,) array
+        Of the springs, those of the meshes the mean of the excitation [N/m, N m/rad]; infinite ones are rigid.
+    loss : (C,) array
+        Loss factor of the springs, twice the damping ratio that they alone would give a mode [1].
+    excitation : MeshExcitation
+        Of the meshes kind by kind (sun, ring), planet by planet.
+    paths : MeshPaths
+        Teeth of the ring, negative where planets follow one another against the sense of the carrier, angles and
+        symmetry of the planets.
+    sense : int
+        Of the carrier, 1 or -1.
+    structure_loss : float
+        Loss factor of the structure, which adds to its damping ratios half of itself [1].
+    viscous : (C,) array, optional
+        Viscous damping of the springs [N s/m, N m s].
+    flexibility : (N, C, N, C) array, optional
+        Compliance between the springs of all planets by bodies that they have in common, such as an elastic
+        carrier, in series with the springs [m/N]. A turn from planet to planet maps it on itself.
+    """
+
+    natural_frequency: np.ndarray
+    damping_ratio: np.ndarray
+    shape: np.ndarray
+    residual: np.ndarray
+    mass: np.ndarray
+    gyroscopic: np.ndarray
+    turning: np.ndarray
+    approach: np.ndarray
+    stiffness: np.ndarray
+    loss: np.ndarray
+    excitation: MeshExcitation
+    paths: MeshPaths
+    sense: int = 1
+    structure_loss: float = 0.0
+    viscous: np.ndarray | None = None
+    flexibility: np.ndarray | None = None
+
+    @property
+    def waves(self) -> np.ndarray:
+        """Circumferential orders n (W,)."""
+        return np.arange(self.shape.shape[1]) - self.shape.shape[1] // 2
+
+    @cached_property
+    def groups(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Leaders, group and turns of the planets, see `planet_groups`."""
+        return planet_groups(self.paths.planet_angles, self.paths.symmetry)
+
+    @property
+    def kinds(self) -> int:
+        """Meshes of a planet: 2, of a pair 1."""
+        return len(self.excitation.stiffness) // len(self.paths.planet_angles)
+
+    @cached_property
+    def products(self) -> np.ndarray:
+        """Products (m, (C W)^2) of the shapes of two contact points."""
+        P = self.shape.reshape(-1, self.shape.shape[2])
+        return (P[:, None] * P.conj()).reshape(-1, P.shape[1]).T
+
+    def receptance(self, omega: np.ndarray) -> np.ndarray:
+        """Receptances (..., m) [s^2] of the modes at angular frequencies (...); free motions have none at rest."""
+        omega = np.asarray(omega, float)[..., None]
+        stiffness = self.natural_frequency**2 * (1.0 + 1j * self.structure_loss * np.sign(omega))
+        below = stiffness - omega**2 + 2j * self.damping_ratio * self.natural_frequency * omega
+        nothing = (self.natural_frequency == 0.0) & (omega == 0.0)
+        return np.where(nothing, 0.0, 1.0 / np.where(nothing, 1.0, below))
+
+    def compliance(self, omega: np.ndarray) -> np.ndarray:
+        """Compliances (..., C) of the springs with their damping [m/N] at angular frequencies (...)."""
+        omega = np.asarray(omega, float)[..., None]
+        rigid = np.isinf(self.stiffness)
+        stiffness = np.where(rigid, 1.0, self.stiffness) * (1.0 + 1j * self.loss * np.sign(omega))
+        if self.viscous is not None:
+            stiffness = stiffness + 1j * omega * self.viscous
+        return np.where(rigid, 0.0, 1.0 / stiffness)
+
+    def planet_stiffness(self, omega: np.ndarray, mesh_frequency: float, speed: float) -> np.ndarray:
+        """Dynamic stiffness (..., p, p) of a planet at angular frequencies (...) in the frame of the carrier.
+
+        ``speed`` is that of the carrier, positive for its sense [rad/s].
+        """
+        rate = 1j * np.asarray(omega)[..., None, None] * np.eye(len(self.mass)) + self.sense * speed * self.turning
+        return self.mass @ rate @ rate + mesh_frequency * self.gyroscopic @ rate
+
+    def shared(self, whole: np.ndarray, omega: np.ndarray) -> np.ndarray:
+        """Compliances (..., G, C, G, C) by bodies in common at whole orders (...) and frequencies [m/N].
+
+        Of a pattern of the planets: whole orders are those of the carrier with the number of the pattern.
+        """
+        assert self.flexibility is not None
+        leaders, group, turn = self.groups
+        N, loss = self.paths.symmetry, self.loss.max(initial=0.0)
+        member = group == np.arange(len(leaders))[:, None]
+        phase = np.exp(2j * np.pi * ((self.sense * turn * (np.asarray(whole)[..., None] % N)) % N) / N)
+        found = np.einsum("...j,hj,gcjd->...gchd", phase, member, self.flexibility[leaders], optimize=True)
+        return found / (1.0 + 1j * loss * np.sign(np.asarray(omega)))[..., None, None, None, None]
+
+
+@dataclass(frozen=True)
+class RunningResponse(ReadOnlyArrays):
+    """Periodic response of a stage in its structure at one speed, two-sided, of the harmonics 0 .. Q.
+
+    Parameters
+    ----------
+    mesh_frequency, carrier_speed : float
+        [rad/s], both positive or zero.
+    force : (G, C, B, R) complex array
+        Forces beyond their means on the contact points of the leading planets [N, N m], by harmonics and side bands.
+    approach : (J, B, R) complex array
+        Approaches of the leading meshes beyond their means [m].
+    band : (S,) int array
+        Side bands of the structure.
+    modal : (Q + 1, S, m) complex array
+        Coordinates of the modes of the structure [m kg^1/2], in all patterns of the planets.
+    periods : int
+        Mesh periods after which all repeats: line q has the frequency of q/periods mesh frequencies.
+    residual, radius : float
+        Residual of the equations, and spectral radius of the iteration without GMRES [1].
+    products : int
+        Products with the fluctuating stiffness.
+    tail : float
+        Share (root of energies) of the mesh forces in the upper half of the harmonics, and in the outermost
+        side bands.
+    """
+
+    mesh_frequency: float
+    carrier_speed: float
+    force: np.ndarray
+    approach: np.ndarray
+    band: np.ndarray
+    modal: np.ndarray
+    periods: int
+    residual: float
+    radius: float
+    products: int
+    tail: tuple[float, float]
+
+    @property
+    def frequency(self) -> np.ndarray:
+        """Angular frequencies (Q + 1, S) of the structure [rad/s]."""
+        line = np.arange(len(self.modal))[:, None] / self.periods
+        return line * self.mesh_frequency + self.band * self.carrier_speed
+
+    def lines(self, shape: np.ndarray) -> np.ndarray:
+        """Amplitudes (Q + 1, S, k) of ``Re sum u exp(i frequency t)`` of places that the modes (m, k) move.
+
+        Of harmonic 0 side bands below zero have none: they are the others' conjugates.
+        """
+        found = 2.0 * self.modal @ shape
+        found[0, self.band < 0] = 0.0
+        found[0, self.band == 0] *= 0.5
+        return found
+
+
+def solve_running(  # noqa: PLR0913
+    stage: RunningStage,
+    mesh_frequency: float,
+    carrier_speed: float,
+    *,
+    harmonics: tuple[int, int],
+    side_bands: int | None = None,
+    tolerance: float = 1e-10,
+    cycles: int = CYCLES,
+) -> RunningResponse:
+    """Solve for the periodic response of a stage and its structure at one speed.
+
+    CaseError: planets that do not repeat one another (E-SYMMETRY). ConvergenceError: equations that are nearly
+    singular (E-RESONANCE).
+
+    Parameters
+    ----------
+    stage : RunningStage
+    mesh_frequency, carrier_speed : float
+        [rad/s], both positive; the speed zero of a pair and of a carrier that stands still.
+    harmonics : two ints
+        Mesh harmonics of the excitation, and of the response.
+    side_bands : int, optional
+        On either side of every harmonic; by default four times the largest wave.
+    tolerance : float
+        Residual over the norm of what fluctuates.
+    cycles : int
+        Of GMRES.
+    """
+    problem = _Problem(stage, harmonics, side_bands)
+    return problem.solve(mesh_frequency, carrier_speed, tolerance, cycles)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Blocks whose side bands ``bands`` (b,) act on one another, through bands ``met`` (k,) of the structure.
+
+    ``answer`` (blocks, b G C, b G M) are forces of the contact points by the forces e beyond k0.
+    """
+
+    blocks: np.ndarray
+    bands: np.ndarray
+    met: np.ndarray
+    answer: np.ndarray
+
+
+class _Problem:
+    """A stage with so many harmonics of the excitation and of the response, at any speed."""
+
+    def __init__(self, stage: RunningStage, harmonics: tuple[int, int], side_bands: int | None):
+        excited, kept = harmonics
+        self.stage, widest, periods = stage, int(stage.waves[-1]), stage.excitation.periods
+        self.leaders, group, turn = stage.groups
+        bands = 4 * widest if side_bands is None else side_bands
+        symmetry = stage.paths.symmetry
+        patterns = 1 if periods == 1 else symmetry
+        self.orders = CarrierOrders(stage.paths, kept * periods, widest, bands, stage.sense, periods, patterns)
+        N, kinds = len(stage.paths.planet_angles), stage.kinds
+        leading = np.concatenate([kind * N + self.leaders for kind in range(kinds)])
+        owner = np.concatenate([kind * len(self.leaders) + group for kind in range(kinds)])
+        turns = np.tile(turn, kinds)
+        signals = mesh_harmonics(stage.excitation, excited)
+        if patterns == 1 and periods == 1:
+            check_repeated(signals, self.orders, *stage.groups)
+            signals = tuple(values[leading] for values in signals)
+            owner, turns = np.arange(len(leading)), np.zeros(len(leading), int)
+        self.mean = np.repeat(stage.stiffness[:kinds], len(self.leaders))
+        self.source, self.fluctuation = self._source(signals, owner, turns)
+
+    def _source(self, signals, owner, turns) -> tuple[np.ndarray, MeshFluctuation]:
+        """Static part of the forces beyond k0 (J, B, R), and the fluctuation of the stiffness."""
+        stiffness, deflection, force = signals
+        orders, lines = self.orders, self.orders.lines
+        varying = stiffness.copy()
+        varying[:, 0] -= self.mean[owner]
+        deflection, force = deflection.copy(), force.copy()
+        deflection[:, 0] = force[:, 0] = 0.0
+        fluctuation = MeshFluctuation(varying, orders, owner, turns)
+        forcing = pad(force, lines) - Product(pad(stiffness, lines))(pad(deflection, lines)[:, None])[:, 0]
+        source = np.zeros((len(forcing), lines + 1, len(orders.bands)), complex)
+        source[..., orders.middle] = 0.5 * forcing
+        source[:, 0, orders.middle] = np.real(forcing[:, 0])
+        return fluctuation.of_leaders(source), fluctuation
+
+    def solve(self, mesh_frequency: float, speed: float, tolerance: float, cycles: int) -> RunningResponse:
+        """Solve at a mesh frequency and a speed of the carrier [rad/s]."""
+        orders, shape = self.orders, self.source.shape
+        parts = list(self._parts(mesh_frequency, speed))
+        line = np.tile(np.arange(orders.lines + 1), orders.patterns) / orders.periods
+        omega = line[:, None] * mesh_frequency + orders.bands * speed
+        omega[np.abs(omega) < _STILL * mesh_frequency] = 0.0
+        springs = np.repeat(self.stage.compliance(omega)[..., : self.stage.kinds], len(self.leaders), axis=-1)
+        springs = springs.transpose(2, 0, 1)
+
+        def approach(extra: np.ndarray) -> np.ndarray:
+            return springs * (self._mesh_forces(parts, extra) - extra)
+
+        def answer(flat: np.ndarray) -> np.ndarray:
+            return self.fluctuation(approach(flat.view(complex).reshape(shape))).ravel().view(float)
+
+        right = self.source.ravel().view(float)
+        size = max(float(np.linalg.norm(right)), np.finfo(float).tiny)
+        flat, residual, radius, products = gmres(answer, right, size, None, tolerance, cycles)
+        if not residual < _RESIDUAL:
+            raise ConvergenceError(
+                f"residual {residual:.3e} of the response at a mesh frequency of {mesh_frequency / 6.283185307179586:.6g} Hz",
+                code="E-RESONANCE",
+                limit=f"{_RESIDUAL:g}",
+                remedy="give the modes some damping",
+            )
+        extra = flat.view(complex).reshape(shape)
+        force, (band, modal) = self._forces(parts, extra), self._modal(parts, extra, mesh_frequency, speed)
+        tail = self._tail(force[:, : self.stage.kinds])
+        figures = approach(extra), band, modal, orders.periods, residual, radius, products, tail
+        return RunningResponse(mesh_frequency, speed, force, *figures)
+
+    def _groups_of_bands(self, residue: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+        """Side bands that the structure connects, and the bands of the structure between them, by residue."""
+        orders, waves = self.orders, self.stage.sense * self.stage.waves
+        met = orders.structure_bands(residue)
+        reached = [orders.place(band + waves) for band in met]
+        owner = np.arange(len(orders.bands))
+        for places in reached:
+            inside = places[places < len(owner)]
+            if len(inside):
+                owner[np.isin(owner, owner[inside])] = owner[inside].min()
+        for first in np.unique(owner):
+            bands = np.flatnonzero(owner == first)
+            used = [k for k, places in enumerate(reached) if np.isin(places, bands).any()]
+            yield bands, met[used]
+
+    def _parts(self, mesh_frequency: float, speed: float) -> Iterator[_Part]:
+        """Solve all blocks for unit forces e beyond k0."""
+        orders, stage = self.orders, self.stage
+        G, C, p = len(self.leaders), len(stage.stiffness), len(stage.mass)
+        for residue in range(orders.paths.symmetry):
+            blocks = orders.blocks(residue)
+            if not len(blocks):
+                continue
+            for bands, met in self._groups_of_bands(residue):
+                size = 16.0 * (len(bands) * G * (C + p)) ** 2
+                for some in np.array_split(blocks, int(np.ceil(len(blocks) * size / _ROOM))):
+                    still = some[orders.base[some] + orders.seed[some] == 0]
+                    for chosen in (np.setdiff1d(some, still), still):
+                        if len(chosen):
+                            answer = self._answer(chosen, bands, met, mesh_frequency, speed)
+                            yield _Part(chosen, bands, met, answer)
+
+    def _answer(self, blocks, bands, met, mesh_frequency: float, speed: float) -> np.ndarray:
+        """Forces (blocks, b G C, b G M) of the contact points by unit forces e of the meshes."""
+        stage, orders, kinds = self.stage, self.orders, self.stage.kinds
+        G, C, p = len(self.leaders), len(stage.stiffness), len(stage.mass)
+        b, line = len(bands), (orders.base[blocks] + orders.seed[blocks]) / orders.paths.z_ring
+        omega = line[:, None] * mesh_frequency + orders.bands[bands] * speed
+        omega[np.abs(omega) < _STILL * mesh_frequency] = 0.0
+        points, planets = b * G * C, b * G * p
+        c = stage.compliance(omega)
+        system = np.zeros((len(blocks), points + planets, points + planets), complex)
+        inner = np.zeros((len(blocks), b, G, C, b, G, C), complex)
+        free = list[np.ndarray]()
+        for band in met:
+            free += self._add_structure(inner, band, bands, line * mesh_frequency + band * speed)
+        every = np.arange(b)[:, None, None], np.arange(G)[:, None], np.arange(C)
+        inner[:, every[0], every[1], every[2], every[0], every[1], every[2]] += c[:, :, None, :]
+        if stage.flexibility is not None:
+            whole = (orders.base + orders.pattern)[blocks][:, None] + orders.bands[bands]
+            shared = stage.shared(whole, omega)
+            for k in range(b):
+                inner[:, k, :, :, k] += shared[:, k]
+        system[:, :points, :points] = inner.reshape(len(blocks), points, points)
+        A = np.kron(np.eye(b * G), stage.approach)
+        system[:, points:, :points], system[:, :points, points:] = A, -A.T
+        own = stage.planet_stiffness(omega, mesh_frequency, speed)
+        for k in range(b):
+            for g in range(G):
+                at = points + (k * G + g) * p + np.arange(p)
+                system[:, at[:, None], at] = own[:, k]
+        if free:  # motions that nothing holds take up no mean force
+            rigid = np.zeros((points + planets, len(free)), complex)
+            rigid[:points] = np.array(free).T
+            border = np.broadcast_to(rigid, (len(blocks), *rigid.shape))
+            corner = np.zeros((len(blocks), len(free), len(free)))
+            system = np.block([[system, -border], [border.conj().swapaxes(1, 2), corner]])
+        meshes = np.zeros((system.shape[1], b, kinds, G), complex)
+        right = np.broadcast_to(meshes[None], (len(blocks), *meshes.shape)).copy()
+        for k in range(b):
+            for g in range(G):
+                for kind in range(kinds):
+                    right[:, (k * G + g) * C + kind, k, kind, g] = c[:, k, kind]
+        # columns in the order of the meshes of all leaders, band by band
+        right = right.reshape(len(blocks), system.shape[1], -1)
+        # planets have units of their own
+        rows = 1.0 / np.maximum(np.abs(system).max(axis=2), np.finfo(float).tiny)
+        columns = 1.0 / np.maximum(np.abs(system * rows[:, :, None]).max(axis=1), np.finfo(float).tiny)
+        found = np.linalg.solve(system * rows[:, :, None] * columns[:, None], right * rows[:, :, None])
+        return (found * columns[:, :, None])[:, :points]
+
+    def _add_structure(self, inner: np.ndarray, band: int, bands: np.ndarray, omega: np.ndarray) -> list[np.ndarray]:
+        """Add compliances of the structure at one of its bands; approaches of the motions that are free there."""
+        stage, orders = self.stage, self.orders
+        n, C, W = stage.waves, stage.shape.shape[0], stage.shape.shape[1]
+        number = {int(place): k for k, place in enumerate(bands)}
+        places = orders.place(band + stage.sense * n)
+        met = [(w, number[int(place)]) for w, place in enumerate(places) if int(place) in number]
+        omega = np.where(np.abs(omega) < _STILL * max(np.abs(omega).max(), 1.0), 0.0, omega)
+        both = (stage.receptance(omega) @ stage.products).reshape(len(omega), C, W, C, W) + stage.residual
+        psi = np.asarray(stage.paths.planet_angles)[self.leaders]
+        N = stage.paths.symmetry
+        for w, k in met:
+            for v, m in met:
+                phase = N * np.exp(1j * n[w] * psi)[:, None] * np.exp(-1j * n[v] * psi)
+                inner[:, k, :, :, m] += phase[None, :, None, :, None] * both[:, None, :, w, None, :, v]
+        if not (omega == 0.0).any():
+            return []
+        found = []
+        for mode in np.flatnonzero(stage.natural_frequency == 0.0):
+            row = np.zeros(inner.shape[1:4], complex)
+            for w, k in met:
+                row[k] += np.exp(1j * n[w] * psi)[:, None] * stage.shape[:, w, mode]
+            if np.abs(row).max() > 1e-9 * np.abs(stage.shape[:, :, mode]).max(initial=0.0) > 0.0:
+                found.append(row.ravel())
+        return found
+
+    def _sub(self, part: _Part, extra: np.ndarray) -> np.ndarray:
+        """Forces e (blocks, b G M, 1) of a part of those of all (J, B, R)."""
+        some = extra[:, part.blocks[:, None], part.bands]
+        return some.transpose(1, 2, 0).reshape(len(part.blocks), -1, 1)
+
+    def _mesh_forces(self, parts, extra: np.ndarray) -> np.ndarray:
+        """Forces (J, B, R) of the leading meshes by forces e beyond k0."""
+        kinds, found = self.stage.kinds, np.zeros_like(extra)
+        G, C = len(self.leaders), len(self.stage.stiffness)
+        for part in parts:
+            b = len(part.bands)
+            force = (part.answer @ self._sub(part, extra)).reshape(-1, b, G, C)[..., :kinds]
+            found[:, part.blocks[:, None], part.bands] = force.transpose(3, 2, 0, 1).reshape(-1, len(force), b)
+        return found
+
+    def _forces(self, parts, extra: np.ndarray) -> np.ndarray:
+        """Forces (G, C, B, R) of all contact points of the leaders by forces e beyond k0."""
+        G, C = len(self.leaders), len(self.stage.stiffness)
+        found = np.zeros((G, C, *extra.shape[1:]), complex)
+        for part in parts:
+            force = (part.answer @ self._sub(part, extra)).reshape(len(part.blocks), len(part.bands), G, C)
+            found[:, :, part.blocks[:, None], part.bands] = force.transpose(2, 3, 0, 1)
+        return found
+
+    def _modal(self, parts, extra: np.ndarray, mesh_frequency: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
+        """Side bands (S,) of the structure, and the coordinates (Q + 1, S, m) of its modes."""
+        stage, orders = self.stage, self.orders
+        N, n, G, C = stage.paths.symmetry, stage.waves, len(self.leaders), len(stage.stiffness)
+        reach = int(orders.bands[-1]) + int(n[-1])
+        every = np.arange(-reach, reach + 1)
+        found = np.zeros((orders.lines + 1, len(every), len(stage.natural_frequency)), complex)
+        psi = np.asarray(stage.paths.planet_angles)[self.leaders]
+        for part in parts:
+            force = (part.answer @ self._sub(part, extra)).reshape(len(part.blocks), len(part.bands), G, C)
+            line = (orders.base[part.blocks] + orders.seed[part.blocks]) / orders.paths.z_ring
+            number = {int(place): k for k, place in enumerate(part.bands)}
+            for band in part.met:
+                total = np.zeros((len(part.blocks), found.shape[2]), complex)
+                for w, place in enumerate(orders.place(band + stage.sense * n)):
+                    if int(place) in number:
+                        at = force[:, number[int(place)]] * np.exp(-1j * n[w] * psi)[:, None]
+                        total += at.sum(axis=1) @ stage.shape[:, w].conj()
+                omega = line * mesh_frequency + band * speed
+                omega[np.abs(omega) < _STILL * mesh_frequency] = 0.0
+                found[part.blocks % (orders.lines + 1), band + reach] -= N * stage.receptance(omega) * total
+        return every, found
+
+    def _tail(self, force: np.ndarray) -> tuple[float, float]:
+        """Shares of the mesh forces (G, M, B, R) in the upper half of the harmonics, and at the outer bands."""
+        orders = self.orders
+        energy = (np.abs(force) ** 2).sum(axis=(0, 1)).reshape(orders.patterns, -1, len(orders.bands)).sum(axis=0)
+        energy[0, orders.middle] = 0.0
+        whole = max(float(energy.sum()), np.finfo(float).tiny)
+        upper, outer = energy[len(energy) // 2 + 1 :].sum(), energy[:, [0, -1]].sum() if len(orders.bands) > 1 else 0.0
+        return float(np.sqrt(upper / whole)), float(np.sqrt(outer / whole))
