@@ -31,6 +31,7 @@ CATALOGUE = {
     "W-CONTACT-RATIO": (NOTE, "The contact ratio is low."),
     "W-CONVERGENCE": (DOUBT, "A periodic solution did not converge."),
     "W-COUPLING": (NOTE, "The torque turns a coupling further than couplings go."),
+    "W-CROSS": (DOUBT, "Stages change one another by more than a response stage by stage may leave out."),
     "W-DAMPING": (DOUBT, "Without damping resonances have no limit."),
     "W-DEFLECTION": (DOUBT, "Deflections are no longer small."),
     "W-EDGE": (DOUBT, "Contacts lie at the end of a flank, where the pressure has no limit."),

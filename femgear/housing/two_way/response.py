@@ -517,7 +517,9 @@ def check_repeated(one_sided, orders: CarrierOrders, leaders, group, turn) -> No
     whole = turn[:, None] * harmonic * (orders.sense * orders.paths.z_ring % N)
     shift = np.exp(2j * np.pi * (whole % N) / N)
     for name, values in zip(("stiffness", "deflection", "force"), one_sided):
-        apart = max(np.abs(half - shift * half[leaders][group]).max() for half in np.split(values, len(values) // len(turn)))
+        apart = max(
+            np.abs(half - shift * half[leaders][group]).max() for half in np.split(values, len(values) // len(turn))
+        )
         if apart > _EQUAL * np.abs(values).max():
             raise CaseError(
                 f"the {name} of equal planets differs by {apart / np.abs(values).max():.2e} of its largest harmonic",

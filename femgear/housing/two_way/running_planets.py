@@ -220,7 +220,7 @@ class RunningResponse(ReadOnlyArrays):
         return found
 
 
-def solve_running(  # noqa: PLR0913
+def solve_running(
     stage: RunningStage,
     mesh_frequency: float,
     carrier_speed: float,
@@ -324,8 +324,9 @@ class _Problem:
         size = max(float(np.linalg.norm(right)), np.finfo(float).tiny)
         flat, residual, radius, products = gmres(answer, right, size, None, tolerance, cycles)
         if not residual < _RESIDUAL:
+            hertz = mesh_frequency / (2.0 * np.pi)
             raise ConvergenceError(
-                f"residual {residual:.3e} of the response at a mesh frequency of {mesh_frequency / 6.283185307179586:.6g} Hz",
+                f"residual {residual:.3e} of the response at a mesh frequency of {hertz:.6g} Hz",
                 code="E-RESONANCE",
                 limit=f"{_RESIDUAL:g}",
                 remedy="give the modes some damping",

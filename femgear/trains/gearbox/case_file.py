@@ -42,7 +42,7 @@ from femgear.case.quantities import (
     Title,
     Values,
 )
-from femgear.case.sections import FORMAT, Angle, DampingRatio, End, PressureAngle, Radius, Teeth
+from femgear.case.sections import FORMAT, Angle, DampingRatio, End, PressureAngle, Radius, RunupSection, Teeth
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError
 from femgear.trains.gearbox.materials import with_materials
@@ -548,6 +548,18 @@ class BoxModesSection(Section):
     """Of the Campbell diagram, over the speed of the load case."""
 
 
+class BoxDynamicsSection(Section):
+    """Response: reach of the excitation and tolerance of the periodic solution.
+
+    All stages with teeth excite the gearbox up to the frequency ``up_to``. Planets make ``side_bands`` at either side
+    of each mesh harmonic.
+    """
+
+    up_to: Annotated[float, Quantity(FREQUENCY, 10.0, 200e3)] = 20e3
+    side_bands: Annotated[int, Count(1, 60)] = 4
+    tolerance: Annotated[float, Number(1e-12, 1e-2)] = 1e-8
+
+
 class GearboxCase(Section, ReadCase):
     """A gearbox, its load cases and how to compute it, in SI units.
 
@@ -575,6 +587,8 @@ class GearboxCase(Section, ReadCase):
     operation: BoxOperationSection
     deflection: DeflectionSection = DeflectionSection()
     modes: BoxModesSection = BoxModesSection()
+    dynamics: BoxDynamicsSection = BoxDynamicsSection()
+    runup: RunupSection = RunupSection(count=0)
 
     @model_validator(mode="before")
     @classmethod

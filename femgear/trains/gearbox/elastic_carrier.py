@@ -133,6 +133,29 @@ def elastic_carrier(
     )
 
 
+def pin_flexibility(stage: BoxPlanetarySection, angles: Sequence[float]) -> np.ndarray:
+    """Compute the compliance (6N, 6N) of all pins of a carrier from a file, along and about x, y, z, its shaft held.
+
+    [m/N, rad/N, rad/(N m)]; pins without rotations of their own have none.
+
+    Parameters
+    ----------
+    stage : BoxPlanetarySection
+        The set; its carrier was read from a file.
+    angles : (N,) floats
+        Of the planets [rad].
+    """
+    body, count = _unpacked(stage.superelement), len(angles)
+    components = len(body.compliance) // count
+    way = body.pins[0] - body.seat
+    turn = pin_axes(angles[0] - math.atan2(way[1], way[0])).T
+    turned = np.kron(np.eye(count), np.kron(np.eye(components // 3), turn))
+    found = np.zeros((count, 6, count, 6))
+    whole = (turned @ body.compliance @ turned.T).reshape(count, components, count, components)
+    found[:, :components, :, :components] = whole
+    return found.reshape(6 * count, 6 * count)
+
+
 def with_carriers(system: MechanicalSystem, assembly: Assembly, carriers: Sequence[ElasticCarrier]) -> MechanicalSystem:
     """Join the inner modes of carriers to a system, whose first coordinates are the free motions of the assembly."""
     free = assembly.motions.shape[1]

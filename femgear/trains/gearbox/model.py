@@ -460,7 +460,7 @@ class _Builder:
 
     def _pins(self, stage, teeth, angles, planets, carrier: Seat, place) -> ElasticCarrier | None:
         """Hold planets on the carrier: rigid, giving way at its pins by closed forms, or elastic as in its file."""
-        held, elastic = _planet_bearing(stage, teeth), None
+        held, elastic = planet_bearing(stage), None
         offsets = [np.asarray(carrier.offset) + np.asarray(self.places[planet]) - place for planet in planets]
         holders = (carrier.station,) * len(planets)
         if stage.superelement is not None:
@@ -566,9 +566,12 @@ class _Builder:
         return load
 
 
-def _planet_bearing(stage: BoxPlanetarySection, teeth) -> np.ndarray:
-    """Stiffness (6,) between a planet and its pin along three axes and about them; none about the last one."""
-    given = stage.planet.bearing
+def planet_bearing(stage: BoxPlanetarySection) -> np.ndarray:
+    """Find the stiffness (6,) between a planet and its pin along three axes and about them; none about the last one.
+
+    Radially, tangentially, along z [N/m, N m/rad]; what is given nowhere is rigid.
+    """
+    given, teeth = stage.planet.bearing, teeth_of(stage)
     of_teeth = (getattr(teeth and teeth.planet, f"{name}_stiffness", None) for name in ("bearing", "tilt"))
     radial, tilt = (math.inf if value is None else value for value in of_teeth)
     radial, axial, tilt = (given.radial, given.axial, given.tilt) if given else (radial, math.inf, tilt)

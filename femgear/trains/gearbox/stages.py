@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from femgear.case.dependencies import Steps
 from femgear.case.quantities import RPM
 from femgear.report.tables import Block, tabulate
@@ -11,8 +13,16 @@ from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_ver
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import check_held, solve_deflection
+from femgear.trains.gearbox.model import gearbox_model
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
+from femgear.trains.gearbox.response import reference_shaft, solve_response
+from femgear.trains.gearbox.response_results import (
+    GearboxResponseResult,
+    describe_response,
+    response_tables,
+    response_warnings,
+)
 from femgear.trains.gearbox.results import (
     ESTIMATES,
     DeflectionResult,
@@ -52,6 +62,41 @@ def solve_box_modes(
 ) -> GearboxModesResult:
     """Solve for the modes of the gearbox about the loaded state of its chosen load case."""
     return GearboxModesResult(solve_gearbox_modes(deflection.state, steps=steps))
+
+
+@one_blas_thread()
+def solve_box_dynamics(
+    case: GearboxCase, deflection: DeflectionResult, *, progress: Progress = silent, steps: Steps | None = None
+) -> GearboxResponseResult:
+    """Solve for the response to all stages at the speeds of the chosen load case."""
+    state = deflection.state
+    speed = [abs(state.model.flow.speed[reference_shaft(state.model)])]
+    return GearboxResponseResult(solve_response(state, speed, steps=steps, progress=progress), whole=True)
+
+
+@one_blas_thread()
+def solve_box_runup(
+    case: GearboxCase, deflection: DeflectionResult, *, progress: Progress = silent, steps: Steps | None = None
+) -> GearboxResponseResult:
+    """Follow the response to all stages over the speed of the reference shaft, at the torques of the load case."""
+    state = deflection.state
+    nominal = abs(state.model.flow.speed[reference_shaft(state.model)])
+    start, stop = case.runup.start or 0.25 * nominal, case.runup.to or 1.25 * nominal
+    speeds = np.linspace(start, stop, case.runup.count)
+    found = solve_response(state, speeds, steps=steps, progress=progress, stage="runup")
+    return GearboxResponseResult(found, whole=False)
+
+
+def _silent(case: GearboxCase) -> str:
+    """Tell why a case has no response, empty where it has one."""
+    if not case.deflection.contact or not any(stage.teeth for stage in (*case.pair, *case.planetary)):
+        return "no stage has computed teeth that excite it"
+    model = gearbox_model(case)
+    return "" if model.flow.speed[reference_shaft(model)] else "nothing turns"
+
+
+def _no_runup(case: GearboxCase) -> str:
+    return _silent(case) or ("" if case.runup.count else "[runup] gives no speeds")
 
 
 def check_before_run(case: GearboxCase) -> None:
@@ -99,6 +144,10 @@ def _port_texts(case, flow, power, shaft: str) -> tuple[str, str]:
     return f"{torque:.6g} ({', '.join(ports)})", f"{1e-3 * sum(power[name] for name in ports):.6g}"
 
 
+def _response_verdict(result: GearboxResponseResult) -> dict:
+    return {"speeds": len(result.found.speed), "stages": [stage.name for stage in result.found.stages]}
+
+
 GEARBOX = Train(
     name="gearbox",
     words="a gearbox case",
@@ -124,6 +173,31 @@ GEARBOX = Train(
             describe=lambda results: describe_gearbox_modes(results.modes),
             tables=lambda results: tuple(describe_modes_at_sensors(results.modes)),
             warnings=gearbox_modes_warnings,
+        ),
+        Stage(
+            name="dynamics",
+            title="Response",
+            solve=solve_box_dynamics,
+            takes=("deflection",),
+            options=("progress", "steps"),
+            wanted=lambda case: not _silent(case),
+            unavailable=_silent,
+            verdict=_response_verdict,
+            describe=lambda results: describe_response(results.dynamics),
+            tables=lambda results: response_tables(results.dynamics),
+            warnings=response_warnings,
+        ),
+        Stage(
+            name="runup",
+            title="Run-up",
+            solve=solve_box_runup,
+            takes=("deflection",),
+            options=("progress", "steps"),
+            wanted=lambda case: not _no_runup(case),
+            unavailable=_no_runup,
+            verdict=_response_verdict,
+            describe=lambda results: describe_response(results.runup),
+            warnings=response_warnings,
         ),
     ),
     describe=describe_gearbox,

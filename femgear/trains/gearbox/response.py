@@ -1,0 +1,336 @@
+"""Response of a gearbox to the excitation of every stage, over the speed.
+
+Each stage is solved with its own stiffness k(t) in the structure of all the rest, where the other meshes have their
+mean stiffness (`femgear.trains.gearbox.stage_structure`). Lines of all stages add at sensors, feet and bearings. What
+that leaves out, k(t) of one stage on the motion that another one makes, is estimated (`cross_excitation`).
+
+Damping is structural: springs and structure have the loss factor ``2 zeta``, with which a mode has the damping ratio
+zeta at its own frequency, wherever its energy lies (L. Cremer, M. Heckl, B. Petersson, Structure-Borne Sound, 2005).
+Torques and loads are those of one load case at all speeds; speeds are in proportion to one another. Gyroscopic terms
+of shafts are left out, those of the running planets are in.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.case.dependencies import Steps
+from femgear.housing.two_way.running_planets import RunningResponse, RunningStage, solve_running
+from femgear.stages.protocol import Progress, silent
+from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection
+from femgear.trains.gearbox.deflection import Deflection, spread_rows
+from femgear.trains.gearbox.model import GearboxModel, StageModel
+from femgear.trains.gearbox.sensors import sensor_rows
+from femgear.trains.gearbox.stage_structure import running_stage, stage_excitation
+
+_MOST = 2000
+"""Mesh harmonics at most."""
+_INSTANTS, _TURNS = 256, 16
+"""Instants of a mesh period, and angles of the carrier, at which mesh forces are looked at."""
+
+
+@dataclass(frozen=True)
+class StageLines:
+    """Lines that one stage makes at all speeds, of amplitudes ``Re sum u exp(i frequency t)``.
+
+    Parameters
+    ----------
+    name : str
+        Of the stage.
+    harmonic, side_band : (L,) int arrays
+        Mesh harmonic of every line, and the turns of the carrier beside it.
+    order : (L,) array
+        Frequency over that of the reference shaft [1].
+    motion : (v, k, L) complex array
+        Displacements of the outputs [m], see `output_rows`; NaN-free, zero beyond the harmonics of a speed.
+    force : (v, kinds, 3) array
+        Mean, largest and smallest force of a mesh of every kind (with the sun, with the ring) [N].
+    mean_stiffness, spread : (kinds,) arrays
+        Mean mesh stiffness, and r.m.s. of what fluctuates in it [N/m].
+    dynamic_force : (v, kinds) array
+        R.m.s. of the mesh force about its mean [N].
+    approach : (v, M) array
+        R.m.s. of the approach of all meshes of the gearbox by this stage [m]; NaN of its own.
+    residual, radius, tail, outer : (v,) arrays
+        Residual of the equations, spectral radius without GMRES, share of the mesh forces in the upper half of the
+        harmonics, and in the outermost side bands [1].
+    products : (v,) int array
+        Products with the fluctuating stiffness.
+    harmonics : (v,) int array
+        Mesh harmonics.
+    """
+
+    name: str
+    harmonic: np.ndarray
+    side_band: np.ndarray
+    order: np.ndarray
+    motion: np.ndarray
+    force: np.ndarray
+    mean_stiffness: np.ndarray
+    spread: np.ndarray
+    dynamic_force: np.ndarray
+    approach: np.ndarray
+    residual: np.ndarray
+    radius: np.ndarray
+    tail: np.ndarray
+    outer: np.ndarray
+    products: np.ndarray
+    harmonics: np.ndarray
+
+
+@dataclass(frozen=True)
+class GearboxResponse:
+    """Response of a gearbox at speeds in proportion to those of a load case.
+
+    Parameters
+    ----------
+    deflection : Deflection
+        Loaded state about which the gearbox vibrates.
+    reference : str
+        Shaft whose speed counts.
+    speed : (v,) array
+        Of the reference shaft [rad/s], positive.
+    stages : tuple of StageLines
+        Of all stages with teeth.
+    missing : tuple of str
+        Stages without teeth, which excite nothing.
+    up_to : float
+        Frequency up to which stages excite [Hz].
+    """
+
+    deflection: Deflection
+    reference: str
+    speed: np.ndarray
+    stages: tuple[StageLines, ...]
+    missing: tuple[str, ...]
+    up_to: float
+
+    @property
+    def cross_excitation(self) -> np.ndarray:
+        """Force (v, stages, stages) of k(t) of a stage (first) on the motion by another one, over its dynamic force.
+
+        R.m.s. values; zero of a stage itself.
+        """
+        found = np.zeros((len(self.speed), len(self.stages), len(self.stages)))
+        meshes = {stage.name: stage.meshes for stage in self.deflection.model.stages}
+        for a, excited in enumerate(self.stages):
+            count = len(meshes[excited.name]) // len(excited.spread)
+            for b, other in enumerate(self.stages):
+                if a == b:
+                    continue
+                moved = other.approach[:, list(meshes[excited.name])].reshape(len(self.speed), -1, count).max(axis=2)
+                own = np.maximum(excited.dynamic_force, np.finfo(float).tiny)
+                found[:, a, b] = (excited.spread * moved / own).max(axis=1)
+        return found
+
+
+def reference_shaft(model: GearboxModel) -> str:
+    """Name the shaft whose speed counts: the first one that is given."""
+    return model.flow.independent[0] if model.flow.independent else model.case.shaft[0].name
+
+
+def output_rows(found: Deflection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Make rows of all motions for sensors (s, 6n), bearings (3b, 6n) and feet (3f, 6n).
+
+    Those of sensors give displacements [1, m]. Those of bearings and feet give, by stiffness and damping, forces on the
+    shaft and on the casing along x, y, z [N/m, N]; NaN where they are rigid.
+    """
+    model = found.model
+    assembly, loss = model.assembly, 2.0 * model.case.modes.damping_ratio
+    bearings = np.zeros((len(model.bearings), 3, assembly.count), complex)
+    for row, springs, tangent in zip(bearings, model.bearings, found.bearing_stiffness, strict=True):
+        finite = np.where(np.isfinite(tangent[:3]), tangent[:3], 0.0)
+        row[:] = -(1.0 + 1j * loss) * finite @ spread_rows(springs, assembly)
+        row[np.isinf(tangent[:3]).any(axis=1)] = np.nan
+    casing = model.casing
+    feet = np.zeros((0, assembly.count), complex)
+    if casing is not None:
+        feet = np.zeros((len(casing.feet), 3, assembly.count), complex)
+        for row, springs, stiffness in zip(feet, casing.feet, casing.foot_stiffness, strict=True):
+            finite = np.where(np.isfinite(stiffness[:3]), stiffness[:3], 0.0)
+            row[:] = -(1.0 + 1j * loss) * finite[:, None] * spread_rows(springs, assembly)[:3]
+            row[np.isinf(stiffness[:3])] = np.nan
+    return sensor_rows(model), bearings.reshape(-1, assembly.count), feet.reshape(-1, assembly.count)
+
+
+def solve_response(
+    found: Deflection,
+    speed: Sequence[float],
+    *,
+    steps: Steps | None = None,
+    progress: Progress = silent,
+    stage: str = "dynamics",
+) -> GearboxResponse:
+    """Solve for the response of a gearbox to all its stages.
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state.
+    speed : (v,) sequence of float
+        Of the reference shaft [rad/s], positive.
+    steps : Steps, optional
+        What other computations have left: excitations are kept in it.
+    progress : callable
+        Called with (stage, done, total).
+    stage : str
+        Name for it.
+
+    Raises
+    ------
+    FemgearError
+        A mesh that opens (E-CONTACT-OPEN), equations that are nearly singular (E-RESONANCE).
+    """
+    model, steps = found.model, steps or Steps()
+    case, reference = model.case, reference_shaft(model)
+    nominal, speeds = abs(model.flow.speed[reference]), np.asarray(speed, float)
+    up_to = case.dynamics.up_to
+    rows = np.vstack(output_rows(found))
+    lines, done = list[StageLines](), 0
+    staged = [one for one in model.stages if one.name in found.contacts]
+    for one in staged:
+        excitation = stage_excitation(found.contacts[one.name], steps=steps)
+        running, motion = running_stage(found, one, excitation)
+        outputs = np.vstack([rows, mesh_rows(model, one)]) @ motion
+        lines.append(_stage_lines(model, one, running, outputs, speeds / nominal, up_to, len(rows)))
+        done += 1
+        progress(stage, done, len(staged))
+    missing = tuple(one.name for one in model.stages if one.name not in found.contacts)
+    return GearboxResponse(found, reference, speeds, tuple(lines), missing, up_to)
+
+
+def mesh_rows(model: GearboxModel, stage: StageModel) -> np.ndarray:
+    """Rows (M, 6n) of the approach of the flanks of all meshes in the middle of their slices; zero of a stage's own."""
+    assembly = model.assembly
+    found = np.zeros((len(assembly.contacts), assembly.count))
+    for number, part in enumerate(assembly.slices):
+        if number not in stage.meshes:
+            found[number] = assembly.columns[:, part].mean(axis=1)
+    return found
+
+
+def _stage_lines(
+    model: GearboxModel,
+    stage: StageModel,
+    running: RunningStage,
+    outputs: np.ndarray,
+    factors: np.ndarray,
+    up_to: float,
+    measured: int,
+) -> StageLines:
+    """Lines of one stage at all speeds, of outputs (k, m) per unit of a mode, the first ones ``measured``."""
+    mesh = 2.0 * math.pi * model.flow.mesh_frequency[stage.name]
+    section = stage.section
+    carrier = 0.0
+    if isinstance(section, BoxPlanetarySection) and section.carrier != CASING:
+        carrier = abs(model.flow.speed[section.carrier])
+    counts = np.clip(np.floor(2.0 * math.pi * up_to / (mesh * factors) * (1.0 + 1e-12)), 1, _MOST).astype(int)
+
+    def solve(i: int) -> RunningResponse:
+        both = (int(counts[i]), int(counts[i]))
+        return solve_running(
+            running,
+            mesh * factors[i],
+            carrier * factors[i],
+            harmonics=both,
+            side_bands=model.case.dynamics.side_bands if stage.planets else 0,
+            tolerance=model.case.dynamics.tolerance,
+        )
+
+    widest = solve(int(counts.argmax()))
+    harmonic, band, at = _line_numbers(widest, running.paths.symmetry)
+    motion = np.zeros((len(factors), measured, len(harmonic)), complex)
+    kinds, count = running.kinds, max(len(stage.planets), 1)
+    force, dynamic = np.zeros((len(factors), kinds, 3)), np.zeros((len(factors), kinds))
+    approach, figures = np.full((len(factors), len(outputs) - measured), np.nan), np.zeros((5, len(factors)))
+    mean = running.excitation.force.mean(axis=1).reshape(kinds, count).mean(axis=1)
+
+    def keep(i: int) -> None:
+        response = solve(i)
+        few = harmonic < len(response.modal)
+        amplitude = response.lines(outputs.T)[harmonic[few], at[few]]
+        motion[i][:, few] = amplitude[:, :measured].T
+        approach[i] = np.sqrt(0.5 * (np.abs(amplitude[:, measured:]) ** 2).sum(axis=0))
+        low, high, dynamic[i] = _extremes(response, kinds)
+        force[i] = np.stack([mean, mean + high, mean + low], axis=1)
+        figures[:, i] = response.residual, response.radius, *response.tail, response.products
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        list(pool.map(keep, range(len(factors))))
+    approach[:, list(stage.meshes)] = np.nan
+    nominal = abs(model.flow.speed[reference_shaft(model)])
+    order = (harmonic * mesh + band * carrier) / nominal
+    stiffness = running.excitation.stiffness.reshape(kinds, -1)
+    spread = running.excitation.stiffness.std(axis=1).reshape(kinds, count).max(axis=1)
+    residual, radius, tail, outer, products = figures
+    return StageLines(
+        stage.name,
+        harmonic,
+        band,
+        order,
+        motion,
+        force,
+        stiffness.mean(axis=1),
+        spread,
+        dynamic,
+        approach,
+        residual,
+        radius,
+        tail,
+        outer,
+        products.astype(int),
+        counts,
+    )
+
+
+def _line_numbers(response: RunningResponse, symmetry: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Harmonic and side band (L,) of the lines of the structure, and the places of these bands."""
+    moved = np.abs(response.modal).max(axis=2) > 0.0
+    if symmetry > 1:
+        moved[0, response.band % symmetry != 0] = False
+    moved[0, response.band <= 0] = False
+    harmonic, at = np.nonzero(moved)
+    return harmonic, response.band[at], at
+
+
+def _extremes(response: RunningResponse, kinds: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Smallest and largest force (kinds,) of the leading meshes beyond their mean, and its r.m.s. [N].
+
+    Over a mesh period and a turn of the carrier, which are seldom in a small ratio.
+    """
+    force = response.force[:, :kinds]
+    leaders, _, lines, bands = force.shape
+    points = max(_INSTANTS, 4 * lines)
+    spectrum = np.zeros((leaders, kinds, points, bands), complex)
+    spectrum[:, :, :lines] = 2.0 * force
+    spectrum[:, :, 0] *= 0.5
+    in_time = np.fft.ifft(spectrum, axis=2, norm="forward")
+    turn = np.arange(_TURNS if bands > 1 and response.carrier_speed else 1) / _TURNS
+    wave = np.exp(2j * np.pi * np.outer(np.arange(bands) - bands // 2, turn))
+    values = np.real(in_time @ wave)
+    energy = 2.0 * (np.abs(force) ** 2).sum(axis=(2, 3)) - (np.abs(force[:, :, 0]) ** 2).sum(axis=2)
+    return values.min(axis=(0, 2, 3)), values.max(axis=(0, 2, 3)), np.sqrt(energy.max(axis=0))
+
+
+def level(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.ndarray:
+    """R.m.s. (v, k) over the lines (v, k, L) of all stages by name; lines at one order add with their phase."""
+    order = np.concatenate([stage.order for stage in response.stages])
+    whole = np.concatenate([lines[stage.name] for stage in response.stages], axis=2)
+    known, place = np.unique(np.round(order / order.max(initial=1.0), 9), return_inverse=True)
+    total = np.zeros((*whole.shape[:2], len(known)), complex)
+    np.add.at(total, (slice(None), slice(None), place), whole)
+    return np.sqrt(0.5 * (np.abs(total) ** 2).sum(axis=2))
+
+
+def accelerations(response: GearboxResponse, count: int) -> dict[str, np.ndarray]:
+    """Accelerations (v, s, L) of the sensors, the first ``count`` outputs, by every stage [m/s^2]."""
+    return {
+        stage.name: -((stage.order * response.speed[:, None])[:, None] ** 2) * stage.motion[:, :count]
+        for stage in response.stages
+    }

@@ -1,0 +1,326 @@
+"""Results of the response of a gearbox: dynamics.nc and runup.nc, their tables and findings."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.case.quantities import RPM
+from femgear.findings import Finding
+from femgear.report.tables import Block, tabulate
+from femgear.stages.protocol import StageResult
+from femgear.storage.contents import Contents
+from femgear.trains.gearbox.response import GearboxResponse, StageLines, accelerations, level
+from femgear.trains.gearbox.sensors import casing_sensors
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+LINES_SHOWN = 12
+"""Lines of a sensor in the table."""
+_CHANGE = 0.5
+"""Change of a level by the upper half of the excitation that is told [dB]."""
+_CROSS = 0.05
+"""Force by the stiffness of a stage on the motion of another one, over its dynamic force, that is told."""
+_TAIL = 0.05
+"""Share of mesh forces at the outer side bands that is told."""
+_KINDS = ("sun", "ring")
+
+
+@dataclass(frozen=True, eq=False)
+class GearboxResponseResult(StageResult):
+    """Response of a gearbox at some speeds, ``found``; ``whole`` keeps the lines of bearings and feet too."""
+
+    found: GearboxResponse
+    whole: bool
+
+    @property
+    def residual(self) -> float:
+        """Largest residual of the equations of all stages."""
+        return max((float(stage.residual.max()) for stage in self.found.stages), default=math.nan)
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        products = max((int(stage.products.max()) for stage in self.found.stages), default=0)
+        return f"every stage in the structure of all the rest, GMRES with at most {products} products"
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterable[Finding]:
+        """List what the file says against itself, see `response_warnings`."""
+        return response_warnings(data)
+
+    def contents(self) -> Contents:
+        """Collect the contents of dynamics.nc or runup.nc."""
+        found = self.found
+        model = found.deflection.model
+        sensors, bearings = len(casing_sensors(model.case)), len(model.bearings)
+        forces = slice(sensors, sensors + 3 * bearings)
+        variables = _of_stages(found) | _of_lines(found)
+        moved = accelerations(found, sensors)
+        if sensors:
+            lines = np.concatenate([moved[stage.name] for stage in found.stages], axis=2)
+            variables |= {
+                "level": ("speed sensor", level(found, moved), "m/s^2", "root mean square of the acceleration"),
+                "level_of_stage": (
+                    "speed sensor stage",
+                    np.stack([_rms(moved[stage.name]) for stage in found.stages], axis=2),
+                    "m/s^2",
+                    "the same by the lines of one stage",
+                ),
+                "level_change": (
+                    "speed sensor",
+                    _change(found, moved),
+                    "dB",
+                    "change of the level by lines beyond half the frequency of the excitation",
+                ),
+                **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
+            }
+        of_bearings = {stage.name: stage.motion[:, forces] for stage in found.stages}
+        size = (len(found.speed), bearings, 3)
+        rms = level(found, of_bearings).reshape(size)
+        text = "root mean square of the bearing force about its mean; NaN of rigid bearings"
+        variables["bearing_force_rms"] = ("speed bearing axis", rms, "N", text)
+        of_feet = {stage.name: stage.motion[:, forces.stop :] for stage in found.stages}
+        feet = () if model.casing is None else model.casing.feet
+        if feet:
+            size = (len(found.speed), len(feet), 3)
+            text = "root mean square of the force of the foot about its mean; NaN of rigid feet"
+            variables["foot_force_rms"] = ("speed foot axis", level(found, of_feet).reshape(size), "N", text)
+        if self.whole:
+            text = "force of the bearing on the shaft, amplitude of the line"
+            lines = np.concatenate(list(of_bearings.values()), axis=2)
+            lines = lines.reshape(len(found.speed), bearings, 3, -1)
+            variables |= _complex("bearing_force", "speed bearing axis line", lines, "N", text)
+        if len(found.stages) > 1:
+            text = "force of k(t) of the stage on the motion by another one, over the dynamic force of the stage"
+            variables["cross_excitation"] = ("speed stage other_stage", found.cross_excitation, "1", text)
+        names = [stage.name for stage in found.stages]
+        coords: dict[str, Any] = {
+            "speed": (("speed",), found.speed / RPM, "rpm", f"speed of {found.reference}"),
+            "stage": (("stage",), names, "1", "stage that excites"),
+            "other_stage": (("other_stage",), names, "1", "stage that excites"),
+            "kind": (("kind",), list(_KINDS), "1", "kind of mesh; of a pair the first one"),
+            "bearing": (("bearing",), list(model.bearing_names), "1", "bearing"),
+            "axis": (("axis",), list("xyz"), "1", "coordinate"),
+        }
+        if sensors:
+            coords["sensor"] = (("sensor",), [one.name for one in casing_sensors(model.case)], "1", "sensor")
+        if feet:
+            coords["foot"] = (("foot",), [one.name for one in feet], "1", "foot of the casing")
+        attrs = {
+            "title": "response of the gearbox to its stages",
+            "up_to": found.up_to,
+            "reference": found.reference,
+            "missing": ", ".join(found.missing),
+        }
+        used = {dim for entry in variables.values() for dim in entry[0].split()}
+        return Contents(variables, {name: entry for name, entry in coords.items() if name in used}, attrs)
+
+
+def _complex(name: str, dims: str, values: np.ndarray, unit: str, text: str) -> dict[str, tuple]:
+    return {f"{name}_real": (dims, np.real(values), unit, text), f"{name}_imag": (dims, np.imag(values), unit, text)}
+
+
+def _rms(lines: np.ndarray) -> np.ndarray:
+    return np.sqrt(0.5 * (np.abs(lines) ** 2).sum(axis=-1))
+
+
+def _of_stages(found: GearboxResponse) -> dict[str, tuple]:
+    """Mesh forces and figures of the solutions, stage by stage."""
+
+    def kinds(values) -> np.ndarray:
+        whole = np.full((len(found.speed), len(found.stages), 2), np.nan)
+        for number, stage in enumerate(found.stages):
+            own = values(stage)
+            whole[:, number, : own.shape[1]] = own
+        return whole
+
+    def figures(name: str) -> np.ndarray:
+        return np.stack([getattr(stage, name) for stage in found.stages], axis=1)
+
+    return {
+        "dynamic_factor": (
+            "speed stage kind",
+            kinds(lambda stage: stage.force[..., 1] / stage.force[..., 0]),
+            "1",
+            "largest mesh force over its mean; NaN where a pair has no second mesh",
+        ),
+        "lowest_force": (
+            "speed stage kind",
+            kinds(lambda stage: stage.force[..., 2]),
+            "N",
+            "smallest mesh force along the normal; below zero real flanks part",
+        ),
+        "mesh_force_rms": (
+            "speed stage kind",
+            kinds(lambda stage: stage.dynamic_force),
+            "N",
+            "root mean square of the mesh force about its mean",
+        ),
+        "mesh_harmonics": ("speed stage", figures("harmonics"), "1", "mesh harmonics of the stage"),
+        "tail": ("speed stage", figures("tail"), "1", "share of the mesh forces in the upper half of the harmonics"),
+        "outer": ("speed stage", figures("outer"), "1", "share of the mesh forces at the outermost side bands"),
+        "residual": ("speed stage", figures("residual"), "1", "relative residual of the equations"),
+        "spectral_radius": ("speed stage", figures("radius"), "1", "spectral radius of the fixed point"),
+        "products": ("speed stage", figures("products"), "1", "products with the fluctuating stiffness"),
+    }
+
+
+def _of_lines(found: GearboxResponse) -> dict[str, tuple]:
+    """Origin and order of all lines."""
+
+    def joined(values) -> np.ndarray:
+        return np.concatenate([values(stage) for stage in found.stages])
+
+    return {
+        "order": ("line", joined(lambda stage: stage.order), "1", f"frequency over that of {found.reference}"),
+        "origin": (
+            "line",
+            [stage.name for stage in found.stages for _ in stage.order],
+            "1",
+            "stage that makes the line",
+        ),
+        "harmonic": ("line", joined(lambda stage: stage.harmonic), "1", "mesh harmonic of the line"),
+        "side_band": ("line", joined(lambda stage: stage.side_band), "1", "turns of the carrier beside the harmonic"),
+    }
+
+
+def _change(found: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
+    """Change of the levels (v, s) by lines beyond half the frequency of the excitation [dB]."""
+    half = math.pi * found.up_to
+
+    def low(stage: StageLines) -> np.ndarray:
+        return moved[stage.name] * (stage.order * found.speed[:, None] <= half)[:, None]
+
+    less = level(found, {stage.name: low(stage) for stage in found.stages})
+    whole = level(found, moved)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(whole > 0.0, 20.0 * np.log10(whole / less), 0.0)
+
+
+def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """List what dynamics.nc or runup.nc says against itself."""
+    stages, speeds = [str(name) for name in data["stage"].values], data["speed"].values
+    lowest = data["lowest_force"].values
+    for number, stage in enumerate(stages):
+        pulling = np.nanmin(lowest[:, number], axis=1) < 0.0
+        if pulling.any():
+            text = f"flanks of {stage} would part at {_of_speeds(speeds, pulling)}: the model holds them together"
+            yield Finding("W-PULL", "operation.load_case", text, remedy="more torque, smaller errors, more damping")
+        outer = data["outer"].values[:, number]
+        if outer.max() > _TAIL:
+            text = f"{outer.max():.2g} of the mesh forces of {stage} are at the outermost side bands"
+            yield Finding("W-TAIL", "dynamics.side_bands", text, remedy="more of them")
+    if "level_change" in data:
+        change = np.nan_to_num(np.abs(data["level_change"].values), posinf=0.0)
+        if change.max(initial=0.0) > _CHANGE:
+            speed, sensor = np.unravel_index(int(change.argmax()), change.shape)
+            text = (
+                f"the upper half of the excitation, to {1e-3 * data.attrs['up_to']:g} kHz, changes the level of "
+                f"{data['sensor'].values[sensor]} at {speeds[speed]:.5g} rpm by {change.max():.2g} dB"
+            )
+            yield Finding("W-EXCITATION", "dynamics.up_to", text, remedy="a higher frequency")
+    if "cross_excitation" in data:
+        cross = data["cross_excitation"].values
+        if cross.max(initial=0.0) > _CROSS:
+            speed, first, second = np.unravel_index(int(cross.argmax()), cross.shape)
+            text = (
+                f"the stiffness of {stages[first]} on the motion by {stages[second]} makes {cross.max():.0%} of its "
+                f"dynamic force at {speeds[speed]:.5g} rpm, and is left out"
+            )
+            yield Finding("W-CROSS", "", text, limit=f"{_CROSS:.0%}")
+    if data.attrs["missing"]:
+        text = f"without teeth {data.attrs['missing']} excite nothing"
+        yield Finding("W-EXCITATION", "", text, remedy="give the teeth of these stages")
+
+
+def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:
+    """Words for some of the speeds [rpm]."""
+    some = speeds[chosen]
+    return f"{some[0]:.5g} rpm" if len(some) == 1 else f"{len(some)} speeds, {some.min():.5g} to {some.max():.5g} rpm"
+
+
+def describe_response(data: xr.Dataset) -> Block:
+    """Tabulate mesh forces of all stages, at the speed with the largest factor of each."""
+    factor = np.nan_to_num(data["dynamic_factor"].values)
+
+    def worst(stage: int) -> int:
+        return int(factor[:, stage].max(axis=1).argmax())
+
+    columns = {
+        "stage": lambda i: str(data["stage"].values[i]),
+        "speed [rpm]": lambda i: f"{float(data['speed'].values[worst(i)]):.5g}",
+        "largest force over mean": lambda i: f"{factor[worst(i), i].max():.4f}",
+        "smallest force [N]": lambda i: f"{np.nanmin(data['lowest_force'].values[worst(i), i]):.5g}",
+        "mesh harmonics": lambda i: f"{int(data['mesh_harmonics'].values[worst(i), i])}",
+    }
+    note = f"excitation up to {1e-3 * data.attrs['up_to']:g} kHz; speeds are those of {data.attrs['reference']}"
+    return tabulate("Response of the stages", range(data.sizes["stage"]), columns, (note,))
+
+
+def response_tables(data: xr.Dataset) -> Iterator[Block]:
+    """Tabulate levels and largest lines of the sensors, and forces of bearings and feet, at the loudest speed."""
+    at = 0
+    if "level" in data:
+        at = int(data["level"].values.max(axis=1).argmax())
+        yield _levels(data, at)
+        if "lines_real" in data:
+            yield from (_lines(data, at, sensor) for sensor in range(data.sizes["sensor"]))
+    speed = f"{float(data['speed'].values[at]):.5g} rpm"
+    for name, dim in (("bearing", "bearing"), ("foot", "foot")):
+        if f"{name}_force_rms" in data:
+            forces = data[f"{name}_force_rms"].values[at]
+            columns = {name: lambda i, dim=dim: str(data[dim].values[i])} | {
+                f"{axis} [N]": lambda i, way=way, forces=forces: _number(forces[i, way])
+                for way, axis in enumerate("xyz")
+            }
+            title = f"Fluctuating forces of the {'bearings' if name == 'bearing' else 'feet'}, r.m.s., {speed}"
+            yield tabulate(title, range(data.sizes[dim]), columns)
+
+
+def _number(value: float) -> str:
+    return "rigid" if math.isnan(value) else f"{value:.4g}"
+
+
+def _levels(data: xr.Dataset, at: int) -> Block:
+    """Levels of all sensors at a speed, with the share of every stage."""
+    whole, parts = data["level"].values[at], data["level_of_stage"].values[at]
+    columns = {
+        "sensor": lambda i: str(data["sensor"].values[i]),
+        "level [m/s^2]": lambda i: f"{whole[i]:.4g}",
+    } | {
+        f"{name}": lambda i, stage=stage: f"{(parts[i, stage] / max(whole[i], 1e-300)) ** 2:.1%}"
+        for stage, name in enumerate(data["stage"].values.tolist())
+    }
+    speed = float(data["speed"].values[at])
+    return tabulate(f"Levels at {speed:.5g} rpm, and shares of the stages in their power", range(len(whole)), columns)
+
+
+def _lines(data: xr.Dataset, at: int, sensor: int) -> Block:
+    """Largest lines of a sensor at a speed, each with its origin."""
+    size = np.hypot(data["lines_real"].values[at, sensor], data["lines_imag"].values[at, sensor])
+    hertz = data["order"].values * float(data["speed"].values[at]) / 60.0
+    chosen = [int(i) for i in np.argsort(-size, kind="stable")[:LINES_SHOWN] if size[i] > 0.0]
+    columns = {
+        "frequency [Hz]": lambda i: f"{hertz[i]:.2f}",
+        "order": lambda i: f"{float(data['order'].values[i]):.5g}",
+        "amplitude [m/s^2]": lambda i: f"{size[i]:.4g}",
+        "origin": lambda i: line_origin(data, i),
+    }
+    return tabulate(f"Largest lines at {data['sensor'].values[sensor]}", chosen, columns)
+
+
+def line_origin(data: xr.Dataset, line: int) -> str:
+    """Write where a line comes from: stage, mesh harmonic, turns of the carrier beside it."""
+    harmonic, band = int(data["harmonic"].values[line]), int(data["side_band"].values[line])
+    side = f" {band:+d} x carrier" if band else ""
+    return (
+        f"{data['origin'].values[line]}, mesh harmonic {harmonic}{side}"
+        if harmonic
+        else (f"{data['origin'].values[line]}, {band} x carrier")
+    )

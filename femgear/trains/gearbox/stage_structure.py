@@ -1,0 +1,295 @@
+"""One stage of a gearbox and the structure of all the rest, as the response takes them.
+
+The structure is the gearbox about its loaded state without the meshes of the stage and, of a planetary one, without
+planets and pins: shafts, bearings, casing, the meshes of the other stages with their mean stiffness, the planets of
+these where they are. Planets of the stage run around in it (`femgear.housing.two_way.running_planets`).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from femgear.case.dependencies import Steps
+from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.contact.cycle import CycleOptions
+from femgear.contact.loaded_period import loaded_period
+from femgear.fe.beam import rigid_link
+from femgear.gears.deviations import rotational_symmetry
+from femgear.gears.profile import base_helix_angle
+from femgear.housing.two_way.carrier_orders import MeshPaths, mean_excitation
+from femgear.housing.two_way.running_planets import RunningStage
+from femgear.solvers.linear.modal import solve_modes
+from femgear.stages.static import over_width, record_positions, static_supports
+from femgear.system.assembly import GROUND, Assembly, Inertia
+from femgear.system.system import MechanicalSystem, MeshExcitation
+from femgear.trains.gearbox.carrier import pin_axes, pin_compliance
+from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, teeth_of
+from femgear.trains.gearbox.contact import StageContact
+from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.elastic_carrier import pin_flexibility
+from femgear.trains.gearbox.model import GearboxModel, StageModel, planet_bearing
+from femgear.trains.gearbox.modes import linear_system
+
+_RECORD = 2**13
+"""Positions of the excitation in the mesh period; of sets the next multiple of their planets."""
+_TURNING = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+
+
+def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> MeshExcitation:
+    """Compute mesh stiffness, deflection and force of the teeth of a stage along their normals over a mesh period.
+
+    As time goes on where gear 1, or the sun against its carrier, turns counter-clockwise.
+
+    Parameters
+    ----------
+    contact : StageContact
+        Of the loaded state.
+    steps : Steps, optional
+        What other computations of the stage have left.
+    """
+    case, static = contact.case, contact.result
+    gears = static.planetary_set
+    slices = over_width(case, gears, waves=static.waves, steps=steps)
+    if slices:
+        slices |= {"held_waves": slices["waves"]}
+    state = loaded_period(
+        gears,
+        static.bodies,
+        static.bodies,
+        sun_torque=static.sun_torque,
+        positions=record_positions(case, gears),
+        contact=case.static.contact,
+        deviations=None if contact.deviations.ideal else contact.deviations,
+        supports=static_supports(case),
+        options=CycleOptions(**slices),
+    )
+    count = gears.n_planets * -(-_RECORD // gears.n_planets) * state.periods
+    cosine = math.cos(base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
+    stiffness, deflection, force = (state.resampled(name, count) for name in ("stiffness", "deflection", "force"))
+    play = np.zeros(len(force))
+    return MeshExcitation(stiffness / cosine**2, deflection * cosine, force / cosine, play, state.periods)
+
+
+def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitation) -> tuple[RunningStage, np.ndarray]:
+    """Take a stage out of a gearbox: its planets and meshes, and the modes of the structure without it.
+
+    The motions (6n, m) of all stations by these modes [kg^-1/2] come with it.
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state of the gearbox.
+    stage : StageModel
+        With teeth.
+    excitation : MeshExcitation
+        See `stage_excitation`.
+    """
+    assembly, system, slices = structure_without(found, stage)
+    modes = solve_modes(system, slices, damping_ratio=0.0)
+    motion = assembly.motions @ modes.shape
+    damping = found.model.case.modes.damping_ratio
+    section = stage.section
+    planetary = isinstance(section, BoxPlanetarySection)
+    rows, stiffness, points = _mesh_rows(found, stage)
+    excitation, paths, sense = _in_time(found.model, stage, excitation)
+    mean = excitation.stiffness.mean(axis=1)
+    kinds = len(mean) // max(len(stage.planets), 1)
+    stiffness[:kinds] = mean.reshape(kinds, -1).mean(axis=1)
+    mass, gyroscopic, turning = np.zeros((3, 6, 6))
+    flexibility, free = None, np.zeros(0, int)
+    if planetary:
+        own = slice(6 * stage.planets[0], 6 * stage.planets[0] + 6)
+        free = np.flatnonzero(~found.model.assembly.held[own])
+        used = free[planet_bearing(section)[free] > 0.0]
+        pins, springs, flexibility = _pin_rows(found.model, stage, used, len(rows))
+        rows, stiffness = [*rows, *pins], np.append(stiffness, springs)
+        points = np.vstack([points, np.eye(6)[used]])
+        mass, gyroscopic, turning = _planet(found.model, stage)
+    shape = np.array([_waves(row, stage, motion, planetary=planetary) for row in rows])
+    return (
+        RunningStage(
+            2.0 * math.pi * modes.frequency,
+            np.zeros(len(modes.frequency)),
+            shape,
+            np.zeros((*shape.shape[:2], *shape.shape[:2])),
+            mass[np.ix_(free, free)],
+            gyroscopic[np.ix_(free, free)],
+            turning[np.ix_(free, free)],
+            points.T[free],
+            stiffness,
+            np.full(len(stiffness), 2.0 * damping),
+            excitation,
+            paths,
+            sense,
+            structure_loss=2.0 * damping,
+            flexibility=flexibility,
+        ),
+        motion,
+    )
+
+
+def structure_without(found: Deflection, stage: StageModel) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
+    """Take planets, pins and meshes of a stage out of the linear gearbox; stiffness (g,) of the slices left [N/m]."""
+    assembly, _, stiffness = linear_system(found)
+    carrier = stage.elastic_carrier
+    gone = {*stage.planets, *(carrier.stations[1:] if carrier else ())}
+    held = assembly.held.copy()
+    for station in gone:
+        held[6 * station : 6 * station + 6] = True
+    inertias = [one for one in assembly.inertias if gone.isdisjoint(one.stations)]
+    if carrier is not None and carrier.stations[0] != GROUND:
+        inertias.append(_rigid_carrier(found.model, stage))
+    kept = np.concatenate(
+        [np.full(part.stop - part.start, i not in stage.meshes) for i, part in enumerate(assembly.slices)]
+    )
+    rest = replace(
+        assembly,
+        held=held,
+        inertias=tuple(inertias),
+        springs=tuple(one for one in assembly.springs if gone.isdisjoint(one.stations)),
+        contacts=tuple(one for i, one in enumerate(assembly.contacts) if i not in stage.meshes),
+    )
+    system = rest.system()
+    return rest, replace(system, gyroscopic=None), stiffness[kept]
+
+
+def _rigid_carrier(model: GearboxModel, stage: StageModel) -> Inertia:
+    """Carrier of a file as a rigid body on its shaft: its pins run around."""
+    carrier = stage.elastic_carrier
+    assert carrier is not None
+    hub = model.assembly.places[carrier.stations[0]]
+    rigid = np.vstack([np.eye(6), *(rigid_link(model.assembly.places[pin] - hub) for pin in carrier.stations[1:])])
+    polar = carrier.gyroscopic[:6, :6]
+    return Inertia(carrier.stations[:1], rigid.T @ carrier.mass @ rigid, polar)
+
+
+def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[tuple[int, np.ndarray]], np.ndarray, np.ndarray]:
+    """Springs of the leading meshes: what they do to the structure, stiffness, and approach (.., 6) of the planet.
+
+    First the approach of the flanks along the normal, then the slope of the approach along the width, of each mesh
+    that has slices. The former is that of all slices by their stiffness. Axes of the planet are radial, tangential, z.
+    """
+    assembly, _, stiffness = linear_system(found)
+    count = max(len(stage.planets), 1)
+    approach, slope = [], []
+    axes = np.kron(np.eye(2), pin_axes(stage.angles[0])) if stage.planets else np.eye(6)
+    for mesh in stage.meshes[::count]:
+        contact, k = assembly.contacts[mesh], stiffness[assembly.slices[mesh]]
+        weight = k / k.sum()
+        mean = np.einsum("s,gsm->gm", weight, contact.approach)
+        height = contact.heights - weight @ contact.heights
+        tilt = np.zeros_like(mean)
+        if len(k) > 1:
+            tilt = (contact.approach[:, -1] - contact.approach[:, 0]) / (contact.heights[-1] - contact.heights[0])
+        for kept, rows, value in ((approach, mean, k.sum()), (slope, tilt, float(k @ height**2))):
+            if value > 0.0:
+                kept.append((contact.stations, rows, value))
+    rows, points, springs = [], [], []
+    for stations, effect, value in (*approach, *slope):
+        parts = [(station, row) for station, row in zip(stations, effect, strict=True) if station != GROUND]
+        planet = [row for station, row in parts if station in stage.planets]
+        rows.append([(station, row) for station, row in parts if station not in stage.planets])
+        points.append(axes @ planet[0] if planet else np.zeros(6))
+        springs.append(value)
+    return rows, np.array(springs), np.array(points)
+
+
+def _pin_rows(model: GearboxModel, stage: StageModel, used: np.ndarray, meshes: int):
+    """Springs of the pin of the first planet on the carrier: rows, stiffness, and compliance of all pins.
+
+    Of the motions ``used`` that the pin holds, behind so many springs of the meshes.
+    """
+    section: Any = stage.section
+    bearing = planet_bearing(section)
+    seat = model.seat(section.carrier, section.seat_position) if section.carrier != CASING else None
+    holder = GROUND if seat is None else seat.station
+    if stage.elastic_carrier is not None:
+        holder = stage.elastic_carrier.stations[0]
+    along = np.kron(np.eye(2), pin_axes(stage.angles[0]))
+    rows: list = [[] for _ in used]
+    if holder != GROUND:
+        offset = model.assembly.places[stage.planets[0]] - model.assembly.places[holder]
+        effect = -along @ rigid_link(offset)
+        rows = [[(holder, effect[way])] for way in used]
+    compliance = None
+    if stage.elastic_carrier is not None:
+        compliance = pin_flexibility(section, stage.angles)
+    elif section.pins is not None:
+        compliance = pin_compliance(model.case, section, stage.angles)
+    if compliance is None:
+        return rows, bearing[used], None
+    count, size = len(stage.planets), meshes + len(used)
+    turned = np.asarray(block_diag(*(np.kron(np.eye(2), pin_axes(psi)) for psi in stage.angles)))
+    whole = (turned @ compliance @ turned.T).reshape(count, 6, count, 6)
+    flexibility = np.zeros((count, size, count, size))
+    flexibility[:, meshes:, :, meshes:] = whole[:, used][:, :, :, used]
+    return rows, bearing[used], flexibility
+
+
+def _waves(row: list[tuple[int, np.ndarray]], stage: StageModel, motion: np.ndarray, *, planetary: bool) -> np.ndarray:
+    """Approach (W, m) of a contact point by the modes, as the planet runs around: waves -1, 0, 1; of a pair 0."""
+    angle = stage.angles[0] if planetary else 0.0
+    shape = np.zeros((3 if planetary else 1, motion.shape[1]), complex)
+    for station, effect in row:
+        moved = motion[6 * station : 6 * station + 6]
+        if not planetary:
+            shape[0] += effect @ moved
+            continue
+        shape[1] += effect[[2, 5]] @ moved[[2, 5]]
+        for first in (0, 3):
+            x, y = effect[first : first + 2]
+            # a turn of the row by phi - angle
+            forward = 0.5 * ((x + 1j * y) * moved[first] + (y - 1j * x) * moved[first + 1])
+            shape[2] += np.exp(-1j * angle) * forward
+            shape[0] += np.exp(1j * angle) * forward.conj()
+    return shape
+
+
+def _planet(model: GearboxModel, stage: StageModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Mass, gyroscopic and turning matrices (6, 6) of a planet along its own axes, see `RunningStage`."""
+    station = stage.planets[0]
+    parts = [one for one in model.assembly.inertias if one.stations == (station,)]
+    mass, gyroscopic = sum(one.mass for one in parts), sum(one.gyroscopic for one in parts)
+    frequency = 2.0 * math.pi * model.flow.mesh_frequency[stage.name]
+    turning = np.asarray(block_diag(_TURNING, _TURNING))
+    return np.asarray(mass), np.asarray(gyroscopic) / frequency, turning
+
+
+def _in_time(
+    model: GearboxModel, stage: StageModel, excitation: MeshExcitation
+) -> tuple[MeshExcitation, MeshPaths, int]:
+    """Excitation as time goes on, paths of its meshes, and the sense of the carrier.
+
+    Planets that only the gearbox loads unequally are taken as equal, with the mean of all of them.
+    """
+    section, flow = stage.section, model.flow
+    if not isinstance(section, BoxPlanetarySection):
+        turns = flow.speed[section.shafts[0]] if section.shafts[0] != CASING else -flow.speed[section.shafts[1]]
+        return _reversed(excitation, back=turns < 0.0), MeshPaths(1, (0.0,)), 1
+    carrier = flow.speed[section.carrier] if section.carrier != CASING else 0.0
+    sun = flow.speed[section.sun] if section.sun != CASING else 0.0
+    ring = flow.speed[section.ring] if section.ring != CASING else 0.0
+    excitation = _reversed(excitation, back=sun < carrier)
+    sense = -1 if carrier < 0.0 else 1
+    teeth = stage.sizes.teeth[2] * sense * (1 if carrier > ring else -1)
+    case = teeth_of(section)
+    count = rotational_symmetry(set_deviations(case), planetary_set(case))
+    paths = MeshPaths(teeth, tuple(stage.angles), 0.0, count)
+    if excitation.periods == 1 and count > 1:
+        excitation = mean_excitation(excitation, paths, sense)
+    return excitation, paths, sense
+
+
+def _reversed(excitation: MeshExcitation, *, back: bool) -> MeshExcitation:
+    """Excitation of gears that turn the other way round."""
+    if not back:
+        return excitation
+    arrays = {
+        name: np.roll(getattr(excitation, name)[:, ::-1], 1, axis=1) for name in ("stiffness", "deflection", "force")
+    }
+    return replace(excitation, **arrays)
