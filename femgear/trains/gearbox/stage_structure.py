@@ -52,7 +52,11 @@ def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> Me
     steps : Steps, optional
         What other computations of the stage have left.
     """
-    case, static = contact.case, contact.result
+    case, static, steps = contact.case, contact.result, steps or Steps()
+    moved = contact.deviations.planet_misalignment, contact.deviations.pin_errors
+    known = {"teeth": case.source, "moved": tuple(np.concatenate([one.ravel() for one in moved]).tolist())}
+    if (kept := steps.kept("excitation of a stage", known)) is not None:
+        return kept
     gears = static.planetary_set
     slices = over_width(case, gears, waves=static.waves, steps=steps)
     if slices:
@@ -72,7 +76,8 @@ def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> Me
     cosine = math.cos(base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
     stiffness, deflection, force = (state.resampled(name, count) for name in ("stiffness", "deflection", "force"))
     play = np.zeros(len(force))
-    return MeshExcitation(stiffness / cosine**2, deflection * cosine, force / cosine, play, state.periods)
+    found = MeshExcitation(stiffness / cosine**2, deflection * cosine, force / cosine, play, state.periods)
+    return steps.keep("excitation of a stage", known, found)
 
 
 def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitation) -> tuple[RunningStage, np.ndarray]:
