@@ -41,6 +41,8 @@ _RESIDUAL = 1e-6
 """Residual that is refused."""
 _STILL = 1e-12
 """Frequency over the mesh frequency below which it is none."""
+_SINGULAR = 1e-11
+"""Singular value of a scaled system of the means, over the largest, of a motion of the whole that nothing holds."""
 _ROOM = 64e6
 """Size of the systems that are in memory together [bytes]."""
 
@@ -399,11 +401,11 @@ class _Problem:
                 at = points + (k * G + g) * p + np.arange(p)
                 system[:, at[:, None], at] = own[:, k]
         if free:  # motions that nothing holds take up no mean force
-            rigid = np.zeros((points + planets, len(free)), complex)
-            rigid[:points] = np.array(free).T
-            border = np.broadcast_to(rigid, (len(blocks), *rigid.shape))
+            border = np.zeros((len(free), points + planets), complex)
+            border[:, :points] = free
+            border = np.broadcast_to(border, (len(blocks), *border.shape))
             corner = np.zeros((len(blocks), len(free), len(free)))
-            system = np.block([[system, -border], [border.conj().swapaxes(1, 2), corner]])
+            system = np.block([[system, -border.swapaxes(1, 2)], [border.conj(), corner]])
         meshes = np.zeros((system.shape[1], b, kinds, G), complex)
         right = np.broadcast_to(meshes[None], (len(blocks), *meshes.shape)).copy()
         for k in range(b):
@@ -412,6 +414,8 @@ class _Problem:
                     right[:, (k * G + g) * C + kind, k, kind, g] = c[:, k, kind]
         # columns in the order of the meshes of all leaders, band by band
         right = right.reshape(len(blocks), system.shape[1], -1)
+        if free:
+            return np.stack([_consistent(one, points, of) for one, of in zip(system, right, strict=True)])
         # planets have units of their own
         rows = 1.0 / np.maximum(np.abs(system).max(axis=2), np.finfo(float).tiny)
         columns = 1.0 / np.maximum(np.abs(system * rows[:, :, None]).max(axis=1), np.finfo(float).tiny)
@@ -499,3 +503,18 @@ class _Problem:
         whole = max(float(energy.sum()), np.finfo(float).tiny)
         upper, outer = energy[len(energy) // 2 + 1 :].sum(), energy[:, [0, -1]].sum() if len(orders.bands) > 1 else 0.0
         return float(np.sqrt(upper / whole)), float(np.sqrt(outer / whole))
+
+
+def _consistent(system: np.ndarray, points: int, right: np.ndarray) -> np.ndarray:
+    """Forces (points, k) of a system of the means, in which the whole may move: forces do not hang on that.
+
+    Of the first ``points`` rows and columns are forces and approaches, of the others motions and balances.
+    """
+    own = np.abs(np.diag(system))[:points]
+    scale = np.ones(len(system))
+    scale[:points] = 1.0 / np.sqrt(np.where(own > 0.0, own, own.max(initial=0.0) or 1.0))
+    effect = np.abs(system[points:, :points] * scale[:points]).max(axis=1, initial=0.0)
+    scale[points:] = 1.0 / np.where(effect > 0.0, effect, 1.0)
+    scaled = scale[:, None] * system * scale
+    found = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=_SINGULAR)[0]
+    return (scale[:, None] * found)[:points]

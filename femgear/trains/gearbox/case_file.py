@@ -564,7 +564,8 @@ class GearboxCase(Section, ReadCase):
     """A gearbox, its load cases and how to compute it, in SI units.
 
     The fields carry the names of the case file; ``source`` is the text that gives this case. ``motions`` restricts
-    all bodies: ``"space"`` has six, ``"plane"`` x, y and rotation, ``"rotation"`` the rotation alone.
+    all bodies: ``"space"`` has six, ``"plane"`` x, y and rotation, ``"rotation"`` the rotation alone, with which
+    planets go round on their pins.
     """
 
     format: Annotated[int, Count(1, FORMAT)] = FORMAT

@@ -40,7 +40,7 @@ from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, set_sizes
 from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
 
 HELD = {"space": (), "plane": (2, 3, 4), "rotation": (0, 1, 2, 3, 4)}
-"""Motions that do not take place, by ``motions`` of the case."""
+"""Motions that do not take place, by ``motions`` of the case; planets move in their plane at any rate."""
 
 
 @dataclass(frozen=True)
@@ -237,6 +237,11 @@ class _Builder:
         stages = [self._pair(stage) for stage in case.pair] + [self._planetary(stage) for stage in case.planetary]
         held = np.zeros((len(self.names), 6), bool)
         held[:, list(HELD[case.motions])] = True
+        if case.motions == "rotation":
+            # planets go round with their carrier
+            for stage in stages:
+                around = stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ()
+                held[[*stage.planets, *around], :2] = False
         if self.casing is not None and self.elastic is not None:
             # elastic motions have no directions
             held[list(self.casing.elastic)] = self.elastic.held[1 : 1 + len(self.casing.elastic)]

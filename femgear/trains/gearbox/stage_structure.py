@@ -8,6 +8,7 @@ these where they are. Planets of the stage run around in it (`femgear.housing.tw
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -23,7 +24,7 @@ from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.profile import base_helix_angle
 from femgear.housing.two_way.carrier_orders import MeshPaths, mean_excitation
 from femgear.housing.two_way.running_planets import RunningStage
-from femgear.solvers.linear.modal import solve_modes
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.static import over_width, record_positions, static_supports
 from femgear.system.assembly import GROUND, Assembly, Inertia
 from femgear.system.system import MechanicalSystem, MeshExcitation
@@ -95,7 +96,7 @@ def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitati
         See `stage_excitation`.
     """
     assembly, system, slices = structure_without(found, stage)
-    modes = solve_modes(system, slices, damping_ratio=0.0)
+    modes = undamped_modes(system, slices, damping_ratio=0.0)
     motion = assembly.motions @ modes.shape
     damping = found.model.case.modes.damping_ratio
     section = stage.section
@@ -282,12 +283,21 @@ def _in_time(
     excitation = _reversed(excitation, back=sun < carrier)
     sense = -1 if carrier < 0.0 else 1
     teeth = stage.sizes.teeth[2] * sense * (1 if carrier > ring else -1)
-    case = teeth_of(section)
-    count = rotational_symmetry(set_deviations(case), planetary_set(case))
+    count = _alike(section, stage.angles)
     paths = MeshPaths(teeth, tuple(stage.angles), 0.0, count)
     if excitation.periods == 1 and count > 1:
         excitation = mean_excitation(excitation, paths, sense)
     return excitation, paths, sense
+
+
+def _alike(section: BoxPlanetarySection, angles: Sequence[float]) -> int:
+    """Largest number of turns that take every planet to the place of one like it."""
+    case = teeth_of(section)
+    if case is not None:
+        return rotational_symmetry(set_deviations(case), planetary_set(case))
+    places = np.exp(1j * np.asarray(angles))
+    turned = {count: places[:, None] * np.exp(2j * np.pi / count) for count in range(1, len(places) + 1)}
+    return max(count for count, one in turned.items() if np.abs(one - places).min(axis=1).max() < 1e-6)
 
 
 def _reversed(excitation: MeshExcitation, *, back: bool) -> MeshExcitation:
