@@ -4,10 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path as FilePath
 from typing import Any
 
 import numpy as np
+from small_gearbox import pair_tables
+
+from femgear.case.dependencies import Steps
+from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.response import GearboxResponse, solve_response
+from femgear.trains.reading import read_case
 
 FEET = {
     "left front": (-80, -100, 0),
@@ -19,6 +26,7 @@ FEET = {
 TENSOR = np.array([[0.6, -0.01, 0.02], [-0.01, 0.8, -0.03], [0.02, -0.03, 1.1]])
 MASS, CENTRE = 40.0, np.array([0.05, 0.01, 0.04])
 STIFFNESS = (1.1e8, 2.3e8, 0.7e8)
+RPM = np.pi / 30.0
 
 
 def casing_tables(stiffness: Any = STIFFNESS) -> dict[str, Any]:
@@ -161,3 +169,18 @@ def rigid_matrices() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     load = np.zeros(18)
     load[5], load[11] = 100.0, 150.0
     return mass, stiffness, load
+
+
+@cache
+def pair_in_a_casing() -> Deflection:
+    """Loaded state of a pair with teeth in a casing on feet, with sensors at its centre along all axes."""
+    tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "3 kHz"}}
+    centre = [f"{value!r} m" for value in CENTRE.tolist()]
+    tables["sensor"] = [{"name": way, "position": centre, "direction": way} for way in "xyz"]
+    return solve_deflection(read_case(tables), steps=Steps())
+
+
+@cache
+def response() -> GearboxResponse:
+    """Response of that pair at two speeds."""
+    return solve_response(pair_in_a_casing(), [1000.0 * RPM, 2500.0 * RPM])

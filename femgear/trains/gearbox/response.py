@@ -161,7 +161,7 @@ def output_rows(found: Deflection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def solve_response(
     found: Deflection,
-    speed: Sequence[float],
+    speed: Sequence[float] | np.ndarray,
     *,
     steps: Steps | None = None,
     progress: Progress = silent,
@@ -324,7 +324,8 @@ def level(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.ndar
     whole = np.concatenate([lines[stage.name] for stage in response.stages], axis=2)
     known, place = np.unique(np.round(order / order.max(initial=1.0), 9), return_inverse=True)
     total = np.zeros((*whole.shape[:2], len(known)), complex)
-    np.add.at(total, (slice(None), slice(None), place), whole)
+    for line, at in enumerate(place.tolist()):
+        total[..., at] += whole[..., line]
     return np.sqrt(0.5 * (np.abs(total) ** 2).sum(axis=2))
 
 

@@ -38,6 +38,8 @@ from femgear.trains.gearbox.modes import linear_system
 
 _RECORD = 2**13
 """Positions of the excitation in the mesh period; of sets the next multiple of their planets."""
+Row = list[tuple[int, np.ndarray]]
+"""Stations of the structure, each with the approach (6,) of a contact point per unit of its motions [1, m]."""
 _TURNING = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
@@ -174,7 +176,7 @@ def _rigid_carrier(model: GearboxModel, stage: StageModel) -> Inertia:
     return Inertia(carrier.stations[:1], rigid.T @ carrier.mass @ rigid, polar)
 
 
-def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[tuple[int, np.ndarray]], np.ndarray, np.ndarray]:
+def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray, np.ndarray]:
     """Springs of the leading meshes: what they do to the structure, stiffness, and approach (.., 6) of the planet.
 
     First the approach of the flanks along the normal, then the slope of the approach along the width, of each mesh
@@ -195,7 +197,7 @@ def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[tuple[int, np
         for kept, rows, value in ((approach, mean, k.sum()), (slope, tilt, float(k @ height**2))):
             if value > 0.0:
                 kept.append((contact.stations, rows, value))
-    rows, points, springs = [], [], []
+    rows, points, springs = list[Row](), [], []
     for stations, effect, value in (*approach, *slope):
         parts = [(station, row) for station, row in zip(stations, effect, strict=True) if station != GROUND]
         planet = [row for station, row in parts if station in stage.planets]
@@ -205,7 +207,9 @@ def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[tuple[int, np
     return rows, np.array(springs), np.array(points)
 
 
-def _pin_rows(model: GearboxModel, stage: StageModel, used: np.ndarray, meshes: int):
+def _pin_rows(
+    model: GearboxModel, stage: StageModel, used: np.ndarray, meshes: int
+) -> tuple[list[Row], np.ndarray, np.ndarray | None]:
     """Springs of the pin of the first planet on the carrier: rows, stiffness, and compliance of all pins.
 
     Of the motions ``used`` that the pin holds, behind so many springs of the meshes.
@@ -217,7 +221,7 @@ def _pin_rows(model: GearboxModel, stage: StageModel, used: np.ndarray, meshes: 
     if stage.elastic_carrier is not None:
         holder = stage.elastic_carrier.stations[0]
     along = np.kron(np.eye(2), pin_axes(stage.angles[0]))
-    rows: list = [[] for _ in used]
+    rows: list[Row] = [[] for _ in used]
     if holder != GROUND:
         offset = model.assembly.places[stage.planets[0]] - model.assembly.places[holder]
         effect = -along @ rigid_link(offset)
@@ -237,7 +241,7 @@ def _pin_rows(model: GearboxModel, stage: StageModel, used: np.ndarray, meshes: 
     return rows, bearing[used], flexibility
 
 
-def _waves(row: list[tuple[int, np.ndarray]], stage: StageModel, motion: np.ndarray, *, planetary: bool) -> np.ndarray:
+def _waves(row: Row, stage: StageModel, motion: np.ndarray, *, planetary: bool) -> np.ndarray:
     """Approach (W, m) of a contact point by the modes, as the planet runs around: waves -1, 0, 1; of a pair 0."""
     angle = stage.angles[0] if planetary else 0.0
     shape = np.zeros((3 if planetary else 1, motion.shape[1]), complex)

@@ -1,0 +1,112 @@
+"""Files and tables of the response of a gearbox, and what they say against themselves."""
+
+import numpy as np
+import pytest
+from casings import response
+
+from femgear.trains.gearbox.response_results import (
+    GearboxResponseResult,
+    describe_response,
+    line_origin,
+    response_tables,
+    response_warnings,
+)
+
+
+@pytest.fixture
+def data():
+    return GearboxResponseResult(response(), whole=True).dataset()
+
+
+def codes(data) -> list[str]:
+    return [finding.code for finding in response_warnings(data)]
+
+
+def test_the_file_has_levels_lines_and_forces(data):
+    assert dict(data.sizes) == {
+        "speed": 2,
+        "stage": 1,
+        "kind": 2,
+        "line": 7,
+        "sensor": 3,
+        "bearing": 4,
+        "axis": 3,
+        "foot": 4,
+    }
+    assert data["speed"].values == pytest.approx([1000.0, 2500.0])
+    lines = np.hypot(data["lines_real"], data["lines_imag"]).values
+    assert data["level"].values == pytest.approx(np.sqrt(0.5 * (lines**2).sum(axis=2)))
+    assert data["level_of_stage"].values[..., 0] == pytest.approx(data["level"].values)
+    force = np.hypot(data["bearing_force_real"], data["bearing_force_imag"]).values
+    assert data["bearing_force_rms"].values == pytest.approx(np.sqrt(0.5 * (force**2).sum(axis=3)))
+    assert all(array.attrs["units"] for array in data.data_vars.values())
+
+
+def test_lines_of_bearings_are_left_out_of_a_run_up():
+    data = GearboxResponseResult(response(), whole=False).dataset()
+    assert "bearing_force_real" not in data
+    assert "bearing_force_rms" in data
+
+
+def test_result_tells_how_it_was_found():
+    result = GearboxResponseResult(response(), whole=True)
+    assert result.residual < 1e-8
+    assert "GMRES" in result.message
+
+
+def test_tables_name_stages_sensors_and_the_origin_of_lines(data):
+    block = describe_response(data)
+    assert block.rows[0][0] == "stage"
+    titles = [table.title for table in response_tables(data)]
+    assert titles[0].startswith("Levels at 2500 rpm")
+    assert [title for title in titles if title.startswith("Largest lines")] == [
+        f"Largest lines at {name}" for name in "xyz"
+    ]
+    assert line_origin(data, 0) == "stage, mesh harmonic 1"
+
+
+def test_side_bands_are_turns_of_the_carrier(data):
+    data["side_band"].values[0] = -3
+    assert line_origin(data, 0) == "stage, mesh harmonic 1 -3 x carrier"
+    data["harmonic"].values[0] = 0
+    data["side_band"].values[0] = 3
+    assert line_origin(data, 0) == "stage, 3 x carrier"
+
+
+def test_nothing_is_said_of_a_quiet_response(data):
+    data["level_change"].values[:] = 0.0
+    assert codes(data) == []
+
+
+def test_flanks_that_would_part_are_told(data):
+    data["level_change"].values[:] = 0.0
+    data["lowest_force"].values[1, 0, 0] = -1.0
+    (finding,) = response_warnings(data)
+    assert finding.code == "W-PULL"
+    assert "2500 rpm" in finding.text
+
+
+def test_side_bands_and_an_excitation_that_end_too_early_are_told(data):
+    data["outer"].values[0, 0] = 0.1
+    data["level_change"].values[:] = 0.0
+    data["level_change"].values[1, 2] = -0.7
+    assert codes(data) == ["W-TAIL", "W-EXCITATION"]
+    assert "0.7 dB" in list(response_warnings(data))[1].text
+
+
+def test_stages_that_change_one_another_are_told(data):
+    import xarray as xr
+
+    data["level_change"].values[:] = 0.0
+    cross = xr.DataArray(np.array([[[0.0]], [[0.2]]]), dims=("speed", "stage", "other_stage"))
+    (finding,) = response_warnings(data.assign(cross_excitation=cross))
+    assert finding.code == "W-CROSS"
+    assert "20%" in finding.text
+
+
+def test_stages_without_teeth_are_told(data):
+    data["level_change"].values[:] = 0.0
+    data.attrs["missing"] = "second stage"
+    (finding,) = response_warnings(data)
+    assert finding.code == "W-EXCITATION"
+    assert "second stage" in finding.text
