@@ -13,7 +13,7 @@ from small_gearbox import pair_tables
 
 from femgear.case.dependencies import Steps
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
-from femgear.trains.gearbox.response import GearboxResponse, solve_response
+from femgear.trains.gearbox.response import GearboxResponse, solve_gearbox_response
 from femgear.trains.reading import read_case
 
 FEET = {
@@ -183,4 +183,4 @@ def pair_in_a_casing() -> Deflection:
 @cache
 def response() -> GearboxResponse:
     """Response of that pair at two speeds."""
-    return solve_response(pair_in_a_casing(), [1000.0 * RPM, 2500.0 * RPM])
+    return solve_gearbox_response(pair_in_a_casing(), [1000.0 * RPM, 2500.0 * RPM])

@@ -159,7 +159,7 @@ def output_rows(found: Deflection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return sensor_rows(model), bearings.reshape(-1, assembly.count), feet.reshape(-1, assembly.count)
 
 
-def solve_response(
+def solve_gearbox_response(
     found: Deflection,
     speed: Sequence[float] | np.ndarray,
     *,

@@ -51,8 +51,8 @@ class GearboxResponseResult(StageResult):
 
     @staticmethod
     def warnings(data: xr.Dataset) -> Iterable[Finding]:
-        """List what the file says against itself, see `response_warnings`."""
-        return response_warnings(data)
+        """List what the file says against itself, see `gearbox_response_warnings`."""
+        return gearbox_response_warnings(data)
 
     def contents(self) -> Contents:
         """Collect the contents of dynamics.nc or runup.nc."""
@@ -203,7 +203,7 @@ def _change(found: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
         return np.where(whole > 0.0, 20.0 * np.log10(whole / less), 0.0)
 
 
-def response_warnings(data: xr.Dataset) -> Iterator[Finding]:
+def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """List what dynamics.nc or runup.nc says against itself."""
     stages, speeds = [str(name) for name in data["stage"].values], data["speed"].values
     lowest = data["lowest_force"].values
@@ -245,7 +245,7 @@ def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:
     return f"{some[0]:.5g} rpm" if len(some) == 1 else f"{len(some)} speeds, {some.min():.5g} to {some.max():.5g} rpm"
 
 
-def describe_response(data: xr.Dataset) -> Block:
+def describe_gearbox_response(data: xr.Dataset) -> Block:
     """Tabulate mesh forces of all stages, at the speed with the largest factor of each."""
     factor = np.nan_to_num(data["dynamic_factor"].values)
 

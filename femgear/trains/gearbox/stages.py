@@ -16,12 +16,12 @@ from femgear.trains.gearbox.deflection import check_held, solve_deflection
 from femgear.trains.gearbox.model import gearbox_model
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
-from femgear.trains.gearbox.response import reference_shaft, solve_response
+from femgear.trains.gearbox.response import reference_shaft, solve_gearbox_response
 from femgear.trains.gearbox.response_results import (
     GearboxResponseResult,
-    describe_response,
+    describe_gearbox_response,
+    gearbox_response_warnings,
     response_tables,
-    response_warnings,
 )
 from femgear.trains.gearbox.results import (
     ESTIMATES,
@@ -71,7 +71,7 @@ def solve_box_dynamics(
     """Solve for the response to all stages at the speeds of the chosen load case."""
     state = deflection.state
     speed = [abs(state.model.flow.speed[reference_shaft(state.model)])]
-    return GearboxResponseResult(solve_response(state, speed, steps=steps, progress=progress), whole=True)
+    return GearboxResponseResult(solve_gearbox_response(state, speed, steps=steps, progress=progress), whole=True)
 
 
 @one_blas_thread()
@@ -83,7 +83,7 @@ def solve_box_runup(
     nominal = abs(state.model.flow.speed[reference_shaft(state.model)])
     start, stop = case.runup.start or 0.25 * nominal, case.runup.to or 1.25 * nominal
     speeds = np.linspace(start, stop, case.runup.count)
-    found = solve_response(state, speeds, steps=steps, progress=progress, stage="runup")
+    found = solve_gearbox_response(state, speeds, steps=steps, progress=progress, stage="runup")
     return GearboxResponseResult(found, whole=False)
 
 
@@ -183,9 +183,9 @@ GEARBOX = Train(
             wanted=lambda case: not _silent(case),
             unavailable=_silent,
             verdict=_response_verdict,
-            describe=lambda results: describe_response(results.dynamics),
+            describe=lambda results: describe_gearbox_response(results.dynamics),
             tables=lambda results: response_tables(results.dynamics),
-            warnings=response_warnings,
+            warnings=gearbox_response_warnings,
         ),
         Stage(
             name="runup",
@@ -196,8 +196,8 @@ GEARBOX = Train(
             wanted=lambda case: not _no_runup(case),
             unavailable=_no_runup,
             verdict=_response_verdict,
-            describe=lambda results: describe_response(results.runup),
-            warnings=response_warnings,
+            describe=lambda results: describe_gearbox_response(results.runup),
+            warnings=gearbox_response_warnings,
         ),
     ),
     describe=describe_gearbox,

@@ -14,7 +14,7 @@ from femgear.trains.gearbox.response import (
     mesh_rows,
     output_rows,
     reference_shaft,
-    solve_response,
+    solve_gearbox_response,
 )
 from femgear.trains.reading import read_case
 
@@ -50,7 +50,7 @@ def test_forces_stay_near_their_mean_and_slow_gears_near_statics():
     mean = stage.force[..., 0]
     assert (stage.force[..., 2] < mean).all() and (mean < stage.force[..., 1]).all()
     assert mean[0, 0] == pytest.approx(found.deflection.contacts["stage"].normal_force[0], rel=1e-6)
-    slow = solve_response(pair_in_a_casing(), [5.0 * RPM])
+    slow = solve_gearbox_response(pair_in_a_casing(), [5.0 * RPM])
     record = slow.stages[0]
     assert record.dynamic_force[0, 0] < 1e-3 * mean[0, 0]
 
@@ -91,6 +91,6 @@ def test_rows_of_other_meshes_are_their_approach():
 
 def test_stages_without_teeth_excite_nothing():
     found = solve_deflection(read_case(pair_tables()))
-    silent = solve_response(found, [1000.0 * RPM])
+    silent = solve_gearbox_response(found, [1000.0 * RPM])
     assert silent.missing == ("stage",)
     assert not silent.stages

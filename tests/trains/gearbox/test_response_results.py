@@ -6,10 +6,10 @@ from casings import response
 
 from femgear.trains.gearbox.response_results import (
     GearboxResponseResult,
-    describe_response,
+    describe_gearbox_response,
+    gearbox_response_warnings,
     line_origin,
     response_tables,
-    response_warnings,
 )
 
 
@@ -19,7 +19,7 @@ def data():
 
 
 def codes(data) -> list[str]:
-    return [finding.code for finding in response_warnings(data)]
+    return [finding.code for finding in gearbox_response_warnings(data)]
 
 
 def test_the_file_has_levels_lines_and_forces(data):
@@ -55,7 +55,7 @@ def test_result_tells_how_it_was_found():
 
 
 def test_tables_name_stages_sensors_and_the_origin_of_lines(data):
-    block = describe_response(data)
+    block = describe_gearbox_response(data)
     assert block.rows[0][0] == "stage"
     titles = [table.title for table in response_tables(data)]
     assert titles[0].startswith("Levels at 2500 rpm")
@@ -81,7 +81,7 @@ def test_nothing_is_said_of_a_quiet_response(data):
 def test_flanks_that_would_part_are_told(data):
     data["level_change"].values[:] = 0.0
     data["lowest_force"].values[1, 0, 0] = -1.0
-    (finding,) = response_warnings(data)
+    (finding,) = gearbox_response_warnings(data)
     assert finding.code == "W-PULL"
     assert "2500 rpm" in finding.text
 
@@ -91,7 +91,7 @@ def test_side_bands_and_an_excitation_that_end_too_early_are_told(data):
     data["level_change"].values[:] = 0.0
     data["level_change"].values[1, 2] = -0.7
     assert codes(data) == ["W-TAIL", "W-EXCITATION"]
-    assert "0.7 dB" in list(response_warnings(data))[1].text
+    assert "0.7 dB" in list(gearbox_response_warnings(data))[1].text
 
 
 def test_stages_that_change_one_another_are_told(data):
@@ -99,7 +99,7 @@ def test_stages_that_change_one_another_are_told(data):
 
     data["level_change"].values[:] = 0.0
     cross = xr.DataArray(np.array([[[0.0]], [[0.2]]]), dims=("speed", "stage", "other_stage"))
-    (finding,) = response_warnings(data.assign(cross_excitation=cross))
+    (finding,) = gearbox_response_warnings(data.assign(cross_excitation=cross))
     assert finding.code == "W-CROSS"
     assert "20%" in finding.text
 
@@ -107,6 +107,6 @@ def test_stages_that_change_one_another_are_told(data):
 def test_stages_without_teeth_are_told(data):
     data["level_change"].values[:] = 0.0
     data.attrs["missing"] = "second stage"
-    (finding,) = response_warnings(data)
+    (finding,) = gearbox_response_warnings(data)
     assert finding.code == "W-EXCITATION"
     assert "second stage" in finding.text
