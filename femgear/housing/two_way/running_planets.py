@@ -257,9 +257,18 @@ def solve_running(
 
 @dataclass(frozen=True)
 class _Part:
-    """Blocks whose side bands ``bands`` (b,) act on one another, through bands ``met`` (k,) of the structure.
+    """Blocks whose side bands act on one another through the structure, solved for unit forces of the meshes.
 
-    ``answer`` (blocks, b G C, b G M) are forces of the contact points by the forces e beyond k0.
+    Parameters
+    ----------
+    blocks : (k,) int array
+        Their numbers.
+    bands : (b,) int array
+        Places of the side bands.
+    met : (s,) int array
+        Side bands of the structure between them.
+    answer : (k, b G C, b M G) complex array
+        Forces of the contact points by the forces e beyond k0 [1].
     """
 
     blocks: np.ndarray
