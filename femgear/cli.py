@@ -342,13 +342,13 @@ def run(
     from femgear.trains.reading import read_case
     from femgear.trains.registry import check_case, stage_names, train_of
 
-    if only is not None and only not in (known := stage_names()):
+    if only is not None and only not in (names := stage_names()):
         raise CaseError(
             "no train has this stage",
             code="E-ARGUMENTS",
             key="--only",
             value=only,
-            limit=", ".join(known),
+            limit=", ".join(names),
             remedy="femgear run --help",
         )
     case = case or _only_case()
@@ -384,16 +384,16 @@ def _results_folder(case: Path) -> Path:
 
 def _only_case() -> Path:
     """Find the one case file of the current folder."""
-    found = sorted(path for path in Path().glob("*.toml") if path.name != "pyproject.toml")
-    if len(found) == 1:
-        return found[0]
-    here = ", ".join(map(str, found or sorted(Path().iterdir())))
+    files = sorted(path for path in Path().glob("*.toml") if path.name != "pyproject.toml")
+    if len(files) == 1:
+        return files[0]
+    here = ", ".join(map(str, files or sorted(Path().iterdir())))
     raise CaseError(
-        f"no case is named, and the current folder holds {len(found) or 'none'}",
+        f"no case is named, and the current folder holds {len(files) or 'none'}",
         code="E-ARGUMENTS",
         value=textwrap.shorten(here, 200, placeholder=" ...") or "an empty folder",
         limit="one *.toml",
-        remedy="name one" if found else "femgear new planetary writes one; femgear run --help",
+        remedy="name one" if files else "femgear new planetary writes one; femgear run --help",
     )
 
 
@@ -501,8 +501,8 @@ def export(
 
     named = [name for name, wanted in vars(formats or Formats()).items() if wanted]
     if not named:
-        known = ", ".join(f"--{name}" for name in vars(Formats()))
-        raise CaseError("no format is named", code="E-ARGUMENTS", limit=known, remedy="femgear export --help")
+        options = ", ".join(f"--{name}" for name in vars(Formats()))
+        raise CaseError("no format is named", code="E-ARGUMENTS", limit=options, remedy="femgear export --help")
     wanted = named, sampling or Sampling()
     if output is None:
         with folder_lock(folder), additions(folder) as new, Progress() as progress:
@@ -617,13 +617,13 @@ def new(
     from femgear.trains.drafts import ToothForm, new_case
 
     form = form or _ToothForm()
-    count = tuple(whole_number(one, "--teeth") for one in form.teeth)
+    count = tuple(whole_number(text_of_count, "--teeth") for text_of_count in form.teeth)
     numbers: dict[str, Any] = {"teeth": count, "module": module, "torque": torque, "speed": speed}
     teeth_as = ToothForm(form.shifts, form.centre_distance, form.helix, form.addendum)
     text = new_case(kind, **numbers, planets=planets, face_width=face_width, form=teeth_as)
     output = output or Path(f"{kind}.toml")
     _write_case(text, output, force=force)
-    for line in takewhile(lambda one: one.startswith("#"), text.splitlines()):
+    for line in takewhile(lambda line_there: line_there.startswith("#"), text.splitlines()):
         _say(f" {line[1:]}")
     _say(f"next:    femgear run {shlex.quote(str(output))}")
     return 0
@@ -666,13 +666,13 @@ def import_rexs(
     model = read_model(file)
     drafts = case_drafts(model, output.name, stage=stage, load_case=load_case)
     _warn(model.findings)
-    paths = [output.with_name(f"{output.stem}{one.suffix}{output.suffix}") for one in drafts]
+    paths = [output.with_name(f"{output.stem}{case_draft.suffix}{output.suffix}") for case_draft in drafts]
     _need_new(paths, force=force)
     for draft, path in zip(drafts, paths, strict=True):
         _write_case(draft.text, path, force=force)
         if len(drafts) > 1:
             _say(f"         {draft.words}")
-    _say(f"entries that are assumed: {sum(one.text.count('# assumed') for one in drafts)}")
+    _say(f"entries that are assumed: {sum(case_draft.text.count('# assumed') for case_draft in drafts)}")
     left = list(model.unused())
     count = sum(line.count(",") + 1 for line in left)
     _say(f"attributes that are not used: {count} of {len(left)} types{'' if unused else ', listed by --unused'}")
@@ -768,11 +768,11 @@ def compute_sweep(
     need_set(data)
     with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
         options = {"speeds": speeds, "cache": grid_cache(), "progress": progress, "runner": runner}
-        found, names = sweep_into(data, output, over=over, of=of, **options)
-    failed = sum(bool(error) for error in found.errors)
-    _print([describe_sweep(found)])
-    cases = f"{len(found.points)} case{'s' * (len(found.points) != 1)}"
-    print(f"{cases}, {found.computed} computed now, {failed} cannot be computed")
+        swept, names = sweep_into(data, output, over=over, of=of, **options)
+    failed = sum(bool(error) for error in swept.errors)
+    _print([describe_sweep(swept)])
+    cases = f"{len(swept.points)} case{'s' * (len(swept.points) != 1)}"
+    print(f"{cases}, {swept.computed} computed now, {failed} cannot be computed")
     _say(f"files in {output}: {', '.join(names)}")
     return 0
 
@@ -1226,12 +1226,12 @@ def _termination_interrupts() -> Iterator[None]:
 def _handlers(handlers: Mapping[signal.Signals, Any]) -> Iterator[None]:
     """Handle signals so in the block; in the main thread alone, where they arrive."""
     main = threading.current_thread() is threading.main_thread()
-    before = {number: signal.signal(number, one) for number, one in handlers.items()} if main else {}
+    before = {number: signal.signal(number, handler) for number, handler in handlers.items()} if main else {}
     try:
         yield
     finally:
-        for number, one in before.items():
-            signal.signal(number, one)
+        for number, former in before.items():
+            signal.signal(number, former)
 
 
 if __name__ == "__main__":

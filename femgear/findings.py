@@ -162,19 +162,19 @@ def remark(text: str) -> Finding:
 
 def once(findings: Iterable[Finding], stage: str = "") -> tuple[Finding, ...]:
     """List findings of a stage, each once and in their order; without a stage they keep theirs."""
-    found = from_data(as_data(findings))  # of whatever class
-    return tuple(dict.fromkeys(replace(one, stage=stage) if stage else one for one in found))
+    copies = from_data(as_data(findings))  # of whatever class
+    return tuple(dict.fromkeys(replace(finding, stage=stage) if stage else finding for finding in copies))
 
 
 def by_severity(findings: Iterable[Finding]) -> list[Finding]:
     """Sort findings from the most to the least severe, those of one severity in their order."""
-    return sorted(findings, key=lambda one: -SEVERITIES.index(one.severity))
+    return sorted(findings, key=lambda finding: -SEVERITIES.index(finding.severity))
 
 
 def as_data(findings: Iterable[Finding]) -> list[dict[str, str]]:
     """Turn findings into tables of texts, as manifest.json and the result files hold them."""
-    names = [one.name for one in fields(Finding)]
-    return [{name: getattr(one, name) for name in names} for one in findings]
+    names = [field_.name for field_ in fields(Finding)]
+    return [{name: getattr(finding, name) for name in names} for finding in findings]
 
 
 def from_data(data: Iterable[dict[str, Any]]) -> tuple[Finding, ...]:
@@ -182,13 +182,13 @@ def from_data(data: Iterable[dict[str, Any]]) -> tuple[Finding, ...]:
 
     TypeError, KeyError, ValueError: other data.
     """
-    found = []
-    for one in data:
-        values = {name: str(value) for name, value in one.items()}
+    findings = []
+    for values_of_one in data:
+        values = {name: str(value) for name, value in values_of_one.items()}
         if (code := values["code"]) and code not in CATALOGUE:
             values |= {"code": "", "text": f"[{code}] {values['text']}"}
-        found.append(Finding(**values))
-    return tuple(found)
+        findings.append(Finding(**values))
+    return tuple(findings)
 
 
 def as_text(findings: Iterable[Finding]) -> str:

@@ -149,8 +149,8 @@ def _asked(case: Any, only: str | None) -> tuple[Any, tuple[Stage, ...]]:
 
 def _options(stage: Stage, progress: Progress) -> dict[str, Any]:
     """Options of a stage: folder of grids, and whom to tell how far it has come."""
-    known = {"cache": grid_cache(), "progress": progress}
-    return {name: known[name] for name in stage.options if name in known}
+    options = {"cache": grid_cache(), "progress": progress}
+    return {name: options[name] for name in stage.options if name in options}
 
 
 _RECORDED = "wav", "uff", "quality"
@@ -206,11 +206,11 @@ class _Run:
 
     def record(self, *names: str, complete: bool = False) -> Manifest:
         """Write the manifest with some more files."""
-        known = {name: digest for name, digest in self.files.items() if name not in names}
-        findings = once(one for stage in self.findings.values() for one in stage)
-        told = {"timings": self.timings, "convergence": self.convergence, "known": known}
-        told["findings"] = findings
-        manifest = record(self.folder, list({**self.files, **dict.fromkeys(names)}), **told, complete=complete)
+        others = {name: digest for name, digest in self.files.items() if name not in names}
+        findings = once(finding for stage in self.findings.values() for finding in stage)
+        entries = {"timings": self.timings, "convergence": self.convergence, "known": others}
+        entries["findings"] = findings
+        manifest = record(self.folder, list({**self.files, **dict.fromkeys(names)}), **entries, complete=complete)
         self.files = dict(manifest.files)
         return manifest
 
@@ -252,7 +252,7 @@ def run_case(
         if computed is not None:
             computed(_results_so_far(run))
         if pictures:
-            _draw(run, case, {name: one for name, one in results.items() if one is not None}, progress)
+            _draw(run, case, {name: result for name, result in results.items() if result is not None}, progress)
     except BaseException:
         with suppress(StorageError):  # what ended the run is what is said
             run.keep(asked)
@@ -293,7 +293,7 @@ def _compute(
     run: _Run, case: Any, stage: Stage, stages: Sequence[Stage], results: dict[str, Any], progress: Progress
 ) -> None:
     """Solve a stage and write its file, part after part with those stages that take its result alone."""
-    following = () if stage.parts is None else (one for one in stages if one.takes == (stage.name,))
+    following = () if stage.parts is None else (later for later in stages if later.takes == (stage.name,))
     members, verdicts, files = [stage, *following], defaultdict(list), dict[str, Path]()
     taken, options = map(results.get, stage.takes), _options(stage, progress)
     seconds, start = defaultdict(float), time.perf_counter()
@@ -304,36 +304,36 @@ def _compute(
         parts = stage.parts(case, *taken, **options)
     with ExitStack() as opened:
         for part, first in parts:
-            for one in members:
-                found = first if one is stage else one.solve(part, first, **_options(one, progress))
-                path, data = run.folder / f"{one.name}.nc", _contents(found)
+            for member in members:
+                computed = first if member is stage else member.solve(part, first, **_options(member, progress))
+                path, data = run.folder / f"{member.name}.nc", _contents(computed)
                 if part is case:
-                    run.findings[one.name] = one.findings(data)
-                    data.attrs["findings"] = as_text(one.carried(run.findings))
+                    run.findings[member.name] = member.findings(data)
+                    data.attrs["findings"] = as_text(member.carried(run.findings))
                     write_dataset(data, path)
-                    run.data[one.name] = data
+                    run.data[member.name] = data
                 else:
-                    if one.name not in files:
+                    if member.name not in files:
                         share = len(part.operation.speeds) / len(case.operation.speeds)
-                        files[one.name] = opened.enter_context(replaced_file(path, size=data.nbytes / share))
-                    append_dataset(data, files[one.name], "speed")
-                results[one.name] = found if part is case else None
-                verdicts[one.name].append(one.convergence(found))
-                seconds[one.name] += time.perf_counter() - start
+                        files[member.name] = opened.enter_context(replaced_file(path, size=data.nbytes / share))
+                    append_dataset(data, files[member.name], "speed")
+                results[member.name] = computed if part is case else None
+                verdicts[member.name].append(member.convergence(computed))
+                seconds[member.name] += time.perf_counter() - start
                 start = time.perf_counter()
-        for one in members:
-            if one.name in files:
-                with read_dataset(files[one.name]) as data:
-                    run.findings[one.name] = one.findings(data)
-                write_attribute(files[one.name], "findings", as_text(one.carried(run.findings)))
+        for member in members:
+            if member.name in files:
+                with read_dataset(files[member.name]) as data:
+                    run.findings[member.name] = member.findings(data)
+                write_attribute(files[member.name], "findings", as_text(member.carried(run.findings)))
     names = []
-    for one in members:
-        run.timings[one.name] = seconds[one.name]
-        codes = [finding.code for finding in run.findings[one.name] if finding.code]
-        run.convergence[one.name] = joint_verdict(verdicts[one.name]) | {"findings": codes}
-        names.append(f"{one.name}.nc")
-        run.pending[one.name] = results[one.name]
-        progress(one.name, 1, 1)
+    for member in members:
+        run.timings[member.name] = seconds[member.name]
+        codes = [finding.code for finding in run.findings[member.name] if finding.code]
+        run.convergence[member.name] = joint_verdict(verdicts[member.name]) | {"findings": codes}
+        names.append(f"{member.name}.nc")
+        run.pending[member.name] = results[member.name]
+        progress(member.name, 1, 1)
     run.record(*names)
 
 
@@ -368,7 +368,7 @@ def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, di
     run = _Run(folder, files, findings={name: () for name in ("", *(stage.name for stage in stages))})
     for name in results:
         run.timings[name], run.convergence[name] = manifest.timings[name], manifest.convergence.get(name)
-        run.findings[name] = tuple(one for one in manifest.findings if one.stage == name)
+        run.findings[name] = tuple(finding for finding in manifest.findings if finding.stage == name)
     return run, results
 
 
@@ -380,10 +380,10 @@ def _fingerprint(case: Any) -> str:
 @cache
 def _source_checksum() -> str:
     """SHA-256 of femgear's own files."""
-    found = hashlib.sha256()
+    digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.rglob("*.py")):
-        found.update(path.read_bytes())
-    return found.hexdigest()
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 @one_blas_thread()
@@ -414,54 +414,54 @@ def export_results(
     The folder was made ready by `own_files` or `list_own`. Returns the names of the files. FemgearError: the
     run has no signals or modes (E-STAGE), the library of a format is not installed (E-LIBRARY).
     """
-    recorded, found = train_of(results.case).recorded, list[str]()
+    recorded, files = train_of(results.case).recorded, list[str]()
     needs = {} if recorded is None else recorded.needs
-    without = [one for one in formats if one in _RECORDED and one not in needs]
-    for one, stages in needs.items():
-        without += [one] if one in formats and not {*stages} <= {*results.stages} else []
+    without = [form for form in formats if form in _RECORDED and form not in needs]
+    for form, stages in needs.items():
+        without += [form] if form in formats and not {*stages} <= {*results.stages} else []
     if without:
-        known = "; ".join(f"--{one} with the stages {', '.join(stages)}" for one, stages in needs.items())
+        possible = "; ".join(f"--{form} with the stages {', '.join(stages)}" for form, stages in needs.items())
         raise CaseError(
             "the run has nothing that these formats hold",
             code="E-STAGE",
-            value=", ".join(f"--{one}" for one in without),
-            limit=known or "runs with an elastic ring, and --wav of pairs",
+            value=", ".join(f"--{form}" for form in without),
+            limit=possible or "runs with an elastic ring, and --wav of pairs",
             remedy="export tables, or run such a case without --only",
         )
     _need_libraries(formats)
     if "csv" in formats:
-        found += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
+        files += [name for stage in results for name in write_csv_tables(results[stage], folder, stage)]
         if recorded is not None and recorded.cuts and {"runup", "housing"} <= {*results.stages}:
             header, rows = recorded.cuts(results, how.level)
             write_csv(folder / "order_cuts.csv", header, ([float(x) for x in row] for row in rows))
-            found.append("order_cuts.csv")
+            files.append("order_cuts.csv")
     if "xlsx" in formats:
         tables = (table for stage in results for table in tables_of(results[stage], stage))
         if long := write_workbook(tables, folder / "results.xlsx"):
             text = f"tables that no sheet can hold are left out: {', '.join(long)}"
             tell(Finding("W-ROWS", "", text, remedy="export them with --csv"))
-        found.append("results.xlsx")
+        files.append("results.xlsx")
     if "mat" in formats:
         write_matlab({stage: results[stage] for stage in results}, folder / "results.mat")
-        found.append("results.mat")
+        files.append("results.mat")
     if recorded is not None and {"wav", "uff", "quality"} & {*formats}:
         how = _scaled(how, recorded.extent(results, how.rate))
     if recorded is not None and recorded.shapes and "uff" in formats:
-        signals = (one for one in recorded.signals(results, how) if one.steady)
+        signals = (signal for signal in recorded.signals(results, how) if signal.steady)
         write_functions(signals, recorded.spectra(results), folder / "signals.uff")
         write_modes(recorded.shapes(results), folder / "modes.uff")
-        found += ["signals.uff", "modes.uff"]
+        files += ["signals.uff", "modes.uff"]
     if recorded is not None and not {"wav", "quality"}.isdisjoint(formats):
         steps = recorded.each * (results[needs["wav"][0]].sizes["speed"] + ("runup" in results.stages))
         signals = _told(recorded.signals(results, how), progress, steps)
-        found += _export_sound(signals, folder, formats, how)
-    return found
+        files += _export_sound(signals, folder, formats, how)
+    return files
 
 
 def _need_libraries(formats: Collection[str]) -> None:
     """Refuse formats whose library is not installed (E-LIBRARY), before any file is written."""
-    for one, (words, library) in _LIBRARIES.items():
-        if one in formats:
+    for form, (words, library) in _LIBRARIES.items():
+        if form in formats:
             with nvh_library(words):
                 if find_spec(library) is None:
                     raise ImportError(f"No module named {library!r}")
@@ -470,8 +470,8 @@ def _need_libraries(formats: Collection[str]) -> None:
 def _told(signals: Iterable[Signal], progress: Progress, steps: int) -> Iterator[Signal]:
     """Give signals, and tell how many of them have been used up."""
     progress("sound", 0, steps)
-    for done, one in enumerate(signals, 1):
-        yield one
+    for done, signal in enumerate(signals, 1):
+        yield signal
         progress("sound", done, steps)
 
 
@@ -493,16 +493,16 @@ def _scaled(sampling: Sampling, extent: Mapping[str, tuple[float, float, float]]
 
 def _export_sound(signals: Iterable[Signal], folder: Path, formats: Collection[str], sampling: Sampling) -> list[str]:
     """Write signals as WAV files, what is heard of those of microphones as a table; returns their names."""
-    found, rows, peaks = list[str](), list[list](), dict[str, float]()
+    files, rows, peaks = list[str](), list[list](), dict[str, float]()
     scales = {unit: getattr(sampling, name) or 1.0 for unit, name in SCALES.items()}
     for signal in signals:
         if "wav" in formats:
             peaks[signal.unit] = max(peaks.get(signal.unit, 0.0), float(np.abs(signal.values).max()))
-            found.append(checked_name(f"{signal.name}.wav"))
-            write_wav(signal, folder / found[-1], full_scale=scales[signal.unit])
+            files.append(checked_name(f"{signal.name}.wav"))
+            write_wav(signal, folder / files[-1], full_scale=scales[signal.unit])
         if "quality" in formats and signal.unit == "Pa" and signal.steady:
             heard = sound_quality(signal.values, signal.rate)
-            tones = " ".join(f"{one:g}" for one in heard.tones)
+            tones = " ".join(f"{tone:g}" for tone in heard.tones)
             rows.append([signal.name, heard.loudness, heard.tone_to_noise, heard.prominence, tones])
     for unit in [unit for unit, peak in peaks.items() if peak > scales[unit]]:
         text = f"samples reach {peaks[unit]:.4g} {unit}, the full scale is {scales[unit]:g}: most players clip"
@@ -517,5 +517,5 @@ def _export_sound(signals: Iterable[Signal], folder: Path, formats: Collection[s
             "tones [Hz]",
         )
         write_csv(folder / "sound_quality.csv", header, rows)
-        found.append("sound_quality.csv")
-    return found
+        files.append("sound_quality.csv")
+    return files

@@ -38,8 +38,8 @@ def shared(tasks: Sequence[Callable[[], Any]], beside: Callable[[], object] | No
 
         with _second_process(take) as others:
             beside()
-            found = take() | others()
-    return [found[number] for number in range(len(tasks))]
+            values = take() | others()
+    return [values[number] for number in range(len(tasks))]
 
 
 @contextmanager
@@ -84,21 +84,23 @@ def _send(work: Callable[[], Any], connection: Any, parent: int) -> None:
         return
     with warnings.catch_warnings(record=True) as said:
         try:
-            found = work()
+            value = work()
         except Exception as error:
-            found = error
-    connection.send((found, [(str(one.message), one.category, one.filename, one.lineno) for one in said]))
+            value = error
+    connection.send(
+        (value, [(str(warning.message), warning.category, warning.filename, warning.lineno) for warning in said])
+    )
 
 
 def _received(connection: Any) -> dict:
     """Receive what `_send` sends: value or error, and warnings."""
     try:
-        found, said = connection.recv()
+        value, said = connection.recv()
     except EOFError:
         message, remedy = "the second process, which draws or solves, was ended", "give it more memory"
         raise FemgearError(message, code="E-WORKER", remedy=remedy) from None
-    for one in said:
-        warnings.warn_explicit(*one)
-    if isinstance(found, BaseException):
-        raise found
-    return found
+    for warning in said:
+        warnings.warn_explicit(*warning)
+    if isinstance(value, BaseException):
+        raise value
+    return value

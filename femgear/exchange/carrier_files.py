@@ -119,7 +119,7 @@ def _arrays(path: Path) -> tuple[list[np.ndarray], dict, dict, tuple[Node, ...]]
             remedy="save them by these names (numpy.savez)",
         )
     roles, places = [str(role) for role in np.atleast_1d(arrays["role"])], arrays["position"]
-    dofs = [str(one) for one in np.atleast_1d(arrays.get("dofs", np.full(len(roles), "123456")))]
+    dofs = [str(dof) for dof in np.atleast_1d(arrays.get("dofs", np.full(len(roles), "123456")))]
     if np.shape(places) != (len(roles), 3) or len(dofs) != len(roles):
         raise CaseError(
             "role, position and dofs do not say the same number of nodes",
@@ -190,10 +190,10 @@ def _seats(element: Superelement) -> tuple[list[Node], list[int]]:
 def _reduced(K: np.ndarray, M: np.ndarray, seats: np.ndarray, places: np.ndarray, components: int) -> CarrierBody:
     """Condense free coordinates on the seats, and find the normal modes with all seats held."""
     inner = np.setdiff1d(np.arange(len(K)), seats)
-    own, other = K[np.ix_(inner, inner)], K[np.ix_(inner, seats)]
+    inside, other = K[np.ix_(inner, inner)], K[np.ix_(inner, seats)]
     try:
         # modes by their compliance: coordinates without mass have none
-        soft, shape = eigh(M[np.ix_(inner, inner)], own) if len(inner) else (np.zeros(0), np.zeros((0, 0)))
+        soft, shape = eigh(M[np.ix_(inner, inner)], inside) if len(inner) else (np.zeros(0), np.zeros((0, 0)))
     except np.linalg.LinAlgError as error:
         raise CaseError(
             "coordinates beside the seats are held by nothing",
@@ -204,7 +204,7 @@ def _reduced(K: np.ndarray, M: np.ndarray, seats: np.ndarray, places: np.ndarray
         ) from error
     kept = np.flatnonzero(soft > _MASSLESS * soft.max(initial=0.0))[::-1][:_MOST_MODES]
     omega, shape = 1.0 / np.sqrt(soft[kept]), shape[:, kept] / np.sqrt(soft[kept])
-    static = -np.linalg.solve(own, other)
+    static = -np.linalg.solve(inside, other)
     moved = M[np.ix_(seats, inner)] + static.T @ M[np.ix_(inner, inner)]
     mass = M[np.ix_(seats, seats)] + moved @ static + static.T @ M[np.ix_(inner, seats)]
     stiffness = K[np.ix_(seats, seats)] + other.T @ static

@@ -174,8 +174,8 @@ def read_casing(
     """
     kind = path.suffix.lower()
     with file_in_refusals(path):
-        known = ", ".join(UNITS)
-        _check("no such units", units in UNITS, code="E-CHOICE", key="units", value=units, limit=known)
+        names = ", ".join(UNITS)
+        _check("no such units", units in UNITS, code="E-CHOICE", key="units", value=units, limit=names)
         _check(
             "no such file, or no kind of file that holds a casing",
             path.is_file() and kind in _KINDS,
@@ -196,8 +196,8 @@ def read_casing(
             if kind in _UNIVERSAL:
                 modes = _universal(path, table, *UNITS[units])
             else:
-                found = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
-                modes = _modes(*found, table, *UNITS[units])
+                matrices = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
+                modes = _modes(*matrices, table, *UNITS[units])
             arrays = _arrays(modes, table, direction, pitch_radius, max_diameter, units)
         given = {} if damping_ratio is None else {"damping_ratio": damping_ratio}
         structure = from_arrays(arrays | given, direction=direction, max_diameter=max_diameter)
@@ -217,8 +217,8 @@ def output_names(nodes: Path) -> tuple[str, ...]:
 
 def _output_names(table: Sequence[Node]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names of sensors, and of the forces on feet."""
-    names = [one.name for one in table if one.role == "sensor"]
-    ways = [one.direction for one in table if one.role == "sensor"]
+    names = [node.name for node in table if node.role == "sensor"]
+    ways = [node.direction for node in table if node.role == "sensor"]
     sensors = (f"{name} {way}" if names.count(name) > 1 else name for name, way in zip(names, ways))
     return tuple(sensors), tuple(f"foot {name} {axis}" for name in _feet(table) for axis in "xyz")
 
@@ -322,9 +322,9 @@ def read_nodes(path: Path, roles: Mapping[str, bool] = CASING_ROLES) -> tuple[No
             limit="node, role; x, y, z, direction, dofs where needed",
         )
         table = tuple(_node({key: (row[key] or "").strip() for key in columns}, roles) for row in rows)
-        ring = "ring" not in roles or any(one.role == "ring" for one in table)
+        ring = "ring" not in roles or any(node.role == "ring" for node in table)
         _check("no points of the ring", ring, code="E-COUNT", key="nodes", limit="nodes of the role ring")
-        keys = [(one.number, one.role, one.direction * (one.role == "sensor")) for one in table]
+        keys = [(node.number, node.role, node.direction * (node.role == "sensor")) for node in table]
         twice = [key for key in keys if keys.count(key) > 1]
         _check(
             "a node stands twice",
@@ -341,17 +341,17 @@ def _node(row: Mapping[str, str], roles: Mapping[str, bool]) -> Node:
     """A row of the table of nodes."""
     (role, _, name), place = row["role"].partition(" "), [row.get(axis, "") for axis in "xyz"]
     direction, dofs = row.get("direction") or "radial", row.get("dofs") or "123"
-    known = role in roles and bool(name) == roles[role]
-    known &= direction.removeprefix("-") in ("x", "y", "z", "radial", "tangential")
+    allowed = role in roles and bool(name) == roles[role]
+    allowed &= direction.removeprefix("-") in ("x", "y", "z", "radial", "tangential")
     try:
-        position = np.array([float(one) for one in place]) if any(place) else None
+        position = np.array([float(coordinate) for coordinate in place]) if any(place) else None
         number = int(row["node"] or 0)
-        known &= role != "centre" if position is None else bool(np.isfinite(position).all())
+        allowed &= role != "centre" if position is None else bool(np.isfinite(position).all())
     except (TypeError, ValueError):
-        known = False
+        allowed = False
     _check(
         "a row of the table of nodes that cannot be read",
-        known and set(dofs) <= set("123456"),
+        allowed and set(dofs) <= set("123456"),
         code="E-CHOICE",
         key="nodes",
         value=", ".join(row.values()),
@@ -369,15 +369,15 @@ def _listed(roles: Mapping[str, bool]) -> str:
 
 def _feet(table: Sequence[Node]) -> list[str]:
     """Names of the feet, each once."""
-    return list(dict.fromkeys(one.name for one in table if one.role == "foot"))
+    return list(dict.fromkeys(node.name for node in table if node.role == "foot"))
 
 
 def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, units) -> dict:
     """The arrays of `from_arrays` of modes in all coordinates of a file."""
-    centre = next((UNITS[units][0] * one.position for one in table if one.role == "centre"), np.zeros(3))
+    centre = next((UNITS[units][0] * node.position for node in table if node.role == "centre"), np.zeros(3))
     place = {number: position - centre for number, position in modes.position.items()}
-    ring, sensors = ([one for one in table if one.role == role] for role in ("ring", "sensor"))
-    lost = [one.number for one in (*ring, *sensors) if one.number not in place]
+    ring, sensors = ([node for node in table if node.role == role] for role in ("ring", "sensor"))
+    lost = [node.number for node in (*ring, *sensors) if node.number not in place]
     _check(
         "nodes without coordinates",
         not lost,
@@ -386,8 +386,8 @@ def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, units) 
         value=lost[:9],
         limit="x, y, z in the file or in the table",
     )
-    points = np.array([place[one.number] for one in ring]).reshape(-1, 3)
-    angle = _ring_angles(points, [one.number for one in ring], pitch_radius, max_diameter, units)
+    points = np.array([place[node.number] for node in ring]).reshape(-1, 3)
+    angle = _ring_angles(points, [node.number for node in ring], pitch_radius, max_diameter, units)
 
     def motion(number: int, along: np.ndarray) -> np.ndarray:
         """Displacement of a node along a vector (3,), of unit coordinates (r,)."""
@@ -408,8 +408,8 @@ def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, units) 
 
     ways = [_directions(a) for a in angle]
     shape = [[motion(o.number, w[word]) for word in ("radial", "tangential")] for o, w in zip(ring, ways)]
-    shape, across = np.array(shape), [np.arctan2(*place[one.number][1::-1]) for one in sensors]
-    heard = [motion(one.number, _directions(a)[one.direction]) for one, a in zip(sensors, across)]
+    shape, across = np.array(shape), [np.arctan2(*place[sensor.number][1::-1]) for sensor in sensors]
+    heard = [motion(sensor.number, _directions(a)[sensor.direction]) for sensor, a in zip(sensors, across)]
     heard = np.array(heard).reshape(len(sensors), modes.shape.shape[1])
     path = np.asarray(direction, float) @ shape
     outputs = np.hstack([modes.shape @ heard.T, modes.foot_force])
@@ -430,8 +430,8 @@ def _arrays(modes: _Modes, table, direction, pitch_radius, max_diameter, units) 
 def _directions(angle: float) -> dict[str, np.ndarray]:
     """Unit vectors (3,) at an angle around the ring by the words for them, of either sign."""
     out, around = [np.cos(angle), np.sin(angle), 0.0], [-np.sin(angle), np.cos(angle), 0.0]
-    found = zip(("radial", "tangential", "x", "y", "z"), np.array([out, around, *np.eye(3)]))
-    return {sign + word: (-v if sign else v) for word, v in found for sign in ("", "-")}
+    words_and_vectors = zip(("radial", "tangential", "x", "y", "z"), np.array([out, around, *np.eye(3)]))
+    return {sign + word: (-v if sign else v) for word, v in words_and_vectors for sign in ("", "-")}
 
 
 def _ring_angles(place, number: list[int], pitch_radius: float, max_diameter: int, units: str) -> np.ndarray:
@@ -516,15 +516,15 @@ def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
                 size = sum(archive.getinfo(f"{name}.npy").file_size for name in _named(archive.namelist()))
             check_array_size(size)
             with np.load(path, allow_pickle=False) as stored:
-                found = {name: stored[name] for name in ARRAY_NAMES if name in stored}
+                arrays = {name: stored[name] for name in ARRAY_NAMES if name in stored}
         else:
             import xarray as xr
 
             with xr.open_dataset(path) as data:
                 named = {name: data[name] for name in ARRAY_NAMES if name in data}
-                check_array_size(sum(one.nbytes for one in named.values()))
-                found = {name: one.values for name, one in named.items()}
-    words = [name for name, one in found.items() if one.dtype.kind not in "buifc"]
+                check_array_size(sum(variable.nbytes for variable in named.values()))
+                arrays = {name: value.values for name, value in named.items()}
+    words = [name for name, value in arrays.items() if value.dtype.kind not in "buifc"]
     _check(
         "arrays that hold no numbers",
         not words,
@@ -535,7 +535,7 @@ def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
         remedy="export the array again",
     )
     # complex numbers are some if they have an imaginary part
-    turned = [name for name, one in found.items() if np.iscomplexobj(one) and np.imag(one).any()]
+    turned = [name for name, value in arrays.items() if np.iscomplexobj(value) and np.imag(value).any()]
     _check(
         "complex arrays",
         not turned,
@@ -545,10 +545,10 @@ def _stored(path: Path, length: float, mass: float) -> dict[str, np.ndarray]:
         limit="real numbers",
         remedy="give modes without damping, and damping ratios",
     )
-    powers = {name: _POWERS.get(name, (0, 0)) for name in found}
+    powers = {name: _POWERS.get(name, (0, 0)) for name in arrays}
     return {
-        name: np.asarray(np.real(one), float) * mass ** powers[name][0] * length ** powers[name][1]
-        for name, one in found.items()
+        name: np.asarray(np.real(value), float) * mass ** powers[name][0] * length ** powers[name][1]
+        for name, value in arrays.items()
     }
 
 
@@ -598,15 +598,15 @@ def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:
         remedy="export displacements in the basic system",
     )
     both = _pair(deck.dmigs)
-    labels = np.unique(np.vstack([side for one in both for side in (one.GCi, one.GCj)]), axis=0)
+    labels = np.unique(np.vstack([side for stored in both for side in (stored.GCi, stored.GCj)]), axis=0)
     row = {(int(g), int(c)): i for i, (g, c) in enumerate(labels)}
-    found = [np.zeros((len(row),) * 2, complex) for _ in both]
-    for one, matrix in zip(both, found):
-        i, j = (np.array([row[int(g), int(c)] for g, c in side], int) for side in (one.GCi, one.GCj))
-        matrix[i, j] = np.array(one.Real) + (1j * np.array(one.Complex) if one.is_complex else 0.0)
-        if one.matrix_form == 6:
+    matrices = [np.zeros((len(row),) * 2, complex) for _ in both]
+    for stored, matrix in zip(both, matrices):
+        i, j = (np.array([row[int(g), int(c)] for g, c in side], int) for side in (stored.GCi, stored.GCj))
+        matrix[i, j] = np.array(stored.Real) + (1j * np.array(stored.Complex) if stored.is_complex else 0.0)
+        if stored.matrix_form == 6:
             matrix[j, i] = matrix[i, j]
-    return found, row, place
+    return matrices, row, place
 
 
 def _pair(matrices: Mapping[str, Any]) -> list[Any]:
@@ -614,7 +614,7 @@ def _pair(matrices: Mapping[str, Any]) -> list[Any]:
     names = [_stiffness_or_mass(matrices, letter) for letter in "KM"]
     _check(
         "the file does not hold one stiffness and one mass matrix",
-        [len(one) for one in names] == [1, 1],
+        [len(name) for name in names] == [1, 1],
         code="E-COUNT",
         key="matrices",
         value=", ".join(matrices),
@@ -638,13 +638,13 @@ def op4_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], d
         from pyNastran.op4.op4 import OP4
     with foreign_refusals("ASCII OP4"):
         matrices = OP4(debug=False).read_op4(str(path))
-    found = [getattr(one, "data", one) for one in _pair(matrices)]
-    found = [one[1].toarray() if hasattr(one[1], "toarray") else np.asarray(one[1]) for one in found]
-    pairs = ((one.number, int(dof)) for one in table if one.role != "centre" for dof in one.dofs)
+    entries = [getattr(entry, "data", entry) for entry in _pair(matrices)]
+    entries = [matrix[1].toarray() if hasattr(matrix[1], "toarray") else np.asarray(matrix[1]) for matrix in entries]
+    pairs = ((node.number, int(dof)) for node in table if node.role != "centre" for dof in node.dofs)
     labels = list(dict.fromkeys(pairs))
-    sizes = {n for one in found for n in one.shape}
+    sizes = {n for matrix in entries for n in matrix.shape}
     _check(
-        f"matrices of {found[0].shape} and {found[1].shape} do not fit the {len(labels)} degrees of freedom "
+        f"matrices of {entries[0].shape} and {entries[1].shape} do not fit the {len(labels)} degrees of freedom "
         "of the table",
         len(sizes) == 1 and max(sizes) >= len(labels),
         code="E-SHAPE",
@@ -652,17 +652,17 @@ def op4_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray], d
         limit=f"square, of one size, {len(labels)} rows or more",
         remedy="give all nodes of the matrices in their order, with their dofs",
     )
-    return found, {label: i for i, label in enumerate(labels)}, {}
+    return entries, {label: i for i, label in enumerate(labels)}, {}
 
 
-def _modes(found, row, place, table: Sequence[Node], length: float, mass: float) -> _Modes:
+def _modes(matrices, row, place, table: Sequence[Node], length: float, mass: float) -> _Modes:
     """Modes of a reduced stiffness and mass (r, r) in the units of the file, the feet held."""
-    _check_matrices(found)
+    _check_matrices(matrices)
     # with time in seconds a stiffness scales as a mass; generalised coordinates take their units with them
-    K, M = (0.5 * mass * np.real(matrix + matrix.T) for matrix in found)
-    standing = [one for one in table if one.role == "foot"]
-    feet = [[row.get((one.number, c), -1) for c in (1, 2, 3)] for one in standing]
-    held = {one.number for one in standing}
+    K, M = (0.5 * mass * np.real(matrix + matrix.T) for matrix in matrices)
+    standing = [node for node in table if node.role == "foot"]
+    feet = [[row.get((node.number, c), -1) for c in (1, 2, 3)] for node in standing]
+    held = {node.number for node in standing}
     free = np.setdiff1d(np.arange(len(K)), [i for (number, _), i in row.items() if number in held])
     _check(
         "a foot without coordinates in the matrices, or nothing but feet",
@@ -699,21 +699,21 @@ def _modes(found, row, place, table: Sequence[Node], length: float, mass: float)
     phi[:, heavy], phi[:, light] = shape.T, shape.T @ follow.T
     names = _feet(table)
     total = np.zeros((len(names), 3, len(K)))
-    for rows, one in zip(feet, standing):
-        total[names.index(one.name), range(3), rows] += 1.0
+    for rows, foot in zip(feet, standing):
+        total[names.index(foot.name), range(3), rows] += 1.0
     stiff, inert = (total.reshape(-1, len(K)) @ matrix for matrix in (K, M))
     force = square[:, None] * (phi @ inert.T) - phi @ stiff.T
     direct = -(inert @ phi.T) @ phi
     if len(light):
         direct -= stiff @ compliance
-    places = place | {one.number: one.position for one in table if one.position is not None}
+    places = place | {node.number: node.position for node in table if node.position is not None}
     places = {number: length * x for number, x in places.items()}
     return _Modes(np.sqrt(square), phi, row, places, None, force, direct, compliance if len(light) else None)
 
 
-def _check_matrices(found: Sequence[np.ndarray]) -> None:
+def _check_matrices(matrices: Sequence[np.ndarray]) -> None:
     """Refuse stiffness and mass that are complex, not symmetric or not finite."""
-    for matrix, name in zip(found, ("stiffness", "mass")):
+    for matrix, name in zip(matrices, ("stiffness", "mass")):
         _check(
             "a complex matrix",
             not np.imag(matrix).any(),
@@ -748,16 +748,16 @@ def _massless(K: np.ndarray, heavy: np.ndarray, light: np.ndarray) -> tuple[np.n
     ``-K_ll^-1 K_lh`` and ``K_ll^-1`` among all coordinates (r, r). CaseError: E-MECHANISM.
     """
     compliance = np.zeros_like(K)
-    own = K[np.ix_(light, light)]
+    of_light = K[np.ix_(light, light)]
     _check(
         "coordinates without mass are held by nothing",
-        not len(light) or float(np.linalg.cond(own)) < 1 / _FREE,
+        not len(light) or float(np.linalg.cond(of_light)) < 1 / _FREE,
         code="E-MECHANISM",
         key="mass",
         limit="stiffness or mass on every coordinate",
         remedy="leave these coordinates out of the export, or give them mass",
     )
-    inverse = np.linalg.inv(own) if len(light) else own
+    inverse = np.linalg.inv(of_light) if len(light) else of_light
     compliance[np.ix_(light, light)] = inverse
     return -inverse @ K[np.ix_(light, heavy)], compliance
 
@@ -784,15 +784,15 @@ def _analysis_data(sets: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     (universal file dataset 2414, records 12 and 13).
     """
     modes = list[dict[str, Any]]()
-    for one in sets:
-        if one["type"] != 2414 or one["dataset_location"] != 1 or one["result_type"] != _DISPLACEMENT:
+    for dataset in sets:
+        if dataset["type"] != 2414 or dataset["dataset_location"] != 1 or dataset["result_type"] != _DISPLACEMENT:
             continue
-        if one["analysis_type"] != 2:
+        if dataset["analysis_type"] != 2:
             continue
-        motion = np.array(one["data_at_node"], float)
+        motion = np.array(dataset["data_at_node"], float)
         _check(
             "modes whose nodes have no displacement vectors",
-            motion.ndim == 2 and motion.shape[1] in (3, 6) and one["data_type"] in _REAL,
+            motion.ndim == 2 and motion.shape[1] in (3, 6) and dataset["data_type"] in _REAL,
             code="E-TYPE",
             key="modes",
             limit="three or six real components",
@@ -801,12 +801,12 @@ def _analysis_data(sets: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
         modes.append(
             vectors
             | {
-                "node_nums": one["node_nums"],
+                "node_nums": dataset["node_nums"],
                 "analysis_type": 2,
-                "freq": one["record12_field2"],
-                "modal_m": one["record12_field4"],
-                "modal_damp_vis": one["record12_field5"],
-                "modal_damp_his": one["record12_field6"],
+                "freq": dataset["record12_field2"],
+                "modal_m": dataset["record12_field4"],
+                "modal_damp_vis": dataset["record12_field5"],
+                "modal_damp_his": dataset["record12_field6"],
             }
         )
     return modes
@@ -815,23 +815,23 @@ def _analysis_data(sets: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
 def _universal(path: Path, table: Sequence[Node], length: float, mass: float) -> _Modes:
     """Modes of a universal file, datasets 55 or 2414, at the nodes of datasets 15 or 2411."""
     sets = _datasets(path)
-    modes = [one for one in sets if one["type"] == 55] + _analysis_data(sets)
+    modes = [dataset for dataset in sets if dataset["type"] == 55] + _analysis_data(sets)
     weights = _checked_weights(sets, modes, table, length)
-    numbers = sorted({int(number) for one in modes for number in one["node_nums"]})
+    numbers = sorted({int(number) for mode in modes for number in mode["node_nums"]})
     row = {(number, c + 1): 3 * i + c for i, number in enumerate(numbers) for c in range(3)}
     shape = np.zeros((len(modes), 3 * len(numbers)))
-    for one, target in zip(modes, shape):
-        first = np.array([row[int(number), 1] for number in one["node_nums"]])
+    for mode, target in zip(modes, shape):
+        first = np.array([row[int(number), 1] for number in mode["node_nums"]])
         for c in range(3):
-            target[first + c] = one[f"r{c + 1}"]
+            target[first + c] = mode[f"r{c + 1}"]
     places = dict[int, np.ndarray]()
-    for one in sets:
-        if one["type"] in (15, 2411):
-            places |= zip(map(int, one["node_nums"]), np.transpose([one[axis] for axis in "xyz"]))
-    places |= {one.number: one.position for one in table if one.position is not None}
-    damping = np.array([one["modal_damp_vis"] + 0.5 * one["modal_damp_his"] for one in modes], float)
+    for mode in sets:
+        if mode["type"] in (15, 2411):
+            places |= zip(map(int, mode["node_nums"]), np.transpose([mode[axis] for axis in "xyz"]))
+    places |= {node.number: node.position for node in table if node.position is not None}
+    damping = np.array([mode["modal_damp_vis"] + 0.5 * mode["modal_damp_his"] for mode in modes], float)
     return _Modes(
-        2 * np.pi * np.array([one["freq"] for one in modes], float),
+        2 * np.pi * np.array([mode["freq"] for mode in modes], float),
         shape / np.sqrt(mass * weights)[:, None],
         row,
         {number: length * x for number, x in places.items()},
@@ -859,7 +859,7 @@ def _datasets(path: Path) -> list[dict]:
 
 def _checked_weights(sets: Sequence[dict], modes: Sequence[dict], table: Sequence[Node], length: float) -> np.ndarray:
     """Modal masses (m,); other units, no modes, complex ones, without mass or of feet are refused."""
-    system = [one["length"] for one in sets if one["type"] == 164]
+    system = [dataset["length"] for dataset in sets if dataset["type"] == 164]
     _check(
         "the file is in other units than told",
         not system or np.isclose(system[0] * length, 1.0, rtol=1e-3),
@@ -869,9 +869,9 @@ def _checked_weights(sets: Sequence[dict], modes: Sequence[dict], table: Sequenc
         limit=f"{1 / length:g}",
         remedy="give the units of the file",
     )
-    real = all(one["analysis_type"] == 2 and not np.iscomplexobj(one["r1"]) for one in modes)
+    real = all(mode["analysis_type"] == 2 and not np.iscomplexobj(mode["r1"]) for mode in modes)
     _check("complex modes", real, code="E-TYPE", key="modes", limit="real normal modes (analysis type 2)")
-    kinds = sorted({int(one["type"]) for one in sets})
+    kinds = sorted({int(dataset["type"]) for dataset in sets})
     _check(
         "the file holds no modes",
         len(modes) > 0,
@@ -881,7 +881,7 @@ def _checked_weights(sets: Sequence[dict], modes: Sequence[dict], table: Sequenc
         limit="datasets 55, or 2414 of normal modes at nodes",
         remedy="export normal modes, displacements at nodes, in ASCII",
     )
-    weights = np.array([one["modal_m"] for one in modes], float)
+    weights = np.array([mode["modal_m"] for mode in modes], float)
     _check(
         "modes without modal mass",
         bool((weights > 0).all()),

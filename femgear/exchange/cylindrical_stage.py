@@ -39,11 +39,11 @@ def pair_tables(
     CaseError: E-CHOICE: no such load case. E-REXS, E-UNIT.
     """
     stage, remarks, before = pair_stage(model, mesh), dict[str, str](), len(model.findings)
-    known = list(model.findings)
+    findings_before = list(model.findings)
     read = gear_tables(stage, remarks)
     for name in stage.gears:
-        found = bearings_between(model, stage.shafts[name], "inner_part", "gear_casing")
-        add_bearings(stage, read, remarks, name, "bearing_stiffness", found)
+        bearings = bearings_between(model, stage.shafts[name], "inner_part", "gear_casing")
+        add_bearings(stage, read, remarks, name, "bearing_stiffness", bearings)
     if "profile_shift" not in read["sun"] and "centre_distance" not in read["set"]:
         read["sun"]["profile_shift"], remarks["sun.profile_shift"] = 0.0, "assumed"
     elif "profile_shift" not in read["sun"]:
@@ -53,13 +53,14 @@ def pair_tables(
     add_modifications(stage, read, remarks, dict.fromkeys(stage.gears, forwards))
     if before < len(model.findings):
         model.findings[:] = [
-            one if one in known else replace(one, key=_renamed(f"{mesh.id}: {one.key}")) for one in model.findings
+            finding if finding in findings_before else replace(finding, key=_renamed(f"{mesh.id}: {finding.key}"))
+            for finding in model.findings
         ]
-    title = f"{mesh.name or 'stage'}, {' and '.join(one.name or str(one) for (one,) in stage.gears.values())}"
+    title = f"{mesh.name or 'stage'}, {' and '.join(gear.name or str(gear) for (gear,) in stage.gears.values())}"
     tables: dict[str, Any] = {"format": 1, "model": "pair"}
     tables["title"] = "".join(c for c in title if c.isprintable())[:200]
     shared = {key: read["sun"].pop(key) for key in ("module", "pressure_angle")}
-    tables |= {key: one for key, one in read.items() if key not in _NAMES}
+    tables |= {key: value for key, value in read.items() if key not in _NAMES}
     tables["set"] = {**shared, **read["set"]}
     tables |= {_NAMES[name]: read[name] for name in stage.gears} | {"operation": operation}
     return tables, {_renamed(key): text for key, text in remarks.items()}
@@ -100,5 +101,5 @@ def _operation(
         model.remark("operation.torque", "the file does not determine the torque: that of a K factor is taken")
     taken = speeds_of_cases(model, number, torques, speeds, alone=wanted is not None)
     remarks |= {} if taken else {"operation.speeds": "assumed"}
-    texts = dict.fromkeys(with_unit(one, SPEED) for one in taken or [1000.0 * SPEED.scale])
+    texts = dict.fromkeys(with_unit(taken_speed, SPEED) for taken_speed in taken or [1000.0 * SPEED.scale])
     return {"torque": with_unit(torque, TORQUE), "speeds": [*texts]}

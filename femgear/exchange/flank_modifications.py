@@ -90,11 +90,11 @@ def flank_modifications(
     up : bool
         Whether the datum face is the end z < 0 of the teeth.
     """
-    found = model.related(("reference", "ordered_reference"), "referenced", origin=flank.id)
-    parts = [one for one in found if one.type in READ]
+    components = model.related(("reference", "ordered_reference"), "referenced", origin=flank.id)
+    parts = [component for component in components if component.type in READ]
     outwards, upwards = -1.0 if internal else 1.0, 1.0 if up else -1.0
     reader = _Reader(model, width, base_radius, tip_diameter, outwards, upwards, [], [])
-    reader.left_out += [f"{one}: no case has it" for one in found if one.type in NOT_READ]
+    reader.left_out += [f"{component}: no case has it" for component in components if component.type in NOT_READ]
     ends: dict[str, Component] = {}
     for part in parts:
         if part.type.startswith("end_relief"):
@@ -106,8 +106,8 @@ def flank_modifications(
     if ends:
         reader.end_reliefs(ends)
     # a part that takes nothing off is none
-    tables = [one for one in reader.tables if one.get("amount") not in ("0 um", "-0 um")]
-    signs = any(one["kind"] in ("profile slope", "lead slope", "flank twist") for one in tables)
+    tables = [table for table in reader.tables if table.get("amount") not in ("0 um", "-0 um")]
+    signs = any(table["kind"] in ("profile slope", "lead slope", "flank twist") for table in tables)
     return Flank(tables, reader.left_out, signs)
 
 
@@ -145,7 +145,7 @@ class _Reader:
     def length(self, part: Component, *attributes: str) -> float | None:
         """First attribute of several that is given [m]."""
         values = (self.model.number(part, name, LENGTH) for name in attributes)
-        return next((one for one in values if one is not None), None)
+        return next((value for value in values if value is not None), None)
 
     def exponent(self, part: Component) -> str | None:
         """Shape of a relief as a case has it; None where no case has it, with the words for it."""
@@ -209,7 +209,7 @@ class _Reader:
 
     def helix_slope(self, part: Component) -> None:
         """Lead slope of the whole width."""
-        start, end = (self.length(part, f"helix_evaluation_{one}") for one in ("start", "end"))
+        start, end = (self.length(part, f"helix_evaluation_{side}") for side in ("start", "end"))
         amount = self.length(part, "helix_slope") or 0.0
         if start is not None and end is not None and abs(end - start) > 0.0:
             amount *= self.width / abs(end - start)
@@ -264,8 +264,8 @@ class _Reader:
             side = self.up * (1.0 if face == "non_datum_face" else -1.0)
             for i, place in enumerate(places):
                 removed[i] += depth * max(1.0 - (half - side * place) / length, 0.0) ** power
-        deviations = [um(-one if one else 0.0) for one in removed]
-        return {"kind": "measured lead", "places": [mm(one) for one in places], "deviations": deviations}
+        deviations = [um(-removed_there if removed_there else 0.0) for removed_there in removed]
+        return {"kind": "measured lead", "places": [mm(along) for along in places], "deviations": deviations}
 
 
 def written_modifications(
@@ -275,75 +275,76 @@ def written_modifications(
 
     The datum face is the end z < 0; ``side`` is "both" of sun or ring, or the side of a planet.
     """
-    found, left_out = [], []
-    for one in flank_form(case, gear, side).modifications:
+    written, left_out = [], []
+    for modification in flank_form(case, gear, side).modifications:
         parts = [
-            (kind, {k: (f"{1e3 * v:.12g}", "mm") for k, v in values.items()}) for kind, values in _parts(one, gear)
+            (kind, {k: (f"{1e3 * v:.12g}", "mm") for k, v in values.items()})
+            for kind, values in _parts(modification, gear)
         ]
-        if parts and isinstance(one, TipRelief | RootRelief):
-            parts[0][1]["shape_of_relief"] = ("linear" if one.power == 1.0 else "parabolic", "none")
-        if isinstance(one, EndRelief):
+        if parts and isinstance(modification, TipRelief | RootRelief):
+            parts[0][1]["shape_of_relief"] = ("linear" if modification.power == 1.0 else "parabolic", "none")
+        if isinstance(modification, EndRelief):
             for _, attributes in parts:
                 attributes["shape_of_relief"] = ("parabolic", "none")
-        found += parts
+        written += parts
         if not parts:
-            left_out.append(_words(one))
-    return found, left_out
+            left_out.append(_words(modification))
+    return written, left_out
 
 
-def _words(one: Any) -> str:
-    power = getattr(one, "power", None)
-    name = "".join(f" {c.lower()}" if c.isupper() else c for c in type(one).__name__).strip()
+def _words(modification: Any) -> str:
+    power = getattr(modification, "power", None)
+    name = "".join(f" {c.lower()}" if c.isupper() else c for c in type(modification).__name__).strip()
     return name if power is None else f"{name} of the power {power:g}"
 
 
-def _parts(one: Any, gear: Gear) -> Iterator[tuple[str, dict[str, float]]]:
+def _parts(modification: Any, gear: Gear) -> Iterator[tuple[str, dict[str, float]]]:
     """Types and lengths [m] of a modification; none where REXS has no such form."""
 
     def diameter(roll: float | None, default: float) -> float:
         return 2.0 * math.hypot(default if roll is None else roll, gear.base_radius)
 
     root, tip = gear.form_roll, gear.tip_roll
-    match one:
-        case TipRelief() | RootRelief() if one.power in (1.0, 2.0):
-            name, end = ("tip_relief", tip) if isinstance(one, TipRelief) else ("root_relief", root)
+    match modification:
+        case TipRelief() | RootRelief() if modification.power in (1.0, 2.0):
+            name, end = ("tip_relief", tip) if isinstance(modification, TipRelief) else ("root_relief", root)
             yield (
                 name,
                 {
-                    f"{name}_depth": one.amount,
-                    f"{name}_datum_diameter": diameter(one.start, root),
-                    f"{name}_evaluation_reference": diameter(one.end, end),
+                    f"{name}_depth": modification.amount,
+                    f"{name}_datum_diameter": diameter(modification.start, root),
+                    f"{name}_evaluation_reference": diameter(modification.end, end),
                 },
             )
         case ProfileSlope():
             yield (
                 "profile_slope",
                 {
-                    "profile_slope": one.amount,
-                    "profile_evaluation_start": diameter(one.start, root),
-                    "profile_evaluation_end": diameter(one.end, tip),
+                    "profile_slope": modification.amount,
+                    "profile_evaluation_start": diameter(modification.start, root),
+                    "profile_evaluation_end": diameter(modification.end, tip),
                 },
             )
         case ProfileCrowning():
             yield (
                 "profile_crowning",
                 {
-                    "profile_crowning_at_tip": one.amount,
-                    "profile_crowning_at_root": one.amount,
-                    "diameter_where_profile_crowning_root_is_specified": diameter(one.start, root),
-                    "diameter_where_profile_crowning_tip_is_specified": diameter(one.end, tip),
+                    "profile_crowning_at_tip": modification.amount,
+                    "profile_crowning_at_root": modification.amount,
+                    "diameter_where_profile_crowning_root_is_specified": diameter(modification.start, root),
+                    "diameter_where_profile_crowning_tip_is_specified": diameter(modification.end, tip),
                 },
             )
         case LeadSlope():
-            yield "helix_slope", {"helix_slope": one.amount}
+            yield "helix_slope", {"helix_slope": modification.amount}
         case LeadCrowning():
             faces = ("datum_face", "non_datum_face")
-            yield "helix_crowning", {f"helix_crowning_amount_{face}": one.amount for face in faces}
+            yield "helix_crowning", {f"helix_crowning_amount_{face}": modification.amount for face in faces}
         case FlankTwist():
-            yield "profile_twist", {"profile_twist": one.amount}
+            yield "profile_twist", {"profile_twist": modification.amount}
         case EndRelief():
             for face in ("datum_face", "non_datum_face"):
                 yield (
                     f"end_relief_{face}",
-                    {f"end_relief_depth_{face}": one.amount, f"end_relief_length_{face}": one.length},
+                    {f"end_relief_depth_{face}": modification.amount, f"end_relief_length_{face}": modification.length},
                 )

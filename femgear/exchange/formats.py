@@ -143,15 +143,15 @@ def line_extent(parts: Iterable[tuple], rate: float) -> dict[str, tuple[float, f
     That is the largest root mean square of these lines, with the one of all lines at that speed; of parts
     ``(unit, orders (n,), speeds (s,) [rad/s], amplitudes (s, n))``.
     """
-    found = dict[str, tuple[float, float, float]]()
+    sums_of = dict[str, tuple[float, float, float]]()
     for unit, order, speed, values in parts:
         power, above = 0.5 * np.abs(values) ** 2, order * speed[:, None] >= np.pi * rate
-        lost, (most, least, _) = (power * above).sum(axis=1), found.get(unit, (0.0, 0.0, 0.0))
+        lost, (most, least, _) = (power * above).sum(axis=1), sums_of.get(unit, (0.0, 0.0, 0.0))
         worst = int(lost.argmax())
         level = (float(np.sqrt(lost[worst])), float(np.sqrt(power[worst].sum())))
         sums = max(most, float(np.abs(values).sum(axis=1).max()))
-        found[unit] = (sums, *(level if level[0] >= least else found[unit][1:]))
-    return found
+        sums_of[unit] = (sums, *(level if level[0] >= least else sums_of[unit][1:]))
+    return sums_of
 
 
 def write_wav(signal: Signal, path: Path, *, full_scale: float = 1.0) -> None:
@@ -198,15 +198,15 @@ def write_functions(signals: Iterable[Signal], spectra: Iterable[Spectrum], path
     unused = {f"{name}_spec_data_type": 0 for name in ("orddenom", "z_axis")} | {"z_axis_value": 0.0}
     scalar = {"rsp_dir": 0, "ref_node": 0, "ref_dir": 0, "binary": 0, "abscissa_spacing": 1, **unused}
     with _universal_file(path) as write:
-        for number, one in enumerate([*signals, *spectra], 1):
-            if isinstance(one, Signal):
-                step, words = 1 / one.rate, f"samples a second [Hz]: {one.rate!r}"
+        for number, signal in enumerate([*signals, *spectra], 1):
+            if isinstance(signal, Signal):
+                step, words = 1 / signal.rate, f"samples a second [Hz]: {signal.rate!r}"
                 kind = {"func_type": 1, "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s"}
             else:
-                step, words = one.step, f"peak amplitudes, step [Hz]: {one.step!r}"
+                step, words = signal.step, f"peak amplitudes, step [Hz]: {signal.step!r}"
                 kind = {"func_type": 0, "abscissa_spec_data_type": 18, "abscissa_axis_units_lab": "Hz"}
-            unit = {"ordinate_spec_data_type": _QUANTITIES[one.unit], "ordinate_axis_units_lab": one.unit}
-            data = {"data": one.values, "x": step * np.arange(len(one.values)), "id1": one.name, "id2": words}
+            unit = {"ordinate_spec_data_type": _QUANTITIES[signal.unit], "ordinate_axis_units_lab": signal.unit}
+            data = {"data": signal.values, "x": step * np.arange(len(signal.values)), "id1": signal.name, "id2": words}
             write(58, rsp_node=number, **data, **kind, **unit, **scalar)
 
 
@@ -224,8 +224,8 @@ def write_modes(shapes: Shapes, path: Path, *, words: str = "in the frame of the
         modes = zip(shapes.frequency.tolist(), shapes.damping_ratio.tolist(), shapes.shape)
         for number, (frequency, damping, shape) in enumerate(modes, 1):
             motion = dict(zip(("r1", "r2", "r3"), shape.T))
-            known = {"mode_n": number, "freq": frequency, "modal_m": 1.0, "modal_damp_vis": damping}
-            write(55, id1=words, **known, **motion, **fixed)
+            always = {"mode_n": number, "freq": frequency, "modal_m": 1.0, "modal_damp_vis": damping}
+            write(55, id1=words, **always, **motion, **fixed)
 
 
 @contextmanager
@@ -256,19 +256,19 @@ def write_workbook(tables: Iterable[tuple[str, Any]], path: Path) -> list[str]:
     with nvh_library("spreadsheets"):
         from openpyxl import Workbook
         from openpyxl.cell import WriteOnlyCell
-    book, known, long = Workbook(write_only=True), set[str](), list[str]()
+    book, titles, long = Workbook(write_only=True), set[str](), list[str]()
     for name, frame in tables:
         if len(frame) >= _ROWS:
             long.append(f"{name} ({len(frame)} rows)")
             continue
-        sheet = book.create_sheet(_sheet_name(name, known))
+        sheet = book.create_sheet(_sheet_name(name, titles))
 
         def cell(value: Any, sheet=sheet) -> Any:
             if isinstance(value, int) or (isinstance(value, float) and np.isfinite(value)):
                 return value
-            one = WriteOnlyCell(sheet, printable(str(value)))
-            one.data_type = "s"  # a beginning = would make it a formula
-            return one
+            cell_ = WriteOnlyCell(sheet, printable(str(value)))
+            cell_.data_type = "s"  # a beginning = would make it a formula
+            return cell_
 
         sheet.append([cell(str(column)) for column in frame.columns])
         for row in frame.itertuples(index=False):
@@ -278,13 +278,13 @@ def write_workbook(tables: Iterable[tuple[str, Any]], path: Path) -> list[str]:
     return long
 
 
-def _sheet_name(name: str, known: set[str]) -> str:
+def _sheet_name(name: str, titles: set[str]) -> str:
     """Shorten a name to the 31 characters of a sheet, so that no two are the same."""
     short, number = name[:31], 2
-    while short.lower() in known:
+    while short.lower() in titles:
         end = f"~{number}"
         short, number = name[: 31 - len(end)] + end, number + 1
-    known.add(short.lower())
+    titles.add(short.lower())
     return short
 
 
@@ -296,7 +296,7 @@ def write_matlab(stages: Mapping[str, xr.Dataset], path: Path) -> None:
     """
     from scipy.io import savemat
 
-    largest = max((one.nbytes for one in stages.values()), default=0)
+    largest = max((stage.nbytes for stage in stages.values()), default=0)
     if largest >= 2**31:
         raise StorageError(
             f"a stage of {largest / 1e9:.1f} GB",
@@ -305,19 +305,19 @@ def write_matlab(stages: Mapping[str, xr.Dataset], path: Path) -> None:
             limit="less than 2.1 GB",
             remedy="export it with --csv, or read its .nc file by ncread",
         )
-    found = {stage: _struct(data) for stage, data in stages.items()}
+    structures = {stage: _struct(data) for stage, data in stages.items()}
     with replaced_file(path, size=sum(data.nbytes for data in stages.values())) as temporary:
-        savemat(temporary, found, appendmat=False, long_field_names=True, oned_as="column")
+        savemat(temporary, structures, appendmat=False, long_field_names=True, oned_as="column")
 
 
 def _struct(data: xr.Dataset) -> dict[str, Any]:
     """Variables of a dataset by name, as `write_matlab` writes them."""
-    found, units = dict[str, Any](), dict[str, str]()
-    for key, one in data.variables.items():
-        name, values = str(key), one.values
+    arrays, units = dict[str, Any](), dict[str, str]()
+    for key, variable in data.variables.items():
+        name, values = str(key), variable.values
         whole = name.removesuffix("_real").removesuffix("_imag")
         if f"{whole}_real" in data and f"{whole}_imag" in data:
             name, values = whole, data[f"{whole}_real"].values + 1j * data[f"{whole}_imag"].values
-        found[name] = values.astype(object) if values.dtype.kind in "OU" else values
-        units[name] = str(one.attrs.get("units", "1"))
-    return {**found, "units": units, "attributes": {str(name): one for name, one in data.attrs.items()}}
+        arrays[name] = values.astype(object) if values.dtype.kind in "OU" else values
+        units[name] = str(variable.attrs.get("units", "1"))
+    return {**arrays, "units": units, "attributes": {str(name): attr for name, attr in data.attrs.items()}}

@@ -52,47 +52,47 @@ class UnitFlow:
 def shaft_of(model: Model, part: Component) -> Component | None:
     """Find the shaft that a gear or load belongs to."""
     wholes = model.related(("assembly", "ordered_assembly"), "assembly", part=part.id)
-    return next((one for one in wholes if one.type == "shaft"), None)
+    return next((whole for whole in wholes if whole.type == "shaft"), None)
 
 
 def stage_components(model: Model) -> list[Component]:
     """List the stages of a unit, without the meshes inside planetary ones."""
-    stages = [one for one in model.components.values() if one.type.endswith("_stage")]
-    planetary = [one for one in stages if one.type == "planetary_stage"]
-    inside = {one.id for stage in planetary for one in model.related("assembly", "part", assembly=stage.id)}
-    return [one for one in stages if one.id not in inside]
+    stages = [component for component in model.components.values() if component.type.endswith("_stage")]
+    planetary = [stage for stage in stages if stage.type == "planetary_stage"]
+    inside = {component.id for stage in planetary for component in model.related("assembly", "part", assembly=stage.id)}
+    return [stage for stage in stages if stage.id not in inside]
 
 
 def gears_of(model: Model, mesh: Component) -> list[Component]:
     """List both gears of a mesh, the internal one last; fewer where relations are missing."""
     roles = ("gear_1", "gear_2")
-    gears = [one for role in roles for one in model.related("stage", role, stage=mesh.id)[:1]]
-    return sorted(gears, key=lambda one: one.type == "ring_gear")
+    gears = [gear for role in roles for gear in model.related("stage", role, stage=mesh.id)[:1]]
+    return sorted(gears, key=lambda gear: gear.type == "ring_gear")
 
 
 def unit_stages(model: Model) -> list[UnitStage]:
     """List the stages whose teeth and shafts the file gives."""
-    return [one for stage in stage_components(model) if (one := _unit_stage(model, stage)) is not None]
+    return [unit_stage for stage in stage_components(model) if (unit_stage := _unit_stage(model, stage)) is not None]
 
 
 def _unit_stage(model: Model, stage: Component) -> UnitStage | None:
     if stage.type == "planetary_stage":
         meshes = model.related("assembly", "part", assembly=stage.id)
-        gears = {one.id: one for mesh in meshes for one in gears_of(model, mesh)}
-        ring = next((one for one in gears.values() if one.type == "ring_gear"), None)
-        planets = {one.id for mesh in meshes if ring in (pair := gears_of(model, mesh)) for one in pair}
-        sun = next((one for one in gears.values() if one.id not in planets), None)
+        gears = {gear.id: gear for mesh in meshes for gear in gears_of(model, mesh)}
+        ring = next((gear for gear in gears.values() if gear.type == "ring_gear"), None)
+        planets = {gear.id for mesh in meshes if ring in (pair := gears_of(model, mesh)) for gear in pair}
+        sun = next((gear for gear in gears.values() if gear.id not in planets), None)
         carriers = model.related("planet_carrier_shaft", "shaft", planetary_stage=stage.id)
         if ring is None or sun is None or not carriers or carriers[0].type != "shaft":
             return None
         central, shafts = [sun, ring], [shaft_of(model, sun), carriers[0], shaft_of(model, ring)]
     elif stage.type == "cylindrical_stage":
         central = gears_of(model, stage)
-        shafts = [shaft_of(model, one) for one in central]
+        shafts = [shaft_of(model, gear) for gear in central]
     else:
         return None
-    ids = [one.id for one in shafts if one is not None]
-    teeth = [abs(model.number(one, "number_of_teeth") or 0.0) for one in central]
+    ids = [shaft.id for shaft in shafts if shaft is not None]
+    teeth = [abs(model.number(gear, "number_of_teeth") or 0.0) for gear in central]
     if len(central) != 2 or len(ids) < len(shafts) or not all(map(float.is_integer, teeth)):
         return None
     first, second = map(int, teeth)
@@ -100,7 +100,7 @@ def _unit_stage(model: Model, stage: Component) -> UnitStage | None:
         if stage.type == "planetary_stage":
             condition = planetary_condition(stage.id, ids[0], ids[1], ids[2], first, second)
         else:
-            internal = any(one.type == "ring_gear" for one in central)
+            internal = any(gear.type == "ring_gear" for gear in central)
             condition = pair_condition(stage.id, ids[0], ids[1], first, second, internal)
     except GeometryError:  # teeth that no stage has
         return None
@@ -131,7 +131,11 @@ def unit_flow(model: Model, given: Mapping[str, Mapping]) -> UnitFlow:
     stages = unit_stages(model)
     graph = _graph(model, stages)
     inside = {graph.group[id] for stage in stages for id in stage.arms}
-    shafts = [one for one in model.components.values() if one.type == "shaft" and graph.group[one.id] in inside]
+    shafts = [
+        component
+        for component in model.components.values()
+        if component.type == "shaft" and graph.group[component.id] in inside
+    ]
     loads: dict[int, list[float | None]] = {}
     for shaft in shafts:
         loads.setdefault(graph.group[shaft.id], []).extend(loads_on(model, shaft, given))
@@ -148,48 +152,50 @@ def case_flows(model: Model, load_case: int | None) -> list[UnitFlow]:
     CaseError: no such load case (E-CHOICE).
     """
     _, given = model.chosen_case(load_case)
-    return [unit_flow(model, one) for one in (given, *model.load_cases)]
+    return [unit_flow(model, case) for case in (given, *model.load_cases)]
 
 
 def plain_ids(ids: Iterable[str]) -> dict[str, str]:
     """Make ids that names of files and bodies can hold, each of its own."""
-    found: dict[str, str] = {}
+    plain_of: dict[str, str] = {}
     for id in ids:
         plain = re.sub(r"[^A-Za-z0-9_-]", "_", id)[:20]
-        number = sum(one == plain or one.startswith(f"{plain}-") for one in found.values())
-        found[id] = f"{plain}-{number + 1}" if number else plain
-    return found
+        number = sum(taken == plain or taken.startswith(f"{plain}-") for taken in plain_of.values())
+        plain_of[id] = f"{plain}-{number + 1}" if number else plain
+    return plain_of
 
 
 def _graph(model: Model, stages: Iterable[UnitStage]) -> ShaftGraph:
     """Shafts of a unit with its stages and couplings."""
-    shafts = tuple(one.id for one in model.components.values() if one.type == "shaft")
+    shafts = tuple(component.id for component in model.components.values() if component.type == "shaft")
     held: list[str] = []
     joined: list[tuple[str, ...]] = []
-    for joint in [one for one in model.components.values() if one.type.endswith("coupling")]:
+    for joint in [component for component in model.components.values() if component.type.endswith("coupling")]:
         sides = (model.related("side", role, assembly=joint.id) for role in ("inner_part", "outer_part"))
-        ends = [one for side in sides for one in side]
-        ids = tuple(one.id for one in ends if one.id in shafts)
+        ends = [component for side in sides for component in side]
+        ids = tuple(end.id for end in ends if end.id in shafts)
         if len(ids) == 2:
             joined.append(ids)
-        elif len(ids) == 1 and any(one.type == "gear_casing" for one in ends):
+        elif len(ids) == 1 and any(end.type == "gear_casing" for end in ends):
             held.append(ids[0])
-    conditions = tuple(SpeedCondition(one.component.id, one.arms) for one in stages)
+    conditions = tuple(SpeedCondition(stage.component.id, stage.arms) for stage in stages)
     return ShaftGraph(shafts, conditions, tuple(held), tuple(joined))
 
 
 def _speeds(model: Model, graph: ShaftGraph, shafts: Iterable[Component], given) -> dict[str, float]:
     """Speeds of shafts [rad/s] without those that nothing determines; of speeds that contradict the first counts."""
     value: dict[int, float] = {group: 0.0 for group in graph.standing}
-    told = []
+    driven = []
     for shaft in shafts:
         speed = model.number(with_load_case(shaft, given), "rotational_speed", SPEED)
         if speed is not None and graph.group[shaft.id] not in value:
             value[graph.group[shaft.id]] = speed
-            told.append(shaft.id)
-    for group, ratio in graph.speeds(told).ratio.items():
+            driven.append(shaft.id)
+    for group, ratio in graph.speeds(driven).ratio.items():
         value[group] = sum(float(share) * value[other] for other, share in ratio.items())
-    return {one.id: value[graph.group[one.id]] for one in shafts if graph.group[one.id] in value}
+    return {
+        component.id: value[graph.group[component.id]] for component in shafts if graph.group[component.id] in value
+    }
 
 
 def _stage_torques(
@@ -199,29 +205,33 @@ def _stage_torques(
     stages_on = [group for stage in part for group in graph.rows[stage]]
     groups = sorted(set(stages_on))
     loaded = {group: values for group, values in loads.items() if group in groups}
-    known = {group: sum(one for one in values if one is not None) for group, values in loaded.items()}
-    known = {group: torque for group, torque in known.items() if torque}
-    if not known:
+    torque_of = {group: sum(value for value in values if value is not None) for group, values in loaded.items()}
+    torque_of = {group: torque for group, torque in torque_of.items() if torque}
+    if not torque_of:
         return {}
-    ends = [one for one in groups if stages_on.count(one) == 1 and one not in known and one not in graph.standing]
-    silent = [one for one, values in loaded.items() if any(not torque for torque in values) and one not in known]
+    ends = [
+        group
+        for group in groups
+        if stages_on.count(group) == 1 and group not in torque_of and group not in graph.standing
+    ]
+    silent = [key for key, values in loaded.items() if any(not torque for torque in values) and key not in torque_of]
     # the load takes the rest: one that says no torque, or the only end of the unit without one
     output = silent if len(silent) == 1 else ends if len(ends) == 1 else []
     unknown = [group for group in groups if group in graph.standing or group in output]
     first = {group: graph.names([group])[0] for group in groups}
-    balance = graph.torques([first[one] for one in known], [first[one] for one in unknown], part)
-    torque = dict(enumerate(known.values(), len(graph.conditions) + len(unknown)))
-    sums = [[float(share) * torque[one] for one, share in relation.items()] for relation in balance.relations]
+    balance = graph.torques([first[group] for group in torque_of], [first[group] for group in unknown], part)
+    torque = dict(enumerate(torque_of.values(), len(graph.conditions) + len(unknown)))
+    sums = [[float(share) * torque[key] for key, share in relation.items()] for relation in balance.relations]
     if balance.open or any(disagree(terms, TORQUE_ROUNDING) for terms in sums):
         return {}
-    return {stage: sum(float(share) * torque[one] for one, share in balance.ratio[stage].items()) for stage in part}
+    return {stage: sum(float(share) * torque[key] for key, share in balance.ratio[stage].items()) for stage in part}
 
 
 def stage_in_words(model: Model, stage: Component) -> str:
     """Tell type, id and name of a stage, and the teeth of two gears."""
     gears = gears_of(model, stage)
-    teeth: Any = [model.number(one, "number_of_teeth") for one in gears]
-    shown = f" {'/'.join(f'{abs(one):g}' for one in teeth)}" if len(teeth) == 2 and all(teeth) else ""
+    teeth: Any = [model.number(gear, "number_of_teeth") for gear in gears]
+    shown = f" {'/'.join(f'{abs(count):g}' for count in teeth)}" if len(teeth) == 2 and all(teeth) else ""
     return f"{stage}{shown}" + (f" ({stage.name[:60]})" if stage.name not in ("", "stage") else "")
 
 

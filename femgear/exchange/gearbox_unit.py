@@ -91,7 +91,7 @@ def gearbox_tables(
     if (weight := _gravity(model)) is not None:
         tables["gravity"] = weight
     casings = (part for part in model.components.values() if part.type == "gear_casing")
-    if rise := next((one for part in casings if (one := temperature_rise(model, part))), None):
+    if rise := next((rise_of_part for part in casings if (rise_of_part := temperature_rise(model, part))), None):
         tables["thermal"] = {"casing_rise": f"{rise:.6g} K"}
     for entry, why in unit.unseated.items():
         text, remedy = f"{entry}: {why}: taken as 0 mm", "give it in the gear unit, or the position in the case"
@@ -101,7 +101,7 @@ def gearbox_tables(
 
 def has_whole_shafts(tables: Mapping[str, Any]) -> bool:
     """Whether all shafts of a gearbox have sections and bearings of the file."""
-    held = {one["shaft"] for one in tables.get("bearing", ()) if not one["name"].startswith(_SUPPORT)}
+    held = {bearing["shaft"] for bearing in tables.get("bearing", ()) if not bearing["name"].startswith(_SUPPORT)}
     return all("part" in shaft and shaft["name"] in held for shaft in tables["shaft"])
 
 
@@ -130,7 +130,7 @@ def _gravity(model: Model) -> dict[str, Any] | None:
             if not any(along):
                 model.remark("gravity", "the file does not tell where its weight acts: along -y", severity=NOTE)
                 return table
-            return table | {"direction": [one / math.hypot(*along) for one in along]}
+            return table | {"direction": [component / math.hypot(*along) for component in along]}
     return None
 
 
@@ -193,10 +193,10 @@ class _Unit:
         sun = next(gear for gear in gears.values() if gear.id not in planets and gear.id != ring.id)
         yield "sun", (sun, self._shaft(sun))
         carriers = model.related("planet_carrier_shaft", "shaft", planetary_stage=stage.id)
-        if not carriers or any(one.type != "shaft" for one in carriers):
+        if not carriers or any(carrier.type != "shaft" for carrier in carriers):
             raise NoGearbox(f"the carrier of {stage} has no shaft")
         self.components.setdefault(carriers[0].id, list(carriers))
-        self.main |= {one.id: carriers[0].id for one in carriers}
+        self.main |= {carrier.id: carriers[0].id for carrier in carriers}
         yield "carrier", (None, carriers[0].id)
         shaft = shaft_of(model, ring)
         yield "ring", (ring, None if shaft is None or self._stands(stage, shaft) else self._shaft(ring))
@@ -207,8 +207,8 @@ class _Unit:
 
     def _planets(self, stage: Component) -> list[Component]:
         """Planets of a planetary stage; none of another one."""
-        found = {one.id: one for _, pair in self._meshes(stage) if pair[1].type == "ring_gear" for one in pair[:1]}
-        return list(found.values())
+        planets = {gear.id: gear for _, pair in self._meshes(stage) if pair[1].type == "ring_gear" for gear in pair[:1]}
+        return list(planets.values())
 
     def _shaft(self, gear: Component) -> str:
         shaft = shaft_of(self.model, gear)
@@ -219,10 +219,12 @@ class _Unit:
 
     def _stands(self, stage: Component, shaft: Component) -> bool:
         """Whether the shaft of a ring stands in the casing: held by a coupling, or by nothing else in its stage."""
-        held = [one for one in self.couplings if self._ends(one) == {shaft.id, None}]
+        held = [coupling for coupling in self.couplings if self._ends(coupling) == {shaft.id, None}]
         if held:
-            return not any(value != "rigid" for one in held for value in coupling_table(self.model, one).values())
-        loaded = any(one.type == "external_load" for one in self.model.related(_PARTS, "part", assembly=shaft.id))
+            return not any(
+                value != "rigid" for coupling in held for value in coupling_table(self.model, coupling).values()
+            )
+        loaded = any(part.type == "external_load" for part in self.model.related(_PARTS, "part", assembly=shaft.id))
         fixed = self.teeth[stage.id].get("operation", {}).get("fixed")
         if fixed != "ring" or loaded or self.model.number(shaft, "rotational_speed", SPEED):
             return False
@@ -232,19 +234,21 @@ class _Unit:
     def _ends(self, joint: Component) -> set[str | None]:
         """Ids of the shafts that a joint joins, with None for the casing; other parts are left out."""
         sides = [
-            one
+            component
             for role in ("inner_part", "outer_part")
-            for one in self.model.related("side", role, assembly=joint.id)[:1]
+            for component in self.model.related("side", role, assembly=joint.id)[:1]
         ]
-        return {None if one.type == "gear_casing" else one.id for one in sides if one.type in ("gear_casing", "shaft")}
+        return {
+            None if side.type == "gear_casing" else side.id for side in sides if side.type in ("gear_casing", "shaft")
+        }
 
     def _inside(self) -> set[str]:
         """Ids of the shafts and pins of planets, which are no shafts of the gearbox."""
         return {
-            one.id
+            component.id
             for stage in self.stages
             for kind in ("planet_shaft", "planet_pin")
-            for one in self.model.related(kind, "shaft", planetary_stage=stage.id)
+            for component in self.model.related(kind, "shaft", planetary_stage=stage.id)
         }
 
     def _add_struts(self) -> None:
@@ -254,13 +258,13 @@ class _Unit:
             carrier = members.get("carrier", (None, None))[1]
             joined: dict[str, int] = {}
             for ends in map(self._ends, self.couplings):
-                if carrier is not None and {self.main.get(one or "") for one in ends} == {carrier, None}:
-                    for one in ends - self.main.keys() - inside - {None}:
-                        joined[one or ""] = joined.get(one or "", 0) + 1
-            for one, count in joined.items():
-                if count > 1 and carrier is not None and self._carries(one):
-                    self.components[carrier].append(self.model.components[one])
-                    self.main[one] = carrier
+                if carrier is not None and {self.main.get(end or "") for end in ends} == {carrier, None}:
+                    for end in ends - self.main.keys() - inside - {None}:
+                        joined[end or ""] = joined.get(end or "", 0) + 1
+            for end, count in joined.items():
+                if count > 1 and carrier is not None and self._carries(end):
+                    self.components[carrier].append(self.model.components[end])
+                    self.main[end] = carrier
 
     def _add_coupled(self) -> None:
         """Add shafts that couplings join with those of stages, where anything is on them."""
@@ -269,8 +273,8 @@ class _Unit:
         while grown:
             grown = False
             for joint in self.couplings:
-                ends = {one for one in self._ends(joint) if one is not None and one not in inside}
-                new = [one for one in ends if one not in self.main]
+                ends = {end for end in self._ends(joint) if end is not None and end not in inside}
+                new = [end for end in ends if end not in self.main]
                 if len(ends) == 2 and len(new) == 1 and self._carries(new[0]):
                     self.components[new[0]] = [self.model.components[new[0]]]
                     self.main[new[0]], grown = new[0], True
@@ -278,7 +282,7 @@ class _Unit:
     def _carries(self, shaft: str) -> bool:
         """Whether a shaft has sections with sizes, or loads."""
         parts = self.model.related(_PARTS, "part", assembly=shaft)
-        return any(one.type == "external_load" or self.model.number(one, "length", LENGTH) for one in parts)
+        return any(part.type == "external_load" or self.model.number(part, "length", LENGTH) for part in parts)
 
     def _sides(self, part: Component) -> tuple[Component, str, Component | None, bool] | None:
         """Shaft of a bearing with its id, shaft around it if any, and whether the first is its outer part.
@@ -289,16 +293,16 @@ class _Unit:
             next(iter(self.model.related("side", role, assembly=part.id)), None)
             for role in ("inner_part", "outer_part")
         )
-        known = [one is not None and one.id in self.main for one in (inner, outer)]
-        other = outer if known[0] else inner
-        if not any(known) or (not all(known) and other is not None and other.type == "shaft"):
+        inside = [component is not None and component.id in self.main for component in (inner, outer)]
+        other = outer if inside[0] else inner
+        if not any(inside) or (not all(inside) and other is not None and other.type == "shaft"):
             return None
-        if all(known):
+        if all(inside):
             assert inner is not None and outer is not None
             return inner, self.main[inner.id], outer, False
-        shaft = inner if known[0] else outer
+        shaft = inner if inside[0] else outer
         assert shaft is not None
-        return shaft, self.main[shaft.id], None, known[1]
+        return shaft, self.main[shaft.id], None, inside[1]
 
     # where they lie
 
@@ -321,35 +325,35 @@ class _Unit:
 
     def _zeros(self) -> dict[str, tuple[float, float, float]]:
         """Axis and zero (x, y, z) of the shafts of the file [m]: their coordinates, else from stage to stage."""
-        parts = [one for shaft in self.shafts for one in self.components[shaft]]
+        parts = [component for shaft in self.shafts for component in self.components[shaft]]
         ways = list(self._stage_ways())
-        found = file_places(self.model, parts)
-        if found is not None and (off := misses(found, ways)) <= TOLERANCE:
-            return found
-        if found is not None:
+        places = file_places(self.model, parts)
+        if places is not None and (off := misses(places, ways)) <= TOLERANCE:
+            return places
+        if places is not None:
             text = f"coordinates of shafts miss the centre distances by up to {1e6 * off:.3g} um: not taken"
             self.model.remark("shaft", text, remedy="shafts lie by centre distances and angles of the stages")
         ways += self._joint_ways()
-        return walked_places([one.id for one in parts], ways)
+        return walked_places([part.id for part in parts], ways)
 
     def _stage_ways(self) -> Iterator[Way]:
         for stage in self.stages:
             members = self.members[stage.id]
             if stage.type == "cylindrical_stage":
-                (first, one), (second, other) = members["gear_1"], members["gear_2"]
-                assert first is not None and second is not None and one is not None and other is not None
+                (first, first_shaft), (second, other) = members["gear_1"], members["gear_2"]
+                assert first is not None and second is not None and first_shaft is not None and other is not None
                 angle = self.model.number(stage, _ANGLE_KEY, ANGLE) or 0.0
                 # the angle leads from gear 1 of the file, which may be the internal one, that is gear 2 here
                 if second in self.model.related("stage", "gear_1", stage=stage.id):
                     angle += math.pi
-                yield one, other, stage_way(self._distance(stage), angle, self.at(first) - self.at(second))
+                yield first_shaft, other, stage_way(self._distance(stage), angle, self.at(first) - self.at(second))
                 continue
             sun, shaft = members["sun"]
             ring, around = members["ring"]
             assert sun is not None and ring is not None and shaft is not None
             # the middle of the planets lies at the zero of the carrier where nothing else tells it
-            for one in self.components[str(members["carrier"][1])]:
-                yield shaft, one.id, (0.0, 0.0, self.at(sun))
+            for first_shaft in self.components[str(members["carrier"][1])]:
+                yield shaft, first_shaft.id, (0.0, 0.0, self.at(sun))
             if around is not None:
                 yield shaft, around, (0.0, 0.0, self.at(sun) - self.at(ring))
 
@@ -363,12 +367,12 @@ class _Unit:
     def _joint_ways(self) -> Iterator[Way]:
         """Ways along bearings and couplings between two shafts."""
         keys = ("u_coordinate_on_shaft_inner_side", "u_coordinate_on_shaft_outer_side")
-        for joint in [*(one[0] for one in self.bearings), *self.couplings]:
+        for joint in [*(bearing[0] for bearing in self.bearings), *self.couplings]:
             sides = [
                 next(iter(self.model.related("side", r, assembly=joint.id)), None) for r in ("inner_part", "outer_part")
             ]
-            if all(one is not None and one.id in self.main for one in sides):
-                inner, outer = (one.id for one in sides if one is not None)
+            if all(side is not None and side.id in self.main for side in sides):
+                inner, outer = (side.id for side in sides if side is not None)
                 yield inner, outer, (0.0, 0.0, self.at(joint, keys[0]) - self.at(joint, keys[1]))
 
     def height(self, part: Component, shaft: Component, key: str = "u_coordinate_on_shaft") -> float:
@@ -383,46 +387,50 @@ class _Unit:
 
     def _pieces(self, shaft: str) -> list[Piece]:
         """Sections of a shaft, with what carriers have beside, as far as its parts reach."""
-        found = [p for one in self.components[shaft] for p in file_pieces(self.model, one, self.zero[one.id][2])]
-        if not found:
+        pieces = [
+            p
+            for component in self.components[shaft]
+            for p in file_pieces(self.model, component, self.zero[component.id][2])
+        ]
+        if not pieces:
             text = f"shaft {shaft} has no sections: it is one rigid body"
             self.model.remark(f"shaft {shaft}", text, remedy="give it parts: what it bends misaligns teeth")
             return []
         for stage in self.stages:
             if self.members[stage.id].get("carrier", (None, None))[1] == shaft:
-                found += self._carrier_body(stage, found)
-        found, gaps = joined_pieces(found)
+                pieces += self._carrier_body(stage, pieces)
+        pieces, gaps = joined_pieces(pieces)
         if gaps:
             text = f"sections of shaft {shaft} leave gaps of {1e3 * gaps:.4g} mm: they are closed"
             self.model.remark(f"shaft {shaft}", text)
         reach = [height for height in self._heights(shaft)]
-        low, high = min([*reach, found[0].start]), max([*reach, found[-1].end])
-        longer = max(found[0].start - low, high - found[-1].end)
+        low, high = min([*reach, pieces[0].start]), max([*reach, pieces[-1].end])
+        longer = max(pieces[0].start - low, high - pieces[-1].end)
         if longer > _EDGE:
             text = f"shaft {shaft} is made {1e3 * longer:.4g} mm longer, up to the last part on it"
             self.model.remark(f"shaft {shaft}", text, remedy="correct the place of the part, or the sections")
-        if found[0].start - low > _EDGE:
-            found.insert(0, _extension(found[0], low, found[0].start))
-        if high - found[-1].end > _EDGE:
-            found.append(_extension(found[-1], found[-1].end, high))
-        return found
+        if pieces[0].start - low > _EDGE:
+            pieces.insert(0, _extension(pieces[0], low, pieces[0].start))
+        if high - pieces[-1].end > _EDGE:
+            pieces.append(_extension(pieces[-1], pieces[-1].end, high))
+        return pieces
 
     def _heights(self, shaft: str) -> Iterator[float]:
         """Places along z of all that sits on a shaft [m]."""
         for members in self.members.values():
-            for gear, own in members.values():
-                if own == shaft and gear is not None:
+            for gear, owner in members.values():
+                if owner == shaft and gear is not None:
                     yield self.gear_height(gear)
         for stage in self.stages:
             if self.members[stage.id].get("carrier", (None, None))[1] == shaft:
                 yield self.planet_height(stage)
-        for part, component, own, outer, turned in self.bearings:
-            if own == shaft:
+        for part, component, owner, outer, turned in self.bearings:
+            if owner == shaft:
                 yield self.height(part, component, _side(turned))
             if outer is not None and self.main[outer.id] == shaft:
                 yield self.height(part, outer, _side(True))
-        for part, own in self.loads:
-            if own == shaft:
+        for part, owner in self.loads:
+            if owner == shaft:
                 yield self.load_height(part)
 
     def load_height(self, part: Component) -> float:
@@ -438,28 +446,35 @@ class _Unit:
         return self.gear_height(sun)
 
     def _carrier_parts(self, stage: Component, kind: str) -> list[Component]:
-        return [one for one in self.model.related(_PARTS, "part", assembly=stage.id) if one.type == kind]
+        return [
+            component for component in self.model.related(_PARTS, "part", assembly=stage.id) if component.type == kind
+        ]
 
     def _side_plates(self, stage: Component) -> list[Piece]:
         """Side plates of a carrier from left to right, where the file has their sizes and places."""
         model, plates = self.model, []
         for carrier in self._carrier_parts(stage, "planet_carrier"):
-            for one in self._carrier_parts(carrier, "side_plate"):
-                length, outer = model.number(one, "length", LENGTH), model.number(one, "outer_diameter", LENGTH)
-                place = model.vector(one, "support_vector", LENGTH)
+            for carrier_part in self._carrier_parts(carrier, "side_plate"):
+                length, outer = (
+                    model.number(carrier_part, "length", LENGTH),
+                    model.number(carrier_part, "outer_diameter", LENGTH),
+                )
+                place = model.vector(carrier_part, "support_vector", LENGTH)
                 if length and outer and place:
-                    bore = model.number(one, "inner_diameter", LENGTH) or 0.0
+                    bore = model.number(carrier_part, "inner_diameter", LENGTH) or 0.0
                     plates.append(Piece(place[0], place[0] + length, (outer, outer), (bore, bore)))
-        return sorted(plates, key=lambda one: one.start)
+        return sorted(plates, key=lambda plate: plate.start)
 
-    def _carrier_body(self, stage: Component, known: Sequence[Piece]) -> list[Piece]:
+    def _carrier_body(self, stage: Component, pieces: Sequence[Piece]) -> list[Piece]:
         """Side plates of a carrier, and a tube in place of the struts between them where its shafts have none."""
         plates = self._side_plates(stage)
-        if len(plates) == 2 and not any(one.start < plates[1].start and one.end > plates[0].end for one in known):
+        if len(plates) == 2 and not any(
+            piece.start < plates[1].start and piece.end > plates[0].end for piece in pieces
+        ):
             carriers = self._carrier_parts(stage, "planet_carrier")
-            bores = [self.model.number(one, "strut_inner_diameter", LENGTH) for one in carriers]
-            outer = min(one.outer[0] for one in plates)
-            bore = next((one for one in bores if one), 0.5 * outer)
+            bores = [self.model.number(carrier, "strut_inner_diameter", LENGTH) for carrier in carriers]
+            outer = min(plate.outer[0] for plate in plates)
+            bore = next((given for given in bores if given), 0.5 * outer)
             plates.insert(1, Piece(plates[0].end, plates[1].start, (outer, outer), (bore, bore)))
             text = f"the struts of the carrier of {stage} are taken as a tube: stiffer and heavier than they are"
             self.model.remark(f"{stage.id}: carrier", text, severity=NOTE)
@@ -469,8 +484,8 @@ class _Unit:
 
     def name(self, part: Component | str) -> str:
         """Name of a part in the case: its own where that is a name that nothing else has, else kind and id."""
-        one = self.model.components[part] if isinstance(part, str) else part
-        return self.names[one.id]
+        component = self.model.components[part] if isinstance(part, str) else part
+        return self.names[component.id]
 
     def start(self, shaft: str) -> float:
         """Left end of a shaft along z [m]; of a rigid body the middle of its first part."""
@@ -497,7 +512,7 @@ class _Unit:
 
     def bearing_tables(self) -> list[dict[str, Any]]:
         """Tables of all bearings, and of those that shafts without any need."""
-        reader, found = BearingReader(self.model, self.remarks), []
+        reader, rows = BearingReader(self.model, self.remarks), []
         for part, component, shaft, outer, turned in self.bearings:
             table: dict[str, Any] = {"name": self.name(part), "shaft": self.name(shaft)}
             table["position"] = self.position(shaft, self.height(part, component, _side(turned)))
@@ -505,11 +520,11 @@ class _Unit:
                 around = self.main[outer.id]
                 table["outer_shaft"] = self.name(around)
                 table["outer_position"] = self.position(around, self.height(part, outer, _side(True)))
-            own = self._bearing(reader, part, f"bearing[{len(found)}]", self._usual(shaft), turned)
-            if not {"radial", "axial", "tilt", "kind"} & own.keys():
+            row = self._bearing(reader, part, f"bearing[{len(rows)}]", self._usual(shaft), turned)
+            if not {"radial", "axial", "tilt", "kind"} & row.keys():
                 reader.tell(part, "holds nothing in the file: left out", severity=NOTE)
                 continue
-            found.append(table | own | self._oil(part, own, component, outer, f"bearing[{len(found)}]"))
+            rows.append(table | row | self._oil(part, row, component, outer, f"bearing[{len(rows)}]"))
         for part in self.model.components.values():
             if _is_whole(part) and not any(self.model.related("side", r, assembly=part.id) for r in _SIDES):
                 reader.tell(
@@ -519,8 +534,8 @@ class _Unit:
                 )
         reader.finish()
         for shaft in self.shafts:
-            self._hold(shaft, found)
-        return found
+            self._hold(shaft, rows)
+        return rows
 
     def _bearing(self, reader: BearingReader, part: Component, key: str, usual: float, turned: bool) -> dict[str, Any]:
         """Table of a bearing, or of what stands in its place where it cannot be taken."""
@@ -529,7 +544,9 @@ class _Unit:
             try:
                 return reader.table(part, key, usual, turned=turned)
             except CaseError as error:
-                why = " ".join(str(one) for one in (error.key, error.value) if one is not None) + f": {error.message}"
+                why = (
+                    " ".join(str(text) for text in (error.key, error.value) if text is not None) + f": {error.message}"
+                )
         return reader.stand_in(part, usual, why, turned=turned)
 
     def _oil(self, part: Component, table: Mapping[str, Any], inner: Component, outer: Component | None, key: str):
@@ -548,60 +565,60 @@ class _Unit:
             self.remarks[f"{key}.viscosity_ratio"] = "least of all load cases, of the oil at its temperature"
         return entries
 
-    def _hold(self, shaft: str, found: list[dict[str, Any]]) -> None:
+    def _hold(self, shaft: str, rows: list[dict[str, Any]]) -> None:
         """Hold a shaft without bearings, and tilts of one that is a rigid body in bearings at one place."""
         name = self.name(shaft)
-        own = [one for one in found if name in (one["shaft"], one.get("outer_shaft"))]
+        rows_there = [row for row in rows if name in (row["shaft"], row.get("outer_shaft"))]
         coupled = any(shaft in self._ends(joint) for joint in self.couplings)
-        if not own and not coupled:
+        if not rows_there and not coupled:
             usual = with_unit(self._usual(shaft), STIFFNESS)
             height = next(self._heights(shaft), self.start(shaft))
             table = {"name": f"{_SUPPORT}{name}", "shaft": name, "position": self.position(shaft, height)}
-            found.append(table | {"radial": usual, "axial": usual, "estimated": True})
-            self.remarks[f"bearing[{len(found) - 1}].radial"] = "assumed: the shaft has no bearing"
+            rows.append(table | {"radial": usual, "axial": usual, "estimated": True})
+            self.remarks[f"bearing[{len(rows) - 1}].radial"] = "assumed: the shaft has no bearing"
             text = f"{name} has no bearing: one of {usual} is assumed at its gear"
             self.model.remark("bearing", text, remedy="give its bearings")
-        places = {one["position" if one["shaft"] == name else "outer_position"] for one in own}
+        places = {row["position" if row["shaft"] == name else "outer_position"] for row in rows_there}
         if not self.pieces[shaft] and len(places) < 2:
-            for one in (own or found[-1:])[:1]:
-                if "kind" not in one:
-                    one["tilt"] = "rigid"
+            for row in (rows_there or rows[-1:])[:1]:
+                if "kind" not in row:
+                    row["tilt"] = "rigid"
                     text = f"{name} is a rigid body that one bearing holds: it is kept upright"
                     self.model.remark("bearing", text, remedy="give the places of its bearings, and its parts")
 
     def _usual(self, shaft: str) -> float:
         """Estimated stiffness of a bearing [N/m], from the widest gear of its shaft, else of the unit."""
         widths = {
-            own: self.model.number(gear, "face_width", LENGTH) or 0.0
+            carrier: self.model.number(gear, "face_width", LENGTH) or 0.0
             for members in self.members.values()
-            for gear, own in members.values()
-            if gear is not None and own is not None
+            for gear, carrier in members.values()
+            if gear is not None and carrier is not None
         }
         width = widths.get(shaft) or max(widths.values(), default=0.0) or 0.02
         for members in self.members.values():
-            for gear, own in members.values():
-                if gear is not None and own == shaft:
+            for gear, carrying in members.values():
+                if gear is not None and carrying == shaft:
                     width = max(width, self.model.number(gear, "face_width", LENGTH) or 0.0)
         return float(f"{SUPPORT_SHARE * USUAL_STIFFNESS * width:.3g}")
 
     def coupling_tables(self) -> list[dict[str, Any]]:
         """Tables of the couplings between shafts of the gearbox, or of one and the casing."""
-        found = []
+        rows = []
         for joint in self.couplings:
             ends = self._joined(joint)
             if ends is None:
                 continue
             table: dict[str, Any] = {"name": self.name(joint)}
-            table["between"] = [CASING if one is None else self.name(self.main[one.id]) for one in ends]
+            table["between"] = [CASING if end is None else self.name(self.main[end.id]) for end in ends]
             heights = [
-                None if one is None else self.height(joint, one, _side(number == 1)) for number, one in enumerate(ends)
+                None if end is None else self.height(joint, end, _side(number == 1)) for number, end in enumerate(ends)
             ]
             table["positions"] = [
-                _length(0.0) if one is None or height is None else self.position(self.main[one.id], height)
-                for one, height in zip(ends, heights, strict=True)
+                _length(0.0) if end is None or height is None else self.position(self.main[end.id], height)
+                for end, height in zip(ends, heights, strict=True)
             ]
-            found.append(table | coupling_table(self.model, joint))
-        return found
+            rows.append(table | coupling_table(self.model, joint))
+        return rows
 
     def _joined(self, joint: Component) -> list[Component | None] | None:
         """Both ends of a coupling, None for the casing; None altogether where it joins no two of them."""
@@ -609,13 +626,13 @@ class _Unit:
             next(iter(self.model.related("side", role, assembly=joint.id)), None)
             for role in ("inner_part", "outer_part")
         ]
-        found: list[Component | None] = []
-        for one in sides:
-            if one is None or not (one.type == "gear_casing" or one.id in self.main):
+        ends: list[Component | None] = []
+        for side in sides:
+            if side is None or not (side.type == "gear_casing" or side.id in self.main):
                 return None
-            found.append(None if one.type == "gear_casing" else one)
-        shafts = {self.main[one.id] for one in found if one is not None}
-        return found if shafts and (None in found or len(shafts) == 2) else None
+            ends.append(None if side.type == "gear_casing" else side)
+        shafts = {self.main[end.id] for end in ends if end is not None}
+        return ends if shafts and (None in ends or len(shafts) == 2) else None
 
     def pair(self, stage: Component) -> dict[str, Any]:
         """Table of a cylindrical stage."""
@@ -628,11 +645,11 @@ class _Unit:
 
     def _teeth(self, stage: Component) -> dict[str, Any]:
         """Tables of the teeth of a stage, without its supports, which the gearbox has."""
-        found = {key: value for key, value in self.teeth[stage.id].items() if key not in ("dynamics", "runup")}
+        tables = {key: value for key, value in self.teeth[stage.id].items() if key not in ("dynamics", "runup")}
         for name in ("gear_1", "gear_2", "sun", "carrier", "ring"):
-            if name in found:
-                found[name] = {key: value for key, value in found[name].items() if key not in _SUPPORTS}
-        return {key: value for key, value in found.items() if value != {}}
+            if name in tables:
+                tables[name] = {key: value for key, value in tables[name].items() if key not in _SUPPORTS}
+        return {key: value for key, value in tables.items() if value != {}}
 
     def planetary(self, stage: Component) -> dict[str, Any]:
         """Table of a planetary stage."""
@@ -652,11 +669,11 @@ class _Unit:
         teeth = self._teeth(stage)
         if turned and turned[0] is not None:
             table["angle"] = with_unit((0.5 * math.pi - turned[0]) % math.tau, ANGLE)
-            known = [one for one in turned if one is not None]
-            if "planet_angles" in teeth["set"] and len(known) == len(turned):
+            angles_given = [angle for angle in turned if angle is not None]
+            if "planet_angles" in teeth["set"] and len(angles_given) == len(turned):
                 # around -u they count the other way than around z
-                angles = sorted((turned[0] - one) % math.tau for one in known)
-                teeth["set"] = teeth["set"] | {"planet_angles": [with_unit(one, ANGLE) for one in angles]}
+                angles = sorted((turned[0] - angle) % math.tau for angle in angles_given)
+                teeth["set"] = teeth["set"] | {"planet_angles": [with_unit(angle, ANGLE) for angle in angles]}
         if pins := self._pins(stage):
             table["pins"] = pins
         if self._side_plates(stage):
@@ -670,11 +687,11 @@ class _Unit:
         if not pins:
             return {}
         sections = file_pieces(self.model, pins[0], 0.0)
-        joints = [one for one in self.couplings if pins[0].id in self._ends(one)]
-        places = sorted(self.at(one, "u_coordinate_on_shaft_inner_side") for one in joints)
+        joints = [coupling for coupling in self.couplings if pins[0].id in self._ends(coupling)]
+        places = sorted(self.at(joint, "u_coordinate_on_shaft_inner_side") for joint in joints)
         if not sections or len(places) != 2:
             return {}
-        held = [self.model.number(one, "length", LENGTH) or 0.0 for one in joints]
+        held = [self.model.number(joint, "length", LENGTH) or 0.0 for joint in joints]
         free = places[1] - places[0] - 0.5 * sum(held)
         outer, inner = sections[0].outer[0], sections[0].inner[0]
         table: dict[str, Any] = {"diameter": with_unit(outer, LENGTH), "length": with_unit(0.5 * free, LENGTH)}
@@ -682,7 +699,7 @@ class _Unit:
 
     def load_tables(self, added: Mapping[str, str]) -> list[dict[str, Any]]:
         """Tables of the loads of the file, and of those that it lacks at the right ends of shafts."""
-        found = [
+        rows = [
             {
                 "name": self.name(part),
                 "shaft": self.name(shaft),
@@ -692,16 +709,16 @@ class _Unit:
         ]
         for name, shaft in added.items():
             end = self.pieces[shaft][-1].end if self.pieces[shaft] else self.start(shaft)
-            found.append({"name": name, "shaft": self.name(shaft), "position": self.position(shaft, end)})
-        return found
+            rows.append({"name": name, "shaft": self.name(shaft), "position": self.position(shaft, end)})
+        return rows
 
     def operation(self, wanted: int | None) -> tuple[dict[str, Any], dict[str, str]]:
         """Table of load cases, and shafts of loads that the file lacks by their names."""
-        stages = [[shaft for _, shaft in one.values()] for one in self.members.values()]
+        stages = [[shaft for _, shaft in member.values()] for member in self.members.values()]
         ends = [pair for joint in self.couplings if (pair := self._joined(joint)) is not None]
-        shafts = [[self.main[one.id] for one in pair if one is not None] for pair in ends]
-        joints, held = ([one for one in shafts if len(one) == count] for count in (2, 1))
-        groups = shaft_groups(self.shafts, stages, joints, [one for (one,) in held])
+        shafts = [[self.main[end.id] for end in pair if end is not None] for pair in ends]
+        joints, held = ([shaft for shaft in shafts if len(shaft) == count] for count in (2, 1))
+        groups = shaft_groups(self.shafts, stages, joints, [shaft for (shaft,) in held])
         reader = OperationReader(
             self.model,
             groups,
@@ -721,17 +738,17 @@ def _part_names(model: Model) -> dict[str, str]:
         if part.type in kinds or part.type.endswith(("coupling", "_stage")) or _is_whole(part)
     ]
     plain, count = plain_ids([part.id for part in model.components.values()]), Counter(part.name for part in parts)
-    own = {
+    names_given = {
         part.id: part.name
         for part in parts
         if count[part.name] == 1 and part.name != CASING and _NAME.fullmatch(part.name)
     }
-    found = {}
+    names = {}
     for part in parts:
         word = "bearing" if _is_whole(part) else "coupling" if part.type.endswith("coupling") else "stage"
-        found[part.id] = f"{kinds.get(part.type, word)} {plain[part.id]}"
-    made = {name for id, name in found.items() if id not in own}
-    return found | {id: name for id, name in own.items() if name not in made}
+        names[part.id] = f"{kinds.get(part.type, word)} {plain[part.id]}"
+    made = {name for id, name in names.items() if id not in names_given}
+    return names | {id: name for id, name in names_given.items() if name not in made}
 
 
 def _is_whole(part: Component) -> bool:

@@ -77,19 +77,19 @@ class _Stage:
         self, of: Iterable[Component], attribute: str, kind: Dimension | None = None, *, sign: bool = True
     ) -> float | None:
         """Value in SI units of all that give it, None where none does; without ``sign`` of rings positive."""
-        found: dict[float, Component] = {}
-        for one in of:
-            if (value := self.model.number(one, attribute, kind)) is not None:
-                found.setdefault(value if sign or one.type != "ring_gear" else abs(value), one)
-        if found and max(found) - min(found) > 1e-9 * max(map(abs, found)):
-            least, most = found[min(found)], found[max(found)]
+        first_of_value: dict[float, Component] = {}
+        for component in of:
+            if (value := self.model.number(component, attribute, kind)) is not None:
+                first_of_value.setdefault(value if sign or component.type != "ring_gear" else abs(value), component)
+        if first_of_value and max(first_of_value) - min(first_of_value) > 1e-9 * max(map(abs, first_of_value)):
+            least, most = first_of_value[min(first_of_value)], first_of_value[max(first_of_value)]
             self.model.refuse(
-                f"{min(found):.9g} here, {max(found):.9g} of {most} (SI units)",
+                f"{min(first_of_value):.9g} here, {max(first_of_value):.9g} of {most} (SI units)",
                 f"{least}, {attribute}",
                 limit="one value for all",
                 remedy="femgear needs equal planets, and gears that match",
             )
-        return next(iter(found), None)
+        return next(iter(first_of_value), None)
 
     def needed(self, of: list[Component], attribute: str, kind: Dimension | None = None) -> float:
         """Value that all components have; tooth numbers of ring gears without their sign."""
@@ -164,14 +164,14 @@ def named(model: Model, wanted: str | None = None) -> Iterator[None]:
             else _stage(model, _chosen(model, wanted))
         )
         names = {"gear_1": "sun", "gear_2": [*s.gears][-1]}
-        for one in {error, *error.problems}:
-            path = [names.get(part, part) for part in (one.key or "").split(".")]
-            one.file, attribute = model.name, _ATTRIBUTES.get(path[-1], path[-1])
+        for problem in {error, *error.problems}:
+            path = [names.get(part, part) for part in (problem.key or "").split(".")]
+            problem.file, attribute = model.name, _ATTRIBUTES.get(path[-1], path[-1])
             near = [*s.gears.get(path[0], ()), *s.flanks.get(path[0], ())] or model.components.values()
             read = [m for m in near if attribute in m.attributes and (m.type, attribute) in model.used]
             if len({member.attributes[attribute] for member in read}) == 1:
-                one.key = f"{read[0]}, {attribute} ({one.key})"
-            _suspect_ring(s, one)
+                problem.key = f"{read[0]}, {attribute} ({problem.key})"
+            _suspect_ring(s, problem)
         raise
 
 
@@ -193,16 +193,16 @@ def _suspect_ring(s: _Stage, error: FemgearError) -> None:
 
 def _chosen(model: Model, wanted: str | None) -> Component:
     """Planetary stage of an id, or the only one."""
-    stages = [one for one in model.components.values() if one.type == "planetary_stage"]
+    stages = [component for component in model.components.values() if component.type == "planetary_stage"]
     if not stages:
-        kinds = sorted({one.type for one in model.components.values() if one.type.endswith("_stage")})
+        kinds = sorted({component.type for component in model.components.values() if component.type.endswith("_stage")})
         model.refuse(
             "the file has no planetary stage",
             "components",
             limit=f"planetary_stage, not {', '.join(kinds)}",
             remedy="femgear imports planetary and cylindrical stages",
         )
-    chosen = [one for one in stages if one.id == wanted or (wanted is None and len(stages) == 1)]
+    chosen = [stage for stage in stages if stage.id == wanted or (wanted is None and len(stages) == 1)]
     if not chosen:
         raise CaseError(
             f"the file has {len(stages)} planetary stages" if wanted is None else "no such planetary stage",
@@ -210,7 +210,7 @@ def _chosen(model: Model, wanted: str | None) -> Component:
             key="--stage",
             value=wanted,
             file=model.name,
-            limit=", ".join(f"{one.id} ({one.name})" for one in stages[:20]),
+            limit=", ".join(f"{stage.id} ({stage.name})" for stage in stages[:20]),
             remedy=f"choose one by its id: --stage {stages[0].id}",
         )
     return chosen[0]
@@ -221,14 +221,14 @@ def _stage(model: Model, stage: Component) -> _Stage:
     meshes: list[tuple[Component, list[Component]]] = []
     mates: dict[str, list[Component]] = {}
     for mesh in model.related("assembly", "part", assembly=stage.id):
-        pair = [one for role in ("gear_1", "gear_2") for one in model.related("stage", role, stage=mesh.id)]
+        pair = [gear for role in ("gear_1", "gear_2") for gear in model.related("stage", role, stage=mesh.id)]
         if mesh.type == "cylindrical_stage" and len(pair) == 2:
             meshes.append((mesh, pair))
-            for one, other in (pair, pair[::-1]):
-                mates.setdefault(one.id, []).append(other)
+            for gear, mate in (pair, pair[::-1]):
+                mates.setdefault(gear.id, []).append(mate)
     rings = [model.components[id] for id in mates if model.components[id].type == "ring_gear"]
-    planets = {one.id: one for ring in rings for one in mates[ring.id]}
-    suns = {one.id: one for planet in planets for one in mates[planet] if one.type != "ring_gear"}
+    planets = {mate.id: mate for ring in rings for mate in mates[ring.id]}
+    suns = {mate.id: mate for planet in planets for mate in mates[planet] if mate.type != "ring_gear"}
     # every planet meshes with the one sun and the one ring, and with nothing else
     if len(rings) != 1 or len(suns) != 1 or planets.keys() & suns or len(meshes) != 2 * len(planets):
         model.refuse(
@@ -241,13 +241,15 @@ def _stage(model: Model, stage: Component) -> _Stage:
 
     def of_all(kind: str, to: tuple[str, ...], role: str) -> dict[str, list[Component]]:
         return {
-            name: [found for one in ones for t in to for found in model.related(kind, t, **{role: one.id})]
+            name: [
+                related for component in ones for t in to for related in model.related(kind, t, **{role: component.id})
+            ]
             for name, ones in gears.items()
         }
 
     shafts = of_all("assembly", ("assembly",), "part")
     shafts["carrier"] = model.related("planet_carrier_shaft", "shaft", planetary_stage=stage.id)
-    sun_meshes = [mesh for mesh, pair in meshes if suns.keys() & {one.id for one in pair}]
+    sun_meshes = [mesh for mesh, pair in meshes if suns.keys() & {gear.id for gear in pair}]
     flanks = of_all("flank", ("left", "right"), "gear")
     return _Stage(model, stage, [mesh for mesh, _ in meshes], sun_meshes, gears, flanks, shafts)
 
@@ -264,7 +266,7 @@ def pair_stage(model: Model, mesh: Component) -> _Stage:
     wheel = "ring" if pair[1].type == "ring_gear" else "planet"
     gears = {"sun": [pair[0]], wheel: [pair[1]]}
     flanks = {
-        name: [one for side in ("left", "right") for one in model.related("flank", side, gear=gear.id)]
+        name: [flank for side in ("left", "right") for flank in model.related("flank", side, gear=gear.id)]
         for name, (gear,) in gears.items()
     }
     shafts = {name: model.related("assembly", "assembly", part=gear.id) for name, (gear,) in gears.items()}
@@ -277,33 +279,33 @@ def with_unit(value: float, dimension: Dimension) -> str:
 
 def _set(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     """Section of what the gears share; planet angles where planets are not equally spaced."""
-    found: dict[str, Any] = {"planets": len(s.gears["planet"])} if s.sun_meshes else {}
+    set_table: dict[str, Any] = {"planets": len(s.gears["planet"])} if s.sun_meshes else {}
     if (distance := s.common(s.meshes, "center_distance", LENGTH)) is not None:
-        found["centre_distance"] = with_unit(distance, LENGTH)
+        set_table["centre_distance"] = with_unit(distance, LENGTH)
     given = [s.common(s.gears[name], "face_width", LENGTH) for name in s.gears]
     given += [s.model.number(mesh, "common_face_width", LENGTH) for mesh in s.meshes]
-    widths = [one for one in given if one is not None]
+    widths = [value for value in given if value is not None]
     width = min(widths) if widths else s.needed(s.gears["sun"], "face_width", LENGTH)
-    found["face_width"] = with_unit(width, LENGTH)
+    set_table["face_width"] = with_unit(width, LENGTH)
     turned = [s.model.number(mesh, "rotating_angle_around_neg_u_axis", ANGLE) for mesh in s.sun_meshes]
-    angles = sorted(one % math.tau for one in turned if one is not None)
+    angles = sorted(angle % math.tau for angle in turned if angle is not None)
     if len(angles) < len(turned):
         remarks["set.planets"] = "assumed: equally spaced"
     elif s.sun_meshes:
         steps = [b - a for a, b in pairwise((*angles, angles[0] + math.tau))]
         if max(steps) - min(steps) > 1e-6:
-            found["planet_angles"] = [with_unit(one - angles[0], ANGLE) for one in angles]
+            set_table["planet_angles"] = [with_unit(angle - angles[0], ANGLE) for angle in angles]
     helix = "helix_angle_reference_diameter"
     sun, *others = (s.common(s.gears[name], helix, ANGLE) or 0.0 for name in s.gears)
     # an internal gear has the hand of its mate
     hand = -1.0 if [*s.gears] == ["sun", "ring"] else 1.0
-    if max(abs(sun + hand * one) for one in others) > 1e-9:
+    if max(abs(sun + hand * other) for other in others) > 1e-9:
         limit = "equal ones, that of the sun with the other sign"
         s.model.refuse("helix angles do not match", f"{s.gears['sun'][0]}, {helix}", limit=limit)
     if sun:
-        found["helix_angle"] = with_unit(sun, ANGLE)
+        set_table["helix_angle"] = with_unit(sun, ANGLE)
         remarks["set.helix_angle"] = "assumed: a positive one is right-handed"
-    return found
+    return set_table
 
 
 def _widths(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
@@ -344,28 +346,32 @@ def _materials(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> No
         ("poisson_ratio", "poisson_ratio", None, 0.3),
         ("density", "density", DENSITY, 7850.0),
     ):
-        values = {name: s.model.number(one, attribute, dimension) for name, ones in made.items() for one in ones[:1]}
-        known = {name: value for name, value in values.items() if value is not None}
-        value = next(iter(known.values()), usual)
+        values = {
+            name: s.model.number(component, attribute, dimension)
+            for name, ones in made.items()
+            for component in ones[:1]
+        }
+        given = {name: value for name, value in values.items() if value is not None}
+        value = next(iter(given.values()), usual)
         tables["material"][key] = with_unit(value, dimension) if dimension else value
-        if missing := [name for name in s.gears if name not in known]:
-            what = f"of the {' and the '.join(missing)} too" if known else "steel"
+        if missing := [name for name in s.gears if name not in given]:
+            what = f"of the {' and the '.join(missing)} too" if given else "steel"
             remarks[f"material.{key}"] = f"assumed: {what}"
-        _differing(tables, key, dimension, value, known)
+        _differing(tables, key, dimension, value, given)
     for key, attribute in (("root", "endurance_limit_root"), ("contact", "endurance_limit_flank")):
         values = {n: s.common((s.gears[n][0], *made[n][:1]), attribute, STRESS) for n in s.gears}
-        known = {name: value for name, value in values.items() if value is not None}
+        given = {name: value for name, value in values.items() if value is not None}
         common = None
-        if len(known) == len(values):
-            common = next(iter(known.values()))
+        if len(given) == len(values):
+            common = next(iter(given.values()))
             tables["material"][f"{key}_stress_limit"] = with_unit(common, STRESS)
-        _differing(tables, f"{key}_stress_limit", STRESS, common, known)
+        _differing(tables, f"{key}_stress_limit", STRESS, common, given)
 
 
 def _made_of(model: Model, *parts: Component) -> list[Component]:
     """Materials that components refer to."""
-    referred = (one for part in parts for one in model.related("reference", "referenced", origin=part.id))
-    return [one for one in referred if one.type == "material"]
+    referred = (material for part in parts for material in model.related("reference", "referenced", origin=part.id))
+    return [material for material in referred if material.type == "material"]
 
 
 def _differing(
@@ -373,43 +379,43 @@ def _differing(
     key: str,
     dimension: Dimension | None,
     common: float | None,
-    known: dict[str, float],
+    given: dict[str, float],
 ) -> None:
     """Give the materials of gears an entry that is another one than the common one, if there is one."""
-    for name, value in known.items():
+    for name, value in given.items():
         if common is None or abs(value - common) > 1e-9 * abs(common):
-            own = tables[name].setdefault("material", {})
-            own[key] = with_unit(value, dimension) if dimension else value
+            material = tables[name].setdefault("material", {})
+            material[key] = with_unit(value, dimension) if dimension else value
 
 
 def _gear(s: _Stage, name: str, remarks: dict[str, str]) -> dict[str, Any]:
     """Section of a gear without rack and rim."""
-    gears, every = s.gears[name], [one for ones in s.gears.values() for one in ones]
+    gears, every = s.gears[name], [component for ones in s.gears.values() for component in ones]
     teeth = s.needed(gears, "number_of_teeth")
     if not teeth or teeth != round(teeth):
         s.model.refuse(f"{teeth:g} is no number of teeth", f"{gears[0]}, number_of_teeth")
-    found: dict[str, Any] = {"teeth": round(teeth)}
+    section: dict[str, Any] = {"teeth": round(teeth)}
     if name == "sun":
-        found["module"] = with_unit(s.needed(every, "normal_module", LENGTH), LENGTH)
-        angle = s.common((one for ones in s.flanks.values() for one in ones), "normal_pressure_angle", ANGLE)
-        found["pressure_angle"] = with_unit(math.radians(20.0) if angle is None else angle, ANGLE)
+        section["module"] = with_unit(s.needed(every, "normal_module", LENGTH), LENGTH)
+        angle = s.common((flank for ones in s.flanks.values() for flank in ones), "normal_pressure_angle", ANGLE)
+        section["pressure_angle"] = with_unit(math.radians(20.0) if angle is None else angle, ANGLE)
         remarks |= {"sun.pressure_angle": "assumed"} if angle is None else {}
     shift = s.common(s.flanks[name], "addendum_modification_coefficient")
     if shift is not None:
-        found["profile_shift"] = 0.0 - shift if name == "ring" else shift
+        section["profile_shift"] = 0.0 - shift if name == "ring" else shift
     elif name == "planet":
-        found["profile_shift"], remarks["planet.profile_shift"] = 0.0, "assumed"
+        section["profile_shift"], remarks["planet.profile_shift"] = 0.0, "assumed"
     for key in ("tip_diameter", "root_diameter"):
         if (diameter := s.common(gears, key, LENGTH, sign=False)) is None:
             continue
         module = s.common(every, "normal_module", LENGTH)
         # no gear has tips this deep inside its reference circle
-        if key == "tip_diameter" and name != "ring" and module and diameter < module * (found["teeth"] - 3.0):
+        if key == "tip_diameter" and name != "ring" and module and diameter < module * (section["teeth"] - 3.0):
             text = f"the tip diameter {1e3 * diameter:.4g} mm of {gears[0]} lies inside its teeth: it is left out"
             s.model.remark(f"{name}.tip_diameter", text, remedy="correct it in the file, or give it in the case")
             continue
-        found[key] = with_unit(diameter, LENGTH)
-    return found
+        section[key] = with_unit(diameter, LENGTH)
+    return section
 
 
 def _racks(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
@@ -435,11 +441,11 @@ def _racks(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
 
 def _tools(s: _Stage, name: str) -> list[Component]:
     """Tools that relations join with a gear, and since version 1.4 with its flanks."""
-    steps = [(one, "manufacturing_step", "workpiece", "tool") for one in s.flanks[name]]
+    steps = [(flank, "manufacturing_step", "workpiece", "tool") for flank in s.flanks[name]]
     for kind in ("reference", "ordered_reference"):
-        steps += [(one, kind, "origin", "referenced") for one in s.gears[name]]
-    found = (t for one, kind, role, to in steps for t in s.model.related(kind, to, **{role: one.id}))
-    return [one for one in found if one.type in ("rack_shaped_tool", "cutter_wheel_tool")]
+        steps += [(gear, kind, "origin", "referenced") for gear in s.gears[name]]
+    tools = (t for component, kind, role, to in steps for t in s.model.related(kind, to, **{role: component.id}))
+    return [tool for tool in tools if tool.type in ("rack_shaped_tool", "cutter_wheel_tool")]
 
 
 def _rim(s: _Stage, name: str, tables: dict[str, Any], remarks: dict[str, str]) -> None:
@@ -486,22 +492,22 @@ def _supports(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> Non
     bearings = {"planet": bearings_between(s.model, s.shafts["planet"][:1], "outer_part", "shaft")}
     for name in ("sun", "carrier"):
         bearings[name] = bearings_between(s.model, s.shafts[name], "inner_part", "gear_casing")
-    for name, found in bearings.items():
+    for name, bearings_there in bearings.items():
         key = "bearing_stiffness" if name == "planet" else "support_stiffness"
-        add_bearings(s, tables, remarks, name, key, found)
+        add_bearings(s, tables, remarks, name, key, bearings_there)
 
 
 def add_bearings(
-    s: _Stage, tables: dict[str, Any], remarks: dict[str, str], name: str, key: str, found: list[Component]
+    s: _Stage, tables: dict[str, Any], remarks: dict[str, str], name: str, key: str, bearings_there: list[Component]
 ) -> None:
     """Add the radial stiffness of bearings to a member; rigid ones are `RIGID` mesh stiffnesses."""
     width, modulus = to_si(tables["set"]["face_width"], LENGTH), tables["material"]["youngs_modulus"]
     rigid = min(RIGID * USUAL_STIFFNESS * to_si(modulus, MODULUS) / STEEL * width, _SOFT)
-    springs = [one for one in found if is_bearing(one)]
-    values = [k for one in springs if (k := _radial_stiffness(s.model, one, f"{name}.{key}")) and k > 0.0]
+    springs = [bearing for bearing in bearings_there if is_bearing(bearing)]
+    values = [k for spring in springs if (k := _radial_stiffness(s.model, spring, f"{name}.{key}")) and k > 0.0]
     if max(values, default=0.0) > _SOFT:
-        many = Counter(f"{one:.3g} N/m" for one in values).items()
-        what = ", ".join(f"{n} bearing{'s' * (n > 1)} of {one}" for one, n in many)
+        many = Counter(f"{value:.3g} N/m" for value in values).items()
+        what = ", ".join(f"{n} bearing{'s' * (n > 1)} of {stiffness}" for stiffness, n in many)
         tables[name][key] = f"{rigid:.3g} N/m"
         remarks[f"{name}.{key}"] = f"rigid: {what} in the file"
         s.model.remark(
@@ -536,8 +542,8 @@ def is_bearing(part: Component) -> bool:
 def bearings_between(model: Model, shafts: list[Component], role: str, mate: str) -> list[Component]:
     """Bearings and couplings that join shafts, in a role, with a component of a type."""
     other = "inner_part" if role == "outer_part" else "outer_part"
-    joints = (one for shaft in shafts for one in model.related("side", "assembly", **{role: shaft.id}))
-    return [one for one in joints if any(m.type == mate for m in model.related("side", other, assembly=one.id))]
+    joints = (joint for shaft in shafts for joint in model.related("side", "assembly", **{role: shaft.id}))
+    return [joint for joint in joints if any(m.type == mate for m in model.related("side", other, assembly=joint.id))]
 
 
 def add_modifications(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], forwards: Mapping[str, bool]) -> None:
@@ -552,25 +558,27 @@ def add_modifications(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]
     for name in s.gears:
         flanks = [_flanks_of(s, tables, name, gear) for gear in s.gears[name]]
         sides = flanks[0]
-        if any(one != sides for one in flanks):
+        if any(flank != sides for flank in flanks):
             first = s.gears[name][0]
             model.remark(f"{name}.modifications", f"planets have different modifications: all get those of {first}")
-        for problem in dict.fromkeys(p for one in flanks for flank in one.values() for p in flank.left_out):
+        for problem in dict.fromkeys(
+            p for flanks_of_side in flanks for flank in flanks_of_side.values() for p in flank.left_out
+        ):
             model.remark(f"{name}.modifications", f"not taken: {problem}")
         left, right = (sides[side].tables if side in sides else [] for side in ("left", "right"))
-        found = left
+        sections_of_flanks = left
         if left != right and name not in forwards:
-            found = [{"flank": "sun side", **one} for one in left]
-            found += [{"flank": "ring side", **one} for one in right]
+            sections_of_flanks = [{"flank": "sun side", **section} for section in left]
+            sections_of_flanks += [{"flank": "ring side", **section} for section in right]
         elif left != right:
-            found = left if forwards[name] else right
+            sections_of_flanks = left if forwards[name] else right
             model.remark(
                 f"{name}.modifications",
                 f"the flanks of {s.gears[name][0]} differ: taken are those that carry under the torque of "
                 "the case; its back flanks, and flanks under the other sense of torque, get the same",
             )
-        if found:
-            tables[name]["modifications"] = found
+        if sections_of_flanks:
+            tables[name]["modifications"] = sections_of_flanks
         if any(flank.signs for flank in sides.values()):
             model.remark(
                 f"{name}.modifications",
@@ -580,7 +588,9 @@ def add_modifications(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]
             )
 
     sections = (tables[name] for name in s.gears)
-    leads = (one["kind"] in OVER_WIDTH for section in sections for one in section.get("modifications", ()))
+    leads = (
+        modification["kind"] in OVER_WIDTH for section in sections for modification in section.get("modifications", ())
+    )
     if "helix_angle" in tables["set"] or any(leads):
         tables["static"], remarks["static.slices"] = {"slices": 25}, "assumed"
     _chamfers(s, tables)
@@ -592,7 +602,7 @@ def _chamfers(s: _Stage, tables: dict[str, Any]) -> None:
     Taken as the radial height h_K of ISO 21771, which leaves a flank up to the diameter d_a - 2 h_K.
     """
     for name, gears in s.gears.items():
-        sizes = [s.model.number(one, "tooth_tip_chamfer", LENGTH) or 0.0 for one in s.flanks[name]]
+        sizes = [s.model.number(flank, "tooth_tip_chamfer", LENGTH) or 0.0 for flank in s.flanks[name]]
         if not (height := max(sizes, default=0.0)) > 0.0:
             continue
         table, module = tables[name], to_si(tables["sun"]["module"], LENGTH)
@@ -643,16 +653,16 @@ def _width(s: _Stage, tables: dict[str, Any], name: str) -> float:
 def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wanted: int | None) -> dict[str, Any]:
     """Input, fixed member, torque and speeds of the input."""
     coupled = {name: bearings_between(s.model, s.shafts[name], "inner_part", "gear_casing") for name in MEMBERS}
-    held = [name for name in MEMBERS if any(one.type.endswith("coupling") for one in coupled[name])]
+    held = [name for name in MEMBERS if any(coupling.type.endswith("coupling") for coupling in coupled[name])]
     fixed = held[0] if len(held) == 1 else "ring"
     remarks |= {} if len(held) == 1 else {"operation.fixed": "assumed"}
     number, given = s.model.chosen_case(wanted)
-    said = [_state(s, fixed, given), *(_state(s, fixed, one) for one in s.model.load_cases)]
-    stands, idle = (0.0 in one.values() for one in said[0])
-    states = [tuple({name: v for name, v in one.items() if v} for one in pair) for pair in said]
+    said = [_state(s, fixed, given), *(_state(s, fixed, load_case) for load_case in s.model.load_cases)]
+    stands, idle = (0.0 in values.values() for values in said[0])
+    states = [tuple({name: v for name, v in state.items() if v} for state in pair) for pair in said]
     turning, loaded = states[0]
     usual = "carrier" if fixed == "sun" else "sun"
-    member = next(iter([*(one for one in turning if one in loaded), *turning, *loaded]), usual)
+    member = next(iter([*(name for name in turning if name in loaded), *turning, *loaded]), usual)
     ratios = torque_ratios(tables["sun"]["teeth"], tables["ring"]["teeth"])
     torques, speeds = zip(*(_of_member(member, ratios, *state) for state in states), strict=True)
     torque = torques[0]
@@ -665,7 +675,7 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wante
     speeds = speeds_of_cases(s.model, number, torques, speeds, alone=wanted is not None)
     remarks |= {} if turning or loaded else {"operation.input": "assumed"}
     remarks |= {} if speeds else {"operation.speeds": f"assumed{'; that of the file is 0' * stands}"}
-    texts = dict.fromkeys(with_unit(one, SPEED) for one in speeds or [1000.0 * SPEED.scale])
+    texts = dict.fromkeys(with_unit(speed, SPEED) for speed in speeds or [1000.0 * SPEED.scale])
     return {"input": member, "fixed": fixed, "torque": with_unit(torque, TORQUE), "speeds": [*texts]}
 
 
@@ -676,9 +686,9 @@ def speeds_of_cases(
 
     Torques [N m] and speeds are those of this load case, then of all. A finding lists the cases left out.
     """
-    taken, others, own = [speeds[0]], [], torques[0]
+    taken, others, first = [speeds[0]], [], torques[0]
     for i, (torque, speed) in enumerate(zip(torques[1:], speeds[1:], strict=True), start=1):
-        alike = torque == own or (torque and own and abs(torque - own) <= 1e-6 * abs(own))
+        alike = torque == first or (torque and first and abs(torque - first) <= 1e-6 * abs(first))
         if i != number and alike and not alone:
             taken.append(speed)
         elif i != number:
@@ -691,7 +701,7 @@ def speeds_of_cases(
             f"{'; '.join(others[:10])}{' ...' * (len(others) > 10)}",
             remedy=f"--load-case 1 to {count} takes another",
         )
-    return list(dict.fromkeys(one for one in taken if one))
+    return list(dict.fromkeys(taken_speed for taken_speed in taken if taken_speed))
 
 
 def _of_member(
@@ -711,7 +721,7 @@ def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[st
     Where the shafts of the stage say nothing of one of them, it is what flows through the unit.
     """
     model, turns, loads = s.model, {}, {}
-    for name, shaft in ((m, one) for m in MEMBERS if m != fixed for one in s.shafts[m]):
+    for name, shaft in ((m, component) for m in MEMBERS if m != fixed for component in s.shafts[m]):
         speed = model.number(with_load_case(shaft, given), "rotational_speed", SPEED)
         turns |= {} if speed is None else {name: turns.get(name) or speed}
         for torque in loads_on(model, shaft, given):
@@ -719,7 +729,7 @@ def _state(s: _Stage, fixed: str, given: Mapping[str, Mapping]) -> tuple[dict[st
     if len(stage_components(model)) > 1:
         flow = unit_flow(model, given)
         if not turns:
-            members = ((name, one.id) for name in MEMBERS if name != fixed for one in s.shafts[name][:1])
+            members = ((name, component.id) for name in MEMBERS if name != fixed for component in s.shafts[name][:1])
             turns = {name: flow.speed[id] for name, id in members if id in flow.speed}
         # what acts on a shaft is shared where another stage sits on it, too
         if s.stage.id in flow.torque and (not loads or s.stage.id in flow.joined):
@@ -737,7 +747,7 @@ class ModelWriter:
     def add(self, type: str, name: str = "", **attributes: tuple[str, str] | None) -> str:
         """Add a component with those attributes that are given, and return its id."""
         id = str(len(self.components) + 1)
-        given = {key: one for key, one in attributes.items() if one is not None}
+        given = {key: attribute for key, attribute in attributes.items() if attribute is not None}
         self.components[id] = Component(id, type, name, given)
         return id
 
@@ -782,7 +792,9 @@ def stage_model(case: Case, name: str) -> Model:
     for whole, part in ((unit, casing), (unit, stage), (stage, carrier)):
         w.relate("assembly", assembly=whole, part=part)
     model = Model(name, "1.4", w.components, (), ())
-    (sun, sun_shaft), (ring, ring_shaft) = (add_gear(w, case, one.name, one, model) for one in (gears.sun, gears.ring))
+    (sun, sun_shaft), (ring, ring_shaft) = (
+        add_gear(w, case, gear.name, gear, model) for gear in (gears.sun, gears.ring)
+    )
     shafts = {"sun": sun_shaft, "ring": ring_shaft, "carrier": w.add("shaft", "carrier shaft")}
     w.relate("planet_carrier_shaft", planetary_stage=stage, shaft=shafts["carrier"])
     for shaft in (sun_shaft, ring_shaft):
@@ -902,14 +914,14 @@ def _add_modifications(w: ModelWriter, case: Case, gear: Any, flanks: Mapping[st
     """Add the modifications of both flanks; the datum face is the end z < 0, as where REXS says nothing."""
     # looked at from z < 0 the flank towards the sun is the right one, see `_modifications`
     sides = {"right": "sun side", "left": "ring side"} if gear.name == "planet" else {}
-    known: dict[str, str] = {}
+    components: dict[str, str] = {}
     for role, flank in flanks.items():
         parts, left_out = written_modifications(case, gear, sides.get(role, "both"))
         for kind, attributes in parts:
             key = f"{kind} {attributes}"
-            if key not in known:
-                known[key] = w.add(kind, "", **attributes)
-            w.relate("reference", origin=flank, referenced=known[key])
+            if key not in components:
+                components[key] = w.add(kind, "", **attributes)
+            w.relate("reference", origin=flank, referenced=components[key])
         for kind in left_out:
             model.remark(f"{gear.name}.modifications", f"REXS has no {kind}: left out")
 
@@ -929,12 +941,12 @@ def _add_operation(w: ModelWriter, case: Case, shafts: dict[str, str], casing: s
         if stiffness := _stiffness(case, member, "support_stiffness"):
             bearing = w.add("concept_bearing", f"{member} bearing", radial_stiffness=stiffness)
             joints.setdefault(member, []).append(bearing)
-    for member, joint in ((member, one) for member, ones in joints.items() for one in ones):
+    for member, joint in ((member, component) for member, ones in joints.items() for component in ones):
         w.relate("side", assembly=joint, outer_part=casing, inner_part=shafts[member])
     torque, shaft = a(operation.torque, "N m"), shafts[operation.input]
     load = w.add("external_load", defines_torque=("true", "none"), torque_around_u_axis=torque)
     w.relate("assembly", assembly=shaft, part=load)
-    speeds = [{"rotational_speed": (repr(one / SPEED.scale), "1 / min")} for one in operation.speeds]
+    speeds = [{"rotational_speed": (repr(speed / SPEED.scale), "1 / min")} for speed in operation.speeds]
     turning = speeds[0] | {"defines_speed": ("true", "none")}
     w.components[shaft] = replace(w.components[shaft], attributes=turning)
-    return tuple({shaft: one} for one in speeds) if len(speeds) > 1 else ()
+    return tuple({shaft: speed} for speed in speeds) if len(speeds) > 1 else ()

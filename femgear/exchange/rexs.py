@@ -85,7 +85,7 @@ class Relation:
 
     def of(self, role: str) -> list[str]:
         """List the ids in a role."""
-        return [id for known, id in self.refs if known == role]
+        return [id for of_role, id in self.refs if of_role == role]
 
 
 @dataclass(frozen=True)
@@ -123,7 +123,7 @@ class Model:
         finding = Finding("W-REXS", key, text, remedy=remedy, severity=severity)
         if finding not in self.findings:
             self.findings.insert(0 if first else len(self.findings), finding)
-            self.findings.sort(key=lambda one: -SEVERITIES.index(one.severity))
+            self.findings.sort(key=lambda remark_told: -SEVERITIES.index(remark_told.severity))
 
     def chosen_case(self, wanted: int | None) -> tuple[int, Mapping[str, Mapping[str, tuple[str, str | None]]]]:
         """Find number, from 1, and attributes of a load case, by default of the first, if there are any.
@@ -145,7 +145,7 @@ class Model:
 
     def case_in_words(self, number: int, speed: float, torque: float | None) -> str:
         """Tell number, speed [rad/s], torque [N m] and share of a load case."""
-        shares = (one.get("load_duration_fraction") for one in self.load_cases[number - 1].values())
+        shares = (load_case.get("load_duration_fraction") for load_case in self.load_cases[number - 1].values())
         share = next((f", {value} {unit or ''}".rstrip() for value, unit in filter(None, shares)), "")
         load = "no torque" if torque is None else f"{torque:.6g} N m"
         return f"{number}: {speed * 30.0 / math.pi:.6g} rpm, {load}{share}"
@@ -154,17 +154,17 @@ class Model:
         """List the components in the role `to` of relations that have an id in another role."""
         (has,) = role.items()
         of = [kinds] if isinstance(kinds, str) else kinds
-        found = (id for kind in of for one in self._relations_of.get((kind, *has), ()) for id in one.of(to))
-        return [self.components[id] for id in dict.fromkeys(found)]
+        ids = (id for kind in of for relation in self._relations_of.get((kind, *has), ()) for id in relation.of(to))
+        return [self.components[id] for id in dict.fromkeys(ids)]
 
     @cached_property
     def _relations_of(self) -> dict[tuple[str, str, str], list[Relation]]:
         """Relations by type, role and id."""
-        found: dict[tuple[str, str, str], list[Relation]] = {}
+        relations: dict[tuple[str, str, str], list[Relation]] = {}
         for relation in self.relations:
             for role, id in relation.refs:
-                found.setdefault((relation.type, role, id), []).append(relation)
-        return found
+                relations.setdefault((relation.type, role, id), []).append(relation)
+        return relations
 
     def text(self, component: Component, attribute: str) -> str | None:
         """Value of an attribute as text, None where it is not given."""
@@ -224,7 +224,7 @@ class Model:
         for component in self.components.values():
             types.setdefault(component.type, []).append(component)
         for kind, members in sorted(types.items()):
-            names = dict.fromkeys(name for one in members for name in one.attributes)
+            names = dict.fromkeys(name for member in members for name in member.attributes)
             left = [name for name in names if (kind, name) not in self.used]
             if left:
                 yield f"{kind} ({len(members)}): {', '.join(left)}"
@@ -282,7 +282,7 @@ def _unzipped(data: bytes, name: str) -> bytes:
     """Only REXS file in a zip; unpacked as far as it may be long, whatever its header says."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            inside = [one for one in archive.infolist() if one.filename.lower().endswith((".rexs", ".rexsj"))]
+            inside = [file for file in archive.infolist() if file.filename.lower().endswith((".rexs", ".rexsj"))]
             if len(inside) != 1:
                 raise _broken(f"the zip holds {len(inside)} REXS files", name, limit="one of them")
             with archive.open(inside[0]) as stream:
@@ -301,12 +301,12 @@ def _from_json(text: str, name: str) -> dict:
         raise
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise _broken(f"no REXS model in JSON: {type(error).__name__}: {error}", name) from error
-    cases = [case for one in _dicts(model, "load_spectrum") for case in _dicts(one, "load_cases")]
+    cases = [case for part in _dicts(model, "load_spectrum") for case in _dicts(part, "load_cases")]
     for component in (one for part in (model, *cases) for one in _dicts(part, "components")):
-        for one in _dicts(component, "attributes"):
-            values = (one[key] for key in one if key not in ("id", "unit"))
-            one["value"] = next((value for value in values if isinstance(value, str | int | float)), None)
-            one["vector"] = next((value for key, value in one.items() if isinstance(value, list)), None)
+        for attribute in _dicts(component, "attributes"):
+            values = (attribute[key] for key in attribute if key not in ("id", "unit"))
+            attribute["value"] = next((value for value in values if isinstance(value, str | int | float)), None)
+            attribute["vector"] = next((value for key, value in attribute.items() if isinstance(value, list)), None)
     return model if isinstance(model, dict) else {}
 
 
@@ -336,17 +336,18 @@ def _from_xml(text: str, name: str) -> dict:
         raise _broken(f"no REXS file: its root is {_tag(root)!a}", name, limit="model")
     return {
         **root.attrib,
-        "components": [_xml_component(one) for one in _below(root, "components", "component")],
+        "components": [_xml_component(component) for component in _below(root, "components", "component")],
         "relations": [
-            {**one.attrib, "refs": [dict(ref.attrib) for ref in one]} for one in _below(root, "relations", "relation")
+            {**relation.attrib, "refs": [dict(ref.attrib) for ref in relation]}
+            for relation in _below(root, "relations", "relation")
         ],
-        "load_spectrum": [{"load_cases": _xml_cases(one)} for one in root if _tag(one) == "load_spectrum"],
+        "load_spectrum": [{"load_cases": _xml_cases(part)} for part in root if _tag(part) == "load_spectrum"],
     }
 
 
 def _xml_cases(spectrum: ElementTree.Element) -> list[dict]:
-    cases = (one for one in spectrum if _tag(one) == "load_case")
-    return [{"components": [_xml_component(one) for one in case]} for case in cases]
+    cases = (part for part in spectrum if _tag(part) == "load_case")
+    return [{"components": [_xml_component(component) for component in case]} for case in cases]
 
 
 def _tag(element: ElementTree.Element) -> str:
@@ -354,22 +355,22 @@ def _tag(element: ElementTree.Element) -> str:
 
 
 def _below(root: ElementTree.Element, group: str, tag: str) -> list[ElementTree.Element]:
-    return [one for table in root if _tag(table) == group for one in table if _tag(one) == tag]
+    return [element for table in root if _tag(table) == group for element in table if _tag(element) == tag]
 
 
 def _xml_component(element: ElementTree.Element) -> dict:
     attributes = []
-    for one in element:
-        arrays = [array for array in one if _tag(array) == "array"]
+    for attribute in element:
+        arrays = [array for array in attribute if _tag(array) == "array"]
         vector = [entry.text for entry in arrays[0]] if arrays else None
-        attributes.append({**one.attrib, "value": None if len(one) else one.text, "vector": vector})
+        attributes.append({**attribute.attrib, "value": None if len(attribute) else attribute.text, "vector": vector})
     return {**element.attrib, "attributes": attributes}
 
 
 def _dicts(table: Any, key: str) -> list[dict]:
     """Tables in a list of a table, empty where there is none."""
-    found = table.get(key) if isinstance(table, dict) else None
-    return [one for one in found if isinstance(one, dict)] if isinstance(found, list) else []
+    entries = table.get(key) if isinstance(table, dict) else None
+    return [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []
 
 
 def _model(data: dict, name: str) -> Model:
@@ -387,13 +388,13 @@ def _model(data: dict, name: str) -> Model:
         )
     components: dict[str, Component] = {}
     model = Model(name, version, components, tuple(_relations(data)), _load_cases(data, name))
-    for one in _dicts(data, "components"):
-        id, kind = str(one.get("id", "")), str(one.get("type", ""))
+    for component in _dicts(data, "components"):
+        id, kind = str(component.get("id", "")), str(component.get("type", ""))
         if not id or not kind or id in components:
             wrong = "is given twice" if id in components else f"has no {'type' if id else 'id'}"
-            model.refuse(f"the component {str(one.get('name', '')) or kind!a} {wrong}", f"component {id}")
-        attributes = _attributes(one, f"{kind} {id}", name)
-        components[id] = Component(id, kind, str(one.get("name", "")), attributes, _vectors(one))
+            model.refuse(f"the component {str(component.get('name', '')) or kind!a} {wrong}", f"component {id}")
+        attributes = _attributes(component, f"{kind} {id}", name)
+        components[id] = Component(id, kind, str(component.get("name", "")), attributes, _vectors(component))
     for relation in model.relations:
         for role, id in relation.refs:
             if id not in components:
@@ -404,49 +405,51 @@ def _model(data: dict, name: str) -> Model:
 
 
 def _relations(data: dict) -> Iterator[Relation]:
-    for one in _dicts(data, "relations"):
-        refs = ((str(ref.get("role", "")), str(ref.get("id", ""))) for ref in _dicts(one, "refs"))
-        yield Relation(str(one.get("type", "")), tuple(refs))
+    for relation in _dicts(data, "relations"):
+        refs = ((str(ref.get("role", "")), str(ref.get("id", ""))) for ref in _dicts(relation, "refs"))
+        yield Relation(str(relation.get("type", "")), tuple(refs))
 
 
 def _attributes(table: dict, component: str, name: str) -> dict[str, tuple[str, str | None]]:
     """Values and units of a component; JSON has true and numbers, XML texts."""
-    found, attributes = {}, _dicts(table, "attributes")
-    _need_once([str(one.get("id", "")) for one in attributes], f"{component}, ", name)
-    for one in attributes:
-        value, unit = one.get("value"), one.get("unit")
+    values_of, attributes = {}, _dicts(table, "attributes")
+    _need_once([str(attribute.get("id", "")) for attribute in attributes], f"{component}, ", name)
+    for attribute in attributes:
+        value, unit = attribute.get("value"), attribute.get("unit")
         if value is not None:
             text = str(value).lower() if isinstance(value, bool) else str(value)
-            found[str(one.get("id", ""))] = text, None if unit is None else str(unit)
-    return found
+            values_of[str(attribute.get("id", ""))] = text, None if unit is None else str(unit)
+    return values_of
 
 
 def _vectors(table: dict) -> dict[str, tuple[tuple[float, ...], str | None]]:
     """Arrays of finite numbers of a component, true as 1; what else stands in an array is left out."""
-    found = {}
-    for one in _dicts(table, "attributes"):
+    values_of = {}
+    for attribute in _dicts(table, "attributes"):
         try:
-            values = tuple(float(_BOOLEANS.get(text := str(entry).lower().strip(), text)) for entry in one["vector"])
+            values = tuple(
+                float(_BOOLEANS.get(text := str(entry).lower().strip(), text)) for entry in attribute["vector"]
+            )
         except (KeyError, TypeError, ValueError):
             continue
         if len(values) <= MOST_ENTRIES and all(map(math.isfinite, values)):
-            unit = one.get("unit")
-            found[str(one.get("id", ""))] = values, None if unit is None else str(unit)
-    return found
+            unit = attribute.get("unit")
+            values_of[str(attribute.get("id", ""))] = values, None if unit is None else str(unit)
+    return values_of
 
 
 def _load_cases(data: dict, name: str) -> tuple[dict, ...]:
     """Attributes by component id of every load case of the first load spectrum."""
-    cases = [c for one in _dicts(data, "load_spectrum")[:1] for c in _dicts(one, "load_cases")]
+    cases = [c for spectrum in _dicts(data, "load_spectrum")[:1] for c in _dicts(spectrum, "load_cases")]
     if len(cases) > MOST_CASES:
         message, limit = f"{len(cases)} load cases are too many", f"{MOST_CASES} load cases"
         raise _broken(message, name, "export fewer", limit=limit)
-    found = []
+    cases_read = []
     for case in cases:
-        where, members = f"load case {len(found) + 1}, component ", _dicts(case, "components")
-        _need_once([str(one.get("id")) for one in members], where, name)
-        found.append({(id := str(one.get("id"))): _attributes(one, where + id, name) for one in members})
-    return tuple(found)
+        where, members = f"load case {len(cases_read) + 1}, component ", _dicts(case, "components")
+        _need_once([str(member.get("id")) for member in members], where, name)
+        cases_read.append({(id := str(member.get("id"))): _attributes(member, where + id, name) for member in members})
+    return tuple(cases_read)
 
 
 def _refuse_loops(model: Model) -> None:
@@ -478,8 +481,10 @@ def model_text(model: Model, program: str, version: str) -> str:
         for role, id in relation.refs:
             ElementTree.SubElement(parent, "ref", id=id, role=role, hint=model.components[id].type)
     components = ElementTree.SubElement(root, "components")
-    for one in model.components.values():
-        _write_component(components, one.id, one.attributes, one.vectors, type=one.type, name=one.name)
+    for component in model.components.values():
+        _write_component(
+            components, component.id, component.attributes, component.vectors, type=component.type, name=component.name
+        )
     if model.load_cases:
         spectrum = ElementTree.SubElement(root, "load_spectrum", id="1")
         for number, case in enumerate(model.load_cases, start=1):

@@ -92,15 +92,15 @@ class Superelement:
 
         Coordinates of no node follow the nodes as the stiffness has it.
         """
-        found = np.zeros((len(self.stiffness), 6))
+        motions = np.zeros((len(self.stiffness), 6))
         for (number, component), row in self.row.items():
-            found[row] = rigid_link(self.place[number] - centre)[component - 1]
-        inner = np.setdiff1d(np.arange(len(found)), list(self.row.values()))
+            motions[row] = rigid_link(self.place[number] - centre)[component - 1]
+        inner = np.setdiff1d(np.arange(len(motions)), list(self.row.values()))
         if len(inner):
             outer = np.array([*self.row.values()])
-            held = self.stiffness[np.ix_(inner, outer)] @ found[outer]
-            found[inner] = -np.linalg.lstsq(self.stiffness[np.ix_(inner, inner)], held, rcond=None)[0]
-        return found
+            held = self.stiffness[np.ix_(inner, outer)] @ motions[outer]
+            motions[inner] = -np.linalg.lstsq(self.stiffness[np.ix_(inner, inner)], held, rcond=None)[0]
+        return motions
 
 
 @dataclass(frozen=True)
@@ -162,38 +162,38 @@ def read_superelement(
             )
         table = read_nodes(nodes, roles)
         if kind in _ARRAYS:
-            found, row, place = _stored_matrices(path, table)
+            matrices, row, place = _stored_matrices(path, table)
         else:
-            found, row, place = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
-        return superelement_of(found, row, place, table, units)
+            matrices, row, place = dmig_matrices(path) if kind in _PUNCH else op4_matrices(path, table)
+        return superelement_of(matrices, row, place, table, units)
 
 
 def superelement_of(
-    found: Sequence[np.ndarray],
+    matrices: Sequence[np.ndarray],
     row: Mapping[tuple[int, int], int],
     place: Mapping[int, np.ndarray],
     table: tuple[Node, ...],
     units: str,
 ) -> Superelement:
     """Make the superelement of stiffness and mass in the units of a file, rows by node and component, places, nodes."""
-    _check_real(found)
-    apart = [float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max()) for matrix in found]
+    _check_real(matrices)
+    apart = [float(np.abs(matrix - matrix.T).max() / np.abs(matrix).max()) for matrix in matrices]
     length, mass = UNITS[units]
     # scalar points, such as those of inner modes, have the component 0 and no place
     row = {label: at for label, at in row.items() if label[1] > 0}
     # with time in seconds a stiffness scales as a mass; rotations have no length
-    scale = np.ones(len(found[0]))
+    scale = np.ones(len(matrices[0]))
     scale[[at for (_, component), at in row.items() if component > 3]] = length
-    K, M = (0.5 * mass * np.outer(scale, scale) * np.real(matrix + matrix.T) for matrix in found)
+    K, M = (0.5 * mass * np.outer(scale, scale) * np.real(matrix + matrix.T) for matrix in matrices)
     places = dict(place) | {node.number: node.position for node in table if node.position is not None}
     _check_nodes(table, row, places)
     in_metres = {number: length * x for number, x in places.items()}
     return Superelement(K, M, row, in_metres, table, (apart[0], apart[1]))
 
 
-def _check_real(found: Sequence[np.ndarray]) -> None:
+def _check_real(matrices: Sequence[np.ndarray]) -> None:
     """Refuse matrices that are empty, complex or not finite."""
-    for matrix, name in zip(found, ("stiffness", "mass"), strict=True):
+    for matrix, name in zip(matrices, ("stiffness", "mass"), strict=True):
         if not matrix.any() or not np.isfinite(matrix).all() or np.imag(matrix).any():
             raise CaseError(
                 f"the {name} matrix holds other entries than real numbers",
@@ -212,14 +212,14 @@ def _stored_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray
             with ZipFile(path) as archive:
                 check_array_size(sum(entry.file_size for entry in archive.infolist()))
             with np.load(path, allow_pickle=False) as stored:
-                found = [np.asarray(stored[name]) for name in ("stiffness", "mass") if name in stored]
+                matrices = [np.asarray(stored[name]) for name in ("stiffness", "mass") if name in stored]
         else:
             with xr.open_dataset(path) as data:
-                found = [data[name].values for name in ("stiffness", "mass") if name in data]
+                matrices = [data[name].values for name in ("stiffness", "mass") if name in data]
     labels = list(dict.fromkeys((node.number, int(dof)) for node in table for dof in node.dofs))
-    square = len(found) == 2 and found[0].shape == found[1].shape == (len(found[0]),) * 2
-    if not square or len(found[0]) < len(labels):
-        shapes = " and ".join(str(matrix.shape) for matrix in found) or "none"
+    square = len(matrices) == 2 and matrices[0].shape == matrices[1].shape == (len(matrices[0]),) * 2
+    if not square or len(matrices[0]) < len(labels):
+        shapes = " and ".join(str(matrix.shape) for matrix in matrices) or "none"
         raise CaseError(
             "the file does not hold stiffness and mass of the coordinates of the table",
             code="E-SHAPE",
@@ -228,7 +228,7 @@ def _stored_matrices(path: Path, table: Sequence[Node]) -> tuple[list[np.ndarray
             limit=f"arrays stiffness and mass, square, {len(labels)} rows or more",
             remedy="give all nodes of the matrices in their order, with their dofs",
         )
-    return found, {label: i for i, label in enumerate(labels)}, {}
+    return matrices, {label: i for i, label in enumerate(labels)}, {}
 
 
 def _check_nodes(table: Sequence[Node], row: Mapping[tuple[int, int], int], place: Mapping[int, np.ndarray]) -> None:

@@ -149,17 +149,23 @@ class BearingReader:
     def _row(self, part: Component) -> list[Component]:
         """The rows of a bearing, and the first rolling element of its first row."""
         kinds = ("assembly", "ordered_assembly")
-        rows = [one for one in self.model.related(kinds, "part", assembly=part.id) if one.type == "rolling_bearing_row"]
-        elements = [one for row in rows[:1] for one in self.model.related(kinds, "part", assembly=row.id)]
-        return [*rows, *[one for one in elements if one.type == "rolling_element"][:1]]
+        rows = [
+            component
+            for component in self.model.related(kinds, "part", assembly=part.id)
+            if component.type == "rolling_bearing_row"
+        ]
+        elements = [component for row in rows[:1] for component in self.model.related(kinds, "part", assembly=row.id)]
+        return [*rows, *[element for element in elements if element.type == "rolling_element"][:1]]
 
     def _elements(self, part: Component) -> dict[str, Any]:
         """Kind and rolling elements of a bearing whose file has them; empty otherwise."""
         model, parts = self.model, [*self._row(part), part]
-        rows = [one for one in parts if one.type == "rolling_bearing_row"]
+        rows = [component for component in parts if component.type == "rolling_bearing_row"]
 
         def first(name: str, of: Dimension | None = None) -> float | None:
-            return next((value for one in parts if (value := model.number(one, name, of)) is not None), None)
+            return next(
+                (value for component in parts if (value := model.number(component, name, of)) is not None), None
+            )
 
         kind = kind_of(model.text(part, "bearing_type") or "")
         count, size = first("number_of_rolling_elements"), first("diameter_of_rolling_element", LENGTH)
@@ -188,13 +194,13 @@ class BearingReader:
         if sense != "both" and kind not in ("cylindrical", "needle"):
             table["axial_sense"] = sense
         plays = (model.number(part, name, LENGTH) for name in _CLEARANCES)
-        if clearance := next((one for one in plays if one is not None), 0.0):
+        if clearance := next((given for given in plays if given is not None), 0.0):
             table["clearance"] = with_unit(clearance, LENGTH)
         if preload := model.number(part, "preload_distance", LENGTH):
             table["preload"] = with_unit(preload, LENGTH)
         for key, names in _RATINGS.items():
             values = (model.number(part, name, FORCE) for name in names)
-            if value := next((one for one in values if one), None):
+            if value := next((number for number in values if number), None):
                 table[key] = with_unit(value, FORCE)
         return table
 

@@ -50,55 +50,62 @@ class Lubrication:
 
         ``pitch`` is its pitch diameter [m], ``shafts`` are the ids of the shafts of its rings, one of the casing.
         """
-        found: dict[str, Any] = {}
+        entries_: dict[str, Any] = {}
         if "kind" not in table:
-            return found
+            return entries_
         values = (self.model.number(part, name) for name in _CONTAMINATION)
         if (clean := next((value for value in values if value is not None), None)) is not None:
-            found["contamination"] = clean
+            entries_["contamination"] = clean
         if (ratio := self.least_ratio(pitch, shafts)) is not None:
-            found["viscosity_ratio"] = float(f"{ratio:.4g}")
+            entries_["viscosity_ratio"] = float(f"{ratio:.4g}")
             if ratio < VISCOSITY_RATIOS[0]:
                 text = f"{part}: a viscosity ratio of {ratio:.2g} is below what ISO 281 has: it is left out"
                 self.model.remark("bearing", text, remedy="a thicker or a colder oil")
-                del found["viscosity_ratio"]
-        return found
+                del entries_["viscosity_ratio"]
+        return entries_
 
     def least_ratio(self, pitch: float, shafts: Sequence[str]) -> float | None:
         """Least viscosity ratio kappa over the load cases in which rings turn; None where the file has no oil."""
         if not self.viscosities:
             return None
         cool, warm = self.viscosities
-        found = []
+        ratios = []
         for temperature, speed in zip(self.temperatures, self.speeds, strict=True):
             first, second = (*(speed.get(id, 0.0) for id in shafts), 0.0)[:2]
             if temperature is not None and first != second:
                 needed = reference_viscosity(pitch, abs(first - second))
-                found.append(oil_viscosity(cool, warm, temperature) / needed)
-        return min(found, default=None)
+                ratios.append(oil_viscosity(cool, warm, temperature) / needed)
+        return min(ratios, default=None)
 
 
 def unit_lubrication(model: Model) -> Lubrication:
     """Read the oil of a unit, and its temperatures and the speeds of shafts in all load cases."""
     cases = model.load_cases or ({},)
     oils = [part for part in model.components.values() if part.type == "lubricant"]
-    known = [model.number(oil, f"viscosity_at_{at}_degree_celsius", VISCOSITY) for oil in oils[:1] for at in (40, 100)]
+    viscosity = [
+        model.number(oil, f"viscosity_at_{at}_degree_celsius", VISCOSITY) for oil in oils[:1] for at in (40, 100)
+    ]
     casings = [part for part in model.components.values() if part.type == "gear_casing"]
     temperatures = [
         next(
-            (value for one in casings if (value := _celsius(model, with_load_case(one, given), _OIL_TEMPERATURE))), None
+            (
+                value
+                for casing in casings
+                if (value := _celsius(model, with_load_case(casing, given), _OIL_TEMPERATURE))
+            ),
+            None,
         )
         for given in cases
     ]
-    viscosities = tuple(value for value in known if value is not None)
+    viscosities = tuple(value for value in viscosity if value is not None)
     speeds = tuple(unit_flow(model, given).speed for given in cases)
     return Lubrication(model, viscosities if len(viscosities) == 2 else (), tuple(temperatures), speeds)
 
 
 def temperature_rise(model: Model, part: Component) -> float | None:
     """Temperature of a shaft or the casing over the one of reference of the unit [K]; None where either is missing."""
-    units = [one for one in model.components.values() if one.type == "gear_unit"]
-    reference = next((value for one in units if (value := _celsius(model, one, _REFERENCE)) is not None), None)
+    units = [component for component in model.components.values() if component.type == "gear_unit"]
+    reference = next((value for unit in units if (value := _celsius(model, unit, _REFERENCE)) is not None), None)
     mean = _celsius(model, part, _MEAN)
     return None if mean is None or reference is None else mean - reference
 

@@ -63,13 +63,16 @@ def unit_model(case: Any, teeth: Mapping[str, Any], name: str) -> Model:
         writer.planetary(stage, f"planetary[{number}]")
     loads = {load.name: writer.load(load) for load in case.load}
     for body in (shaft for shaft in case.shaft if not shaft.part):
-        if any(body.name in one.torque for one in case.operation.load_case) or body.name in case.operation.output:
+        if (
+            any(body.name in load_case.torque for load_case in case.operation.load_case)
+            or body.name in case.operation.output
+        ):
             loads[body.name] = writer.add_on(body.name, "external_load", f"load of {body.name}", None)
     for shaft in case.operation.fixed:
         joint = writer.w.add("coupling", f"{shaft} held")
         writer.w.relate("side", assembly=joint, inner_part=writer.shafts[shaft], outer_part=writer.casing)
     writer.left_out()
-    cases = tuple(writer.load_case(one, loads) for one in case.operation.load_case)
+    cases = tuple(writer.load_case(load_case, loads) for load_case in case.operation.load_case)
     return replace(writer.model, relations=tuple(writer.w.relations), load_cases=cases)
 
 
@@ -111,7 +114,7 @@ class _UnitWriter:
         vectors = {
             "u_axis_vector": ((1.0, 0.0, 0.0), "mm"),
             "w_axis_vector": ((0.0, 0.0, 1.0), "mm"),
-            "support_vector": (tuple(float(f"{1e3 * one:.12g}") for one in place), "mm"),
+            "support_vector": (tuple(float(f"{1e3 * coordinate:.12g}") for coordinate in place), "mm"),
         }
         reference = {"reference_component_for_position": (self.unit, "none")}
         part = self.w.components[id]
@@ -237,7 +240,7 @@ class _UnitWriter:
             u_coordinate_on_shaft_outer_side=rexs_attribute(places[outer] or 0.0, "mm"),
             **stiffness,
         )
-        ids = [self.shafts.get(one, self.casing) for one in (first, second)]
+        ids = [self.shafts.get(name, self.casing) for name in (first, second)]
         self.w.relate("side", assembly=id, inner_part=ids[inner], outer_part=ids[outer])
         if not coupling.transmits:
             self.model.remark(f"coupling[{number}].transmits", "REXS has no springs between shafts that turn apart")
@@ -265,7 +268,7 @@ class _UnitWriter:
                 f"REXS has no outer diameter of the internal gear of {stage.name}: it comes back as that of its shaft"
             )
             self.model.remark(f"{key}.teeth", text)
-        first, second = (self.case.shaft_named(one).axis for one in stage.shafts)
+        first, second = (self.case.shaft_named(shaft).axis for shaft in stage.shafts)
         angle = math.atan2(second[0] - first[0], second[1] - first[1])
         id = self.w.add(
             "cylindrical_stage",
@@ -296,7 +299,7 @@ class _UnitWriter:
         if stage.carrier in self.shafts:
             self.w.relate("planet_carrier_shaft", planetary_stage=id, shaft=self.shafts[stage.carrier])
         psi = gears.planet_angles
-        turned = [0.5 * math.pi - (stage.angle + one - psi[0]) for one in psi]
+        turned = [0.5 * math.pi - (stage.angle + angle - psi[0]) for angle in psi]
         given, radial = stage.planet.bearing, getattr(case.planet, "bearing_stiffness", None)
         bearing = {
             "radial_stiffness": _stiffness(given.radial if given else radial, "N / m"),
@@ -317,10 +320,10 @@ class _UnitWriter:
             self.model.remark(f"{key}.pins", "pins that one cheek holds are left out: they come back rigid")
             return
         shafts = [
-            one
+            shaft
             for rel in self.w.relations
             if rel.type == "planet_pin"
-            for one in rel.of("shaft")
+            for shaft in rel.of("shaft")
             if id in rel.of("planetary_stage")
         ]
         for pin in shafts:
@@ -346,7 +349,7 @@ class _UnitWriter:
     def load(self, load: Any) -> str:
         """Add the place of a load; its id."""
         turns = load.name in self.case.operation.output or any(
-            load.name in one.torque for one in self.case.operation.load_case
+            load.name in load_case.torque for load_case in self.case.operation.load_case
         )
         return self.add_on(
             load.shaft, "external_load", load.name, load.position, transmits_torque=_YES if turns else _NO
@@ -354,10 +357,10 @@ class _UnitWriter:
 
     def load_case(self, given: Any, loads: Mapping[str, str]) -> dict[str, Attributes]:
         """Write torques, forces, speeds and share of a load case."""
-        found: dict[str, Attributes] = {self.unit: self._put(load_duration_fraction=(given.share, "%"))}
+        values_of: dict[str, Attributes] = {self.unit: self._put(load_duration_fraction=(given.share, "%"))}
         for shaft, speed in given.speed.items():
-            found[self.shafts[shaft]] = {"rotational_speed": (f"{speed / SPEED.scale:.15g}", "1 / min")}
-        fixed = {one.name: one for one in self.case.load}
+            values_of[self.shafts[shaft]] = {"rotational_speed": (f"{speed / SPEED.scale:.15g}", "1 / min")}
+        fixed = {load.name: load for load in self.case.load}
         for name, id in loads.items():
             always = fixed.get(name)
             force, moment = (given.force.get(name), given.tilting_moment.get(name))
@@ -366,36 +369,40 @@ class _UnitWriter:
             values = {}
             if name in given.torque:
                 values["torque_around_u_axis"] = (given.torque[name], "N m")
-            values |= {f"force_{way}_direction": (one, "N") for way, one in zip("vwu", forces) if one}
-            values |= {f"torque_around_{way}_axis": (one, "N m") for way, one in zip("vw", moments) if one}
+            values |= {f"force_{way}_direction": (newtons, "N") for way, newtons in zip("vwu", forces) if newtons}
+            values |= {
+                f"torque_around_{way}_axis": (newton_metres, "N m")
+                for way, newton_metres in zip("vw", moments)
+                if newton_metres
+            }
             if values:
-                found[id] = self._put(**values)
-        return found
+                values_of[id] = self._put(**values)
+        return values_of
 
     @staticmethod
     def _put(**values: tuple[float, str]) -> Attributes:
-        found = {key: rexs_attribute(value, unit) for key, (value, unit) in values.items()}
-        return {key: value for key, value in found.items() if value is not None}
+        attributes = {key: rexs_attribute(value, unit) for key, (value, unit) in values.items()}
+        return {key: value for key, value in attributes.items() if value is not None}
 
     def left_out(self) -> None:
         """Tell what of the case REXS has no form for."""
         case, tell = self.case, self.model.remark
-        for number, one in enumerate(case.mass):
-            text = f"REXS has no mass such as {one.name or one.shaft}: left out, modes change"
+        for number, section in enumerate(case.mass):
+            text = f"REXS has no mass such as {section.name or section.shaft}: left out, modes change"
             tell(f"mass[{number}]", text, remedy="give it again after import")
         if case.casing is not None:
             text = "REXS has no feet of a casing: left out, the casing comes back as one that stands still"
             tell("casing", text, remedy="give it again after import")
-        estimated = [number for number, one in enumerate(case.bearing) if one.estimated]
+        estimated = [number for number, bearing in enumerate(case.bearing) if bearing.estimated]
         if estimated:
             text = f"{len(estimated)} bearings are estimated, which REXS cannot say: they come back as given"
             tell(f"bearing[{estimated[0]}].estimated", text, severity=NOTE)
-        warm = [f"shaft[{number}]" for number, one in enumerate(case.shaft) if one.temperature_rise]
+        warm = [f"shaft[{number}]" for number, shaft in enumerate(case.shaft) if shaft.temperature_rise]
         warm += ["thermal"] if case.thermal.casing_rise else []
         if warm:
             tell(warm[0], f"temperatures of {', '.join(warm[:6])} are left out", remedy="give them again after import")
-        for number, one in enumerate(case.bearing):
-            if one.torsional:
+        for number, section in enumerate(case.bearing):
+            if section.torsional:
                 tell(f"bearing[{number}].torsional", "REXS has no stiffness of a bearing against rotation: left out")
-            if one.viscosity_ratio is not None or one.contamination is not None:
+            if section.viscosity_ratio is not None or section.contamination is not None:
                 tell(f"bearing[{number}].viscosity_ratio", "lubrication of bearings is left out", severity=NOTE)

@@ -52,30 +52,31 @@ def shaft_groups(
 
     A stage takes one freedom, and so does a coupling between shafts that no other one joins already.
     """
-    ties = [[one for one in stage if one is not None] for stage in stages]
+    ties = [[shaft for shaft in stage if shaft is not None] for stage in stages]
     turning = _merged(shafts, joints)
     group = _merged(shafts, [*joints, *ties])
-    standing = {turning[one] for one in held}
-    found = []
+    standing = {turning[shaft] for shaft in held}
+    groups = []
     for number in dict.fromkeys(group.values()):
-        own = tuple(shaft for shaft in shafts if group[shaft] == number)
+        members = tuple(shaft for shaft in shafts if group[shaft] == number)
         inside = [tie for tie in ties if tie and group[tie[0]] == number]
-        rotors = {turning[one] for one in own}
+        rotors = {turning[shaft] for shaft in members}
         ends = tuple(
-            one
-            for one in own
-            if turning[one] not in standing and sum(turning[one] in {turning[o] for o in tie} for tie in inside) == 1
+            shaft
+            for shaft in members
+            if turning[shaft] not in standing
+            and sum(turning[shaft] in {turning[o] for o in tie} for tie in inside) == 1
         )
-        found.append(ShaftGroup(own, len(rotors - standing) - len(inside), ends))
-    return found
+        groups.append(ShaftGroup(members, len(rotors - standing) - len(inside), ends))
+    return groups
 
 
 def _merged(shafts: Sequence[str], ties: Iterable[Sequence[str]]) -> dict[str, int]:
     """Number of the group of every shaft that ties make."""
     group = {shaft: number for number, shaft in enumerate(shafts)}
     for tie in ties:
-        for one in tie[1:]:
-            old, new = group[one], group[tie[0]]
+        for shaft in tie[1:]:
+            old, new = group[shaft], group[tie[0]]
             group = {shaft: new if number == old else number for shaft, number in group.items()}
     return group
 
@@ -114,7 +115,7 @@ class OperationReader:
         flows, shares = [unit_flow(self.model, given) for given in cases], load_case_shares(cases)
         torques = [self._torques(given, flow) for given, flow in zip(cases, flows, strict=True)]
         outputs, added = self._outputs(torques)
-        found, places = [], {}
+        tables, places = [], {}
         for place, (given, flow, said) in enumerate(zip(cases, flows, torques, strict=True), start=1):
             torque = {name: with_unit(value, TORQUE) for name, value in said.items() if value and name not in outputs}
             if not torque:
@@ -125,26 +126,26 @@ class OperationReader:
             table |= self._forces(given)
             if (share := shares[place - 1]) is not None:
                 table["share"] = float(f"{share:.12g}")
-            places[place] = len(found) + 1
-            found.append(table)
-        if not found:
+            places[place] = len(tables) + 1
+            tables.append(table)
+        if not tables:
             raise NoGearbox("no load gives a torque")
-        _share_time(found, self.model)
+        _share_time(tables, self.model)
         first = places.get(number)
         if first is None:
             raise NoGearbox(f"load case {number} has no torque")
-        return {"output": outputs, "first": first, "load_case": found}, added
+        return {"output": outputs, "first": first, "load_case": tables}, added
 
     def _torques(self, given, flow: UnitFlow) -> dict[str, float]:
         """Torques of loads [N m] in a load case, from powers where the file has these; zero where it has none."""
-        found = {}
+        torques = {}
         for name, (part, shaft) in self.loads.items():
             load = with_load_case(part, given)
             torque = self.model.number(load, "torque_around_u_axis", TORQUE)
             power = self.model.number(load, "power", POWER)
-            speed = next((flow.speed[one.id] for one in self.members[shaft] if flow.speed.get(one.id)), None)
-            found[name] = (power / speed if power is not None and speed and not torque else torque) or 0.0
-        return found
+            speed = next((flow.speed[member.id] for member in self.members[shaft] if flow.speed.get(member.id)), None)
+            torques[name] = (power / speed if power is not None and speed and not torque else torque) or 0.0
+        return torques
 
     def _outputs(self, torques: Sequence[Mapping[str, float]]) -> tuple[list[str], dict[str, str]]:
         """Names of the loads that take the power, and the shafts of those that the file lacks.
@@ -155,16 +156,16 @@ class OperationReader:
         outputs: list[str] = []
         added: dict[str, str] = {}
         for group in self.groups:
-            own = [name for name, (_, shaft) in self.loads.items() if shaft in group.shafts]
-            driving = [name for name in own if any(said[name] for said in torques)]
+            loads_there = [name for name, (_, shaft) in self.loads.items() if shaft in group.shafts]
+            driving = [name for name in loads_there if any(said[name] for said in torques)]
             if group.freedom < 1:
                 continue
             if not driving:
-                which = ", ".join(self.names[one] for one in group.shafts[:6])
+                which = ", ".join(self.names[shaft_there] for shaft_there in group.shafts[:6])
                 raise NoGearbox(f"no load gives a torque to {which}")
-            silent = [name for name in own if name not in driving and self._transmits(name)]
+            silent = [name for name in loads_there if name not in driving and self._transmits(name)]
             taking = silent[-group.freedom :]
-            loaded = {self.loads[name][1] for name in own if self._transmits(name)}
+            loaded = {self.loads[name][1] for name in loads_there if self._transmits(name)}
             for shaft in group.ends:
                 if len(taking) < group.freedom and shaft not in loaded:
                     name = self._new_name(added)
@@ -189,7 +190,7 @@ class OperationReader:
 
     def _speeds(self, given, flow: UnitFlow) -> dict[str, str]:
         """Speeds that tell those of all shafts: as many of every group as it has ways to turn."""
-        found: dict[str, str] = {}
+        speeds: dict[str, str] = {}
         for group in self.groups:
             said = {}
             for shaft in group.shafts:
@@ -198,20 +199,20 @@ class OperationReader:
                     if speed is not None and shaft not in said:
                         said[shaft] = speed
             by_flow = {
-                one: flow.speed[part.id]
-                for one in group.shafts
-                for part in self.members[one][:1]
+                shaft_there: flow.speed[part.id]
+                for shaft_there in group.shafts
+                for part in self.members[shaft_there][:1]
                 if flow.speed.get(part.id)
             }
-            known = said | {one: speed for one, speed in by_flow.items() if one not in said}
-            if len(known) < group.freedom:
-                assumed = next((shaft for shaft in group.ends if shaft not in known), group.shafts[0])
+            speeds_given = said | {key: speed for key, speed in by_flow.items() if key not in said}
+            if len(speeds_given) < group.freedom:
+                assumed = next((shaft for shaft in group.ends if shaft not in speeds_given), group.shafts[0])
                 text = f"the file does not tell the speed of {self.names[assumed]}: 1000 rpm are taken"
                 self.model.remark("operation.speed", text)
-                known[assumed] = _USUAL_SPEED
-            for shaft, speed in list(known.items())[: group.freedom]:
-                found[self.names[shaft]] = with_unit(speed, SPEED)
-        return found
+                speeds_given[assumed] = _USUAL_SPEED
+            for shaft, speed in list(speeds_given.items())[: group.freedom]:
+                speeds[self.names[shaft]] = with_unit(speed, SPEED)
+        return speeds
 
     def _forces(self, given) -> dict[str, Any]:
         """Forces and tilting moments at loads in a load case: v, w, u of the unit are x, y, z."""
@@ -221,23 +222,23 @@ class OperationReader:
             forces = [self.model.number(load, f"force_{way}_direction", FORCE) or 0.0 for way in "vwu"]
             moments = [self.model.number(load, f"torque_around_{way}_axis", TORQUE) or 0.0 for way in "vw"]
             if any(forces):
-                force[name] = [with_unit(one, FORCE) for one in forces]
+                force[name] = [with_unit(newtons, FORCE) for newtons in forces]
             if any(moments):
-                moment[name] = [with_unit(one, TORQUE) for one in moments]
+                moment[name] = [with_unit(newton_metres, TORQUE) for newton_metres in moments]
         return {key: value for key, value in (("force", force), ("tilting_moment", moment)) if value}
 
 
 def _share_time(load_cases: list[dict[str, Any]], model: Model) -> None:
     """Give load cases without shares equal ones, and bring shares of more than the whole time to it."""
-    given = [one["share"] for one in load_cases if "share" in one]
+    given = [load_case["share"] for load_case in load_cases if "share" in load_case]
     if len(load_cases) > 1 and len(given) < len(load_cases):
         left = max(1.0 - sum(given), 0.0) / (len(load_cases) - len(given))
-        for one in load_cases:
-            one.setdefault("share", float(f"{left or 1.0 / len(load_cases):.12g}"))
+        for load_case in load_cases:
+            load_case.setdefault("share", float(f"{left or 1.0 / len(load_cases):.12g}"))
         model.remark("operation", "the file does not tell the shares of all load cases: equal ones are assumed")
-    if len(load_cases) > 1 and (total := sum(one["share"] for one in load_cases)) > 1.0 + 1e-6:
-        for one in load_cases:
-            one["share"] = float(f"{one['share'] / total:.12g}")
+    if len(load_cases) > 1 and (total := sum(load_case["share"] for load_case in load_cases)) > 1.0 + 1e-6:
+        for load_case in load_cases:
+            load_case["share"] = float(f"{load_case['share'] / total:.12g}")
         model.remark("operation", f"the shares of the load cases are {total:.4g} in all: they are divided by it")
 
 
@@ -250,11 +251,11 @@ def load_case_shares(cases: Sequence[LoadCase]) -> list[float | None]:
     if any(share is not None for share in shares):
         return shares
     hours = [_first(given, "load_duration", _HOURS) for given in cases]
-    known = [value for value in hours if value]
-    return [value / sum(known) for value in known] if len(known) == len(cases) else shares
+    given = [value for value in hours if value]
+    return [value / sum(given) for value in given] if len(given) == len(cases) else shares
 
 
 def _first(given: LoadCase, name: str, units: Mapping[str | None, float]) -> float | None:
     """First value of an attribute in a load case, by the size of its unit."""
-    found = (attributes.get(name) for attributes in given.values())
-    return next((float(value) * units.get(unit, 1.0) for value, unit in filter(None, found)), None)
+    values = (attributes.get(name) for attributes in given.values())
+    return next((float(value) * units.get(unit, 1.0) for value, unit in filter(None, values)), None)

@@ -74,7 +74,7 @@ def file_places(model: Model, shafts: Iterable[Component]) -> dict[str, Place] |
 
     NoGearbox: shafts that are not parallel to the u axis of the unit.
     """
-    found: dict[str, Place] = {}
+    places: dict[str, Place] = {}
     for shaft in shafts:
         axis = model.vector(shaft, "u_axis_vector")
         if axis is not None and len(axis) == 3 and math.dist(axis, (1.0, 0.0, 0.0)) > 1e-6:
@@ -83,22 +83,22 @@ def file_places(model: Model, shafts: Iterable[Component]) -> dict[str, Place] |
         if place is None:
             return None
         u, v, w = place
-        found[shaft.id] = (v, w, u)
-    return found
+        places[shaft.id] = (v, w, u)
+    return places
 
 
 def _place(model: Model, part: Component, depth: int = 0) -> Place | None:
     """Coordinates (u, v, w) of a part in the unit [m], by what its own are relative to."""
-    own = model.vector(part, "support_vector", LENGTH)
-    if own is None or len(own) != 3 or depth > _DEEPEST:
+    offset = model.vector(part, "support_vector", LENGTH)
+    if offset is None or len(offset) != 3 or depth > _DEEPEST:
         return None
     base = _reference(model, part)
     if base is None or base.type in ("gear_unit", "gear_casing") or base.id == part.id:
-        return own
+        return offset
     below, axes = _place(model, base, depth + 1), model.vector(base, "w_axis_vector")
     if below is None or (axes is not None and math.dist(axes, (0.0, 0.0, 1.0)) > 1e-6):
         return None
-    return below[0] + own[0], below[1] + own[1], below[2] + own[2]
+    return below[0] + offset[0], below[1] + offset[1], below[2] + offset[2]
 
 
 def _reference(model: Model, part: Component) -> Component | None:
@@ -146,22 +146,22 @@ def misses(place: Mapping[str, Place], ways: Iterable[Way]) -> float:
 
 def file_pieces(model: Model, shaft: Component, zero: float) -> list[Piece]:
     """List the sections of a shaft whose zero lies at z [m]; sections without sizes are left out."""
-    found: list[Piece] = []
+    pieces: list[Piece] = []
     end = zero
     for part in model.related(("assembly", "ordered_assembly"), "part", assembly=shaft.id):
         if part.type != "shaft_section":
             continue
         keys = ("u_coordinate_on_shaft", "length", "outer_diameter_begin", "outer_diameter_end")
         place, length, begin, outer_end = (model.number(part, key, LENGTH) for key in keys)
-        inner, inner_end = (model.number(part, f"inner_diameter_{one}", LENGTH) for one in ("begin", "end"))
+        inner, inner_end = (model.number(part, f"inner_diameter_{side}", LENGTH) for side in ("begin", "end"))
         if not length or not begin or min(length, begin) < _SAME:
             text = f"{part} of {shaft} has no length or no diameter: it is left out"
             model.remark(f"shaft {shaft.id}", text, severity=NOTE)
             continue
         start = end if place is None else zero + place
         end, bore = start + length, inner or 0.0
-        found.append(Piece(start, end, (begin, outer_end or begin), (bore, bore if inner_end is None else inner_end)))
-    return found
+        pieces.append(Piece(start, end, (begin, outer_end or begin), (bore, bore if inner_end is None else inner_end)))
+    return pieces
 
 
 def joined_pieces(pieces: Sequence[Piece]) -> tuple[list[Piece], float]:
@@ -171,23 +171,23 @@ def joined_pieces(pieces: Sequence[Piece]) -> tuple[list[Piece], float]:
     the thinner one of its neighbours.
     """
     ends: list[float] = []
-    for place in sorted(one for piece in pieces for one in (piece.start, piece.end)):
+    for place in sorted(end_place for piece in pieces for end_place in (piece.start, piece.end)):
         if not ends or place - ends[-1] > _SAME:
             ends.append(place)
-    found: list[Piece] = []
+    pieces_so_far: list[Piece] = []
     gaps = 0.0
     for start, end in pairwise(ends):
-        here = [one for one in pieces if one.start <= start + _SAME and one.end >= end - _SAME]
+        here = [piece for piece in pieces if piece.start <= start + _SAME and piece.end >= end - _SAME]
         if not here:
             gaps += end - start
-            after = min(one.outer[0] for one in pieces if abs(one.start - end) <= _SAME)
-            outer = min(found[-1].outer[1], after)
-            found.append(Piece(start, end, (outer, outer), (0.0, 0.0)))
+            after = min(piece.outer[0] for piece in pieces if abs(piece.start - end) <= _SAME)
+            outer = min(pieces_so_far[-1].outer[1], after)
+            pieces_so_far.append(Piece(start, end, (outer, outer), (0.0, 0.0)))
             continue
-        sizes = [[one.at(place) for one in here] for place in (start, end)]
+        sizes = [[piece.at(place) for piece in here] for place in (start, end)]
         left, right = ((max(outer for outer, _ in at), min(inner for _, inner in at)) for at in sizes)
-        found.append(Piece(start, end, (left[0], right[0]), (left[1], right[1])))
-    return found, gaps
+        pieces_so_far.append(Piece(start, end, (left[0], right[0]), (left[1], right[1])))
+    return pieces_so_far, gaps
 
 
 def material_table(model: Model, shaft: Component) -> dict[str, Any]:

@@ -66,7 +66,7 @@ def draft_text(tables: Mapping[str, Any], remarks: Mapping[str, str], *, word: s
     """
     tables, notes = deepcopy(dict(tables)), dict(remarks)
     case = parse_case(case_text.write(tables))
-    for key, one in (estimates(case) if hasattr(case, "gear_names") else {}).items():
+    for key, estimate in (estimates(case) if hasattr(case, "gear_names") else {}).items():
         section, last = key.rpartition(".")[::2]
         model = _section(case, section)
         # rigid rings have no foundation
@@ -76,10 +76,10 @@ def draft_text(tables: Mapping[str, Any], remarks: Mapping[str, str], *, word: s
         for part in section.split("."):
             table = table.setdefault(part, {})
         if last not in table:
-            table[last] = str(one)
-            notes[key] = f"{word}: {one.how}{f'; {notes[key]}' if key in notes else ''}"
+            table[last] = str(estimate)
+            notes[key] = f"{word}: {estimate.how}{f'; {notes[key]}' if key in notes else ''}"
     ordered = {name: tables[name] for name in type(case).model_fields if name in tables}
-    lines = [f"# {line}".rstrip() for one in head for line in wrap(one, 105) or [""]]
+    lines = [f"# {line}".rstrip() for remark in head for line in wrap(remark, 105) or [""]]
     return "\n".join([*lines, case_text.write(ordered, notes)])
 
 
@@ -216,7 +216,7 @@ def new_case(
         tables["helical"]["section"] = "transverse"
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
-    left = [f"--{key} {one}" for key, one in taken.items() if not given[key] and (of_set or key != "planets")]
+    left = [f"--{key} {value}" for key, value in taken.items() if not given[key] and (of_set or key != "planets")]
     shape = {"drivetrain": _chain, "gearbox": pair_in_gearbox}.get(kind)
     tables = tables if shape is None else shape(tables, notes)
     return draft_text(tables, notes, word="estimated", head=_head(kind, left, lacks, form))
@@ -351,23 +351,23 @@ def _gears(
         of_all |= _rack_table(addendum, notes)
     if form.addendum is None:
         notes["rack.addendum"] = f"estimated: {ADDENDA[0]:g} leaves undercut or too little contact"
-    found = [round(shift / math.cos(beta), 4) + 0.0 for shift in shared.shifts]
-    for gear, shift in zip(gears, found, strict=True):
+    shifts = [round(shift / math.cos(beta), 4) + 0.0 for shift in shared.shifts]
+    for gear, shift in zip(gears, shifts, strict=True):
         gear["rim_shift"] = shift
     rounding = shared.gears.gears[-1].rack.root_radius / math.cos(beta)
     if rounding < 0.25 - 1e-9:
         gears[-1]["rack"] = {"addendum": addendum, "dedendum": _dedendum(addendum)}
         gears[-1]["rack"]["root_radius"] = round(rounding, 4)
         notes[f"{names[-1]}.rack.root_radius"] = "estimated: what its pinion cutter has room for"
-    if not any(found) and distance is None:
+    if not any(shifts) and distance is None:
         for gear in gears:
             gear["profile_shift"] = 0.0
         return gears, of_all, shared.lacks
     # the other shifts are found, so that the set closes to the last digit
-    own = 1 if len(teeth) == 3 else 0
-    gears[own]["profile_shift"] = found[own]
-    others = ", ".join(f"{n} {x:g}" for n, x in zip(names, found, strict=True) if n != names[own])
-    notes[f"{names[own]}.profile_shift"] = (
+    first = 1 if len(teeth) == 3 else 0
+    gears[first]["profile_shift"] = shifts[first]
+    others = ", ".join(f"{n} {x:g}" for n, x in zip(names, shifts, strict=True) if n != names[first])
+    notes[f"{names[first]}.profile_shift"] = (
         f"estimated: specific sliding of {names[0]} and {names[1]} as equal as undercut, tips and contact "
         f"ratios allow; found with it: {others}"
     )
@@ -439,7 +439,7 @@ def _sections(
     gears: list[dict[str, Any]], of_all: dict[str, Any], size: float, beta: float, notes: dict[str, str]
 ) -> dict[str, dict[str, Any]]:
     """Sections of all gears, with rims and tips that run free."""
-    found = {}
+    sections = {}
     for gear in gears:
         section = dict(gear)
         name, internal = section.pop("name"), gear["name"] == "ring"
@@ -450,8 +450,8 @@ def _sections(
         key = "outer_radius" if internal else "bore_radius"
         rim = round(abs(radius - root) / size, 9)
         notes[f"{name}.{key}"] = f"estimated: a rim of {_MODULES.get(rim, f'{rim:.4g}')} modules"
-        found[name] = {**section, key: LENGTH.show(radius), "tip_diameter": FREE}
-    return found
+        sections[name] = {**section, key: LENGTH.show(radius), "tip_diameter": FREE}
+    return sections
 
 
 def _with_tips(tables: dict[str, Any], notes: dict[str, str]) -> Any:
@@ -489,7 +489,7 @@ def _planets(gears: PlanetarySet) -> tuple[int, dict[str, list[str]]]:
         room = planet_room(gears, angles)[0]
         if (total % count and equal) or room < gears.planet.module:
             continue
-        around = {"planet_angles": [f"{math.degrees(one):.10g} deg" for one in angles]}
+        around = {"planet_angles": [f"{math.degrees(angle):.10g} deg" for angle in angles]}
         return count, {} if equal else around
     return 1, {}
 
@@ -500,7 +500,7 @@ def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:
     even = [n for n in range(2, 13) if total % n == 0]
     counts = [n for n in even if len(neighbouring_teeth(sun, planet, ring, n, distance=0, closure=10))]
     near = neighbouring_teeth(sun, planet, ring, planets)
-    others = [" ".join(map(str, one)) for one in near.only(near.equally_spaced).teeth[:3]]
+    others = [" ".join(map(str, teeth_there)) for teeth_there in near.only(near.equally_spaced).teeth[:3]]
     remedies = [f"with these teeth --planets {' or '.join(map(str, counts))}"] if counts else []
     remedies += [f"with {planets} planets --teeth {' or '.join(others)}"] if others else []
     return CaseError(
@@ -536,12 +536,12 @@ def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     """Tables of a drivetrain: motor, shaft, the pair, shaft and load."""
     case = parse_case(case_text.write(pair))
     gears: Any = planetary_set(case)
-    known, width = estimates(case), planetary_set(case).mesh_widths[0]
-    bearing, ratio = known["gear_1.bearing_stiffness"], gears.gear_2.teeth / gears.gear_1.teeth
+    estimated, width = estimates(case), planetary_set(case).mesh_widths[0]
+    bearing, ratio = estimated["gear_1.bearing_stiffness"], gears.gear_2.teeth / gears.gear_1.teeth
     tilt = Estimate(0.75 * bearing.value * width**2, TORSION, "the bearing's stiffness over three face widths")
     how = "cylinder of the wheel's radius and four face widths"
     rotor = cylinder(0.0, gears.gear_2.reference_radius, 4.0 * width, case.material.density)
-    rotors = [Estimate(value, one, how) for value, one in zip(rotor, (MASS, INERTIA, INERTIA), strict=True)]
+    rotors = [Estimate(value, dimension, how) for value, dimension in zip(rotor, (MASS, INERTIA, INERTIA), strict=True)]
     modulus = case.material.youngs_modulus
     mesh = estimated_mesh_stiffness(modulus, modulus, width)
     stiffness = Estimate(mesh, STIFFNESS, "20 N/(mm um) times the face width")
@@ -549,13 +549,13 @@ def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
     tables |= {"body": [], "shaft": [], "parallel": [], "bearing": []}
 
     def add(table: str, given: dict[str, Any], **estimated: Estimate) -> None:
-        for key, one in estimated.items():
-            notes[f"{table}[{len(tables[table])}].{key}"] = f"estimated: {one.how}"
-        tables[table].append(given | {key: str(one) for key, one in estimated.items()})
+        for key, value in estimated.items():
+            notes[f"{table}[{len(tables[table])}].{key}"] = f"estimated: {value.how}"
+        tables[table].append(given | {key: str(value) for key, value in estimated.items()})
 
     for name, gear in (("motor", ""), ("pinion", "gear_1"), ("wheel", "gear_2"), ("load", "")):
         keys = f"{gear}.mass", f"{gear}.inertia", f"helical.{gear}.diametral_inertia"
-        mass, inertia, transverse = [known[key] for key in keys] if gear else rotors
+        mass, inertia, transverse = [estimated[key] for key in keys] if gear else rotors
         add("body", {"name": name}, mass=mass, inertia=inertia, transverse_inertia=transverse)
         add("bearing", {"body": name}, radial=bearing, tilt=tilt)
     for ends, torque in ((["motor", "pinion"], 1.0), (["wheel", "load"], ratio)):

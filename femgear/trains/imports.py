@@ -63,7 +63,7 @@ def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case:
     """
     stages = stage_components(model)
     if stage is not None:
-        chosen = [one for one in stages if one.id == stage]
+        chosen = [component for component in stages if component.id == stage]
         if not chosen:
             raise CaseError(
                 "no such stage",
@@ -71,40 +71,40 @@ def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case:
                 key="--stage",
                 value=stage,
                 file=model.name,
-                limit=", ".join(stage_in_words(model, one) for one in stages[:20]) or "none in the file",
+                limit=", ".join(stage_in_words(model, component) for component in stages[:20]) or "none in the file",
                 remedy="choose one by its id",
             )
-        left = [stage_in_words(model, one) for one in stages if one.id != stage]
+        left = [stage_in_words(model, component) for component in stages if component.id != stage]
         if left:
             model.remark("--stage", f"stages that are not taken: {_listed(left)}", first=True)
         stages = chosen
     model.chosen_case(load_case)
-    if not [one for one in stages if one.type in _READ]:
+    if not [component for component in stages if component.type in _READ]:
         # a file without a stage is refused as one without a planetary stage
         return [CaseDraft("", _text(model, *case_tables(model, stage, load_case), stage), "the stage")]
     if len(stages) > MOST_STAGES:
         limit = f"at most {MOST_STAGES}, or one by --stage"
         model.refuse(f"{len(stages)} stages are too many", "components", "name one by --stage", limit)
-    found: dict[str, tuple[dict, dict]] = {}
+    tables_of: dict[str, tuple[dict, dict]] = {}
     texts: dict[str, str] = {}
     refusals: list[FemgearError] = []
     flows = case_flows(model, load_case)
-    for one in stages:
+    for component in stages:
         try:
-            tables = _stage_tables(model, one, load_case, flows)
-            texts[one.id] = _text(model, *tables, one.id)
-            found[one.id] = tables
+            tables = _stage_tables(model, component, load_case, flows)
+            texts[component.id] = _text(model, *tables, component.id)
+            tables_of[component.id] = tables
         except FemgearError as error:
             if len(stages) == 1:
                 raise
             refusals.append(error)
             # with the attribute of the file that stands in the way
             why = " ".join(str(part) for part in (error.key, error.value) if part is not None)
-            text = f"{stage_in_words(model, one)} is not taken: {f'{why}: ' if why else ''}{error.message}"
-            model.remark(one.id, text, remedy=error.remedy or "", first=True)
+            text = f"{stage_in_words(model, component)} is not taken: {f'{why}: ' if why else ''}{error.message}"
+            model.remark(component.id, text, remedy=error.remedy or "", first=True)
     if not texts:
         raise refusals[0]
-    return list(_drafts(model, stages, found, texts, load_case, alone=stage is not None))
+    return list(_drafts(model, stages, tables_of, texts, load_case, alone=stage is not None))
 
 
 def _stage_tables(
@@ -132,8 +132,8 @@ def _text(model: Model, tables: dict, remarks: dict, stage: str | None) -> str:
                 left_out = _shortened(tables, error.key or "")
                 if not left_out:
                     raise
-                found = f"{error.message} ({error.value}; {error.limit}): {left_out}"
-                model.remark((error.key or "").partition("[")[0], found)
+                text_left_out = f"{error.message} ({error.value}; {error.limit}): {left_out}"
+                model.remark((error.key or "").partition("[")[0], text_left_out)
             else:
                 return text
 
@@ -153,18 +153,18 @@ def _shortened(tables: dict, key: str) -> str:
     return f"the {parts[number]['kind']} is taken to the end of the flank"
 
 
-def _drafts(model: Model, stages, found, texts, load_case: int | None, *, alone: bool) -> Iterator[CaseDraft]:
+def _drafts(model: Model, stages, tables_of, texts, load_case: int | None, *, alone: bool) -> Iterator[CaseDraft]:
     """The case without an id in its name, then those of the stages."""
-    planetary = [one for one in stages if one.type == "planetary_stage" and one.id in texts]
+    planetary = [stage for stage in stages if stage.type == "planetary_stage" and stage.id in texts]
     suffixes = {id: f"_{plain}" for id, plain in plain_ids(texts).items()}
     before = list(model.findings)
     if not alone:
         try:
-            text = _gearbox_text(model, found, load_case)
+            text = _gearbox_text(model, tables_of, load_case)
             yield CaseDraft("", text, f"gearbox of {'all stages' if len(stages) > 1 else 'the unit'}")
             return
         except NoGearbox as error:
-            model.findings[:] = before + [one for one in model.findings if one.key == SEATS]
+            model.findings[:] = before + [finding for finding in model.findings if finding.key == SEATS]
             if len(stages) > 1:
                 whole = f"no gearbox of all stages is written: {error}"
                 model.remark("", f"{whole}; each stage is a case of its own")
@@ -173,9 +173,9 @@ def _drafts(model: Model, stages, found, texts, load_case: int | None, *, alone:
         return
     if len(planetary) == 1:
         yield CaseDraft("", texts[planetary[0].id], stage_in_words(model, planetary[0]))
-    for one in stages:
-        if one.id in texts and not (one in planetary and len(planetary) == 1):
-            yield CaseDraft(suffixes[one.id], texts[one.id], stage_in_words(model, one))
+    for stage in stages:
+        if stage.id in texts and not (stage in planetary and len(planetary) == 1):
+            yield CaseDraft(suffixes[stage.id], texts[stage.id], stage_in_words(model, stage))
 
 
 # Keys of findings on supports of single stages and on their load cases, which are those of the gearbox.
@@ -184,10 +184,10 @@ _OF_STAGES = re.compile(r"(gear_\d|sun|carrier|ring)\.(bearing|support)_stiffnes
 
 def _gearbox_text(model: Model, stages: dict[str, tuple[dict, dict]], load_case: int | None) -> str:
     """Text of the gearbox; NoGearbox where it makes no case, or of a single stage without whole shafts."""
-    known = [one for one in model.findings if not _OF_STAGES.search(one.key)]
-    teeth, refused = {id: one for id, (one, _) in stages.items()}, dict[str, str]()
+    findings = [finding for finding in model.findings if not _OF_STAGES.search(finding.key)]
+    teeth, refused = {id: tables_there for id, (tables_there, _) in stages.items()}, dict[str, str]()
     while True:
-        model.findings[:] = known
+        model.findings[:] = findings
         tables, remarks = gearbox_tables(model, teeth, load_case, refused=refused)
         if len(stages) == 1 and not has_whole_shafts(tables):
             raise NoGearbox("the shafts of the only stage have no sections or no bearings")
@@ -203,8 +203,8 @@ def _gearbox_text(model: Model, stages: dict[str, tuple[dict, dict]], load_case:
                 raise NoGearbox(f"{first.key}: {first.message}{more}") from error
             refused |= wrong
     for kind, wanted in (("pair", "cylindrical_stage"), ("planetary", "planetary_stage")):
-        own = [one.id for one in stage_components(model) if one.type == wanted]
-        for number, id in enumerate(own):
+        ids = [stage_component.id for stage_component in stage_components(model) if stage_component.type == wanted]
+        for number, id in enumerate(ids):
             remarks |= {f"{kind}[{number}].teeth.{key}": text for key, text in stages[id][1].items()}
     head = f"# Written by femgear import (REXS {model.version}). What is assumed says so."
     return "\n".join([head, case_text.write(tables, remarks)])
@@ -212,13 +212,13 @@ def _gearbox_text(model: Model, stages: dict[str, tuple[dict, dict]], load_case:
 
 def _refused_bearings(tables: dict, error: FemgearError) -> dict[str, str]:
     """Bearings that a case refuses, by their names, and why."""
-    found: dict[str, str] = {}
-    for one in error.problems:
-        if place := re.match(r"bearing\[(\d+)\]\.(\w+)$", one.key or ""):
-            value = "" if one.value is None else f" {one.value}"
-            limit = f", allowed: {one.limit}" if one.limit else ""
-            found.setdefault(tables["bearing"][int(place[1])]["name"], f"{place[2]}{value}: {one.message}{limit}")
-    return found
+    refused: dict[str, str] = {}
+    for problem in error.problems:
+        if place := re.match(r"bearing\[(\d+)\]\.(\w+)$", problem.key or ""):
+            value = "" if problem.value is None else f" {problem.value}"
+            limit = f", allowed: {problem.limit}" if problem.limit else ""
+            refused.setdefault(tables["bearing"][int(place[1])]["name"], f"{place[2]}{value}: {problem.message}{limit}")
+    return refused
 
 
 def _listed(words: list[str]) -> str:

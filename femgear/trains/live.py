@@ -70,8 +70,8 @@ class Answer(Mapping[str, Any]):
     def of(self, case: Any) -> Answer:
         """Give the answer of another case, which shares all steps with this one."""
         # grids of teeth that are tried would fill the folder
-        known = isinstance(case, Case) and isinstance(self.case, Case)
-        same = not known or compliance_entries(case) == compliance_entries(self.case)
+        comparable = isinstance(case, Case) and isinstance(self.case, Case)
+        same = not comparable or compliance_entries(case) == compliance_entries(self.case)
         cache = self.cache if same else None
         return Answer(case, self.steps, cache=cache, progress=self._progress)
 
@@ -98,8 +98,8 @@ class Answer(Mapping[str, Any]):
         if (kept := self.steps.kept(stage.name, entries)) is not None:
             return kept
         taken = [self[name] if name in before else None for name in stage.takes]
-        known = {"cache": self.cache, "progress": self._progress, "steps": self.steps}
-        options = {name: known[name] for name in stage.options}
+        options_known = {"cache": self.cache, "progress": self._progress, "steps": self.steps}
+        options = {name: options_known[name] for name in stage.options}
         return self.steps.keep(stage.name, entries, stage.solve(self.case, *taken, **options))
 
 

@@ -72,10 +72,10 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     """
     data, lines = case_text.parse(text, name), text if numbered else ""
     try:
-        known = _train_of_file(data)
+        train = _train_of_file(data)
     except CaseError as error:
         raise combine([error], lines, name) from None
-    file, of_set = known.file, known.key != "model"
+    file, of_set = train.file, train.key != "model"
     files, unread = _embedded_files(_embed_of_set if of_set else file.embed, data, name)
     case_text.check_tree(data, name)
     try:
@@ -241,10 +241,10 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
     """Table or list under a part of a key; tables that are not there yet are made."""
     if isinstance(table, list):
         number = int(part[1:-1])
-        found = table[number] if number < len(table) else None
+        entry = table[number] if number < len(table) else None
     else:
-        found = table.setdefault(part, {}) if wanted is dict else table.get(part)
-    if not isinstance(found, (dict, list)) or not isinstance(found, wanted):
+        entry = table.setdefault(part, {}) if wanted is dict else table.get(part)
+    if not isinstance(entry, (dict, list)) or not isinstance(entry, wanted):
         kind = "table" if wanted is dict else "list"
         raise CaseError(
             f"{part} is not a {kind}",
@@ -255,7 +255,7 @@ def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type)
             # entries of a list can only be changed where the file has them
             remedy=None if wanted is dict else f"give the case a table [[{key.split('[')[0]}]] for every entry",
         )
-    return found
+    return entry
 
 
 def to_toml(case: Case) -> str:
@@ -277,24 +277,24 @@ def case_schema(model: str | None = None) -> dict[str, Any]:
     """
     if model is None:
         return every_section().model_json_schema()
-    own = _own_files()
-    if model not in own:
+    files = _own_files()
+    if model not in files:
         raise CaseError(
             "there is no such model",
             code="E-MODEL",
             key="--model",
             value=model,
-            limit=", ".join(own),
+            limit=", ".join(files),
             remedy="planetary sets have no model: leave it out",
         )
-    return own[model].file.model.model_json_schema()
+    return files[model].file.model.model_json_schema()
 
 
 @cache
 def every_section() -> type[Case]:
     """Make the model of a planetary set with the sections of all trains, for its keys and what they are."""
     fields: dict[str, Any] = {
-        one.key: (one.file.model.model_fields[one.key].annotation | None, None) for one in _sections()
+        section.key: (section.file.model.model_fields[section.key].annotation | None, None) for section in _sections()
     }
     return create_model("Case", __base__=Case, __doc__=Case.__doc__, **fields)
 
@@ -312,12 +312,12 @@ def _train_of_file(data: dict) -> registry.Known:
             remedy="update femgear",
         )
     if "model" in data:
-        own, model = _own_files(), data["model"]
-        if not isinstance(model, str) or model not in own:
+        files, model = _own_files(), data["model"]
+        if not isinstance(model, str) or model not in files:
             raise _unknown_model(model)
-        return own[model]
-    foreign = data.keys() - {*Case.model_fields, *(one.key for one in _sections())}
-    for train in [one for one in registry.TRAINS if one.key == "model"] if foreign else ():
+        return files[model]
+    foreign = data.keys() - {*Case.model_fields, *(section.key for section in _sections())}
+    for train in [other for other in registry.TRAINS if other.key == "model"] if foreign else ():
         if what := train.file.claims(data):
             raise CaseError(
                 f"a file with {what} needs its model",
@@ -330,28 +330,28 @@ def _train_of_file(data: dict) -> registry.Known:
 
 def _own_files() -> dict[str, registry.Known]:
     """Trains with a case file of their own, by the model that the file names."""
-    return {one.name: one for one in registry.trains() if one.key == "model"}
+    return {train.name: train for train in registry.trains() if train.key == "model"}
 
 
 def _sections() -> list[registry.Known]:
     """Trains that a section makes of a planetary set."""
-    return [one for one in reversed(registry.TRAINS) if one.key not in ("", "model")]
+    return [train for train in reversed(registry.TRAINS) if train.key not in ("", "model")]
 
 
 def _unknown_model(value: object) -> CaseError:
-    known = tuple(_own_files())
+    names = tuple(_own_files())
     if not isinstance(value, str):
-        message, limit = f"a text is needed, not {described(value)}", ", ".join(known)
+        message, limit = f"a text is needed, not {described(value)}", ", ".join(names)
         return CaseError(message, code="E-TYPE", key="model", value=value, limit=limit)
-    limit = f"{', '.join(known)}; planetary sets have no entry model"
-    return no_such("model", "model", value, known, "leave it out", limit=limit)
+    limit = f"{', '.join(names)}; planetary sets have no entry model"
+    return no_such("model", "model", value, names, "leave it out", limit=limit)
 
 
 def _train_of_set(data: dict) -> registry.Known:
     """Train whose section the tables of a planetary set hold; that without one where they hold none."""
-    given = [one for one in _sections() if one.key in data]
+    given = [section for section in _sections() if section.key in data]
     if len(given) > 1:
-        sections = [one.key for one in given]
+        sections = [section.key for section in given]
         raise CaseError(
             f"a set is {' or '.join(sections)}",
             code="E-CHOICE",
@@ -360,4 +360,4 @@ def _train_of_set(data: dict) -> registry.Known:
             limit="one of the sections",
             remedy="leave one of them out",
         )
-    return given[0] if given else next(one for one in registry.TRAINS if not one.key)
+    return given[0] if given else next(train for train in registry.TRAINS if not train.key)

@@ -64,8 +64,8 @@ class Installed(Known):
     def _loaded(self, place: str, name_of: Callable[[Any], str]) -> Any:
         """Load what stands at a place; a package that fails or names it otherwise is refused (E-LIBRARY)."""
         try:
-            found = resolve_name(place)
-            if (name := name_of(found)) != self.name:
+            loaded = resolve_name(place)
+            if (name := name_of(loaded)) != self.name:
                 raise ValueError(f"{place} is of {name}")
         except (Exception, SystemExit) as error:
             raise FemgearError(
@@ -74,7 +74,7 @@ class Installed(Known):
                 code="E-LIBRARY",
                 remedy=f"update {self.package} or remove it",
             ) from error
-        return found
+        return loaded
 
 
 def trains() -> tuple[Known, ...]:
@@ -82,28 +82,28 @@ def trains() -> tuple[Known, ...]:
 
     Of two of one name the first is kept, femgear's own before all others; the other one is told (W-PLUGIN).
     """
-    known = {one.name: one for one in TRAINS}
-    for one in _installed():
-        first = known.setdefault(one.name, one)
-        if first is not one:
-            _tell_taken(one, getattr(first, "package", "femgear"))
-    return tuple(known.values())
+    trains_of_names = {train.name: train for train in TRAINS}
+    for installed in _installed():
+        first = trains_of_names.setdefault(installed.name, installed)
+        if first is not installed:
+            _tell_taken(installed, getattr(first, "package", "femgear"))
+    return tuple(trains_of_names.values())
 
 
 @cache
-def _tell_taken(one: Installed, first: str) -> None:
+def _tell_taken(installed: Installed, first: str) -> None:
     """Tell once that a package has a train of a name that is taken."""
-    text = f"the package {one.package} has a train {one.name}, and so has {first}, whose is taken"
-    remedy = f"remove {one.package}, or rename its train"
+    text = f"the package {installed.package} has a train {installed.name}, and so has {first}, whose is taken"
+    remedy = f"remove {installed.package}, or rename its train"
     tell(Finding("W-PLUGIN", "", text, remedy=remedy), stacklevel=3)
 
 
 def stage_names() -> list[str]:
     """List the names of the stages of all trains, but of those that cannot be loaded."""
     names = dict[str, None]()
-    for one in trains():
+    for train in trains():
         with suppress(FemgearError):
-            names |= dict.fromkeys(stage.name for stage in one.train.stages)
+            names |= dict.fromkeys(stage.name for stage in train.train.stages)
     return list(names)
 
 
@@ -113,16 +113,22 @@ def _installed() -> tuple[Installed, ...]:
     from importlib.metadata import entry_points
 
     return tuple(
-        Installed(one.name, "model", f"{one.module}:FILE", f"{one.module}:TRAIN", one.dist.name if one.dist else "")
-        for one in sorted(entry_points(group=GROUP))
+        Installed(
+            entry_point.name,
+            "model",
+            f"{entry_point.module}:FILE",
+            f"{entry_point.module}:TRAIN",
+            entry_point.dist.name if entry_point.dist else "",
+        )
+        for entry_point in sorted(entry_points(group=GROUP))
     )
 
 
 def train_of(case) -> Train:
     """Find the train that a case is one of; other things are refused (E-TYPE)."""
-    for known in trains():
-        if known.name == getattr(case, "train", None):
-            return known.train
+    for train in trains():
+        if train.name == getattr(case, "train", None):
+            return train.train
     raise CaseError(f"a case is needed, not {described(case)}", code="E-TYPE", remedy="femgear.read_case reads one")
 
 
@@ -148,7 +154,7 @@ def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:
         allowed = [stage.name for stage in train.stages if not stage.unavailable(case)]
         raise CaseError(f"no stage {only}: {why}", code="E-STAGE", key="only", value=only, limit=", ".join(allowed))
     needs, needed = {stage.name: stage.before(case) for stage in train.stages}, {only}
-    while more := {one for name in needed for one in needs[name]} - needed:
+    while more := {stage for name in needed for stage in needs[name]} - needed:
         needed |= more
     return tuple(stage for stage in train.stages if stage.name in needed)
 

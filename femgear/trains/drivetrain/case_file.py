@@ -165,17 +165,17 @@ def torque_histories(case: DrivetrainCase, ratio: Mapping[str, float]) -> tuple[
 
     ``ratio`` holds the speeds of the bodies over that of the first one.
     """
-    found = [
-        TorqueHistory(one.body, np.array(one.times or [0.0]), np.array(one.torques or [one.torque]))
-        for one in case.operation.torque
-        if one.share is None
+    histories = [
+        TorqueHistory(torque.body, np.array(torque.times or [0.0]), np.array(torque.torques or [torque.torque]))
+        for torque in case.operation.torque
+        if torque.share is None
     ]
-    for one in case.operation.torque:
-        if one.share is not None:
-            times = np.unique(np.concatenate([history.times for history in found]))
-            power = np.sum([ratio[history.body] * history.at(times) for history in found], axis=0)
-            found.append(TorqueHistory(one.body, times, -one.share * power / ratio[one.body]))
-    return tuple(found)
+    for torque in case.operation.torque:
+        if torque.share is not None:
+            times = np.unique(np.concatenate([history.times for history in histories]))
+            power = np.sum([ratio[history.body] * history.at(times) for history in histories], axis=0)
+            histories.append(TorqueHistory(torque.body, times, -torque.share * power / ratio[torque.body]))
+    return tuple(histories)
 
 
 def settle_time(case: DrivetrainCase) -> float:
@@ -188,15 +188,15 @@ def check_entries_together(case: DrivetrainCase) -> list[CaseError]:
     """Refuse what no entry shows alone."""
     names = list(_names(case))
     checks = (_bodies, _bearings, _shafts, _sizes, _meshes, _torques, _simulation, _coordinates)
-    found = [*names, *(problem for check in checks for problem in check(case))]
-    return found if names else [*found, *_chain(case)]
+    problems = [*names, *(problem for check in checks for problem in check(case))]
+    return problems if names else [*problems, *_chain(case)]
 
 
 def _joints(case: DrivetrainCase) -> list[tuple[str, ...]]:
     """Key, and the two bodies, of every shaft and gear stage."""
-    found = [(f"shaft[{i}].between", *one.between) for i, one in enumerate(case.shaft)]
-    found += [(f"parallel[{i}].between", *one.between) for i, one in enumerate(case.parallel)]
-    return found + [(f"planetary[{i}].sun", one.carrier, one.sun) for i, one in enumerate(case.planetary)]
+    joints = [(f"shaft[{i}].between", *shaft.between) for i, shaft in enumerate(case.shaft)]
+    joints += [(f"parallel[{i}].between", *stage.between) for i, stage in enumerate(case.parallel)]
+    return joints + [(f"planetary[{i}].sun", stage.carrier, stage.sun) for i, stage in enumerate(case.planetary)]
 
 
 def _names(case: DrivetrainCase) -> Iterator[CaseError]:
@@ -213,8 +213,8 @@ def _names(case: DrivetrainCase) -> Iterator[CaseError]:
     used = [(key, name) for key, *ends in _joints(case) if ".between" in key for name in ends]
     for i, stage in enumerate(case.planetary):
         used += [(f"planetary[{i}].carrier", stage.carrier), (f"planetary[{i}].sun", stage.sun)]
-    used += [(f"bearing[{i}].body", one.body) for i, one in enumerate(case.bearing) if one.body is not None]
-    used += [(f"operation.torque[{i}].body", one.body) for i, one in enumerate(case.operation.torque)]
+    used += [(f"bearing[{i}].body", bearing.body) for i, bearing in enumerate(case.bearing) if bearing.body is not None]
+    used += [(f"operation.torque[{i}].body", torque.body) for i, torque in enumerate(case.operation.torque)]
     for key, name in used:
         if name not in names:
             yield no_such("body", key, name, names, "name a body of a [[body]] table", limit=", ".join(names[:20]))
@@ -265,25 +265,25 @@ def _bodies(case: DrivetrainCase) -> Iterator[CaseError]:
 
 def _bearings(case: DrivetrainCase) -> Iterator[CaseError]:
     elements = {shaft.between: shaft.elements for shaft in case.shaft}
-    for i, one in enumerate(case.bearing):
-        inside = (one.shaft is not None, one.station is not None)
-        if inside != (one.body is None,) * 2:
+    for i, bearing in enumerate(case.bearing):
+        inside = (bearing.shaft is not None, bearing.station is not None)
+        if inside != (bearing.body is None,) * 2:
             yield CaseError(
                 "a bearing sits on one body, or on one station inside a shaft",
                 code="E-CHOICE",
-                key=f"bearing[{i}].{'body' if one.body else 'shaft'}",
+                key=f"bearing[{i}].{'body' if bearing.body else 'shaft'}",
                 limit="body, or shaft with station",
             )
-        elif one.shaft and one.station and not one.station < elements.get(one.shaft, 0):
-            stations = elements.get(one.shaft, 0) - 1
+        elif bearing.shaft and bearing.station and not bearing.station < elements.get(bearing.shaft, 0):
+            stations = elements.get(bearing.shaft, 0) - 1
             yield CaseError(
                 "there is no such station",
                 code="E-CHOICE",
                 key=f"bearing[{i}].station",
-                value=one.station,
+                value=bearing.station,
                 limit=f"1 to {stations}" if stations > 0 else "a [[shaft]] with this between and 2 elements or more",
             )
-        if one.radial == one.tilt == 0.0:
+        if bearing.radial == bearing.tilt == 0.0:
             yield CaseError(
                 "a bearing without stiffness",
                 code="E-RANGE",
@@ -292,12 +292,12 @@ def _bearings(case: DrivetrainCase) -> Iterator[CaseError]:
                 limit="one of radial and tilt above 0",
                 remedy="give it, or leave the [[bearing]] out",
             )
-        if math.isinf(one.radial) and one.offset:
+        if math.isinf(bearing.radial) and bearing.offset:
             yield CaseError(
                 "a rigid bearing beside the centre of its body",
                 code="E-CHOICE",
                 key=f"bearing[{i}].offset",
-                value=LENGTH.show(one.offset),
+                value=LENGTH.show(bearing.offset),
                 limit="0 mm where radial is rigid",
                 remedy="give a finite stiffness",
             )
@@ -351,10 +351,10 @@ def _shaft_problem(shaft: ShaftSection, springs: list[str]) -> str:
 
 def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
     shares, bodies = [], []
-    for i, one in enumerate(case.operation.torque):
+    for i, torque in enumerate(case.operation.torque):
         key = f"operation.torque[{i}]"
-        series = len(one.given("times", "torques"))
-        given = one.given("torque", "file", "share") + ["times"] * bool(series)
+        series = len(torque.given("times", "torques"))
+        given = torque.given("torque", "file", "share") + ["times"] * bool(series)
         if len(given) != 1 or series == 1:
             yield CaseError(
                 "the torque on a body is given in one way",
@@ -362,25 +362,25 @@ def _torques(case: DrivetrainCase) -> Iterator[CaseError]:
                 key=f"{key}.{given[0] if given else 'torque'}",
                 limit="torque, file, times with torques, or share",
             )
-        elif one.times is not None and one.torques is not None:
-            if len(one.times) != len(one.torques) or any(b <= a for a, b in pairwise(one.times)):
+        elif torque.times is not None and torque.torques is not None:
+            if len(torque.times) != len(torque.torques) or any(b <= a for a, b in pairwise(torque.times)):
                 yield CaseError(
                     "the series needs ascending times, and as many torques",
                     code="E-TORQUE",
                     key=f"{key}.times",
-                    value=f"{len(one.times)} times, {len(one.torques)} torques",
+                    value=f"{len(torque.times)} times, {len(torque.torques)} torques",
                     remedy="sort the points by time, and keep one of every instant",
                 )
-        if one.body in bodies:
+        if torque.body in bodies:
             yield CaseError(
                 "a second torque on one body",
                 code="E-DUPLICATE",
                 key=f"{key}.body",
-                value=one.body,
+                value=torque.body,
                 remedy="add the torques up in one table",
             )
-        bodies.append(one.body)
-        shares += [key] if one.share is not None else []
+        bodies.append(torque.body)
+        shares += [key] if torque.share is not None else []
     if len(shares) > 1 or (shares and len(bodies) == 1):
         yield CaseError(
             "a share needs other torques that it balances, none of them a share",
@@ -492,13 +492,15 @@ def _meshes(case: DrivetrainCase) -> Iterator[CaseError]:
         elif stage.stiffness is not None:
             try:
                 pair = pair_case_of(case_text.write(stage.stiffness))
-                found = [*_unlike(pair, stage, key), *_unfit(pair, case.simulation.harmonics)]
+                problems = [*_unlike(pair, stage, key), *_unfit(pair, case.simulation.harmonics)]
             except FemgearError as error:
-                found = [CaseError(one.message, **_told(one)) for one in getattr(error, "problems", (error,))]
-            for one in found:
-                if not (one.key or "").startswith(key):
-                    one.key = f"{key}.stiffness.{one.key}"
-                yield one
+                problems = [
+                    CaseError(problem.message, **_told(problem)) for problem in getattr(error, "problems", (error,))
+                ]
+            for problem in problems:
+                if not (problem.key or "").startswith(key):
+                    problem.key = f"{key}.stiffness.{problem.key}"
+                yield problem
 
 
 @lru_cache(maxsize=8)
@@ -525,18 +527,20 @@ def _unlike(pair: GearCase, stage: ParallelSection, key: str) -> Iterator[CaseEr
         words = "the gears of a parallel stage are external"
         yield CaseError(words, code="E-CHOICE", key="gear_2.outer_radius", remedy="leave it out")
     angle = stage.pressure_angle
-    nearest = min(gears.gear_1.pressure_angle, gears.working_pressure_angle, key=lambda one: abs(one - angle))
+    nearest = min(
+        gears.gear_1.pressure_angle, gears.working_pressure_angle, key=lambda candidate: abs(candidate - angle)
+    )
     radii = [math.cos(angle) * radius for radius in stage.pitch_radii], [g.base_radius for g in gears.gears]
     teeth = list(stage.teeth), [gear.teeth for gear in gears.gears]
-    words = tuple(f"base radii {' and '.join(map(LENGTH.show, one))}" for one in radii)
+    words = tuple(f"base radii {' and '.join(map(LENGTH.show, radius))}" for radius in radii)
     size = next(iter(stage.given("radii", "base_radii", "module")), "module")
-    for name, found, wanted, shown in (
+    for name, value, wanted, shown in (
         ("teeth", *teeth, tuple(map(str, teeth))),
         ("helix_angle", abs(stage.helix_angle), helix, tuple(map(ANGLE.show, (stage.helix_angle, helix)))),
         ("pressure_angle", angle, nearest, tuple(map(ANGLE.show, (angle, nearest)))),
         (size, radii[0] or radii[1], radii[1], words),
     ):
-        if not np.allclose(found, wanted, rtol=_UNLIKE, atol=0.0):
+        if not np.allclose(value, wanted, rtol=_UNLIKE, atol=0.0):
             limit = f"{shown[1]}, transverse module {LENGTH.show(gears.gear_1.module)}"
             yield CaseError(
                 "the stage has not the gears of the pair that gives its stiffness",
@@ -713,7 +717,9 @@ def drivetrain_notices(case: DrivetrainCase) -> Iterator[Finding]:
     meshes = [(f"{key}.{name}", getattr(stage, name, None)) for key, stage in stages for name in _MESHES]
     bare = [key for key, mesh in meshes if mesh is not None and mesh.backlash is None]
     pairs = [(i, stage.stiffness) for i, stage in enumerate(case.parallel) if stage.stiffness is not None]
-    bare += [f"parallel[{i}].stiffness" for i, one in pairs if not line_play(pair_case_of(case_text.write(one)))]
+    bare += [
+        f"parallel[{i}].stiffness" for i, section in pairs if not line_play(pair_case_of(case_text.write(section)))
+    ]
     if bare:
         yield Finding(
             "W-BACKLASH",
@@ -752,13 +758,13 @@ def _teeth_notices(stage: ParallelSection | PlanetarySection, key: str) -> Itera
 
 def embed_files(data: dict, name: str) -> dict[str, str]:
     """Put torques, and the tables of pairs that give stages their stiffness, in the place of their files."""
-    found, stages = embed_torques(data, name), data.get("parallel")
+    files, stages = embed_torques(data, name), data.get("parallel")
     for i, table in enumerate(stages if isinstance(stages, list) else ()):
         if isinstance(table, dict) and isinstance(table.get("stiffness"), str):
             key, file = f"parallel[{i}].stiffness", table.pop("stiffness")
             table["stiffness"] = embedded(file, name, key, _pair_tables)
-            found[key] = case_text.printable(file)
-    return found
+            files[key] = case_text.printable(file)
+    return files
 
 
 def _pair_tables(path: str) -> dict:
@@ -792,11 +798,11 @@ def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
         decimal commas); the first line names them with their units, such as ``time [s]`` and
         ``torque [kN m]``, in either order. Empty lines and those that begin with ``#`` are skipped.
     """
-    found = read_columns(path, _DIMENSIONS, least=1, most=_MOST_POINTS, remedy=_COLUMNS)
-    times, torques = (_column(found, key) for key in ("time", "torque"))
-    for (before, after), line in zip(pairwise(times), found.lines[1:], strict=True):
+    columns = read_columns(path, _DIMENSIONS, least=1, most=_MOST_POINTS, remedy=_COLUMNS)
+    times, torques = (_column(columns, key) for key in ("time", "torque"))
+    for (before, after), line in zip(pairwise(times), columns.lines[1:], strict=True):
         if not after > before:
-            raise found.problem(
+            raise columns.problem(
                 "the times do not ascend",
                 line,
                 value=f"{after:g} s",
@@ -806,13 +812,13 @@ def read_torques(path: str | os.PathLike) -> dict[str, list[float]]:
     return {"times": times, "torques": torques}
 
 
-def _column(found: CsvColumns, key: str) -> list[float]:
+def _column(columns: CsvColumns, key: str) -> list[float]:
     """One column as the case will hold it, within the limits of a case file."""
     (low, high), dimension = _LIMITS[key], _DIMENSIONS[key]
-    values = [float(f"{value:{_DIGITS}}") for value in found.values[key]]
-    for value, line in zip(values, found.lines, strict=True):
+    values = [float(f"{value:{_DIGITS}}") for value in columns.values[key]]
+    for value, line in zip(values, columns.lines, strict=True):
         if not low <= value <= high:
-            raise found.problem(
+            raise columns.problem(
                 f"{dimension.name} of {dimension.show(value)} is not plausible",
                 line,
                 value=dimension.show(value),

@@ -95,9 +95,9 @@ def reached_speeds(
     instants, so that the speed there is a sum of trapezoids, and a parabola in between with its vertex where
     the sum is zero.
     """
-    instants = np.concatenate([[0.0, start, duration], *(one.times for one in torques)])
+    instants = np.concatenate([[0.0, start, duration], *(torque.times for torque in torques)])
     times = np.unique(np.clip(instants, 0.0, duration))
-    power = sum((model.ratio[one.body] * one.at(times) for one in torques), np.zeros(len(times)))
+    power = sum((model.ratio[torque.body] * torque.at(times) for torque in torques), np.zeros(len(times)))
     rate, step = power / model.inertia, np.diff(times)
     speeds = speed + np.append(0.0, np.cumsum(0.5 * step * (rate[1:] + rate[:-1])))
     begin = int(np.searchsorted(times, start))
@@ -399,16 +399,16 @@ def loose_motions(train: Drivetrain, *, turning: bool = True) -> tuple[int, tupl
     `drivetrain_model` does. At most six coordinates are named, rotations last.
     """
     model = drivetrain_model(replace(train, damping_ratio=0.0), harmonics=0, turning=turning)
-    lengths = [one.length for one in train.shafts]
-    lengths += [one.pitch_radii[0] for one in (*train.parallel, *train.planetary)]
+    lengths = [shaft.length for shaft in train.shafts]
+    lengths += [stage.pitch_radii[0] for stage in (*train.parallel, *train.planetary)]
     arm = math.exp(np.mean(np.log(lengths))) if lengths else 1.0
     stiffness = model.system.W @ model.system.W.T
-    for one in springs_of(train, model.place):
-        there = (one.stiffness > 0.0) & np.isfinite(one.stiffness)
-        rows = (one.rows * np.where(one.turns, arm, 1.0)[:, None])[there] @ model.free[one.places]
+    for spring in springs_of(train, model.place):
+        there = (spring.stiffness > 0.0) & np.isfinite(spring.stiffness)
+        rows = (spring.rows * np.where(spring.turns, arm, 1.0)[:, None])[there] @ model.free[spring.places]
         stiffness += rows.T @ rows
-    own = np.diag(stiffness)
-    size = np.sqrt(np.where(own > 0.0, own, 1.0))
+    diagonal = np.diag(stiffness)
+    size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
     # the spin is known, and held
     spin = model.rigid * size
     scaled = stiffness / np.outer(size, size) + np.outer(spin, spin) / (spin @ spin)
@@ -435,12 +435,12 @@ def _check_spread(train: Drivetrain, *, turning: bool) -> None:
     share = math.sqrt(n) * max(1e-12, 10.0 * n * np.finfo(float).eps)
     if n == 1 or values[1] > share * values[-1]:
         return
-    own = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
-    fast = model.system.dofs[int(np.argmax(own))]
+    hertz = np.sqrt(np.diag(stiffness) / np.diag(mass)) / (2.0 * math.pi)
+    fast = model.system.dofs[int(np.argmax(hertz))]
     factor = f"a factor of {1.0 / math.sqrt(share):.1g}"
     soft, key, body, value = _softest(train)
     # a support is the cause where it lies further from the middle than the fastest coordinate does
-    if soft * own.max() < np.median(own) ** 2:
+    if soft * hertz.max() < np.median(hertz) ** 2:
         slow = f"{body} on its bearings alone has {soft:.3g} Hz, slower"
         remedy = f"stiffen the bearings of {body}: theirs are the softest"
     else:
@@ -452,7 +452,7 @@ def _check_spread(train: Drivetrain, *, turning: bool) -> None:
         remedy += second.split(":")[0]
     raise CaseError(
         "natural frequencies are too far apart for double precision: "
-        f"{fast} by itself has {own.max():.3g} Hz, and {slow} by more than {factor}",
+        f"{fast} by itself has {hertz.max():.3g} Hz, and {slow} by more than {factor}",
         code="E-STIFFNESS",
         key=key,
         value=value,
@@ -472,14 +472,14 @@ def _slowest(model: DrivetrainModel, stiffness) -> str:
 
 def _softest(train: Drivetrain) -> tuple[float, str, str, str]:
     """Slowest body on its own bearings: frequency [Hz], key, body and stiffness; infinite without any."""
-    found = [(math.inf, "", "", "")]
+    estimates = [(math.inf, "", "", "")]
     for body in train.bodies:
-        places = [i for i, one in enumerate(train.bearings) if one.body == body.name]
+        places = [i for i, bearing in enumerate(train.bearings) if bearing.body == body.name]
         inertias = ("radial", body.mass, "N/m"), ("tilt", body.transverse_inertia, "N m/rad")
         for kind, inertia, unit in inertias if body.tilts else inertias[:1]:
             springs = [getattr(train.bearings[i], kind) for i in places]
             if sum(springs) > 0.0:
                 key = f"bearing[{places[int(np.argmax(springs))]}].{kind}"
                 hertz = math.sqrt(sum(springs) / inertia) / (2.0 * math.pi)
-                found.append((hertz, key, body.name, f"{max(springs):g} {unit}"))
-    return min(found)
+                estimates.append((hertz, key, body.name, f"{max(springs):g} {unit}"))
+    return min(estimates)

@@ -164,7 +164,7 @@ def band(time, values, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Find middle of the time (n,), least and largest of values (n,) in pieces (count,) that share ends."""
     time, values = np.asarray(time), np.asarray(values)
     first = np.linspace(0, len(time) - 1, count + 1).astype(int)
-    low, high = (one.reduceat(values, first[:-1]) for one in (np.minimum, np.maximum))
+    low, high = (extreme.reduceat(values, first[:-1]) for extreme in (np.minimum, np.maximum))
     # a piece ends where the next one begins: steep curves leave no gaps
     ends, middle = values[first[1:]], 0.5 * (time[first[:-1]] + time[first[1:]])
     return middle, np.minimum(low, ends), np.maximum(high, ends)
@@ -214,10 +214,10 @@ def stiffness_figure(model: DrivetrainModel) -> Figure:
     for ax in axes[len(first) :]:
         figure.delaxes(ax)
     for ax, (row, wave) in zip(axes, first):
-        known, words = _known_stiffness(wave, phase)
+        stiffness, words = _known_stiffness(wave, phase)
         series = 1e-6 * FourierSeries(model.stiffness[row]).at(2.0 * np.pi * phase[:, None])[:, 0]
         mean = 1e-6 * float(np.real(model.stiffness[row, 0]))
-        ax.plot(phase, 1e-6 * known, color=GREY, linewidth=1.4, label=words)
+        ax.plot(phase, 1e-6 * stiffness, color=GREY, linewidth=1.4, label=words)
         words = f"series of {model.stiffness.shape[1] - 1} terms"
         ax.plot(phase, series, color=COLOURS[0], label=words)
         ax.axhline(mean, color=COLOURS[1], linestyle="--", linewidth=1.2, label="mean")
@@ -362,8 +362,8 @@ def _side_bands(data, base: int, lines, title: str):
     if not planetary:
         return None
     orders, order = data["line_orders"].values, data["line_order"].values
-    own = base < 2 * planetary
-    if own:
+    of_stage = base < 2 * planetary
+    if of_stage:
         turn = np.flatnonzero((np.abs(orders).sum(axis=1) == 1) & (orders[:, base - 1] == 1))[0]
         shift, text, width = order[turn], "turn", _TURNS * order[turn]
     else:

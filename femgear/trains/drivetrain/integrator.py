@@ -86,8 +86,8 @@ class Spin:
         """Take the next `count` steps, which begin with step `first`; the spin moves on to their end."""
         times = self.step * np.arange(first, first + count + 1)
         values = np.zeros((count + 1, len(self.torques)))
-        for column, one in enumerate(self.torques):
-            values[:, column] = one.at(times)
+        for column, acting in enumerate(self.torques):
+            values[:, column] = acting.at(times)
         torque, h = values @ self.share, self.step
         rate = torque / self.inertia
         speed = self.speed + np.append(0.0, np.cumsum(0.5 * h * (rate[1:] + rate[:-1])))
@@ -275,10 +275,12 @@ def _march_pairs(scheme: ChainScheme, meshes: MeshBlock, loads, rows, steps: ran
     early, late = loads[start:stop:2], loads[start + 1 : stop : 2]
     begun = early[:, :at] @ of_state
     added = np.hstack([begun[:, :at] + late[:, :at], early[:, at:], begun[:, at:] + late[:, at:]])
-    found = np.zeros((pairs + 1, 2, at + 2 * m))
-    found[0, :, :at], found[0, :, at + m :] = rows[start, :, :at], rows[start, :, at:]
-    dot, double, after = np.dot, scheme.of_pairs, found[1:]
-    for before, end, motion, drawn, load, closed in zip(found, after, after[:, 0], after[:, :, at:], added, forces):
+    state_rows = np.zeros((pairs + 1, 2, at + 2 * m))
+    state_rows[0, :, :at], state_rows[0, :, at + m :] = rows[start, :, :at], rows[start, :, at:]
+    dot, double, after = np.dot, scheme.of_pairs, state_rows[1:]
+    for before, end, motion, drawn, load, closed in zip(
+        state_rows, after, after[:, 0], after[:, :, at:], added, forces
+    ):
         dot(before, double, out=end)
         motion += load
         drawn[:] = dot(drawn, closed)
@@ -315,14 +317,14 @@ def solve_overlaps(
     for number in range(_ROUNDS + _SINGLE):
         slopes = np.where(closed, touching, parted)
         u = np.linalg.solve(np.eye(len(free)) + flexibility * slopes, free)
-        found = _changed(u, closed, rounding)
-        wrong = np.flatnonzero(found != closed)
+        closed_now = _changed(u, closed, rounding)
+        wrong = np.flatnonzero(closed_now != closed)
         if not len(wrong):
             return u, closed
         # all that are wrong, or the first one alone
         wrong = wrong if number < _ROUNDS else wrong[:1]
         closed = closed.copy()
-        closed[wrong] = found[wrong]
+        closed[wrong] = closed_now[wrong]
     raise ConvergenceError(
         "no contacts of the meshes fit the end of a step",
         code="E-CONTACT",
@@ -396,11 +398,11 @@ class Separating:
             return np.full_like(x, np.nan)
         S = meshes.selection[i]
         free = np.dot(x[0], S) - self.gap
-        found = _changed(u, self.closed, _OVERLAP_ROUNDING * np.abs(free).max())
-        if np.array_equal(found, self.closed):
+        closed_now = _changed(u, self.closed, _OVERLAP_ROUNDING * np.abs(free).max())
+        if np.array_equal(closed_now, self.closed):
             return forces
         flexibility = np.dot(S.T, np.dot(scheme.flexibility, S))
-        self._take(solve_overlaps(flexibility, free, found, meshes.stiffness[i])[1])
+        self._take(solve_overlaps(flexibility, free, closed_now, meshes.stiffness[i])[1])
         return self._solved(scheme, meshes, i, x)[0]
 
     def _solved(self, scheme, meshes, i, x):
@@ -408,12 +410,12 @@ class Separating:
         S, k = meshes.selection[i], meshes.stiffness[i][self.touching]
         if not len(k):
             return np.zeros_like(x), np.dot(x[0], S) - self.gap
-        own, flexible = S.take(self.touching, axis=1), scheme.flexibility.T
-        inner = np.dot(np.dot(own.T, flexible), own) * k
+        columns_touching, flexible = S.take(self.touching, axis=1), scheme.flexibility.T
+        inner = np.dot(np.dot(columns_touching.T, flexible), columns_touching) * k
         inner.ravel()[:: len(k) + 1] += 1.0
-        right = np.dot(x, own)
+        right = np.dot(x, columns_touching)
         right[0] -= self.play
         right *= k
         # rows in C order are columns in that of Fortran: nothing is copied
-        forces = np.dot(self.dgesv(inner.T, right.T, overwrite_a=True, overwrite_b=True)[2].T, own.T)
+        forces = np.dot(self.dgesv(inner.T, right.T, overwrite_a=True, overwrite_b=True)[2].T, columns_touching.T)
         return forces, np.dot(x[0] - np.dot(forces[0], flexible), S) - self.gap

@@ -52,11 +52,11 @@ class Coordinates:
 def coordinates_of(train: Drivetrain) -> Coordinates:
     """List coordinates: five a body and a station of a shaft, three a planet, which follows its carrier."""
     names, body, planets, stations = [], {}, {}, []
-    for one in train.bodies:
-        body[one.name] = len(names)
-        names += [f"{one.name}: {axis}" for axis in _NAMES]
+    for member in train.bodies:
+        body[member.name] = len(names)
+        names += [f"{member.name}: {axis}" for axis in _NAMES]
         for number, stage in enumerate(train.planetary):
-            if stage.carrier == one.name:
+            if stage.carrier == member.name:
                 planets[number] = len(names) + np.arange(3 * len(stage.angles)).reshape(-1, 3)
                 axes = ("radial", "tangential", "rotation")
                 names += [f"{name}: {axis}" for name in train.planet_names(stage) for axis in axes]
@@ -88,15 +88,15 @@ def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
     Stiffnesses [N/m] along and [N m/rad] about the coordinates ``place`` of the chain, `coordinates_of`;
     infinite ones are conditions.
     """
-    found, turns = [], np.array([False, False, True, True, True])
+    springs, turns = [], np.array([False, False, True, True, True])
     stations = {shaft.between: own for shaft, own in zip(train.shafts, place.stations)}
     for shaft in train.shafts:
         length = shaft.length / max(shaft.elements, 1)
         s = joint_springs(shaft.section, length) if shaft.elements else shaft.springs
         stiffness = np.array([s.shear, s.shear, s.bending, s.bending, s.torsion])
-        for one, two in pairwise(stations[shaft.between]):
-            places = np.r_[one : one + 5, two : two + 5]
-            found.append(Springs(places, joint_deflections(length)[np.ix_(MOTIONS, ENDS)], stiffness, turns))
+        for start, end in pairwise(stations[shaft.between]):
+            places = np.r_[start : start + 5, end : end + 5]
+            springs.append(Springs(places, joint_deflections(length)[np.ix_(MOTIONS, ENDS)], stiffness, turns))
     for bearing in train.bearings:
         rows = np.eye(4)
         rows[0, 3], rows[1, 2] = bearing.offset, -bearing.offset
@@ -105,14 +105,14 @@ def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
             first = place.body[bearing.body or ""]
         else:
             first = stations[bearing.shaft or ()][bearing.station]
-        found.append(Springs(first + np.arange(4), rows, stiffness, turns[:4]))
+        springs.append(Springs(first + np.arange(4), rows, stiffness, turns[:4]))
     for number, stage in enumerate(train.planetary):
         if math.isfinite(stage.planet_bearing):
             pins = pin_directions(planar_of(train, stage)).reshape(-1, 2 * len(stage.angles))
             rows = pins.T @ lumped_map(stage, place, number)
             stiffness = np.full(len(rows), stage.planet_bearing)
-            found.append(Springs(np.arange(place.count), rows, stiffness, np.zeros(len(rows), bool)))
-    return found
+            springs.append(Springs(np.arange(place.count), rows, stiffness, np.zeros(len(rows), bool)))
+    return springs
 
 
 def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray, tuple[str, ...]]:
@@ -122,11 +122,11 @@ def free_coordinates(train: Drivetrain, place: Coordinates) -> tuple[np.ndarray,
     fewer.
     """
     held = np.zeros(place.count, bool)
-    for one in train.bodies:
-        if not one.tilts:
-            held[place.body[one.name] + np.array([2, 3])] = True
-    for stage, own in zip(train.planetary, place.planets):
-        held[own[:, :2]] |= math.isinf(stage.planet_bearing)
+    for body in train.bodies:
+        if not body.tilts:
+            held[place.body[body.name] + np.array([2, 3])] = True
+    for stage, planet in zip(train.planetary, place.planets):
+        held[planet[:, :2]] |= math.isinf(stage.planet_bearing)
     groups = [np.zeros((0, place.count))]
     for group in springs_of(train, place):
         stiff = group.rows[np.isinf(group.stiffness)]
@@ -167,7 +167,7 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
         for p in planets[:, 2]:
             condition((s, sun), (p, planet), (c, -(sun + planet)))
             condition((c, ring - planet), (p, planet))
-    rotations = sorted({*turn.values(), *(int(p) for own in place.planets for p in own[:, 2])})
+    rotations = sorted({*turn.values(), *(int(p) for planet_dofs in place.planets for p in planet_dofs[:, 2])})
     rotations += [first + 4 for _, *inner, _ in place.stations for first in inner]
     table = np.array(rows).reshape(-1, place.count)[:, rotations]
     _, values, vectors = np.linalg.svd(table)
@@ -253,10 +253,10 @@ def mesh_geometry(train: Drivetrain, place: Coordinates, spin: np.ndarray) -> Me
     for number, places in enumerate(planar):
         at = count + 4 * number + np.arange(4)
         basic[places, at] = 1.0
-        own = np.flatnonzero(stages == number)
-        basic[np.ix_(places, own)] = 0.0
-        turned = _turned_directions(total[np.ix_(places, own)])
-        even[number][np.ix_(at, own)], odd[number][np.ix_(at, own)] = turned
+        of_stage = np.flatnonzero(stages == number)
+        basic[np.ix_(places, of_stage)] = 0.0
+        turned = _turned_directions(total[np.ix_(places, of_stage)])
+        even[number][np.ix_(at, of_stage)], odd[number][np.ix_(at, of_stage)] = turned
     fixed = np.vstack([np.eye(count), np.zeros((extra, count))])
     names = tuple(numbered([mesh.name for mesh in train.meshes]))
     return MeshGeometry(names, basic, fixed, even, odd, stages)
@@ -278,7 +278,7 @@ def _flank_directions(train: Drivetrain, place: Coordinates, spin, *, back: bool
 def _planar_places(train: Drivetrain, place: Coordinates) -> list[np.ndarray]:
     """Per planetary stage the places (4,) of x and y of the carrier and the sun."""
     firsts = [(place.body[stage.carrier], place.body[stage.sun]) for stage in train.planetary]
-    return [np.array([one, one + 1, two, two + 1]) for one, two in firsts]
+    return [np.array([first, first + 1, two, two + 1]) for first, two in firsts]
 
 
 def _turned_directions(direction) -> tuple[np.ndarray, np.ndarray]:
@@ -313,8 +313,8 @@ def planar_of(train: Drivetrain, stage: PlanetarySection) -> PlanarSet:
 
 def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.ndarray:
     """Compute coordinates (3 (N + 3), n) of the stage `number` per unit of the chain's, at angle zero."""
-    own, (sun_radius, planet_radius, _) = place.planets[number], stage.base_radii
-    B = np.zeros((9 + 3 * len(own), place.count))
+    planet_dofs, (sun_radius, planet_radius, _) = place.planets[number], stage.base_radii
+    B = np.zeros((9 + 3 * len(planet_dofs), place.count))
     for row, name, radius in (
         (0, stage.carrier, stage.axis_distance),
         (6, stage.sun, sun_radius),
@@ -322,7 +322,7 @@ def lumped_map(stage: PlanetarySection, place: Coordinates, number: int) -> np.n
         first = place.body[name]
         B[row, first] = B[row + 1, first + 1] = 1.0
         B[row + 2, first + 4] = radius
-    for p, planet in enumerate(own):
+    for p, planet in enumerate(planet_dofs):
         B[11 + 3 * p, planet[2]] = planet_radius
         if math.isfinite(stage.planet_bearing):
             B[9 + 3 * p, planet[0]] = B[10 + 3 * p, planet[1]] = 1.0
@@ -421,11 +421,13 @@ def flank_contacts(train: Drivetrain, place: Coordinates, spin, T, geometry: Mes
         whole[..., : len(geometry.fixed), :count] = part
     columns = [np.append(j, _shared(geometry, j)) for j in range(count)]
     for column, j in enumerate(behind.tolist(), start=count):
-        stage, own, radial = geometry.stage[j], _shared(geometry, j), [extra[j]] if j in extra else []
+        stage, coordinates, radial = geometry.stage[j], _shared(geometry, j), [extra[j]] if j in extra else []
         fixed[j, column], fixed[radial, column] = -1.0, 1.0
         if stage < len(planar):
-            even[stage, own, column], odd[stage, own, column] = _turned_directions(total[planar[stage], j])
-        columns.append(np.r_[j, radial, own].astype(int))
+            even[stage, coordinates, column], odd[stage, coordinates, column] = _turned_directions(
+                total[planar[stage], j]
+            )
+        columns.append(np.r_[j, radial, coordinates].astype(int))
     names = (*geometry.names, *(f"{geometry.names[j]}, back flank" for j in behind))
     mesh = np.r_[np.arange(count), behind].astype(int)
     basic = np.hstack([geometry.basic, apart[:, behind[wedges]]])

@@ -102,19 +102,19 @@ def drivetrain_layout(train: Drivetrain) -> Layout:
 
 def _wheels(train: Drivetrain, places, size: float) -> list[Wheel]:
     order = [body.name for body in train.bodies]
-    found = []
+    wheels = []
     for stage in train.planetary:
         plate = places[stage.carrier] - np.array([0.0, 0.0, 0.2 * size])
-        found.append((stage.carrier, plate, stage.axis_distance, 0.06 * size))
-        found.append((stage.sun, places[stage.sun], stage.pitch_radii[0], 0.2 * size))
+        wheels.append((stage.carrier, plate, stage.axis_distance, 0.06 * size))
+        wheels.append((stage.sun, places[stage.sun], stage.pitch_radii[0], 0.2 * size))
     for stage in train.parallel:
         first, second = (places[name] for name in stage.between)
         # in the plane of the second gear
         centres = np.array([first[0], first[1], second[2]]), second
-        found += [(*one, 0.2 * size) for one in zip(stage.between, centres, stage.pitch_radii)]
-    geared = {name for name, *_ in found}
-    found += [(n, places[n], _PLAIN * size, 0.3 * size) for n in order if n not in geared]
-    return [Wheel(name, centre, radius, width, order.index(name)) for name, centre, radius, width in found]
+        wheels += [(*wheel, 0.2 * size) for wheel in zip(stage.between, centres, stage.pitch_radii)]
+    geared = {name for name, *_ in wheels}
+    wheels += [(n, places[n], _PLAIN * size, 0.3 * size) for n in order if n not in geared]
+    return [Wheel(name, centre, radius, width, order.index(name)) for name, centre, radius, width in wheels]
 
 
 def layout_motion(model: DrivetrainModel, layout: Layout, shape) -> tuple[np.ndarray, np.ndarray]:
@@ -148,14 +148,14 @@ def shaft_centre_lines(
     joint stands for. In the order of the shafts of the chain.
     """
     place, full = model.place, model.free @ shape
-    found = []
+    lines = []
     for shaft, first, ends in zip(model.train.shafts, place.stations, layout.shafts):
         stations = full[np.array(first)[:, None] + np.arange(5)]
         share, across = _beam_line(shaft, stations, points if shaft.elements else 3 * points)
-        one, two = layout.centre[list(ends)]
-        rest = one + share[:, None] * (two - one)
-        found.append((rest, np.column_stack([across, np.zeros(len(share))])))
-    return tuple(found)
+        start, end = layout.centre[list(ends)]
+        rest = start + share[:, None] * (end - start)
+        lines.append((rest, np.column_stack([across, np.zeros(len(share))])))
+    return tuple(lines)
 
 
 def _beam_line(shaft, stations, points: int) -> tuple[np.ndarray, np.ndarray]:
@@ -245,20 +245,20 @@ def _add_shape(pv, plotter, layout: Layout, move, turn, lines):
     centres, places = layout.centre, [wheel.body for wheel in layout.wheels]
     discs = [_disc(pv, wheel) for wheel in layout.wheels]
     fields = [move[p] + np.cross(turn[p], d.points - centres[p]) for d, p in zip(discs, places)]
-    lengths = [np.linalg.norm(one, axis=1) for one in (*fields, *(across for _, across in lines))]
+    lengths = [np.linalg.norm(field, axis=1) for field in (*fields, *(across for _, across in lines))]
     extent = np.ptp(np.vstack([disc.points for disc in discs]), axis=0).max()
     # a shaft may move more than any disc
     reach = max(length.max() for length in lengths)
     scale = _SHARE * extent / reach if reach > 0.0 else 0.0
     moves = [(centres[p], scale * move[p], scale * turn[p]) for p in places]
     rest, whole = pv.merge(discs, merge_points=False), pv.merge(discs, merge_points=False)
-    whole.points = np.vstack([_moved(disc.points, *own) for disc, own in zip(discs, moves)])
+    whole.points = np.vstack([_moved(disc.points, *motion) for disc, motion in zip(discs, moves)])
     length = np.concatenate(lengths[: len(discs)])
     whole[_COLOURS] = length / (length.max() or 1.0)
     style = {"cmap": "cividis", "clim": (0.0, 1.0), "lighting": False, "show_scalar_bar": False}
     plotter.add_mesh(whole, scalars=_COLOURS, **style)
     spokes = [_spoke(wheel) for wheel in layout.wheels]
-    turned = [_moved(spoke, *own) for spoke, own in zip(spokes, moves)]
+    turned = [_moved(spoke, *motion) for spoke, motion in zip(spokes, moves)]
     for mesh, colour, width, front in (
         (rest.extract_feature_edges(**_EDGES), _REST, 2.0, 0.0),
         (_polylines(pv, [*spokes, *(line for line, _ in lines)]), _REST, 3.0, 0.0),
@@ -356,7 +356,7 @@ def write_mode_pictures(folder: Path, model: DrivetrainModel, modes: xr.Dataset,
     apart |= kinds[elastic][1:] != kinds[elastic][:-1]
     for pair in np.split(elastic, np.flatnonzero(apart) + 1)[:count]:
         mode, shape = int(pair[0]), modes["shape"].values[:, pair[0]]
-        title = f"mode{'s' * (len(pair) > 1)} {' and '.join(str(one + 1) for one in pair)}"
+        title = f"mode{'s' * (len(pair) > 1)} {' and '.join(str(number + 1) for number in pair)}"
         title += f": {hertz[mode]:.2f} Hz, {kinds[mode]}"
         names.append(f"drivetrain_mode_{mode + 1}.png")
         move, turn = layout_motion(model, layout, shape)

@@ -246,9 +246,9 @@ def drivetrain_problem(
     number, elements = np.arange(len(geometry.names)), []
     for back in (False, True):
         for stage in np.unique(geometry.stage):
-            own = np.flatnonzero((geometry.stage == stage) & ((number >= count) == back))
-            if len(own):
-                elements.append(_flanks(model, geometry, own, int(stage), separates))
+            contacts_of_stage = np.flatnonzero((geometry.stage == stage) & ((number >= count) == back))
+            if len(contacts_of_stage):
+                elements.append(_flanks(model, geometry, contacts_of_stage, int(stage), separates))
     load = model.system.load.copy()
     for name, torque in (torques or {}).items():
         load[model.index(f"{name}: rotation")] += torque
@@ -293,20 +293,20 @@ class _TurningMeshes:
         return force[..., None] * S, slope[..., None, None] * S[..., :, None] * S[..., None, :]
 
 
-def _flanks(model: DrivetrainModel, geometry: MeshGeometry, own, stage: int, separates: bool) -> _TurningMeshes:
+def _flanks(model: DrivetrainModel, geometry: MeshGeometry, chosen, stage: int, separates: bool) -> _TurningMeshes:
     """Element of like flanks of a stage."""
     contacts, planetary = model.contacts, stage < len(geometry.even)
-    meshes, n_bases = contacts.mesh[own], len(model.bases)
+    meshes, n_bases = contacts.mesh[chosen], len(model.bases)
     empty, fixed = np.zeros_like(geometry.fixed), geometry.fixed
     even, odd = (geometry.even[stage], geometry.odd[stage]) if planetary else (empty, empty)
     if not model.turning:
         fixed, even, odd = fixed + even, empty, empty
-    used = [contacts.columns[j] for j in own]
+    used = [contacts.columns[j] for j in chosen]
     order = orders_of(int(model.mesh_base[meshes[0]]), n_bases)
     turn = orders_of(2 * stage, n_bases, int(planetary))
-    fixed, even, odd = (np.array([s[u, j] for u, j in zip(used, own)]) for s in (fixed, even, odd))
+    fixed, even, odd = (np.array([s[u, j] for u, j in zip(used, chosen)]) for s in (fixed, even, odd))
     stiffness = FourierSeries(model.stiffness[meshes], order)
-    return _TurningMeshes(np.array(used), fixed, even, odd, stiffness, turn, contacts.gap[own], separates)
+    return _TurningMeshes(np.array(used), fixed, even, odd, stiffness, turn, contacts.gap[chosen], separates)
 
 
 def balanced_torque(model: DrivetrainModel, driver: str, torque: float, output: str) -> dict[str, float]:
@@ -355,8 +355,8 @@ def _matrices(train: Drivetrain, place: Coordinates, spin: np.ndarray):
     for shaft, stations in zip(train.shafts, place.stations):
         if shaft.elements:
             mass, _, gyroscopic = beam_element(shaft.section, shaft.length / shaft.elements)
-            for one, two in itertools.pairwise(stations):
-                at = np.r_[one : one + 5, two : two + 5]
+            for start, end in itertools.pairwise(stations):
+                at = np.r_[start : start + 5, end : end + 5]
                 M[np.ix_(at, at)] += mass[np.ix_(ENDS, ENDS)]
                 G[np.ix_(at, at)] += gyroscopic[np.ix_(ENDS, ENDS)] * spin[stations[0] + 4]
     for group in springs_of(train, place):
@@ -442,9 +442,9 @@ def torsional_model(train: Drivetrain, **options) -> DrivetrainModel:
     """Make a model as `drivetrain_model` with all axes held: rotations and twist alone, no weight."""
     held = replace(
         train,
-        bodies=tuple(one.changed(tilts=False) for one in train.bodies),
-        bearings=tuple(BearingSection.in_si(body=one.name, radial=math.inf) for one in train.bodies),
-        planetary=tuple(one.changed(planet_bearing=math.inf) for one in train.planetary),
+        bodies=tuple(body.changed(tilts=False) for body in train.bodies),
+        bearings=tuple(BearingSection.in_si(body=body.name, radial=math.inf) for body in train.bodies),
+        planetary=tuple(stage.changed(planet_bearing=math.inf) for stage in train.planetary),
         gravity=0.0,
     )
     return drivetrain_model(held, **options)
@@ -504,8 +504,8 @@ def _computed_mesh(text: str) -> ComputedMesh:
     # a negative torque is the drive of gear 2: positions run backwards
     samples = values if pair.operation.torque > 0.0 else values[-np.arange(len(values)) % len(values)]
     ratio = static.planetary_set.contact_ratio + abs(static.overlap_ratio)
-    known = {"stiffness": float(values.mean()), "contact_ratio": ratio, "backlash": line_play(pair) or None}
-    return ComputedMesh.in_si(samples=tuple(samples.tolist()), **known)
+    values_of_mesh = {"stiffness": float(values.mean()), "contact_ratio": ratio, "backlash": line_play(pair) or None}
+    return ComputedMesh.in_si(samples=tuple(samples.tolist()), **values_of_mesh)
 
 
 @contextmanager
@@ -531,15 +531,15 @@ def with_drivers(train: Drivetrain, torques: Sequence[TorqueHistory], *, duratio
     CaseError: a torque on no body, stages that leave no single spin (E-DRIVETRAIN).
     """
     stages = train.stages
-    if not torques or all(one.driver is not None for one in stages):
+    if not torques or all(stage.driver is not None for stage in stages):
         return train
     force = _stage_forces(train, torques, duration)
-    found: list = [
-        one.changed(driver=one.ends[1]) if one.driver is None and value < 0.0 else one
-        for one, value in zip(stages, force)
+    driven: list = [
+        stage.changed(driver=stage.ends[1]) if stage.driver is None and value < 0.0 else stage
+        for stage, value in zip(stages, force)
     ]
     planets = len(train.planetary)
-    return replace(train, planetary=tuple(found[:planets]), parallel=tuple(found[planets:]))
+    return replace(train, planetary=tuple(driven[:planets]), parallel=tuple(driven[planets:]))
 
 
 def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration: float) -> np.ndarray:
@@ -547,14 +547,14 @@ def _stage_forces(train: Drivetrain, torques: Sequence[TorqueHistory], duration:
     model = torsional_model(replace(train, damping_ratio=0.0), harmonics=0, turning=False)
     W, k, carried = model.system.W, model.mean_stiffness, model.system.M @ model.rigid
     flexibility, force = static_flexibility(model, W, k), np.zeros((len(k), len(torques)))
-    for column, one in enumerate(torques):
+    for column, torque_there in enumerate(torques):
         load = np.zeros(len(carried))
-        load[model.index(f"{one.body}: rotation")] = one.mean(duration)
+        load[model.index(f"{torque_there.body}: rotation")] = torque_there.mean(duration)
         load -= carried * (model.rigid @ load) / model.inertia
         force[:, column] = k * (W.T @ flexibility @ load)
     sums = np.zeros((len(train.stages), len(torques)))
     np.add.at(sums, model.geometry.stage, force)
     total = sums.sum(axis=1)
     # the model's flanks are those of the drivers that are given
-    default = [one.flank for one in train.stages]
+    default = [stage.flank for stage in train.stages]
     return np.where(np.abs(total) > _NO_FORCE * np.abs(sums).sum(axis=1), total * default, 0.0)

@@ -248,7 +248,7 @@ class ParallelSection(Part):
         """Pitch radii of both gears [m]."""
         if self.module is not None:
             return tuple(0.5 * self.module * teeth for teeth in self.teeth)
-        return self.radii or tuple(one / math.cos(self.pressure_angle) for one in self.base_radii or ())
+        return self.radii or tuple(radius / math.cos(self.pressure_angle) for radius in self.base_radii or ())
 
 
 class PlanetarySection(Part):
@@ -430,17 +430,17 @@ class Drivetrain:
     @property
     def meshes(self) -> tuple[StageMesh, ...]:
         """Meshes of the stages in their order; of a planetary one those of the sun before the ring's."""
-        found = []
-        for i, one in enumerate(self.planetary):
-            suns = [f"{one.sun}-planet {p + 1}" for p in range(len(one.angles))]
-            rings = [f"planet {p + 1}-ring of {one.carrier}" for p in range(len(one.angles))]
-            for names, entry, mesh in ((suns, "sun_mesh", one.sun_mesh), (rings, "ring_mesh", one.ring_mesh)):
-                found += [StageMesh(name, i, f"planetary[{i}].{entry}", mesh, p) for p, name in enumerate(names)]
-        for i, one in enumerate(self.parallel):
-            assert one.mesh is not None  # given, or computed by `femgear.trains.drivetrain.model`
-            entry = "mesh" if one.stiffness is None else "stiffness"
-            found.append(StageMesh(one.name, len(self.planetary) + i, f"parallel[{i}].{entry}", one.mesh))
-        return tuple(found)
+        meshes = []
+        for i, stage in enumerate(self.planetary):
+            suns = [f"{stage.sun}-planet {p + 1}" for p in range(len(stage.angles))]
+            rings = [f"planet {p + 1}-ring of {stage.carrier}" for p in range(len(stage.angles))]
+            for names, entry, mesh in ((suns, "sun_mesh", stage.sun_mesh), (rings, "ring_mesh", stage.ring_mesh)):
+                meshes += [StageMesh(name, i, f"planetary[{i}].{entry}", mesh, p) for p, name in enumerate(names)]
+        for i, stage in enumerate(self.parallel):
+            assert stage.mesh is not None  # given, or computed by `femgear.trains.drivetrain.model`
+            entry = "mesh" if stage.stiffness is None else "stiffness"
+            meshes.append(StageMesh(stage.name, len(self.planetary) + i, f"parallel[{i}].{entry}", stage.mesh))
+        return tuple(meshes)
 
     def planet_names(self, stage: PlanetarySection) -> list[str]:
         """Name the planets of a stage: ``planet 1``, or ``planet of carrier 1`` beside other stages."""
@@ -449,7 +449,7 @@ class Drivetrain:
 
     def body(self, name: str) -> BodySection:
         """Find the body of that name."""
-        return next(one for one in self.bodies if one.name == name)
+        return next(body for body in self.bodies if body.name == name)
 
 
 @dataclass(frozen=True)
@@ -485,11 +485,11 @@ def constant_torques(torques: dict[str, float]) -> tuple[TorqueHistory, ...]:
 
 def numbered(names: Sequence[str]) -> list[str]:
     """Number names that come again with the next free number: ``a-b``, ``a-b 2``."""
-    found: list[str] = []
+    numbered_names: list[str] = []
     for name in names:
         number, text = 1, name
-        while text in found:
+        while text in numbered_names:
             number += 1
             text = f"{name} {number}"
-        found.append(text)
-    return found
+        numbered_names.append(text)
+    return numbered_names

@@ -74,12 +74,12 @@ class DrivetrainModesResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
-        modes, model, found = self.modes, self.model, self.campbell
+        modes, model, campbell = self.modes, self.model, self.campbell
         members, energy, rotation = _energies(model, modes.shape)
         bases = np.unique(model.mesh_base)
         orders = model.base_ratio[bases]
-        critical, over_speed = found.critical, "natural frequency over the speed"
-        at = [one.speed / RPM for one in critical]
+        critical, over_speed = campbell.critical, "natural frequency over the speed"
+        at = [critical_speed.speed / RPM for critical_speed in critical]
         line = orders * self.speed / (2 * np.pi)
         variables = mode_entries(modes) | {
             "kind": ("mode", _kinds(modes.frequency, rotation), "1", "rigid, torsional, bending or mixed"),
@@ -89,7 +89,7 @@ class DrivetrainModesResult(StageResult):
             "ratio": ("body", list(model.ratio.values()), "1", "speed over that of the first body"),
             "base_order": ("base", orders, "1", "mesh frequency over the first body's turn"),
             "mesh_frequency": ("base", line, "Hz", "mesh frequency at the speed of the operation"),
-            "campbell_frequency": ("campbell_speed branch", found.frequency, "Hz", over_speed),
+            "campbell_frequency": ("campbell_speed branch", campbell.frequency, "Hz", over_speed),
             "critical_speed": ("crossing", at, "rpm", "speed of a mesh line on a branch"),
             "critical_frequency": ("crossing", [c.frequency for c in critical], "Hz", "frequency there"),
         }
@@ -99,7 +99,7 @@ class DrivetrainModesResult(StageResult):
             "mesh": _names("mesh", model.meshes, "gear mesh"),
             "body": _names("body", model.ratio, "body"),
             "base": _names("base", [model.bases[b] for b in bases], "mesh of a stage"),
-            "campbell_speed": (("campbell_speed",), found.speed / RPM, "rpm", "speed of the first body"),
+            "campbell_speed": (("campbell_speed",), campbell.speed / RPM, "rpm", "speed of the first body"),
         }
         attrs = {"title": "modes of the drivetrain, mean mesh stiffness", "unknowns": len(modes.shape)}
         return Contents(variables, coords, attrs)
@@ -287,16 +287,16 @@ class SpectrumResult(StageResult):
         """Collect the contents of spectrum.nc."""
         transient = self.transient
         model, variants = next(iter(transient.models.values())), list(self.spectra)
-        some, tracked = self.spectra[variants[0]], self.orders
-        length = min(len(one.frequency) for one in tracked.values())
+        spectrum, tracked = self.spectra[variants[0]], self.orders
+        length = min(len(order_spectrum.frequency) for order_spectrum in tracked.values())
         order = tracked[variants[0]].frequency[:length]
         lines, distance = self.lines, self.order_distance
         amplitude = [self.spectra[v].amplitude for v in variants]
         by_order = [tracked[v].amplitude[:, :length] for v in variants]
         averaged = "amplitude spectrum of the mesh force, root of the mean square of the segments, peak values"
         single = "amplitude of the mesh force over orders of the first body, one segment, peak values"
-        line, orders = [self.amplitudes[v] for v in variants], np.array([one.order for one in lines])
-        hertz, multiples = orders * self.speed / (2 * np.pi), [one.orders for one in lines]
+        line, orders = [self.amplitudes[v] for v in variants], np.array([mesh_line.order for mesh_line in lines])
+        hertz, multiples = orders * self.speed / (2 * np.pi), [mesh_line.orders for mesh_line in lines]
         of_line = "amplitude of the line, peak value; NaN beyond the pass band"
         variables = {
             "amplitude": ("variant mesh frequency", amplitude, "N", averaged),
@@ -311,7 +311,7 @@ class SpectrumResult(StageResult):
         coords = {
             "variant": _names("variant", variants, "model"),
             "mesh": _names("mesh", model.meshes, "gear mesh"),
-            "frequency": (("frequency",), some.frequency, "Hz", "frequency"),
+            "frequency": (("frequency",), spectrum.frequency, "Hz", "frequency"),
             "order": (("order",), order, "1", "order of the first body"),
             "line": _names("line", [line.name for line in lines], "line"),
             "base": _names("base", model.bases, "base frequency: turn of a carrier, or mesh"),
@@ -319,10 +319,10 @@ class SpectrumResult(StageResult):
         attrs = {
             "title": "spectra of the mesh forces",
             "window": WINDOW,
-            "segments": some.segments,
+            "segments": spectrum.segments,
             "overlap": 0.5,
-            "resolution": some.resolution,
-            "bandwidth": some.bandwidth,
+            "resolution": spectrum.resolution,
+            "bandwidth": spectrum.bandwidth,
             "order_resolution": distance,
             "settle": self.settle,
             "speed": self.speed,
@@ -343,7 +343,7 @@ def _energies(model, shape):
     owner = [name.split(":")[0] for name in model.system.dofs]
     members = list(dict.fromkeys(owner))
     energy = np.zeros((len(members), shape.shape[1]))
-    np.add.at(energy, [members.index(one) for one in owner], density)
+    np.add.at(energy, [members.index(body) for body in owner], density)
     turning = [name.endswith(": rotation") for name in model.system.dofs]
     return members, energy, density[turning].sum(axis=0)
 
@@ -388,13 +388,13 @@ def _growth_warnings(data: xr.Dataset) -> Iterator[Finding]:
             continue
         if grows:
             times = _shown_factor(rate * duration / math.log(10.0))
-            found = f"grows with {rate:.4g} 1/s, {times} times over the run"
+            growing = f"grows with {rate:.4g} 1/s, {times} times over the run"
         else:
             way = "grows slowly" if rate > 0.0 else "decays"
-            found = f"{way} in the mean, but grows {_shown_factor(math.log10(gain))} times on the way"
+            growing = f"{way} in the mean, but grows {_shown_factor(math.log10(gain))} times on the way"
         senseless = gain > _GAINED and pulled
         text = (
-            f"{variant}: the free motion {found}: a parametric resonance"
+            f"{variant}: the free motion {growing}: a parametric resonance"
             f"{'; these forces mean nothing: real teeth part long before' if senseless else ''}"
         )
         remedy = "give more damping or another speed, or contact_loss = true"
@@ -408,8 +408,8 @@ def separating(data: xr.Dataset) -> bool:
 
 def _growth(data: xr.Dataset) -> Iterator[tuple[str, float, float]]:
     """Variants, rates [1/s] and largest growths of their free motions."""
-    found = (data[name].values.tolist() for name in ("growth", "gain"))
-    yield from zip(map(str, data["variant"].values), *found)
+    growth_and_gain = (data[name].values.tolist() for name in ("growth", "gain"))
+    yield from zip(map(str, data["variant"].values), *growth_and_gain)
 
 
 def _shown_factor(power: float) -> str:
@@ -427,8 +427,8 @@ def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
 
     def bearings(body) -> str:
         # a bearing inside a shaft counts with its first body
-        held = [one for one in model.train.bearings if body.name in (one.body, *(one.shaft or ())[:1])]
-        return _spring(sum(one.radial for one in held), 3) if held else "-"
+        held = [bearing for bearing in model.train.bearings if body.name in (bearing.body, *(bearing.shaft or ())[:1])]
+        return _spring(sum(bearing.radial for bearing in held), 3) if held else "-"
 
     columns = {
         "": lambda body: body.name,
@@ -448,12 +448,12 @@ def _bodies(case: DrivetrainCase, model: DrivetrainModel) -> Block:
 
 def _shafts(model: DrivetrainModel) -> Block:
     columns = {
-        "": lambda one: " - ".join(one.between),
-        "length [m]": lambda one: f"{one.length:.4g}",
-        "bending [N m/rad]": lambda one: _spring(one.springs.bending, 4),
-        "torsion [N m/rad]": lambda one: _spring(one.springs.torsion, 4),
-        "shear [N/m]": lambda one: _spring(one.springs.shear, 4),
-        "model": lambda one: f"beam, {one.elements} elements" if one.elements else "joint",
+        "": lambda shaft: " - ".join(shaft.between),
+        "length [m]": lambda shaft: f"{shaft.length:.4g}",
+        "bending [N m/rad]": lambda shaft: _spring(shaft.springs.bending, 4),
+        "torsion [N m/rad]": lambda shaft: _spring(shaft.springs.torsion, 4),
+        "shear [N/m]": lambda shaft: _spring(shaft.springs.shear, 4),
+        "model": lambda shaft: f"beam, {shaft.elements} elements" if shaft.elements else "joint",
     }
     return tabulate("Shafts", model.train.shafts, columns)
 
@@ -465,21 +465,21 @@ def _spring(stiffness: float, digits: int) -> str:
 def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
     train, hertz = model.train, model.frequencies(case.operation.speed) / (2.0 * np.pi)
     rows = []
-    for number, one in enumerate(train.stages):
+    for number, stage in enumerate(train.stages):
         meshes = [i for i, mesh in enumerate(train.meshes) if mesh.stage == number and not mesh.planet]
-        waves, radii, (first, second) = [train.meshes[i].section for i in meshes], one.pitch_radii, one.ends
-        if isinstance(one, PlanetarySection):
-            n = len(one.angles)
-            planet, known = one.planet_teeth_or_half, one.planet_teeth or one.module
-            of_planet = f"{planet:g} / " if known else ""
-            teeth = f"{one.sun_teeth} / {of_planet}{one.ring_teeth}, {n} planet{'s' * (n > 1)}"
-            radii = (*radii, one.ring_radius)
+        waves, radii, (first, second) = [train.meshes[i].section for i in meshes], stage.pitch_radii, stage.ends
+        if isinstance(stage, PlanetarySection):
+            n = len(stage.angles)
+            planet, sized = stage.planet_teeth_or_half, stage.planet_teeth or stage.module
+            of_planet = f"{planet:g} / " if sized else ""
+            teeth = f"{stage.sun_teeth} / {of_planet}{stage.ring_teeth}, {n} planet{'s' * (n > 1)}"
+            radii = (*radii, stage.ring_radius)
         else:
-            teeth = f"{one.teeth[0]} / {one.teeth[1]}"
+            teeth = f"{stage.teeth[0]} / {stage.teeth[1]}"
         rows.append(
             (
-                one.name,
-                one.driver or first,
+                stage.name,
+                stage.driver or first,
                 teeth,
                 ", ".join(f"{1e3 * radius:.4f}" for radius in radii),
                 f"{model.ratio[second] / model.ratio[first]:.5g}",
@@ -503,11 +503,11 @@ def _stages(case: DrivetrainCase, model: DrivetrainModel) -> Block:
 
 def _operation(case: DrivetrainCase, model: DrivetrainModel) -> Block:
     rows, drive = [], 0.0
-    for one in torque_histories(case, model.ratio):
-        low, high = one.values.min(), one.values.max()
-        text = f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}, {len(one.times)} points"
-        rows.append((one.body, text))
-        drive += float(one.values[0]) * model.ratio[one.body]
+    for torque_history in torque_histories(case, model.ratio):
+        low, high = torque_history.values.min(), torque_history.values.max()
+        text = f"{low:.6g}" if low == high else f"{low:.6g} to {high:.6g}, {len(torque_history.times)} points"
+        rows.append((torque_history.body, text))
+        drive += float(torque_history.values[0]) * model.ratio[torque_history.body]
     s = case.simulation
     contact = "meshes part" if s.contact_loss else "meshes keep contact"
     change, last = drive / model.inertia / RPM, case_speeds(case, model).last / RPM
@@ -633,16 +633,16 @@ def _combination(orders, names) -> str:
 def chosen_meshes(data: xr.Dataset) -> list[int]:
     """Choose a mesh of every kind: of planet 1 of every planetary stage, and of every parallel stage."""
     numbers = [_PLANET.search(str(name)) for name in data["mesh"].values]
-    return [i for i, found in enumerate(numbers) if found is None or found[1] == "1"][:MOST_PANELS]
+    return [i for i, match in enumerate(numbers) if match is None or match[1] == "1"][:MOST_PANELS]
 
 
 def symbols(data: xr.Dataset) -> list[str]:
     """Name the base frequencies of spectrum.nc shortly: t, or t1 .., turns of carriers; f1 .. meshes."""
-    stages, found, meshes = int(data.attrs["planetary_stages"]), [], 0
+    stages, symbols_, meshes = int(data.attrs["planetary_stages"]), [], 0
     for base in range(data.sizes["base"]):
         if base < 2 * stages and base % 2 == 0:
-            found.append("t" if stages == 1 else f"t{base // 2 + 1}")
+            symbols_.append("t" if stages == 1 else f"t{base // 2 + 1}")
         else:
             meshes += 1
-            found.append(f"f{meshes}")
-    return found
+            symbols_.append(f"f{meshes}")
+    return symbols_

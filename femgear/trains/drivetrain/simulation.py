@@ -255,7 +255,7 @@ def _start_state(
             load = load - spin.carried * (model.rigid @ load) / spin.inertia
             q = _static_deviations(model, U @ S, k, load, contacts)
     else:
-        q, v = (np.asarray(one, float) for one in start)
+        q, v = (np.asarray(array, float) for array in start)
     approach = (U @ S).T @ q
     force = k * (approach if contacts is None else np.maximum(approach - contacts.gap, 0.0))
     return np.concatenate([q, v, S @ force])
@@ -545,11 +545,11 @@ class Decimator:
             return np.empty((0, self.buffer.shape[1]))
         begin, number = self.done * self.every - self.half - self.first, stop - self.done
         wanted = self.buffer[begin : begin + (number - 1) * self.every + 2 * self.half + 1]
-        found = _weighted(wanted, self.weights, self.every)
+        filtered = _weighted(wanted, self.weights, self.every)
         self.done = stop
         keep = max(stop * self.every - self.half - self.first, 0)
         self.buffer, self.first = self.buffer[keep:].copy(), self.first + keep
-        return found
+        return filtered
 
 
 def _weighted(rows, weights, every: int) -> np.ndarray:
@@ -618,7 +618,7 @@ class _Record:
         *tables, angle, speed = np.split(self.table, self.cuts, axis=1)
         names = ("motion", "velocity", "approach", "force")
         return {
-            **{name: np.ascontiguousarray(one) for name, one in zip(names, tables)},
+            **{name: np.ascontiguousarray(table) for name, table in zip(names, tables)},
             "time": step * self.every * np.arange(len(self.table)),
             "spin": angle[:, 0].copy(),
             "spin_speed": speed[:, 0].copy(),

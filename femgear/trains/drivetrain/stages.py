@@ -70,9 +70,9 @@ def solve_drivetrain_modes(case: DrivetrainCase) -> DrivetrainModesResult:
     most = min(_MOST_BRANCHES, len(modes.frequency) - 1)
     count = int(np.clip(np.count_nonzero(modes.frequency < top), min(2, most), most))
     speeds = np.linspace(0.0, _FASTEST * speed, _SPEEDS)
-    found = campbell_data(lambda _: still, speeds, model.mean_stiffness, orders=orders, count=count)
+    campbell = campbell_data(lambda _: still, speeds, model.mean_stiffness, orders=orders, count=count)
     ratio = np.where(modes.frequency > 0.0, case.simulation.damping_ratio, 0.0)
-    return DrivetrainModesResult(model, replace(modes, damping_ratio=ratio), found, speed)
+    return DrivetrainModesResult(model, replace(modes, damping_ratio=ratio), campbell, speed)
 
 
 @one_blas_thread()
@@ -87,12 +87,12 @@ def solve_transient_run(case: DrivetrainCase, *, progress: Progress = silent) ->
     for done, variant in enumerate(variants):
         model = models[variant] = case_model(case, variant)
         torques = torque_histories(case, model.ratio)
-        told = lambda share, done=done: progress("transient", done + share, len(variants))  # noqa: E731
-        runs[variant] = _run(case, variant, model, torques, told)
+        tell_share = lambda share, done=done: progress("transient", done + share, len(variants))  # noqa: E731
+        runs[variant] = _run(case, variant, model, torques, tell_share)
     return TransientResult(models, runs, torques)
 
 
-def _run(case: DrivetrainCase, variant: str, model, torques, told) -> DrivetrainRun:
+def _run(case: DrivetrainCase, variant: str, model, torques, tell_share) -> DrivetrainRun:
     s = case.simulation
     try:
         run = march_drivetrain(
@@ -103,7 +103,7 @@ def _run(case: DrivetrainCase, variant: str, model, torques, told) -> Drivetrain
             speed=case.operation.speed,
             start=s.start,
             outputs=[f"{body.name}: rotation" for body in model.train.bodies],
-            records=Records(record_every(case, model), lowpass=True, told=told),
+            records=Records(record_every(case, model), lowpass=True, told=tell_share),
             contact_loss=s.contact_loss,
         )
     except ConvergenceError as error:
@@ -164,9 +164,11 @@ def solve_spectrum(case: DrivetrainCase, transient: TransientResult) -> Spectrum
     for variant, run in transient.runs.items():
         force, angle = run.force[late], run.spin[late]
         spectra[variant] = averaged_spectrum(force, step, resolution=resolution)
-        found = angle_spectrum(force, angle, resolution=distance, per_turn=per_turn)
-        kept = found.frequency <= _ORDERS * rate * 2.0 * np.pi / run.spin_speed[late].max()
-        tracked[variant] = replace(found, frequency=found.frequency[kept], amplitude=found.amplitude[..., kept])
+        spectrum = angle_spectrum(force, angle, resolution=distance, per_turn=per_turn)
+        kept = spectrum.frequency <= _ORDERS * rate * 2.0 * np.pi / run.spin_speed[late].max()
+        tracked[variant] = replace(
+            spectrum, frequency=spectrum.frequency[kept], amplitude=spectrum.amplitude[..., kept]
+        )
         amplitudes[variant] = line_amplitudes(force, angle, run.spin_speed[late], lines, record_rate=rate)
     resolved = resolved_lines(model, lines, distance)
     return SpectrumResult(transient, settle, speed, spectra, tracked, lines, amplitudes, distance, resolved)
@@ -176,14 +178,14 @@ def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
     """List mesh harmonics, side bands of the carrier's turn, sums and differences of two meshes."""
     count, planets = len(model.bases), len(model.geometry.even)
     meshes = [base for base in range(count) if base % 2 or base >= 2 * planets]
-    found = []
+    lines = []
 
     def add(name: str, orders: dict[int, int]) -> None:
         vector = np.zeros(count, int)
         vector[list(orders)] = list(orders.values())
         order = float(vector @ model.base_ratio)
         if order:
-            found.append(MeshLine(name, tuple(int(o) for o in vector), abs(order)))
+            lines.append(MeshLine(name, tuple(int(o) for o in vector), abs(order)))
 
     for base in meshes:
         text = model.bases[base]
@@ -194,10 +196,10 @@ def mesh_lines(model: DrivetrainModel) -> tuple[MeshLine, ...]:
         for k in (*range(-_SIDE_BANDS, 0), *range(1, _SIDE_BANDS + 1)) if base < 2 * planets else ():
             words = f"{'+' if k > 0 else '-'} {abs(k)} turn{'s' if abs(k) > 1 else ''}"
             add(f"{text} {words}", {base: 1, base - 1: k})
-    for one, two in itertools.combinations(meshes, 2):
+    for first, second in itertools.combinations(meshes, 2):
         for sign, word in ((1, "+"), (-1, "-")):
-            add(f"{model.bases[two]} {word} {model.bases[one]}", {two: 1, one: sign})
-    return tuple(found)
+            add(f"{model.bases[second]} {word} {model.bases[first]}", {second: 1, first: sign})
+    return tuple(lines)
 
 
 def resolved_lines(model: DrivetrainModel, lines, distance: float) -> np.ndarray:
@@ -222,11 +224,11 @@ def line_amplitudes(signal, angle, speed, lines, *, record_rate: float) -> np.nd
     weight = weight / weight.sum()
     signal = np.asarray(signal, float)
     signal = signal - weight @ signal
-    found = np.full((len(lines), signal.shape[1]), np.nan)
+    amplitudes = np.full((len(lines), signal.shape[1]), np.nan)
     for row, line in enumerate(lines):
         if line.order * np.abs(speed).max() / (2.0 * np.pi) <= 0.5 * PASS_BAND * record_rate:
-            found[row] = 2.0 * np.abs((weight * np.exp(-1j * line.order * angle)) @ signal)
-    return found
+            amplitudes[row] = 2.0 * np.abs((weight * np.exp(-1j * line.order * angle)) @ signal)
+    return amplitudes
 
 
 def averaged_spectrum(signal, step: float, *, resolution: float) -> AveragedSpectrum:
@@ -323,7 +325,7 @@ DRIVETRAIN = Train(
             takes=("transient",),
             verdict=lambda result: {
                 "lines": len(result.lines),
-                "segments": min(one.segments for one in result.spectra.values()),
+                "segments": min(spectrum.segments for spectrum in result.spectra.values()),
             },
             describe=lambda results: describe_spectrum(results.spectrum),
             unavailable=lambda case: "" if case.parallel or case.planetary else "the chain has no gears",

@@ -95,10 +95,10 @@ def record_periods(case: Case, gears: PlanetarySet) -> int:
     CaseError: more than ``static.longest_record`` (E-PERIODS).
     """
     longest = case.static.longest_record
-    periods, told = common_period(set_deviations(case), gears, limit=sys.maxsize)
+    periods, cause = common_period(set_deviations(case), gears, limit=sys.maxsize)
     if periods > longest:
         raise CaseError(
-            f"modes, dynamics and housing need the whole record: {told}",
+            f"modes, dynamics and housing need the whole record: {cause}",
             code="E-PERIODS",
             key="static.longest_record",
             value=longest,
@@ -113,8 +113,8 @@ def no_runup(case: Case) -> str:
     """Say why there is no run-up: it was not asked for, or errors turn; empty where there is one."""
     if not case.runup.count:
         return "runup.count is 0"
-    one = common_period(set_deviations(case), planetary_set(case))[0] == 1
-    return "" if one else "errors turn with gears, and the run-up takes one mesh period"
+    single = common_period(set_deviations(case), planetary_set(case))[0] == 1
+    return "" if single else "errors turn with gears, and the run-up takes one mesh period"
 
 
 def fixed_diameters(case: Case) -> int:
@@ -132,7 +132,7 @@ def fixed_diameters(case: Case) -> int:
 def housing_supports(case: Case) -> list[Support]:
     """Make the supports of the ring, those of the case with their widths as angles."""
     radius = case.ring.outer_radius
-    return [Support(**one.model_dump() | {"width": one.width / radius}) for one in case.housing.support]
+    return [Support(**support.model_dump() | {"width": support.width / radius}) for support in case.housing.support]
 
 
 def _acts(support: SupportSection) -> bool:
@@ -141,8 +141,8 @@ def _acts(support: SupportSection) -> bool:
 
 def _check_housing_supports(case: Case) -> None:
     """Refuse supports of the ring that cannot be: idle, two at one place, with the linear form."""
-    found, circle = case.housing.support, 2 * math.pi * case.ring.outer_radius
-    idle = next((i for i, one in enumerate(found) if not _acts(one)), None)
+    supports, circle = case.housing.support, 2 * math.pi * case.ring.outer_radius
+    idle = next((i for i, support in enumerate(supports) if not _acts(support)), None)
     if idle is not None:
         raise CaseError(
             "a support without stiffness and mass does nothing",
@@ -151,16 +151,16 @@ def _check_housing_supports(case: Case) -> None:
             limit="a stiffness or mass above zero",
             remedy="give one of them, or leave the support out",
         )
-    angles = [round(math.remainder(one.angle, 2 * math.pi), 9) for one in found]
+    angles = [round(math.remainder(support.angle, 2 * math.pi), 9) for support in supports]
     again = next((i for i, angle in enumerate(angles) if angle in angles[:i]), None)
     if again is not None:
         message, remedy = "two supports stand at this angle", "make one of them, with the sum of both"
         key, value = f"housing.support[{again}].angle", f"{math.degrees(angles[again]):.6g} deg"
         raise CaseError(message, code="E-DUPLICATE", key=key, value=value, remedy=remedy)
-    around = sorted(range(len(found)), key=lambda i: angles[i])
+    around = sorted(range(len(supports)), key=lambda i: angles[i])
     for i, j in zip(around, around[1:] + around[:1]):
         room = (angles[j] - angles[i]) % (2 * math.pi) / (2 * math.pi) * circle or circle
-        wide = 0.5 * (found[i].width + found[j].width)
+        wide = 0.5 * (supports[i].width + supports[j].width)
         # angles are compared in nine digits
         if wide > room * (1 + 1e-6):
             message = "supports overlap" if i != j else "a support is longer than the ring is around"
@@ -168,7 +168,7 @@ def _check_housing_supports(case: Case) -> None:
                 message,
                 code="E-SUPPORT",
                 key=f"housing.support[{j}].width",
-                value=f"{1e3 * found[i].width:g} and {1e3 * found[j].width:g} mm, {1e3 * room:.4g} mm apart",
+                value=f"{1e3 * supports[i].width:g} and {1e3 * supports[j].width:g} mm, {1e3 * room:.4g} mm apart",
                 limit="half of both widths up to the distance along the circumference",
                 remedy="make them narrower, or one of both",
             )
@@ -201,7 +201,7 @@ def imported_casing(
     psi, on_ring = gears.planet_angles[0], mesh_normals(gears, back=case.torque_on_first_gear() < 0)[gears.n_planets]
     turned = np.array([[np.cos(psi), np.sin(psi)], [-np.sin(psi), np.cos(psi)]])
     try:
-        refuse_other_files((one for one in (file, nodes) if one), section.file, section.sha256)
+        refuse_other_files((path for path in (file, nodes) if path), section.file, section.sha256)
         from femgear.exchange.casing_files import named_outputs, read_casing
 
         structure = read_casing(
@@ -217,8 +217,8 @@ def imported_casing(
         )
         return structure, *named_outputs(structure, nodes)
     except CaseError as error:
-        known = error.key in type(section).model_fields
-        error.key, error.file = f"housing.structure.{error.key if known else 'file'}", error.file or str(file)
+        of_section = error.key in type(section).model_fields
+        error.key, error.file = f"housing.structure.{error.key if of_section else 'file'}", error.file or str(file)
         raise
 
 
@@ -429,20 +429,20 @@ def missing_level(rpm, level_change, limit, compared_to: float, *, of: str = "")
     of : str
         What the speeds are of, such as ``"run-up: "``.
     """
-    known = np.where(np.isfinite(level_change), np.abs(level_change), 0.0)
+    change = np.where(np.isfinite(level_change), np.abs(level_change), 0.0)
     if not np.isfinite(level_change).any():
         text = (
             f"{of}the excitation ends at {limit.min():.4g} Hz at the slowest speed; what it loses is "
             f"unknown: equations with excitation up to {compared_to:.4g} Hz are nearly singular"
         )
         return (Finding("W-EXCITATION", "dynamics.damping_ratio", text, remedy="give the set some damping"),)
-    if known.max(initial=0.0) < NOTICEABLE:
+    if change.max(initial=0.0) < NOTICEABLE:
         return ()
-    worst = int(known.argmax())
+    worst = int(change.argmax())
     text = (
         f"{of}at {rpm[worst]:.6g} rpm the excitation ends at {limit[worst]:.4g} Hz; up to "
         f"{compared_to:.4g} Hz the level of the housing changes by {level_change[worst]:+.1f} dB. It does by "
-        f"{NOTICEABLE:g} dB or more at {int((known >= NOTICEABLE).sum())} of the "
+        f"{NOTICEABLE:g} dB or more at {int((change >= NOTICEABLE).sum())} of the "
         f"{int(np.isfinite(level_change).sum())} speeds looked at: raise dynamics.up_to or "
         "dynamics.mesh_harmonics, or leave the slowest speeds out, before levels are compared"
     )

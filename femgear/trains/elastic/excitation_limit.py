@@ -52,13 +52,13 @@ class FrequencyLimit:
     response: np.ndarray
     frequency: np.ndarray
 
-    def at(self, some) -> FrequencyLimit:
-        """Limits at the speeds number ``some`` alone."""
-        return FrequencyLimit(self.excitation[some], self.response[some], self.frequency[some])
+    def at(self, numbers) -> FrequencyLimit:
+        """Limits at the speeds number ``numbers`` alone."""
+        return FrequencyLimit(self.excitation[numbers], self.response[numbers], self.frequency[numbers])
 
-    def options(self, case: Case, some: Any = slice(None)) -> dict[str, Any]:
+    def options(self, case: Case, numbers: Any = slice(None)) -> dict[str, Any]:
         """What `solve_spectral` takes at some of the speeds beside modes, excitation and frequencies."""
-        kept = {"excitation_harmonics": self.excitation[some], "response_harmonics": self.response[some]}
+        kept = {"excitation_harmonics": self.excitation[numbers], "response_harmonics": self.response[numbers]}
         return {**kept, "tolerance": case.dynamics.tolerance}
 
 

@@ -134,7 +134,7 @@ def natural_frequencies(modes: xr.Dataset) -> Figure:
     if "excitation_reach" in reach:
         end = 1e-3 * float(reach["excitation_reach"])
         ax.axhspan(end, ax.get_ylim()[1], color="0.5", alpha=0.12, linewidth=0, zorder=0)
-        below = sum(len(group) for group, one in zip(groups, frequency) if one < end)
+        below = sum(len(group) for group, mode_frequency in zip(groups, frequency) if mode_frequency < end)
         title += f", {below} of them below the end of the excitation at {end:.4g} kHz (grey: above)"
     label(ax, "nodal diameters of the ring [1] (–: ring at rest)", "natural frequency [kHz]", title)
     legend_below(figure, columns=4)
@@ -278,11 +278,11 @@ def draw_order_spectrum(housing: xr.Dataset) -> Figure:
 def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     """Draw the lines around a mesh harmonic, the strongest with their order and the distance from it."""
     centre = harmonic * ring_teeth
-    own = np.rint(order / ring_teeth) == harmonic
-    largest = max(linear[own].max(initial=0.0), exact[own].max(initial=0.0)) or 1.0
+    in_band = np.rint(order / ring_teeth) == harmonic
+    largest = max(linear[in_band].max(initial=0.0), exact[in_band].max(initial=0.0)) or 1.0
     floor = 1e-3 * largest
     # the images that the interpolation makes far from the centre are left to the upper diagram
-    reach = int(np.abs(order[own & (exact > floor)] - centre).max(initial=4.0)) + 2
+    reach = int(np.abs(order[in_band & (exact > floor)] - centre).max(initial=4.0)) + 2
     inside = np.abs(order - centre) <= reach
     stems(ax, order[inside], linear[inside], floor, text=form, width=2.5)
     ax.set_yscale("log")
@@ -299,7 +299,7 @@ def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
     ax.set_ylim(floor, largest * (largest / floor) ** _ROOM)
     ax.minorticks_off()
     ax.set_xlim(centre - reach, centre + reach)
-    strongest = int(np.argmax(np.where(own, peak, -1.0)))
+    strongest = int(np.argmax(np.where(in_band, peak, -1.0)))
     title = f"mesh harmonic {harmonic} (order {harmonic}·{ring_teeth} = {centre})"
     title += f": largest line {order[strongest]:.6g} with {peak[strongest]:.3g} m/s²"
     label(ax, "carrier order [1]", title=title)
@@ -336,8 +336,8 @@ def modulation_polar(
     figure, axes = new_figure(columns=len(harmonics), width=0.5 * WIDTH * len(harmonics), height=4.9, polar=True)
     start, turn = float(housing.attrs["sensor_angle"]), np.sign(float(housing["carrier_speed"][0]))
     for ax, harmonic in zip(axes, harmonics):
-        found = analyse_band(spectrum, _ring_teeth(housing), harmonic)
-        lobes, (angle, value) = found.lobes, _around_carrier(found.envelope, start, turn, spectrum.turns)
+        band = analyse_band(spectrum, _ring_teeth(housing), harmonic)
+        lobes, (angle, value) = band.lobes, _around_carrier(band.envelope, start, turn, spectrum.turns)
         largest = value.max(initial=0.0) or 1.0
         ax.plot(angle, value, color=BLUE, linewidth=2.0, label="envelope")
         # the scale stands where the curve is lowest, so that it hides nothing
@@ -352,9 +352,9 @@ def modulation_polar(
         for n, psi in enumerate(np.asarray(planet_angles, float)):
             ax.plot([psi, psi], [0.0, 1.12 * largest], color=VERMILION, linewidth=1.2, label="carrier arms")
             ax.text(psi, 1.12 * largest, str(n + 1), bbox=_BADGE, ha="center", va="center", fontsize=SMALL)
-        for one in supports:
-            half = max(0.5 * one.width, 0.02)
-            arc, edge = np.linspace(one.angle - half, one.angle + half, 9), [1.36 * largest] * 9
+        for support in supports:
+            half = max(0.5 * support.width, 0.02)
+            arc, edge = np.linspace(support.angle - half, support.angle + half, 9), [1.36 * largest] * 9
             ax.plot(
                 arc, edge, color=BLACK, linewidth=7, solid_capstyle="butt", label="supports at the start", clip_on=False
             )
@@ -416,11 +416,11 @@ def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], 
     """Levels of the lines of a band at both sensors, each relative to its strongest, with nodal diameters."""
     from matplotlib.ticker import MaxNLocator
 
-    own = np.rint(lines.order / lines.z_ring) == harmonic
-    order, highest = lines.order[own], np.full(own.sum(), -np.inf)
-    n = np.abs(nodal_diameters(lines)[own]) if (one := lines.method == "exact") else [""] * len(order)
+    in_band = np.rint(lines.order / lines.z_ring) == harmonic
+    order, highest = lines.order[in_band], np.full(in_band.sum(), -np.inf)
+    n = np.abs(nodal_diameters(lines)[in_band]) if (exact := lines.method == "exact") else [""] * len(order)
     for (text, amplitude), colour, side in zip(amplitudes.items(), (BLUE, VERMILION), (-0.2, 0.2)):
-        relative = amplitude[own] / (amplitude[own].max(initial=0.0) or 1.0)
+        relative = amplitude[in_band] / (amplitude[in_band].max(initial=0.0) or 1.0)
         level = 20 * np.log10(np.maximum(relative, 1e-30))
         shown = level > _BAND_FLOOR
         ax.vlines(order[shown] + side, _BAND_FLOOR, level[shown], color=colour, linewidth=3.0, label=text)
@@ -433,7 +433,7 @@ def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], 
     ax.xaxis.set_major_locator(MaxNLocator(_TICKS, steps=_STEPS, integer=True))
     ax.set_ylim(_BAND_FLOOR, 10)
     title = f"mesh harmonic {harmonic} (order {harmonic * lines.z_ring})"
-    title += "; numbers: nodal diameters" if one else ""
+    title += "; numbers: nodal diameters" if exact else ""
     label(ax, "carrier order [1]", "level [dB re\nlargest line]", title)
 
 
@@ -502,8 +502,8 @@ def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
     """What the page walks through of the run-up."""
     runup, housing = drawn.data["runup"], drawn.data.get("housing")
     pressure = None if housing is None else run_up_lines(runup, housing.attrs)[1]
-    found = explorer(runup, drawn.data["modes"], pressure)
-    write_text(json.dumps(found, allow_nan=False, separators=(",", ":")), folder / EXPLORER)
+    content = explorer(runup, drawn.data["modes"], pressure)
+    write_text(json.dumps(content, allow_nan=False, separators=(",", ":")), folder / EXPLORER)
     return [EXPLORER]
 
 
@@ -511,17 +511,17 @@ def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
     figures, housing, dynamics = {}, drawn.data["housing"], drawn.data.get("dynamics")
     angles, supports = planetary_set(drawn.case).planet_angles, housing_supports(drawn.case)
     for s in shown_speeds(housing):
-        one, speed = housing.isel(speed=[s]), f"{round(float(housing['speed'][s]))}_rpm"
+        at_speed, speed = housing.isel(speed=[s]), f"{round(float(housing['speed'][s]))}_rpm"
         if dynamics is not None and "level_change" in dynamics:
-            one = one.assign(level_change=("speed", dynamics["level_change"].values[[s]]))
+            at_speed = at_speed.assign(level_change=("speed", dynamics["level_change"].values[[s]]))
         model = None if dynamics is None else hanning_spectrum(dynamics, housing, angles, s)
         figures |= {
-            f"housing_signal_{speed}": housing_signal(one),
-            f"order_spectrum_{speed}": draw_order_spectrum(one),
-            f"modulation_{speed}": modulation_polar(one, angles, windowed=model, supports=supports),
+            f"housing_signal_{speed}": housing_signal(at_speed),
+            f"order_spectrum_{speed}": draw_order_spectrum(at_speed),
+            f"modulation_{speed}": modulation_polar(at_speed, angles, windowed=model, supports=supports),
         }
-        if "pressure_level" in one:
-            figures[f"microphone_spectrum_{speed}"] = microphone_spectrum(one)
+        if "pressure_level" in at_speed:
+            figures[f"microphone_spectrum_{speed}"] = microphone_spectrum(at_speed)
     return figures
 
 

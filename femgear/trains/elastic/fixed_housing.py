@@ -85,7 +85,7 @@ class _Surroundings:
     damping: np.ndarray | None
     coupled: int
 
-    def solve(self, carrier: np.ndarray, limit: FrequencyLimit, tolerance: float, **known) -> TwoWayResponse:
+    def solve(self, carrier: np.ndarray, limit: FrequencyLimit, tolerance: float, **options) -> TwoWayResponse:
         """Solve for the forces at speeds of the carrier (n_speeds,) [rad/s], with a limit of each."""
         return solve_two_way(
             self.gears,
@@ -96,7 +96,7 @@ class _Surroundings:
             damping=self.damping,
             harmonics=(limit.excitation, limit.response),
             tolerance=tolerance,
-            **{"coupled_diameters": self.coupled} | known,
+            **{"coupled_diameters": self.coupled} | options,
         )
 
 
@@ -122,15 +122,15 @@ class HousingModel:
         self.case, self.modes, self.sense = case, modes, int(np.sign(sense))
         self.highest, n_max = MODES_ABOVE * modes.reach, fixed_diameters(case)
         self.missing, ratio, top = "", case.dynamics.damping_ratio, modes.max_diameter
-        known: Any = {"max_frequency": self.highest, "damping_ratio": ratio, "max_diameter": top}
-        self.ring = supported_ring(modes.ring.modes, (), **known)
+        options: Any = {"max_frequency": self.highest, "damping_ratio": ratio, "max_diameter": top}
+        self.ring = supported_ring(modes.ring.modes, (), **options)
         if case.housing.structure:
             low = {name: getattr(modes.ring, name)[: n_max + 1] for name in ("compliance", "held_compliance")}
-            told = _casing(case, low["compliance"], self.highest)
-            self.structure, self.sensors, self.forces, self.missing = told
+            casing = _casing(case, low["compliance"], self.highest)
+            self.structure, self.sensors, self.forces, self.missing = casing
             self.springs = mesh_springs(planetary_set(case), replace(modes.ring, **low), modes.state)
         else:
-            self.structure, self.sensors, self.forces = _ring_on_supports(case, modes, known)
+            self.structure, self.sensors, self.forces = _ring_on_supports(case, modes, options)
             self.springs = modes.excitation, modes.model.system.flexibility
 
     def paths(self, *, even: bool = True) -> MeshPaths:
@@ -151,11 +151,11 @@ class HousingModel:
 
     def in_housing(self, *, even: bool = False) -> _Surroundings:
         """The set in its housing; with the mean of errors that turn if ``even``."""
-        found = self._surroundings(self.structure, self.springs, fixed_diameters(self.case))
+        around = self._surroundings(self.structure, self.springs, fixed_diameters(self.case))
         if even:
-            found = replace(found, excitation=self._even(found.excitation))
+            around = replace(around, excitation=self._even(around.excitation))
         # the ring of a file is loaded where flanks touch
-        return replace(found, paths=self.lines_paths)
+        return replace(around, paths=self.lines_paths)
 
     @property
     def lines_paths(self) -> MeshPaths:
@@ -218,8 +218,8 @@ def lines_at_sensor(
     model = HousingModel(case, modes, carrier[0])
     housing = model.in_housing(even=True)
     # a level that is compared is not worth minutes: nearly singular equations are told as such
-    found = housing.solve(carrier, limit, _ROUGH, cycles=1)
-    return _first_lines(case, modes, model, housing.structure, found)
+    response = housing.solve(carrier, limit, _ROUGH, cycles=1)
+    return _first_lines(case, modes, model, housing.structure, response)
 
 
 def _first_lines(case: Case, modes: ModesResult, model, structure, two_way: TwoWayResponse) -> SensorLines:
@@ -238,16 +238,16 @@ def _casing(
     With the names of its sensors and of forces on the ground; compliance of the ring by nodal diameter.
     """
     expected = 1.0 / ring_mesh_compliance(compliance, case.ring.teeth, [0.0])[0, 0]
-    known: Any = {"max_frequency": highest, "expected_stiffness": expected}
-    structure, sensors, forces = imported_casing(case, planetary_set(case), **known)
+    options: Any = {"max_frequency": highest, "expected_stiffness": expected}
+    structure, sensors, forces = imported_casing(case, planetary_set(case), **options)
     missing, given = "", case.housing.structure
     if given and may_lack_compliance(Path(case.name).parent / given.file):
-        missing = " ".join(one.text for one in missing_compliance(structure, expected))
+        missing = " ".join(finding.text for finding in missing_compliance(structure, expected))
     return structure, sensors, forces, missing
 
 
 def _ring_on_supports(
-    case: Case, modes: ModesResult, known: Any
+    case: Case, modes: ModesResult, options: Any
 ) -> tuple[FixedStructure, tuple[str, ...], tuple[str, ...]]:
     """Structure of a ring on supports with sensors all around, those of the case, and forces on the ground.
 
@@ -255,17 +255,17 @@ def _ring_on_supports(
     """
     supports, points = housing_supports(case), 4 * (modes.max_diameter + 1)
     places = [(2 * np.pi * i / points, 0.0, 0.0, 1.0) for i in range(points)]
-    places += [(one.angle, one.direction, 0.0, 1.0) for one in case.housing.sensor]
-    for one in supports:
-        for turned, stiffness in ((0.0, one.radial_stiffness), (0.5 * np.pi, one.tangential_stiffness)):
-            places.append((one.angle, turned, one.width, stiffness))
+    places += [(sensor.angle, sensor.direction, 0.0, 1.0) for sensor in case.housing.sensor]
+    for support in supports:
+        for turned, stiffness in ((0.0, support.radial_stiffness), (0.5 * np.pi, support.tangential_stiffness)):
+            places.append((support.angle, turned, support.width, stiffness))
     angle, turned, width, factor = np.array(places).T
     # those around are asked for places between them
     waves = np.where(np.arange(len(angle)) < points, modes.max_diameter, np.inf)
     structure = supported_ring(
         modes.ring.modes,
         supports,
-        **known,
+        **options,
         sensor_angles=angle,
         sensor_directions=turned,
         sensor_widths=width,
@@ -273,12 +273,14 @@ def _ring_on_supports(
         rim=modes.ring.rim_compliance,
     )
     ways = [f"support {i} {way}" for i in range(1, len(supports) + 1) for way in ("radial", "tangential")]
-    return structure.combined(np.diag(factor)), tuple(one.name for one in case.housing.sensor), tuple(ways)
+    return structure.combined(np.diag(factor)), tuple(sensor.name for sensor in case.housing.sensor), tuple(ways)
 
 
-def lines_in_housing(case: Case, dynamics: DynamicsResult, found: HousingResult, fixed: FixedHousing) -> HousingResult:
+def lines_in_housing(
+    case: Case, dynamics: DynamicsResult, housing: HousingResult, fixed: FixedHousing
+) -> HousingResult:
     """What sensors and the microphone hear of the structure, by the forces of both routes."""
-    structure, exact, top = fixed.structure, found.exact, dynamics.ring_radial.shape[-1] // 2
+    structure, exact, top = fixed.structure, housing.exact, dynamics.ring_radial.shape[-1] // 2
     count, first = structure.sensor_shape.shape[1], _radial_sensor(structure, fixed, exact.sensor_angle, top)
     points = count - len(fixed.sensors) - len(fixed.forces)
     n, place = np.arange(-top, top + 1), 2 * np.pi * np.arange(points) / max(points, 1)
@@ -292,16 +294,16 @@ def lines_in_housing(case: Case, dynamics: DynamicsResult, found: HousingResult,
     order, one_way = structure_lines(structure.combined(weights[:, :1]), fixed.one_way)
     if points:
         around = structure.combined(np.eye(count)[:, :points])
-        sound = _sound_around(around, fixed.two_way, lines, n, wave, found)
+        sound = _sound_around(around, fixed.two_way, lines, n, wave, housing)
     elif structure.sensor_area is not None:
         velocity = 1j * np.outer(lines.base_speed, lines.order)[..., None] * np.swapaxes(moved[:, 1:], 1, 2)
-        air = found.cylinder.density, found.cylinder.sound_speed
-        pressure, power = equivalent_sound(velocity, structure.sensor_area, *air, found.microphone.distance)
+        air = housing.cylinder.density, housing.cylinder.sound_speed
+        pressure, power = equivalent_sound(velocity, structure.sensor_area, *air, housing.microphone.distance)
         sound = pressure, None, power
     level = order_level(replace(lines, order=order, displacement=one_way[:, 0]))
     with np.errstate(divide="ignore", invalid="ignore"):  # of a sensor that stands still
         apart = 20.0 * np.log10(order_level(lines) / level)
-    told = {
+    attributes = {
         "one_way_level": level,
         "one_way_difference": apart,
         "two_way_residual": fixed.two_way.residual,
@@ -311,12 +313,12 @@ def lines_in_housing(case: Case, dynamics: DynamicsResult, found: HousingResult,
         "dynamic_factor": two_way_factors(fixed.two_way),
     }
     return replace(
-        found,
+        housing,
         exact=lines,
-        supported=told,
+        supported=attributes,
         judged=fixed.judged,
         missing=fixed.missing,
-        outputs={kind: one for kind, one in outputs.items() if one[0]},
+        outputs={kind: output for kind, output in outputs.items() if output[0]},
         sound=sound,
     )
 
@@ -364,16 +366,16 @@ def two_way_factors(two_way: TwoWayResponse) -> np.ndarray:
 
 
 def _sound_around(
-    around: FixedStructure, two_way: TwoWayResponse, lines: SensorLines, n, wave, found: HousingResult
+    around: FixedStructure, two_way: TwoWayResponse, lines: SensorLines, n, wave, housing: HousingResult
 ) -> tuple[np.ndarray, ...]:
     """Sound of a structure by its sensors around the outer surface, with waves (points, n)."""
     sound = list[tuple[np.ndarray, ...]]()
     speeds = np.arange(len(lines.base_speed))
-    for some in np.array_split(speeds, -(-len(speeds) // 20)):  # fit into memory
-        here = two_way.at(some)
-        velocity = 1j * np.outer(lines.base_speed[some], lines.order)[..., None]
+    for numbers in np.array_split(speeds, -(-len(speeds) // 20)):  # fit into memory
+        here = two_way.at(numbers)
+        velocity = 1j * np.outer(lines.base_speed[numbers], lines.order)[..., None]
         waves = velocity * np.swapaxes(structure_lines(around, here)[1], 1, 2) @ wave.conj()
-        sound.append(surface_sound(waves, n, lines.frequency[some], found.cylinder, found.microphone))
+        sound.append(surface_sound(waves, n, lines.frequency[numbers], housing.cylinder, housing.microphone))
     return tuple(np.concatenate(parts) for parts in zip(*sound))
 
 

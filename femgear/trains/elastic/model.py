@@ -137,15 +137,15 @@ def gears_alone(model: ElasticSet, flexibility) -> MechanicalSystem:
 
     ``flexibility`` (2N, 2N) as for `elastic_set`, without what another model of the ring holds [m/N].
     """
-    system, own = model.system, slice(model.ring_slice.start)
+    system, rigid = model.system, slice(model.ring_slice.start)
     return replace(
         system,
-        M=system.M[own, own],
-        C=system.C[own, own],
-        K=system.K[own, own],
-        dofs=system.dofs[own],
-        W=model.rigid_directions[own],
-        load=system.load[own],
+        M=system.M[rigid, rigid],
+        C=system.C[rigid, rigid],
+        K=system.K[rigid, rigid],
+        dofs=system.dofs[rigid],
+        W=model.rigid_directions[rigid],
+        load=system.load[rigid],
         flexibility=flexibility,
     )
 
@@ -164,7 +164,7 @@ def _machines(case: Case) -> list[tuple[str, str, Any]]:
     """List motor at the input and brake at the output: name, member that it is coupled to, and entries."""
     output = "carrier" if case.operation.input == "sun" else "sun"
     both = ("motor", case.operation.input, case.motor), ("brake", output, case.brake)
-    return [one for one in both if one[2] is not None]
+    return [machine for machine in both if machine[2] is not None]
 
 
 def rigid_gears(case: Case, planetary_set: PlanetarySet, machines, *, sun_torque: float) -> Assembly:
@@ -308,9 +308,9 @@ def mesh_excitation(
     flexibility = np.zeros((2 * N, 2 * N)) if flexibility is None else flexibility
     ring_compliance = held_compliance if ring_compliance is None else ring_compliance
     _refuse_open((stiffness <= 0).max(axis=1))
-    own = np.zeros((2 * N, 1))
-    own[N:, 0] = np.diag(held_compliance)
-    remaining = 1.0 / stiffness - own
+    held_ring = np.zeros((2 * N, 1))
+    held_ring[N:, 0] = np.diag(held_compliance)
+    remaining = 1.0 / stiffness - held_ring
     between = np.diag(remaining.min(axis=1)) + flexibility
     if remaining.min() <= 0 or np.linalg.eigvalsh(between)[0] <= 0:
         raise ContactError(

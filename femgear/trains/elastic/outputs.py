@@ -25,8 +25,8 @@ def sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np
 
 def lines_of_field(case: Case, modes: ModesResult, field: np.ndarray, carrier: np.ndarray) -> SensorLines:
     """Lines of the fixed sensor by the radial field of the ring, see `mesh_and_ring_outputs`."""
-    known = {"symmetry": modes.symmetry, "periods": modes.excitation.periods}
-    return component_lines(field, case.ring.teeth, carrier, case.housing.sensor_angle, **known)
+    options = {"symmetry": modes.symmetry, "periods": modes.excitation.periods}
+    return component_lines(field, case.ring.teeth, carrier, case.housing.sensor_angle, **options)
 
 
 def mesh_and_ring_outputs(
@@ -53,22 +53,22 @@ def mesh_and_ring_outputs(
         residual=rows @ residual_output(model.system, basis, outputs),
         load=rows @ output_load(model.system, basis, outputs),
     )
-    found = np.zeros((len(values), values.shape[-1], len(heard)), complex)
-    found[..., heard] = np.swapaxes(values[:, n_meshes:], 1, 2)
-    return values[:, :n_meshes], found
+    ring = np.zeros((len(values), values.shape[-1], len(heard)), complex)
+    ring[..., heard] = np.swapaxes(values[:, n_meshes:], 1, 2)
+    return values[:, :n_meshes], ring
 
 
 def named_sensors(case: Case, dynamics: DynamicsResult) -> tuple[tuple[str, ...], np.ndarray]:
     """Names and lines (speeds, n_sensors, n_orders) [m] of the sensors of a case on the ring."""
     carrier, lines = np.array([s.carrier for s in dynamics.speeds]), list[np.ndarray]()
-    for one in case.housing.sensor:
-        field = math.cos(one.direction) * dynamics.ring_radial
-        if math.sin(one.direction):
-            field = field + math.sin(one.direction) * dynamics.ring_tangential
-        place = dynamics.ring_teeth, carrier, one.angle
-        known = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
-        lines.append(component_lines(field, *place, **known).displacement)
-    return tuple(one.name for one in case.housing.sensor), np.stack(lines, axis=1)
+    for sensor in case.housing.sensor:
+        field = math.cos(sensor.direction) * dynamics.ring_radial
+        if math.sin(sensor.direction):
+            field = field + math.sin(sensor.direction) * dynamics.ring_tangential
+        place = dynamics.ring_teeth, carrier, sensor.angle
+        options = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
+        lines.append(component_lines(field, *place, **options).displacement)
+    return tuple(sensor.name for sensor in case.housing.sensor), np.stack(lines, axis=1)
 
 
 def lines_method(case: Case) -> str:

@@ -304,10 +304,10 @@ class JudgedTurn:
         """Modulus of the largest Floquet multiplier over a turn (speeds,), nan where there is no verdict."""
         from femgear.housing.two_way.turn_stability import turn_stability
 
-        found = np.full(len(self.carrier_speed), np.nan)
+        multipliers = np.full(len(self.carrier_speed), np.nan)
         if len(self.at):
             with one_blas_thread():
-                found[self.at] = turn_stability(
+                multipliers[self.at] = turn_stability(
                     self.gears,
                     self.excitation,
                     self.structure,
@@ -316,7 +316,7 @@ class JudgedTurn:
                     damping=self.damping,
                     harmonics=self.harmonics,
                 ).modulus
-        return found ** (1.0 / self.turns)
+        return multipliers ** (1.0 / self.turns)
 
 
 @dataclass(frozen=True)
@@ -532,7 +532,7 @@ class HousingResult(StageResult):
             stored.append(("pressure", "speed order", sound[0], "Pa", "sound pressure at the microphone"))
         elif not self.supported:
             pressure = sound_pressure(exact, cylinder, self.microphone)
-            sound = pressure, *(sound_power(exact, cylinder, equivalent=one) for one in (False, True))
+            sound = pressure, *(sound_power(exact, cylinder, equivalent=equivalent) for equivalent in (False, True))
         for kind, (_, moved) in self.outputs.items():
             stored.append((f"{kind}_lines", f"speed {kind} order", moved, *_OUTPUTS[kind]))
         variables = complex_entries(tuple(stored), single=True) | {
@@ -552,14 +552,16 @@ class HousingResult(StageResult):
                 levels["power_level"] = power_level(sound[1], frequency), f"A-weighted {power}"
             words = _EQUIVALENT if sound[1] is not None else f"A-weighted {power}, {_ESTIMATE}"
             levels["equivalent_power_level"] = power_level(sound[2], frequency), words
-            variables |= {name: ("speed", one, "dB(A)", said) for name, (one, said) in levels.items()}
+            variables |= {
+                name: ("speed", values_of_level, "dB(A)", said) for name, (values_of_level, said) in levels.items()
+            }
         judged = {} if self.judged is None else {"turn_multiplier": self.judged.multiplier}
         supported = {
             name: ("speed" if value.ndim == 1 else "speed mesh_kind", value, *_SUPPORTED[name])
             for name, value in {**judged, **self.supported}.items()
         }
         kinds = {"mesh_kind": ("mesh_kind", list(KINDS), "1", "kind of mesh")} if self.supported else {}
-        names = {kind: (kind, one[0], "1", f"name of the {kind}") for kind, one in self.outputs.items()}
+        names = {kind: (kind, output[0], "1", f"name of the {kind}") for kind, output in self.outputs.items()}
         order = {"order": ("order", exact.order, "1", "carrier order")}
         return Contents(
             variables | supported,
@@ -596,7 +598,7 @@ def verdict(results: Results) -> Iterator[Block]:
         shown = [f"{significant(value, 3)} um" for value in map(float, error)]
         text = _kinds("{}", shown, lambda text: marks(text, *LARGE, "W-POSITIONS", of=("static",)))
         rows.append((f"transmission error, peak to peak{_where(static, '')}", text))
-    factors, known, doubts = np.ones((1, 2)), dict[str, np.ndarray](), dict[int, tuple[str, ...]]()
+    factors, load_factors, doubts = np.ones((1, 2)), dict[str, np.ndarray](), dict[int, tuple[str, ...]]()
     if "dynamics" in stages:
         factors, sharing = _load_factors(results.dynamics)
         if "housing" in stages and "dynamic_factor" in results.housing:
@@ -608,14 +610,14 @@ def verdict(results: Results) -> Iterator[Block]:
         codes = _all_of(doubts)
         text = _kinds("{:.3f}", factors.max(axis=0), lambda text: marks(text, *codes, of=_OF_LEVEL))
         rows.append(("largest dynamic factor K_v, at operating speeds", text))
-        known = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
+        load_factors = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
     if "stress" in stages:
         static = results.static
         if "face_load_factor" in static:
-            known["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
-            text = _kinds("{:.3f}", known["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
+            load_factors["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+            text = _kinds("{:.3f}", load_factors["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
             rows.append(("face load factor K_Hβ", text))
-        rows += _strength(results, known, notes, marks, _all_of(doubts))
+        rows += _strength(results, load_factors, notes, marks, _all_of(doubts))
     if "runup" in stages:
         rows.append(("largest dynamic factor K_v of the run-up", largest_factors(results.runup, marks)))
         rows.append(("largest level of the run-up", loudest(results.runup, marks)))
@@ -660,7 +662,7 @@ def _unequal(results: Results, sharing: np.ndarray, notes: list[str]) -> Iterato
         )
     if "modes" in results.stages and "supported_force" in results.modes:
         force = results.modes["supported_force"].values
-        most = np.array([(one / one.mean(axis=0)).max() for one in np.split(force, 2)])
+        most = np.array([(half / half.mean(axis=0)).max() for half in np.split(force, 2)])
     if (most > UNEQUAL * sharing).any():
         yield "largest share at one instant, at rest", _kinds("{:.3f}", most)
         notes.append("at one instant: of the equal share, on the same supports and bearings; K_v contains it")
@@ -706,7 +708,7 @@ def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _strength(
-    results: Results, known: Mapping[str, Any], notes: list[str], marks: Marks, doubts: tuple[str, ...]
+    results: Results, load_factors: Mapping[str, Any], notes: list[str], marks: Marks, doubts: tuple[str, ...]
 ) -> Iterator[tuple[str, str]]:
     """Rows of the largest stresses, and of the safeties of ISO 6336 with known load factors (2,).
 
@@ -719,17 +721,17 @@ def _strength(
 
     root, nominal = largest("root_worst").ravel(), largest("iso_root_stress").ravel()
     contact, worst = largest_pressure(stress).reshape(2, -1).max(axis=1), int(root.argmax())
-    nominals, factors = largest("iso_contact_stress"), np.prod([np.ones(2), *known.values()], axis=0)
+    nominals, factors = largest("iso_contact_stress"), np.prod([np.ones(2), *load_factors.values()], axis=0)
     where = _where(results.static, ", static")
     titles, number = SIDES[KINDS[worst // 2]], worst % 2
     kinked = root_doubts(results.findings, titles[number], titles[1 - number])
     yield f"largest root stress{where}", marks(f"{root[worst] * 1e-6:.1f} MPa, {_PARTS[worst]}", *kinked)
     pressures = [
-        marks(f"{kind} {significant(one * 1e-6, 1)} MPa", *pressure_doubts(results.findings, kind, one))
-        for kind, one in zip(KINDS, contact)
+        marks(f"{kind} {significant(pressure * 1e-6, 1)} MPa", *pressure_doubts(results.findings, kind, pressure))
+        for kind, pressure in zip(KINDS, contact)
     ]
     yield f"largest contact pressure{where}", ", ".join(pressures)
-    for name, text in _safeties(results.case, nominal, nominals, factors, tuple(known), notes):
+    for name, text in _safeties(results.case, nominal, nominals, factors, tuple(load_factors), notes):
         yield name, marks(text, *doubts, "W-FACE-LOAD", "W-THRUST", of=("static", *_OF_LEVEL))
 
 
@@ -742,7 +744,9 @@ def _safeties(
     load factors of these ``names``.
     """
     of_parts, over = [gear_material(case, gear) for gear in _GEARS], " ".join(names)
-    flims, hlims = ([getattr(one, f"{kind}_stress_limit") for one in of_parts] for kind in ("root", "contact"))
+    flims, hlims = (
+        [getattr(material, f"{kind}_stress_limit") for material in of_parts] for kind in ("root", "contact")
+    )
     safe = [
         None if limit is None else root_safety(limit, root[i], factors[i // 2], reversed_bending=i in (1, 2))
         for i, limit in enumerate(flims)
@@ -781,7 +785,7 @@ def _safeties(
 
 def _of_parts(values: list[float | None]) -> str:
     """Write a number, where there is one, of every one of `_PARTS`."""
-    return ", ".join(f"{part} {'-' if one is None else f'{one:.2f}'}" for part, one in zip(_PARTS, values))
+    return ", ".join(f"{part} {'-' if value is None else f'{value:.2f}'}" for part, value in zip(_PARTS, values))
 
 
 def _limits(limits: list[float | None]) -> str:
@@ -831,7 +835,7 @@ def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int
                 columns[text] = lambda i, name=name: marked(f"{float(limit[name][i]):.1f}", i)
         if limit.attrs.get("method") == "casing" and "pressure_level" in limit:
             notes.append(f"microphone: {_ESTIMATE}")
-    ends = sorted({f"{1e-3 * float(one):.4g}" for one in limit["excitation_limit"][[0, -1]]}, key=float)
+    ends = sorted({f"{1e-3 * float(end):.4g}" for end in limit["excitation_limit"][[0, -1]]}, key=float)
     notes.append(
         f"levels assume: foundation of the ring {ring.foundation_radial:.3g} N/m³ radial, "
         f"{ring.foundation_tangential:.3g} N/m³ tangential; damping ratio {case.dynamics.damping_ratio:g} of "
@@ -847,8 +851,8 @@ def level_changes(results: Results) -> np.ndarray:
     """Find how far a longer excitation changes the level of the housing at every speed [dB], NaN unknown."""
     if "dynamics" not in results.stages:
         return np.full(results.housing.sizes["speed"], np.nan)
-    known = results.dynamics.get("level_change")
-    return np.full(results.dynamics.sizes["speed"], np.nan) if known is None else known.values
+    change = results.dynamics.get("level_change")
+    return np.full(results.dynamics.sizes["speed"], np.nan) if change is None else change.values
 
 
 def _passing(housing: xr.Dataset) -> float:
@@ -861,13 +865,13 @@ def _passing(housing: xr.Dataset) -> float:
 
 def _near_resonances(runup: xr.Dataset, marks: Marks) -> Block:
     """Tabulate the resonances nearest to the operating speeds, of those that count there."""
-    value = {str(name): one.values for name, one in runup.items() if one.dims[:1] == ("resonance",)}
+    value = {str(name): variable.values for name, variable in runup.items() if variable.dims[:1] == ("resonance",)}
     level = np.interp(value["operating_speed"], runup["speed"].values, runup["level"].values)
     near = np.abs(value["distance"]) <= _NEAR
-    counts, found = np.flatnonzero(near & (value["operating_alone"] >= _COUNTS * level)), list[int]()
+    counts, nearest = np.flatnonzero(near & (value["operating_alone"] >= _COUNTS * level)), list[int]()
     for speed in np.unique(value["operating_speed"][counts]):
-        own = counts[value["operating_speed"][counts] == speed]
-        found += own[np.argsort(np.abs(value["distance"][own]), kind="stable")[:_FEW]].tolist()
+        of_speed = counts[value["operating_speed"][counts] == speed]
+        nearest += of_speed[np.argsort(np.abs(value["distance"][of_speed]), kind="stable")[:_FEW]].tolist()
     columns = {
         "operating [rpm]": lambda i: f"{value['operating_speed'][i]:.6g}",
         "resonance": lambda i: f"{np.round(value['distance'][i], 1) + 0.0:+.1f} %",
@@ -878,7 +882,7 @@ def _near_resonances(runup: xr.Dataset, marks: Marks) -> Block:
         f"mesh harmonics within {_NEAR:g} % of a mode that they excite, the nearest {_FEW} of those that "
         f"give {100 * _COUNTS:g} % of the level or more; alone: level there by that mode at that harmonic"
     )
-    rows = found[: 2 * MANY]
+    rows = nearest[: 2 * MANY]
     notes = (note if rows else "none",)
     return tabulate("Resonances near the operating speeds", rows, columns, notes, marks)
 
@@ -956,22 +960,22 @@ def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
         heard = [("accelerometer_run_up", "m/s^2", lines.acceleration)]
         heard += [] if pressure is None else [("microphone_run_up", "Pa", pressure)]
         for name, unit, values in heard:
-            found = run_up_signal(lines.order, values, lines.base_speed, duration=sampling.run_up, rate=rate)
-            yield Signal(name, unit, rate, found, steady=False)
+            recorded = run_up_signal(lines.order, values, lines.base_speed, duration=sampling.run_up, rate=rate)
+            yield Signal(name, unit, rate, recorded, steady=False)
 
 
-def run_up_lines(runup: xr.Dataset, known: Mapping[str, Any]) -> tuple[SensorLines, np.ndarray | None]:
+def run_up_lines(runup: xr.Dataset, attributes: Mapping[str, Any]) -> tuple[SensorLines, np.ndarray | None]:
     """Read the lines of the sensor from runup.nc, and compute those of the microphone [Pa].
 
-    ``known`` are the attributes of housing.nc: places of both, ring and air. A housing that stands still has
+    ``attributes`` are those of housing.nc: places of both, ring and air. A housing that stands still has
     several nodal diameters a line, and no microphone there.
     """
     order, carrier = runup["order"].values, runup["carrier_speed"].values
     heard = runup["lines_real"].values + 1j * runup["lines_imag"].values
     displacement = -heard / (np.maximum(order, 1) * carrier[:, None]) ** 2
-    place = float(known["sensor_angle"]), int(known["ring_teeth"])
+    place = float(attributes["sensor_angle"]), int(attributes["ring_teeth"])
     lines = SensorLines(order, displacement, carrier, *place, runup.attrs.get("method", "exact"))
-    return lines, microphone_lines(lines, known) if lines.method == "exact" else None
+    return lines, microphone_lines(lines, attributes) if lines.method == "exact" else None
 
 
 def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
@@ -980,7 +984,7 @@ def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float
     if "runup" in results.stages:
         lines, pressure = run_up_lines(results.runup, results.housing.attrs)
         heard = ("m/s^2", lines.acceleration), ("Pa", pressure)
-        parts += [(unit, lines.order, lines.base_speed, one) for unit, one in heard if one is not None]
+        parts += [(unit, lines.order, lines.base_speed, signal) for unit, signal in heard if signal is not None]
     return line_extent(parts, rate)
 
 
@@ -1020,12 +1024,12 @@ def _recordings(results: Results) -> Iterator[tuple[float, str, str, np.ndarray,
     """
     housing = results.housing
     for s, rpm in enumerate(housing["speed"].values):
-        one = housing.isel(speed=s)
-        lines, name = stored_lines(one), np.format_float_positional(rpm, 9, fractional=False, trim="-")
+        at_speed = housing.isel(speed=s)
+        lines, name = stored_lines(at_speed), np.format_float_positional(rpm, 9, fractional=False, trim="-")
         speed = float(lines.base_speed) / lines.turns
         yield speed, f"accelerometer_{name}_rpm", "m/s^2", lines.number, lines.acceleration
-        if "pressure_level" in one:
-            exact, pressure = stored_sound(one)
+        if "pressure_level" in at_speed:
+            exact, pressure = stored_sound(at_speed)
             yield speed, f"microphone_{name}_rpm", "Pa", exact.number, pressure
 
 
@@ -1049,9 +1053,9 @@ def ring_shapes(results: Results) -> Shapes:
     )
 
 
-def _largest_lines(one: xr.Dataset) -> str:
+def _largest_lines(housing: xr.Dataset) -> str:
     """Write the five largest lines of one speed."""
-    lines = stored_lines(one)
+    lines = stored_lines(housing)
     amplitude = np.abs(lines.acceleration)
     largest = np.argsort(-amplitude, kind="stable")[:5]
     return ", ".join(f"{lines.order[j]:.8g} ({amplitude[j]:.3g})" for j in largest)
@@ -1070,13 +1074,13 @@ def mesh_bands(results: Results) -> Block:
             windowed = hanning_spectrum(results.dynamics, housing, planetary_set(case).planet_angles, s)
         rpm = float(housing["speed"][s])
         for h in _shown_harmonics(spectrum, teeth, case.dynamics.mesh_harmonics):
-            found = analyse_band(spectrum, teeth, h, count=3)
-            threshold = found.lobes.threshold
-            two = [_line(line, h * teeth) for line in found.lines[:2]] + ["-", "-"]
-            third = f"{found.lines[2].level:.1f}" if len(found.lines) > 2 else "-"
+            band = analyse_band(spectrum, teeth, h, count=3)
+            threshold = band.lobes.threshold
+            two = [_line(line, h * teeth) for line in band.lines[:2]] + ["-", "-"]
+            third = f"{band.lines[2].level:.1f}" if len(band.lines) > 2 else "-"
             lobes, hanning = (
-                "-" if one is None else f"{len(one.lobes.position) / turns:.4g}"
-                for one in (found, windowed and analyse_band(windowed, teeth, h))
+                "-" if side is None else f"{len(side.lobes.position) / turns:.4g}"
+                for side in (band, windowed and analyse_band(windowed, teeth, h))
             )
             published = _published(case, rpm, h)
             rows.append((f"{rpm:.6g}", str(h), str(h * teeth), *two[:2], third, lobes, hanning, published))

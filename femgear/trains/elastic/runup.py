@@ -112,16 +112,16 @@ def mesh_factors(force: np.ndarray) -> np.ndarray:
 
 def joined_speeds(parts: Sequence[HeardSpeeds]) -> HeardSpeeds:
     """Join what is kept of speeds one after the other, without the orders that are silent at all of them."""
-    order = np.unique(np.concatenate([one.order for one in parts]))
-    lines = np.zeros((sum(len(one.level) for one in parts), len(order)), np.complex64)
+    order = np.unique(np.concatenate([part.order for part in parts]))
+    lines = np.zeros((sum(len(part.level) for part in parts), len(order)), np.complex64)
     first = 0
-    for one in parts:
-        lines[first : first + len(one.level), np.searchsorted(order, one.order)] = one.lines
-        first += len(one.level)
+    for part in parts:
+        lines[first : first + len(part.level), np.searchsorted(order, part.order)] = part.lines
+        first += len(part.level)
     largest = np.abs(lines).max(axis=0)
     heard = largest > _SILENT * largest.max(initial=0.0)
-    names = {one.name for one in fields(HeardSpeeds)} - {"order", "lines"}
-    rest = {name: np.concatenate([getattr(one, name) for one in parts]) for name in names}
+    names = {field_.name for field_ in fields(HeardSpeeds)} - {"order", "lines"}
+    rest = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
     return HeardSpeeds(order=order[heard], lines=lines[:, heard], **rest)
 
 
@@ -142,8 +142,8 @@ def mode_levels(response: Response, field: np.ndarray, alike, harmonic, heard_sp
     """
     levels = np.zeros(len(at))
     for i in np.flatnonzero((at >= 0) & (harmonic < response.modal.shape[-1])):
-        own, h = np.flatnonzero(alike[:, i]), harmonic[i]
-        lines = response.modal[at[i], own, h] @ field[own] * heard_speed[at[i], h] ** 2
+        lines_of_order, h = np.flatnonzero(alike[:, i]), harmonic[i]
+        lines = response.modal[at[i], lines_of_order, h] @ field[lines_of_order] * heard_speed[at[i], h] ** 2
         levels[i] = np.sqrt(0.5 * (np.abs(lines) ** 2).sum())
     return levels
 
@@ -244,7 +244,7 @@ class RunupResult(StageResult):
         at = partial(np.interp, self.resonances["resonance_speed"] * RPM, self.input_speed)
         there = {
             "resonance_level": at(heard.level),
-            "resonance_factor": np.stack([at(one) for one in heard.dynamic_factor.T], axis=1),
+            "resonance_factor": np.stack([at(factor) for factor in heard.dynamic_factor.T], axis=1),
         }
         variables = {
             "mesh_frequency": ("speed", self.mesh_frequency, "Hz", "mesh frequency"),
@@ -323,7 +323,7 @@ def describe_runup(data: xr.Dataset) -> Block:
     strongest, marks = np.argsort(-data["resonance_alone"].values, kind="stable")[:_SHOWN], _marks(data)
     change = level_change_at(data, data["resonance_speed"].values)
     codes = "W-STEPS", *_RUN_UP_DOUBTS
-    value = {str(name): one.values for name, one in data.items() if one.dims[:1] == ("resonance",)}
+    value = {str(name): variable.values for name, variable in data.items() if variable.dims[:1] == ("resonance",)}
     columns = {
         "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
         "from operating": lambda i: f"{np.round(value['distance'][i], 1) + 0.0:+.1f} %",

@@ -211,10 +211,10 @@ def solve_modes(
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_dynamic_case(case, static.planetary_set)
     steps, gears, torque = steps or Steps(), static.planetary_set, static.sun_torque
-    bodies, deviations, known = _ring_bodies(case, static, steps), set_deviations(case), state_entries(case)
-    state = steps.kept("loaded state", known) or steps.keep(
+    bodies, deviations, entries = _ring_bodies(case, static, steps), set_deviations(case), state_entries(case)
+    state = steps.kept("loaded state", entries) or steps.keep(
         "loaded state",
-        known,
+        entries,
         loaded_period(
             gears,
             *bodies,
@@ -231,9 +231,9 @@ def solve_modes(
     stiffness = state.resampled("held_stiffness", RECORD * state.periods).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
     reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
-    ring, known = _ring_of_case(case, static, bodies, steps, reach), {**known, "reach": reach}
-    springs = steps.kept("mesh springs", known)
-    excitation, flexibility = springs or steps.keep("mesh springs", known, mesh_springs(gears, ring, state))
+    ring, entries = _ring_of_case(case, static, bodies, steps, reach), {**entries, "reach": reach}
+    springs = steps.kept("mesh springs", entries)
+    excitation, flexibility = springs or steps.keep("mesh springs", entries, mesh_springs(gears, ring, state))
     model = elastic_set(case, gears, ring, sun_torque=torque, flexibility=flexibility)
     modes = undamped_modes(
         model.system,
@@ -265,13 +265,13 @@ def _sharing_over_bearings(
     share equally, or their bearings are rigid.
     """
     share = _shares(state.resampled("force", RECORD * state.periods))
-    supports, known = linear_supports(case), state_entries(case)
+    supports, entries = linear_supports(case), state_entries(case)
     if supports.planet is None or np.abs(share - 1.0).max() < _EQUAL:
         return None
     deviations = set_deviations(case)
-    if (kept := steps.kept("sharing over bearings", known)) is not None:
+    if (kept := steps.kept("sharing over bearings", entries)) is not None:
         return kept
-    found = [
+    sharing = [
         _shares(
             walk_mesh_cycle(
                 gears,
@@ -286,7 +286,7 @@ def _sharing_over_bearings(
         )
         for factor in BEARING_FACTORS
     ]
-    return steps.keep("sharing over bearings", known, np.array(found).T)
+    return steps.keep("sharing over bearings", entries, np.array(sharing).T)
 
 
 def _shares(force: np.ndarray) -> np.ndarray:
@@ -298,10 +298,10 @@ def _shares(force: np.ndarray) -> np.ndarray:
 def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies, Bodies]:
     """Flank compliances with the ring on its foundation, and with the ring held; one is the static one's."""
     fixed, gears = case.static.members == "fixed", static.planetary_set
-    known = {**gear_entries(case, gears, 2), **(foundation_entries(case) if fixed else {})}
-    ring = steps.kept("flanks of the ring", known) or steps.keep(
+    entries = {**gear_entries(case, gears, 2), **(foundation_entries(case) if fixed else {})}
+    ring = steps.kept("flanks of the ring", entries) or steps.keep(
         "flanks of the ring",
-        known,
+        entries,
         with_ring(static.bodies, ring_foundation(case, static.sectors.ring) if fixed else None).ring,
     )
     other = static.bodies.with_gear(-1, ring)
@@ -318,10 +318,10 @@ def _ring_of_case(
 ) -> RingModel:
     """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz]."""
     gears, sector, side = static.planetary_set, static.sectors.ring, 1.0 if static.sun_torque >= 0 else -1.0
-    known = {**ring_entries(case), "reach": reach, "side": side}
-    return steps.kept("ring model", known) or steps.keep(
+    entries = {**ring_entries(case), "reach": reach, "side": side}
+    return steps.kept("ring model", entries) or steps.keep(
         "ring model",
-        known,
+        entries,
         ring_model(
             gears,
             sector,
@@ -386,57 +386,57 @@ def dynamics_parts(
     check_reach(case, modes.reach, fastest_mesh_frequency(case, static.planetary_set))
     basis, excitation, gears = modes.modes, modes.excitation, static.planetary_set
     speeds, (frequency, carrier) = np.array(case.operation.speeds), _turning_speeds(case, modes)
-    some, heard_lines = _compared_speeds(case), _heard_lines(case, modes)
+    compared, heard_lines = _compared_speeds(case), _heard_lines(case, modes)
     first, early, level = first_limit(case, modes, frequency), None, None
     if _solved_before(case, modes, first, memory):
         response = solve_spectral(basis, excitation, frequency, **first.options(case))
         early = response, *mesh_and_ring_outputs(modes, response)
-        level = order_level(lines_of_field(case, modes, early[2][some], carrier[some]))
+        level = order_level(lines_of_field(case, modes, early[2][compared], carrier[compared]))
     up_to, beyond, change = _excitation_end(case, modes, level)
     limit = limited(case, frequency, up_to, given=case.dynamics.mesh_harmonics)
     if (first.excitation != limit.excitation).any():
         early = None
     level_change = np.full(len(speeds), np.nan)
-    level_change[some] = change
+    level_change[compared] = change
     _estimate_slow(level_change, heard_lines, case, frequency, carrier, limit, beyond)
-    decisive, told = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
+    decisive, responses = decisive_harmonics(basis, excitation, int(limit.excitation.max())), list[Response]()
     room = _HARMONIC * limit.response * excitation.periods
     if case.housing.stands_still:
         from femgear.trains.elastic.fixed_housing import housing_memory
 
         room = room + housing_memory(case, modes, limit)
-    for own, part in parts_of_speeds(case, room, memory):
+    for numbers, part in parts_of_speeds(case, room, memory):
         if early is None:
-            response = solve_spectral(basis, excitation, frequency[own], **limit.options(case, own))
+            response = solve_spectral(basis, excitation, frequency[numbers], **limit.options(case, numbers))
             dte, radial = mesh_and_ring_outputs(modes, response)
         else:
             response, dte, radial = early
-        told.append(response.without_lines())
-        if own[-1] + 1 == len(speeds) and part is not case:
-            response = replace(response, message=joint_message(told))
+        responses.append(response.without_lines())
+        if numbers[-1] + 1 == len(speeds) and part is not case:
+            response = replace(response, message=joint_message(responses))
         last = replace(response, **{name: getattr(response, name)[-1:] for name in _LINES})
-        heard = response if any(math.sin(one.direction) for one in case.housing.sensor) else last
+        heard = response if any(math.sin(sensor.direction) for sensor in case.housing.sensor) else last
         yield (
             part,
             DynamicsResult(
-                input_speed=speeds[own],
+                input_speed=speeds[numbers],
                 response=response,
                 dte=dte,
                 ring_radial=radial,
                 speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
-                judged=Judged(basis, excitation, frequency[own], decisive),
+                judged=Judged(basis, excitation, frequency[numbers], decisive),
                 ring_tangential=mesh_and_ring_outputs(modes, heard, TANGENTIAL)[1],
                 ring_teeth=gears.ring.teeth,
                 symmetry=modes.symmetry,
                 harmonics=int(limit.response.max()),
-                excitation_limit=limit.frequency[own],
-                level_change=level_change[own],
+                excitation_limit=limit.frequency[numbers],
+                level_change=level_change[numbers],
                 compared_to=beyond,
                 entries=dynamic_entries(part),
-                fixed=_fixed_part(case, modes, carrier, limit, own) if case.housing.stands_still else None,
+                fixed=_fixed_part(case, modes, carrier, limit, numbers) if case.housing.stands_still else None,
             ),
         )
-        progress("dynamics", float(own[-1] + 1), float(len(speeds)))
+        progress("dynamics", float(numbers[-1] + 1), float(len(speeds)))
 
 
 @one_blas_thread()
@@ -471,12 +471,12 @@ def _estimate_slow(change, heard_lines: Heard, case: Case, frequency, carrier, l
         change[slow] = lost_level(case, heard_lines, limit.frequency[slow], beyond, np.sign(carrier[0]))
 
 
-def _fixed_part(case: Case, modes: ModesResult, carrier, limit: FrequencyLimit, own) -> FixedHousing:
+def _fixed_part(case: Case, modes: ModesResult, carrier, limit: FrequencyLimit, numbers) -> FixedHousing:
     """Housing that stands still at some speeds of all (n_speeds,) of the carrier [rad/s]."""
-    judged = np.flatnonzero(np.isin(own, checked_speeds(len(carrier))))
+    judged = np.flatnonzero(np.isin(numbers, checked_speeds(len(carrier))))
     from femgear.trains.elastic.fixed_housing import fixed_housing
 
-    return fixed_housing(case, modes, carrier[own], limit.at(own), judged_at=judged)
+    return fixed_housing(case, modes, carrier[numbers], limit.at(numbers), judged_at=judged)
 
 
 def _compared_speeds(case: Case) -> np.ndarray:
@@ -496,11 +496,11 @@ def _excitation_end(case: Case, modes: ModesResult, level: np.ndarray | None = N
 
     With the ``level`` (n,) at those that are compared where it is known.
     """
-    if not (known := _known_ends(case, modes)):
+    if not (ends := _known_ends(case, modes)):
         frequency, carrier = (values[_compared_speeds(case)] for values in _turning_speeds(case, modes))
-        found = excitation_end(case, modes, _heard_lines(case, modes), frequency, carrier, level)
-        known.append(found)
-    return known[0]
+        end = excitation_end(case, modes, _heard_lines(case, modes), frequency, carrier, level)
+        ends.append(end)
+    return ends[0]
 
 
 @remembered(latest=2)
@@ -519,9 +519,9 @@ def _heard_lines(case: Case, modes: ModesResult) -> Heard:
 
 def _turning_speeds(case: Case, modes: ModesResult) -> tuple[np.ndarray, np.ndarray]:
     """Mesh frequency [Hz] and speed of the carrier [rad/s], refused where the ring has no modes for them."""
-    one, speeds = member_speeds(case, planetary_set(case)), np.array(case.operation.speeds)
-    check_rim_speed(modes.ring.modes, one.carrier * speeds)
-    return one.mesh_frequency * speeds, one.carrier * speeds
+    turning, speeds = member_speeds(case, planetary_set(case)), np.array(case.operation.speeds)
+    check_rim_speed(modes.ring.modes, turning.carrier * speeds)
+    return turning.mesh_frequency * speeds, turning.carrier * speeds
 
 
 @one_blas_thread()
@@ -547,12 +547,12 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     """
     check_entries(dynamics, DynamicsResult, dynamic_entries(case), "dynamic response")
     place = dynamics.ring_teeth, np.array([s.carrier for s in dynamics.speeds]), case.housing.sensor_angle
-    known = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
+    options = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
     heard, width = case.housing.microphone, planetary_set(case).ring.face_width
     angle = case.housing.sensor_angle if heard.angle is None else heard.angle
-    found = HousingResult(
+    housing = HousingResult(
         input_speed=np.array(case.operation.speeds),
-        exact=component_lines(dynamics.ring_radial, *place, **known),
+        exact=component_lines(dynamics.ring_radial, *place, **options),
         form=case.housing.form,
         points=case.housing.points,
         harmonics=dynamics.harmonics,
@@ -562,15 +562,15 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
         microphone=Microphone(heard.distance, angle),
     )
     if case.housing.sensor:
-        found = replace(found, outputs={"sensor": named_sensors(case, dynamics)})
+        housing = replace(housing, outputs={"sensor": named_sensors(case, dynamics)})
     if (periods := dynamics.response.periods) > 1:
-        radiating = *place[:2], found.cylinder, found.microphone
-        found = replace(found, sound=component_sound(dynamics.ring_radial, *radiating, periods=periods))
+        radiating = *place[:2], housing.cylinder, housing.microphone
+        housing = replace(housing, sound=component_sound(dynamics.ring_radial, *radiating, periods=periods))
     if dynamics.fixed is None:
-        return found
+        return housing
     from femgear.trains.elastic.fixed_housing import lines_in_housing
 
-    return lines_in_housing(case, dynamics, found, dynamics.fixed)
+    return lines_in_housing(case, dynamics, housing, dynamics.fixed)
 
 
 @one_blas_thread()
@@ -582,48 +582,48 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     foundation. CaseError: E-SPEED as there. ConvergenceError.
     """
     check_entries(modes, ModesResult, modal_entries(case), "modal basis")
-    one, basis, excitation = member_speeds(case, planetary_set(case)), modes.modes, modes.excitation
+    speed_of, basis, excitation = member_speeds(case, planetary_set(case)), modes.modes, modes.excitation
     operating, given = np.array(case.operation.speeds), case.dynamics.mesh_harmonics
-    some, up_to = checked_speeds(len(operating)), _excitation_end(case, modes)[0]
+    checked, up_to = checked_speeds(len(operating)), _excitation_end(case, modes)[0]
     first, last = _runup_ends(case, modes)
-    slowest, fastest = first * one.mesh_frequency, last * one.mesh_frequency
+    slowest, fastest = first * speed_of.mesh_frequency, last * speed_of.mesh_frequency
     count = int(limited(case, [slowest], up_to, given=given).excitation[0])
     motions = basis.shape[modes.model.ring_slice].T
     field = ring_field(modes.ring.modes, motions, RADIAL, modes.max_diameter)
     forces = modal_forces(basis, excitation, count, output=field)
     met = crossings(forces, slowest, fastest, up_to if given is None else math.inf)
-    resonance = met.mesh_frequency / one.mesh_frequency
+    resonance = met.mesh_frequency / speed_of.mesh_frequency
     heard, damping = forces.heard[met.row, met.harmonic - 1], forces.damping_ratio[met.row]
     speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, heard, damping)
-    speeds = merged_speeds(operating[some][(operating[some] >= first) & (operating[some] <= last)], speeds)
+    speeds = merged_speeds(operating[checked][(operating[checked] >= first) & (operating[checked] <= last)], speeds)
     beside = operating[np.abs(operating[:, None] - resonance).argmin(axis=0)]
-    found = resonances(basis, forces, met, resonance, beside)
-    alike = np.abs(basis.frequency[:, None] / found["frequency"] - 1.0) <= ONE_FREQUENCY
+    resonances_ = resonances(basis, forces, met, resonance, beside)
+    alike = np.abs(basis.frequency[:, None] / resonances_["frequency"] - 1.0) <= ONE_FREQUENCY
     nearest = [np.abs(speeds[:, None] - at).argmin(axis=0) for at in (resonance, beside)]
-    frequency, carrier, parts = one.mesh_frequency * speeds, one.carrier * speeds, list[HeardSpeeds]()
+    frequency, carrier, parts = speed_of.mesh_frequency * speeds, speed_of.carrier * speeds, list[HeardSpeeds]()
     alone, n = np.zeros((2, len(resonance))), np.arange(-modes.max_diameter, modes.max_diameter + 1)
     limit = limited(case, frequency, up_to, given=given)
     cuts = np.flatnonzero(np.diff(np.cumsum(limit.response) // _LINES_TOGETHER)) + 1
 
-    def followed(own: np.ndarray) -> tuple[HeardSpeeds | None, list[np.ndarray]]:
+    def followed(numbers: np.ndarray) -> tuple[HeardSpeeds | None, list[np.ndarray]]:
         """What is kept of some speeds, and the levels of single modes at those of their resonances."""
         response, heard = (
-            solve_spectral(basis, excitation, frequency[own], radius=False, **limit.options(case, own)),
+            solve_spectral(basis, excitation, frequency[numbers], radius=False, **limit.options(case, numbers)),
             None,
         )
         if not case.housing.stands_still:
-            lines = sensor_lines(case, modes, response, carrier[own])
+            lines = sensor_lines(case, modes, response, carrier[numbers])
             heard = heard_speeds(response.force, lines, response.lowest_force)
-        order = np.arange(response.force.shape[-1])[:, None] * case.ring.teeth - np.sign(one.carrier) * n
-        turning, levels = carrier[own][:, None, None] * order, []
+        order = np.arange(response.force.shape[-1])[:, None] * case.ring.teeth - np.sign(speed_of.carrier) * n
+        turning, levels = carrier[numbers][:, None, None] * order, []
         for at in nearest:
-            inside = np.where((at >= own[0]) & (at <= own[-1]), at - own[0], -1)
+            inside = np.where((at >= numbers[0]) & (at <= numbers[-1]), at - numbers[0], -1)
             levels.append(mode_levels(response, field, alike, met.harmonic, turning, inside))
         if not case.housing.stands_still:  # else the speeds in the housing are told
-            progress("runup", float(own[-1] + 1), float(len(speeds)))  # to nobody from a second process
+            progress("runup", float(numbers[-1] + 1), float(len(speeds)))  # to nobody from a second process
         return heard, levels
 
-    tasks = [partial(followed, own) for own in np.split(np.arange(len(speeds)), cuts)]
+    tasks = [partial(followed, numbers) for numbers in np.split(np.arange(len(speeds)), cuts)]
     for heard_part, levels in reversed(second_process.shared(tasks[::-1])):
         parts += [heard_part] if heard_part is not None else []
         alone += levels
@@ -639,7 +639,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         compared_to=compared_to,
         carrier_speed=carrier,
         heard=levels,
-        resonances={**found, "resonance_alone": alone[0], "operating_alone": alone[1]},
+        resonances={**resonances_, "resonance_alone": alone[0], "operating_alone": alone[1]},
         ring_teeth=case.ring.teeth,
         sensor_angle=case.housing.sensor_angle,
         operating_speeds=operating,
@@ -665,14 +665,14 @@ def _heard_in_housing(
     _ = model.housing  # made before the process is copied
 
     def heard(block: np.ndarray) -> HeardSpeeds:
-        found = heard_in_housing(model, carrier[block], limit.at(block), workers)
+        heard_lines = heard_in_housing(model, carrier[block], limit.at(block), workers)
         progress("runup", float(block[-1] + 1), float(count))  # to nobody from a second process
-        return found
+        return heard_lines
 
     # the slowest speeds, which take longest, come first
     tasks = [partial(heard, block) for block in reversed(blocks)]
-    found = second_process.shared(tasks) if processes > 1 else [task() for task in reversed(tasks)][::-1]
-    return found[::-1]
+    parts = second_process.shared(tasks) if processes > 1 else [task() for task in reversed(tasks)][::-1]
+    return parts[::-1]
 
 
 def _run_up_change(
@@ -684,31 +684,31 @@ def _run_up_change(
     solving again; NaN at all others. Speeds are those of the input [rad/s], in ascending order.
     """
     of_speed, heard_lines = member_speeds(case, planetary_set(case)), _heard_lines(case, modes)
-    _, beyond, known = _excitation_end(case, modes)
+    _, beyond, changes = _excitation_end(case, modes)
     frequency, carrier = of_speed.mesh_frequency * speeds, of_speed.carrier * speeds
     change = np.full(len(speeds), np.nan)
-    for speed, value in zip(np.array(case.operation.speeds)[_compared_speeds(case)], known):
+    for speed, value in zip(np.array(case.operation.speeds)[_compared_speeds(case)], changes):
         change[speeds == speed] = value
     _estimate_slow(change, heard_lines, case, frequency, carrier, limit, beyond)
-    some = np.union1d(checked_speeds(len(speeds), _COMPARED), level.argmax())
-    some = some[np.isnan(change[some]) & (limit.frequency[some] < beyond - frequency[some])]
-    if len(some):
-        longer = limited(case, frequency[some], beyond)
+    checked = np.union1d(checked_speeds(len(speeds), _COMPARED), level.argmax())
+    checked = checked[np.isnan(change[checked]) & (limit.frequency[checked] < beyond - frequency[checked])]
+    if len(checked):
+        longer = limited(case, frequency[checked], beyond)
         with suppress(ConvergenceError):  # nearly singular: what these lose is not known
-            wider = order_level(heard_lines(frequency[some], carrier[some], longer))
-            change[some] = 20.0 * np.log10(wider / level[some])
+            wider = order_level(heard_lines(frequency[checked], carrier[checked], longer))
+            change[checked] = 20.0 * np.log10(wider / level[checked])
     return change, beyond
 
 
 def _runup_ends(case: Case, modes: ModesResult) -> tuple[float, float]:
     """First and last speed of the run-up [rad/s]; a default does not leave the range of the model."""
-    one, (first, last) = member_speeds(case, planetary_set(case)), runup_ends(case)
+    turning, (first, last) = member_speeds(case, planetary_set(case)), runup_ends(case)
     if case.runup.to is not None:
-        check_rim_speed(modes.ring.modes, one.carrier * last)
+        check_rim_speed(modes.ring.modes, turning.carrier * last)
         return first, last
     highest = min(HIGHEST_RESPONSE / (case.response_harmonics or 3), case.dynamics.up_to or math.inf)
     wave = _BELOW_WAVES * slowest_wave(modes.ring.modes)[0]
-    allowed = min(highest / one.mesh_frequency, wave / abs(one.carrier))
+    allowed = min(highest / turning.mesh_frequency, wave / abs(turning.carrier))
     return first, max(min(last, allowed), *case.operation.speeds)
 
 

@@ -155,12 +155,12 @@ def spatial_mode_shapes(modes: xr.Dataset, gears: PlanetarySet, *, scale: float 
         row, column = divmod(place, columns)
         front, side = (axes[(2 * row + i) * columns + column] for i in (0, 1))
         # motions of every body x, y, z, tilts and rotation as arcs, in the axes of the set of `gear_geometry`
-        one, first = moved[:, :, pair[0]], pair[0]
-        sizes = [np.abs(one[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
+        motion, first = moved[:, :, pair[0]], pair[0]
+        sizes = [np.abs(motion[:, axis]).max() for axis in ([0, 1, 5], [2, 3, 4])]
         # a view without motion shows none
         inside, across = np.maximum(sizes, max(sizes) / _MOST)
-        _draw_front(front, data, scale * data.ring_radius / inside * one)
-        _draw_side(side, data, scale * data.ring_radius / across * one)
+        _draw_front(front, data, scale * data.ring_radius / inside * motion)
+        _draw_side(side, data, scale * data.ring_radius / across * motion)
         kind, phasing = str(modes["kind"].values[first]), str(modes["phasing"].values[first])
         names = " and ".join(str(mode + 1) for mode in pair)
         words = f"mode{'s' * (len(pair) > 1)} {names}: {float(f'{frequency[first]:.4g}'):g} Hz"
@@ -211,9 +211,9 @@ def _mesh_force_spectra(dynamics: xr.Dataset, modes: xr.Dataset) -> Figure:
     top = count * hertz.max()
     for ax, mesh in zip(axes, (0, n)):
         force = np.abs(lines[:, mesh, 1 : count + 1])
-        for h, one in enumerate(force.T, start=1):
+        for h, amplitude in enumerate(force.T, start=1):
             style = {"color": COLOURS[h - 1], "label": f"harmonic {h}"}
-            ax.plot(1e-3 * h * hertz, one, DASHES[(h - 1) % 4], **style)
+            ax.plot(1e-3 * h * hertz, amplitude, DASHES[(h - 1) % 4], **style)
         _mark(ax, modes, top)
         peak, h = np.unravel_index(force.argmax(), force.shape)
         at = (h + 1) * hertz[peak]
@@ -285,10 +285,10 @@ def _slice_forces(dynamics: xr.Dataset) -> Figure:
 
 def _mark(ax, modes: xr.Dataset, top: float) -> None:
     """Natural frequencies as marks inside the lower edge, by the phasing of the mode."""
-    found = modes["frequency"].values
+    hertz = modes["frequency"].values
     phasing = np.array([str(name) for name in modes["phasing"].values])
     for name in dict.fromkeys(phasing):
-        here = found[(phasing == name) & (found > 0.0) & (found <= top)]
+        here = hertz[(phasing == name) & (hertz > 0.0) & (hertz <= top)]
         if len(here):
             ax.plot(
                 1e-3 * here,

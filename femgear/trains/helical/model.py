@@ -149,12 +149,12 @@ def helical_data(case: HelicalCase, gears: PlanetarySet, mesh_stiffness=None) ->
     """
     helical = case.helical
     bodies = {}
-    for name, one in (("sun", case.sun), ("ring", helical.ring), ("carrier", case.carrier)):
+    for name, section in (("sun", case.sun), ("ring", helical.ring), ("carrier", case.carrier)):
         space = getattr(helical, name)
         torsional = torsional_support(case, name, space.torsional_stiffness)
-        radial = needed(support_stiffness(case, name, one), f"{name}.support_stiffness")
+        radial = needed(support_stiffness(case, name, section), f"{name}.support_stiffness")
         support = HelicalSupport(radial, space.axial_stiffness, space.tilt_stiffness, torsional)
-        bodies[name] = HelicalBody(one.mass, one.inertia, space.diametral_inertia, support)
+        bodies[name] = HelicalBody(section.mass, section.inertia, space.diametral_inertia, support)
     pin = helical.planet
     return HelicalSet(
         **gear_geometry(gears),
@@ -311,7 +311,7 @@ def section_stiffness(case: HelicalCase, gears: PlanetarySet, *, cache: Path | N
     virtual = _virtual_gears(case, gears)
     single = replace(gears, planet_angles=gears.planet_angles[:1])
     load = _line_load(case, gears)
-    transverse, normal = (_pair_stiffness(case, one, load, cache) for one in (single, virtual))
+    transverse, normal = (_pair_stiffness(case, section_gears, load, cache) for section_gears in (single, virtual))
     teeth = (virtual.sun.teeth, virtual.planet.teeth, virtual.ring.teeth)
     base = profile.base_helix_angle(case.sun.pressure_angle, case.helical.helix_angle)
     return SectionStiffness(teeth, transverse, normal, base)
@@ -423,7 +423,7 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
 
 def _check_torque(case: HelicalCase, gears: PlanetarySet) -> None:
     """A load under which teeth would give way by a large part of their height has no static solution."""
-    moduli = [one.youngs_modulus for one in materials_of(case)]
+    moduli = [material.youngs_modulus for material in materials_of(case)]
     stiffness = _TOOTH * min(material_factor(*pair) for pair in pairwise(moduli))
     share = _line_load(case, gears) / (stiffness * gears.sun.module)
     if share > _MOST:
@@ -484,7 +484,7 @@ def _refuse_loose(case: HelicalCase, data: HelicalSet) -> None:
     ]
     if not free and data.support_stiffness[:, 0].all():
         _refuse_hidden(case)
-    cures = [one for one in free if _balanced(case, _supported(data, *one))] or free
+    cures = [motion for motion in free if _balanced(case, _supported(data, *motion))] or free
     names = [f"helical.{body}.{entry}" for body, entry in cures]
     lost = " or the ".join(dict.fromkeys(_AXES[entry][1] for _, entry in cures)) or "torque"
     raise CaseError(
@@ -503,5 +503,5 @@ def _supported(data: HelicalSet, body: str, entry: str) -> HelicalSet:
     change = {_AXES[entry][0]: _TRIAL}
     if body == "planet":
         return replace(data, planet_bearing=replace(data.planet_bearing, **change))
-    one = getattr(data, body)
-    return replace(data, **{body: replace(one, support=replace(one.support, **change))})
+    held_body = getattr(data, body)
+    return replace(data, **{body: replace(held_body, support=replace(held_body.support, **change))})

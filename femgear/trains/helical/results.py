@@ -81,7 +81,7 @@ class HelicalModesResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
-        found = modes_dataset(
+        contents = modes_dataset(
             self.data,
             self.planetary_set,
             self.modes,
@@ -90,7 +90,7 @@ class HelicalModesResult(StageResult):
             along=" along the tooth normals",
         )
         if (whole := self.whole) is None:
-            return found
+            return contents
         along, where = np.cos(self.data.base_helix_angle), ("mesh", "position")
         position = np.arange(whole.stiffness.shape[1]) / whole.stiffness.shape[1]
         curves = {
@@ -107,7 +107,7 @@ class HelicalModesResult(StageResult):
                 "static transmission error along the transverse line of action, centres fixed",
             ),
         }
-        return found.merge(Contents(curves, coords=coordinates(position=position), attrs={}))
+        return contents.merge(Contents(curves, coords=coordinates(position=position), attrs={}))
 
 
 @dataclass(frozen=True)
@@ -231,7 +231,7 @@ def describe_helical(case: HelicalCase, planetary: PlanetarySet) -> tuple[Block,
 
 def _bodies(case: HelicalCase) -> Iterator[tuple[str, ...]]:
     helical, planet = case.helical, case.planet
-    for name, one, radial in (
+    for name, section, radial in (
         ("sun", case.sun, support_text(case, "sun")),
         ("ring", helical.ring, support_text(case, "ring", helical.ring)),
         ("carrier", case.carrier, support_text(case, "carrier")),
@@ -240,8 +240,8 @@ def _bodies(case: HelicalCase) -> Iterator[tuple[str, ...]]:
         space = getattr(helical, name.partition(" ")[0])
         yield (
             name,
-            f"{one.mass:.6g}",
-            f"{one.inertia:.6g}, {space.diametral_inertia:.6g}",
+            f"{section.mass:.6g}",
+            f"{section.inertia:.6g}, {space.diametral_inertia:.6g}",
             f"{radial}, {space.axial_stiffness:.6g}",
             f"{space.tilt_stiffness:.6g}, {torsion_text(case, name, space.torsional_stiffness)}",
         )
@@ -268,7 +268,7 @@ def describe_helical_static(static: xr.Dataset, modes: xr.Dataset | None = None)
     sources = [("spur", [(mean_over_period(static, name), peak_to_peak(static, name)) for name in curves])]
     if modes is not None and "helical_ste" in modes:
         sliced = (modes[name].values for name in ("helical_ste", "helical_stiffness"))
-        sources.insert(0, ("helical", [(one.mean(axis=1), np.ptp(one, axis=1)) for one in sliced]))
+        sources.insert(0, ("helical", [(values.mean(axis=1), np.ptp(values, axis=1)) for values in sliced]))
     header, columns = ["mesh"], [[str(name) for name in static["mesh"].values]]
     for name, pair in sources:
         for sizes, short, factor, unit in zip(pair, ("STE", "k"), (1e6, 1e-6), ("um", "N/um")):

@@ -166,11 +166,11 @@ def helical_dynamics_parts(
     if modes.excitation is None:
         remedy = "leave it out: the static solution then gives a stiffness that varies"
         raise CaseError(_NOTHING_EXCITES, code="E-STAGE", key="helical.mesh_stiffness", remedy=remedy)
-    count, told = len(case.operation.speeds), list[Response]()
-    for own, part in parts_of_speeds(case, np.ones(count), most):
+    count, responses = len(case.operation.speeds), list[Response]()
+    for numbers, part in parts_of_speeds(case, np.ones(count), most):
         speeds = part.operation.speeds
         turning = tuple(member_speeds(case, modes.planetary_set, speed) for speed in speeds)
-        frequency = np.array([one.mesh_frequency for one in turning])
+        frequency = np.array([speeds_there.mesh_frequency for speeds_there in turning])
         response = solve_spectral(
             modes.modes,
             modes.excitation,
@@ -180,11 +180,11 @@ def helical_dynamics_parts(
             tolerance=case.dynamics.tolerance,
         )
         verdict = floquet_verdict(modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics)
-        told.append(response.without_lines())
+        responses.append(response.without_lines())
         loads = _loads(modes, response)
-        response = replace(response, message=joint_message(told))
+        response = replace(response, message=joint_message(responses))
         yield part, HelicalDynamicsResult(modes, np.array(speeds), turning, response, verdict, loads)
-        progress("dynamics", float(own[-1] + 1), float(count))
+        progress("dynamics", float(numbers[-1] + 1), float(count))
 
 
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
@@ -200,21 +200,21 @@ def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarr
             -(stiffness / scale).reshape(18, 1) * T[:18],
         ]
     )
-    found = output_response(
+    forces = output_response(
         basis,
         response,
         rows @ basis.shape,
         residual=residual_output(system, basis, rows),
         load=output_load(system, basis, rows),
     )
-    pin, support = found[:, : 6 * N], found[:, 6 * N :].copy()
+    pin, support = forces[:, : 6 * N], forces[:, 6 * N :].copy()
     # what holds a motion takes up what meshes and pins exert on it
     W = mesh_directions(data, result.flank)[:18]
     for row in np.flatnonzero(np.isinf(springs).ravel()):
         meshes = np.einsum("j,sjh->sh", W[row], response.force)
         on_pins = np.einsum("p,sph->sh", pins[row].reshape(-1), pin)
         support[:, row] = (meshes - on_pins) * scale.ravel()[row]
-    shape = (len(found), -1, 6, found.shape[-1])
+    shape = (len(forces), -1, 6, forces.shape[-1])
     return {"pin": pin.reshape(shape), "support": support.reshape(shape)}
 
 

@@ -128,7 +128,7 @@ def check_impact_entries(case: GearPairCase) -> Iterator[CaseError]:
                 limit=f"none, or {count}, one for each entry of mesh.{wave}",
             )
     # k(t) of no sign change whatever the angles are
-    if (size := sum(abs(one) for one in mesh.stiffness_waves)) >= 1.0:
+    if (size := sum(abs(amplitude) for amplitude in mesh.stiffness_waves)) >= 1.0:
         yield CaseError(
             "the mesh stiffness may turn negative",
             code="E-RANGE",
@@ -148,7 +148,7 @@ def check_impact_entries(case: GearPairCase) -> Iterator[CaseError]:
             "both gears are eccentric and turn with one frequency",
             code="E-RANGE",
             key="gears.eccentricity",
-            value=", ".join(LENGTH.show(one) for one in gears.eccentricity),
+            value=", ".join(LENGTH.show(length) for length in gears.eccentricity),
             limit="one of them, or other teeth",
             remedy="give the sum of both to one gear",
         )
@@ -160,10 +160,14 @@ def check_impact_entries(case: GearPairCase) -> Iterator[CaseError]:
             remedy="add the section sweep, or chaos",
         )
     for key in ("response", "chaos"):
-        one = getattr(case, key)
-        if one is not None and one.start == one.to:
+        range_ = getattr(case, key)
+        if range_ is not None and range_.start == range_.to:
             yield CaseError(
-                "a range of one ratio", code="E-RANGE", key=f"{key}.to", value=one.to, limit="another ratio than from"
+                "a range of one ratio",
+                code="E-RANGE",
+                key=f"{key}.to",
+                value=range_.to,
+                limit="another ratio than from",
             )
 
 
@@ -194,12 +198,12 @@ def pair_of(case: GearPairCase) -> ImpactPair:
     if gears.mass is not None and gears.bearing_stiffness is not None:
         equivalent = mesh.stiffness / scales.frequency**2
         bearings = PairBearings(
-            mass=tuple(one / equivalent for one in gears.mass),
-            stiffness=tuple(one / mesh.stiffness for one in gears.bearing_stiffness),
+            mass=tuple(mass / equivalent for mass in gears.mass),
+            stiffness=tuple(stiffness / mesh.stiffness for stiffness in gears.bearing_stiffness),
             damping_ratio=gears.bearing_damping_ratio,
         )
-    error = [one / scales.length for one in mesh.error]
-    eccentricity = [one / scales.length for one in gears.eccentricity]
+    error = [length / scales.length for length in mesh.error]
+    eccentricity = [length / scales.length for length in gears.eccentricity]
     first, second = _waves(eccentricity, gears.eccentricity_angles)
     return ImpactPair(
         damping_ratio=mesh.damping_ratio,

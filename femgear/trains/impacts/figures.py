@@ -89,7 +89,7 @@ def state_bands(rows: Sequence[tuple]) -> Figure:
             mark = {"marker": ".", "color": BLACK, "markersize": 2.5, "linestyle": "none"}
             ax.plot(at, np.full(len(at), place), **mark, label=None if marked else "computed ratios")
             marked = True
-    present = {int(one) for _, _, state in rows for one in np.unique(state)}
+    present = {int(state_number) for _, _, state in rows for state_number in np.unique(state)}
     for number, (colour, name) in enumerate(zip(STATE_COLOURS, STATE_NAMES)):
         if number < 3 or number in present:
             ax.barh([0], [0.0], color=colour, label=name)
@@ -173,7 +173,7 @@ def _draw_response(drawn: Drawn) -> dict[str, Figure]:
     top = int(np.nanargmax(curve[2]))
     title = f"largest amplitude {curve[2][top]:.3g} half backlash at {curve[1][top]:.3g}"
     if len(folds := np.sort(data["ratio"].values[data["fold"].values])):
-        title += f", limit points at {', '.join(f'{one:.3g}' for one in folds)}"
+        title += f", limit points at {', '.join(f'{fold:.3g}' for fold in folds)}"
     return {"amplitude_and_mean": amplitude_and_mean([curve], sweeps, title=title)}
 
 

@@ -164,7 +164,7 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
     """
     from scipy.optimize import brentq
 
-    away = np.array([_lowest_deflection(one) for one in branch.solutions]) - level
+    away = np.array([_lowest_deflection(solution) for solution in branch.solutions]) - level
     borders = []
     for i in np.flatnonzero(np.signbit(away[:-1]) != np.signbit(away[1:])):
         ends, near = branch.parameter[i : i + 2], branch.solutions[i]
@@ -173,10 +173,10 @@ def impact_borders(pair: ImpactPair, branch: Branch, level: float) -> np.ndarray
             continue
 
         def lowest(ratio, near=near):
-            found = solve_harmonic_balance(
+            solution = solve_harmonic_balance(
                 pair.problem(ratio), 1.0, orders=near.orders, start=near, samples=1024, stability=False
             )
-            return _lowest_deflection(found) - level
+            return _lowest_deflection(solution) - level
 
         borders.append(brentq(lowest, *ends, xtol=1e-6))
     return np.array(borders)

@@ -184,30 +184,30 @@ class ChaosResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of chaos.nc; exponents are per unit of time 1 / omega_n."""
-        ratio, found = self.ratio, self.found
+        ratio, exponents = self.ratio, self.found
         variables = _numbers(
             "ratio",
-            exponent=(ratio * [one.largest for one in found], f"largest Lyapunov exponent {_RATE}"),
-            error=(ratio * [one.error[0] for one in found], f"its error {_RATE}"),
-            lowest=([one.lowest[0] for one in found], f"smallest deflection {_LENGTH}"),
-            highest=([one.highest[0] for one in found], f"largest deflection {_LENGTH}"),
-            repeats=([one.section.repeats_after(1e-3) for one in found], "periods until it repeats, or 0"),
-            chaotic=([_CHAOTIC[one.chaotic] for one in found], "yes, no or not told"),
+            exponent=(ratio * [result.largest for result in exponents], f"largest Lyapunov exponent {_RATE}"),
+            error=(ratio * [result.error[0] for result in exponents], f"its error {_RATE}"),
+            lowest=([result.lowest[0] for result in exponents], f"smallest deflection {_LENGTH}"),
+            highest=([result.highest[0] for result in exponents], f"largest deflection {_LENGTH}"),
+            repeats=([result.section.repeats_after(1e-3) for result in exponents], "periods until it repeats, or 0"),
+            chaotic=([_CHAOTIC[result.chaotic] for result in exponents], "yes, no or not told"),
         )
-        points = [one.section.deflection[-_SHOWN:, 0] for one in found]
+        points = [result.section.deflection[-_SHOWN:, 0] for result in exponents]
         variables |= _numbers("ratio period", point=(points, f"deflection once a period {_LENGTH}"))
         if self.sections:
-            at, long = np.array([r for r, _ in self.sections]), [one for _, one in self.sections]
-            velocity = at[:, None] * [one.section.velocity[:, -1] for one in long]
+            at, long = np.array([r for r, _ in self.sections]), [section for _, section in self.sections]
+            velocity = at[:, None] * [result.section.velocity[:, -1] for result in long]
             variables |= _numbers(
                 "section",
                 section_ratio=(at, "frequency ratio of the section"),
-                section_exponent=(at * [one.largest for one in long], f"largest exponent {_RATE}"),
-                section_error=(at * [one.error[0] for one in long], f"its error {_RATE}"),
+                section_exponent=(at * [result.largest for result in long], f"largest exponent {_RATE}"),
+                section_error=(at * [result.error[0] for result in long], f"its error {_RATE}"),
             )
             variables |= _numbers(
                 "section run",
-                section_deflection=([one.section.deflection[:, 0] for one in long], f"deflection {_LENGTH}"),
+                section_deflection=([result.section.deflection[:, 0] for result in long], f"deflection {_LENGTH}"),
                 section_velocity=(velocity, f"velocity {_LENGTH}, {_RATE}"),
             )
         title = "Lyapunov exponents and sections once a period"
@@ -273,7 +273,7 @@ def solve_sweep(case: GearPairCase) -> SweepResult:
     """Integrate in time at every frequency ratio until the motion repeats, upwards and from there back."""
     pair, given = pair_of(case), case.sweep
     assert given is not None
-    ratios = np.concatenate([np.linspace(one.start, one.to, one.count) for one in given.ranges])
+    ratios = np.concatenate([np.linspace(range_.start, range_.to, range_.count) for range_ in given.ranges])
     up, down = sweep_up_and_down(
         lambda ratio: (pair.problem(ratio), pair.frequency),
         ratios,
@@ -287,13 +287,13 @@ def solve_sweep(case: GearPairCase) -> SweepResult:
 @one_blas_thread()
 def solve_chaos(case: GearPairCase, *, progress: Progress = silent) -> ChaosResult:
     """Compute Lyapunov exponents over the ratio, each from the end of the one before, and long sections."""
-    pair, given, found = pair_of(case), case.chaos, []
+    pair, given, results = pair_of(case), case.chaos, []
     assert given is not None
     ratios, start = np.linspace(given.start, given.to, given.count), None
     options: dict[str, Any] = {"steps": given.steps * pair.periods, "periods": pair.periods}
     for number, ratio in enumerate(ratios):
         progress("chaos", number, len(ratios))
-        found.append(
+        results.append(
             lyapunov_exponents(
                 pair.problem(ratio),
                 pair.frequency,
@@ -303,11 +303,11 @@ def solve_chaos(case: GearPairCase, *, progress: Progress = silent) -> ChaosResu
                 **options,
             )
         )
-        start = found[-1].section.displacement[-1], found[-1].section.velocity[-1]
+        start = results[-1].section.displacement[-1], results[-1].section.velocity[-1]
     sections = []
     for wanted in given.sections:
         place = int(np.argmin(np.abs(ratios - wanted)))
-        end = found[place].section
+        end = results[place].section
         once = lyapunov_exponents(
             pair.problem(ratios[place]),
             pair.frequency,
@@ -317,7 +317,7 @@ def solve_chaos(case: GearPairCase, *, progress: Progress = silent) -> ChaosResu
             **options,
         )
         sections.append((float(ratios[place]), once))
-    return ChaosResult(case, ratios, found, sections)
+    return ChaosResult(case, ratios, results, sections)
 
 
 def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
@@ -334,7 +334,7 @@ def _describe_case(case: GearPairCase) -> tuple[Block, ...]:
     rows = [(text, f"{value:.6g}") for text, value in numbers.items()]
     waves = {"tooth error over b": pair.tooth_error, "mesh stiffness wave over its mean": pair.stiffness}
     for text, wave in waves.items():
-        rows.append((text, ", ".join(f"{abs(one):.6g}" for one in wave) or "none"))
+        rows.append((text, ", ".join(f"{abs(amplitude):.6g}" for amplitude in wave) or "none"))
     notes: tuple[str, ...] = ()
     if pair.load and len(pair.tooth_error) == 1 and pair.bearings is None:
         parting = separation_ratios(
@@ -383,14 +383,14 @@ def _describe_sweep(data: xr.Dataset) -> Block:
     rows = [
         (str(direction), STATE_NAMES[number], f"{min(ends):.3f}", f"{max(ends):.3f}")
         for direction, states in zip(data["direction"].values, data["state"].values)
-        for number, *ends in state_regions(data["ratio"].values, [STATE_NAMES.index(one) for one in states])
+        for number, *ends in state_regions(data["ratio"].values, [STATE_NAMES.index(state) for state in states])
     ]
     return Block("Sweep", ("sweep", "contact state", "from ratio", "to ratio"), tuple(rows))
 
 
 def _describe_chaos(data: xr.Dataset) -> Block:
-    words = [str(one) for one in data["chaotic"].values]
-    chaotic = data["ratio"].values[[one == "yes" for one in words]]
+    words = [str(value_there) for value_there in data["chaotic"].values]
+    chaotic = data["ratio"].values[[word == "yes" for word in words]]
     ends = [f"{ratio:.4g}" for ratio in chaotic[[0, -1]]] if len(chaotic) else ["none", "none"]
     counts, lowest = [len(words), len(chaotic), words.count("not told")], float(data["lowest"].min())
     row = str(counts[0]), str(counts[1]), *ends, str(counts[2]), f"{lowest:.3f}"

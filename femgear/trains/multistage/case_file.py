@@ -198,18 +198,18 @@ class MultistageCase(Section, ReadCase):
     @property
     def geared(self) -> bool:
         """Whether every stage has gears, and with them mesh phases and tooth pairs in contact."""
-        return all(one.gears is not None for one in self.stage)
+        return all(stage.gears is not None for stage in self.stage)
 
 
 def check_stages_entries(case: MultistageCase) -> Iterator[CaseError]:
     """Refuse what no entry shows alone."""
-    found = list(_entry_problems(case))
-    yield from found
-    if not found:
+    problems = list(_entry_problems(case))
+    yield from problems
+    if not problems:
         train, operation = multistage_of(case), case.operation
         _named(check_turns, "coupling", train)
         if operation is not None:
-            _named(lambda one: train_torques(one, operation.torque), "coupling", train)
+            _named(lambda train_given: train_torques(train_given, operation.torque), "coupling", train)
 
 
 def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
@@ -225,7 +225,7 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
                 limit="given where there is an operation",
                 remedy="give the teeth of sun, planet and ring",
             )
-    named = [(f"coupling[{n}].between", one) for n, c in enumerate(case.coupling) for one in c.between]
+    named = [(f"coupling[{n}].between", member_name) for n, c in enumerate(case.coupling) for member_name in c.between]
     if case.operation is not None:
         named += [(f"operation.{key}", getattr(case.operation, key)) for key in ("input", "output")]
     for key, member in named:
@@ -237,9 +237,9 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
                 value=member,
                 limit=f"stage 1 to stage {len(case.stage)}",
             )
-    for n, one in enumerate(case.coupling):
-        sizes = len(one.given("diameter", "length"))
-        if sizes == 1 or (not sizes and one.torsional is None):
+    for n, coupling in enumerate(case.coupling):
+        sizes = len(coupling.given("diameter", "length"))
+        if sizes == 1 or (not sizes and coupling.torsional is None):
             yield CaseError(
                 "the shaft has neither a torsional stiffness nor a whole section",
                 code="E-CHOICE",
@@ -259,8 +259,8 @@ def _entry_problems(case: MultistageCase) -> Iterator[CaseError]:
 
 def multistage_of(case: MultistageCase) -> MultistageSet:
     """Make the train of a case; without couplings each carrier turns the next sun, joined rigidly."""
-    stages = [_named(_stage, f"stage[{n}]", one) for n, one in enumerate(case.stage)]
-    couplings = [_named(_coupling, f"coupling[{n}]", one) for n, one in enumerate(case.coupling)]
+    stages = [_named(_stage, f"stage[{n}]", stage) for n, stage in enumerate(case.stage)]
+    couplings = [_named(_coupling, f"coupling[{n}]", coupling) for n, coupling in enumerate(case.coupling)]
     operation = case.operation
     ends = (Member(1, "sun"), Member(len(stages), "carrier"))
     if operation is not None:
@@ -291,20 +291,20 @@ def _named(make, key: str, section):
 
 
 def _member_of(text: str) -> Member:
-    found = _MEMBER.fullmatch(text)
-    assert found is not None
-    return Member(int(found[1]), found[2])
+    match = _MEMBER.fullmatch(text)
+    assert match is not None
+    return Member(int(match[1]), match[2])
 
 
-def _coupling(one: CouplingSection) -> StageCoupling:
-    given = {name: getattr(one, name) for name in one.given("torsional", "lateral")}
+def _coupling(section: CouplingSection) -> StageCoupling:
+    given = {name: getattr(section, name) for name in section.given("torsional", "lateral")}
     springs = {}
-    if one.diameter is not None and one.length is not None:
+    if section.diameter is not None and section.length is not None:
         # ends that do not tilt: Timoshenko's beam (Przemieniecki, Theory of Matrix Structural Analysis, 5.6)
-        shaft, length = RoundSection(one.diameter), one.length
+        shaft, length = RoundSection(section.diameter), section.length
         bending = 12.0 * shaft.young * shaft.second_moment / (length**3 * (1.0 + shaft.shear_ratio(length)))
         springs = {"torsional": joint_springs(shaft, length).torsion, "lateral": bending}
-    first, second = (_member_of(text) for text in one.between)
+    first, second = (_member_of(text) for text in section.between)
     return StageCoupling(first, second, **springs | given)
 
 
@@ -359,7 +359,8 @@ def _entry(key: str) -> str:
 def _stage(stage: StageSection) -> PlanetaryStage:
     members = (("sun", stage.sun), ("ring", stage.ring), ("carrier", stage.carrier))
     lumped: dict[str, Any] = {
-        name: PlanarBody(one.mass, one.inertia, one.support_stiffness, one.torsional_stiffness) for name, one in members
+        name: PlanarBody(member.mass, member.inertia, member.support_stiffness, member.torsional_stiffness)
+        for name, member in members
     }
     lumped["planet"] = PlanarBody(stage.planet.mass, stage.planet.inertia)
     lumped["planet_bearing"] = stage.planet.bearing_stiffness

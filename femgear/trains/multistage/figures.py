@@ -29,8 +29,8 @@ def stage_energy(modes: xr.Dataset) -> Figure:
     present = [kind for kind in _DASHES if np.any(kinds == kind)]
     figure, axes = new_figure(rows=len(present), width=9.0, height=1.0 + 2.2 * len(present))
     for ax, kind in zip(axes, present):
-        own = np.flatnonzero(kinds == kind)
-        groups = np.split(own, np.flatnonzero(np.diff(frequency[own]) > 1e-6 * frequency[own][1:]) + 1)
+        of_kind = np.flatnonzero(kinds == kind)
+        groups = np.split(of_kind, np.flatnonzero(np.diff(frequency[of_kind]) > 1e-6 * frequency[of_kind][1:]) + 1)
         place, bottom = np.arange(len(groups)), np.zeros(len(groups))
         for stage, row in enumerate(modes["energy"].values):
             height = np.array([row[group].mean() for group in groups])
@@ -58,10 +58,10 @@ def mesh_orders(modes: xr.Dataset, response: xr.Dataset) -> Figure:
     harmonics, hertz = response["harmonic"].values, modes["frequency"].values
     figure, (ax,) = new_figure(width=8.5, height=6.0)
     top, lowest = float(harmonics.max() * mesh.max()), hertz[hertz > 0.0].min(initial=np.inf)
-    for one, kind in zip(hertz, modes["kind"].values):
-        if 0.0 < one < top:
+    for frequency, kind in zip(hertz, modes["kind"].values):
+        if 0.0 < frequency < top:
             style = {"linestyle": _DASHES[kind], "linewidth": 0.8, "label": f"{kind} mode"}
-            ax.axhline(one, color="0.65", **style)
+            ax.axhline(frequency, color="0.65", **style)
     below = []
     for stage, line in enumerate(mesh):
         if harmonics.max() * line.max() < lowest:
@@ -102,12 +102,12 @@ def _peaks(modes: xr.Dataset, response: xr.Dataset, stage: int, harmonic: int) -
 
     force = stored_harmonics(response.isel(excited_by=stage, harmonic=harmonic), "mesh_force")
     hertz = response["harmonic"].values[harmonic] * response["mesh_frequency"].values[stage]
-    size, found = np.log10(np.maximum(np.abs(force).max(axis=1), 1e-300)), []
+    size, peaks = np.log10(np.maximum(np.abs(force).max(axis=1), 1e-300)), []
     for at in find_peaks(size, prominence=_PROMINENCE)[0].tolist():
         near = np.flatnonzero(np.abs(modes["frequency"].values / hertz[at] - 1.0) < 0.05)
         work = np.abs(modes["mesh_deflection"].values[:, near].T @ force[at])
-        found += [(at, int(near[work.argmax()]))] if len(near) else []
-    return found
+        peaks += [(at, int(near[work.argmax()]))] if len(near) else []
+    return peaks
 
 
 def stage_forces(response: xr.Dataset, balance: xr.Dataset | None = None) -> Figure:

@@ -308,7 +308,7 @@ def check_turns(data: MultistageSet) -> None:
 
 def _rows(data: MultistageSet, weights: np.ndarray) -> np.ndarray:
     """Stages, couplings (first less second), and fixed members (rows, 3 S)."""
-    couplings = [_unit(data, one.first) - _unit(data, one.second) for one in data.couplings]
+    couplings = [_unit(data, coupling.first) - _unit(data, coupling.second) for coupling in data.couplings]
     held = [
         _unit(data, Member(number, stage.fixed))
         for number, stage in enumerate(data.stages, 1)
@@ -390,7 +390,7 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
     check_turns(data)
     turning = turning_couplings(data, speed)
     carrier = train_speeds(data, speed).carrier if speed else np.zeros(len(data.stages))
-    parts = [gear_set_system(one.data, carrier_speed=w) for one, w in zip(data.stages, carrier.tolist())]
+    parts = [gear_set_system(stage.data, carrier_speed=w) for stage, w in zip(data.stages, carrier.tolist())]
     motions, Z = _member_motions(data), joined_motions(data)
     K = block_diag(*(part.K for part in parts)) + _centrifugal_stiffness(data, carrier)
     for number, coupling in enumerate(data.couplings):
@@ -398,8 +398,10 @@ def multistage_system(data: MultistageSet, *, torque: float = 0.0, speed: float 
         K += (columns * stiffness) @ columns.T
     # torques that load the flanks of every stage; without any those of suns that drive counter-clockwise
     on_sun = train_torques(data, torque, radii=True).sun if torque else np.ones(len(data.stages))
-    flanks = [flank_sign(one.data, PlanarTorque(float(t))) for one, t in zip(data.stages, on_sun)]
-    meshes = [free_motions(one.data).T @ mesh_directions(one.data, flank) for one, flank in zip(data.stages, flanks)]
+    flanks = [flank_sign(stage.data, PlanarTorque(float(t))) for stage, t in zip(data.stages, on_sun)]
+    meshes = [
+        free_motions(stage.data).T @ mesh_directions(stage.data, flank) for stage, flank in zip(data.stages, flanks)
+    ]
     turned = [member for n in turning for member in (data.couplings[n].first, data.couplings[n].second)]
     ends = [motions[member][:2].T for member in turned]
     load = np.concatenate([part.load for part in parts]) + _torque_load(data, motions, torque)
@@ -432,24 +434,24 @@ def turning_couplings(data: MultistageSet, speed: float) -> dict[int, float]:
 
     CaseError: centres joined rigidly between such frames (E-RANGE).
     """
-    if not speed or not any(one.lateral for one in data.couplings):
+    if not speed or not any(coupling.lateral for coupling in data.couplings):
         return {}
     carrier = train_speeds(data, speed).carrier
-    found = {}
-    for number, one in enumerate(data.couplings):
-        relative = carrier[one.second.stage - 1] - carrier[one.first.stage - 1]
-        if not one.lateral or abs(relative) <= _SAME_SPEED * np.abs(carrier).max():
+    turning = {}
+    for number, coupling in enumerate(data.couplings):
+        relative = carrier[coupling.second.stage - 1] - carrier[coupling.first.stage - 1]
+        if not coupling.lateral or abs(relative) <= _SAME_SPEED * np.abs(carrier).max():
             continue
-        if math.isinf(one.lateral):
+        if math.isinf(coupling.lateral):
             raise CaseError(
-                f"the centres of {one.first} and {one.second} are one, in frames of different speeds",
+                f"the centres of {coupling.first} and {coupling.second} are one, in frames of different speeds",
                 code="E-RANGE",
                 key=f"couplings[{number}].lateral",
                 limit="a finite stiffness",
                 remedy="give the stiffness of the shaft",
             )
-        found[number] = float(relative)
-    return found
+        turning[number] = float(relative)
+    return turning
 
 
 def joined_motions(data: MultistageSet) -> np.ndarray:
@@ -505,19 +507,19 @@ def _centrifugal_stiffness(data: MultistageSet, carrier: np.ndarray) -> np.ndarr
 def _gyroscopic(parts: list[MechanicalSystem], ratio: np.ndarray) -> np.ndarray:
     """Matrix per unit of the input's speed; ``ratio`` (S,) of the carriers' speeds to it."""
     still = (np.zeros_like(part.M) if part.gyroscopic is None else part.gyroscopic for part in parts)
-    return np.asarray(block_diag(*(one * matrix for one, matrix in zip(ratio, still))))
+    return np.asarray(block_diag(*(factor * matrix for factor, matrix in zip(ratio, still))))
 
 
 def _member_motions(data: MultistageSet) -> dict[Member, np.ndarray]:
     """x, y and rotation [rad] (3, n) of every member per coordinate of `_stage_motions`; zero where held."""
-    T, found, first = _stage_motions(data), {}, 0
+    T, motions, first = _stage_motions(data), {}, 0
     for number, stage in enumerate(data.stages, 1):
         for name in CENTRAL:
-            found[Member(number, name)] = T[first : first + 3].copy()
-            found[Member(number, name)][2] /= member_radius(stage.data, name)
+            motions[Member(number, name)] = T[first : first + 3].copy()
+            motions[Member(number, name)][2] /= member_radius(stage.data, name)
             first += 3
         first += 3 * stage.data.n_planets
-    return found
+    return motions
 
 
 def _twist(motions: dict[Member, np.ndarray], coupling: StageCoupling) -> np.ndarray:
@@ -564,6 +566,6 @@ def _torque_load(data: MultistageSet, motions: dict[Member, np.ndarray], torque:
 
 def _names(data: MultistageSet, Z: np.ndarray) -> tuple[str, ...]:
     """Name of every coordinate that is left: its own row of ``Z`` is a unit row."""
-    names = [f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in dof_names(one.data)]
-    own = np.argmax(_stage_motions(data) == 1.0, axis=0)
-    return tuple(names[own[row]] for row in np.argmax(Z == 1.0, axis=0))
+    names = [f"stage {n} {name}" for n, stage in enumerate(data.stages, 1) for name in dof_names(stage.data)]
+    largest = np.argmax(_stage_motions(data) == 1.0, axis=0)
+    return tuple(names[largest[row]] for row in np.argmax(Z == 1.0, axis=0))

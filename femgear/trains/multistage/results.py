@@ -117,8 +117,8 @@ class StagesResponseResult(StageResult):
     def forces(self) -> dict[str, np.ndarray]:
         """R.m.s. force (F, S) in sun-planet 1 of every stage [N], by the stage that excites."""
         first, squares = _first_meshes(self.data), {}
-        for n, one in self.answers.items():
-            squares[f"meshes of stage {n}"] = 0.5 * (np.abs(one.force[..., first]) ** 2).sum(axis=1)
+        for n, answer in self.answers.items():
+            squares[f"meshes of stage {n}"] = 0.5 * (np.abs(answer.force[..., first]) ** 2).sum(axis=1)
         total = {"all stages": np.sqrt(sum(squares.values()))}
         return total | {text: np.sqrt(square) for text, square in squares.items()}
 
@@ -127,13 +127,13 @@ class StagesResponseResult(StageResult):
         answers, along = list(self.answers.values()), ("excited_by", "speed")
         total, *single = self.forces.values()
         words = "r.m.s. of the force in sun-planet 1 of every stage"
-        hertz = [one.mesh_frequency for one in answers]
+        hertz = [answer.mesh_frequency for answer in answers]
         variables = {
             "mesh_frequency": (along, hertz, "Hz", "mesh frequency of the stage that excites"),
             "first_force": ((*along, "stage"), single, "N", words),
             "total_force": (("speed", "stage"), total, "N", f"{words}, meshes of all stages"),
         }
-        force = np.array([one.force for one in answers])
+        force = np.array([answer.force for answer in answers])
         lines = [("mesh_force", (*along, "harmonic", "mesh"), force, "N", "dynamic mesh force")]
         coords = _coordinates(self.data, self.speed) | {
             "excited_by": (("excited_by",), list(self.answers), "1", "stage whose meshes excite"),
@@ -209,9 +209,9 @@ def _first_meshes(data: MultistageSet) -> list[int]:
 
 def _coordinates(data: MultistageSet, speed=None) -> dict[str, tuple]:
     """Stages, meshes, and speeds of the input where there are some."""
-    names = [f"stage {n} {name}" for n, one in enumerate(data.stages, 1) for name in mesh_names(one.data.n_planets)]
-    found = {**coordinates(mesh=names), "stage": ("stage", range(1, len(data.stages) + 1), "1", "stage")}
-    return found if speed is None else found | coordinates(speed=speed / RPM)
+    names = [f"stage {n} {name}" for n, stage in enumerate(data.stages, 1) for name in mesh_names(stage.data.n_planets)]
+    coordinates_ = {**coordinates(mesh=names), "stage": ("stage", range(1, len(data.stages) + 1), "1", "stage")}
+    return coordinates_ if speed is None else coordinates_ | coordinates(speed=speed / RPM)
 
 
 def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
@@ -219,10 +219,10 @@ def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
     train = multistage_of(case)
     header = ["stage", "teeth", "planets", "fixed", "sun-planet [N/m]", "planet-ring [N/m]"]
     rows = []
-    for n, one in enumerate(train.stages, 1):
-        teeth, k = "/".join(map(str, one.teeth or ())), one.data.mesh_stiffness[[0, -1]]
-        fixed = one.fixed or "none"
-        rows.append([str(n), teeth or "-", str(one.data.n_planets), fixed, f"{k[0]:.4g}", f"{k[1]:.4g}"])
+    for n, stage in enumerate(train.stages, 1):
+        teeth, k = "/".join(map(str, stage.teeth or ())), stage.data.mesh_stiffness[[0, -1]]
+        fixed = stage.fixed or "none"
+        rows.append([str(n), teeth or "-", str(stage.data.n_planets), fixed, f"{k[0]:.4g}", f"{k[1]:.4g}"])
     notes: tuple[str, ...] = ()
     if case.operation is not None:
         speeds = train_speeds(train, case.operation.speed)
@@ -237,10 +237,10 @@ def describe_multistage(case: MultistageCase) -> tuple[Block, ...]:
             f"torque {torques.output:.6g} N m",
         )
     couplings = {
-        "from": lambda one: str(one.first),
-        "to": lambda one: str(one.second),
-        "torsional [N m/rad]": lambda one: f"{one.torsional:.4g}",
-        "lateral [N/m]": lambda one: f"{one.lateral:.4g}",
+        "from": lambda coupling: str(coupling.first),
+        "to": lambda coupling: str(coupling.second),
+        "torsional [N m/rad]": lambda coupling: f"{coupling.torsional:.4g}",
+        "lateral [N/m]": lambda coupling: f"{coupling.lateral:.4g}",
     }
     return (
         Block("Stages", tuple(header), tuple(map(tuple, rows)), notes),

@@ -86,8 +86,8 @@ def _by_stage(modes: Modes, masses: np.ndarray) -> Modes:
     """
 
     def weighted(group: np.ndarray) -> np.ndarray:
-        own = modes.shape[:, group]
-        return np.sum([number * own.T @ mass @ own for number, mass in enumerate(masses, 1)], axis=0)
+        shapes = modes.shape[:, group]
+        return np.sum([number * shapes.T @ mass @ shapes for number, mass in enumerate(masses, 1)], axis=0)
 
     return mixed_modes(modes, mixture(modes.frequency, weighted))
 
@@ -140,16 +140,16 @@ def error_response(
     speed = np.atleast_1d(np.asarray(speed, float))
     if modes is None:
         modes = multistage_modes(data, damping_ratio=damping_ratio).modes
-    unit, found = train_speeds(data, math.copysign(1.0, speed[0])), {}
+    unit, answers = train_speeds(data, math.copysign(1.0, speed[0])), {}
     for number, error in errors.items():
         hertz = np.abs(speed) * unit.mesh_frequency[number - 1]
         forward = unit.sun[number - 1] > unit.carrier[number - 1]
         every = np.zeros((data.n_meshes, np.shape(error)[1]), complex)
         # where the sun turns backwards the mesh runs through its period from the end
         every[mesh_columns(data)[number - 1]] = error if forward else np.conj(error)
-        one = modal_error_response(modes, hertz, every)
-        found[number] = replace(one, deflection=one.deflection[0], force=one.force[0])
-    return found
+        answer = modal_error_response(modes, hertz, every)
+        answers[number] = replace(answer, deflection=answer.deflection[0], force=answer.force[0])
+    return answers
 
 
 def base_frequencies(data: MultistageSet, speed: float) -> np.ndarray:
@@ -217,7 +217,8 @@ def multistage_problem(
         return problem
     # frames at rest, without the lateral springs that turn: these are columns
     couplings = tuple(
-        replace(one, lateral=0.0) if number in turning else one for number, one in enumerate(data.couplings)
+        replace(coupling, lateral=0.0) if number in turning else coupling
+        for number, coupling in enumerate(data.couplings)
     )
     standing = multistage_system(replace(data, couplings=couplings)).K
     centred = replace(system, K=standing, gyroscopic=None)
@@ -228,22 +229,22 @@ def _stage_elements(data: MultistageSet, meshes: Mapping[int, GearMeshes], forwa
     """The meshes of all stages on their columns, each with its own base frequency."""
     for number, (stage, columns) in enumerate(zip(data.stages, mesh_columns(data)), 1):
         made = meshes.get(number) or mesh_elements(stage.data)
-        orders, own = orders_of(number - 1, bases, 1 if forward[number - 1] else -1), {}
+        orders, series_of = orders_of(number - 1, bases, 1 if forward[number - 1] else -1), {}
         for name in ("stiffness", "deflection", "force"):
             series = getattr(made, name)
-            own[name] = replace(series, orders=tuple(series.orders[0] * one for one in orders))
-        yield replace(made, columns=columns, **own)
+            series_of[name] = replace(series, orders=tuple(series.orders[0] * order for order in orders))
+        yield replace(made, columns=columns, **series_of)
 
 
 def _turning_elements(data: MultistageSet, turning: dict[int, float], bases: int) -> Iterator[TurningSprings]:
     """Lateral springs between frames that turn apart, each with its own base frequency."""
     for place, (number, relative) in enumerate(turning.items()):
-        one = data.couplings[number]
+        coupling = data.couplings[number]
         orders = orders_of(len(data.stages) + place, bases, 1 if relative > 0.0 else -1)
-        phase = data.stages[one.second.stage - 1].angle - data.stages[one.first.stage - 1].angle
+        phase = data.stages[coupling.second.stage - 1].angle - data.stages[coupling.first.stage - 1].angle
         first = data.n_meshes + 4 * place
         wave = turning_wave(orders, phase=phase)
-        yield TurningSprings(np.arange(first, first + 4)[None], np.array([one.lateral]), wave)
+        yield TurningSprings(np.arange(first, first + 4)[None], np.array([coupling.lateral]), wave)
 
 
 def solve_multistage_modes(case: MultistageCase) -> MultistageModes:
@@ -272,13 +273,16 @@ def solve_balance(case: MultistageCase, *, progress: Progress = silent) -> Balan
         train, meshes=_wave_meshes(case, train), torque=operation.torque, damping=given.damping_ratio
     )
     speeds = np.linspace(given.lowest, given.highest, given.balance_points + 2)[1:-1]
-    found = []
+    solutions = []
     for number, speed in enumerate(speeds):
         progress("balance", number, len(speeds))
         frequency = base_frequencies(train, speed)[:stages]
-        found.append(solve_harmonic_balance(problem, frequency, orders=distinct_lines(orders), stability=False))
-    force, converged = np.array([one.force for one in found]), np.array([one.converged for one in found])
-    return BalanceResult(train, speeds, found[0].orders, force, converged)
+        solutions.append(solve_harmonic_balance(problem, frequency, orders=distinct_lines(orders), stability=False))
+    force, converged = (
+        np.array([solution.force for solution in solutions]),
+        np.array([solution.converged for solution in solutions]),
+    )
+    return BalanceResult(train, speeds, solutions[0].orders, force, converged)
 
 
 def _stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.ndarray]:
@@ -291,7 +295,7 @@ def _stiffness_waves(case: MultistageCase, number: int) -> tuple[np.ndarray, np.
     geared, h = stage_gears(case.stage[number - 1]), np.arange(1, _asked(case)[1].harmonics + 1)
     waves = []
     for path in (geared.path_sun_planet, geared.path_planet_ring):
-        start, end = (one / geared.base_pitch for one in path)
+        start, end = (end_of_path / geared.base_pitch for end_of_path in path)
         wave = np.exp(-2j * np.pi * h * start) - np.exp(-2j * np.pi * h * end)
         waves.append(wave / (1j * np.pi * h * (end - start)))
     return waves[0], waves[1]

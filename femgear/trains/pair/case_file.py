@@ -166,22 +166,22 @@ class PairCase(GearCase):
 
     def made_deviations(self, gears: GearPair) -> SetDeviations:
         """Make the deviations of both gears from their modifications and errors."""
-        one, two = (getattr(self, name).errors or GearErrors() for name in self.gear_names)
+        errors_1, errors_2 = (getattr(self, name).errors or GearErrors() for name in self.gear_names)
         form = flank_form(self, gears.gear_2)
         # a tooth that stands further on brings the flank on that side nearer to the mate
-        pitch = gears.senses[1] * pitch_of(two, gears.gear_2)
+        pitch = gears.senses[1] * pitch_of(errors_2, gears.gear_2)
         return replace(
             no_deviations(gears),
             sun=flank_form(self, gears.gear_1),
             planet_sun_side=form,
             planet_ring_side=form,
-            sun_pitch=-pitch_of(one, gears.gear_1),
+            sun_pitch=-pitch_of(errors_1, gears.gear_1),
             planet_pitch=[pitch],
             planet_ring_side_pitch=[-pitch],
-            sun_runout=runout_of(one),
-            planet_runout=(runout_of(two),),
-            sun_thickness=one.thickness_reduction or 0.0,
-            planet_thickness=np.array([two.thickness_reduction or 0.0]),
+            sun_runout=runout_of(errors_1),
+            planet_runout=(runout_of(errors_2),),
+            sun_thickness=errors_1.thickness_reduction or 0.0,
+            planet_thickness=np.array([errors_2.thickness_reduction or 0.0]),
         )
 
     def torque_on_first_gear(self, torque: float | None = None) -> float:

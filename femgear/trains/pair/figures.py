@@ -56,8 +56,8 @@ def pair_levels(runup: xr.Dataset) -> Figure:
             ax.plot([], [], dash, color=colour, label=f"{_OF[number]}flanks held together{thin}")
         if "branch_speed" in runup:
             _draw_branch(ax, runup, f"branch_{name}", unit)
-        for one in np.atleast_1d(runup.attrs["operating_speeds"])[:8]:
-            ax.axvline(one, color=GREY, linewidth=0.9, linestyle=":", label="operating speed")
+        for operating in np.atleast_1d(runup.attrs["operating_speeds"])[:8]:
+            ax.axvline(operating, color=GREY, linewidth=0.9, linestyle=":", label="operating speed")
         ax.set_ylim(bottom=float(name == "dynamic_factor"))
         label(ax, y=words)
     axes[0].set_xlim(speed[0], speed[-1])
@@ -84,11 +84,11 @@ def _curves(values: np.ndarray) -> np.ndarray:
 
 def _dynamics(drawn: Drawn) -> dict[str, Figure]:
     dynamics, static = drawn.data["dynamics"], drawn.data.get("static")
-    known = None if static is None else (static["position"].values, static["mesh_force"].values)
+    curve = None if static is None else (static["position"].values, static["mesh_force"].values)
     return response_figures(
         dynamics,
         dynamic_transmission_error=transmission_error_period(dynamics, static),
-        mesh_forces=mesh_force_period(dynamics, known),
+        mesh_forces=mesh_force_period(dynamics, curve),
     )
 
 

@@ -81,22 +81,22 @@ class PairModel:
 def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     """Assemble bodies, bearings, couplings and mesh of a case; the torque loads motor, mesh and brake."""
     machines = [(gear, name, getattr(case, name)) for gear, name in enumerate(("motor", "brake"))]
-    machines = [one for one in machines if one[2] is not None]
+    machines = [machine for machine in machines if machine[2] is not None]
     sections, torque = (case.gear_1, case.gear_2), case.operation.torque
     radii = [gear.base_radius for gear in gears.gears]
     names = ("gear 1", "gear 2", *(name for _, name, _ in machines))
-    bodies = (body_matrices(one.mass, one.inertia, 0.5 * one.inertia) for one in sections)
+    bodies = (body_matrices(section.mass, section.inertia, 0.5 * section.inertia) for section in sections)
     inertias = [Inertia((i,), *matrices) for i, matrices in enumerate(bodies)]
-    bearing = np.repeat([one.bearing_stiffness or np.inf for one in sections], 2)
+    bearing = np.repeat([section.bearing_stiffness or np.inf for section in sections], 2)
     nowhere = np.zeros(3), np.zeros(3)
     springs = [
         joint(f"bearing of {names[i]}", (GROUND, i), nowhere, [*bearing[2 * i : 2 * i + 2], 0.0, 0.0, 0.0, 0.0])
         for i in (0, 1)
     ]
     ends = [0, 1]
-    for station, (gear, name, one) in enumerate(machines, 2):
-        inertias.append(Inertia((station,), *body_matrices(0.0, one.inertia, 0.0)))
-        springs.append(joint(f"coupling of {name}", (gear, station), nowhere, [*np.zeros(5), one.coupling_stiffness]))
+    for station, (gear, name, motor) in enumerate(machines, 2):
+        inertias.append(Inertia((station,), *body_matrices(0.0, motor.inertia, 0.0)))
+        springs.append(joint(f"coupling of {name}", (gear, station), nowhere, [*np.zeros(5), motor.coupling_stiffness]))
         ends[gear] = station
     (kind,), (angle,) = gears.kinds, gears.mesh_angles.tolist()
     contact = gear_contact(
@@ -156,6 +156,6 @@ def pair_kinds(modes: Modes, mass: np.ndarray) -> tuple[str, ...]:
     """Name the modes by the share of the rotations in their kinetic energy; mass matrix (n, n) diagonal."""
     turning = np.array([name.endswith("rotation") for name in modes.dofs])
     shares = np.diag(mass)[turning] @ modes.shape[turning] ** 2
-    found = np.where(shares <= 1.0 - _ONE_KIND, "lateral", "coupled")
-    found = np.where(shares >= _ONE_KIND, "torsional", found)
-    return tuple(np.where(modes.frequency == 0.0, "rigid", found).tolist())
+    kinds = np.where(shares <= 1.0 - _ONE_KIND, "lateral", "coupled")
+    kinds = np.where(shares >= _ONE_KIND, "torsional", kinds)
+    return tuple(np.where(modes.frequency == 0.0, "rigid", kinds).tolist())

@@ -128,8 +128,8 @@ class PairMotion:
         factor = self.peak / np.real(self.force[:, 0, 0])
         values = fluctuation(self.dte)[:, 0], factor, self.lowest, np.sqrt(0.5 * power), self.drive, self.back
         return {
-            f"{prefix}{name}": (f"{along} gear" if one.ndim > 1 else along, one, *_LEVELS[name])
-            for name, one in zip(_LEVELS, values, strict=True)
+            f"{prefix}{name}": (f"{along} gear" if value.ndim > 1 else along, value, *_LEVELS[name])
+            for name, value in zip(_LEVELS, values, strict=True)
         }
 
 
@@ -195,11 +195,11 @@ class PairDynamicsResult(StageResult):
             ("mesh_force", lines, motion.force, "N", "dynamic mesh force"),
         )
         reach = ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation")
-        known = response_variables(self) | {"excitation_limit": reach} | motion.levels("speed")
-        known["backlash"] = ("mesh", self.backlash, *_PLAY)
+        variables = response_variables(self) | {"excitation_limit": reach} | motion.levels("speed")
+        variables["backlash"] = ("mesh", self.backlash, *_PLAY)
         title = {"title": "periodic response of the pair", "message": self.response.message}
         return Contents(
-            known | complex_entries(entries),
+            variables | complex_entries(entries),
             _coordinates(self, axis=["x", "y"], harmonic=np.arange(motion.dte.shape[-1])),
             title | {"fourier_convention": FOURIER},
         )
@@ -263,20 +263,20 @@ class PairRunupResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of runup.nc."""
-        levels, known = self.motion.levels("speed"), dict(self.resonances)
+        levels, resonances = self.motion.levels("speed"), dict(self.resonances)
         for name, of in (("resonance_dte", "dte_rms"), ("resonance_factor", "dynamic_factor")):
-            known[name] = np.interp(known["resonance_speed"] * RPM, self.input_speed, levels[of][1])
+            resonances[name] = np.interp(resonances["resonance_speed"] * RPM, self.input_speed, levels[of][1])
         variables = {
             "mesh_frequency": ("speed", self.mesh_frequency, "Hz", "mesh frequency"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation"),
             **levels,
             **complex_entries(_lines(self.motion), single=True),
-            **declared({name: ("resonance", *words) for name, words in _RESONANCE.items()}, known),
+            **declared({name: ("resonance", *words) for name, words in _RESONANCE.items()}, resonances),
         }
         if self.branch is not None:
-            speed, own, stable = self.branch
+            speed, motion, stable = self.branch
             words = "whether the motion is known to be stable"
-            variables |= own.levels("point", "branch_") | {
+            variables |= motion.levels("point", "branch_") | {
                 "branch_speed": ("point", speed / RPM, "rpm", "speed of gear 1 along the branch with play"),
                 "branch_stable": ("point", stable, "1", words),
             }
@@ -313,14 +313,14 @@ def pair_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
     for stage in ("dynamics", *({"runup"} & {*results.stages})):
         for name, unit, order, speed, values in _recordings(results, stage):
             if stage == "runup":
-                found = run_up_signal(order, values, speed, duration=sampling.run_up, rate=rate)
-                yield Signal(f"{name}_run_up", unit, rate, found, steady=False)
+                recorded = run_up_signal(order, values, speed, duration=sampling.run_up, rate=rate)
+                yield Signal(f"{name}_run_up", unit, rate, recorded, steady=False)
                 continue
-            for one, lines, rpm in zip(speed, values, results[stage]["speed"].values, strict=True):
-                samples = whole_turns(one, sampling.duration, rate=rate)
-                found = sampled_signal(order, lines, one, samples=samples, rate=rate)
+            for turning_speed, lines, rpm in zip(speed, values, results[stage]["speed"].values, strict=True):
+                samples = whole_turns(turning_speed, sampling.duration, rate=rate)
+                recorded = sampled_signal(order, lines, turning_speed, samples=samples, rate=rate)
                 text = np.format_float_positional(rpm, 9, fractional=False, trim="-")
-                yield Signal(f"{name}_{text}_rpm", unit, rate, found)
+                yield Signal(f"{name}_{text}_rpm", unit, rate, recorded)
     if "runup" in results.stages and results.runup.attrs["separated"]:
         text = "the sound of the run-up is that of flanks held together, which pull at some of its speeds"
         tell(Finding("W-PULL", "runup", text, remedy="listen to the speeds"))
@@ -329,7 +329,7 @@ def pair_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
 def pair_signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float, float]]:
     """Find the extent of the lines of all signals by unit, see `femgear.exchange.formats.line_extent`."""
     stages = ("dynamics", *({"runup"} & {*results.stages}))
-    return line_extent((one[1:] for stage in stages for one in _recordings(results, stage)), rate)
+    return line_extent((recording[1:] for stage in stages for recording in _recordings(results, stage)), rate)
 
 
 def _recordings(results: Results, stage: str) -> Iterator[tuple[str, str, np.ndarray, np.ndarray, Any]]:
@@ -357,15 +357,15 @@ def _coordinates(result: PairDynamicsResult | PairRunupResult, **axes: Any) -> d
 def describe_dynamics(data: xr.Dataset) -> Block:
     """Tabulate transmission error, mesh and bearing forces, contact and stability of dynamics.nc by speed."""
     columns = {
-        "speed [rpm]": lambda one: f"{float(one.speed):.2f}",
-        "mesh [Hz]": lambda one: f"{float(one.mesh_frequency):.2f}",
-        "DTE rms [um]": lambda one: f"{1e6 * float(one.dte_rms):.4f}",
-        "K_v": lambda one: f"{float(one.dynamic_factor):.4f}",
-        "lowest force [N]": lambda one: f"{float(one.lowest_force):.5g}",
-        "bearings rms [N]": lambda one: ", ".join(f"{value:.4g}" for value in one.bearing_rms.values),
-        "contact": lambda one: f"{float(one.drive_contact):.4f}",
-        "method": lambda one: str(one.method.values),
-        "Floquet": lambda one: f"{float(one.floquet_multiplier):.4f}",
+        "speed [rpm]": lambda row: f"{float(row.speed):.2f}",
+        "mesh [Hz]": lambda row: f"{float(row.mesh_frequency):.2f}",
+        "DTE rms [um]": lambda row: f"{1e6 * float(row.dte_rms):.4f}",
+        "K_v": lambda row: f"{float(row.dynamic_factor):.4f}",
+        "lowest force [N]": lambda row: f"{float(row.lowest_force):.5g}",
+        "bearings rms [N]": lambda row: ", ".join(f"{value:.4g}" for value in row.bearing_rms.values),
+        "contact": lambda row: f"{float(row.drive_contact):.4f}",
+        "method": lambda row: str(row.method.values),
+        "Floquet": lambda row: f"{float(row.floquet_multiplier):.4f}",
     }
     notes = (
         "K_v: largest over mean mesh force; contact: share of the time with drive flanks closed; Floquet: "
@@ -376,7 +376,7 @@ def describe_dynamics(data: xr.Dataset) -> Block:
 
 def pair_dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
     """Name the speeds of dynamics.nc that are not stable, and those at which flanks part (W-SEPARATION)."""
-    yield from (one for one in response_warnings(data) if one.code != "W-PULL")
+    yield from (response_warning for response_warning in response_warnings(data) if response_warning.code != "W-PULL")
     speed, apart, back = data["speed"].values, data["drive_contact"] < 1.0, data["back_contact"] > 0.0
     if apart.any():
         text = f"flanks part at {first_speeds(speed[apart])}"
@@ -390,7 +390,7 @@ def pair_dynamics_warnings(data: xr.Dataset) -> Iterator[Finding]:
 
 def describe_pair_runup(data: xr.Dataset) -> Block:
     """Tabulate the strongest resonances of runup.nc by speed."""
-    value = {str(name): one.values for name, one in data.items() if one.dims == ("resonance",)}
+    value = {str(name): variable.values for name, variable in data.items() if variable.dims == ("resonance",)}
     columns = {
         "speed [rpm]": lambda i: f"{value['resonance_speed'][i]:.1f}",
         "from operating": lambda i: f"{np.round(value['distance'][i], 1) + 0.0:+.1f} %",

@@ -129,7 +129,7 @@ def iso_stiffness(case: PairCase) -> tuple[float, float]:
     """
     gears: GearPair = planetary_set(case)
     load = abs(case.operation.torque) / (gears.gear_1.reference_radius * gears.face_width)
-    moduli = (one.youngs_modulus for one in materials_of(case))
+    moduli = (material.youngs_modulus for material in materials_of(case))
     factor = material_factor(*moduli) * min(1.0, load / _FULL_LOAD) ** 0.25
     try:
         single, mean = pair_mesh_stiffness(gears, case.helix_angle or 0.0)
@@ -159,8 +159,8 @@ def _describe_static(results: Results) -> Block:
     case, data = results.case, results.static
     block = describe_static(data)
     single, mean = (1e-9 * value for value in iso_stiffness(case))
-    found = 1e-9 * float(mean_over_period(data, "mesh_stiffness").mean()) / data.attrs["face_width"]
-    words = f"mean k over face width {found:.3f} N/(mm um); ISO 6336-1, method B: "
+    per_width = 1e-9 * float(mean_over_period(data, "mesh_stiffness").mean()) / data.attrs["face_width"]
+    words = f"mean k over face width {per_width:.3f} N/(mm um); ISO 6336-1, method B: "
     standard = f"c' = {single:.3f}, c_gamma_alpha = {mean:.3f} N/(mm um)"
     return replace(block, notes=(*block.notes, words + (standard if mean > 0 else "out of range")))
 
@@ -217,13 +217,13 @@ def _harmonics(case: PairCase, modes: Modes, mesh_frequency: np.ndarray) -> np.n
 
 
 def _linear(
-    case: PairCase, found: PairModesResult, frequency: np.ndarray, harmonics: np.ndarray
+    case: PairCase, modes: PairModesResult, frequency: np.ndarray, harmonics: np.ndarray
 ) -> tuple[Response, PairMotion]:
     """Solve for the response with flanks held together at mesh frequencies (s,) [Hz]."""
-    basis, model = found.modes, found.model
+    basis, model = modes.modes, modes.model
     response = solve_spectral(
         basis,
-        found.excitation,
+        modes.excitation,
         frequency,
         excitation_harmonics=harmonics[0],
         response_harmonics=harmonics[1],
@@ -243,39 +243,39 @@ def _linear(
     return response, PairMotion(*lines, *measured, *extremes, closed, np.zeros(len(force)))
 
 
-def _parted(model: PairModel, problem: NonlinearSystem, found: Sequence[PeriodicSolution], size: int) -> PairMotion:
+def _parted(model: PairModel, problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], size: int) -> PairMotion:
     """Collect the motion of solutions with play, their lines filled with zeros up to a harmonic."""
-    lines, known, mesh = np.zeros((len(found), 7, size + 1), complex), reduced(problem), problem.elements[0]
+    lines, reduction, mesh = np.zeros((len(solutions), 7, size + 1), complex), reduced(problem), problem.elements[0]
     assert isinstance(mesh, GearMeshes)
-    for own, one in zip(lines, found, strict=True):
-        parts = one.deflection, one.force, displacements(problem, one, model.rows, reduction=known)
-        own[:, : len(one.orders)] = np.concatenate(parts)
+    for row, solution in zip(lines, solutions, strict=True):
+        parts = solution.deflection, solution.force, displacements(problem, solution, model.rows, reduction=reduction)
+        row[:, : len(solution.orders)] = np.concatenate(parts)
     phase = 2.0 * np.pi * np.arange(_INSTANTS)[:, None] / _INSTANTS
     x = sample(lines[:, 0], _INSTANTS)[..., None, None]
     _, drive, back, has_back = mesh.flank_forces(x, phase)
     force, closed = mesh.evaluate(x, phase)[0][..., 0, 0], (drive > 0.0, has_back & (back < 0.0))
-    told = force.max(axis=1), force.min(axis=1), *(one.mean(axis=(1, 2)) for one in closed)
-    return PairMotion(lines[:, :1], lines[:, 1:2], *model.measured(lines[:, 2:], lines[:, 1]), *told)
+    measures = force.max(axis=1), force.min(axis=1), *(closed_there.mean(axis=(1, 2)) for closed_there in closed)
+    return PairMotion(lines[:, :1], lines[:, 1:2], *model.measured(lines[:, 2:], lines[:, 1]), *measures)
 
 
 def _with_play(problem: NonlinearSystem, frequency: float, start: np.ndarray, case: PairCase) -> PeriodicSolution:
     """Solve the balance with play at a mesh frequency [Hz] from lines (1, H + 1) of the approach on."""
     options = {"harmonics": start.shape[-1] - 1, "radius": False}
-    found = solve_harmonic_balance(problem, 2.0 * np.pi * frequency, start=start, **options)
-    if not found.converged:
-        found = solve_harmonic_balance(problem, 2.0 * np.pi * frequency, **options)
-    if not found.converged:
+    solution = solve_harmonic_balance(problem, 2.0 * np.pi * frequency, start=start, **options)
+    if not solution.converged:
+        solution = solve_harmonic_balance(problem, 2.0 * np.pi * frequency, **options)
+    if not solution.converged:
         damped = case.dynamics.damping_ratio > 0.0
         key = "operation.speeds" if damped else "dynamics.damping_ratio"
         raise ConvergenceError(
-            f"no motion with contact loss at a mesh frequency of {frequency:.6g} Hz; {found.message}",
+            f"no motion with contact loss at a mesh frequency of {frequency:.6g} Hz; {solution.message}",
             code="E-CONVERGENCE",
             key=key,
-            value=f"relative residual {found.residual:.2e}",
+            value=f"relative residual {solution.residual:.2e}",
             file=case.location(key),
             remedy="raise dynamics.damping_ratio, or leave the speed out",
         )
-    return found
+    return solution
 
 
 @one_blas_thread()
@@ -293,7 +293,7 @@ def pair_dynamics_parts(
     """Solve as `solve_pair_dynamics` for ``most`` speeds after the others, each with the case of these."""
     check_entries(modes, PairModesResult, modal_entries(case), "modal basis")
     basis, excitation, count = modes.modes, modes.excitation, len(case.operation.speeds)
-    for own, part in parts_of_speeds(case, np.ones(count), most):
+    for numbers, part in parts_of_speeds(case, np.ones(count), most):
         speeds = np.array(part.operation.speeds)
         frequency = speeds * case.gear_1.teeth / (2.0 * np.pi)
         harmonics = _harmonics(case, basis, frequency)
@@ -301,23 +301,23 @@ def pair_dynamics_parts(
         decisive = decisive_harmonics(basis, excitation, int(harmonics[0].max()))
         judged = stability(basis, excitation, frequency, excitation_harmonics=decisive)
         multiplier, method = judged.multiplier.copy(), list(response.method)
-        told = {name: np.array(getattr(response, name)) for name in _TOLD}
+        verdicts = {name: np.array(getattr(response, name)) for name in _TOLD}
         for s in np.flatnonzero(motion.lowest < 0.0):
             problem = separating_pair(modes.model, basis, excitation, int(harmonics[0, s]))
             start = response.deflection[s, :, : harmonics[1, s] + 1]
-            found = _with_play(problem, frequency[s], start, case)
-            one = _parted(modes.model, problem, [found], motion.dte.shape[-1] - 1)
-            for name, values in vars(one).items():
+            solution = _with_play(problem, frequency[s], start, case)
+            part_motion = _parted(modes.model, problem, [solution], motion.dte.shape[-1] - 1)
+            for name, values in vars(part_motion).items():
                 getattr(motion, name)[s] = values[0]
             for name in _TOLD:
-                told[name][s] = getattr(found, name)
-            multiplier[s], method[s] = [*found.verdict.multipliers, np.nan][0], "harmonic balance"
+                verdicts[name][s] = getattr(solution, name)
+            multiplier[s], method[s] = [*solution.verdict.multipliers, np.nan][0], "harmonic balance"
         lines = {"deflection": motion.deflection, "force": motion.force, "lowest_force": motion.lowest}
-        response = replace(response, **lines, **told, method=tuple(method))
+        response = replace(response, **lines, **verdicts, method=tuple(method))
         judged, reach = replace(judged, multiplier=multiplier), harmonics[0] * frequency
         play = modes.excitation.backlash
         yield part, PairDynamicsResult(modes.gears, speeds, motion, response, judged, reach, play)
-        progress("dynamics", float(own[-1] + 1), float(count))
+        progress("dynamics", float(numbers[-1] + 1), float(count))
 
 
 @one_blas_thread()
@@ -338,9 +338,9 @@ def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
     speeds = merged_speeds(operating[(operating >= first) & (operating <= last)], speeds)
     harmonics = _harmonics(case, basis, speeds * per_speed)
     response, motion = _linear(case, modes, speeds * per_speed, harmonics)
-    nearest, beside = (np.abs(one[:, None] - resonance).argmin(axis=0) for one in (speeds, operating))
+    nearest, beside = (np.abs(speeds_there[:, None] - resonance).argmin(axis=0) for speeds_there in (speeds, operating))
     alone = np.abs(row[mode] * response.modal[nearest, mode, met.harmonic]) / math.sqrt(2.0)
-    found = {
+    table = {
         "mode": mode + 1,
         "kind": [basis.kind[i] for i in mode],
         "mesh_harmonic": met.harmonic,
@@ -357,7 +357,7 @@ def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
         speeds * per_speed,
         motion,
         harmonics[0] * speeds * per_speed,
-        found,
+        table,
         operating,
         unresolved(speeds, resonance, heard, damping),
         *_branch(case, modes, speeds, motion.lowest),
@@ -371,26 +371,26 @@ def _branch(case: PairCase, modes: PairModesResult, speeds: np.ndarray, lowest: 
         return None, True, "flanks stay in contact at all speeds"
     high, low = min(_ABOVE * speeds[apart[-1]], speeds[-1]), max(_BELOW * speeds[apart[0]], speeds[0])
     harmonics = _harmonics(case, modes.modes, np.array([low * teeth / (2.0 * np.pi)]))[:, 0]
-    count, size = (min(int(one), most) for one, most in zip(harmonics, _ON_BRANCH, strict=True))
+    count, size = (min(int(harmonic), most) for harmonic, most in zip(harmonics, _ON_BRANCH, strict=True))
     problem = separating_pair(modes.model, modes.modes, modes.excitation, count)
     # teeth that strike travel as far as the flanks approach at rest and the play together
     scale = float(modes.excitation.deflection.max() + modes.excitation.backlash[0])
     options = {"harmonics": size, "radius": False, "scale": scale, "options": _STEPS}
-    found = frequency_response_curve(problem, (float(high * teeth), float(low * teeth)), **options)
-    far = np.abs(found.lines[:, 0]).sum(axis=1) > LARGEST_APPROACH * case.module
+    curve = frequency_response_curve(problem, (float(high * teeth), float(low * teeth)), **options)
+    far = np.abs(curve.lines[:, 0]).sum(axis=1) > LARGEST_APPROACH * case.module
     kept = max(int(far.argmax()), 1) if far.any() else len(far)
-    motion = _parted(modes.model, problem, found.solutions[:kept], size)
-    along = found.parameter[:kept] / teeth
-    parts, folds = along[motion.drive < 1.0] / RPM, np.sort(along[found.folds[found.folds < kept]]) / RPM
+    motion = _parted(modes.model, problem, curve.solutions[:kept], size)
+    along = curve.parameter[:kept] / teeth
+    parts, folds = along[motion.drive < 1.0] / RPM, np.sort(along[curve.folds[curve.folds < kept]]) / RPM
     span = f"from {parts.min():.6g} to {parts.max():.6g} rpm" if len(parts) else "nowhere"
-    listed, ending = ", ".join(f"{one:.6g}" for one in folds) or "none", "it came to the end of its range"
-    if not found.complete:
-        ending = found.message
+    listed, ending = ", ".join(f"{fold:.6g}" for fold in folds) or "none", "it came to the end of its range"
+    if not curve.complete:
+        ending = curve.message
     if far.any():
         grown = float(fluctuation(motion.dte[-1:])[0, 0])
         ending = f"it ends at {along[-1] / RPM:.6g} rpm, {_unbounded(modes, along[-1] * teeth, count, grown)}"
     words = f"along the branch flanks part {span}, limit points at {listed} rpm; {ending}"
-    return (along, motion, found.stable[:kept]), bool(found.complete and not far.any()), words
+    return (along, motion, curve.stable[:kept]), bool(curve.complete and not far.any()), words
 
 
 def _unbounded(modes: PairModesResult, omega: float, count: int, grown: float) -> str:

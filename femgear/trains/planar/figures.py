@@ -178,7 +178,7 @@ def _weight_bearing_forces(branch: xr.Dataset) -> Figure:
     """Sizes of the planet-bearing forces over one turn of the weight against the carrier."""
     lines = stored_harmonics(branch, "planet_bearing_force")[branch["shown_point"].values[-1]]
     wave = _wave(branch)
-    curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
+    curves = [(f"planet {n + 1}", (line @ wave.T).real) for n, line in enumerate(lines)]
     return bearing_forces(branch["phase"].values, curves, title="".join(_top(branch)))
 
 
@@ -215,8 +215,8 @@ def _response_orbit(response: xr.Dataset, speed: int) -> Figure:
     lines = stored_harmonics(response, "displacement")[speed]
     _, wave = _carrier_turn(response, speed)
     figure, axes = new_figure(columns=3, width=11.0, height=4.2)
-    for ax, colour, name, one in zip(axes, COLOURS, response["member"].values, lines):
-        x, y = 1e6 * (one @ wave.T).real
+    for ax, colour, name, line in zip(axes, COLOURS, response["member"].values, lines):
+        x, y = 1e6 * (line @ wave.T).real
         ax.plot(x, y, color=colour, linewidth=0.7)
         ax.plot([x.mean()], [y.mean()], "+", color=GREY)
         ax.set_aspect("equal", adjustable="datalim")
@@ -230,7 +230,7 @@ def _response_bearing_forces(response: xr.Dataset, speed: int) -> Figure:
     """Sizes of the planet-bearing forces over one carrier turn."""
     lines = stored_harmonics(response, "planet_bearing_force")[speed]
     turn, wave = _carrier_turn(response, speed)
-    curves = [(f"planet {n + 1}", (one @ wave.T).real) for n, one in enumerate(lines)]
+    curves = [(f"planet {n + 1}", (line @ wave.T).real) for n, line in enumerate(lines)]
     title = f"{float(response['speed'][speed]):.6g} rpm" + _doubt(_tails(response)[speed])
     return bearing_forces(2.0 * np.pi * turn, curves, title=title, over="carrier angle [°]")
 
@@ -246,8 +246,8 @@ def response_mesh_forces(response: xr.Dataset, speed: int) -> Figure:
     if response.attrs["mesh_lines"]:
         panels.append((near, "six mesh periods"))
     pair = (0, len(names) // 2)
-    forces = [1e-3 * (lines[one] @ wave.T).real for one in pair]
-    curves = [(names[one], force) for one, force in zip(pair, forces)]
+    forces = [1e-3 * (lines[row] @ wave.T).real for row in pair]
+    curves = [(names[row], force) for row, force in zip(pair, forces)]
     # one curve would hide the other
     equal = ""
     if np.abs(forces[1] - forces[0]).max() <= _EQUAL * np.ptp(forces):

@@ -110,10 +110,10 @@ def planar_data(case: PlanarCase, gears: PlanetarySet, static: StaticResult | No
         Neither a mesh stiffness nor a static solution, or a support without stiffness (E-KEY-MISSING).
     """
     planar, bodies = case.planar, {}
-    for name, one in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
+    for name, section in (("carrier", case.carrier), ("ring", planar.ring), ("sun", case.sun)):
         torsional = torsional_support(case, name, getattr(planar.torsion, name))
-        support = needed(support_stiffness(case, name, one), f"{name}.support_stiffness")
-        bodies[name] = PlanarBody(one.mass, one.inertia, support, torsional)
+        support = needed(support_stiffness(case, name, section), f"{name}.support_stiffness")
+        bodies[name] = PlanarBody(section.mass, section.inertia, support, torsional)
     given = planar.mesh_stiffness
     mean = needed(static, "static").cycle.mean() if given is None else None
     return planar_from_set(
@@ -319,7 +319,7 @@ def judged_branch(
     The branch was followed without stability; ``progress`` is called with (done, total).
     """
     solutions = branch.solutions
-    found = []
+    verdicts_so_far = []
     for first in range(0, len(solutions), _BATCH):
         part = solutions[first : first + _BATCH]
         verdicts = list(floquet_verdicts(problem, part, tolerance=_COARSE))
@@ -327,9 +327,9 @@ def judged_branch(
         fine = floquet_verdicts(problem, [part[i] for i in close], tolerance=_FINE) if close else ()
         for i, verdict in zip(close, fine):
             verdicts[i] = verdict
-        found += verdicts
-        progress(len(found), len(solutions))
-    judged = tuple(replace(solution, verdict=verdict) for solution, verdict in zip(solutions, found))
+        verdicts_so_far += verdicts
+        progress(len(verdicts_so_far), len(solutions))
+    judged = tuple(replace(solution, verdict=verdict) for solution, verdict in zip(solutions, verdicts_so_far))
     return replace(branch, solutions=judged, stability=True)
 
 

@@ -147,8 +147,10 @@ class BranchResult(StageResult):
         carrier = self.sense * branch.parameter
         # without verdicts everything is open
         nothing, unsaid = np.full(count, np.nan), [""] * count
-        stable = np.array([-1 if one.stable is None else one.stable for one in verdicts] or [-1] * count, int)
-        notes = [one.message if one.stable is None else "" for one in verdicts] or unsaid
+        stable = np.array(
+            [-1 if verdict.stable is None else verdict.stable for verdict in verdicts] or [-1] * count, int
+        )
+        notes = [verdict.message if verdict.stable is None else "" for verdict in verdicts] or unsaid
         largest, loss = (branch.largest_multiplier, list(branch.loss)) if verdicts else (nothing, unsaid)
         variables = {
             "weight_frequency": (point, hertz, "Hz", "frequency of the weight in the carrier frame"),
@@ -164,7 +166,7 @@ class BranchResult(StageResult):
             "largest_multiplier": (point, largest, "1", "largest Floquet multiplier"),
             "multiplier_distance": (
                 point,
-                [_nearest(one) for one in verdicts] or nothing,
+                [_nearest(verdict) for verdict in verdicts] or nothing,
                 "1",
                 "distance of the nearest Floquet multiplier from 1, which is zero at a limit point of the motion",
             ),
@@ -208,17 +210,17 @@ class PlanarResponseResult(StageResult):
     @property
     def converged(self) -> bool:
         """Whether all solutions satisfy their tolerance."""
-        return all(one.converged for one in self.solutions)
+        return all(solution.converged for solution in self.solutions)
 
     @property
     def residual(self) -> float:
         """Largest relative residual of the solutions."""
-        return float(max(one.residual for one in self.solutions))
+        return float(max(solution.residual for solution in self.solutions))
 
     @property
     def message(self) -> str:
         """How the solutions were found."""
-        return "; ".join(dict.fromkeys(one.message for one in self.solutions))
+        return "; ".join(dict.fromkeys(solution.message for solution in self.solutions))
 
     @staticmethod
     def warnings(data: xr.Dataset) -> Iterable[Finding]:
@@ -227,28 +229,29 @@ class PlanarResponseResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of response.nc."""
-        found, speed = self.solutions, ("speed",)
-        mesh = [one.mesh_frequency for one in self.speeds]
+        solutions, speed = self.solutions, ("speed",)
+        mesh = [speeds_there.mesh_frequency for speeds_there in self.speeds]
         variables = {
             "carrier_speed": (
                 speed,
-                [one.carrier for one in self.speeds],
+                [speeds_there.carrier for speeds_there in self.speeds],
                 "rad/s",
                 "speed of the carrier, counter-clockwise positive",
             ),
             "mesh_frequency": (speed, mesh, "Hz", "mesh frequency"),
             "frequency": (
                 ("speed", "line"),
-                [one.line_frequency / (2 * np.pi) for one in found],
+                [solution.line_frequency / (2 * np.pi) for solution in solutions],
                 "Hz",
                 "frequency of the line in the carrier frame",
             ),
         }
         variables |= {
-            name: (speed, [getattr(one, name) for one in found], "1", text) for name, text in _OF_SOLUTIONS.items()
+            name: (speed, [getattr(solution, name) for solution in solutions], "1", text)
+            for name, text in _OF_SOLUTIONS.items()
         }
         variables |= _motions(self.lines, "speed", "line")
-        orders, line = found[0].orders, ("line",)
+        orders, line = solutions[0].orders, ("line",)
         coords = _coordinates(self.planetary_set) | coordinates(speed=self.input_speed / RPM)
         coords |= {
             "carrier_order": (line, orders[:, 0], "1", "multiple of the carrier's frequency"),
@@ -259,7 +262,7 @@ class PlanarResponseResult(StageResult):
             coords=coords,
             attrs={
                 "title": "responses to weight and mesh frequency together",
-                "message": " ".join(dict.fromkeys(one.message for one in found)),
+                "message": " ".join(dict.fromkeys(solution.message for solution in solutions)),
                 "mesh_lines": int(np.any(orders[:, 1] != 0)),
                 "fourier_convention": FOURIER,
             },
@@ -273,12 +276,12 @@ def _nearest(verdict: FloquetVerdict) -> float:
 
 def _flank_forces(result: BranchResult, stable: np.ndarray) -> dict[str, tuple]:
     """Forces in time at the points that are drawn, from the laws of the contacts."""
-    rms = np.array([one.rms[0, 0] for one in result.lines])
-    back = np.array([one.back_contact.max() for one in result.lines])
+    rms = np.array([line.rms[0, 0] for line in result.lines])
+    back = np.array([line.back_contact.max() for line in result.lines])
     points = shown_points(rms, back, stable)
     theta = np.linspace(0.0, 2.0 * np.pi, _PHASES)[:, None]
     forces = [flank_forces(result.model, result.branch.solutions[point], theta) for point, _ in points]
-    drive, behind = (np.array([one[side].T for one in forces]) for side in (0, 1))
+    drive, behind = (np.array([force[side].T for force in forces]) for side in (0, 1))
     shown, dims = ("shown",), ("shown", "mesh", "phase")
     return {
         "shown_point": (shown, [point for point, _ in points], "1", "point whose forces are given in time"),
@@ -292,7 +295,7 @@ def _motions(lines: Sequence[MotionLines], along: str, line: str) -> dict[str, t
     """Displacements, forces and contact of all solutions, which stand along the first axis."""
     entries = {}
     for name, (dims, unit, words) in MOTIONS.items():
-        values = np.array([getattr(one, name) for one in lines])
+        values = np.array([getattr(of_speed, name) for of_speed in lines])
         axes = (along, *(line if axis == "line" else axis for axis in dims.split()))
         entry = (axes, values, unit, words)
         entries |= complex_entries([(name, *entry)]) if "line" in dims else {name: entry}
@@ -315,10 +318,10 @@ def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
     stiffness = stiffness_text(planar.mesh_stiffness) if planar.mesh_stiffness else "of the static solution"
     notes = [f"mesh stiffness: {stiffness}", _play(case, planetary)]
     if planar.carrier_bearing is not None:
-        one = planar.carrier_bearing
+        bearing = planar.carrier_bearing
         notes.append(
-            f"bearing between carrier and {one.on}: {one.stiffness:.6g} N/m, radial clearance "
-            f"{one.clearance * 1e6:.6g} um"
+            f"bearing between carrier and {bearing.on}: {bearing.stiffness:.6g} N/m, radial clearance "
+            f"{bearing.clearance * 1e6:.6g} um"
         )
     held = "torsional supports" if planar.reaction == "supports" else f"the {output_member(case)}"
     notes.append(f"the torque on the {case.operation.input} is taken up by {held}")
@@ -330,9 +333,9 @@ def describe_planar(case: PlanarCase, planetary: PlanetarySet) -> Block:
 
 def _bodies(case: PlanarCase) -> Iterator[tuple[str, ...]]:
     planar = case.planar
-    for name, one in (("sun", case.sun), ("ring", planar.ring), ("carrier", case.carrier)):
+    for name, section in (("sun", case.sun), ("ring", planar.ring), ("carrier", case.carrier)):
         torsion = torsion_text(case, name, getattr(planar.torsion, name))
-        yield name, f"{one.mass:.6g}", f"{one.inertia:.6g}", support_text(case, name, one), torsion
+        yield name, f"{section.mass:.6g}", f"{section.inertia:.6g}", support_text(case, name, section), torsion
     planet = case.planet
     bearing = f"{planet.bearing_stiffness:.6g} (bearing)"
     yield "planet", f"{planet.mass:.6g}", f"{planet.inertia:.6g}", bearing, "0"
@@ -342,8 +345,10 @@ def _play(case: PlanarCase, planetary: PlanetarySet) -> str:
     play = case.planar.line_backlash
     values = (planetary.backlash_sun_planet, planetary.backlash_planet_ring) if play is None else (play,)
     text = " and ".join(dict.fromkeys(f"{max(0.0, round(value * 1e6, 6)):.6g}" for value in values))
-    own = "on lines of action of their own" if case.planar.back_flanks else "on those of the drive flanks"
-    return f"play along the line of action {text} um, back flanks {own}"
+    lines_of_back_flanks = (
+        "on lines of action of their own" if case.planar.back_flanks else "on those of the drive flanks"
+    )
+    return f"play along the line of action {text} um, back flanks {lines_of_back_flanks}"
 
 
 def _smoothing(case: PlanarCase, planetary: PlanetarySet) -> str:
@@ -394,7 +399,7 @@ def _sense(case: PlanarCase) -> str:
 def describe_branch(data: xr.Dataset) -> Block:
     """Tabulate branch.nc: ends, folds and the largest responses [um], by frequency of the weight [Hz]."""
     hertz, rms = data["weight_frequency"].values, data["rms"].values
-    known, marks = data.attrs["stability"] != "not computed", Marks(findings_in(data.attrs))
+    judged, marks = data.attrs["stability"] != "not computed", Marks(findings_in(data.attrs))
     doubtful = _tail_codes(data)
     stable = data["stable"].values
     named = {0: "start", len(hertz) - 1: "end"}
@@ -408,14 +413,14 @@ def describe_branch(data: xr.Dataset) -> Block:
         "ring x rms [um]": lambda point: marks(significant(1e6 * rms[point, 1, 0], 3), *doubtful(point)),
         "sun x rms [um]": lambda point: marks(significant(1e6 * rms[point, 2, 0], 3), *doubtful(point)),
         "back contact": lambda point: marks(f"{float(data['back_contact'].values[point].max()):.3f}", *doubtful(point)),
-        "stable": lambda point: _STABLE[int(stable[point])] if known else "-",
+        "stable": lambda point: _STABLE[int(stable[point])] if judged else "-",
     }
     notes = [
         f"{len(hertz)} points; {data.attrs['message']!s}",
         "back contact: largest share of the cycle in which back flanks touch",
     ]
-    notes += _verdicts(data) if known else ["stability was not computed"]
-    notes += _truncation(data) if known else []
+    notes += _verdicts(data) if judged else ["stability was not computed"]
+    notes += _truncation(data) if judged else []
     tail, force = (float(data[name].max()) for name in ("tail", "force_tail"))
     notes.append(
         f"tail, share of the amplitude in the upper half of the lines: up to {tail:.2g} of the deflections, "
@@ -528,18 +533,18 @@ def describe_planar_response(data: xr.Dataset) -> Block:
 
 def published_modes(case: PlanarCase, data: xr.Dataset) -> tuple[Block, ...]:
     """Tabulate natural frequencies [Hz] that the case calls published beside the nearest of the kind."""
-    entries = [(one, one.frequency) for one in case.planar.published if one.frequency is not None]
+    entries = [(mode, mode.frequency) for mode in case.planar.published if mode.frequency is not None]
     if not entries:
         return ()
-    kinds, found = np.array([str(kind) for kind in data["kind"].values]), data["frequency"].values
+    kinds, frequency = np.array([str(kind) for kind in data["kind"].values]), data["frequency"].values
     rows = []
-    for one, hertz in entries:
-        same = found[kinds == one.kind]
+    for entry, hertz in entries:
+        same = frequency[kinds == entry.kind]
         near, difference = "none", "-"
         if len(same):
             nearest = same[np.argmin(np.abs(same - hertz))]
             near, difference = f"{nearest:.6g}", f"{100 * (nearest / hertz - 1):+.2f}"
-        rows.append((one.kind, f"{hertz:.6g}", near, difference, one.source))
+        rows.append((entry.kind, f"{hertz:.6g}", near, difference, entry.source))
     header = ("kind", "published [Hz]", "nearest here [Hz]", "difference [%]", "source")
     return (Block("Published natural frequencies", header, tuple(rows)),)
 

@@ -169,9 +169,9 @@ def _bounded_branch(
 ) -> tuple[Branch, tuple[MotionLines, ...]]:
     """Cut a branch at the last point that converged with small displacements, and compute its motions."""
     good: list[MotionLines] = []
-    for solution, one in zip(branch.solutions, lines):
+    for solution, line in zip(branch.solutions, lines):
         hertz = f"{solution.frequency[0] / (2.0 * np.pi):.6g} Hz"
-        words = _too_far(one, gears) if solution.converged else f"no solution: {solution.message}"
+        words = _too_far(line, gears) if solution.converged else f"no solution: {solution.message}"
         if words:
             where = f"at {hertz} of the weight"
             if len(good) < 2 and not solution.converged:
@@ -183,17 +183,17 @@ def _bounded_branch(
                 raise _moved_too_far("planar.branch.from", where, words)
             ending = f"stopped before {hertz}, where {words}" if solution.converged else f"{words} at {hertz}"
             return _cut(branch, len(good), ending), tuple(good)
-        good.append(one)
+        good.append(line)
     return branch, tuple(good)
 
 
 def _cut(branch: Branch, count: int, message: str) -> Branch:
     """The first points of a branch, which then did not reach an end of its range."""
-    known = branch.curve
+    whole_curve = branch.curve
     curve = replace(
-        known,
-        **{name: getattr(known, name)[:count] for name in _ALONG},
-        **{name: getattr(known, name)[getattr(known, name) < count] for name in ("folds", "branch_points")},
+        whole_curve,
+        **{name: getattr(whole_curve, name)[:count] for name in _ALONG},
+        **{name: getattr(whole_curve, name)[getattr(whole_curve, name) < count] for name in ("folds", "branch_points")},
         closed=False,
         complete=False,
         message=message,
@@ -208,7 +208,7 @@ def _check_response_motions(
     gears: PlanetarySet,
 ) -> None:
     """Refuse speeds without a solution, and displacements that are not small."""
-    lost = [i for i, one in enumerate(solutions) if not one.converged]
+    lost = [i for i, solution in enumerate(solutions) if not solution.converged]
     if lost:
         listed = ", ".join(f"{speeds[i] / RPM:.6g}" for i in lost[:8]) + (", ..." if len(lost) > 8 else "")
         raise ConvergenceError(
@@ -218,17 +218,17 @@ def _check_response_motions(
             value=f"relative residual {solutions[lost[0]].residual:.2e}",
             remedy="leave these speeds out, change planar.response.carrier_harmonics, or raise the damping",
         )
-    for speed, one in zip(speeds, lines):
-        if words := _too_far(one, gears):
+    for speed, line in zip(speeds, lines):
+        if words := _too_far(line, gears):
             raise _moved_too_far("operation.speeds", f"at {speed / RPM:.6g} rpm", words)
 
 
-def _too_far(one: MotionLines, gears: PlanetarySet) -> str:
+def _too_far(lines: MotionLines, gears: PlanetarySet) -> str:
     """Why displacements are not small; empty where they are."""
     module = gears.sun.module
     for value, modules, words in (
-        (one.motion, LARGEST_MOTION, "a member moves"),
-        (one.approach, LARGEST_APPROACH, "the flanks of a mesh approach"),
+        (lines.motion, LARGEST_MOTION, "a member moves"),
+        (lines.approach, LARGEST_APPROACH, "the flanks of a mesh approach"),
     ):
         if not value <= modules * module:
             allowed = f"{modules * module * 1e3:.4g} mm ({modules:g} modules)"
@@ -300,7 +300,7 @@ def solve_branch(case: PlanarCase, static: StaticResult | None = None, *, progre
             radius=True,
             max_points=wanted.points,
         )
-    branch, lines = _bounded_branch(branch, (motion_lines(model, one) for one in branch.solutions), gears)
+    branch, lines = _bounded_branch(branch, (motion_lines(model, solution) for solution in branch.solutions), gears)
     if wanted.stability:
         branch = judged_branch(
             model.problem, branch, lambda done, total: progress("branch", 0.3 * total + 0.7 * done, total)
@@ -330,14 +330,14 @@ def solve_planar_response(
             check_smoothing(case, gears, model)
         frequency = np.array([abs(speed.carrier), 2.0 * np.pi * speed.mesh_frequency])
         _check_damping(case, model, _excited_spans(frequency, orders))
-        found = None
+        solution = None
         options = {"orders": orders, "reduction": model.reduction, "radius": len(orders) < 60}
         if solutions and solutions[-1].converged:
-            found = solve_harmonic_balance(model.problem, frequency, start=solutions[-1], **options)
-        if found is None or not found.converged:
-            found = solve_harmonic_balance(model.problem, frequency, **options)
-        solutions.append(found)
-        lines.append(motion_lines(model, found))
+            solution = solve_harmonic_balance(model.problem, frequency, start=solutions[-1], **options)
+        if solution is None or not solution.converged:
+            solution = solve_harmonic_balance(model.problem, frequency, **options)
+        solutions.append(solution)
+        lines.append(motion_lines(model, solution))
         progress("response", number + 1, len(turning))
     _check_response_motions(operation.speeds, solutions, lines, gears)
     return PlanarResponseResult(gears, np.array(operation.speeds), turning, tuple(solutions), tuple(lines))
@@ -370,8 +370,8 @@ def _response_verdict(result: PlanarResponseResult) -> dict:
 def _truncation(solutions, lines) -> dict:
     """Largest shares of the amplitude in the upper half of the lines."""
     return {
-        "tail": float(max(one.tail for one in solutions)),
-        "force_tail": float(max(one.force_tail for one in lines)),
+        "tail": float(max(solution.tail for solution in solutions)),
+        "force_tail": float(max(line.force_tail for line in lines)),
     }
 
 
