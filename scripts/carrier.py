@@ -4,17 +4,15 @@
 from __future__ import annotations
 
 import math
-import subprocess
 import sys
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
 from casing import condensed
 from cyclopts import Parameter
-from script_tools import Progress, print_table, ready_folder, run_script, say_files
+from script_tools import Progress, meshed, print_table, ready_folder, run_script, say_files
 
 from femgear.errors import CaseError
 from femgear.exchange.carrier_files import read_carrier
@@ -96,15 +94,7 @@ def grid_of(carrier: Carrier):
     """
     from skfem import MeshTet, MeshTet2
 
-    with TemporaryDirectory() as folder:
-        source, grid = Path(folder) / "carrier.geo", Path(folder) / "carrier.msh"
-        source.write_text(geometry(carrier), encoding="utf-8")
-        run = "import sys, gmsh; gmsh.initialize(sys.argv, run=True)"
-        words = [sys.executable, "-c", run, "-3", "-v", "1", "-format", "msh22", source, "-o", grid]
-        done = subprocess.run(words, capture_output=True, text=True, timeout=300)
-        if done.returncode or not grid.is_file():
-            raise CaseError(f"Gmsh made no grid: {done.stderr[-200:]}", code="E-GRID-GMSH")
-        half = MeshTet.load(grid)
+    half = meshed(geometry(carrier))
     points, cells = [], []
     for number in range(carrier.planets):
         turn = 2.0 * math.pi * number / carrier.planets

@@ -3,18 +3,16 @@
 
 from __future__ import annotations
 
-import subprocess
 import sys
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Annotated
 
 import numpy as np
 from cyclopts import Parameter
 from scipy.linalg import eigh
 from scipy.sparse.linalg import LinearOperator, eigsh, splu
-from script_tools import Progress, print_table, ready_folder, run_script, say_files
+from script_tools import Progress, meshed, print_table, ready_folder, run_script, say_files
 
 from femgear.errors import CaseError
 from femgear.exchange.formats import Shapes, write_modes
@@ -71,21 +69,13 @@ class Casing:
 
 def assembled(casing: Casing):
     """Basis, stiffness [N/m] and mass [kg] of the casing, nothing held; Gmsh runs in a process of its own."""
-    from skfem import Basis, BilinearForm, ElementTetP2, ElementVector, MeshTet
+    from skfem import Basis, BilinearForm, ElementTetP2, ElementVector
     from skfem.helpers import dot
     from skfem.models.elasticity import lame_parameters, linear_elasticity
 
     names = {"bottom": -casing.width / 2, **vars(casing)}
     parts = HOUSED.format(**names) if casing.housed else ""
-    with TemporaryDirectory() as folder:
-        source, grid = Path(folder) / "casing.geo", Path(folder) / "casing.msh"
-        source.write_text(GEOMETRY.format(parts=parts, **names), encoding="utf-8")
-        run = "import sys, gmsh; gmsh.initialize(sys.argv, run=True)"
-        words = [sys.executable, "-c", run, "-3", "-v", "1", "-format", "msh22", source, "-o", grid]
-        done = subprocess.run(words, capture_output=True, text=True, timeout=300)
-        if done.returncode or not grid.is_file():
-            raise CaseError(f"Gmsh made no grid: {done.stderr[-200:]}", code="E-GRID-GMSH")
-        mesh, element = MeshTet.load(grid), ElementVector(ElementTetP2())
+    mesh, element = meshed(GEOMETRY.format(parts=parts, **names)), ElementVector(ElementTetP2())
     K = linear_elasticity(*lame_parameters(E, NU)).assemble(Basis(mesh, element, intorder=2))
     basis = Basis(mesh, element, intorder=4)
     return basis, K.tocsc(), BilinearForm(lambda u, v, w: RHO * dot(u, v)).assemble(basis).tocsc()

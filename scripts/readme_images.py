@@ -55,7 +55,7 @@ def _script(command: str, title: str, **says: str) -> Run:
 
 RUNS = {
     "planetary_27_40_108": _case("planetary_27_40_108", "Reference set 27/40/108, elastic ring"),
-    "on_six_bolts": _case("on_six_bolts", "Reference set on six bolts, two named sensors", HOUSING),
+    "on_six_bolts": _case("on_six_bolts", "Reference set on six bolts, two named sensors", HOUSING[:-1]),
     "in_a_casing": _case("in_a_casing", "Reference set in a casing of a file", HOUSING),
     "misaligned": Run(
         "femgear run cases/planetary_27_40_108.toml --only stress",
@@ -83,6 +83,12 @@ RUNS = {
     "grc_like_drivetrain": _case("grc_like_drivetrain", "Drivetrain like that of the gearbox collaborative"),
     "own_chain": _case("own_chain", "A drivetrain to start from", ("campbell", "mesh_force", "transient_forces")),
     "e_axle": _case("e_axle", "Electric axle: shafts, bearings and two stages"),
+    "e_axle_in_a_casing": _case("e_axle_in_a_casing", "Electric axle in an elastic casing", ("mode_energy",)),
+    "e_axle_casing": _script(
+        "e_axle_casing.py",
+        "Casing of the electric axle",
+        casing="Casing of the axle, seen through, with the surfaces that are tied to its nodes.",
+    ),
     "planet_carrier": _case("planet_carrier", "Planetary stage with an elastic carrier", ("mode_energy",)),
     "five_megawatt_chain": _case(
         "five_megawatt_chain", "Chain of a five-megawatt wind turbine", ("deflected_shafts", "mode_energy")

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import subprocess
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from femgear.cli import Progress as Progress
 from femgear.cli import call
-from femgear.errors import printable
+from femgear.errors import CaseError, printable
 from femgear.storage.files import own_files
 from femgear.storage.files import write_csv as write_csv
 
@@ -73,3 +75,21 @@ def print_table(title: str, header: Sequence[str], rows: Iterable[Sequence[str]]
 def say_files(folder: Path, names: Sequence[str]) -> None:
     """Print where the files are."""
     print(printable(f"files in {folder}: {', '.join(names)}"))
+
+
+def meshed(text: str):
+    """Grid of a geometry of Gmsh, tetrahedra of four nodes, or of ten where the geometry asks for second order.
+
+    Gmsh runs in a process of its own.
+    """
+    from skfem import Mesh
+
+    with TemporaryDirectory() as folder:
+        source, grid = Path(folder) / "solid.geo", Path(folder) / "solid.msh"
+        source.write_text(text, encoding="utf-8")
+        run = "import sys, gmsh; gmsh.initialize(sys.argv, run=True)"
+        words = [sys.executable, "-c", run, "-3", "-v", "1", "-format", "msh22", source, "-o", grid]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=600)
+        if done.returncode or not grid.is_file():
+            raise CaseError(f"Gmsh made no grid: {done.stderr[-200:]}", code="E-GRID-GMSH")
+        return Mesh.load(grid)
