@@ -317,7 +317,7 @@ THEMES = (
         "the wind-up, CalculiX where it is installed; a shipped casing: integrals over its volume, CalculiX; gates: "
         "1e-9 of natural frequencies, motions and forces, five passes of teeth and system, 0.1 % of modes of a meshed "
         "casing, 1e-5 of mass and inertia; wind-up of a tube 3 %, of webs 20 %; CalculiX: 1 % of compliance, 0.5 % of "
-        "frequencies, of the shipped casing 2 and 1 %.",
+        "frequencies, of the shipped casing 2 and 0.5 %.",
         (
             gearbox.other_trains,
             gearbox.elastic_ring,
