@@ -88,7 +88,7 @@ def test_on_springs_it_yields_and_vibrates_as_all_elements_do(full, small):
     ours = np.sqrt(eigh(stiffness, mass, eigvals_only=True)[:20]) / (2.0 * np.pi)
     below = expected < 0.5 * HIGHEST
     assert below.sum() >= 8
-    assert ours[below] == pytest.approx(expected[below], rel=2e-2)
+    assert ours[below] == pytest.approx(expected[below], rel=1e-3)
     assert (ours > expected * (1.0 - 1e-7)).all()
 
 
