@@ -1,4 +1,7 @@
-"""Pictures of a gearbox: deflected shafts with bearing forces and load patterns, modes, Campbell diagram."""
+"""Pictures of a gearbox: deflected shafts with bearing forces and load patterns, modes, Campbell diagram.
+
+Those of its response are in `femgear.trains.gearbox.response_figures`.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,7 @@ import numpy as np
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
 from femgear.stages.protocol import Drawn, Figures
 from femgear.trains.gearbox.casing_results import seat_curve
+from femgear.trains.gearbox.response_figures import RESPONSE_FIGURES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -262,4 +266,4 @@ FIGURES = {
         },
         _draw_modes,
     ),
-}
+} | RESPONSE_FIGURES

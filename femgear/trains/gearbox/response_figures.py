@@ -1,0 +1,180 @@
+"""Pictures of the response of a gearbox: levels and mesh forces over the speed, spectra at the sensors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.report.style import BLACK, COLOURS, DASHES, GREY, SMALL, label, legend_below, new_figure, rpm, stems
+from femgear.stages.protocol import Drawn, Figures
+
+if TYPE_CHECKING:
+    import xarray as xr
+    from matplotlib.figure import Figure
+
+SENSORS_DRAWN = 6
+"""Sensors with a chart of their own, at most: the loudest ones."""
+LINES_NAMED = 5
+"""Lines of a spectrum that are named by their origin."""
+_DECADES = 4.0  # below the largest value that are drawn
+_ROOM = 0.34  # share of the height of a spectrum for the names
+_STAGE_COLOURS = tuple(colour for colour in COLOURS if colour != BLACK)
+
+
+def _loudest(data: xr.Dataset) -> tuple[list[int], str]:
+    """Numbers of the sensors that are drawn, in their order, and words where some are left out."""
+    level = data["level"].values.max(axis=0)
+    chosen = sorted(np.argsort(-level, kind="stable")[:SENSORS_DRAWN].tolist())
+    return chosen, "" if len(chosen) == len(level) else f"the loudest {len(chosen)} of {len(level)} sensors"
+
+
+def _stage_style(number: int) -> dict[str, str]:
+    """Colour and dash of a stage."""
+    count = len(_STAGE_COLOURS)
+    return {"color": _STAGE_COLOURS[number % count], "linestyle": DASHES[number // count % len(DASHES)]}
+
+
+def _log_axis(ax, level: np.ndarray, parts: np.ndarray) -> None:
+    """Let the ordinate be logarithmic, over what is drawn, but no more than `_DECADES` decades."""
+    largest = float(level.max(initial=0.0))
+    if largest > 0.0:
+        drawn = np.concatenate([level, parts.ravel()])
+        ax.set_yscale("log")
+        ax.set_ylim(max(0.7 * drawn[drawn > 0.0].min(), 10.0**-_DECADES * largest), 1.5 * largest)
+
+
+def _mark_operation(ax, data: xr.Dataset, operation: float | None) -> None:
+    """Mark the speed of the load case, where the run-up passes it."""
+    speed = data["speed"].values
+    ax.set_xlim(speed[0], speed[-1])
+    if operation is not None and speed[0] <= operation <= speed[-1]:
+        ax.axvline(operation, color=BLACK, linewidth=1.2, linestyle=":", label="speed of the load case")
+
+
+def draw_run_up_levels(runup: xr.Dataset, operation: float | None = None) -> Figure:
+    """Draw the level at every sensor over the speed, and the part of every stage in it, of runup.nc.
+
+    Parameters
+    ----------
+    runup : Dataset
+        With the levels of sensors.
+    operation : float, optional
+        Speed of the load case [rpm].
+    """
+    chosen, words = _loudest(runup)
+    speed, level, parts = (runup[name].values for name in ("speed", "level", "level_of_stage"))
+    figure, axes = new_figure(rows=len(chosen), height=0.9 + 2.7 * len(chosen), sharex=True)
+    several = runup.sizes["stage"] > 1
+    for ax, sensor in zip(axes, chosen, strict=True):
+        ax.plot(speed, level[:, sensor], color=BLACK, linewidth=2.2, label="all stages" if several else "level")
+        for number, stage in enumerate(runup["stage"].values if several else ()):
+            ax.plot(speed, parts[:, sensor, number], linewidth=1.4, label=str(stage), **_stage_style(number))
+        _log_axis(ax, level[:, sensor], parts[:, sensor])
+        _mark_operation(ax, runup, operation)
+        label(ax, y="level, r.m.s. [m/s²]", title=f"sensor {runup['sensor'].values[sensor]}")
+    label(axes[-1], f"speed of {runup.attrs['reference']} [rpm]")
+    if words:
+        figure.suptitle(words, fontsize=SMALL)
+    legend_below(figure, axes[0])
+    return figure
+
+
+def draw_run_up_forces(runup: xr.Dataset, operation: float | None = None) -> Figure:
+    """Draw the largest mesh force over its mean of every stage over the speed, of runup.nc.
+
+    Arguments as of `draw_run_up_levels`.
+    """
+    figure, (ax,) = new_figure(height=4.6)
+    for number, stage in enumerate(runup["stage"].values):
+        curves = runup["dynamic_factor"].values[:, number].T
+        shown = [kind for kind, curve in enumerate(curves) if np.isfinite(curve).all()]
+        for kind in shown:
+            name = f"{stage}, {runup['kind'].values[kind]}" if len(shown) > 1 else str(stage)
+            style = {"color": _STAGE_COLOURS[number % len(_STAGE_COLOURS)], "linestyle": DASHES[kind]}
+            ax.plot(runup["speed"].values, curves[kind], linewidth=1.7, label=name, **style)
+    ax.set_ylim(bottom=1.0)
+    _mark_operation(ax, runup, operation)
+    label(ax, f"speed of {runup.attrs['reference']} [rpm]", "largest mesh force over its mean [1]")
+    legend_below(figure, ax)
+    return figure
+
+
+def draw_sensor_spectra(dynamics: xr.Dataset) -> Figure:
+    """Draw the lines at every sensor over the frequency, coloured by stage, of dynamics.nc at its loudest speed."""
+    data = dynamics.isel(speed=int(dynamics["level"].values.max(axis=1).argmax()))
+    chosen, words = _loudest(dynamics)
+    frequency = 1e-3 / 60.0 * data["order"].values * float(data["speed"])
+    amplitude = np.hypot(data["lines_real"].values, data["lines_imag"].values)
+    figure, axes = new_figure(rows=len(chosen), height=0.9 + 3.3 * len(chosen), sharex=True)
+    for ax, sensor in zip(axes, chosen, strict=True):
+        size, largest = amplitude[sensor], float(amplitude[sensor].max(initial=0.0)) or 1.0
+        floor = 10.0**-_DECADES * largest
+        top = floor * 10.0 ** (_DECADES / (1.0 - _ROOM))
+        ax.set_yscale("log")
+        ax.set_ylim(floor, top)
+        ax.minorticks_off()
+        for number, stage in enumerate(data["stage"].values):
+            lines = data["origin"].values == stage
+            colour = _STAGE_COLOURS[number % len(_STAGE_COLOURS)]
+            stems(ax, frequency[lines], size[lines], floor, text=str(stage), colour=colour, width=1.8)
+        ax.set_xlim(0.0, 1.02 * float(frequency.max(initial=1.0)))
+        _name_lines(ax, data, frequency, size, (floor, top))
+        label(ax, y="amplitude [m/s²]", title=f"sensor {data['sensor'].values[sensor]}, {rpm(float(data['speed']))}")
+    label(axes[-1], "frequency [kHz]")
+    if words:
+        figure.suptitle(words, fontsize=SMALL)
+    legend_below(figure, axes[0])
+    return figure
+
+
+def short_origin(data: xr.Dataset, line: int) -> str:
+    """Write where a line comes from, in short: stage, mesh harmonic, turns of the carrier beside it."""
+    band = int(data["side_band"].values[line])
+    beside = f" {band:+d}".replace("-", "−") if band else ""
+    return f"{data['origin'].values[line]} {int(data['harmonic'].values[line])}{beside}"
+
+
+def _name_lines(ax, data: xr.Dataset, frequency: np.ndarray, size: np.ndarray, ends: tuple[float, float]) -> None:
+    """Name the largest lines in rows above them: the farther to the right, the lower, so that none crosses another."""
+    floor, top = ends
+    largest = [i for i in np.argsort(-size, kind="stable")[:LINES_NAMED].tolist() if size[i] > floor]
+    for row, line in enumerate(sorted(largest, key=lambda i: frequency[i])):
+        height = floor * (top / floor) ** (1.0 - _ROOM * (row + 0.5) / LINES_NAMED)
+        x = frequency[line]
+        ax.plot([x, x], [size[line], height], color=GREY, linewidth=0.7, label="_")
+        place = {"xytext": (3, 0), "textcoords": "offset points", "ha": "left", "va": "center"}
+        ax.annotate(short_origin(data, line), (x, height), fontsize=SMALL, annotation_clip=False, **place)
+
+
+def _operation(drawn: Drawn) -> float | None:
+    """Speed of the load case [rpm], where its response was computed."""
+    return float(drawn.data["dynamics"]["speed"].values[0]) if "dynamics" in drawn.data else None
+
+
+def _draw_runup(drawn: Drawn) -> dict[str, Figure]:
+    runup, operation = drawn.data["runup"], _operation(drawn)
+    levels = {"run_up_levels": draw_run_up_levels(runup, operation)} if "level" in runup else {}
+    return levels | {"run_up_forces": draw_run_up_forces(runup, operation)}
+
+
+RESPONSE_FIGURES = {
+    "dynamics": Figures(
+        {
+            "sensor_spectra": "Acceleration at the sensors, line by line, coloured by the stage that makes it. The "
+            "largest lines have the mesh harmonic and, behind its sign, the turns of the carrier beside it: 2 +1 is "
+            "the second harmonic and one turn more.",
+        },
+        lambda drawn: (
+            {"sensor_spectra": draw_sensor_spectra(drawn.data["dynamics"])} if "level" in drawn.data["dynamics"] else {}
+        ),
+    ),
+    "runup": Figures(
+        {
+            "run_up_levels": "Level at the sensors over the speed, and the part that each stage makes of it.",
+            "run_up_forces": "Largest mesh force over its mean over the speed, by stage; of planetary stages with "
+            "the sun and with the ring.",
+        },
+        _draw_runup,
+    ),
+}
