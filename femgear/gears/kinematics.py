@@ -106,12 +106,23 @@ def speeds(planetary: PlanetarySet, *, input: str, fixed: str, speed: float) -> 
         )
     zs, zp, zr = planetary.sun.teeth, planetary.planet.teeth, planetary.ring.teeth
     speed_of = {input: speed, fixed: 0.0}
-    # z_s w_s + z_r w_r - (z_s + z_r) w_c = 0
-    weight = {"sun": zs, "ring": zr, "carrier": -(zs + zr)}
+    sun, ring, carrier = willis_weights(zs, zr)
+    weight = {"sun": sun, "ring": ring, "carrier": carrier}
     (free,) = (member for member in MEMBERS if member not in speed_of)
     speed_of[free] = -sum(weight[member] * value for member, value in speed_of.items()) / weight[free]
     planet, mesh_frequency = planet_motion(speed_of["sun"], speed_of["carrier"], zs, zp)
     return Speeds(planet=planet, mesh_frequency=mesh_frequency, **speed_of)
+
+
+def willis_weights(first: Any, second: Any) -> tuple[Any, Any, Any]:
+    """Compute the weights of the speeds of two gears of a carrier, and of the carrier, in Willis' equation.
+
+    ``z_1 (w_1 - w_c) + z_2 (w_2 - w_c) = 0``, so ``z_1 w_1 + z_2 w_2 - (z_1 + z_2) w_c = 0``: of sun and ring with
+    planets between them, of two external gears in mesh, and with a negative size of the second of an internal one and
+    of sun and ring with double planets (R. Willis, Principles of Mechanism, 1841). Without losses the torques have
+    the same ratios. Sizes are tooth numbers or base radii, numbers or arrays.
+    """
+    return first, second, -(first + second)
 
 
 def planet_motion(sun: Any, carrier: Any, sun_teeth: Any, planet_teeth: Any) -> tuple[Any, Any]:
@@ -125,7 +136,7 @@ def planet_motion(sun: Any, carrier: Any, sun_teeth: Any, planet_teeth: Any) -> 
 
 def sun_ratio(sun_teeth: Any, ring_teeth: Any) -> Any:
     """Compute the speed of the sun over that of the carrier with the ring held, ``1 + z_r/z_s``, numbers or arrays."""
-    return 1.0 + ring_teeth / sun_teeth
+    return -willis_weights(1.0, ring_teeth / sun_teeth)[2]
 
 
 def torque_ratios(sun_teeth: int, ring_teeth: int) -> dict[str, float]:
@@ -134,7 +145,8 @@ def torque_ratios(sun_teeth: int, ring_teeth: int) -> dict[str, float]:
     Willis: without losses ``T_s : T_r : T_c = 1 : z_r/z_s : -(1 + z_r/z_s)``, and
     ``T_s w_s + T_r w_r + T_c w_c = 0``.
     """
-    return {"sun": 1.0, "ring": ring_teeth / sun_teeth, "carrier": -sun_ratio(sun_teeth, ring_teeth)}
+    sun, ring, carrier = willis_weights(1.0, ring_teeth / sun_teeth)
+    return {"sun": sun, "ring": ring, "carrier": carrier}
 
 
 def torques(planetary: PlanetarySet, *, member: str, torque: float) -> Torques:

@@ -20,6 +20,7 @@ from numbers import Integral, Rational, Real
 
 from femgear.errors import CaseError, GeometryError, several
 from femgear.gears.exact_linear import ExactSolution, reduce_rows
+from femgear.gears.kinematics import willis_weights
 from femgear.gears.shaft_graph import EXTERNAL, INTERNAL, ShaftGraph, SpeedCondition, StageGears, connected_sets
 
 _RPM = math.pi / 30.0  # [rad/s]
@@ -102,7 +103,7 @@ def planetary_condition(
     sign = -1 if double else 1
     return _condition(
         name,
-        ((sun, sun_teeth), (ring, sign * ring_teeth), (carrier, -sun_teeth - sign * ring_teeth)),
+        tuple(zip((sun, ring, carrier), willis_weights(sun_teeth, sign * ring_teeth), strict=True)),
         StageGears(
             {"sun": sun_teeth, "ring": ring_teeth},
             {"sun": sun, "carrier": carrier, "ring": ring},
@@ -134,7 +135,7 @@ def stepped_condition(
     on_sun, on_ring = sun_teeth * second_planet_teeth, first_planet_teeth * ring_teeth
     return _condition(
         name,
-        ((sun, on_sun), (ring, on_ring), (carrier, -on_sun - on_ring)),
+        tuple(zip((sun, ring, carrier), willis_weights(on_sun, on_ring), strict=True)),
         StageGears(
             teeth,
             {"sun": sun, "carrier": carrier, "ring": ring},

@@ -9,7 +9,7 @@ from scipy.optimize import linprog
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear
-from femgear.gears.kinematics import mesh_normals, orientations, speeds, torques, unheld_members
+from femgear.gears.kinematics import mesh_normals, orientations, speeds, torques, unheld_members, willis_weights
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from validation.planetary import reference_set
 
@@ -33,6 +33,20 @@ def test_mesh_frequency_of_the_modulation_paper():
         assert found.ring == 0.0
         # the ring's teeth pass the planets at the same frequency
         assert found.carrier * 108 / (2 * math.pi) == pytest.approx(frequency, rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("sizes", "speeds_of"),
+    [
+        ((27, 108), (5.0, 0.0, 1.0)),  # sun, held ring, carrier: 1 + 108/27
+        ((20, 40), (1.0, 0.0, 1.0 / 3.0)),  # two gears in mesh, the second at rest: the arm of 20 + 40 turns by 20/60
+        ((30, -90), (-2.0, 0.0, 1.0)),  # a planet in a held ring: 1 - 90/30
+        ((30, -60), (2.0, 1.5, 1.0)),  # double planets: (w_s - w_c) over (w_r - w_c) is 60/30
+    ],
+)
+def test_weights_of_willis_are_those_of_tooth_numbers(sizes, speeds_of):
+    assert np.dot(willis_weights(*sizes), speeds_of) == pytest.approx(0.0, abs=1e-13)
+    assert sum(willis_weights(*sizes)) == 0
 
 
 @pytest.mark.parametrize("driven", MEMBERS)

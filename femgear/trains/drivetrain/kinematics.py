@@ -17,6 +17,7 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.fe.beam import AXES, joint_deflections, joint_springs
+from femgear.gears.kinematics import willis_weights
 from femgear.system.assembly import point_approach, solved_conditions
 from femgear.system.mesh_directions import mesh_directions, pin_directions
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
@@ -165,8 +166,10 @@ def rigid_rotation(train: Drivetrain, place: Coordinates) -> np.ndarray:
         c, s = turn[stage.carrier], turn[stage.sun]
         sun, planet, ring = stage.base_radii
         for p in planets[:, 2]:
-            condition((s, sun), (p, planet), (c, -(sun + planet)))
-            condition((c, ring - planet), (p, planet))
+            condition(*zip((s, p, c), willis_weights(sun, planet), strict=True))
+            # the ring stands still
+            on_planet, _, on_carrier = willis_weights(planet, -ring)
+            condition((p, on_planet), (c, on_carrier))
     rotations = sorted({*turn.values(), *(int(p) for planet_dofs in place.planets for p in planet_dofs[:, 2])})
     rotations += [first + 4 for _, *inner, _ in place.stations for first in inner]
     table = np.array(rows).reshape(-1, place.count)[:, rotations]

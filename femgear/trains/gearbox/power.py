@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from femgear.errors import CaseError, FemgearError
+from femgear.gears.kinematics import willis_weights
 from femgear.gears.power_flow import pair_condition, planetary_condition, power_flow
 from femgear.gears.shaft_graph import ShaftGraph, SpeedCondition
 from femgear.gears.stage_frequencies import StageFrequencies, stage_frequencies
@@ -50,11 +51,11 @@ class BoxFlow:
         torques = self.stage_torque[stage.name]
         if isinstance(stage, PairSection):
             return torques[stage.shafts[0]]
-        sun, _, ring = set_sizes(stage).teeth
+        teeth_sun, _, teeth_ring = set_sizes(stage).teeth
         if stage.sun != CASING:
             return torques[stage.sun]
-        # the torques of the members are as z_s, z_r and -(z_s + z_r) (Willis)
-        return -torques[stage.carrier] * sun / (sun + ring)
+        sun, _, carrier = willis_weights(teeth_sun, teeth_ring)
+        return torques[stage.carrier] * sun / carrier
 
     @property
     def mesh_frequency(self) -> dict[str, float]:
