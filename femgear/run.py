@@ -233,8 +233,8 @@ def run_case(
     are done, before anything is drawn. Returns the contents of the files, by stage, those that were written
     part by part only where they were drawn or told.
     """
-    asked, stages = _asked(case, only)
-    run, results = _resumed(folder, asked, stages)
+    requested, stages = _asked(case, only)
+    run, results = _resumed(folder, requested, stages)
     if results:
         tell(remark(f"{', '.join(results)}: as the run that was interrupted left them"), stacklevel=3)
     write_text(case.source, folder / "case.toml")
@@ -244,8 +244,8 @@ def run_case(
     try:
         for stage in stages:
             if stage.name not in run.timings:
-                _compute(run, asked, stage, stages, results, progress)
-                run.keep(asked, least=_WORTH_KEEPING)
+                _compute(run, requested, stage, stages, results, progress)
+                run.keep(requested, least=_WORTH_KEEPING)
         if pictures or computed is not None:
             files = (stage.name for stage in stages if stage.name not in run.data)
             run.data |= {name: read_dataset(folder / f"{name}.nc") for name in files}
@@ -255,7 +255,7 @@ def run_case(
             _draw(run, case, {name: result for name, result in results.items() if result is not None}, progress)
     except BaseException:
         with suppress(StorageError):  # what ended the run is what is said
-            run.keep(asked)
+            run.keep(requested)
         raise
     run.files = _without_kept(run.files)
     run.record(complete=True)

@@ -302,7 +302,7 @@ def _from_json(text: str, name: str) -> dict:
     except (ValueError, RecursionError, KeyError, TypeError) as error:
         raise _broken(f"no REXS model in JSON: {type(error).__name__}: {error}", name) from error
     cases = [case for part in _dicts(model, "load_spectrum") for case in _dicts(part, "load_cases")]
-    for component in (one for part in (model, *cases) for one in _dicts(part, "components")):
+    for component in (entry for part in (model, *cases) for entry in _dicts(part, "components")):
         for attribute in _dicts(component, "attributes"):
             values = (attribute[key] for key in attribute if key not in ("id", "unit"))
             attribute["value"] = next((value for value in values if isinstance(value, str | int | float)), None)

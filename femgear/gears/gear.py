@@ -235,15 +235,15 @@ def largest_allowance(gear: Gear) -> float:
     return gear.thickness_allowance + 2.0 * gear.reference_radius * float(half_thickness_angle(gear, gear.tip_radius))
 
 
-def working_half_angles(one: Gear, two: Gear, angle: float) -> tuple[float, float]:
+def working_half_angles(gear_1: Gear, gear_2: Gear, angle: float) -> tuple[float, float]:
     """Compute the half-thickness angles [rad] of two gears on their working pitch circles.
 
     The circles have the radii ``r_b / cos(angle)``, with the working pressure angle [rad].
     """
     cosine = math.cos(angle)
     return (
-        float(half_thickness_angle(one, one.base_radius / cosine)),
-        float(half_thickness_angle(two, two.base_radius / cosine)),
+        float(half_thickness_angle(gear_1, gear_1.base_radius / cosine)),
+        float(half_thickness_angle(gear_2, gear_2.base_radius / cosine)),
     )
 
 

@@ -362,21 +362,21 @@ def close_pair(
     return GearPair(gear_1, gear_2, centre_distance)
 
 
-def _tooth_sum(one: Gear, two: Gear) -> int:
+def _tooth_sum(gear_1: Gear, gear_2: Gear) -> int:
     """Sum of the teeth of an external pair, difference of an internal one (gear 2)."""
-    if two.internal and two.teeth <= one.teeth:
+    if gear_2.internal and gear_2.teeth <= gear_1.teeth:
         raise GeometryError(
-            f"{one.teeth} teeth do not turn in an internal gear of {two.teeth}",
+            f"{gear_1.teeth} teeth do not turn in an internal gear of {gear_2.teeth}",
             code="E-RANGE",
-            key=f"{two.name}.teeth",
-            value=two.teeth,
-            limit=f"more than {one.teeth} teeth",
+            key=f"{gear_2.name}.teeth",
+            value=gear_2.teeth,
+            limit=f"more than {gear_1.teeth} teeth",
             remedy="give the internal gear more teeth than its pinion",
         )
-    return two.teeth - one.teeth if two.internal else one.teeth + two.teeth
+    return gear_2.teeth - gear_1.teeth if gear_2.internal else gear_1.teeth + gear_2.teeth
 
 
-def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> float:
+def working_pressure_angle(gear_1: Gear, gear_2: Gear, centre_distance: float) -> float:
     """Compute the working pressure angle [rad] of two gears at a centre distance [m].
 
     ``cos(aw) = a0 cos(alpha) / a``
@@ -386,11 +386,11 @@ def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> floa
     GeometryError
         E-CENTRE-DISTANCE: the base circles would overlap (``cos(aw) > 1``).
     """
-    base = 0.5 * one.module * _tooth_sum(one, two) * math.cos(one.pressure_angle)
+    base = 0.5 * gear_1.module * _tooth_sum(gear_1, gear_2) * math.cos(gear_1.pressure_angle)
     if not centre_distance >= base:
         raise GeometryError(
-            f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {one.teeth} and "
-            f"{two.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
+            f"at a centre distance of {centre_distance * 1e3:.6g} mm the base circles of {gear_1.teeth} and "
+            f"{gear_2.teeth} teeth leave no line of action (cos(alpha_w) > 1 below {base * 1e3:.6g} mm)",
             code="E-CENTRE-DISTANCE",
             key="set.centre_distance",
             value=centre_distance,
@@ -400,7 +400,7 @@ def working_pressure_angle(one: Gear, two: Gear, centre_distance: float) -> floa
     return pressure_angle_at(centre_distance, base)
 
 
-def zero_backlash_distance(one: Gear, two: Gear) -> float:
+def zero_backlash_distance(gear_1: Gear, gear_2: Gear) -> float:
     """Compute the centre distance [m] at which two gears run without play, allowances left aside.
 
     External: ``inv(aw) = inv(a) + 2 tan(a) (x1 + x2)/(z1 + z2)`` (ISO 21771, eq. 60); internal (gear 2):
@@ -411,29 +411,29 @@ def zero_backlash_distance(one: Gear, two: Gear) -> float:
     GeometryError
         E-GEOMETRY: ``inv(aw)`` would be negative.
     """
-    alpha, total = one.pressure_angle, _tooth_sum(one, two)
-    x_1, x_2 = one.profile_shift, two.profile_shift
-    shift = x_2 - x_1 if two.internal else x_1 + x_2
+    alpha, total = gear_1.pressure_angle, _tooth_sum(gear_1, gear_2)
+    x_1, x_2 = gear_1.profile_shift, gear_2.profile_shift
+    shift = x_2 - x_1 if gear_2.internal else x_1 + x_2
     try:
         angle = arcinv(inv(alpha) + 2.0 * math.tan(alpha) * shift / total)
     except GeometryError as error:
         raise GeometryError(
-            f"no centre distance suits profile shifts {x_1:.4f} ({one.name}) and {x_2:.4f} "
-            f"({two.name}): {error.message}",
+            f"no centre distance suits profile shifts {x_1:.4f} ({gear_1.name}) and {x_2:.4f} "
+            f"({gear_2.name}): {error.message}",
             code=error.code,
-            key=f"{two.name}.profile_shift",
+            key=f"{gear_2.name}.profile_shift",
             value=x_2,
             limit=error.limit,
             remedy=error.remedy,
         ) from None
-    return 0.5 * one.module * total * math.cos(alpha) / math.cos(angle)
+    return 0.5 * gear_1.module * total * math.cos(alpha) / math.cos(angle)
 
 
-def zero_backlash_shift(one: Gear, two: Gear, centre_distance: float) -> float:
+def zero_backlash_shift(gear_1: Gear, gear_2: Gear, centre_distance: float) -> float:
     """Compute the sum or difference of profile shifts [modules] without play at a centre distance [m].
 
     The sum of external gears, ``x2 - x1`` where gear 2 is internal: inverse of `zero_backlash_distance`
     (ISO 21771, eq. 60).
     """
-    alpha, working = one.pressure_angle, working_pressure_angle(one, two, centre_distance)
-    return _tooth_sum(one, two) * (inv(working) - inv(alpha)) / (2.0 * math.tan(alpha))
+    alpha, working = gear_1.pressure_angle, working_pressure_angle(gear_1, gear_2, centre_distance)
+    return _tooth_sum(gear_1, gear_2) * (inv(working) - inv(alpha)) / (2.0 * math.tan(alpha))

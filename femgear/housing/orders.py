@@ -208,7 +208,7 @@ def classify_line(
         shared = "factor zero: by sun and ring, which unequally spaced planets share"
         return LineVerdict(nearest, factor, NORMAL, "" if factor > _ZERO else shared)
     turns = [turn for turn in _turns(order, teeth, g, tolerance) if not (whole and turn[1])]
-    turned = min(turns, key=lambda one: one[0] + one[1])[2] if turns else ""
+    turned = min(turns, key=lambda turn: turn[0] + turn[1])[2] if turns else ""
     if whole:
         words = f"no multiple of {g}" + (f"; {turned}" if turned else "")
         return LineVerdict(nearest, factor, UNEQUAL, words)

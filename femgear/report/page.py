@@ -95,7 +95,7 @@ def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progre
     others = [write for stage in stages for write in stage.write]
     steps = len(stages) + len(others)
 
-    def told() -> None:
+    def count_picture() -> None:
         if os.getpid() == here:
             progress("pictures", next(done), steps)
 
@@ -103,9 +103,9 @@ def write_pictures(folder: Path, train: Train, drawn: Drawn, *, progress: Progre
         progress("pictures", 0, steps)
         for write in others:
             names.extend(write(drawn, folder))
-            told()
+            count_picture()
 
-    figures = write_figures(folder, train, drawn, write_others, told)
+    figures = write_figures(folder, train, drawn, write_others, count_picture)
     progress("pictures", steps, steps)
     return figures + names
 

@@ -108,9 +108,9 @@ def mode_shapes(
     outer radius.
     """
     first = frequency_groups(modes["frequency"].values)
-    elastic = [one for one in first if modes["frequency"].values[one[0]] > 0.0]
+    elastic = [pair for pair in first if modes["frequency"].values[pair[0]] > 0.0]
     groups = [(int(mode),) for mode in shown] if shown is not None else elastic[:12]
-    shown = [one[0] for one in groups]
+    shown = [alike[0] for alike in groups]
     columns = max(min(4, len(shown)), 1)
     rows = max(-(-len(shown) // columns), 1)
     figure, axes = new_figure(rows=rows, columns=columns, width=2.0 * columns, height=2.45 * rows + 0.4)
@@ -212,8 +212,8 @@ def campbell(speed, frequency, *, orders, order_names, critical, speed_unit: str
     of speed]; ``critical`` are intersections to mark, pairs of speed and frequency [Hz].
     """
     figure, (ax,) = new_figure(height=5.4)
-    for one in np.transpose(frequency):
-        ax.plot(speed, one, linewidth=1.6, color=BLUE, label="mode")
+    for branch in np.transpose(frequency):
+        ax.plot(speed, branch, linewidth=1.6, color=BLUE, label="mode")
     for i, (order, text) in enumerate(zip(orders, order_names)):
         dash = (0, (6, 2) + (1, 2) * i)
         ax.plot(speed, order * speed, color=GREY, linewidth=1.2, linestyle=dash, label=text)
@@ -238,14 +238,14 @@ def transmission_error_period(
     axes a speed where all meshes are drawn ``together``.
     """
     first = np.flatnonzero(dynamics["harmonic"].values > 0)
-    known = None if static is None else (static["position"].values, static["ste"].values)
+    static_curves = None if static is None else (static["position"].values, static["ste"].values)
 
     def words(dynamic: np.ndarray, quasi: np.ndarray) -> str:
         beside = f", static {np.ptp(quasi, axis=-1).max():.3g}" if quasi.size else ""
         return f"peak to peak {np.ptp(dynamic, axis=-1).max():.3g}{beside} µm"
 
     text = "transmission error\nless its mean [µm]"
-    return _over_period(dynamics.isel(harmonic=first), "dte", 1e6, known, text, words, together=together)
+    return _over_period(dynamics.isel(harmonic=first), "dte", 1e6, static_curves, text, words, together=together)
 
 
 def mesh_force_period(dynamics: xr.Dataset, static: tuple[np.ndarray, np.ndarray] | None = None) -> Figure:
@@ -273,11 +273,11 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
     position = periods * np.linspace(0.0, 1.0, count + 1)
     values = unit * _closed(stored_harmonics(dynamics.isel(speed=speeds), name), h, periods, count)
     cuts = [_excited_harmonics(dynamics, s) for s in speeds] if static is not None else []
-    known = [unit * _cut_series(static, h, cut, periods, count) for cut in cuts]
+    given_curves = [unit * _cut_series(static, h, cut, periods, count) for cut in cuts]
     # what is one line at one speed need not be one at another: the lines are those of all speeds; equal
     # planets that mesh one after the other have equal spectra
     names = [str(name) for name in dynamics["mesh"].values]
-    lines, kinds = _told_apart(names, np.hstack([*values, *known])), list(dict.fromkeys(map(family, names)))
+    lines, kinds = _told_apart(names, np.hstack([*values, *given_curves])), list(dict.fromkeys(map(family, names)))
     size = np.abs(stored_harmonics(dynamics.isel(speed=speeds), name))
     same = _told_apart(names, np.hstack([*size]))
     shifted = len(lines) > len(kinds) == len(same) and not together
@@ -285,17 +285,17 @@ def _over_period(dynamics, name: str, unit: float, static, y: str, words, *, tog
     alike = len(lines) == len(kinds) and not together
     figure, axes = _panels(len(speeds) * len(kinds), above=1.2 if together else 0.8)
     for ax, (s, kind) in zip(axes, product(range(len(speeds)), kinds)):
-        own = [(i, *line) for i, line in enumerate(lines) if kind in ("", family(line[0]))]
-        rows = [row for *_, row in own]
-        for i, text, row in own:
+        drawn = [(i, *line) for i, line in enumerate(lines) if kind in ("", family(line[0]))]
+        rows = [row for *_, row in drawn]
+        for i, text, row in drawn:
             style, text = ({"color": BLUE}, _DYNAMIC) if alike else (line_style(i), text)
             ax.plot(position, values[s][row], label=text, linewidth=2.0 if periods == 1 else 1.0, **style)
             if static is not None:
                 style, text = ({"color": BLACK}, _STATIC) if alike else (style, "_")
-                ax.plot(position, known[s][row], linewidth=0.9, label=text, **style)
+                ax.plot(position, given_curves[s][row], linewidth=0.9, label=text, **style)
         kind = f"{names[rows[0]]}, others shifted" if shifted and kind else kind
         title = [rpm(dynamics["speed"].values[speeds[s]]), *[kind] * bool(kind)]
-        quasi = known[s][rows] if static is not None else np.empty(0)
+        quasi = given_curves[s][rows] if static is not None else np.empty(0)
         label(ax, title=f"{', '.join(title)}\n{words(values[s][rows], quasi)}")
         ax.set_xlim(0.0, periods)
     for ax in axes[-2:]:
@@ -333,12 +333,12 @@ def transmission_error_spectrum(dynamics: xr.Dataset) -> Figure:
     figure, axes = _panels(len(speeds) * len(kinds), height=2.9, sharex="row")
     for ax, (s, kind) in zip(axes, product(range(len(speeds)), kinds)):
         step = 1e-3 * float(dynamics["mesh_frequency"].values[speeds[s]]) or 1.0
-        own = [(i, *line) for i, line in enumerate(lines) if family(line[0]) == kind]
-        for i, text, row in own[:1] if crowded else own:
-            row = [line[-1] for line in own] if crowded else [row]
+        drawn = [(i, *line) for i, line in enumerate(lines) if family(line[0]) == kind]
+        for i, text, row in drawn[:1] if crowded else drawn:
+            row = [line[-1] for line in drawn] if crowded else [row]
             value = amplitude[s, row].max(axis=0)
             shown = value > floor
-            if len(own) == 1 or crowded:
+            if len(drawn) == 1 or crowded:
                 stems(ax, step * h, value, floor, text="_", width=2.0 if shown.sum() <= _MOST_BARS else 0.8)
             else:
                 style = {"color": COLOURS[i % len(COLOURS)], "markersize": 4.0, "label": text}
@@ -417,7 +417,7 @@ def some_at_a_time(dynamics: xr.Dataset) -> Iterator[xr.Dataset]:
 
 def fluctuation_rms(dynamics: xr.Dataset) -> np.ndarray:
     """Compute the RMS of the transmission errors less their means (speeds, meshes) [m]."""
-    return np.concatenate([fluctuation(stored_harmonics(one, "dte")) for one in some_at_a_time(dynamics)])
+    return np.concatenate([fluctuation(stored_harmonics(block, "dte")) for block in some_at_a_time(dynamics)])
 
 
 def stored_harmonics(dynamics: xr.Dataset, name: str) -> np.ndarray:

@@ -135,8 +135,8 @@ def _name_modes(ax, crossings: xr.Dataset, speed: np.ndarray) -> None:
 def _operating(ax, runup: xr.Dataset) -> None:
     """Mark the operating speeds, if they are few, by dotted lines."""
     operating = np.atleast_1d(runup.attrs["operating_speeds"])
-    for one in operating[: _NAMED if len(operating) <= _NAMED else 0]:
-        ax.axvline(one, color=ORANGE, linewidth=1.6, linestyle=":", label="operating speed")
+    for speed_named in operating[: _NAMED if len(operating) <= _NAMED else 0]:
+        ax.axvline(speed_named, color=ORANGE, linewidth=1.6, linestyle=":", label="operating speed")
 
 
 def waterfall(runup: xr.Dataset) -> Figure:
@@ -167,10 +167,10 @@ def waterfall(runup: xr.Dataset) -> Figure:
     floor = float(runup.attrs["reference_acceleration"]) ** 2
     with np.errstate(divide="ignore"):
         levels = [10.0 * np.log10(image[nearest] / floor) for image in images]
-    highest = max(float(one.max()) for one in levels)
-    for ax, one, (_, end, _, text) in zip(axes, levels, views):
+    highest = max(float(panel_level.max()) for panel_level in levels)
+    for ax, panel_level, (_, end, _, text) in zip(axes, levels, views):
         shown = ax.imshow(
-            np.maximum(one, highest - _DYNAMIC),
+            np.maximum(panel_level, highest - _DYNAMIC),
             origin="lower",
             aspect="auto",
             cmap="cividis",

@@ -26,7 +26,7 @@ def all_faults() -> Iterator[_Part]:
         except CaseError as error:
             if option and error.key in (None, "objective", "speeds"):
                 error.key = option if error.key != "speeds" else "--speeds"
-            problems.extend(one for one in error.problems if isinstance(one, CaseError))
+            problems.extend(problem for problem in error.problems if isinstance(problem, CaseError))
 
     yield part
     distinct = {str(problem): problem for problem in problems}

@@ -90,7 +90,7 @@ def springs_of(train: Drivetrain, place: Coordinates) -> list[Springs]:
     infinite ones are conditions.
     """
     springs, turns = [], np.array([False, False, True, True, True])
-    stations = {shaft.between: own for shaft, own in zip(train.shafts, place.stations)}
+    stations = {shaft.between: places_there for shaft, places_there in zip(train.shafts, place.stations)}
     for shaft in train.shafts:
         length = shaft.length / max(shaft.elements, 1)
         s = joint_springs(shaft.section, length) if shaft.elements else shaft.springs

@@ -358,7 +358,7 @@ def normal_record(
     softer = record.force / record.stiffness * (1.0 / scale - 1.0)
     values = [record.stiffness * scale / along**2, (record.deflection + softer) * along, record.force / along]
     if reversed_time:
-        values = [np.roll(one[:, ::-1], 1, axis=1) for one in values]
+        values = [np.roll(lines[:, ::-1], 1, axis=1) for lines in values]
     return MeshExcitation(*values, backlash=record.backlash * along, periods=record.periods)
 
 
