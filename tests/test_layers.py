@@ -50,9 +50,14 @@ def place(path: Path) -> str:
 
 
 @cache
+def tree(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
 def nodes(path: Path, *, typed: bool) -> tuple[ast.Import | ast.ImportFrom, ...]:
     """Import statements of a file, wherever they stand; `typed` adds those that only type checkers see."""
-    pending, found = [ast.parse(path.read_text(encoding="utf-8"))], []
+    pending, found = [tree(path)], []
     while pending:
         node = pending.pop()
         if isinstance(node, ast.Import | ast.ImportFrom):
@@ -220,7 +225,7 @@ def test_no_function_is_longer_than_70_lines():
     functions = ast.FunctionDef, ast.AsyncFunctionDef
     long = {}
     for path in MODULES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(path)):
             if isinstance(node, functions):
                 described = ast.get_docstring(node) is not None
                 first = node.body[0].end_lineno if described else node.lineno
@@ -236,12 +241,12 @@ FOREIGN = {
 """Modules that read messages of others, for want of anything else."""
 
 
-def read_texts(tree: ast.Module) -> list[ast.expr]:
+def read_texts(module: ast.Module) -> list[ast.expr]:
     """Expressions in which words are looked for, or which are cut or changed."""
     reading = {"startswith", "endswith", "removesuffix", "removeprefix", "replace", "partition", "rpartition"}
     reading |= {"split", "rsplit", "find", "index", "count"}
     texts = []
-    for node in ast.walk(tree):
+    for node in ast.walk(module):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in reading:
             if node.func.attr == "split" and not node.args:  # puts a text on one line
                 continue
@@ -268,11 +273,11 @@ def test_no_module_reads_prose():
     """Refusals and findings are data: no condition hangs on words of a message, a remedy or a limit."""
     wrong = defaultdict(list)
     for path in MODULES:
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        loops = (node for node in ast.walk(tree) if isinstance(node, ast.For | ast.comprehension))
+        module = tree(path)
+        loops = (node for node in ast.walk(module) if isinstance(node, ast.For | ast.comprehension))
         of_remedies = (loop.target for loop in loops if ast.unparse(loop.iter).endswith("remedies"))
         remedies = {target.id for target in of_remedies if isinstance(target, ast.Name)}
-        for text in read_texts(tree):
+        for text in read_texts(module):
             if is_prose(text, remedies):
                 wrong[place(path)].append(f"{text.lineno}: {ast.unparse(text)}")
     assert {name: texts for name, texts in wrong.items() if name not in FOREIGN} == {}
@@ -283,7 +288,7 @@ def test_a_public_name_is_defined_once():
     """Functions and classes, methods and private names aside: no two modules call two things alike."""
     places = defaultdict(set)
     for path in sorted(PACKAGE.rglob("*.py")):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        for node in tree(path).body:
             if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
                 places[node.name].add(path)
     assert {name: sorted(map(place, paths)) for name, paths in places.items() if len(paths) > 1} == {}
@@ -308,7 +313,7 @@ def test_local_variables_say_what_they_hold():
         if place(path).startswith(STILL_SO):
             continue
         functions = (ast.FunctionDef, ast.Lambda)
-        bodies = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, functions)]
+        bodies = [node for node in ast.walk(tree(path)) if isinstance(node, functions)]
         for node in {node for body in bodies for node in ast.walk(body)}:
             held = isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
             name = node.id if held else getattr(node, "arg", None) if isinstance(node, ast.arg) else None
