@@ -430,9 +430,10 @@ class Formats:
         All numbers as results.mat for MATLAB.
     wav
         Accelerometer and microphone at every speed, in m/s^2 and Pa over the full scale; of pairs
-        transmission error and bearing forces, in m/s^2 and N.
+        transmission error and bearing forces, in m/s^2 and N; of gearboxes accelerations at their sensors.
     uff
-        Universal files: the same signals and their lines (dataset 58), modes of the ring (15, 55).
+        Universal files: the same signals and their lines (dataset 58), modes of the ring, or of a gearbox
+        (15, 55).
     quality
         Loudness, tone-to-noise ratio and prominence of the sound, as table.
     """

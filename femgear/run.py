@@ -425,7 +425,7 @@ def export_results(
             "the run has nothing that these formats hold",
             code="E-STAGE",
             value=", ".join(f"--{form}" for form in without),
-            limit=possible or "runs with an elastic ring, and --wav of pairs",
+            limit=possible or "runs with an elastic ring, --wav of pairs and gearboxes",
             remedy="export tables, or run such a case without --only",
         )
     _need_libraries(formats)
@@ -452,7 +452,7 @@ def export_results(
         write_modes(recorded.shapes(results), folder / "modes.uff")
         files += ["signals.uff", "modes.uff"]
     if recorded is not None and not {"wav", "quality"}.isdisjoint(formats):
-        steps = recorded.each * (results[needs["wav"][0]].sizes["speed"] + ("runup" in results.stages))
+        steps = recorded.each(results) * (results[needs["wav"][0]].sizes["speed"] + ("runup" in results.stages))
         signals = _told(recorded.signals(results, how), progress, steps)
         files += _export_sound(signals, folder, formats, how)
     return files

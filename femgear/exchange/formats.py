@@ -129,12 +129,14 @@ class Shapes:
     """Modes of a structure at ``points`` (P, 3) [m].
 
     ``frequency`` (M,) [Hz], ``damping_ratio`` (M,) [1] and mass-normalised ``shape`` (M, P, 3) [kg^-1/2].
+    ``words`` tell what the points are, or in which frame they move.
     """
 
     points: np.ndarray
     frequency: np.ndarray
     damping_ratio: np.ndarray
     shape: np.ndarray
+    words: str = "in the frame of the carrier"
 
 
 def line_extent(parts: Iterable[tuple], rate: float) -> dict[str, tuple[float, float, float]]:
@@ -210,10 +212,11 @@ def write_functions(signals: Iterable[Signal], spectra: Iterable[Spectrum], path
             write(58, rsp_node=number, **data, **kind, **unit, **scalar)
 
 
-def write_modes(shapes: Shapes, path: Path, *, words: str = "in the frame of the carrier") -> None:
+def write_modes(shapes: Shapes, path: Path) -> None:
     """Write modes as universal file: datasets 164 (SI units), 15 (nodes) and one 55 (normal mode) for each.
 
-    Shapes are normalised to the modal mass 1 kg; the format holds six digits. The words are ID line 1.
+    Shapes are normalised to the modal mass 1 kg; the format holds six digits. The words of the shapes are
+    ID line 1.
     """
     nodes = np.arange(1, len(shapes.points) + 1)
     # structural model, normal mode, displacement vectors, real
@@ -225,7 +228,7 @@ def write_modes(shapes: Shapes, path: Path, *, words: str = "in the frame of the
         for number, (frequency, damping, shape) in enumerate(modes, 1):
             motion = dict(zip(("r1", "r2", "r3"), shape.T))
             always = {"mode_n": number, "freq": frequency, "modal_m": 1.0, "modal_damp_vis": damping}
-            write(55, id1=words, **always, **motion, **fixed)
+            write(55, id1=shapes.words, **always, **motion, **fixed)
 
 
 @contextmanager

@@ -392,11 +392,11 @@ def sampled_signal(order, values, speed: float, *, samples: int, rate: float = R
     Parameters
     ----------
     order : (n_orders,) array
-        Carrier orders, whole and not negative.
+        Over the turns of what turns, the carrier or a shaft; not negative.
     values : (n_orders,) complex array
         Amplitudes in the unit of the signal.
     speed : float
-        Of the carrier [rad/s], positive.
+        Of what turns [rad/s], positive.
     samples : int
         Number of samples.
     rate : float
@@ -409,24 +409,24 @@ def sampled_signal(order, values, speed: float, *, samples: int, rate: float = R
     """
     order, values, nodes = _checked_lines(order, np.asarray(values)[None], np.atleast_1d(speed), rate)
     turns = np.arange(samples) * (nodes[0] / (2 * np.pi * rate))
-    return _between(_turn(order, _heard(order, values, nodes, rate)), turns)[0]
+    return _values_after(order, _heard(order, values, nodes, rate), turns)[0]
 
 
 def run_up_signal(order, values, speeds, *, duration: float, start=None, stop=None, rate: float = RATE) -> np.ndarray:
-    """Sample the signal of a carrier whose speed rises or falls linearly with time, (n_samples,).
+    """Sample the signal of a carrier or shaft whose speed rises or falls linearly with time, (n_samples,).
 
-    The angle of the carrier is the integral of its speed, start t + (stop - start) t^2/(2 duration), exactly,
+    Its angle is the integral of its speed, start t + (stop - start) t^2/(2 duration), exactly,
     so that the phase of no line jumps. Complex lines, those of steady motion, are interpolated linearly
     between speeds; lines that reach half the rate before the next speed fade out before the one they have.
 
     Parameters
     ----------
     order : (n_orders,) array
-        Carrier orders, whole and not negative.
+        Over the turns of what turns, not negative.
     values : (n_speeds, n_orders) complex array
         Amplitudes in the unit of the signal.
     speeds : (n_speeds,) array
-        Of the carrier [rad/s], positive, ascending.
+        Of what turns [rad/s], positive, ascending.
     duration, rate : float
         Of the signal [s], and samples a second [Hz].
     start, stop : float, optional
@@ -455,7 +455,7 @@ def run_up_signal(order, values, speeds, *, duration: float, start=None, stop=No
     # between them the speed passes none of those of the lines
     for first, last in pairwise(np.flatnonzero(np.diff(place, prepend=-1, append=-1)).tolist()):
         low, samples = int(place[first]), slice(first, last)
-        below, above = _between(_turn(order, heard[low : low + 2]), turns[samples])
+        below, above = _values_after(order, heard[low : low + 2], turns[samples])
         share = (speed[samples] - nodes[low]) / (nodes[low + 1] - nodes[low])
         pressure[samples] = below + share * (above - below)
     return pressure
@@ -464,14 +464,13 @@ def run_up_signal(order, values, speeds, *, duration: float, start=None, stop=No
 def _checked_lines(order, values, speeds, rate: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Check orders (n_orders,), lines (n_speeds, n_orders) and speeds (n_speeds,) [rad/s] of a signal."""
     order, values, speeds = np.asarray(order), np.asarray(values, complex), np.asarray(speeds, float)
-    whole = np.rint(order).astype(int)
     fits = order.ndim == speeds.ndim == 1 and values.shape == (speeds.size, order.size) and values.size > 0
-    if not fits or not np.isfinite(values).all() or (whole != order).any() or (whole < 0).any():
+    if not fits or not np.isfinite(values).all() or not (np.isfinite(order) & (order >= 0)).all():
         raise CaseError(
             f"lines of shape {values.shape} at {order.size} orders and {speeds.size} speeds make no signal",
             code="E-SHAPE",
             remedy="give the lines of one sensor",
-            limit="finite lines of shape (speeds, orders); orders that are whole and not negative",
+            limit="finite lines of shape (speeds, orders); orders that are not negative",
         )
     rising = speeds[0] > 0 and (np.diff(speeds) > 0).all() and speeds[-1] < np.inf
     if not (rising and 0 < rate < np.inf):
@@ -481,12 +480,44 @@ def _checked_lines(order, values, speeds, rate: float) -> tuple[np.ndarray, np.n
             remedy="sort the speeds, take them positive",
             limit="ascending speeds above zero, a rate above zero",
         )
-    return whole, values, speeds
+    return order, values, speeds
 
 
 def _heard(order: np.ndarray, values: np.ndarray, speeds: np.ndarray, rate: float) -> np.ndarray:
     """Lines (n_speeds, n_orders) without those that reach half the rate up to the next speed."""
     return np.where(np.outer(np.append(speeds[1:], speeds[-1]), order) < np.pi * rate, values, 0.0)
+
+
+def _values_after(order: np.ndarray, values: np.ndarray, turns: np.ndarray) -> np.ndarray:
+    """Values (n, n_places) of Re sum_k values[k] exp(2 pi i order[k] x) after numbers of turns (n_places,)."""
+    whole = np.rint(order).astype(int)
+    if (whole == order).all():
+        return _between(_turn(whole, values), turns)
+    used = values.any(axis=0)
+    order, values, sampled = order[used], values[:, used], np.zeros((len(values), len(turns)))
+    for begin in range(0, len(turns), _BLOCK):
+        samples = slice(begin, begin + _BLOCK)
+        start, size = float(turns[samples].min()), 2.0 * _OVERSAMPLING * float(max(order.max(initial=0.0), _WIDTH))
+        count = int((float(turns[samples].max()) - start) * size) + 2 * _WIDTH + 2
+        grid = _uniform(order, values / _kernel_transform(order, size), start - _WIDTH / size, 1.0 / size, count)
+        sampled[:, samples] = _interpolated(grid, (turns[samples] - start) * size + _WIDTH)
+    return sampled
+
+
+def _uniform(order: np.ndarray, values: np.ndarray, start: float, step: float, count: int) -> np.ndarray:
+    """Values (n, count) of Re sum_k values[k] exp(2 pi i order[k] x) at equal steps of x, as product of matrices."""
+    width = int(np.ceil(np.sqrt(count)))
+    first = np.exp(2j * np.pi * (np.outer(start + width * step * np.arange(-(-count // width)), order) % 1.0))
+    beside = np.exp(2j * np.pi * np.outer(order, step * np.arange(width)))
+    parts = np.concatenate([beside.real, -beside.imag])
+    rows = (np.concatenate([(first * line).real, (first * line).imag], axis=1) @ parts for line in values)
+    return np.array([row.ravel()[:count] for row in rows])
+
+
+def _kernel_transform(order: np.ndarray, size: float) -> np.ndarray:
+    """Transform of the kernel of `_interpolated` at some orders, on a grid of so many points a turn."""
+    root = np.sqrt(_BETA**2 - (np.pi * _WIDTH * order / size) ** 2)
+    return np.sinh(root) / root * _WIDTH
 
 
 def _turn(order: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -502,25 +533,30 @@ def _turn(order: np.ndarray, values: np.ndarray) -> np.ndarray:
     order, values = order[used], values[:, used]
     top = int(order.max(initial=_WIDTH))
     size = cast("int", next_fast_len(_OVERSAMPLING * (2 * top + 2), real=True))
-    root = np.sqrt(_BETA**2 - (np.pi * _WIDTH * order / size) ** 2)
     spectrum = np.zeros((len(values), size // 2 + 1), complex)
-    np.add.at(spectrum.T, order, (values * (size / 2 * root / np.sinh(root) / _WIDTH)).T)
+    np.add.at(spectrum.T, order, (values * (0.5 * size / _kernel_transform(order, size))).T)
     spectrum[:, 0] *= 2
     return np.fft.irfft(spectrum, size, axis=-1)
 
 
 def _between(grid: np.ndarray, turns: np.ndarray) -> np.ndarray:
     """Values (n, n_places) between the samples (n, M) of `_turn` after any number of turns (n_places,)."""
+    periodic = np.pad(grid, ((0, 0), (_WIDTH, _WIDTH)), mode="wrap")
+    return _interpolated(periodic, (turns % 1.0) * grid.shape[-1] + _WIDTH)
+
+
+def _interpolated(grid: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Values (n, n_places) between samples (n, M) at places (n_places,) from 0 to M - 1, `_WIDTH` from both ends."""
     from scipy.special import i0
 
-    periodic, interpolated = np.pad(grid, ((0, 0), (_WIDTH, _WIDTH)), mode="wrap"), np.zeros((len(grid), len(turns)))
-    for begin in range(0, len(turns), _BLOCK):
+    interpolated = np.zeros((len(grid), len(places)))
+    for begin in range(0, len(places), _BLOCK):
         samples = slice(begin, begin + _BLOCK)
-        place = (turns[samples] % 1.0) * grid.shape[-1]
+        place = places[samples]
         first = np.ceil(place - _WIDTH / 2).astype(int)
         for m in range(_WIDTH):
             kernel = i0(_BETA * np.sqrt(np.maximum(1 - (2 / _WIDTH * (place - first - m)) ** 2, 0.0)))
-            interpolated[:, samples] += kernel * periodic[:, first + (_WIDTH + m)]
+            interpolated[:, samples] += kernel * grid[:, first + m]
     return interpolated
 
 

@@ -275,7 +275,7 @@ class Recorded:
     every speed, and modes at points (None where there are none).
 
     ``needs`` are the stages that each format takes, of "wav", "uff" and "quality" those that there are, the
-    first one that of the signals, of which every speed and the run-up have ``each``. ``cuts`` takes
+    first one that of the signals, of which every speed and the run-up have ``each(results)``. ``cuts`` takes
     results and a form of `femgear.housing.sound.LEVELS`, and gives header and rows of a table;
     ``extent`` takes results and a rate [Hz], and gives by unit the largest sum of the amplitudes of a speed,
     and the largest level that lines at half the rate and above have, with that of all lines, r.m.s.
@@ -284,7 +284,7 @@ class Recorded:
     signals: Callable[[Results, Sampling], Iterator[Signal]]
     extent: Callable[[Results, float], Mapping[str, tuple[float, float, float]]]
     needs: Mapping[str, tuple[str, ...]]
-    each: int
+    each: Callable[[Results], int]
     spectra: Callable[[Results], Iterator[Spectrum]] = lambda results: iter(())
     shapes: Callable[[Results], Shapes] | None = None
     cuts: Callable[[Results, str], tuple[Sequence[str], Iterable[Sequence[float]]]] | None = None

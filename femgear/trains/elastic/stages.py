@@ -813,5 +813,7 @@ ELASTIC = Train(
     warnings=_warnings,
     verdict=verdict,
     figures=FiguresOf("femgear.trains.elastic.figures:FIGURES"),
-    recorded=Recorded(sensor_signals, signal_extent, _FORMATS, 2, sensor_spectra, ring_shapes, order_cuts),
+    recorded=Recorded(
+        sensor_signals, signal_extent, _FORMATS, lambda results: 2, sensor_spectra, ring_shapes, order_cuts
+    ),
 )

@@ -35,6 +35,7 @@ from femgear.trains.gearbox.results import (
     gearbox_warnings,
 )
 from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors
+from femgear.trains.gearbox.signals import GEARBOX_RECORDED
 
 
 @one_blas_thread()
@@ -203,5 +204,6 @@ GEARBOX = Train(
     describe=describe_gearbox,
     warnings=gearbox_warnings,
     figures=FiguresOf("femgear.trains.gearbox.figures:FIGURES"),
+    recorded=GEARBOX_RECORDED,
     verdict=gearbox_verdict,
 )
