@@ -118,7 +118,7 @@ def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitati
         rows, stiffness = [*rows, *pins], np.append(stiffness, springs)
         points = np.vstack([points, np.eye(6)[used]])
         mass, gyroscopic, turning = _planet(found.model, stage)
-    shape = np.array([_waves(row, stage, motion, planetary=planetary) for row in rows])
+    shape = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rows])
     return (
         RunningStage(
             2.0 * math.pi * modes.frequency,
@@ -241,18 +241,26 @@ def _pin_rows(
     return rows, bearing[used], flexibility
 
 
-def _waves(row: Row, stage: StageModel, motion: np.ndarray, *, planetary: bool) -> np.ndarray:
-    """Approach (W, m) of a contact point by the modes, as the planet runs around: waves -1, 0, 1; of a pair 0."""
-    angle = stage.angles[0] if planetary else 0.0
-    shape = np.zeros((3 if planetary else 1, motion.shape[1]), complex)
+def _waves(row: Row, stage: StageModel, motion: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Approach (W, m) of a contact point by the modes, as the planet runs around: waves -1, 0, 1; of a pair 0.
+
+    ``places`` (n, 3) are those of the stations [m]. A station beside the axis of the stage, such as the centre of a
+    casing, counts with the motions of the point on the axis: only these turn with the planet.
+    """
+    shape = np.zeros((3 if stage.planets else 1, motion.shape[1]), complex)
+    if not stage.planets:
+        for station, effect in row:
+            shape[0] += effect @ motion[6 * station : 6 * station + 6]
+        return shape
+    angle = stage.angles[0]
+    axis = places[stage.planets[0]] - stage.sizes.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
     for station, effect in row:
-        moved = motion[6 * station : 6 * station + 6]
-        if not planetary:
-            shape[0] += effect @ moved
-            continue
-        shape[1] += effect[[2, 5]] @ moved[[2, 5]]
+        beside = np.append((axis - places[station])[:2], 0.0)
+        moved = rigid_link(beside) @ motion[6 * station : 6 * station + 6]
+        there = effect @ rigid_link(-beside)
+        shape[1] += there[[2, 5]] @ moved[[2, 5]]
         for first in (0, 3):
-            x, y = effect[first : first + 2]
+            x, y = there[first : first + 2]
             # a turn of the row by phi - angle
             forward = 0.5 * ((x + 1j * y) * moved[first] + (y - 1j * x) * moved[first + 1])
             shape[2] += np.exp(-1j * angle) * forward

@@ -9,8 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from casings import casing_tables
 from random_gearboxes import random_gearbox
-from small_gearbox import pair_tables, set_on_shafts
+from small_gearbox import pair_tables, planetary_tables, set_on_shafts
 
 from femgear.case.dependencies import Steps
 from femgear.housing.two_way.running_planets import solve_running
@@ -92,6 +93,11 @@ def test_pins_and_carriers_that_give_way_are_in_it():
     stage["pins"] = {"diameter": "12 mm", "length": "14 mm", "cheeks": 2}
     stage["carrier_body"] = {"wind_up_stiffness": "2e5 N m/rad"}
     found = solve_deflection(read_case(tables))
+    assert apart(found, found.model.stages[0]) < 1e-8
+
+
+def test_a_casing_whose_centre_lies_beside_the_axis_carries_the_ring():
+    found = solve_deflection(read_case(planetary_tables() | {"casing": casing_tables()}))
     assert apart(found, found.model.stages[0]) < 1e-8
 
 
