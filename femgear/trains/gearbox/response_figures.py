@@ -18,6 +18,7 @@ SENSORS_DRAWN = 6
 LINES_NAMED = 5
 """Lines of a spectrum that are named by their origin."""
 _DECADES = 4.0  # below the largest value that are drawn
+_WIDE = 60  # lines of a stage that are drawn wide, at most
 _ROOM = 0.34  # share of the height of a spectrum for the names
 _STAGE_COLOURS = tuple(colour for colour in COLOURS if colour != BLACK)
 
@@ -116,8 +117,11 @@ def draw_sensor_spectra(dynamics: xr.Dataset) -> Figure:
         ax.minorticks_off()
         for number, stage in enumerate(data["stage"].values):
             lines = data["origin"].values == stage
-            colour = _STAGE_COLOURS[number % len(_STAGE_COLOURS)]
-            stems(ax, frequency[lines], size[lines], floor, text=str(stage), colour=colour, width=1.8)
+            count = int(np.count_nonzero(size[lines] > floor))
+            look = {"colour": _STAGE_COLOURS[number % len(_STAGE_COLOURS)], "width": 1.8 if count <= _WIDE else 0.8}
+            stems(ax, frequency[lines], size[lines], floor, text=str(stage), **look)
+            # in front of stages of more lines
+            ax.lines[-1].set_zorder(2.0 + 1.0 / (1.0 + count))
         ax.set_xlim(0.0, 1.02 * float(frequency.max(initial=1.0)))
         _name_lines(ax, data, frequency, size, (floor, top))
         label(ax, y="amplitude [m/s²]", title=f"sensor {data['sensor'].values[sensor]}, {rpm(float(data['speed']))}")
@@ -132,7 +136,7 @@ def short_origin(data: xr.Dataset, line: int) -> str:
     """Write where a line comes from, in short: stage, mesh harmonic, turns of the carrier beside it."""
     band = int(data["side_band"].values[line])
     beside = f" {band:+d}".replace("-", "−") if band else ""
-    return f"{data['origin'].values[line]} {int(data['harmonic'].values[line])}{beside}"
+    return f"{data['origin'].values[line]}, {int(data['harmonic'].values[line])}{beside}"
 
 
 def _name_lines(ax, data: xr.Dataset, frequency: np.ndarray, size: np.ndarray, ends: tuple[float, float]) -> None:
@@ -162,7 +166,7 @@ RESPONSE_FIGURES = {
     "dynamics": Figures(
         {
             "sensor_spectra": "Acceleration at the sensors, line by line, coloured by the stage that makes it. The "
-            "largest lines have the mesh harmonic and, behind its sign, the turns of the carrier beside it: 2 +1 is "
+            "largest lines have the mesh harmonic and, with their sign, the turns of the carrier beside it: 2 +1 is "
             "the second harmonic and one turn more.",
         },
         lambda drawn: (

@@ -33,10 +33,15 @@ _KINDS = ("sun", "ring")
 
 @dataclass(frozen=True, eq=False)
 class GearboxResponseResult(StageResult):
-    """Response of a gearbox at some speeds, ``found``; ``whole`` keeps the lines of bearings and feet too."""
+    """Response of a gearbox at some speeds.
+
+    ``found`` is the response; ``whole`` keeps the lines of bearings too; ``unresolved`` counts the resonances of a
+    run-up whose peaks its speeds miss.
+    """
 
     found: GearboxResponse
     whole: bool
+    unresolved: int = 0
 
     @property
     def residual(self) -> float:
@@ -117,6 +122,7 @@ class GearboxResponseResult(StageResult):
             "up_to": found.up_to,
             "reference": found.reference,
             "missing": ", ".join(found.missing),
+            "unresolved_resonances": self.unresolved,
         }
         used = {dim for entry in variables.values() for dim in entry[0].split()}
         return Contents(variables, {name: entry for name, entry in coords.items() if name in used}, attrs)
@@ -234,6 +240,9 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
                 f"dynamic force at {speeds[speed]:.5g} rpm, and is left out"
             )
             yield Finding("W-CROSS", "", text, limit=f"{_CROSS:.0%}")
+    if missed := int(data.attrs.get("unresolved_resonances", 0)):
+        text = f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels there may be higher"
+        yield Finding("W-STEPS", "runup.count", text, remedy="take more speeds, or a narrower range")
     if data.attrs["missing"]:
         text = f"without teeth {data.attrs['missing']} excite nothing"
         yield Finding("W-EXCITATION", "", text, remedy="give the teeth of these stages")

@@ -34,6 +34,7 @@ from femgear.trains.gearbox.results import (
     gearbox_verdict,
     gearbox_warnings,
 )
+from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_speeds
 from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors
 from femgear.trains.gearbox.signals import GEARBOX_RECORDED
 
@@ -79,13 +80,17 @@ def solve_box_dynamics(
 def solve_box_runup(
     case: GearboxCase, deflection: DeflectionResult, *, progress: Progress = silent, steps: Steps | None = None
 ) -> GearboxResponseResult:
-    """Follow the response to all stages over the speed of the reference shaft, at the torques of the load case."""
+    """Follow the response to all stages over the speed of the reference shaft, at the torques of the load case.
+
+    Resonances whose peaks are narrower than the steps get speeds of their own.
+    """
     state = deflection.state
     nominal = abs(state.model.flow.speed[reference_shaft(state.model)])
     start, stop = case.runup.start or 0.25 * nominal, case.runup.to or 1.25 * nominal
-    speeds = np.linspace(start, stop, case.runup.count)
+    equal_steps = np.linspace(start, stop, case.runup.count)
+    speeds, missed = run_up_speeds(equal_steps, gearbox_resonances(state, start, stop, steps=steps))
     found = solve_gearbox_response(state, speeds, steps=steps, progress=progress, stage="runup")
-    return GearboxResponseResult(found, whole=False)
+    return GearboxResponseResult(found, whole=False, unresolved=missed)
 
 
 def _silent(case: GearboxCase) -> str:

@@ -146,9 +146,15 @@ def test_the_largest_lines_are_named_and_no_name_lies_on_another_or_on_a_leader(
         assert not any(path.intersects_bbox(box) for path in paths for box in boxes)
 
 
+def test_few_lines_stand_in_front_of_many():
+    data = response_data(speeds=1)
+    lines = {line.get_label(): line for line in draw_sensor_spectra(data).axes[0].lines}
+    assert lines["first"].get_zorder() > lines["second"].get_zorder()
+
+
 def test_lines_are_named_by_stage_harmonic_and_turns_of_the_carrier():
     data = response_data()
-    assert [short_origin(data, i) for i in (0, 5, 6, 7)] == ["first 1", "second 2 −1", "second 2 +1", "second 0 +3"]
+    assert [short_origin(data, i) for i in (0, 5, 6, 7)] == ["first, 1", "second, 2 −1", "second, 2 +1", "second, 0 +3"]
 
 
 def test_the_pictures_of_both_stages_are_among_those_of_a_gearbox():

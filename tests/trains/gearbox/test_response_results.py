@@ -104,6 +104,15 @@ def test_stages_that_change_one_another_are_told(data):
     assert "20%" in finding.text
 
 
+def test_peaks_between_the_speeds_of_a_run_up_are_told(data):
+    data["level_change"].values[:] = 0.0
+    assert data.attrs["unresolved_resonances"] == 0
+    data.attrs["unresolved_resonances"] = 3
+    (finding,) = gearbox_response_warnings(data)
+    assert (finding.code, finding.key) == ("W-STEPS", "runup.count")
+    assert "3 resonances" in finding.text
+
+
 def test_stages_without_teeth_are_told(data):
     data["level_change"].values[:] = 0.0
     data.attrs["missing"] = "second stage"

@@ -1,0 +1,124 @@
+"""Speeds of the run-up of a gearbox: steps, and resonances whose peaks are narrower than these.
+
+At low speed the meshes of a stage act on the modes of the whole gearbox about its loaded state with the part of their
+force that the mean stiffness leaves (`femgear.solvers.linear.resonances`). A mode is met where one of the mesh
+harmonics that excite it has its frequency. Planets stand where they are in the loaded state: lines beside a mesh
+harmonic, by turns of the carrier, meet modes at speeds that differ by one part in the teeth of the ring at most.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from femgear.case.dependencies import Steps
+from femgear.solvers.linear.modal import undamped_modes
+from femgear.solvers.linear.resonances import crossings, modal_forces, refined_speeds, unresolved
+from femgear.system.system import Modes
+from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.model import StageModel
+from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.response import reference_shaft
+from femgear.trains.gearbox.sensors import sensor_rows
+from femgear.trains.gearbox.stage_structure import stage_excitation
+
+_MOST = 1000
+"""Mesh harmonics at most."""
+_MATTERS = 0.05
+"""Expected level of a resonance over that of the loudest from which on it gets speeds of its own."""
+
+
+@dataclass(frozen=True)
+class GearboxResonances:
+    """Meetings of a mode of a gearbox with a mesh harmonic, (c,) arrays.
+
+    Parameters
+    ----------
+    speed : array
+        Of the reference shaft [rad/s].
+    heard : array
+        What is heard far above the mode, r.m.s. over all sensors [m/s^2]: `femgear.solvers.linear.resonances`.
+        Without sensors that of the approach of the flanks.
+    damping : array
+        Damping ratio of the mode [1].
+    """
+
+    speed: np.ndarray
+    heard: np.ndarray
+    damping: np.ndarray
+
+    @property
+    def expected(self) -> np.ndarray:
+        """Level that is expected in resonance, but for a factor that is the same of all."""
+        return self.heard / np.where(self.damping > 0.0, self.damping, np.inf)
+
+
+def gearbox_resonances(
+    found: Deflection, slowest: float, fastest: float, *, steps: Steps | None = None
+) -> GearboxResonances:
+    """Find the resonances of a gearbox between two speeds of its reference shaft.
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state.
+    slowest, fastest : float
+        Ends of the run-up [rad/s].
+    steps : Steps, optional
+        What other computations have left: excitations of the stages.
+    """
+    model, case = found.model, found.model.case
+    assembly, system, stiffness = linear_system(found)
+    still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
+    modes = undamped_modes(still, stiffness, damping_ratio=case.modes.damping_ratio)
+    at_sensors = (sensor_rows(model) @ assembly.motions @ modes.shape).T
+    up_to, nominal = case.dynamics.up_to, abs(model.flow.speed[reference_shaft(model)])
+    parts = [np.zeros((3, 0))]
+    for stage in model.stages:
+        if stage.name not in found.contacts:
+            continue
+        excitation = stage_excitation(found.contacts[stage.name], steps=steps)
+        mesh_turns = model.flow.mesh_frequency[stage.name] / nominal
+        if not mesh_turns > 0.0:
+            continue
+        own_modes = _with_meshes(modes, found, stage, stiffness, excitation.stiffness.mean(axis=1))
+        most = min(_MOST, excitation.stiffness.shape[1] // (2 * excitation.periods) - 1)
+        count = int(np.clip(up_to / (mesh_turns * slowest), 1, most))
+        output = at_sensors if at_sensors.shape[1] else own_modes.mesh_deflection.T
+        forces = modal_forces(own_modes, excitation, count, output=output)
+        met = crossings(forces, mesh_turns * slowest, mesh_turns * fastest, up_to)
+        heard = forces.heard[met.row, met.harmonic - 1]
+        parts.append(np.array([met.mesh_frequency / mesh_turns, heard, forces.damping_ratio[met.row]]))
+    return GearboxResonances(*np.concatenate(parts, axis=1))
+
+
+def _with_meshes(modes: Modes, found: Deflection, stage: StageModel, stiffness: np.ndarray, mean: np.ndarray) -> Modes:
+    """Modes with the meshes of one stage alone: mean stiffness (M,) [N/m], approach that of all slices by theirs."""
+    approach = np.zeros((len(stage.meshes), len(modes.frequency)))
+    for row, mesh in zip(approach, stage.meshes, strict=True):
+        part = found.model.assembly.slices[mesh]
+        row[:] = stiffness[part] @ modes.mesh_deflection[part] / max(stiffness[part].sum(), math.ulp(0.0))
+    return replace(modes, mesh_stiffness=mean, mesh_deflection=approach)
+
+
+def run_up_speeds(steps_of_speed: np.ndarray, resonances: GearboxResonances) -> tuple[np.ndarray, int]:
+    """Add speeds at narrow resonances to those of a run-up; with the number of peaks that still are missed.
+
+    Those of a twentieth of the highest expected level count, see `femgear.solvers.linear.resonances`.
+
+    Parameters
+    ----------
+    steps_of_speed : (v,) array
+        Speeds at equal steps [rad/s], ascending.
+    resonances : GearboxResonances
+        Between them.
+    """
+    if len(steps_of_speed) < 2:
+        return steps_of_speed, 0
+    expected = resonances.expected
+    matters = expected > _MATTERS * expected.max(initial=0.0)
+    places = resonances.speed[matters], resonances.heard[matters], resonances.damping[matters]
+    speeds = refined_speeds(steps_of_speed, *places)
+    return speeds, unresolved(speeds, *places) if matters.any() else 0
