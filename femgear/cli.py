@@ -18,6 +18,10 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import takewhile
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from femgear.case.text import ReadCase
 
 _INTERRUPTED = 130
 _RARELY = 50_000
@@ -295,7 +299,7 @@ def check(
     return 0
 
 
-def _refused_stages(case: Any) -> str:
+def _refused_stages(case: ReadCase) -> str:
     """Say which stages of a run without ``--only`` cannot represent a case, and which can."""
     from femgear.trains.registry import check_case, stages_of, train_of
 

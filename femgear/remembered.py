@@ -37,7 +37,7 @@ def remembered(latest: int) -> Callable[[Callable[..., Answer]], Callable[..., A
             return function(*(thing.object for thing in things))
 
         @wraps(function)
-        def asked(*things: Any) -> Answer:
+        def asked(*things: object) -> Answer:
             return answer(*map(_Itself, things))
 
         return asked

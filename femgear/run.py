@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.case.planetary import Case
+    from femgear.case.text import ReadCase
 
 
 def grid_cache() -> Path:
@@ -98,7 +99,7 @@ class Solution(dict[str, Any]):
         raise KeyError(f"{name!r} was not computed: there are {', '.join(self) or 'no stages'}")
 
 
-def solve(case: Any, only: str | None = None, *, progress: Progress = silent) -> Solution:
+def solve(case: ReadCase, only: str | None = None, *, progress: Progress = silent) -> Solution:
     """Compute the stages of a case in memory: transmission error, modes, vibration, whatever its train has.
 
     Parameters
@@ -131,7 +132,7 @@ def solve(case: Any, only: str | None = None, *, progress: Progress = silent) ->
     return results
 
 
-def live(case: Any, *, progress: Progress = silent) -> Live:
+def live(case: ReadCase, *, progress: Progress = silent) -> Live:
     """Make a handle of a case that answers again after changes, and keeps what they leave as it was.
 
     ``handle = live("case.toml")``, and then ``handle.change({"operation.torque": "90 N m"}).housing``: see
@@ -140,7 +141,7 @@ def live(case: Any, *, progress: Progress = silent) -> Live:
     return Live(case, cache=grid_cache(), progress=progress)
 
 
-def _asked(case: Any, only: str | None) -> tuple[Any, tuple[Stage, ...]]:
+def _asked(case: ReadCase, only: str | None) -> tuple[Any, tuple[Stage, ...]]:
     """The case as it is computed up to its last stage, and the stages; refuses what they cannot represent."""
     check_case(case, only)
     stages = stages_of(case, only)
@@ -195,7 +196,7 @@ class _Run:
     findings: dict[str, tuple[Finding, ...]] = field(default_factory=dict)
     pending: dict[str, Any] = field(default_factory=dict)
 
-    def keep(self, case: Any, *, least: float = 0.0) -> None:
+    def keep(self, case: ReadCase, *, least: float = 0.0) -> None:
         """Write the pending results of a case, those of ``least`` seconds or more."""
         if not self.pending or sum(self.timings[name] for name in self.pending) < least:
             return
@@ -269,7 +270,7 @@ def _results_so_far(run: _Run, *names: str) -> Results:
     return Results(run.folder, shown, read_case).with_known(run.data)
 
 
-def _draw(run: _Run, case: Case, results: dict[str, Any], progress: Progress) -> None:
+def _draw(run: _Run, case: Case, results: dict[str, object], progress: Progress) -> None:
     """Write the page with its charts, then the pictures, and the page with these."""
     from femgear.report.page import page, write_pictures
 
@@ -347,7 +348,7 @@ def _kept_name(stage: str) -> str:
     return f"{KEPT}/{stage}.npz"
 
 
-def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, dict[str, Any]]:
+def _resumed(folder: Path, case: ReadCase, stages: Sequence[Stage]) -> tuple[_Run, dict[str, Any]]:
     """What an interrupted run of the same case left: its record, and the results of its first stages."""
     results = dict[str, Any]()
     manifest = read_manifest(folder) if (folder / MANIFEST).is_file() else Manifest(complete=False)
@@ -372,7 +373,7 @@ def _resumed(folder: Path, case: Any, stages: Sequence[Stage]) -> tuple[_Run, di
     return run, results
 
 
-def _fingerprint(case: Any) -> str:
+def _fingerprint(case: ReadCase) -> str:
     """SHA-256 of all that the results depend on: the case, femgear as it stands here, the libraries."""
     return fingerprint({"case": case.model_dump(), "source": _source_checksum(), **versions()})
 

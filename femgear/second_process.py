@@ -11,15 +11,18 @@ import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from femgear.errors import FemgearError
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 _BYTES = 4
 """Of the number of a task in the queue, which a pipe holds as a whole."""
 
 
-def shared(tasks: Sequence[Callable[[], Any]], beside: Callable[[], object] | None = None) -> list[Any]:
+def shared(tasks: Sequence[Callable[[], object]], beside: Callable[[], object] | None = None) -> list[Any]:
     """Values of up to 10,000 tasks; a second process begins with the last one, this one after ``beside()``.
 
     Values, errors and warnings of the other process come here through pickle. A task alone is done here.
@@ -77,7 +80,7 @@ def second_core() -> bool:
     return alone and sys.platform == "linux" and len(os.sched_getaffinity(0)) > 1
 
 
-def _send(work: Callable[[], Any], connection: Any, parent: int) -> None:
+def _send(work: Callable[[], object], connection: Connection, parent: int) -> None:
     """Send the value of some work, or its error, and warnings; end with the parent, whose locks it has."""
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     if os.getppid() != parent:
@@ -92,7 +95,7 @@ def _send(work: Callable[[], Any], connection: Any, parent: int) -> None:
     )
 
 
-def _received(connection: Any) -> dict:
+def _received(connection: Connection) -> dict:
     """Receive what `_send` sends: value or error, and warnings."""
     try:
         value, said = connection.recv()

@@ -239,7 +239,7 @@ def embed_points(
     return points_of_files
 
 
-def embedded(file: str, name: str, key: str, read: Callable[[str], Any]) -> Any:
+def embedded(file: str, name: str, key: str, read: Callable[[str], object]) -> Any:
     """Read a file that the entry ``key`` names, beside the case file or below, no link leading out of there.
 
     CaseError: a path that leads out of the folder (E-FILE), and what ``read`` raises, with the key.

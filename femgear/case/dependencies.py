@@ -19,6 +19,7 @@ from femgear.remembered import remembered
 
 if TYPE_CHECKING:
     from femgear.case.planetary import Case
+    from femgear.case.text import ReadCase
 
 Entries = Mapping[str, object]
 """Values by dotted key."""
@@ -100,7 +101,7 @@ def runup_entries(case: Case) -> Entries:
     return _entries(case, (_DYNAMIC - {"housing", "runup"}) | {"housing.published"})
 
 
-def every_entry(case: Any) -> Entries:
+def every_entry(case: ReadCase) -> Entries:
     """List all entries, of which a stage that names none may take any."""
     return {key: value for key, value, *_ in _entries_of(case)}
 
@@ -127,7 +128,7 @@ def _entries(case: Case, left_out: Set[str], parts: Set[str] = frozenset(), *, k
 
 
 @remembered(latest=16)
-def _entries_of(case: Any) -> list[tuple[str, object, list[str], list[str]]]:
+def _entries_of(case: ReadCase) -> list[tuple[str, object, list[str], list[str]]]:
     """Dotted keys and values, with the keys of the tables around each and its own, and its parts."""
     entries = []
     for key, value in _flat(case.model_dump()):
@@ -189,7 +190,7 @@ class Steps:
         return result
 
 
-def _size(result: Any) -> float:
+def _size(result: object) -> float:
     """Memory of the arrays of a result [bytes], roughly."""
     if is_dataclass(result):
         return sum(_size(value) for value in vars(result).values())

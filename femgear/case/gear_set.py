@@ -232,7 +232,7 @@ def support_text(case: Any, member: str, section: Any = None) -> str:
     return "its shaft" if getattr(section, "support_shaft", ()) else f"{section.support_stiffness:.6g}"
 
 
-def materials_of(case: Any) -> tuple[Material, ...]:
+def materials_of(case: GearCase) -> tuple[Material, ...]:
     """Take the materials of the gears of a case in the order of its set: elasticity and density."""
     return tuple(material_of(case, name) for name in case.gear_names)
 

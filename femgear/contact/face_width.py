@@ -59,7 +59,7 @@ def contact_over_width(
     candidates: Candidates,
     state: BatchState,
     load,
-    plane: dict[str, Any],
+    plane: dict[str, object],
     members: MovingMembers,
     deviations: SetDeviations | None,
 ) -> dict[str, Any]:

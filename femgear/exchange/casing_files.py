@@ -609,7 +609,7 @@ def dmig_matrices(path: Path) -> tuple[list[np.ndarray], dict, dict]:
     return matrices, row, place
 
 
-def _pair(matrices: Mapping[str, Any]) -> list[Any]:
+def _pair(matrices: Mapping[str, object]) -> list[Any]:
     """Stiffness and mass among matrices by name: the one that begins with K and the one with M."""
     names = [_stiffness_or_mass(matrices, letter) for letter in "KM"]
     _check(
@@ -623,7 +623,7 @@ def _pair(matrices: Mapping[str, Any]) -> list[Any]:
     return [matrices[name] for (name,) in names]
 
 
-def _stiffness_or_mass(matrices: Mapping[str, Any], letter: str) -> list[str]:
+def _stiffness_or_mass(matrices: Mapping[str, object], letter: str) -> list[str]:
     """Names of matrices that may be the stiffness (K) or the mass (M)."""
     # Nastran's names of reduced matrices go before others of the letter, such as the structural damping K4AAX
     for usual in (f"{letter}AAX", f"{letter}AA"):
@@ -777,7 +777,7 @@ def _without_binary(content: bytes) -> bytes:
     return content
 
 
-def _analysis_data(sets: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+def _analysis_data(sets: Sequence[Mapping[str, object]]) -> list[dict[str, Any]]:
     """Normal modes of datasets 2414 at nodes, in the entries of datasets 55.
 
     Real specific data are time, frequency, eigenvalue, modal mass, viscous and hysteretic damping ratio

@@ -292,13 +292,13 @@ def written_modifications(
     return written, left_out
 
 
-def _words(modification: Any) -> str:
+def _words(modification: object) -> str:
     power = getattr(modification, "power", None)
     name = "".join(f" {c.lower()}" if c.isupper() else c for c in type(modification).__name__).strip()
     return name if power is None else f"{name} of the power {power:g}"
 
 
-def _parts(modification: Any, gear: Gear) -> Iterator[tuple[str, dict[str, float]]]:
+def _parts(modification: object, gear: Gear) -> Iterator[tuple[str, dict[str, float]]]:
     """Types and lengths [m] of a modification; none where REXS has no such form."""
 
     def diameter(roll: float | None, default: float) -> float:

@@ -239,7 +239,7 @@ def _universal_file(path: Path) -> Iterator[Any]:
     with replaced_file(path) as temporary:
         file = pyuff.UFF(str(temporary))
 
-        def write(kind: int, **values: Any) -> None:
+        def write(kind: int, **values: object) -> None:
             try:
                 file.write_sets(getattr(pyuff, f"prepare_{kind}")(**values), mode="add")
             except Exception as error:  # the library hides what happened: a full disk, an interrupt

@@ -52,7 +52,7 @@ _EDGE, _SHORTEST = 1e-9, 1e-5
 
 def gearbox_tables(
     model: Model,
-    stages: Mapping[str, dict[str, Any]],
+    stages: Mapping[str, dict[str, object]],
     load_case: int | None = None,
     *,
     refused: Mapping[str, str] | None = None,
@@ -549,7 +549,7 @@ class _Unit:
                 )
         return reader.stand_in(part, usual, why, turned=turned)
 
-    def _oil(self, part: Component, table: Mapping[str, Any], inner: Component, outer: Component | None, key: str):
+    def _oil(self, part: Component, table: Mapping[str, object], inner: Component, outer: Component | None, key: str):
         """Lubrication of a rolling bearing; nothing, and told, where its numbers cannot be read."""
         if "kind" not in table:
             return {}

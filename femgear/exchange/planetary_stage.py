@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from femgear.case.estimates import USUAL_STIFFNESS, estimates, usual_rim, usual_torque
 from femgear.case.gear_set import planetary_set, support_stiffness
@@ -40,6 +40,9 @@ from femgear.exchange.rexs import Component, Model, Relation
 from femgear.findings import NOTE
 from femgear.gears.iso6336 import STEEL
 from femgear.gears.kinematics import MEMBERS, torque_ratios
+
+if TYPE_CHECKING:
+    from femgear.case.teeth import GearCase
 
 _GEARS = ("sun", "planet", "ring")
 _RACK = {"addendum": 1.0, "dedendum": 1.25, "root_radius": 0.25}
@@ -483,7 +486,7 @@ def _diameter(model: Model, shaft: Component, place: float) -> float | None:
     return None
 
 
-def _supports(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
+def _supports(s: _Stage, tables: dict[str, object], remarks: dict[str, str]) -> None:
     """Radial stiffness of the bearings of a planet on its pin, of sun and carrier in the casing.
 
     A rigid bearing becomes a spring of `RIGID` mesh stiffnesses: members of a case have springs.
@@ -807,7 +810,7 @@ def stage_model(case: Case, name: str) -> Model:
 
 def add_planets(
     w: ModelWriter,
-    case: Any,
+    case: GearCase,
     model: Model,
     stage: str,
     central: tuple[str, str],

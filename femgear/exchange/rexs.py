@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
-from typing import Any, NoReturn
+from typing import NoReturn
 from xml.etree import ElementTree
 
 from femgear.case.quantities import Dimension, to_si
@@ -310,7 +310,7 @@ def _from_json(text: str, name: str) -> dict:
     return model if isinstance(model, dict) else {}
 
 
-def _table(pairs: list[tuple[str, Any]], name: str) -> dict:
+def _table(pairs: list[tuple[str, object]], name: str) -> dict:
     """Table of JSON, no key of which is given twice."""
     if len(table := dict(pairs)) < len(pairs):
         _need_once([key for key, _ in pairs], f"{table['id']}, " if "id" in table else "", name)
@@ -367,7 +367,7 @@ def _xml_component(element: ElementTree.Element) -> dict:
     return {**element.attrib, "attributes": attributes}
 
 
-def _dicts(table: Any, key: str) -> list[dict]:
+def _dicts(table: object, key: str) -> list[dict]:
     """Tables in a list of a table, empty where there is none."""
     entries = table.get(key) if isinstance(table, dict) else None
     return [entry for entry in entries if isinstance(entry, dict)] if isinstance(entries, list) else []

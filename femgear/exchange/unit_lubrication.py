@@ -45,7 +45,9 @@ class Lubrication:
     temperatures: tuple[float | None, ...]
     speeds: tuple[Mapping[str, float], ...]
 
-    def entries(self, part: Component, table: Mapping[str, Any], pitch: float, shafts: Sequence[str]) -> dict[str, Any]:
+    def entries(
+        self, part: Component, table: Mapping[str, object], pitch: float, shafts: Sequence[str]
+    ) -> dict[str, Any]:
         """Entries of a rolling bearing: viscosity ratio and contamination, where the file has what they need.
 
         ``pitch`` is its pitch diameter [m], ``shafts`` are the ids of the shafts of its rings, one of the casing.

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, ClassVar, Self, TypeVar
+from typing import ClassVar, Self, TypeVar
 
 import numpy as np
 
@@ -176,7 +176,7 @@ class GearSet:
         place = {(mesh.kind, mesh.copy): number for number, mesh in enumerate(self.meshes)}
         return np.array([place[mesh.kind, int(planets[mesh.copy])] for mesh in self.meshes])
 
-    def of_kinds(self, values: Sequence[Any] | np.ndarray) -> np.ndarray:
+    def of_kinds(self, values: Sequence[object] | np.ndarray) -> np.ndarray:
         """Give every mesh (M, ...) the value of its kind (kinds, ...)."""
         return np.asarray(values)[self.mesh_kind]
 

@@ -13,6 +13,7 @@ import numpy as np
 from femgear.report.style import thinned
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _DIGITS = 6
@@ -159,12 +160,12 @@ def _axis(axis, limits) -> dict[str, Any]:
     return described
 
 
-def _lines(ax: Any) -> list[dict[str, Any]]:
+def _lines(ax: Axes) -> list[dict[str, Any]]:
     """Read curves, markers and lines across the panel."""
     return [_curve(line, ax) for line in ax.get_lines() if line.get_visible()]
 
 
-def _curve(line, ax: Any) -> dict[str, Any]:
+def _curve(line, ax: Axes) -> dict[str, Any]:
     """Read one curve."""
     from matplotlib.colors import to_hex
 
@@ -194,14 +195,14 @@ def _curve(line, ax: Any) -> dict[str, Any]:
     return {**trace, **_coordinates(x, y, ax), **_name(line)}
 
 
-def _across(transform, ax: Any) -> str:
+def _across(transform, ax: Axes) -> str:
     """Tell whether x or y of an artist is a share of the panel's side."""
     if transform == ax.get_yaxis_transform():
         return "x"
     return "y" if transform == ax.get_xaxis_transform() else ""
 
 
-def _spread(x, y, across: str, ax: Any) -> dict[str, Any]:
+def _spread(x, y, across: str, ax: Axes) -> dict[str, Any]:
     """Spread shares of the side of a panel over its limits."""
     low, high = ax.get_xlim() if across == "x" else ax.get_ylim()
     if (ax.get_xscale() if across == "x" else ax.get_yscale()) == "log":
@@ -233,7 +234,7 @@ def _coordinates(x, y, ax: Any) -> dict[str, Any]:
     return {"x": _numbers(x, ax.get_xscale()), "y": _numbers(y, ax.get_yscale())}
 
 
-def _areas(ax: Any) -> list[dict[str, Any]]:
+def _areas(ax: Axes) -> list[dict[str, Any]]:
     """Read filled areas, bundles of lines, and fields."""
     from matplotlib.collections import LineCollection, PathCollection, PolyCollection, QuadMesh
 
@@ -252,7 +253,7 @@ def _areas(ax: Any) -> list[dict[str, Any]]:
     return traces
 
 
-def _points(collection, ax: Any) -> dict[str, Any]:
+def _points(collection, ax: Axes) -> dict[str, Any]:
     """Read scattered points, each of its size, which is that of an area [pt^2]."""
     x, y = np.asarray(collection.get_offsets(), float).T
     if collection.get_array() is not None or len(collection.get_facecolors()) > 1:
@@ -267,7 +268,7 @@ def _points(collection, ax: Any) -> dict[str, Any]:
     return {"mode": "markers", "marker": marker, **_coordinates(x, y, ax), **_name(collection)}
 
 
-def _bundle(segments, collection, ax: Any) -> dict[str, Any]:
+def _bundle(segments, collection, ax: Axes) -> dict[str, Any]:
     """Read many straight lines as one curve with gaps."""
     gap = np.full((1, 2), np.nan)
     joined = np.concatenate([np.concatenate([segment, gap]) for segment in segments] or [gap])
@@ -275,7 +276,7 @@ def _bundle(segments, collection, ax: Any) -> dict[str, Any]:
     return {"mode": "lines", "line": line, **_coordinates(joined[:, 0], joined[:, 1], ax), **_name(collection)}
 
 
-def _area(corners, collection, ax: Any) -> dict[str, Any]:
+def _area(corners, collection, ax: Axes) -> dict[str, Any]:
     """Read one filled area."""
     if len(collection.get_facecolors()) > 1:
         raise _PictureOnly
@@ -310,7 +311,7 @@ def _field(mesh) -> dict[str, Any]:
     }
 
 
-def _patches(ax: Any) -> list[dict[str, Any]]:
+def _patches(ax: Axes) -> list[dict[str, Any]]:
     """Read bars, bands across the panel, stairs and polygons."""
     from matplotlib.patches import Polygon, Rectangle, StepPatch
 
@@ -344,13 +345,13 @@ def _patches(ax: Any) -> list[dict[str, Any]]:
     return traces
 
 
-def _bar_name(patch, ax: Any) -> dict[str, Any]:
+def _bar_name(patch, ax: Axes) -> dict[str, Any]:
     """Name a bar as its group is named."""
     group = next((bars for bars in ax.containers if patch in list(bars)), patch)
     return _name(group)
 
 
-def _words(ax: Any) -> list[dict[str, Any]]:
+def _words(ax: Axes) -> list[dict[str, Any]]:
     """Read texts within the panel."""
     texts_drawn = []
     text: Any

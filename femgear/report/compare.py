@@ -71,7 +71,7 @@ def _value(case: Any, key: str) -> Any:
     return case
 
 
-def _alike(x: Any, y: Any) -> bool:
+def _alike(x: object, y: object) -> bool:
     """Whether two values agree but for the rounding of their units."""
     if isinstance(x, float) and isinstance(y, float):
         return math.isclose(x, y, rel_tol=1e-12)
@@ -80,7 +80,7 @@ def _alike(x: Any, y: Any) -> bool:
     return x == y
 
 
-def _flat(entries: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+def _flat(entries: object, path: str = "") -> Iterator[tuple[str, Any]]:
     """Entries of a case file with their whole names."""
     if isinstance(entries, dict):
         for key, value in entries.items():

@@ -191,7 +191,7 @@ def _counted(warnings: Sequence[Finding]) -> str:
     return f"{len(warnings)}{' (' + ', '.join(severe) + ')' if severe else ''}"
 
 
-def _scripts(data: dict[str, Any]) -> str:
+def _scripts(data: dict[str, object]) -> str:
     """Data and scripts of a page that can be read off and turned."""
     text = json.dumps(data, allow_nan=False, separators=(",", ":"), sort_keys=True)
     packed = base64.b64encode(zlib.compress(text.encode(), 9)).decode("ascii")

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from threadpoolctl import ThreadpoolController
 
+    from femgear.case.text import ReadCase
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
     from femgear.findings import Finding
     from femgear.storage.results import Results
@@ -99,7 +100,7 @@ class StageResult:
         return once(self.warnings(self.contents()))
 
     @staticmethod
-    def warnings(data: Any) -> Iterable[Finding]:
+    def warnings(data: object) -> Iterable[Finding]:
         """List what the contents of the stage's file, or a dataset of them, say against themselves."""
         return ()
 
@@ -239,7 +240,7 @@ class Stage:
     decided_by: Callable[[Any], Entries] = every_entry
     concerned_by: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
 
-    def before(self, case: Any) -> tuple[str, ...]:
+    def before(self, case: ReadCase) -> tuple[str, ...]:
         """List the stages that must come before this one."""
         return self.takes if self.needs is None else self.needs(case)
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -86,6 +86,9 @@ from femgear.stages.static_results import (
     describe_static,
     describe_stress,
 )
+
+if TYPE_CHECKING:
+    from femgear.case.teeth import GearCase
 
 # beyond this many mesh periods stresses are kept around the worst tooth only: 64 positions of 256 periods
 # would take a quarter of a gigabyte for three planets
@@ -446,7 +449,7 @@ def record_positions(case: Any, gears: GearSet) -> int:
     return gears.equal_positions(wanted)
 
 
-def _overlap(case: Any, gears: GearSet) -> float:
+def _overlap(case: GearCase, gears: GearSet) -> float:
     """Overlap ratio, positive where gear 1 is right-handed and upper slices run ahead; zero of spur teeth."""
     return math.copysign(case_overlap(case, gears), case.helix_angle or 1.0)
 

@@ -498,7 +498,7 @@ def _crossing(slope, arc, angle) -> float | None:
     return float(arc[i] + (arc[i + 1] - arc[i]) * (angle - slope[i]) / (slope[i + 1] - slope[i]))
 
 
-def _panels(draw: Callable[[int, Any], str], y: str, count: int, *, columns: int, sharex: bool = False) -> Figure:
+def _panels(draw: Callable[[int, object], str], y: str, count: int, *, columns: int, sharex: bool = False) -> Figure:
     """Draw all flanks in panels of one scale, two in a row; ``draw(panel, axes)`` gives titles."""
     rows = count // 2
     figure, axes = new_figure(rows=rows, columns=2, height=3.0 * rows, sharex=sharex, sharey=True)
@@ -571,7 +571,7 @@ def pitch_chart(deviations: SetDeviations, planetary_set: GearSet) -> Figure:
     return _deviation_panels(draw, len(rows))
 
 
-def _deviation_panels(draw: Callable[[int, Any], str], count: int) -> Figure:
+def _deviation_panels(draw: Callable[[int, object], str], count: int) -> Figure:
     """Draw deviations of all kinds of flanks on a scale of at least one micrometre up and down."""
     figure = _panels(draw, "deviation [µm], material positive", count, columns=5)
     low, high = figure.axes[0].get_ylim()

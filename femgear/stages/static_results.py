@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.case.planetary import Case
+    from femgear.case.teeth import GearCase
     from femgear.contact.bodies import Bodies, Sectors
     from femgear.contact.cycle import MeshCycle
     from femgear.contact.root_stress import RootRange, RootStresses
@@ -1259,7 +1260,7 @@ def width_warnings(case: Any) -> Iterator[Finding]:
     yield Finding("W-WIDTHS", f"{key}.face_width", text, remedy=remedy)
 
 
-def describe_materials(case: Any) -> Iterator[Block]:
+def describe_materials(case: GearCase) -> Iterator[Block]:
     """Tabulate materials and face widths of the gears, where one has others than the rest."""
     sections = [getattr(case, name) for name in case.gear_names]
     if all(section.material is None and section.face_width is None for section in sections):

@@ -57,7 +57,7 @@ class Labelled:
 
     def _like(
         self,
-        values: Any,
+        values: object,
         dims: tuple[str, ...] | None = None,
         parent: Callable[[], Contents] | None = None,
     ) -> Labelled:
@@ -113,7 +113,7 @@ class Labelled:
     def __repr__(self) -> str:
         return f"<Labelled {self.dims}: {self.values!r}>"
 
-    def _reduced(self, name: str, dim: Any, **options: Any) -> Any:
+    def _reduced(self, name: str, dim: object, **options: object) -> Any:
         """Reduce as xarray does, which leaves NaN out: where there is one, it does it itself."""
         number = self.values.dtype.kind
         if options or not isinstance(dim, str | None) or (number == "f" and np.isnan(self.values).any()):
@@ -134,7 +134,7 @@ class Labelled:
         """Add up along a dimension, or all."""
         return self._reduced("sum", dim, **options)
 
-    def mean(self, dim: Any = None, **options: Any) -> Any:
+    def mean(self, dim: object = None, **options: object) -> Any:
         """Compute the mean along a dimension, or of all."""
         return self._reduced("mean", dim, **options)
 
@@ -289,7 +289,7 @@ class Contents:
             places[dim] = int(places_there[0])
         return self.isel(**places)
 
-    def _chosen(self, choose: Callable[[Labelled], tuple[Any, tuple[str, ...]]]) -> Contents:
+    def _chosen(self, choose: Callable[[Labelled], tuple[object, tuple[str, ...]]]) -> Contents:
         """Contents of parts of all variables."""
         copy_ = Contents.__new__(Contents)
         copy_.attrs = dict(self.attrs)
@@ -300,7 +300,7 @@ class Contents:
         copy_._check()
         return copy_
 
-    def isel(self, **places: Any) -> Contents:
+    def isel(self, **places: object) -> Contents:
         """Choose by numbers along dimensions: one, which ends the dimension, a slice, or several.
 
         ValueError: no variable has such a dimension.
@@ -360,11 +360,11 @@ class Datasets(Mapping[str, Any]):
         return f"<Datasets: {', '.join(self)}>"
 
 
-def _is_one(place: Any) -> bool:
+def _is_one(place: object) -> bool:
     """Tell whether a place along a dimension is one number."""
     return isinstance(place, (int, np.integer)) or (isinstance(place, np.ndarray) and place.ndim == 0)
 
 
-def _place(place: Any) -> Any:
+def _place(place: object) -> Any:
     """Make what NumPy takes as a place along one axis."""
     return place if isinstance(place, slice) or _is_one(place) else np.asarray(place)

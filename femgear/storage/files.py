@@ -94,7 +94,7 @@ def _to_netcdf(dataset: Contents | xr.Dataset, path: Path, *, growing: bool = Fa
     write_hdf5(path, lambda stream: _create(dataset, stream, free))
 
 
-def _create(dataset: Contents | xr.Dataset, stream: io.RawIOBase, free: Sequence[Any]) -> None:
+def _create(dataset: Contents | xr.Dataset, stream: io.RawIOBase, free: Sequence[object]) -> None:
     """Write a dataset into an open file in the form of NetCDF-4, whose dimensions are scales of HDF5."""
     import h5py
 
@@ -128,7 +128,7 @@ def _create(dataset: Contents | xr.Dataset, stream: io.RawIOBase, free: Sequence
                 made[name].dims[axis].attach_scale(made[dim])
 
 
-def _chunk(variable: Labelled | xr.Variable, free: Sequence[Any]) -> tuple[int, ...]:
+def _chunk(variable: Labelled | xr.Variable, free: Sequence[object]) -> tuple[int, ...]:
     """Shape of the pieces in which a variable is stored that grows along some dimensions: 16 000 numbers."""
     sizes = dict(list(variable.sizes.items())[1:])
     fixed = math.prod(size for name, size in sizes.items() if name not in free)
@@ -303,7 +303,7 @@ def read_result(path: str | os.PathLike, *, fingerprint: str) -> Any:
     raise StorageError("no result of this case", code="E-FORMAT", file=os.fspath(path), remedy="run the case again")
 
 
-def _encoded(value: Any, arrays: list[np.ndarray], numbers: dict[int, tuple[int, Any]]) -> Any:
+def _encoded(value: object, arrays: list[np.ndarray], numbers: dict[int, tuple[int, object]]) -> Any:
     """Turn a value into JSON that numbers its arrays; what was met before is named by its number."""
     if value is None or type(value) in (bool, int, float, str):
         return value
@@ -346,7 +346,7 @@ def _parts(value: Any) -> tuple[str, Sequence]:
     return "own", (kind.__module__, kind.__qualname__, state)
 
 
-def _decoded(node: Any, arrays: list[np.ndarray], objects: dict[int, Any]) -> Any:
+def _decoded(node: object, arrays: list[np.ndarray], objects: dict[int, object]) -> Any:
     """Turn JSON of `_encoded` into the value again."""
     if not isinstance(node, list | dict):
         return node

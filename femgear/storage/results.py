@@ -104,7 +104,7 @@ def dataset(variables: dict, coords: dict, attrs: dict) -> xr.Dataset:
     return Contents(variables, coords, attrs).to_xarray()
 
 
-def coordinates(**values: Any) -> dict[str, tuple]:
+def coordinates(**values: object) -> dict[str, tuple]:
     """Make entries of `dataset` for coordinates by name: axis, harmonic, mesh, speed [rpm] and others."""
     if "speed" in values:
         values["speed"] = as_written(values["speed"])
@@ -116,7 +116,7 @@ def as_written(values) -> np.ndarray:
     return np.array([float(f"{value:.13g}") for value in np.asarray(values, float)])
 
 
-def declared(texts: Mapping[str, tuple[str, str, str]], values: Mapping[str, Any]) -> dict[str, tuple]:
+def declared(texts: Mapping[str, tuple[str, str, str]], values: Mapping[str, object]) -> dict[str, tuple]:
     """Join declarations ``(dims, units, long_name)`` with values by name; what has no value is left out."""
     return {name: (dims, values[name], units, words) for name, (dims, units, words) in texts.items() if name in values}
 
@@ -156,7 +156,7 @@ def write_csv_tables(data: xr.Dataset, folder: Path, stage: str) -> list[str]:
     return names
 
 
-def _attribute(name: str, value: Any) -> tuple[str, Any, str]:
+def _attribute(name: str, value: object) -> tuple[str, Any, str]:
     """Name, value and unit of an attribute of a file."""
     number = np.asarray(value).dtype.kind in "iuf"
     return name, value if np.isscalar(value) else str(value), _ATTRIBUTES.get(name, "1") if number else ""
@@ -341,7 +341,7 @@ class Results:
         return path
 
 
-def results_of(folder: str | os.PathLike, read_case: Callable[[Path], Any], *, partial: bool = True) -> Results:
+def results_of(folder: str | os.PathLike, read_case: Callable[[Path], object], *, partial: bool = True) -> Results:
     """Open the results of a run, whose case ``read_case(path)`` reads; see `femgear.open_results`."""
     folder = Path(folder)
     _refuse_missing(folder)

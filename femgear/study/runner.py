@@ -21,12 +21,15 @@ from functools import cache, lru_cache
 from itertools import count, islice
 from multiprocessing import resource_tracker
 from multiprocessing.connection import wait
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from femgear import __version__
 from femgear.errors import CaseError, FemgearError, checked_count
 from femgear.stages.protocol import one_blas_thread
+
+if TYPE_CHECKING:
+    from multiprocessing.connection import Connection
 
 _TIMEOUT, _PERIOD = 20.0, 5.0
 """How long a scheduler may take to answer, and how often its workers are counted [s]."""
@@ -91,7 +94,7 @@ class Runner(AbstractContextManager):
         """Take the function of the tasks that follow."""
         self._function: Any = function
 
-    def _give(self, index: int, item: Any) -> None:
+    def _give(self, index: int, item: object) -> None:
         """Give out a task."""
         self._waiting.append((index, item))
 
@@ -105,7 +108,7 @@ class Runner(AbstractContextManager):
         self._waiting.clear()
 
 
-def _call(function: Callable, item: Any) -> tuple[Any, list[tuple]]:
+def _call(function: Callable, item: object) -> tuple[Any, list[tuple]]:
     """Value of a task, and its warnings."""
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -121,7 +124,7 @@ def _deadly() -> FemgearError:
     return FemgearError("it ends its worker, twice", code="E-WORKER", remedy=remedy)
 
 
-def _packed(value: Any) -> bytes:
+def _packed(value: object) -> bytes:
     """A function or an item as `_call_packed` takes it."""
     try:
         return pickle.dumps(value)
@@ -233,7 +236,7 @@ class Processes(Runner):
         for connection in [*self._busy]:
             self._end(connection)
 
-    def _end(self, connection: Any) -> int:
+    def _end(self, connection: Connection) -> int:
         """End a process, whatever it is at; the number of its task, -1 for none."""
         process, _ = self._processes.pop(connection), self._sent.pop(connection, None)
         connection.close()
@@ -242,7 +245,7 @@ class Processes(Runner):
         return self._busy.pop(connection, -1)
 
 
-def _serve(connection: Any) -> None:
+def _serve(connection: Connection) -> None:
     """Run the tasks that come over a connection, until it or the process that started this one ends."""
     parent: Any = multiprocessing.parent_process()
     threading.Thread(target=lambda: (parent.join(), os._exit(1)), daemon=True).start()
@@ -336,7 +339,7 @@ class Dask(Runner):
         with dask.config.set({"distributed.admin.large-graph-warning-threshold": "1 TB"}):
             self._function = self._client.submit(bytes, _packed(function), pure=False)
 
-    def _give(self, index: int, item: Any) -> None:
+    def _give(self, index: int, item: object) -> None:
         # schedulers keep every group of tasks for good: all of a client are one
         key, task = (self._name, next(self._number)), (__version__, self._function, _packed(item))
         future = self._client.submit(_call_packed, *task, key=key, pure=False)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, is_dataclass, replace
-from typing import Any, Protocol, TypeGuard
+from typing import Protocol, TypeGuard
 
 import numpy as np
 
@@ -384,7 +384,7 @@ def coefficients_of(element: Element) -> dict[str, Series]:
     }
 
 
-def with_coefficients(element: Element, change: Callable[[Series], Any]) -> Element:
+def with_coefficients(element: Element, change: Callable[[Series], object]) -> Element:
     """Make an element with its periodic coefficients as ``change`` makes them."""
     changed = {name: change(series) for name, series in coefficients_of(element).items()}
     return replace(element, **changed) if changed and is_dataclass(element) else element

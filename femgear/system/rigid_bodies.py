@@ -310,7 +310,7 @@ class HelicalBody:
         return [self.mass, self.mass, self.mass, diametral, diametral, polar]
 
 
-def planar_from_set(planetary_set: PlanetarySet, **data: Any) -> PlanarSet:
+def planar_from_set(planetary_set: PlanetarySet, **data: object) -> PlanarSet:
     """Make a planar set with the base radii, working pressure angles and planet angles of a geared one.
 
     ``data`` are the bodies, mesh stiffnesses and planet bearing of `PlanarSet`.

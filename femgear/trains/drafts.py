@@ -232,7 +232,7 @@ def _of_kind(kind: str, beta: float, slices: int, notes: dict[str, str]) -> dict
     return {"static": {"slices": slices}} if beta else {}
 
 
-def _has_normal_section(tables: dict[str, Any], beta: float) -> bool:
+def _has_normal_section(tables: dict[str, object], beta: float) -> bool:
     """Whether the virtual gears of the normal section of a helical set can be made."""
     gears: Any = planetary_set(parse_case(case_text.write(tables)))
     try:
@@ -255,7 +255,7 @@ def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm) -
     return head
 
 
-def _usual_notes(given: Mapping[str, Any]) -> dict[str, str]:
+def _usual_notes(given: Mapping[str, object]) -> dict[str, str]:
     """Remarks on entries that every new case has, and on those whose option is not given."""
     notes = {f"material.{key}": "estimated: steel" for key in _STEEL}
     notes |= {f"{key}.pressure_angle": "estimated: ISO 53" for key in ("sun", "set", "parallel[0]")}
@@ -513,7 +513,7 @@ def _unequal(teeth: tuple[int, ...], planets: int) -> CaseError:
     )
 
 
-def _read(kind: Any, text: str, key: str) -> float:
+def _read(kind: object, text: str, key: str) -> float:
     """Read a quantity as the entry of a case file that has the kind."""
     try:
         return get_args(kind)[1].read(text)
@@ -522,7 +522,7 @@ def _read(kind: Any, text: str, key: str) -> float:
         raise
 
 
-def _follows(tables: dict[str, Any]) -> bool:
+def _follows(tables: dict[str, object]) -> bool:
     """Whether the steps of a drivetrain follow its motion, so that no rate is refused or warned of."""
     case = parse_case(case_text.write(tables))
     try:

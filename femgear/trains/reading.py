@@ -218,7 +218,7 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     return changed
 
 
-def _change(data: dict, key: str, value: Any, name: str) -> None:
+def _change(data: dict, key: str, value: object, name: str) -> None:
     """Change one entry of the tables of a case file; None takes it out."""
     if not isinstance(key, str):
         limit = 'keys such as "operation.torque" or "sun.modifications[0].amount"'

@@ -61,7 +61,7 @@ class Installed(Known):
     file = property(lambda self: self._loaded(self.reads, lambda file: file.model.train))
     train = property(lambda self: self._loaded(self.solves, lambda train: train.name))
 
-    def _loaded(self, place: str, name_of: Callable[[Any], str]) -> Any:
+    def _loaded(self, place: str, name_of: Callable[[object], str]) -> Any:
         """Load what stands at a place; a package that fails or names it otherwise is refused (E-LIBRARY)."""
         try:
             loaded = resolve_name(place)

@@ -122,7 +122,7 @@ def solve_two_way(  # noqa: PLR0913
     paths: MeshPaths,
     carrier_speed,
     *,
-    harmonics: Any,
+    harmonics: object,
     coupled_diameters: int | None = None,
     side_bands: int | None = None,
     damping=None,

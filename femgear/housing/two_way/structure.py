@@ -227,7 +227,7 @@ def _check_arrays(values: Mapping[str, np.ndarray]) -> None:
         )
 
 
-def from_arrays(arrays: Mapping[str, Any], *, direction, max_diameter: int) -> FixedStructure:
+def from_arrays(arrays: Mapping[str, object], *, direction, max_diameter: int) -> FixedStructure:
     """Make a structure of mode shapes at points of the pitch circle and at sensors.
 
     CaseError: as `FixedStructure`; E-KEY-MISSING: arrays that are missing; E-COUNT: too few points;

@@ -117,7 +117,7 @@ class Part(Section):
             raise TypeError(f"{cls.__name__}: missing or unknown {', '.join(sorted(wrong))}")
         return cls.model_construct(**values)
 
-    def changed(self, **values: Any) -> Self:
+    def changed(self, **values: object) -> Self:
         """Copy the part with other values, as of `Part.in_si`."""
         return self.model_copy(update=values)
 

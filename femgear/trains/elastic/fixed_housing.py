@@ -178,7 +178,7 @@ class HousingModel:
 
 
 def fixed_housing(
-    case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit, *, judged_at: Any = ()
+    case: Case, modes: ModesResult, carrier: np.ndarray, limit: FrequencyLimit, *, judged_at: object = ()
 ) -> FixedHousing:
     """Make the structure of ring and casing, and solve for forces at speeds of the carrier [rad/s].
 

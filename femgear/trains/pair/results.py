@@ -348,7 +348,7 @@ def _recordings(results: Results, stage: str) -> Iterator[tuple[str, str, np.nda
         yield f"bearing_force_gear_{gear + 1}", "N", order, speed, along[:, gear]
 
 
-def _coordinates(result: PairDynamicsResult | PairRunupResult, **axes: Any) -> dict[str, tuple]:
+def _coordinates(result: PairDynamicsResult | PairRunupResult, **axes: object) -> dict[str, tuple]:
     names = result.gears.mesh_names
     gear = {"gear": ("gear", ["gear 1", "gear 2"], "1", "gear")}
     return gear | coordinates(speed=result.input_speed / RPM, mesh=names, **axes)
