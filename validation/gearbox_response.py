@@ -1,0 +1,169 @@
+"""Response of gearboxes: running planets against time integration, stages against the solution for gear sets."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from casings import casing_tables
+from gearbox_equivalents import pair_of_rigid_gears_tables
+from running_twin import TURN, Twin, running, twin
+from small_gearbox import planetary_tables
+
+from femgear.case.gear_set import planetary_set
+from femgear.housing.two_way.running_planets import RunningResponse, RunningStage, solve_running
+from femgear.solvers.linear.modal import undamped_modes
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.stages.static import solve_static
+from femgear.system.system import MeshExcitation
+from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.model import StageModel
+from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.stage_structure import running_stage
+from femgear.trains.pair.model import pair_excitation, pair_model
+from femgear.trains.reading import read_case, with_values
+from validation.reference.running_in_time import TurningSystem, motion_over_a_turn
+from validation.rows import Row, at_most
+
+IN_TIME = "time integration, validation.reference.running_in_time"
+GEAR_SETS = "solution for gear sets, femgear.solvers.periodic.spectral"
+SAMPLES = 1024
+"""Angles of the carrier in a turn."""
+POSITIONS = 64
+"""Positions of an excitation in the mesh period."""
+TWINS = {
+    "three planets in sequence": ((3, 13, 1), {}),
+    "three planets in sequence, backwards": ((3, 13, -1), {}),
+    "five planets": ((5, 12, 1), {}),
+    "three unequal planets": ((3, 13, 1), {"uneven": [1.0, 1.1, 0.9]}),
+}
+"""Planets, teeth of the ring and sense of the carrier, and what is out of the ordinary."""
+
+
+def orders_of(response: RunningResponse, shape: np.ndarray, count: int) -> np.ndarray:
+    """Amplitudes (k, count) at orders 0, 1, 2, ... of the carrier of places that the modes (m, k) move.
+
+    The mesh frequency is a multiple of the speed of the carrier; lines of one order add.
+    """
+    found = np.zeros((shape.shape[1], count), complex)
+    order = np.rint(response.frequency / response.carrier_speed).astype(int)
+    amplitude = response.lines(shape)
+    for (line, band), number in np.ndenumerate(order):
+        if abs(number) < count:
+            value = amplitude[line, band]
+            found[:, abs(number)] += value if number >= 0 else value.conj()
+    return found
+
+
+def apart_in_time(system: Twin, symmetry: int, side_bands: int = 6) -> float:
+    """Largest difference of the lines of the structure from time integration, over the largest line."""
+    size = len(system.mass)
+    motion = motion_over_a_turn(TurningSystem(system, TURN, 2), SAMPLES)[:size]
+    wanted = 2.0 * np.fft.rfft(motion, axis=1)[:, : SAMPLES // 2] / SAMPLES
+    known = {"harmonics": (2, 14), "side_bands": side_bands, "tolerance": 1e-13}
+    response = solve_running(running(system, symmetry=symmetry), system.teeth * TURN, TURN, **known)
+    met = orders_of(response, system.modes()[1].T, SAMPLES // 2)
+    return float(np.abs(met - wanted)[:, 1:].max() / np.abs(wanted[:, 1:]).max())
+
+
+def in_time() -> tuple[Row, ...]:
+    """Planets on uneven supports, as side bands of mesh harmonics and in axes at rest over one turn."""
+    rows = list[Row]()
+    for name, (sizes, options) in TWINS.items():
+        apart = apart_in_time(twin(*sizes, **options), 1 if options else sizes[0])
+        text = "lines of sun, carrier, ring and casing, largest difference over the largest line"
+        rows.append(at_most(name, IN_TIME, text, 1e-6, apart))
+    return tuple(rows)
+
+
+def equal_planets() -> tuple[Row, ...]:
+    """Equal planets leave multiples of their number, though every one of them is solved and supports are uneven."""
+    rows = list[Row]()
+    for count in (3, 4, 5):
+        response = solve_running(
+            running(twin(count, 13), symmetry=1), 13 * TURN, TURN, harmonics=(2, 4), side_bands=6, tolerance=1e-13
+        )
+        order = np.rint(response.frequency / TURN).astype(int)
+        beside = np.abs(response.modal[order % count != 0]).max() / np.abs(response.modal).max()
+        text = f"lines at orders that are no multiples of {count}, over the largest"
+        rows.append(at_most(f"{count} equal planets, uneven casing", "symmetry", text, 1e-10, beside))
+    return tuple(rows)
+
+
+def pair_on_bearings() -> tuple[Row, ...]:
+    """Two rigid gears on bearings, k(t) from their teeth, without damping: a gearbox and a train of its own."""
+    springs = {"gear_1.bearing_stiffness": "1e8 N/m", "gear_2.bearing_stiffness": "3e8 N/m"}
+    case = with_values(read_case("cases/spur_pair.toml"), springs)
+    excitation = pair_excitation(case, solve_static(case))
+    mean = excitation.stiffness.mean(axis=1)
+    modes = undamped_modes(pair_model(case, planetary_set(case)).system, mean, damping_ratio=0.0)
+    found = solve_deflection(read_case(pair_of_rigid_gears_tables(case, float(mean[0]))))
+    stage = without_loss(running_stage(found, found.model.stages[0], excitation)[0])
+    rows = list[Row]()
+    for hertz in (300.0, 900.0, 2500.0):
+        known = {"excitation_harmonics": 6, "response_harmonics": 12, "method": "direct"}
+        wanted = solve_spectral(modes, excitation, hertz, **known).force[0, 0, 1:]
+        response = solve_running(stage, 2.0 * np.pi * hertz, 0.0, harmonics=(6, 12), side_bands=0, tolerance=1e-13)
+        apart = np.abs(2.0 * response.force[0, 0, 1:, 0] - wanted).max() / np.abs(wanted).max()
+        text = f"harmonics of the mesh force at {hertz:g} Hz, largest difference over the largest"
+        rows.append(at_most("spur pair on bearings", GEAR_SETS, text, 1e-9, apart))
+    return tuple(rows)
+
+
+def without_loss(stage: RunningStage) -> RunningStage:
+    """Stage without damping and without the gyroscopic terms of its planets."""
+    return replace(stage, loss=0.0 * stage.loss, structure_loss=0.0, gyroscopic=0.0 * stage.gyroscopic)
+
+
+def synthetic_excitation(found: Deflection, stage: StageModel) -> MeshExcitation:
+    """Excitation of equal planets whose stiffness, deflection and force fluctuate, in phase with their places."""
+    count = len(stage.angles)
+    theta = 2.0 * np.pi * np.arange(POSITIONS) / POSITIONS
+    signals = np.zeros((3, 2 * count, POSITIONS))
+    for number, mesh in enumerate(stage.meshes):
+        with_ring = number // count
+        at = theta + stage.sizes.teeth[-1] * stage.angles[number % count]
+        mean = found.model.assembly.contacts[mesh].stiffness.sum()
+        signals[0, number] = mean * (1.0 + (0.15 + 0.05 * with_ring) * np.cos(at) + 0.05 * np.sin(2.0 * at))
+        signals[1, number] = 1e-6 * (1.0 + with_ring) * np.cos(at + 0.4) + 2e-7 * np.cos(2.0 * at)
+        signals[2, number] = 1000.0 * (1.0 + 0.1 * np.cos(at - 1.0))
+    return MeshExcitation(*signals, np.zeros(2 * count))
+
+
+def stage_in_casing(*, casing: bool = True) -> Deflection:
+    """Planetary stage of rigid bodies, its ring in a casing on uneven feet or standing still."""
+    tables = planetary_tables() | {"deflection": {"slices": 1}}
+    return solve_deflection(read_case(tables | ({"casing": casing_tables()} if casing else {})))
+
+
+def carrier_at_rest() -> tuple[Row, ...]:
+    """A planetary stage whose carrier stands still, with k(t), and the modes of the gearbox with all its meshes."""
+    rows = list[Row]()
+    for name, casing in (("ring that stands still", False), ("casing on uneven feet", True)):
+        found = stage_in_casing(casing=casing)
+        stage = found.model.stages[0]
+        running_one, motion = running_stage(found, stage, synthetic_excitation(found, stage))
+        running_one = without_loss(running_one)
+        for hertz in (150.0, 400.0, 1100.0):
+            apart = apart_from_gear_set(found, running_one, motion, hertz)
+            text = f"motions of sun, carrier and casing, mesh frequency {hertz:g} Hz, over the largest of all"
+            rows.append(at_most(f"planetary stage at rest, {name}", GEAR_SETS, text, 1e-9, apart))
+    return tuple(rows)
+
+
+def apart_from_gear_set(found: Deflection, stage: RunningStage, motion: np.ndarray, hertz: float) -> float:
+    """Largest difference of the harmonics of all motions but those of planets, over the largest of all."""
+    assembly, system, _ = linear_system(found)
+    drive = stage.excitation
+    mean = drive.stiffness.mean(axis=1)
+    modes = undamped_modes(replace(system, gyroscopic=None), mean, damping_ratio=0.0)
+    # about the mean state
+    about = {name: getattr(drive, name) for name in ("deflection", "force")}
+    about = {name: signal - signal.mean(axis=1, keepdims=True) for name, signal in about.items()}
+    known = {"excitation_harmonics": 3, "response_harmonics": 8, "method": "direct"}
+    wanted = assembly.motions @ modes.shape @ solve_spectral(modes, replace(drive, **about), hertz, **known).modal[0]
+    response = solve_running(stage, 2.0 * np.pi * hertz, 0.0, harmonics=(3, 8), side_bands=6, tolerance=1e-13)
+    met = 2.0 * motion @ response.modal.sum(axis=1).T
+    planets = [6 * station + way for station in found.model.stages[0].planets for way in range(6)]
+    others = np.setdiff1d(np.arange(assembly.count), planets)
+    return float(np.abs(met - wanted)[others, 1:].max() / np.abs(wanted[:, 1:]).max())
