@@ -111,6 +111,7 @@ def test_roots_observed_with_the_flanks_are_those_of_a_solution_of_their_own(wid
     assert np.abs(body.regular - plain.regular).max() <= 1e-12 * np.abs(plain.regular).max()
 
 
+@pytest.mark.slow
 def test_external_tooth_against_a_direct_analysis_of_a_finer_whole_gear():
     places = 0.4, 0.8
     reference = direct(EXTERNAL, places, flank_elements=16, refine=1.5)

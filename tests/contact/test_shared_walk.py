@@ -17,7 +17,10 @@ SPUR = {"sun.modifications": [SLOPE], "static.slices": 9, "static.positions": 16
 HELICAL = {"static.slices": 9, "static.positions": 72}
 
 
-@pytest.mark.parametrize(("name", "entries"), [("planetary_27_40_108", SPUR), ("helical_23_24_73", HELICAL)])
+@pytest.mark.parametrize(
+    ("name", "entries"),
+    [pytest.param("planetary_27_40_108", SPUR, marks=pytest.mark.slow), ("helical_23_24_73", HELICAL)],
+)
 def test_two_processes_find_the_numbers_of_one(name, entries, monkeypatch):
     case, shared, found = with_values(read_case(f"cases/{name}.toml"), FEW | entries), [], []
     tasks = second_process.shared

@@ -333,6 +333,7 @@ def test_pairs_that_only_an_end_reaches_are_candidates(gears, bodies, waves, mon
     assert np.abs(found.sun_arc - expected.sun_arc).max() < 1e-5 * np.abs(expected.sun_arc).max()
 
 
+@pytest.mark.slow
 def test_coarse_grids_will_do(gears, bodies, waves):
     """Waves of twice as fine elements change K_H-beta by less than 2e-3."""
     fine = width_waves(make_sectors(gears, STEEL, flank_elements=12, refine=1.0), STEEL, SLICES)

@@ -27,6 +27,7 @@ def test_the_rim_is_one_module_thick(thin):
     assert rims.ring_comparison(**SIZES).largest > 50e-6
 
 
+@pytest.mark.slow
 def test_sector_and_108_sectors_in_one_solution_agree():
     assert rims.ring_comparison(**SIZES).same_grid < 1e-9
     assert rims.planet_comparison(**SIZES).same_grid < 1e-9

@@ -153,6 +153,7 @@ def test_compliance_at_the_tip_is_that_of_small_elements(gear):
     assert np.abs(error[~np.eye(len(x), dtype=bool)]).max() < 0.1
 
 
+@pytest.mark.slow
 def test_contact_at_tip_corners_is_that_of_resolved_bodies(bodies):
     """Equal cells without the wedge: deflection 0.9 % off, a load 1.3 % of the mesh force."""
     s, positions = corner_set(), (54, 55, 58)

@@ -37,7 +37,9 @@ def before():
     return case, static, solve_modes(case, static)
 
 
-@pytest.mark.parametrize("name", ["foundation alone", pytest.param("six bolts", marks=pytest.mark.slow), "four feet"])
+@pytest.mark.parametrize(
+    "name", ["foundation alone", *(pytest.param(name, marks=pytest.mark.slow) for name in ("six bolts", "four feet"))]
+)
 def test_rows_of_the_table(before, name):
     case = with_values(before[0], ROWS[name])
     data = solve_housing(case, solve_dynamics(case, *before[1:])).dataset()

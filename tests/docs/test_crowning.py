@@ -23,6 +23,7 @@ def script():
         yield runpy.run_path(str(ROOT / "scripts" / "lead_design.py"))
 
 
+@pytest.mark.slow
 def test_rows_of_the_table(script):
     """The load is least between neighbours of the best crowning, and the rule of ISO is hardly worse."""
     state = script["in_slices"](with_values(read_case(CASE), {"static.slices": 25}), 8)
@@ -38,6 +39,7 @@ def test_rows_of_the_table(script):
     assert rule == pytest.approx(least, rel=5e-3)
 
 
+@pytest.mark.slow
 def test_the_script_on_a_small_case(tmp_path):
     text = CASE.read_text(encoding="utf-8").replace("positions = 64", "positions = 16\nflank_elements = 8")
     (tmp_path / "small.toml").write_text(text, encoding="utf-8")

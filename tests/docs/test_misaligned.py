@@ -36,6 +36,7 @@ def test_rows_of_the_table(row):
     assert found == pytest.approx(printed, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_planets_that_tilt():
     row = re.search(r"(?m)^\| 1e4 N m/rad \|(.*)\|$", PAGE)
     numbers = [float(one) for one in re.findall(r"-?[\d.]+", row[1].replace("−", "-"))]

@@ -144,6 +144,7 @@ def test_flanks_end_where_chamfers_of_the_tips_begin(tmp_path):
         assert (told.key, told.severity) == (key, DOUBT)
 
 
+@pytest.mark.slow
 def test_the_published_stage_with_its_modifications(tmp_path):
     """Transmission error hangs on where the flanks of the ring end, which the file leaves open.
 

@@ -55,6 +55,7 @@ def test_the_shipped_file_is_that_of_the_script():
     assert SHIPPED.stat().st_size < 300_000
 
 
+@pytest.mark.slow
 def test_a_file_that_is_there_is_not_computed_again(tmp_path, capsys):
     main(output=tmp_path, size=0.015, modes=2)
     first = (tmp_path / "carrier.npz").stat().st_mtime_ns

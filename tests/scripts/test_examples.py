@@ -39,6 +39,7 @@ LONG = {
     "face_load",
     "iso_stiffness",
     "pin_error_lobes",
+    "relief_map",
     "six_bolts",
     "sound_to_wav",
     "speed_sweep",

@@ -303,6 +303,7 @@ def helical_case(tmp_path_factory):
     return path
 
 
+@pytest.mark.slow
 def test_load_sharing_of_a_helical_set(helical_case, tmp_path):
     """Without gap that of a run; a gap takes from its planet what the others get."""
     done = run("load_sharing.py", helical_case, "--gap", "0 um", "--gap", "2 um", "-o", tmp_path, folder=tmp_path)
@@ -364,6 +365,7 @@ def test_gyroscopic(quick_case, tmp_path):
     assert re.search(r"2 +1794\.\d\d +1756\.\d\d +1833\.\d\d +± 2\.12", done.stdout)
 
 
+@pytest.mark.slow
 def test_gravity_wedging(tmp_path):
     arguments = ("--backlash", "482 um", "--harmonics", "3", "--no-stability", "--highest", "70")
     sweep = ("--sweep", "2", "--steps", "200")
@@ -442,6 +444,7 @@ def test_multistage_writes_its_tables_and_figures(tmp_path):
     assert {path.suffix for path in tmp_path.glob("[!.]*")} == {".csv", ".png"}
 
 
+@pytest.mark.slow
 def test_drivetrain_writes_spectra_and_pictures(tmp_path):
     settings = ["--duration", "3 s", "--rate", "4 kHz", "--modes", "0", "--balanced", "--no-sensitivity"]
     done = run("drivetrain.py", *settings, "-o", tmp_path, folder=tmp_path)

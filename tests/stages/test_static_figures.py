@@ -367,7 +367,12 @@ CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
 
 @pytest.mark.parametrize(
     ("members", "more"),
-    [("fixed", {}), ("elastic", {}), ("fixed", SLICED), ("fixed", {**SLICED, **HELICAL})],
+    [
+        ("fixed", {}),
+        ("elastic", {}),
+        ("fixed", SLICED),
+        pytest.param("fixed", {**SLICED, **HELICAL}, marks=pytest.mark.slow),
+    ],
     ids=["fixed", "elastic", "slices", "helical"],
 )
 def test_errors_and_supports_of_the_case_are_in_the_deformed_set(members, more):

@@ -249,6 +249,7 @@ def children(pid):
     return [one.pid for one in started if any("spawn_main" in word for word in one.cmdline())]
 
 
+@pytest.mark.slow
 def test_what_is_killed_loses_nothing(words, tmp_path):
     """Ctrl-C, then kill -9 of the program that goes on, then of a worker of the next one, which ends well."""
     journal, lines, workers = tmp_path / "out" / "sweep.jsonl", 0, []

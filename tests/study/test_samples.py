@@ -48,6 +48,7 @@ CASE, TOLERANCES = CASES / "planetary_27_40_108.toml", CASES / "tolerances/3um.t
 TORQUE = 100.0
 ALPHA = math.radians(24.6)
 """Lin and Parker, J. Vib. Acoust. 121 (1999): pressure angle, mesh stiffness 5e8 N/m, bearings."""
+slow = partial(pytest.param, marks=pytest.mark.slow)
 SPRUNG = Supports(sun=5e7, carrier=2e8, planet=3e8)
 
 
@@ -222,8 +223,18 @@ def assert_equal(found, expected, rtol):
         np.testing.assert_allclose(found[name], values, rtol=rtol, atol=rtol * np.abs(values).max())
 
 
-@pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
-@pytest.mark.parametrize("supports", [RIGID, SPRUNG, Supports(sun=0.0)], ids=["fixed", "sprung", "floating sun"])
+@pytest.mark.parametrize(
+    ("supports", "torque"),
+    [
+        (RIGID, TORQUE),
+        slow(RIGID, -TORQUE),
+        slow(SPRUNG, TORQUE),
+        (SPRUNG, -TORQUE),
+        (Supports(sun=0.0), TORQUE),
+        slow(Supports(sun=0.0), -TORQUE),
+    ],
+    ids=["fixed", "fixed, reversed", "sprung", "sprung, reversed", "floating sun", "floating sun, reversed"],
+)
 def test_samples_are_those_of_the_walk_through_the_mesh_cycle(basis, torque, supports):
     basis = replace(basis, supports=supports)
     model = sample_model(basis, PITCH_AND_PINS, sun_torque=torque)
@@ -240,7 +251,7 @@ def test_samples_are_those_of_the_walk_through_the_mesh_cycle(basis, torque, sup
         np.testing.assert_allclose(exact["planet_share"], 1 / 3, rtol=1e-8)
 
 
-@pytest.mark.parametrize("planets", [4, 5])
+@pytest.mark.parametrize("planets", [4, slow(5)])
 def test_planets_out_of_phase(case, planets):
     """Five planets of 36/24/84 teeth in sequential phases; four at uneven angles."""
     values = {"set.planets": planets}
@@ -342,6 +353,7 @@ def test_a_sample_is_a_case(case, basis):
         assert found == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, capsys):
     path, out = tmp_path / "case.toml", tmp_path / "out"
     path.write_text(case.source, encoding="utf-8")
@@ -381,6 +393,7 @@ def test_the_command_writes_numbers_figure_and_the_worst_sample(case, tmp_path, 
     assert planetary_set(again).n_planets == 3
 
 
+@pytest.mark.slow
 def test_samples_drawn_at_random_are_solved_exactly(case, tmp_path, monkeypatch):
     """And many samples are drawn as points of a grid that weigh as many as lie there."""
     monkeypatch.setattr("femgear.study.sample_results._SHARE_AGAIN", 10)
@@ -411,6 +424,7 @@ def test_errors_below_rounding_are_computed_and_drawn(case, tmp_path):
     assert np.ptp(read_dataset(out / "samples.nc").transmission_error.values) < 1e-13
 
 
+@pytest.mark.slow
 def test_members_that_move_share_better_and_are_told(case, tmp_path):
     path = tmp_path / "pins.toml"
     path.write_text('pin_errors.tangential = { distribution = "normal", sigma = "3 um" }', encoding="utf-8")
@@ -440,6 +454,7 @@ class Interrupted(Runner):
         return super()._next()
 
 
+@pytest.mark.slow
 def test_two_processes_and_an_interrupted_command_give_the_same_bits(case, tmp_path, monkeypatch):
     monkeypatch.setattr("femgear.study.sample_results._BLOCKS", {"spring": 8, "exact": 4})
     basis, journal = prepared(case, TOLERANCES, positions=8, cache=grid_cache()), tmp_path / "samples.jsonl"
@@ -539,7 +554,7 @@ def test_refusals(basis, case, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
+@pytest.mark.parametrize("torque", [TORQUE, slow(-TORQUE)])
 def test_samples_have_the_errors_of_runs_with_many_positions(basis, torque):
     """Where pitch errors keep the record open, equidistant positions lacked up to two thirds at its end."""
     places = sample_positions(basis, torque, 16)
@@ -593,8 +608,8 @@ def sliced(case):
 @pytest.mark.parametrize(
     "values",
     [
-        {},
-        {"operation.torque": "-100 N m", "static.members": "elastic"},
+        slow({}),
+        slow({"operation.torque": "-100 N m", "static.members": "elastic"}),
         {
             "sun.modifications": [{"kind": "lead crowning", "amount": "3 um"}],
             "planet.tilt_stiffness": "2e4 N m/rad",
@@ -621,6 +636,7 @@ def test_springs_in_slices_are_within_a_permille_of_the_whole_contact(sliced, va
         assert exact["transmission_error"][0] == pytest.approx(np.ptp(arc), rel=1e-12)
 
 
+@pytest.mark.slow
 def test_a_sample_in_slices_is_a_case_that_a_run_solves(sliced, tmp_path):
     path = tmp_path / "axes.toml"
     path.write_text(
@@ -654,8 +670,8 @@ def test_slopes_of_axes_have_a_plausible_size():
 @pytest.mark.parametrize(
     "values",
     [
-        {"static.slices": 12, "static.flank_elements": 6, "operation.torque": "-300 N m"},
-        {"static.back_flanks": True},
+        slow({"static.slices": 12, "static.flank_elements": 6, "operation.torque": "-300 N m"}),
+        slow({"static.back_flanks": True}),
         {"static.members": "elastic", "planet.bearing_clearance": "3 um"},
     ],
     ids=["helical", "back flanks", "bearing clearance"],

@@ -38,6 +38,7 @@ def printed_errors(text: str) -> np.ndarray:
     return np.array(rows, float)
 
 
+@pytest.mark.slow
 def test_the_optimum_that_is_printed_is_that_of_a_run(quick_case, tmp_path):
     """The largest of all meshes of a kind, of the case that is written."""
     arguments = ("--points", "3", "--also", "60 N m", "--largest", "6 um", "--torque", "90 N m")
@@ -76,6 +77,7 @@ def test_the_numbers_of_the_search_are_those_of_its_case(quick_case):
     assert near.peak_to_peak == pytest.approx(map_.peak_to_peak, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_helical_set_has_a_relief(tmp_path):
     """In slices, its numbers those of a run of the case that is written."""
     case = ROOT / "cases" / "helical_23_24_73.toml"
@@ -144,6 +146,7 @@ def test_bad_input_ends_in_a_message(arguments, message, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_pair_has_a_relief(tmp_path):
     words = ("--points", "3", "--positions", "8", "--largest", "30 um", "--also", "100 N m", "-o", "out")
     done = relief(ROOT / "cases" / "spur_pair.toml", *words, folder=tmp_path)

@@ -187,6 +187,7 @@ def test_a_contact_angle_above_zero_carries_along_z():
     assert both > 100.0 and bearing_state(DEEP, (0, 0, -100e-6, 0, 0, 0)).force[2] == -both
 
 
+@pytest.mark.slow
 def test_force_is_continuous_through_loss_of_contact():
     for bearing in ALL.values():
         path = np.linspace(1.0, -0.6, 4001)[:, None] * MOTIONS[0]

@@ -4,6 +4,7 @@ import contextlib
 import math
 import random
 import re
+from functools import partial
 
 import pytest
 
@@ -249,10 +250,11 @@ FORMERLY_WARNED = [
     ("drivetrain", {"teeth": (9, 74), "module": "25 mm"}),
 ]
 # rings with fewer than z_s + 2 z_p teeth leave no room for the shifts that undercut asks for
+slow = partial(pytest.param, marks=pytest.mark.slow)
 WITHOUT_BETTER = [
-    ("planetary", {"teeth": (18, 11, 38)}, {"W-CONTACT-RATIO", "W-UNDERCUT"}),
-    ("planetary", {"teeth": (13, 17, 45)}, {"W-UNDERCUT"}),
-    ("planetary", {"teeth": (14, 13, 39)}, {"W-UNDERCUT"}),
+    slow("planetary", {"teeth": (18, 11, 38)}, {"W-CONTACT-RATIO", "W-UNDERCUT"}),
+    slow("planetary", {"teeth": (13, 17, 45)}, {"W-UNDERCUT"}),
+    slow("planetary", {"teeth": (14, 13, 39)}, {"W-UNDERCUT"}),
     (
         "planetary",
         {"teeth": (22, 27, 80), "form": ToothForm(helix="20 deg", addendum=0.8)},

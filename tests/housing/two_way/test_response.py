@@ -52,6 +52,7 @@ def test_refusals():
         solve_two_way(unequal, drive, STRUCTURE, paths(3), SPEEDS, **FEW)
 
 
+@pytest.mark.slow
 def test_errors_that_are_not_small_are_solved():
     """A mesh that is gone for a third of the turns of a gear, hardly damped: the same equations."""
     drive, half = shaken(paths(1), 3, planet=1, sense=-1), np.repeat([1.9, 0.1, 1.0], 64)

@@ -69,6 +69,7 @@ def test_stable_impacts_have_the_exponent_of_their_multiplier():
     assert found.largest == pytest.approx(floquet, abs=3e-3) and found.section.repeats_after() == 1
 
 
+@pytest.mark.slow
 def test_chaotic_pair_by_tangents_and_by_neighbours():
     problem = lightly_loaded_pair().problem(1.5)
     found = lyapunov_exponents(problem, 1.0, points=600, skip=40, steps=100)

@@ -70,6 +70,7 @@ def heard(case, static, modes):
     return solve_housing(case, solve_dynamics(case, static, modes))
 
 
+@pytest.mark.slow
 def test_levels_are_as_exact_as_the_tolerance_says(before):
     """A hundredth and less of the forces fluctuates: what is left unsolved is judged by that."""
     speeds = {"operation.speeds": ["10 rpm", "400 rpm", "3100 rpm"], "housing.support": FEET}
@@ -226,6 +227,7 @@ def checksum_of(case) -> str:
     return case.housing.structure.sha256
 
 
+@pytest.mark.slow
 def test_supports_and_their_structure_in_a_file_are_one(before, tmp_path, monkeypatch):
     """The ring of a file is loaded where flanks touch, that of the case at the middle of its teeth.
 

@@ -85,6 +85,7 @@ def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_
     assert force == pytest.approx(abs(static.sun_torque) / static.planetary_set.sun.base_radius / 3, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_at_standstill_errors_that_turn_are_those_of_the_static_record(case, steps):
     """0.01 rpm, the harmonics that excite: of deflections and forces, a thousandth of their fluctuation."""
     errors = {

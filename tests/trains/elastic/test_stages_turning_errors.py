@@ -203,6 +203,7 @@ def support(angle: int, stiffness: str) -> dict[str, str]:
     }
 
 
+@pytest.mark.slow
 def test_a_ring_on_next_to_no_support_is_heard_as_on_its_foundation(solved):
     """Hardly damped, at low speed, the convective terms of the ring are all that differs."""
     errors = {"sun.errors": {"cumulative_pitch": pitch(2, -1, 0, teeth=27)}, "dynamics.damping_ratio": 1e-4}

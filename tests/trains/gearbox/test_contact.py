@@ -54,6 +54,7 @@ def test_rotations_take_up_all_but_what_loads_planets_unequally():
     assert left([5.0]) == pytest.approx([0.0])
 
 
+@pytest.mark.slow
 def test_a_set_is_loaded_by_its_separations_as_by_its_pins():
     stage = read_case(set_on_shafts()).planetary[0]
     pins = [{"planet": 2, "tangential": "-10 um", "radial": "4 um"}]

@@ -100,7 +100,7 @@ def test_weight_hangs_in_the_bearings():
     assert up == pytest.approx(9.80665 * np.array(mass), rel=1e-6)
 
 
-@pytest.mark.parametrize("torque", ["100 N m", "-100 N m"])
+@pytest.mark.parametrize("torque", ["100 N m", pytest.param("-100 N m", marks=pytest.mark.slow)])
 def test_contact_and_system_settle_whatever_they_start_from(torque):
     tables = pair_tables(teeth=True)
     tables["operation"]["load_case"][0]["torque"]["motor"] = torque
@@ -151,6 +151,7 @@ def test_unequal_planets_carry_what_the_set_alone_on_its_bearings_says(torque):
     assert found.mesh_force == pytest.approx(alone, abs=2e-3 * np.ptp(alone))
 
 
+@pytest.mark.slow
 def test_contact_and_system_agree_on_unequal_forces_of_planets():
     tables = set_on_shafts()
     push = {"name": "push", "shaft": "input", "position": "20 mm", "force": ["500 N", "800 N", "0 N"]}

@@ -49,7 +49,7 @@ def test_without_load_shafts_float_in_the_clearance_of_their_balls():
     assert slack_bearings(result.state)[:, :5].all() and not slack_bearings(result.state)[:, 5].any()
 
 
-@pytest.mark.parametrize("what", ["torque", "weight", "preload"])
+@pytest.mark.parametrize("what", ["torque", "weight", pytest.param("preload", marks=pytest.mark.slow)])
 def test_load_weight_or_preload_hold_them(what):
     tables = on_balls("100 N m" if what == "torque" else "0 N m", "-3 um" if what == "preload" else "10 um")
     if what == "weight":

@@ -90,6 +90,7 @@ def test_teeth_without_contact_have_the_stiffness_of_the_standard():
     assert finding.code == "W-STIFFNESS"
 
 
+@pytest.mark.slow
 def test_estimated_bearings_show_the_range_that_they_make():
     tables = pair_tables(teeth=True)
     tables["bearing"][0]["estimated"] = True

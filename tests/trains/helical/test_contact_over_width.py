@@ -34,6 +34,7 @@ def case_with(tmp_path, text, *changes):
     return femgear.read_case(path)
 
 
+@pytest.mark.slow
 def test_elastic_set_with_a_helix(few_waves, tmp_path):
     """Whole overlap ratio: of the transmission error of the transverse section 5 % are left."""
     fewer = ("positions = 64\nslices = 25", "positions = 24\nslices = 12"), ("18 mm", "17.281 mm")
@@ -94,6 +95,7 @@ def test_steep_helices_of_rigid_sets_are_told(angle, steep):
     assert [one.key for one in case.notices if one.code == "W-HELIX"] == ["helical.helix_angle"] * steep
 
 
+@pytest.mark.slow
 def test_rigid_set_takes_the_meshes_of_the_contact(few_waves, tmp_path):
     """The quick estimate has another section factor, and slices that do not draw one another along."""
     text = (ROOT / "cases" / "helical_30_20_70.toml").read_text(encoding="utf-8")

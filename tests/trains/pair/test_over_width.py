@@ -208,6 +208,7 @@ def test_ends_of_narrow_spur_teeth_are_told_with_their_sizes(modules, told):
         assert 12.0 <= slope <= 17.0
 
 
+@pytest.mark.slow
 def test_overlap_keeps_teeth_of_a_low_transverse_contact_ratio_in_contact():
     """A transverse contact ratio of 0.98: always in contact, softer, and the load runs over the width."""
     whole = read_case(new_case("pair", teeth=(20, 30), form=ToothForm(helix="20 deg")))

@@ -15,7 +15,8 @@ from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes, so
 
 
 @pytest.mark.parametrize(
-    ("points", "words"), [(400, "nothing bounds motions"), (40, "after 4. points: raise max_points")]
+    ("points", "words"),
+    [pytest.param(400, "nothing bounds motions", marks=pytest.mark.slow), (40, "after 4. points: raise max_points")],
 )
 def test_a_branch_that_is_cut_says_so_and_why(points, words, monkeypatch):
     """At little damping it grows without bound towards speeds at which the linear motion is not stable."""

@@ -122,6 +122,7 @@ def peaks(runup, dynamics):
     return [data.dte_rms.max(), data.branch_dte_rms.max(), *dynamics.dataset().dte_rms.values]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "finer",
     [{"_LEAST": 32, "_ON_BRANCH": (32, 56)}, {"_STEPS": replace(stages._STEPS, largest=0.025)}],

@@ -370,6 +370,7 @@ def test_clearance_of_the_planet_bearings_acts_in_the_response(pgb):
     assert 20e-6 < apart < 20e-6 + 3 * np.hypot(*pins[0, :, 0].real) / 5.3e9
 
 
+@pytest.mark.slow
 def test_weight_and_meshing_together_agree_with_integration(coarse, static):
     # without back flanks on lines of their own modal damping stays modal, as the quick integration needs
     case = changed(coarse, planar__back_flanks=False, operation__speeds=["30 rpm"])

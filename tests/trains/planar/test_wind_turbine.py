@@ -144,6 +144,7 @@ def test_weight_and_mesh_stiffness_together_agree_with_integration():
     assert fine[0] < 0.3 * coarse[0] and fine[0] < 0.012 < 0.03 < fine[1]
 
 
+@pytest.mark.slow
 def test_small_plays_fold_below_the_resonance_too_and_keep_the_drive_flanks_closed():
     branch = weight_branch(problem := gravity_problem_b(backlash=161e-6, driven=False), (20.0, 95.0))
     folds = np.sort(branch.parameter[branch.folds]) / (2 * np.pi)
