@@ -4,6 +4,7 @@ import ast
 import re
 import sys
 import tomllib
+from functools import cache
 from importlib.metadata import packages_distributions, requires
 from pathlib import Path
 
@@ -31,6 +32,7 @@ def names(requirements):
     return {Requirement(one).name.lower() for one in requirements}
 
 
+@cache
 def imported():
     """Distributions of all that femgear imports, anywhere."""
     modules = set()

@@ -91,6 +91,7 @@ def test_slices_where_the_plane_does_not_touch_have_pressures():
     assert np.median(ratio) == pytest.approx(1.0, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("helix", [20, 30])
 def test_pressures_of_helical_teeth_are_those_of_the_normal_section(helix):
     """Hertz at the pitch point: flanks are curved less by cos(beta_b); the load is that per width."""

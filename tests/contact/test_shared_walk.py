@@ -11,6 +11,8 @@ from femgear.stages.static import solve_static
 from femgear.trains.elastic.stages import solve_modes
 from femgear.trains.reading import read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 SLOPE = {"kind": "lead slope", "amount": "10 um"}
 FEW = {"static.flank_elements": 6, "static.stresses": False}
 SPUR = {"sun.modifications": [SLOPE], "static.slices": 9, "static.positions": 16}

@@ -20,6 +20,7 @@ def thin():
     return rims.static_with(thin=True)
 
 
+@pytest.mark.slow
 def test_the_rim_is_one_module_thick(thin):
     ring = thin.planetary_set.ring
     assert ring.rim_radius - ring.root_radius == pytest.approx(ring.module, rel=1e-6)

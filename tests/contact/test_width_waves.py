@@ -81,6 +81,7 @@ def test_meshes_that_only_an_end_of_the_width_loads_are_coupled(gears, bodies, w
     assert np.abs(found - spur).max() < 5e-3 * np.abs(spur).max()
 
 
+@pytest.mark.slow
 def test_a_whole_overlap_ratio_leaves_little_of_the_transmission_error(gears, bodies, waves, whole_overlap):
     ripple = {one: np.ptp(walk(gears, bodies, waves, one).sun_arc) for one in (None, 0.5, 2.0)}
     ripple[1.0] = np.ptp(whole_overlap.sun_arc)

@@ -233,6 +233,7 @@ def test_a_run_up_of_orders_that_are_not_whole_is_the_chirp_in_closed_form():
     assert np.abs(found - direct).max() < 1e-9
 
 
+@pytest.mark.slow
 def test_a_run_up_of_a_minute_has_no_click():
     """The second difference of every sample is that of its lines at the highest speed, at most."""
     rng = np.random.default_rng(5)

@@ -21,6 +21,7 @@ def body(tmp_path_factory):
     return read_carrier(path)
 
 
+@pytest.mark.slow
 def test_pins_are_alike_to_rounding(body):
     turn = np.array([[-0.5, -np.sqrt(0.75), 0.0], [np.sqrt(0.75), -0.5, 0.0], [0.0, 0.0, 1.0]])
     both = np.kron(np.eye(2), turn)
@@ -31,6 +32,7 @@ def test_pins_are_alike_to_rounding(body):
             assert np.abs(blocks[(n + 1) % 3, (m + 1) % 3] - expected).max() < 1e-9 * np.abs(body.compliance).max()
 
 
+@pytest.mark.slow
 def test_its_mass_is_that_of_its_volume(body):
     rigid = np.vstack([np.eye(6), *(rigid_link(pin - body.seat) for pin in body.pins)])
     mass = (rigid.T @ body.mass @ rigid)[0, 0]
@@ -44,6 +46,7 @@ def test_its_mass_is_that_of_its_volume(body):
     assert mass == pytest.approx(7850.0 * (drum + stub + pins - 3.0 * pocket * 0.028), rel=0.01)
 
 
+@pytest.mark.slow
 def test_coarse_elements_are_near_the_shipped_file(body):
     shipped = read_carrier(SHIPPED)
     assert np.diag(body.compliance) == pytest.approx(np.diag(shipped.compliance), rel=0.05)

@@ -315,6 +315,7 @@ def test_load_sharing_of_a_helical_set(helical_case, tmp_path):
     assert mean[0] < 0.31 < 0.34 < mean[1] and mean.sum() == pytest.approx(1.0)
 
 
+@pytest.mark.slow
 def test_pin_errors_of_a_helical_set(helical_case, tmp_path):
     arguments = ("--samples", "4", "--support", "fixed", "--tolerance", "6 um", "-o", tmp_path)
     done = run("pin_error_load_sharing.py", helical_case, *arguments, folder=tmp_path)
@@ -383,6 +384,7 @@ def test_gravity_wedging(tmp_path):
         assert row["settled"] == "yes" and sizes[0] == pytest.approx(sizes[1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_bearing_clearance(tmp_path):
     arguments = ("--clearance", "100 um", "--harmonics", "1", "--frequencies", "2", "--points", "3")
     done = run("bearing_clearance.py", *arguments, "-o", tmp_path, folder=tmp_path)

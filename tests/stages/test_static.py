@@ -19,6 +19,8 @@ from femgear.stages.static_results import HELIX_VARIABLES, describe_static, desc
 from femgear.trains.elastic.stages import solve_modes
 from femgear.trains.reading import read_case, with_value, with_values
 
+pytestmark = pytest.mark.usefixtures("coarse_states")
+
 ROOT = Path(__file__).parents[2]
 WIND_UP = {"carrier.wind_up_stiffness": "1e5 N m/rad", "carrier.torque_end": "front"}
 SLOPE = {"kind": "lead slope", "amount": "10 um"}
@@ -77,6 +79,7 @@ def test_the_load_over_the_width_is_drawn(misaligned):
     assert pressure.max() <= largest * (1 + 1e-12) < 1.1 * pressure.max()  # equal but for rounding
 
 
+@pytest.mark.slow
 def test_root_stresses_of_a_load_without_leads_are_those_of_the_plane(case, straight):
     """In every slice, over the whole record and in the range over a turn."""
     plane = with_values(case, {"static.slices": 0})
@@ -187,6 +190,7 @@ def test_tilts_and_twists_that_cannot_be_are_refused(case, changes, code, key):
     assert caught.value.code == code and caught.value.key == key
 
 
+@pytest.mark.slow
 def test_axes_askew_in_a_case(case):
     """Any unit of an angle; an end that lifts is named with the share of the width that carries."""
     askew = {"sun.misalignment": {"x": "0.8 mrad"}, "sun.tilt_stiffness": "1e5 N m/rad"}
@@ -220,7 +224,7 @@ def test_modes_know_tilts_and_twists(case, straight):
     assert (found[0] < found[1]).all()
 
 
-@pytest.mark.parametrize("members", ["fixed", "elastic"])
+@pytest.mark.parametrize("members", ["fixed", pytest.param("elastic", marks=pytest.mark.slow)])
 def test_gears_are_condensed_for_waves_once(case, members, monkeypatch):
     """The modal stage takes them from the static one, and cases with another ring those of sun and planet."""
     condensed = []
@@ -230,7 +234,8 @@ def test_gears_are_condensed_for_waves_once(case, members, monkeypatch):
         return condensed_waves(sector, *rest)
 
     monkeypatch.setattr(stages, "condensed_waves", counted)
-    steps, case = Steps(), with_values(case, {"sun.modifications": [SLOPE], "static.members": members})
+    coarse = {"static.flank_elements": 4, "static.slices": 5, "static.stresses": False}
+    steps, case = Steps(), with_values(case, {"sun.modifications": [SLOPE], "static.members": members} | coarse)
     static = solve_static(case, steps=steps)
     modes = solve_modes(case, static)
     assert sorted(condensed) == ["planet", "ring", "sun"]

@@ -118,7 +118,7 @@ def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
         {"static.members": "elastic"},
         {"dynamics.up_to": "60 kHz"},
         {"carrier.mass": "4 kg"},
-        {"operation.torque": "90 N m"},
+        pytest.param({"operation.torque": "90 N m"}, marks=pytest.mark.slow),
         {"operation.torque": "-90 N m"},
         {"ring.foundation_radial": "2e10 N/m^3"},
     ],

@@ -64,7 +64,7 @@ def test_one_negative_torque(quick_case, tmp_path):
     "values",
     [
         {"static.members": "elastic", "planet.bearing_clearance": "2 um"},
-        {"set.helix_angle": "10 deg", "static.slices": 9},
+        pytest.param({"set.helix_angle": "10 deg", "static.slices": 9}, marks=pytest.mark.slow),
         {"static.back_flanks": True, "sun.errors": {"runout_amplitude": "3 um"}, "static.longest_record": 2},
         pytest.param({"static.slices": 9, "static.members": "elastic"}, marks=pytest.mark.slow),
     ],

@@ -60,6 +60,12 @@ def remote(request):
     return request.getfixturevalue(request.param)
 
 
+# Dask begins its workers anew, which takes seconds
+kills = pytest.mark.parametrize(
+    "remote", ["processes", pytest.param("dask_runner", marks=pytest.mark.slow)], indirect=True
+)
+
+
 @pytest.fixture(scope="module")
 def case():
     return read_case(CASE)
@@ -102,6 +108,7 @@ def test_the_default_window_follows_the_workers(remote):
     assert sorted(remote.map(small_tasks.square, [5, 6])) == [(0, 25), (1, 36)]
 
 
+@kills
 def test_what_kills_workers_is_given_up_after_the_second(remote, tmp_path):
     found = dict(remote.map(small_tasks.poisoned, [(str(tmp_path), x) for x in range(20)]))
     lost = found.pop(13)
@@ -209,6 +216,7 @@ def test_a_search_has_the_same_bits_whoever_computes(case, processes, dask_runne
     np.testing.assert_equal(runs[2], runs[0])
 
 
+@kills
 def test_a_design_that_kills_workers_is_a_failure_of_the_sweep(case, remote, tmp_path):
     values = {RATIO: [0.1, 0.2, small_tasks.POISON, 0.7, 0.8]}
     for computed in (5, 0):

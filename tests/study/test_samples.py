@@ -281,6 +281,7 @@ def test_all_kinds_of_errors_at_a_negative_torque(basis):
     assert_equal(springs, exact, 1e-2)
 
 
+@pytest.mark.slow
 def test_a_planet_that_is_hardly_pressed_is_not_taken_for_open():
     """Sample 422 of seed 1: forces settle before motions; springs were 3 % off, and open at a position."""
     model, _ = prepared(read_case(CASE), TOLERANCES, cache=grid_cache())

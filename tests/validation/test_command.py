@@ -231,13 +231,16 @@ ELSEWHERE = {
     "passes": "trains/gearbox/test_deflection.py::test_contact_and_system_settle_whatever_they_start_from",
     "loaded_states": "validation/test_gearbox_statics.py::test_teeth_in_a_gearbox_touch_as_alone",
     "elastic_ring": "trains/gearbox/test_elastic_ring.py::test_modes_are_those_of_the_set_on_its_foundation",
-    "wind_turbine": "trains/gearbox/test_modes.py::test_the_wind_turbine_twists_as_its_rotor_and_generator_on_one_spring",
+    "wind_turbine": "trains/gearbox/test_modes.py"
+    "::test_the_wind_turbine_twists_as_its_rotor_and_generator_on_one_spring",
     "time_integration": "solvers/periodic/test_harmonic_balance_integration.py::test_planetary_set_with_backlash",
     "duffing_routes": "validation/test_three_routes.py::test_duffing_against_an_integration_without_femgear",
     "pair_routes": "validation/test_three_routes.py::test_gear_pair_against_an_integration_without_femgear",
     "train_routes": "validation/test_three_routes.py::test_planetary_train_against_an_integration_without_femgear",
     "limit_points": "solvers/continuation/test_branches.py::test_limit_points_of_the_published_example",
     "free_duffing": "solvers/periodic/test_shooting.py::test_free_duffing_against_elliptic_integrals",
+    "library": "fe/test_beam.py::test_rows_of_the_validation_pass",
+    "turning": "fe/test_beam.py::test_rows_of_the_validation_pass",
     "some_random_problems": "contact/test_solve.py::test_200_random_positions_agree_with_daqp",
 }
 

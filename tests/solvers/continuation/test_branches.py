@@ -307,6 +307,7 @@ def test_two_masses_with_stops_against_integration_in_time(stops, hertz, leg):
     assert np.abs(run.y[1]).max() == pytest.approx(np.abs(solution.at(times)).max(), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_motions_that_lost_their_symmetry_form_a_closed_loop(stops):
     side, mirrored = crossing_branches(
         stops, stops.branch_points[0], stability=False, options=StepOptions(largest=0.2, max_points=200)

@@ -31,7 +31,7 @@ def one_mass(load, stiffness=0.0, **mesh):
 
 
 @pytest.mark.parametrize("torque", [-120.0, -1e-3])
-@pytest.mark.parametrize("frequency", [1.35e4, 2.7e4, 5.4e4])
+@pytest.mark.parametrize("frequency", [1.35e4, *(pytest.param(one, marks=pytest.mark.slow) for one in (2.7e4, 5.4e4))])
 def test_a_mesh_pulled_apart_does_not_converge(torque, frequency):
     """The flanks push only: T / r = -3000 N on the line of action cannot be a mean force of the mesh."""
     found = solve_harmonic_balance(pair(torque), frequency, harmonics=8)

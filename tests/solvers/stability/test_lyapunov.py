@@ -59,6 +59,7 @@ def test_attractor_of_ueda():
     assert found.chaotic and found.section.repeats_after(1e-3) == 0
 
 
+@pytest.mark.slow
 def test_stable_impacts_have_the_exponent_of_their_multiplier():
     pair, ratio = example_pair(0.09), 0.8
     solution = solve_harmonic_balance(pair.problem(ratio), 1.0, harmonics=24)

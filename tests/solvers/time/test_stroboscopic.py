@@ -48,6 +48,7 @@ def test_jump_up_of_the_sweep_down(duffing):
     assert down.amplitude[jump, 0] < 1.2 < 1.9 < down.amplitude[jump + 1, 0]
 
 
+@pytest.mark.slow
 def test_settled_amplitudes_are_those_of_shooting():
     """A gear pair whose teeth part, on both branches near its resonance."""
     mesh = GearMeshes([0], FourierSeries([[1.0, 0.25]]))
@@ -95,7 +96,16 @@ def two_wells(force):
     return oscillator(0.3, 0.0, PolynomialSprings([0], [[-1.0, 0.0, 1.0]]), force=force), 1.2
 
 
-@pytest.mark.parametrize("force, period", [(0.20, 1), (0.28, 2), (0.29, 4), (0.37, 5), (0.65, 2)])
+@pytest.mark.parametrize(
+    "force, period",
+    [
+        (0.20, 1),
+        pytest.param(0.28, 2, marks=pytest.mark.slow),
+        (0.29, 4),
+        pytest.param(0.37, 5, marks=pytest.mark.slow),
+        pytest.param(0.65, 2, marks=pytest.mark.slow),
+    ],
+)
 def test_period_doubling_of_two_wells(force, period):
     """D. W. Jordan and P. Smith, Nonlinear Ordinary Differential Equations (2007), section 13.3."""
     section = stroboscopic_section(*two_wells(force), start=([1.0], [0.0]), points=20, skip=160, steps=100)

@@ -449,6 +449,7 @@ def test_nothing_but_the_spin_has_no_growth():
     assert math.isnan(run.growth) and run.spin_speed[-1] == pytest.approx(1.5)
 
 
+@pytest.mark.slow
 def test_gain_of_a_run_through_a_resonance():
     """The same sweep of the equation of the one elastic coordinate, by another method; the mean decays."""
     damping, ends, duration, step = 0.01, (1.85, 2.6), 1.0, 1e-5

@@ -195,6 +195,7 @@ def test_sensors_of_both_routes(before):
         np.testing.assert_allclose(ours[:, i], theirs[:, i], rtol=0, atol=0.01 * np.abs(theirs[:, i]).max())
 
 
+@pytest.mark.slow
 def test_planets_that_differ_make_all_orders():
     pin = {"planet": 1, "tangential": "3 um"}
     case = reference(**{"housing.support": FEET, "set.pin_errors": [pin], "housing.nodal_diameters": 6})

@@ -45,6 +45,7 @@ def test_named_sensors_and_bolts_are_in_the_lines(name, heard, forces):
     assert float(data["one_way_level"][0]) > 0.0 and np.isfinite(data["turn_multiplier"].values).all()
 
 
+@pytest.mark.slow
 def test_factors_in_the_fixed_housing_are_those_of_its_run_up():
     few = FEW | {"operation.speeds": ["2900 rpm", "3100 rpm"], "runup.count": 2}
     few |= {"runup.from": "2900 rpm", "runup.to": "3100 rpm"}

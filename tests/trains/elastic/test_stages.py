@@ -350,6 +350,7 @@ def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_error
     assert force == pytest.approx(np.fft.irfft(spectrum, 16, axis=1), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_shares_with_half_and_twice_the_bearing_stiffness_are_those_of_the_other_cases(case, modes, steps):
     """One pin 10 um ahead: the range beside K_gamma is that of runs with these bearings."""
     assert modes.bearing_share is None and "bearing_share" not in modes.dataset()

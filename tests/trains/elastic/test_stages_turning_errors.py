@@ -220,6 +220,7 @@ def test_a_ring_on_next_to_no_support_is_heard_as_on_its_foundation(solved):
     assert third.max() > 1e-3 * np.abs(lines).max()
 
 
+@pytest.mark.slow
 def test_orders_on_feet_obey_the_rule(solved):
     """``L = N q + m S`` in a housing that is the same nowhere; a pin error takes N away."""
     feet = [support(angle, "2e8") for angle in (200, 235, 340)]

@@ -132,6 +132,7 @@ def test_an_eccentric_gear_repeats_after_its_turn(case):
     assert found.settled.all() and found.amplitude[:, 0] == pytest.approx(10.0 * gain, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_motions_that_do_not_repeat_have_neither_amplitude_nor_mean(case):
     """At a damping ratio of 0.09 the period doubles between the ratios 1.4 and 2.0."""
     ranges = [{"from": 1.2, "to": 2.4, "count": 5}]

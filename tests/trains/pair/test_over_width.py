@@ -31,6 +31,9 @@ HEIGHT = (np.arange(SLICES) + 0.5) / SLICES - 0.5
 SLICED = {"static.slices": SLICES}
 OPEN = {"set.centre_distance": None, "gear_1.profile_shift": 0.3, "gear_2.profile_shift": 0.1, **SLICED}
 KINDS = pytest.mark.parametrize("kind", [{}, INTERNAL], ids=["external", "internal"])
+ONE_KIND = pytest.mark.parametrize(
+    "kind", [{}, pytest.param(INTERNAL, marks=pytest.mark.slow)], ids=["external", "internal"]
+)
 
 
 def helical(kind, angle, **more):
@@ -49,7 +52,7 @@ def test_spur_slices_are_the_plane_pair(kind):
     assert sliced.face_load_factor == pytest.approx(1.0, abs=1e-9)
 
 
-@KINDS
+@ONE_KIND
 def test_the_other_hand_mirrors_the_width(kind):
     """Under the other torque too, which is that of the other hand from behind."""
     changes = {"set.helix_angle": "-20 deg"}, {"operation.torque": "-200 N m", "set.helix_angle": "-20 deg"}
@@ -119,7 +122,7 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
         np.testing.assert_allclose(*loads, rtol=1e-8, atol=1e-9 * loads[1].max())
 
 
-@KINDS
+@ONE_KIND
 def test_a_slope_loads_one_end_more_than_linear_teeth_would(kind):
     """ISO 6336-1: ``1 + F_by c_gamma b / (2 F)`` of full contact; slices resist a slope more than a load."""
 

@@ -130,6 +130,7 @@ def test_mean_forces_balance_the_torque(results, pgb):
     np.testing.assert_array_equal(data["carrier_bearing_force_real"].values, 0.0)
 
 
+@pytest.mark.slow
 def test_verdicts_agree_with_fine_ones(pgb):
     found = solve_branch(pgb).branch
     chosen = found.solutions[:: max(len(found.solutions) // 3, 1)]
