@@ -21,6 +21,7 @@ def misaligned(torque, slope, *more, **changes):
     return pair_case({"gear_1.modifications": [lead, *more], **changes})
 
 
+@pytest.mark.slow
 def test_slices_that_carry_most_of_the_load_follow_the_curves_of_their_forces(monkeypatch):
     """Pairs yield less per force the more they carry, at more than four times the load of the pair too."""
     cycle = solve_static(misaligned(20, 40)).cycle

@@ -204,12 +204,19 @@ MOUNTED = _mounted()
 @pytest.mark.parametrize(
     ("torque", "angles", "changes", "periods", "parts"),
     [
-        (-TORQUE, 4, {"sun_runout": Runout(4e-6, 0.3)}, 21, 4),
+        pytest.param(-TORQUE, 4, {"sun_runout": Runout(4e-6, 0.3)}, 21, 4, marks=pytest.mark.slow),
         (TORQUE, 4, {"sun_pitch": _pattern(2, -1, 0)}, 3, 4),
         (-TORQUE, PAIRS, {"sun_pitch": _pattern(2, -1, 0), "pin_errors": [[0, 3e-6], [0, 0]] * 2}, 3, 2),
-        (TORQUE, 4, {"sun_pitch": _pattern(2, -1, 0), "pin_errors": [[0, 3e-6]] + [[0, 0]] * 3}, 3, 1),
+        pytest.param(
+            TORQUE,
+            4,
+            {"sun_pitch": _pattern(2, -1, 0), "pin_errors": [[0, 3e-6]] + [[0, 0]] * 3},
+            3,
+            1,
+            marks=pytest.mark.slow,
+        ),
         (TORQUE, 4, {"planet_pitch": MOUNTED}, 19, 4),
-        (-TORQUE, 4, {"planet_ring_side_pitch": MOUNTED}, 19, 4),
+        pytest.param(-TORQUE, 4, {"planet_ring_side_pitch": MOUNTED}, 19, 4, marks=pytest.mark.slow),
     ],
 )
 def test_planets_repeat_one_another_where_errors_turn(bodies, coarse, torque, angles, changes, periods, parts):
@@ -246,6 +253,7 @@ def test_planets_alike_but_for_the_tooth_that_begins_do_not_repeat_one_another()
     assert planet_shift(replace(even, planet_pitch=other), gears, 4, 19) is None
 
 
+@pytest.mark.slow
 def test_runout_of_the_sun_shares_the_load_as_the_meshes_are_soft(bodies, coarse):
     """Sun on rigid bearings, its runout e small: planets take up ``e cos`` of their angle, in closed form.
 

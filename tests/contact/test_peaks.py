@@ -137,7 +137,9 @@ def against_many(walk, count, deviations=None):
 
 
 @pytest.mark.parametrize("torque", [TORQUE, -TORQUE, 0.05 * TORQUE])
-@pytest.mark.parametrize("count", [8, 16, 32, 64])
+@pytest.mark.parametrize(
+    "count", [8, pytest.param(16, marks=pytest.mark.slow), pytest.param(32, marks=pytest.mark.slow), 64]
+)
 def test_equal_planets_in_phase(reference, count, torque):
     """64 equidistant positions cut off 0.5 %, 8 nearly half of the planet-ring meshes' peak to peak."""
     gears, bodies = reference
@@ -176,7 +178,7 @@ def test_random_sets_out_of_phase(seed, count, tmp_path):
     assert apart < 0.02 and share < 0.005 and few.between.doubt < 0.03
 
 
-@pytest.mark.parametrize("power", [1.0, 2.0])
+@pytest.mark.parametrize("power", [pytest.param(1.0, marks=pytest.mark.slow), 2.0])
 def test_tip_relief_that_makes_the_error_small(reference, power):
     gears, bodies = reference
     relief = with_tip_relief(None, gears, amount=5e-6, length=0.9, power=power)
@@ -220,7 +222,7 @@ def test_maps_have_the_numbers_of_a_run(tmp_path):
     assert (stored > np.ptp(data["ste"].values, axis=1).reshape(2, -1).max(axis=1)).all()
 
 
-@pytest.mark.parametrize("seed", [4, 13])
+@pytest.mark.parametrize("seed", [pytest.param(4, marks=pytest.mark.slow), 13])
 def test_root_stresses_and_pressures_of_few_positions(seed, tmp_path):
     """At 9 positions root stresses were up to 6 % low; all planets that are alike have the largest."""
     case = random_set(seed).case

@@ -170,7 +170,13 @@ def test_corner_contact_does_not_depend_on_cells(bodies):
 
 
 @pytest.mark.parametrize(
-    "options", [{"depth": 0.33e-3}, {"depth": 3e-3}, {"flank_elements": 12}, {"flank_elements": 48}]
+    "options",
+    [
+        pytest.param({"depth": 0.33e-3}, marks=pytest.mark.slow),
+        pytest.param({"depth": 3e-3}, marks=pytest.mark.slow),
+        {"flank_elements": 12},
+        {"flank_elements": 48},
+    ],
 )
 def test_corner_contact_does_not_depend_on_depth_and_elements(bodies, options):
     """A third and three times the depth (or what the teeth allow), half and twice the elements."""

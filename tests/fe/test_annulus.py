@@ -41,6 +41,7 @@ def test_frequencies_are_zeros_of_the_bessel_determinant(n, state):
         assert f == pytest.approx(exact, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_no_zero_is_missed():
     inner, outer = 1.8, 6.0
     f = np.linspace(50, 700, 4000)

@@ -48,7 +48,9 @@ def test_rows_of_the_validation_pass(rows):
     assert {row.quantity: row.verdict for row in rows() if row.verdict != "passes"} == {}
 
 
-@pytest.mark.parametrize("rows", [shafts.turning, shafts.library, shafts.rigid_motions])
+@pytest.mark.parametrize(
+    "rows", [shafts.turning, pytest.param(shafts.library, marks=pytest.mark.slow), shafts.rigid_motions]
+)
 def test_wrong_sign_of_the_distributed_gyroscopic_terms_fails(rows, monkeypatch):
     right = beam._gyroscopic
     monkeypatch.setattr(beam, "_gyroscopic", lambda tilting: -right(tilting))

@@ -231,6 +231,7 @@ def test_interpolation_is_exact_for_quadratics(sector, gear):
         interpolation(sector, np.array([[1.0, 0.0]]))
 
 
+@pytest.mark.slow
 def test_cyclic_modes_are_those_of_the_whole_body(gear, sector, whole):
     """Every natural frequency of the whole gear on a foundation, by nodal diameter, to 1e-4."""
     from scipy.sparse.linalg import LinearOperator, eigsh

@@ -40,6 +40,7 @@ LONG = {
     "iso_stiffness",
     "pin_error_lobes",
     "relief_map",
+    "relief_shape",
     "six_bolts",
     "sound_to_wav",
     "speed_sweep",

@@ -240,6 +240,7 @@ def test_load_sharing_under_negative_torque_keeps_the_planet_numbers(quick_case,
     assert shares[1] < 0.27 and shares[0] == pytest.approx(shares[2], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_housing_modulation(quick_case, tmp_path, monkeypatch):
     import pyvista as pv
 
@@ -440,6 +441,7 @@ def test_multistage_lists_the_readings_of_the_published_table(tmp_path):
     assert len(rows) == 2 * (17 + 16 + 21 + 20)
 
 
+@pytest.mark.slow
 def test_multistage_writes_its_tables_and_figures(tmp_path):
     done = run("multistage.py", "--points", "40", "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -458,6 +460,7 @@ def test_drivetrain_writes_spectra_and_pictures(tmp_path):
     assert len(forces["time [s]"]) == 3001 and np.ptp(forces["rotor speed [rad/s]"]) < 1e-2
 
 
+@pytest.mark.slow
 def test_drivetrain_takes_a_case_of_its_own(tmp_path):
     own = ROOT / "cases" / "own_chain.toml"
     done = run("drivetrain.py", own, "--duration", "0.2 s", "--modes", "0", "-o", tmp_path, folder=tmp_path)

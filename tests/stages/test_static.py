@@ -213,6 +213,7 @@ def test_an_offset_of_leads_is_no_deflection(case, straight):
     assert "W-DEFLECTION" not in said(offset)
 
 
+@pytest.mark.slow
 def test_modes_know_tilts_and_twists(case, straight):
     """Of the loaded state: wind-up and torsion are in series with the meshes."""
     soft = {"sun.torque_end": "front", "planet.tilt_stiffness": "1e4 N m/rad", **WIND_UP}

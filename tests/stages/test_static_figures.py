@@ -369,7 +369,7 @@ CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
     ("members", "more"),
     [
         ("fixed", {}),
-        ("elastic", {}),
+        pytest.param("elastic", {}, marks=pytest.mark.slow),
         ("fixed", SLICED),
         pytest.param("fixed", {**SLICED, **HELICAL}, marks=pytest.mark.slow),
     ],

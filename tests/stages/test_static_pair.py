@@ -83,7 +83,7 @@ def test_twice_the_size_under_eight_times_the_torque():
     assert (0.7 < first.root_worst / nominal).all() and (first.root_worst / nominal < 1.1).all()
 
 
-@pytest.mark.parametrize("changes", [{}, INTERNAL], ids=["external", "internal"])
+@pytest.mark.parametrize("changes", [{}, pytest.param(INTERNAL, marks=pytest.mark.slow)], ids=["external", "internal"])
 @pytest.mark.parametrize("torque", ["200 N m", "-200 N m"])
 @pytest.mark.parametrize("gear", ["gear_1", "gear_2"])
 def test_runout_turns_with_its_gear(gear, torque, changes):

@@ -116,11 +116,11 @@ def test_quantities_are_what_the_results_on_disk_hold(reused, whole):
     [
         # with the loaded state of the others, of which the latest few are kept
         {"static.members": "elastic"},
-        {"dynamics.up_to": "60 kHz"},
+        pytest.param({"dynamics.up_to": "60 kHz"}, marks=pytest.mark.slow),
         {"carrier.mass": "4 kg"},
         pytest.param({"operation.torque": "90 N m"}, marks=pytest.mark.slow),
         {"operation.torque": "-90 N m"},
-        {"ring.foundation_radial": "2e10 N/m^3"},
+        pytest.param({"ring.foundation_radial": "2e10 N/m^3"}, marks=pytest.mark.slow),
     ],
     ids=lambda changes: next(iter(changes)),
 )

@@ -54,6 +54,7 @@ def test_a_search_of_the_gears_and_its_continuation(gears, tmp_path):
     assert other.returncode == 4 and "E-JOURNAL" in other.stderr
 
 
+@pytest.mark.slow
 def test_a_search_that_is_killed_goes_on_with_the_same_command(gears, tmp_path):
     """By SIGTERM and kill -9 at random lines: the same files, nothing computed twice."""
     words = ["optimise", *gears, "--method", "global", "--samples", "20"]

@@ -322,6 +322,7 @@ def test_a_sample_repeats_by_itself_and_follows_its_laws(model):
     assert even.std() == pytest.approx(8e-6 / 12**0.5, rel=0.01)
 
 
+@pytest.mark.slow
 def test_over_a_turn_is_the_walk_over_as_many_periods(basis):
     small = tolerances(sun={"runout_amplitude": law("4 um")}, pin_errors={"tangential": law("1 um")})
     model = sample_model(basis, small, sun_torque=-TORQUE, positions=8)

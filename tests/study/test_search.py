@@ -228,6 +228,7 @@ KILLED = """
 """
 
 
+@pytest.mark.slow
 def test_a_killed_search_goes_on_and_repeats_nothing(case, tmp_path):
     journal = tmp_path / "journal.jsonl"
     code = textwrap.dedent(KILLED).format(tests=str(Path(__file__).parent), journal=str(journal))

@@ -173,6 +173,7 @@ def _outcomes(entries):
     return {(entry["place"], entry["change"]): entry["outcome"] for entry in entries}
 
 
+@pytest.mark.slow
 def test_a_campaign_finds_the_gaps_and_goes_on_when_tests_are_added(toy):
     before = {path: path.read_bytes() for path in toy.rglob("*") if path.is_file()}
     done, entries = _campaign(toy)

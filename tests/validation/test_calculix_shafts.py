@@ -26,7 +26,11 @@ _FACES = {
 }
 
 
-@pytest.mark.parametrize("shaft", [UNIFORM, SLENDER, ALL, HIGH], ids=["uniform", "slender", "all", "high"])
+@pytest.mark.parametrize(
+    "shaft",
+    [pytest.param(UNIFORM, marks=pytest.mark.slow), pytest.param(SLENDER, marks=pytest.mark.slow), ALL, HIGH],
+    ids=["uniform", "slender", "all", "high"],
+)
 def test_elements_fit_and_the_free_faces_are_the_surface(shaft):
     solid = round_solid(shaft)
     faces = Counter(

@@ -67,7 +67,9 @@ def test_bodies_without_overlap_are_refused():
     assert error.value.code == "E-SHAPE"
 
 
-@pytest.mark.parametrize("fraction", [-16 / 64, 0.0, 24 / 64])
+@pytest.mark.parametrize(
+    "fraction", [pytest.param(-16 / 64, marks=pytest.mark.slow), pytest.param(0.0, marks=pytest.mark.slow), 24 / 64]
+)
 def test_tooth_pair_on_coarse_grids(bodies, fraction):
     """Two bodies with element edges of a tenth of the contact's half width: 0.1 % in the approach."""
     ours, two = two_body.femgear_contact(bodies, fraction), two_body.two_body_contact(fraction)

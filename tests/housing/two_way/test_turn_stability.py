@@ -14,7 +14,14 @@ from femgear.solvers.stability.parametric import stability
 from validation.fixed_housing import EQUAL, excitation, gears, joined, thin_ring
 
 
-@pytest.mark.parametrize(("speed", "depth", "ratio"), [(100.0, 0.15, 2e-4), (100.0, 0.15, 1e-2), (170.0, 0.4, 2e-4)])
+@pytest.mark.parametrize(
+    ("speed", "depth", "ratio"),
+    [
+        pytest.param(100.0, 0.15, 2e-4, marks=pytest.mark.slow),
+        pytest.param(100.0, 0.15, 1e-2, marks=pytest.mark.slow),
+        (170.0, 0.4, 2e-4),
+    ],
+)
 def test_a_ring_that_turns_alone_is_the_same_in_both_frames(speed, depth, ratio):
     paths, ring = MeshPaths(37, EQUAL, 0.1, 3), thin_ring(0, foundation=2e10)
     structure = supported_ring(ring, (), max_diameter=0, max_frequency=1e6, damping_ratio=ratio)

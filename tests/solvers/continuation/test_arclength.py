@@ -136,7 +136,9 @@ def family(gap, rate=6.0):
     return curves
 
 
-@pytest.mark.parametrize("largest", [0.1, 0.3, 1.0])
+@pytest.mark.parametrize(
+    "largest", [pytest.param(0.1, marks=pytest.mark.slow), pytest.param(0.3, marks=pytest.mark.slow), 1.0]
+)
 @pytest.mark.parametrize("gap", GAPS)
 def test_endless_family_of_curves_with_large_steps(gap, largest):
     options = StepOptions(first=largest, largest=largest)

@@ -78,6 +78,7 @@ def test_one_harmonic_equals_the_closed_form():
     np.testing.assert_allclose(implicit, 0.18**2, rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_force_amplitude_as_parameter_reaches_the_same_solutions(eleven):
     found = parameter_curve(
         duffing, (0.02, 0.6), 1.2, harmonics=11, stability=False, scale=1.0, options=StepOptions(largest=0.2)
@@ -280,7 +281,7 @@ def test_two_masses_with_stops_are_followed_over_both_symmetry_losses(stops):
     assert stops.lines[0, 0, 1] == pytest.approx(linear, rel=1e-3)
 
 
-@pytest.mark.parametrize(("hertz", "leg"), [(105.0, "one"), (200.0, "top")])
+@pytest.mark.parametrize(("hertz", "leg"), [pytest.param(105.0, "one", marks=pytest.mark.slow), (200.0, "top")])
 def test_two_masses_with_stops_against_integration_in_time(stops, hertz, leg):
     """SciPy's integrator settles on the motions of the branch from starts that are 1 % off."""
     problem, (one, other), (top, _) = stops.equations.balance.problem, stops.branch_points, stops.folds

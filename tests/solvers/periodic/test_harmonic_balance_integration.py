@@ -83,7 +83,11 @@ def difference(solution, lines):
 
 @pytest.mark.parametrize(
     ("depth", "frequency", "backlash", "sides"),
-    [(0.3, 1.0, 1.0, 1), (0.3, 0.92, 1.0, 1), (0.5, 0.9, 0.1, 2)],
+    [
+        pytest.param(0.3, 1.0, 1.0, 1, marks=pytest.mark.slow),
+        pytest.param(0.3, 0.92, 1.0, 1, marks=pytest.mark.slow),
+        (0.5, 0.9, 0.1, 2),
+    ],
     ids=["one side", "deep separation", "both sides"],
 )
 def test_gear_pair_with_backlash(depth, frequency, backlash, sides):

@@ -39,7 +39,9 @@ def test_a_mesh_pulled_apart_does_not_converge(torque, frequency):
     assert NOTE in found.message and f"it needs {torque / 0.04:.4g} N" in found.message
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 1e-5, 1e-12])
+@pytest.mark.parametrize(
+    "tolerance", [pytest.param(1e-3, marks=pytest.mark.slow), pytest.param(1e-5, marks=pytest.mark.slow), 1e-12]
+)
 def test_no_tolerance_lets_it_through(tolerance):
     found = solve_harmonic_balance(pair(-120.0), 2.7e4, harmonics=8, tolerance=tolerance)
     assert not found.converged and NOTE in found.message

@@ -24,6 +24,7 @@ def oscillator(element, damping, force=0.0):
     return NonlinearSystem(system, (element,), (HarmonicForce([force]),) if force else ())
 
 
+@pytest.mark.slow
 def test_linear_oscillator_decays_with_its_damping():
     # omega_n = 2, zeta = 0.1: both exponents are -zeta omega_n
     problem = oscillator(GearMeshes([0], constant([4.0]), separates=False), 0.4, 0.3)

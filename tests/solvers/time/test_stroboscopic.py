@@ -33,6 +33,7 @@ def start_on(amplitude, omega):
 OPTIONS = {"steps": 64, "method": "modal", "tolerance": 1e-4, "least": 3, "most": 300}
 
 
+@pytest.mark.slow
 def test_jump_down_of_the_sweep_up(duffing):
     up = sweep_response(duffing, np.arange(1.255, 1.285, 0.005), start=start_on(2.75, 1.255), **OPTIONS)
     (jump,) = up.jumps()
@@ -112,6 +113,7 @@ def test_period_doubling_of_two_wells(force, period):
     assert section.repeats_after(2e-3) == period
 
 
+@pytest.mark.slow
 def test_bifurcation_diagram_carries_the_motion():
     diagram = bifurcation_diagram(
         two_wells, [0.20, 0.28], points=16, skip=100, steps=100, start=([1.0], [0.0]), tolerance=2e-3

@@ -168,6 +168,7 @@ def test_same_steps_by_the_general_integrator():
     assert (np.abs(run.motion - other.displacement) / size).max() < 1e-5
 
 
+@pytest.mark.slow
 def test_adaptive_integrator_and_order():
     """Forces of every mesh over the first contact losses; errors fall with the square of the step."""
     model, _, speed, problem = case = parting(torsional_model)

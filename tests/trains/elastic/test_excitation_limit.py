@@ -212,6 +212,7 @@ def held(case, **entries):
     return with_values(case, {"housing.support": [SUPPORT], "housing.published": [], "runup.count": 0} | entries)
 
 
+@pytest.mark.slow
 def test_a_ring_on_a_support_is_excited_as_far_as_on_its_foundation(case, static, modes):
     """The level at 1500 rpm is 30 m/s^2 with 12 mesh harmonics: most is of the modes of the meshes."""
     dynamics, found = levels(held(case, **{"operation.speeds": ["1500 rpm"]}), static, modes)

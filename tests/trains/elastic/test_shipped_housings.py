@@ -32,7 +32,7 @@ def test_they_are_the_reference_set_but_for_its_housing():
 @pytest.mark.parametrize(
     ("name", "heard", "forces"),
     [
-        ("on_six_bolts", ["between two bolts", "above a bolt, along the rim"], 12),
+        pytest.param("on_six_bolts", ["between two bolts", "above a bolt, along the rim"], 12, marks=pytest.mark.slow),
         ("in_a_casing", [f"sensor {i}" for i in range(1, 241)], 0),
     ],
 )

@@ -65,7 +65,7 @@ def test_the_paper_and_the_reference_set_are_one_set_with_another_excitation_and
     assert differ == {"title", "dynamics", "housing"}
 
 
-@pytest.mark.parametrize("torque", ["100 N m", "-60 N m"])
+@pytest.mark.parametrize("torque", [pytest.param("100 N m", marks=pytest.mark.slow), "-60 N m"])
 def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_supports(case, torque, steps):
     """0.01 rpm, whatever static.members shows: mean and fluctuation of all meshes, and the forces."""
     case = with_value(with_value(case, "operation.speeds", ["0.01 rpm"]), "operation.torque", torque)
@@ -329,6 +329,7 @@ def test_thick_teeth_wedge_without_any_other_error(case, steps):
     assert found.cycle.force[:3].min() > 2 * solve_static(coarse, steps=steps).cycle.force.max()
 
 
+@pytest.mark.slow
 def test_with_elastic_members_standstill_is_the_static_state_even_with_pin_errors(case, steps):
     """Unequal loads, every spring of the dynamic model in the static one: forces agree at 1 rpm."""
     for key, value in {

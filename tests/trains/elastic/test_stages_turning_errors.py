@@ -74,6 +74,7 @@ def test_every_line_is_that_of_time_integration_over_the_whole_record(three):
     assert error < 1e-4 and ours == pytest.approx(reference, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_a_record_over_more_periods_than_it_needs_changes_nothing(three):
     """Three times over: every third line, and in the housing the same lines, levels and sound."""
     case, modes, dynamics, housing = three

@@ -76,6 +76,7 @@ def test_flanks_that_part_as_in_the_dimensionless_pair(ratio):
     assert (known.at(2 * np.pi * TAU).min() < 1.0) == (ratio == 0.95)
 
 
+@pytest.mark.slow
 def test_contact_loss_against_integration_in_time():
     _, modes, dynamics = solved()
     s = 2

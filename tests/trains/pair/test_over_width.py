@@ -43,7 +43,7 @@ def helical(kind, angle, **more):
     return pair_case({**kind, **OPEN, **inside, "set.helix_angle": f"{angle} deg", **more})
 
 
-@KINDS
+@ONE_KIND
 def test_spur_slices_are_the_plane_pair(kind):
     plane, sliced = (solve_static(pair_case({**kind, **more})).cycle for more in ({}, SLICED))
     for name in ("deflection", "force", "stiffness"):
@@ -122,6 +122,7 @@ def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
         np.testing.assert_allclose(*loads, rtol=1e-8, atol=1e-9 * loads[1].max())
 
 
+@pytest.mark.slow
 @ONE_KIND
 def test_a_slope_loads_one_end_more_than_linear_teeth_would(kind):
     """ISO 6336-1: ``1 + F_by c_gamma b / (2 F)`` of full contact; slices resist a slope more than a load."""

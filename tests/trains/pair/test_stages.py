@@ -72,7 +72,11 @@ HELICAL = (
 CROWNED = (("static.slices", 9), ("gear_1.modifications", [{"kind": "lead crowning", "amount": "10 um"}]))
 
 
-@pytest.mark.parametrize("changes", [(), HELICAL, CROWNED], ids=["spur", "helical", "crowned"])
+@pytest.mark.parametrize(
+    "changes",
+    [pytest.param((), marks=pytest.mark.slow), HELICAL, pytest.param(CROWNED, marks=pytest.mark.slow)],
+    ids=["spur", "helical", "crowned"],
+)
 def test_slow_gears_follow_the_static_solution(changes):
     case = pair_case(**dict(changes), **{"operation.speeds": ["30 rpm"], "static.positions": 64})
     static = solve_static(case)

@@ -137,6 +137,7 @@ def test_wedging_begins_at_the_same_clearance_at_any_speed():
     np.testing.assert_array_equal(found.back[:, :3], 0.0)
 
 
+@pytest.mark.slow
 def test_weight_and_mesh_stiffness_together_agree_with_integration():
     coarse = nrel.extended_errors(((3, 8, 3),), speed=36.0, steps=100)
     fine = nrel.extended_errors(((3, 8, 3), (3, 3, 3)), speed=36.0, steps=200)
