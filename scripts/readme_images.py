@@ -44,6 +44,50 @@ class Run:
 # what a fixed housing changes most; its other pictures are of the kind of the reference set
 HOUSING = ("modulation_3100", "order_cuts", "order_spectrum_3100", "waterfall")
 
+# casing of the electric axle, sensors and a run-up
+AXLE_ON_FEET = """[gravity]
+
+[casing]
+mass = "22 kg"
+centre = ["40 mm", "0 mm", "80 mm"]
+inertia = ["0.3 kg m^2", "0.4 kg m^2", "0.35 kg m^2"]
+
+[[casing.foot]]
+name = "left front"
+position = ["-80 mm", "-100 mm", "0 mm"]
+stiffness = ["1e8 N/m", "2e8 N/m", "1e8 N/m"]
+
+[[casing.foot]]
+name = "right front"
+position = ["160 mm", "-100 mm", "0 mm"]
+stiffness = ["1e8 N/m", "2e8 N/m", "1e8 N/m"]
+
+[[casing.foot]]
+name = "left back"
+position = ["-80 mm", "-100 mm", "180 mm"]
+stiffness = ["1e8 N/m", "2e8 N/m", "1e8 N/m"]
+
+[[casing.foot]]
+name = "right back"
+position = ["160 mm", "-100 mm", "180 mm"]
+stiffness = ["1e8 N/m", "2e8 N/m", "1e8 N/m"]
+
+[[sensor]]
+name = "top"
+position = ["40 mm", "80 mm", "90 mm"]
+direction = "y"
+
+[[sensor]]
+name = "side"
+position = ["-80 mm", "0 mm", "90 mm"]
+direction = "x"
+
+[runup]
+from = "2000 rpm"
+to = "12000 rpm"
+count = 100
+"""
+
 
 def _case(name: str, title: str, shows: tuple[str, ...] = ("",)) -> Run:
     return Run(f"femgear run cases/{name}.toml", title, shows=shows)
@@ -83,6 +127,12 @@ RUNS = {
     "grc_like_drivetrain": _case("grc_like_drivetrain", "Drivetrain like that of the gearbox collaborative"),
     "own_chain": _case("own_chain", "A drivetrain to start from", ("campbell", "mesh_force", "transient_forces")),
     "e_axle": _case("e_axle", "Electric axle: shafts, bearings and two stages"),
+    "e_axle_on_feet": Run(
+        "femgear run cases/e_axle.toml",
+        "Electric axle on feet, over the speed",
+        entry=("[gravity]\n", AXLE_ON_FEET),
+        shows=("run_up_levels",),
+    ),
     "e_axle_in_a_casing": _case("e_axle_in_a_casing", "Electric axle in an elastic casing", ("mode_energy",)),
     "e_axle_casing": _script(
         "e_axle_casing.py",

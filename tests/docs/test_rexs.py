@@ -45,6 +45,24 @@ def test_a_unit_becomes_the_gearbox_of_the_page(tmp_path, monkeypatch, capsys):
     assert "K_Hbeta" in capsys.readouterr().out
 
 
+def test_a_unit_with_the_casing_of_the_page_has_a_sound(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    ParallelUnit().write(Path("unit.rexs"))
+    assert cli.main(["import", "unit.rexs", "-o", "box.toml"]) == 0
+    case = Path("box.toml")
+    casing = next(block for block in blocks("rexs.md") if block.startswith("[casing]"))
+    case.write_text(
+        case.read_text(encoding="utf-8") + "\n" + casing.replace("count = 100", "count = 2"), encoding="utf-8"
+    )
+    (commands,) = [one.splitlines() for one in blocks("rexs.md", "sh") if "--wav" in one]
+    run, export = (line.split()[1:] for line in commands)
+    assert cli.main([*run, "--no-pictures"]) == 0
+    assert cli.main([*export, "--duration", "0.1", "--run-up", "0.2"]) == 0
+    names = {path.name for path in Path("out/box/exported").glob("*.wav")}
+    assert len(names) == 2
+    assert "sensor_top_run_up.wav" in names
+
+
 def test_attributes_of_the_page_are_those_that_are_read():
     page, folder = (DOCS / "rexs.md").read_text(encoding="utf-8"), DOCS.parent / "femgear" / "exchange"
     files = (folder / f"{name}.py" for name in ("planetary_stage", "flank_modifications"))
@@ -67,6 +85,7 @@ def test_a_gearbox_is_written_as_the_page_says(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     ParallelUnit().write(Path("unit.rexs"))
     assert cli.main(["import", "unit.rexs", "-o", "box.toml"]) == 0
-    assert cli.main(blocks("rexs.md", "sh")[-1].split()[1:]) == 0
+    (command,) = [block for block in blocks("rexs.md", "sh") if block.startswith("femgear rexs box.toml")]
+    assert cli.main(command.split()[1:]) == 0
     assert cli.main(["import", "back.rexs", "-o", "again.toml"]) == 0
     assert len(tomllib.loads(Path("again.toml").read_text(encoding="utf-8"))["pair"]) == 2
