@@ -20,7 +20,6 @@ def thin():
     return rims.static_with(thin=True)
 
 
-@pytest.mark.slow
 def test_the_rim_is_one_module_thick(thin):
     ring = thin.planetary_set.ring
     assert ring.rim_radius - ring.root_radius == pytest.approx(ring.module, rel=1e-6)
@@ -45,6 +44,7 @@ def test_flanks_at_the_meshes_against_cubic_elements():
     assert rims.ring_comparison(**SIZES).flanks < 0.01
 
 
+@pytest.mark.slow
 def test_sun_side_load_moves_the_ring_side_flanks_of_the_planet():
     found = rims.planet_comparison(**SIZES)
     assert found.flanks < 0.01

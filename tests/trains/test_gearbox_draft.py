@@ -27,6 +27,7 @@ def test_a_new_gearbox_is_computed():
     assert (modes.frequency[1:] > 0.0).all()
 
 
+@pytest.mark.slow
 def test_teeth_bend_their_shafts_and_settle():
     case = read_case(new_case("gearbox", form=ToothForm(helix="15 deg")))
     found = solve_deflection(case)

@@ -38,7 +38,6 @@ def results(case, tmp_path_factory):
     return open_results(folder / "out")
 
 
-@pytest.mark.slow
 def test_stages_and_figures_of_a_run(results):
     assert results.stages == ("response", "sweep", "chaos") and results.manifest.complete
     pictures = {name for name in results.manifest.files if name.endswith(".png")}
