@@ -203,6 +203,7 @@ GEARBOX = Train(
             unavailable=_no_runup,
             verdict=_response_verdict,
             describe=lambda results: describe_gearbox_response(results.runup),
+            tables=lambda results: response_tables(results.runup),
             warnings=gearbox_response_warnings,
         ),
     ),

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from casings import casing_tables
 from small_gearbox import pair_tables
 
-from femgear.run import run_case
+from femgear.exchange.formats import Sampling
+from femgear.run import export_results, run_case
 from femgear.storage.results import run_folder
 from femgear.trains.gearbox.results import describe_deflection, describe_gearbox_modes, gearbox_verdict
 from femgear.trains.gearbox.stages import describe_gearbox
@@ -68,3 +70,20 @@ def test_the_verdict_names_the_worst_of_all_load_cases(results):
     assert rows["largest misalignment over the width"].endswith(f"stage, {worst}")
     assert f"{np.nanmax(results.deflection['face_load_factor'].values):.3f}" in rows["largest face load factor K_Hβ"]
     assert "stage mesh" in rows["mesh line nearest to a mode"]
+
+
+def test_a_run_on_feet_has_pictures_tables_and_signals_of_its_response(tmp_path):
+    tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
+    tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
+    tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
+    with run_folder(tmp_path / "run") as place:
+        run_case(read_case(tables), place)
+    results = open_results(tmp_path / "run")
+    names = {path.name for path in results.folder.iterdir()}
+    assert {"sensor_spectra.png", "run_up_levels.png", "run_up_forces.png"} <= names
+    page = (results.folder / "report.html").read_text(encoding="utf-8")
+    assert page.count("Largest lines at top") == 2
+    (tmp_path / "exported").mkdir()
+    files = export_results(results, tmp_path / "exported", ["wav", "uff"], Sampling(duration=0.1, run_up=0.1))
+    assert files == ["signals.uff", "modes.uff", "sensor_top_1000_rpm.wav", "sensor_top_run_up.wav"]
+    assert {path.name for path in (tmp_path / "exported").iterdir()} == {*files}
