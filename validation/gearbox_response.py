@@ -1,4 +1,4 @@
-"""Response of gearboxes: running planets against time integration, stages against the solution for gear sets."""
+"""Response of gearboxes: equal planets, and stages against the solution for gear sets."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 from casings import casing_tables
 from gearbox_equivalents import pair_of_rigid_gears_tables
-from running_twin import TURN, Twin, running, twin
+from running_twin import TURN, running, twin
 from small_gearbox import planetary_tables
 
 from femgear.case.gear_set import planetary_set
-from femgear.housing.two_way.running_planets import RunningResponse, RunningStage, solve_running
+from femgear.housing.two_way.running_planets import RunningStage, solve_running
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.stages.static import solve_static
@@ -22,58 +22,11 @@ from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.stage_structure import running_stage
 from femgear.trains.pair.model import pair_excitation, pair_model
 from femgear.trains.reading import read_case, with_values
-from validation.reference.running_in_time import TurningSystem, motion_over_a_turn
 from validation.rows import Row, at_most
 
-IN_TIME = "time integration, validation.reference.running_in_time"
 GEAR_SETS = "solution for gear sets, femgear.solvers.periodic.spectral"
-SAMPLES = 1024
-"""Angles of the carrier in a turn."""
 POSITIONS = 64
 """Positions of an excitation in the mesh period."""
-TWINS = {
-    "three planets in sequence": ((3, 13, 1), {}),
-    "three planets in sequence, backwards": ((3, 13, -1), {}),
-    "five planets": ((5, 12, 1), {}),
-    "three unequal planets": ((3, 13, 1), {"uneven": [1.0, 1.1, 0.9]}),
-}
-"""Planets, teeth of the ring and sense of the carrier, and what is out of the ordinary."""
-
-
-def orders_of(response: RunningResponse, shape: np.ndarray, count: int) -> np.ndarray:
-    """Amplitudes (k, count) at orders 0, 1, 2, ... of the carrier of places that the modes (m, k) move.
-
-    The mesh frequency is a multiple of the speed of the carrier; lines of one order add.
-    """
-    found = np.zeros((shape.shape[1], count), complex)
-    order = np.rint(response.frequency / response.carrier_speed).astype(int)
-    amplitude = response.lines(shape)
-    for (line, band), number in np.ndenumerate(order):
-        if abs(number) < count:
-            value = amplitude[line, band]
-            found[:, abs(number)] += value if number >= 0 else value.conj()
-    return found
-
-
-def apart_in_time(system: Twin, symmetry: int, side_bands: int = 6) -> float:
-    """Largest difference of the lines of the structure from time integration, over the largest line."""
-    size = len(system.mass)
-    motion = motion_over_a_turn(TurningSystem(system, TURN, 2), SAMPLES)[:size]
-    wanted = 2.0 * np.fft.rfft(motion, axis=1)[:, : SAMPLES // 2] / SAMPLES
-    known = {"harmonics": (2, 14), "side_bands": side_bands, "tolerance": 1e-13}
-    response = solve_running(running(system, symmetry=symmetry), system.teeth * TURN, TURN, **known)
-    met = orders_of(response, system.modes()[1].T, SAMPLES // 2)
-    return float(np.abs(met - wanted)[:, 1:].max() / np.abs(wanted[:, 1:]).max())
-
-
-def in_time() -> tuple[Row, ...]:
-    """Planets on uneven supports, as side bands of mesh harmonics and in axes at rest over one turn."""
-    rows = list[Row]()
-    for name, (sizes, options) in TWINS.items():
-        apart = apart_in_time(twin(*sizes, **options), 1 if options else sizes[0])
-        text = "lines of sun, carrier, ring and casing, largest difference over the largest line"
-        rows.append(at_most(name, IN_TIME, text, 1e-6, apart))
-    return tuple(rows)
 
 
 def equal_planets() -> tuple[Row, ...]:

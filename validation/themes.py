@@ -24,6 +24,7 @@ from validation import (
     gearbox,
     gearbox_carriers,
     gearbox_cross,
+    gearbox_in_time,
     gearbox_power,
     gearbox_response,
     gearbox_statics,
@@ -340,18 +341,23 @@ THEMES = (
         "gearbox_response",
         "Response of gearboxes",
         "Stages that fluctuate in shafts, bearings and casing. Planets run around between sun, carrier and ring on "
-        "uneven springs. Compared with: the same bodies in axes at rest, integrated over a turn by DOP853; the "
-        "solution for gear sets, on pairs and on planets whose carrier stands still; symmetry; power put in and lost; "
-        "inertia and forces of the casing; two stages whose stiffness fluctuates at once. Gates: 1e-6 in time; 1e-10 "
-        "of lines that symmetry forbids; 1e-9; a factor of two for the estimate of what one stage after the other "
-        "leaves out.",
+        "uneven springs, helical ones with tilts and gyroscopic terms in a casing beside their axis. Compared with: "
+        "the same bodies in axes at rest, integrated over a turn by DOP853; the solution for gear sets, on pairs and "
+        "on planets whose carrier stands still; symmetry; power put in and lost; inertia and forces of the casing; "
+        "two stages whose stiffness fluctuates at once. Gates: 1e-6 in time; 1e-10 of lines that symmetry forbids; "
+        "1e-9; a factor of two for the estimate of what one stage after the other leaves out.",
         (
             gearbox_response.equal_planets,
             gearbox_response.pair_on_bearings,
             gearbox_response.carrier_at_rest,
             gearbox_power.input_and_losses,
         ),
-        (gearbox_response.in_time, gearbox_power.casing_forces, gearbox_cross.two_stages),
+        (
+            gearbox_in_time.in_time,
+            gearbox_in_time.six_motions,
+            gearbox_power.casing_forces,
+            gearbox_cross.two_stages,
+        ),
     ),
     Theme(
         "moving",

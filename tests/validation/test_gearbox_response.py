@@ -9,10 +9,10 @@ from running_twin import TURN, running, twin
 from femgear.housing.two_way.running_planets import solve_running
 from femgear.trains.gearbox.stage_structure import running_stage
 from validation.gearbox_cross import rms
+from validation.gearbox_in_time import orders_of, turning_stage
 from validation.gearbox_power import Grid, out_of_balance, planets_in_a_casing, powers
 from validation.gearbox_response import (
     apart_from_gear_set,
-    orders_of,
     stage_in_casing,
     synthetic_excitation,
     without_loss,
@@ -76,3 +76,12 @@ def test_the_casing_is_out_of_balance_without_its_ring(monkeypatch):
 
 def test_rms_leaves_out_the_mean():
     assert rms(np.array([0.5 + 0.5j, 7.0, 0.5 - 0.5j])) == pytest.approx(1.0)
+
+
+def test_rows_of_a_stage_turn_with_its_carrier():
+    turning, stage, shape = turning_stage(back=False)
+    # the first mesh and pin of the structure, from waves and from the assembly at an angle
+    modal = np.tensordot(np.exp(1j * stage.waves * (0.3 + 1.1)), stage.shape, axes=(0, 1)).real
+    rows = turning.rows(1.1)[:, :18] @ shape.T
+    places = [0, 3, 8, 10]
+    assert rows[places] == pytest.approx(modal[[0, 1, 4, 6]], abs=1e-9 * np.abs(rows).max())

@@ -5,14 +5,14 @@ import pytest
 from running_twin import TURN, twin
 from scipy.integrate import solve_ivp
 
-from validation.reference.running_in_time import TurningSystem, motion_over_a_turn
+from validation.reference.running_in_time import motion_over_a_turn, turning_twin
 
 SAMPLES = 1024
 
 
 @pytest.fixture(scope="module")
 def motion():
-    system = TurningSystem(twin(3, 4), TURN, 2)
+    system = turning_twin(twin(3, 4), TURN, 2)
     return system, motion_over_a_turn(system, SAMPLES)
 
 
@@ -45,16 +45,16 @@ def test_another_turn_changes_nothing(motion):
 
 
 def test_rows_turn_once_with_the_carrier():
-    system = TurningSystem(twin(3, 4, -1), TURN, 2)
-    mean, cosine, sine = system.waves
+    bodies = twin(3, 4, -1)
+    mean, cosine, sine = turning_twin(bodies, TURN, 2).waves
     for theta in (0.3, 2.0, 5.1):
         rows = mean + np.cos(theta) * cosine + np.sin(theta) * sine
-        assert rows == pytest.approx(system.twin.whole_rows(theta), abs=1e-12)
+        assert rows == pytest.approx(bodies.whole_rows(theta), abs=1e-12)
 
 
 def test_signals_are_those_of_the_excitation_but_for_means():
     drive = twin(3, 4).excitation
-    system = TurningSystem(twin(3, 4), TURN, 30)
+    system = turning_twin(twin(3, 4), TURN, 30)
     positions = drive.stiffness.shape[1]
     stiffness, deflection, force = system.signals(2.0 * np.pi * 5 / positions / 4)
     assert stiffness == pytest.approx(drive.stiffness[:, 5])

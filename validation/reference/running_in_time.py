@@ -15,6 +15,9 @@ from functools import cached_property
 import numpy as np
 from running_twin import Twin
 from scipy.integrate import solve_ivp
+from scipy.linalg import block_diag
+
+from femgear.system.system import MeshExcitation
 
 _TOLERANCE = 1e-10
 """Error of a step over the size of the state."""
@@ -22,62 +25,93 @@ _TOLERANCE = 1e-10
 
 @dataclass(frozen=True)
 class TurningSystem:
-    """A twin whose carrier turns at a speed, with so many mesh harmonics of its excitation.
+    """Bodies at rest and planets between them, whose springs turn with the carrier.
 
     Parameters
     ----------
-    twin : Twin
-        Structure and planets.
+    rows : callable
+        Gives the approaches (R, n) of all meshes, then of all other springs, at an angle of the carrier.
+    mass, damping, stiffness : (n, n) arrays
+        Of all coordinates without these springs; gyroscopic terms are in the damping.
+    springs, viscous : (R - J,) arrays
+        Stiffness and damping of the springs behind the meshes.
+    excitation : MeshExcitation
+        Of the J meshes.
+    teeth : int
+        Mesh periods in a turn of the carrier.
     speed : float
         Of the carrier, positive [rad/s].
     harmonics : int
         Of mesh stiffness, deflection and force.
     """
 
-    twin: Twin
+    rows: Callable[[float], np.ndarray]
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    springs: np.ndarray
+    viscous: np.ndarray
+    excitation: MeshExcitation
+    teeth: int
     speed: float
     harmonics: int
 
     @cached_property
     def waves(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Approaches (4 N, n): mean, and factors of cosine and sine of the angle of the carrier."""
-        a, b, c = (self.twin.whole_rows(angle) for angle in (0.0, 0.5 * np.pi, np.pi))
+        """Approaches (R, n): mean, and factors of cosine and sine of the angle of the carrier."""
+        a, b, c = (self.rows(angle) for angle in (0.0, 0.5 * np.pi, np.pi))
         mean = 0.5 * (a + c)
         return mean, 0.5 * (a - c), b - mean
 
     def signals(self, theta: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Stiffness, deflection and force (2 N,) of the meshes at an angle of the carrier, the latter without mean."""
-        phase = np.exp(1j * np.arange(1, self.harmonics + 1) * self.twin.teeth * theta)
+        """Stiffness, deflection and force (J,) of the meshes at an angle of the carrier, the latter without mean."""
+        phase = np.exp(1j * np.arange(1, self.harmonics + 1) * self.teeth * theta)
         stiffness, deflection, force = (2.0 * np.real(lines[:, 1:] @ phase) for lines in self._lines)
         return self._lines[0][:, 0].real + stiffness, deflection, force
 
     @cached_property
     def _lines(self) -> list[np.ndarray]:
-        drive = self.twin.excitation
-        arrays = (drive.stiffness, drive.deflection, drive.force)
+        arrays = (self.excitation.stiffness, self.excitation.deflection, self.excitation.force)
         return [np.fft.rfft(array, axis=1)[:, : self.harmonics + 1] / array.shape[1] for array in arrays]
+
+    @cached_property
+    def _inverse(self) -> np.ndarray:
+        return np.linalg.inv(self.mass)
 
     def equations(self, theta: float) -> tuple[np.ndarray, np.ndarray]:
         """State matrix (2n, 2n) and its drive (2n,) over the angle of the carrier; velocities are over the speed."""
-        twin, omega = self.twin, self.speed
+        omega, n = self.speed, len(self.mass)
         mean, cosine, sine = self.waves
         rows = mean + np.cos(theta) * cosine + np.sin(theta) * sine
         slope = np.cos(theta) * sine - np.sin(theta) * cosine
-        count, size, n = len(twin.angles), len(twin.mass), rows.shape[1]
         stiffness, deflection, force = self.signals(theta)
-        springs = np.concatenate([stiffness, np.repeat(twin.springs[2:], count)])
-        dampers = np.concatenate([np.zeros(2 * count), np.repeat(twin.viscous[2:], count)])
-        K = rows.T @ (springs[:, None] * rows + omega * dampers[:, None] * slope)
-        C = rows.T @ (dampers[:, None] * rows)
-        K[:size, :size] += twin.stiffness
-        C[:size, :size] += twin.damping
-        mass = twin.whole_mass[:, None]
+        meshes = len(stiffness)
+        springs, dampers = np.append(stiffness, self.springs), np.append(np.zeros(meshes), self.viscous)
+        K = self.stiffness + rows.T @ (springs[:, None] * rows + omega * dampers[:, None] * slope)
+        C = self.damping + rows.T @ (dampers[:, None] * rows)
         matrix = np.zeros((2 * n, 2 * n))
         matrix[:n, n:] = np.eye(n)
-        matrix[n:, :n], matrix[n:, n:] = -K / (mass * omega**2), -C / (mass * omega)
+        matrix[n:, :n], matrix[n:, n:] = -self._inverse @ K / omega**2, -self._inverse @ C / omega
         drive = np.zeros(2 * n)
-        drive[n:] = -rows[: 2 * count].T @ (force - stiffness * deflection) / (mass[:, 0] * omega**2)
+        drive[n:] = -self._inverse @ rows[:meshes].T @ (force - stiffness * deflection) / omega**2
         return matrix, drive
+
+
+def turning_twin(twin: Twin, speed: float, harmonics: int) -> TurningSystem:
+    """Make the turning system of a twin."""
+    count, none = len(twin.angles), np.zeros((3 * len(twin.angles),) * 2)
+    return TurningSystem(
+        twin.whole_rows,
+        np.diag(twin.whole_mass),
+        np.asarray(block_diag(twin.damping, none)),
+        np.asarray(block_diag(twin.stiffness, none)),
+        np.repeat(twin.springs[2:], count),
+        np.repeat(twin.viscous[2:], count),
+        twin.excitation,
+        twin.teeth,
+        speed,
+        harmonics,
+    )
 
 
 def motion_over_a_turn(system: TurningSystem, samples: int) -> np.ndarray:
@@ -91,7 +125,6 @@ def motion_over_a_turn(system: TurningSystem, samples: int) -> np.ndarray:
         change[:, -1] += drive
         return change.ravel()
 
-    # drives move by micrometres, and must not drown in the tolerance of unit states
     unit = np.hstack([np.eye(2 * n), np.zeros((2 * n, 1))])
     ends = _integrated(rate, unit.ravel(), np.array([2.0 * np.pi])).reshape(2 * n, -1)
     start = np.linalg.solve(np.eye(2 * n) - ends[:, :-1], ends[:, -1])
