@@ -88,7 +88,7 @@ class BallBearing:
             _refuse("youngs_modulus", (self.youngs_modulus, self.poisson_ratio), "modulus above 0, ratio 0 to 0.5")
         if self.clearance >= 2.0 * self.groove_distance * math.cos(self.contact_angle) and self.clearance > 0.0:
             limit = 2.0 * self.groove_distance * math.cos(self.contact_angle)
-            _refuse("clearance", self.clearance, f"below {limit:.4g} m: the balls must reach both grooves")
+            _refuse("clearance", self.clearance, f"below {1e3 * limit:.4g} mm: the balls must reach both grooves")
 
     @property
     def elements(self) -> int:

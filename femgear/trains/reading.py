@@ -34,6 +34,7 @@ if TYPE_CHECKING:
 
 _MOST_UNREAD = 20
 """Files of a case that are refused at once."""
+_REXS = (".rexs", ".rexsj", ".rexsz")
 
 
 def read_case(source: str | os.PathLike | Mapping[str, Any]) -> Any:
@@ -62,7 +63,10 @@ def read_case(source: str | os.PathLike | Mapping[str, Any]) -> Any:
     if not isinstance(source, str | os.PathLike):
         limit = "the path of a case file, its text or its tables"
         raise CaseError(f"a case is read from no {type(source).__name__}", code="E-TYPE", limit=limit)
-    return parse_case(case_text.read_text(source), name=os.fsdecode(source))
+    if os.path.splitext(name := os.fsdecode(source))[1].lower() in _REXS:
+        remedy = f"femgear import {name} writes cases of its gears"
+        raise CaseError("a REXS file is no case", code="E-FILE", file=name, limit="a TOML file", remedy=remedy)
+    return parse_case(case_text.read_text(source), name=name)
 
 
 def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:

@@ -535,3 +535,10 @@ def _root_radius_code(case, value):
     except GeometryError as error:
         return error.code
     return None
+
+
+@pytest.mark.parametrize("ending", [".rexs", ".REXSZ"])
+def test_a_rexs_file_is_to_be_imported(ending, tmp_path):
+    with pytest.raises(CaseError) as error:
+        read_case(tmp_path / f"unit{ending}")
+    assert error.value.code == "E-FILE" and "femgear import" in error.value.remedy

@@ -83,7 +83,15 @@ def _tables(value: object) -> object:
 
 def _axis_vector(value: object) -> object:
     """Vector of an axis in a word, x, y or z, which a minus sign may turn round."""
-    return DIRECTION_VECTORS.get(value, value) if isinstance(value, str) else value
+    if isinstance(value, str) and value not in DIRECTION_VECTORS:
+        raise CaseError(
+            "there is no such direction",
+            code="E-CHOICE",
+            value=value,
+            limit=f"{', '.join(DIRECTION_VECTORS)}, or a vector of three numbers",
+            remedy='write direction = "y", or direction = [0.0, 1.0, 0.0]',
+        )
+    return DIRECTION_VECTORS[value] if isinstance(value, str) else value
 
 
 Name = Annotated[str, BeforeValidator(_name)]
@@ -539,7 +547,10 @@ class DeflectionSection(Section):
 
 
 class BoxModesSection(Section):
-    """Modes: their highest frequency, damping, speeds of the Campbell diagram."""
+    """Modes: their highest frequency, damping, speeds of the Campbell diagram.
+
+    The lowest 20 modes are kept at least, whatever ``up_to`` is.
+    """
 
     up_to: Annotated[float, Quantity(FREQUENCY, 1.0, 1e6)] | None = None
     damping_ratio: DampingRatio = 0.03
@@ -614,6 +625,11 @@ class GearboxCase(Section, ReadCase):
     def material_of(self, shaft: BoxShaftSection) -> ShaftMaterialSection:
         """Find the material of a shaft."""
         return shaft.material or self.material
+
+
+def named_load_case(name: str) -> str:
+    """Write a load case in a sentence: its name after the words "load case", once where it begins with them."""
+    return name if name.lower().startswith("load case") else f"load case {name}"
 
 
 @lru_cache(maxsize=64)

@@ -21,6 +21,7 @@ from femgear.trains.gearbox.case_file import (
 )
 from femgear.trains.gearbox.casing_checks import check_casing
 from femgear.trains.gearbox.elastic_carrier import superelement_problems
+from femgear.trains.gearbox.entry_checks import coupling_problems, massless_bodies, run_up_problems
 from femgear.trains.gearbox.geometry import (
     DISTANCE_TOLERANCE,
     StageSizes,
@@ -49,8 +50,10 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     named = [*_names(case), *_references(case)]
     stages, loads = [*_stages(case)], [*_loads(case)]
     problems = [*named, *_seats(case), *_bearings(case), *_shaft_parts(case), *stages, *loads, *_weight(case)]
+    problems += [*coupling_problems(case), *run_up_problems(case)]
     problems += [] if named else check_casing(case)
-    return [*problems, *_held(case, problems)]
+    # what has no mass turns and is held as what has
+    return [*problems, *([] if named else massless_bodies(case)), *_held(case, problems)]
 
 
 def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseError]:
@@ -106,29 +109,29 @@ def _weight(case: GearboxCase) -> Iterator[CaseError]:
 def _names(case: GearboxCase) -> Iterator[CaseError]:
     """One name, one part: of shafts, of loads and bearings, of stages."""
     kinds = {
-        "shaft": [(f"shaft[{i}].name", one.name) for i, one in enumerate(case.shaft)],
-        "seat": [
-            (f"{kind}[{i}].name", one.name)
+        "shaft": [(f"shaft[{i}]", one.name) for i, one in enumerate(case.shaft)],
+        "load, bearing and mass": [
+            (f"{kind}[{i}]", one.name)
             for kind in ("load", "bearing", "mass")
             for i, one in enumerate(getattr(case, kind))
             if one.name is not None
         ],
         "stage": [
-            (f"{kind}[{i}].name", one.name)
+            (f"{kind}[{i}]", one.name)
             for kind in ("pair", "planetary")
             for i, one in enumerate(getattr(case, kind))
         ],
-        "load case": [(f"operation.load_case[{i}].name", one.name) for i, one in enumerate(case.operation.load_case)],
+        "load case": [(f"operation.load_case[{i}]", one.name) for i, one in enumerate(case.operation.load_case)],
     }
     for kind, entries in kinds.items():
         known: dict[str, str] = {CASING: ""} if kind == "shaft" else {}
         for key, name in entries:
             if name in known:
-                first = f"that of {known[name]}" if known[name] else "the word for the casing"
+                whose = f"that of {known[name]} already" if known[name] else "the word for the casing"
                 yield CaseError(
-                    f"the name is {first} already",
+                    f"the name is {whose}",
                     code="E-DUPLICATE",
-                    key=key,
+                    key=f"{key}.name",
                     value=name,
                     remedy=f"give every {kind} a name of its own",
                 )
@@ -170,7 +173,7 @@ def port_names(case: GearboxCase) -> list[str]:
 
 def _unknown(key: str, name: str, known: list[str], table: str, others: str = "") -> Iterator[CaseError]:
     if name not in known:
-        limit = ", ".join(known[:20]) or f"none: the case has no {table}"
+        limit = ", ".join([*dict.fromkeys(known)][:20]) or f"none: the case has no {table}"
         yield no_such("part", key, name, known, f"name a {table}{others}", limit=limit)
 
 
@@ -290,6 +293,9 @@ def _refused(bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
         rolling_bearing(bearing)
     except CaseError as error:
         entry = names.get(error.key or "", error.key or "kind")
+        if entry == "clearance" and isinstance(error.value, float):
+            error.message, error.value = "the clearance is too large for the grooves", LENGTH.show(error.value)
+            error.remedy = error.remedy or 'give the radial clearance of the catalogue in its unit, as in "20 um"'
         yield refused_at(error, f"{key}.{entry}")
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from femgear.case.quantities import LENGTH
 from femgear.errors import CaseError, ConvergenceError
 from femgear.gears.shaft_graph import connected_sets
-from femgear.trains.gearbox.case_file import CASING, FORCE, BoxBearingSection, GearboxCase, PairSection
+from femgear.trains.gearbox.case_file import CASING, FORCE, BoxBearingSection, GearboxCase, PairSection, named_load_case
 from femgear.trains.gearbox.geometry import pair_sizes, set_sizes
 from femgear.trains.gearbox.power import BoxFlow
 
@@ -208,7 +208,7 @@ def _untaken(case: GearboxCase, number: int, thrust: float, load_case: str) -> C
             told = f"{bearing.name or key} takes thrust towards {'+z' if senses(bearing)[0] else '-z'} alone"
             break
     return CaseError(
-        f"nothing takes the thrust on shaft {name} towards {way} in load case {load_case}",
+        f"nothing takes the thrust on shaft {name} towards {way} in {named_load_case(load_case)}",
         code="E-MECHANISM",
         key=key,
         value=f"{FORCE.show(abs(thrust))} towards {way}; {told}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from femgear.case.quantities import TORQUE
 from femgear.errors import CaseError, FemgearError
 from femgear.gears.kinematics import willis_weights
 from femgear.gears.power_flow import pair_condition, planetary_condition, power_flow
@@ -154,6 +155,8 @@ def _locate(error: FemgearError, case: GearboxCase, load_case: LoadCaseSection) 
     for problem in (error, *getattr(error, "problems", ())):
         if isinstance(problem, CaseError) and not problem.key:
             problem.key = _KEYS.get(problem.code, "operation.load_case[{}].speed").format(number)
+        if problem.code == "E-LOAD-BALANCE" and isinstance(problem.value, float):
+            problem.value = TORQUE.show(problem.value)
 
 
 def turns_in_words(frequencies: StageFrequencies) -> str:

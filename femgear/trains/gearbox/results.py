@@ -18,7 +18,7 @@ from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
 from femgear.system.assembly import MOTIONS
-from femgear.trains.gearbox.case_file import GearboxCase
+from femgear.trains.gearbox.case_file import GearboxCase, named_load_case
 from femgear.trains.gearbox.casing_file import casing_notices
 from femgear.trains.gearbox.casing_results import (
     casing_coordinates,
@@ -429,7 +429,7 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
     at = int(data.attrs["load_case"])
     one = data.isel(load_case=at)
     count = data.sizes["load_case"]
-    name = f" in load case {data['load_case'].values[at]}" if count > 1 else ""
+    name = f" in {named_load_case(str(data['load_case'].values[at]))}" if count > 1 else ""
     meshes = {
         "mesh": lambda i: str(data["mesh"].values[i]),
         "force [N]": lambda i: f"{float(one['mesh_force'].values[i]):.5g}",
@@ -479,7 +479,7 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
     names = [str(name) for name in data["load_case"].values]
     open_cases = [name for name, settled in zip(names, data["settled"].values, strict=True) if not settled]
     if open_cases:
-        text = f"the misalignment of the meshes has not settled in load case {', '.join(open_cases[:5])}"
+        text = f"the misalignment of the meshes has not settled in {named_load_case(', '.join(open_cases[:5]))}"
         yield Finding("W-PASSES", "deflection.passes", text, remedy="allow more passes")
     if "displacement" in data:
         yield from _large(data)
@@ -515,7 +515,7 @@ def _idle_planets(data: xr.Dataset) -> Iterator[Finding]:
         for case in np.flatnonzero(np.isfinite(factor)):
             idle = [meshes[number] for number in own if force[case, number] <= _IDLE * force[case, own].max()]
             if idle:
-                text = f"{', '.join(idle)} carry nothing in load case {data['load_case'].values[case]}"
+                text = f"{', '.join(idle)} carry nothing in {named_load_case(str(data['load_case'].values[case]))}"
                 remedy = "smaller errors of the pins, or members that give way"
                 yield Finding("W-OPEN", "operation.load_case", text, remedy=remedy)
 
@@ -526,8 +526,8 @@ def _large(data: xr.Dataset) -> Iterator[Finding]:
     if (largest := np.nan_to_num(approach).max(initial=0.0)) > _LARGEST_APPROACH:
         case, mesh = np.unravel_index(int(np.nan_to_num(approach).argmax()), approach.shape)
         text = (
-            f"the flanks of {data['mesh'].values[mesh]} approach by {largest:.3g} of their base pitch in load case "
-            f"{data['load_case'].values[case]}: no teeth carry that"
+            f"the flanks of {data['mesh'].values[mesh]} approach by {largest:.3g} of their base pitch in "
+            f"{named_load_case(str(data['load_case'].values[case]))}: no teeth carry that"
         )
         limit = f"{_LARGEST_APPROACH:g} of it"
         severity = FAULT if largest > _FAR * _LARGEST_APPROACH else DOUBT
@@ -536,8 +536,8 @@ def _large(data: xr.Dataset) -> Iterator[Finding]:
     if tilts.max(initial=0.0) > _LARGEST_TILT:
         case, station, _ = np.unravel_index(int(tilts.argmax()), tilts.shape)
         text = (
-            f"{data['station'].values[station]} tilts by {1e3 * tilts.max():.3g} mrad in load case "
-            f"{data['load_case'].values[case]}: the model is one of small motions"
+            f"{data['station'].values[station]} tilts by {1e3 * tilts.max():.3g} mrad in "
+            f"{named_load_case(str(data['load_case'].values[case]))}: the model is one of small motions"
         )
         remedy = "less torque, or stiffer shafts and bearings"
         severity, limit = FAULT if tilts.max() > _FAR * _LARGEST_TILT else DOUBT, f"{1e3 * _LARGEST_TILT:g} mrad"

@@ -7,7 +7,7 @@ from small_gearbox import TEETH, pair_tables
 
 from femgear.case import text as case_text
 from femgear.errors import CaseError
-from femgear.trains.gearbox.case_file import teeth_of
+from femgear.trains.gearbox.case_file import named_load_case, teeth_of
 from femgear.trains.reading import read_case, to_toml
 
 
@@ -57,3 +57,16 @@ def test_refusals_name_the_entry(change, key):
     with pytest.raises(CaseError) as error:
         read_case(tables)
     assert key in str(error.value)
+
+
+def test_a_direction_that_is_none_is_told_those_that_are():
+    tables = pair_tables() | {"sensor": [{"name": "top", "direction": "up"}]}
+    with pytest.raises(CaseError) as error:
+        read_case(tables)
+    assert (error.value.key, error.value.value) == ("sensor[0].direction", "up")
+    assert "x, -x, y, -y, z, -z" in error.value.limit
+
+
+def test_the_words_load_case_stand_once_in_a_sentence():
+    assert named_load_case("Load case 1") == "Load case 1"
+    assert named_load_case("nominal") == "load case nominal"

@@ -132,6 +132,26 @@ def test_the_right_outer_position_is_offered():
     assert '"65 mm"' in str(problems(tables)["bearing[1].outer_position"])
 
 
+def test_refusals_speak_the_words_of_the_file():
+    tables = pair_tables()
+    CHANGES["bearing[3].clearance"][0](tables)
+    tables["bearing"][3]["clearance"] = "1 mm"
+    tables["load"][1]["name"] = "motor"
+    with pytest.raises(CaseError) as error:
+        read_case(tables)
+    told = {(one.code, one.key): one for one in error.value.problems}
+    twice = told["E-DUPLICATE", "load[1].name"]
+    assert "load[0] already" in twice.message and "every load, bearing and mass" in twice.remedy
+    assert told["E-BEARING", "bearing[3].clearance"].value == "1 mm"
+    assert told["E-CHOICE", "operation.output"].limit == "motor"
+
+
+def test_an_output_that_is_missing_is_told_in_newton_metres():
+    tables = pair_tables()
+    tables["operation"]["output"] = []
+    assert problems(tables)["operation.output"].value == "100 N m"
+
+
 def test_shares_of_the_time_are_at_most_the_whole():
     tables = pair_tables()
     one = tables["operation"]["load_case"][0]
