@@ -54,6 +54,7 @@ CATALOGUE = {
     "W-NEIGHBOURS": (NOTE, "Neighbouring planets come close to one another."),
     "W-ONE-WAY": (NOTE, "Supports or a casing change the level that load factors are computed without."),
     "W-OPEN": (NOTE, "A planet carries nothing at some positions."),
+    "W-OVERLAP": (DOUBT, "Shafts and gears take up the same space."),
     "W-PARTED": (NOTE, "Teeth never touch."),
     "W-PLANETS": (NOTE, "Planets are not equally spaced, or their number is unusual."),
     "W-PLAY": (DOUBT, "Bearings that carry nothing hold nothing: shafts float in their play."),

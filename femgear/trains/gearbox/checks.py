@@ -117,9 +117,7 @@ def _names(case: GearboxCase) -> Iterator[CaseError]:
             if one.name is not None
         ],
         "stage": [
-            (f"{kind}[{i}]", one.name)
-            for kind in ("pair", "planetary")
-            for i, one in enumerate(getattr(case, kind))
+            (f"{kind}[{i}]", one.name) for kind in ("pair", "planetary") for i, one in enumerate(getattr(case, kind))
         ],
         "load case": [(f"operation.load_case[{i}]", one.name) for i, one in enumerate(case.operation.load_case)],
     }

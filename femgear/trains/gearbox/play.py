@@ -96,7 +96,8 @@ def play_findings(data: xr.Dataset) -> Iterator[Finding]:
         more = f" and {len(names) - _MOST_NAMED} more" if len(names) > _MOST_NAMED else ""
         text = (
             f"bearing{'s' * (len(names) > 1)} {', '.join(names[:_MOST_NAMED])}{more}: nothing presses the shaft into "
-            f"the play, which leaves it free {' and '.join(ways)} in {named_load_case(str(name))}; modes of that are at 0 Hz"
+            f"the play, which leaves it free {' and '.join(ways)} in {named_load_case(str(name))}; modes of "
+            "that are at 0 Hz"
         )
         remedy = "give weight ([gravity]), preload or less clearance, or a load that presses"
         yield Finding("W-PLAY", "bearing", text, remedy=remedy)

@@ -31,6 +31,7 @@ from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_
 from femgear.trains.gearbox.life import describe_load_cases, life_text, life_variables, shortest_life
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
 from femgear.trains.gearbox.modes import GearboxModes
+from femgear.trains.gearbox.overlaps import overlaps
 from femgear.trains.gearbox.play import play_findings, slack_bearings
 from femgear.trains.gearbox.sensors import (
     describe_sensors,
@@ -39,6 +40,7 @@ from femgear.trains.gearbox.sensors import (
     sensor_notices,
     static_sensor_variables,
 )
+from femgear.trains.gearbox.silence import idle_entries
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -570,13 +572,15 @@ def describe_gearbox_modes(data: xr.Dataset) -> Block:
 
 
 def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
-    """List what of a gearbox case deserves a look: entries of teeth that have no effect, missing weight."""
+    """List what of a gearbox case deserves a look: entries that have no effect, bodies that overlap."""
     if not case.deflection.contact and any(stage.teeth is not None for stage in (*case.pair, *case.planetary)):
         text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
         yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")
     yield from _given_planets(case)
     yield from casing_notices(case)
     yield from sensor_notices(case)
+    yield from idle_entries(case)
+    yield from overlaps(case)
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
             given = _without_effect(stage.teeth or {})

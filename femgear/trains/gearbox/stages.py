@@ -13,7 +13,6 @@ from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_ver
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import check_held, solve_deflection
-from femgear.trains.gearbox.model import gearbox_model
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
 from femgear.trains.gearbox.response import reference_shaft, solve_gearbox_response
@@ -37,6 +36,7 @@ from femgear.trains.gearbox.results import (
 from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_speeds
 from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors
 from femgear.trains.gearbox.signals import GEARBOX_RECORDED
+from femgear.trains.gearbox.silence import why_silent
 
 
 @one_blas_thread()
@@ -93,16 +93,8 @@ def solve_box_runup(
     return GearboxResponseResult(found, whole=False, unresolved=missed)
 
 
-def _silent(case: GearboxCase) -> str:
-    """Tell why a case has no response, empty where it has one."""
-    if not case.deflection.contact or not any(stage.teeth for stage in (*case.pair, *case.planetary)):
-        return "no stage has computed teeth that excite it"
-    model = gearbox_model(case)
-    return "" if model.flow.speed[reference_shaft(model)] else "nothing turns"
-
-
 def _no_runup(case: GearboxCase) -> str:
-    return _silent(case) or ("" if case.runup.count else "[runup] gives no speeds")
+    return why_silent(case) or ("" if case.runup.count else "[runup] gives no speeds")
 
 
 def check_before_run(case: GearboxCase) -> None:
@@ -186,8 +178,8 @@ GEARBOX = Train(
             solve=solve_box_dynamics,
             takes=("deflection",),
             options=("progress", "steps"),
-            wanted=lambda case: not _silent(case),
-            unavailable=_silent,
+            wanted=lambda case: not why_silent(case),
+            unavailable=why_silent,
             verdict=_response_verdict,
             describe=lambda results: describe_gearbox_response(results.dynamics),
             tables=lambda results: response_tables(results.dynamics),

@@ -81,9 +81,7 @@ def test_planets_on_stiff_pins_are_the_mass_of_their_carrier(bearing, refused):
 def test_a_rigid_coupling_shares_the_mass(motions, entries, refused):
     tables = pair_tables() | {"motions": motions}
     tables["shaft"].append({"name": "flange"})
-    tables["bearing"].append(
-        {"shaft": "flange", "radial": "1e8 N/m", "axial": "1e8 N/m", "tilt": "1e6 N m/rad"}
-    )
+    tables["bearing"].append({"shaft": "flange", "radial": "1e8 N/m", "axial": "1e8 N/m", "tilt": "1e6 N m/rad"})
     tables["coupling"] = [{"between": ["flange", "input"], "positions": ["0 mm", "0 mm"]} | entries]
     assert ("shaft[2].part" in problems(tables)) is refused
 

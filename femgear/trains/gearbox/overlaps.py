@@ -1,0 +1,195 @@
+"""Shafts and gears of a gearbox that take up the same space: real ones of these sizes cannot be put together.
+
+Shafts are bodies of revolution, linear in z between the ends of their parts. Two of one axis overlap where neither
+fits into the bore of the other; two of parallel axes where their outer radii reach further than the axes are apart,
+unless one lies in the bore of the other. Gears are cylinders of their tip circle over their face width, the planets of
+a set the circle around which their tips go. Where teeth are not given the addendum is one module, the dedendum 1.25
+of them (ISO 53). Rigid bodies have no sizes and are not judged.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from femgear.case.gear_set import planetary_set
+from femgear.case.quantities import LENGTH
+from femgear.findings import Finding
+from femgear.trains.gearbox.case_file import (
+    CASING,
+    BoxPlanetarySection,
+    BoxShaftSection,
+    GearboxCase,
+    PairSection,
+    teeth_of,
+)
+from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, pair_sizes, planet_radius, set_sizes
+
+_WIDER = 0.05
+"""Share by which a shaft may be wider than the bore of the teeth that sit on it."""
+_ADDENDUM, _DEDENDUM = 1.0, 1.25
+"""Of gears whose teeth are not given, in modules: ISO 53, profile A."""
+
+
+@dataclass(frozen=True)
+class Cylinder:
+    """A gear as it stands beside shafts.
+
+    Parameters
+    ----------
+    key : str
+        Entry of its place.
+    name : str
+        In messages.
+    shafts : tuple of str
+        That it sits on, and that of its mate: they are judged by centre distance and root circle.
+    axis : tuple of float
+        x and y of its axis [m].
+    ends : tuple of float
+        z of both ends of its face width [m].
+    tip, root, bore : float
+        Radii [m]; a root of infinity is that of teeth inside, a bore of zero is not given.
+    """
+
+    key: str
+    name: str
+    shafts: tuple[str, ...]
+    axis: tuple[float, ...]
+    ends: tuple[float, float]
+    tip: float
+    root: float = math.inf
+    bore: float = 0.0
+
+
+def overlaps(case: GearboxCase) -> Iterator[Finding]:
+    """Tell shafts that penetrate each other or gears, and shafts wider than their gears (W-OVERLAP)."""
+    shafts = [shaft for shaft in case.shaft if shaft.part]
+    numbers = {shaft.name: number for number, shaft in enumerate(case.shaft)}
+    for first, second in combinations(shafts, 2):
+        if (depth := _depth(first, second)) > DISTANCE_TOLERANCE:
+            text = f"shafts {first.name} and {second.name} penetrate each other by {LENGTH.show(depth)}"
+            remedy = "correct axis, start or diameters of one of them"
+            yield Finding("W-OVERLAP", f"shaft[{numbers[second.name]}]", text, remedy=remedy)
+    for gear in _cylinders(case):
+        for shaft in shafts:
+            if shaft.name == gear.shafts[0]:
+                yield from _on_its_shaft(gear, shaft)
+            elif shaft.name not in gear.shafts:
+                reach = _radius(shaft, *gear.ends) + gear.tip - math.dist(shaft.axis, gear.axis)
+                apart = math.dist(shaft.axis, gear.axis) > DISTANCE_TOLERANCE
+                if apart and _radius(shaft, *gear.ends) and reach > DISTANCE_TOLERANCE:
+                    text = f"shaft {shaft.name} reaches into {gear.name} by {LENGTH.show(reach)}"
+                    remedy = "correct its axis or diameters, or the place of the gear"
+                    yield Finding("W-OVERLAP", gear.key, text, remedy=remedy)
+
+
+def _on_its_shaft(gear: Cylinder, shaft: BoxShaftSection) -> Iterator[Finding]:
+    """A shaft wider than the root circle of its gear, or than the bore that the teeth have."""
+    radius, limit = _radius(shaft, *gear.ends), ""
+    if radius > gear.root + DISTANCE_TOLERANCE:
+        limit = f"a root circle of {LENGTH.show(2.0 * gear.root)}"
+    elif gear.bore and radius > (1.0 + _WIDER) * gear.bore:
+        limit = f"a bore of {LENGTH.show(2.0 * gear.bore)}"
+    if limit:
+        text = (
+            f"shaft {shaft.name} has an outer diameter of {LENGTH.show(2.0 * radius)} in {gear.name}, which has {limit}"
+        )
+        yield Finding("W-OVERLAP", gear.key, text, remedy="correct the diameter of the shaft, or the gear")
+
+
+def _bounds(shaft: BoxShaftSection, where: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Bore and outer radii (n, 2) of a shaft at the left and right ends of n intervals within its parts [m]."""
+    places = shaft.start + np.asarray(shaft.places)
+    part = np.clip(np.searchsorted(places, 0.5 * (where[:-1] + where[1:])) - 1, 0, len(shaft.part) - 1)
+    share = (np.stack([where[:-1], where[1:]], axis=1) - places[part, None]) / np.diff(places)[part, None]
+    bores = np.array([(one.inner_diameter, one.bore_at_end) for one in shaft.part])[part]
+    outer = np.array([(one.outer_diameter, one.end_outer_diameter or one.outer_diameter) for one in shaft.part])[part]
+    return tuple(0.5 * (ends[:, :1] + share * (ends[:, 1:] - ends[:, :1])) for ends in (bores, outer))  # type: ignore
+
+
+def _common_intervals(low: float, high: float, *shafts: BoxShaftSection) -> np.ndarray:
+    """Ends of the parts of shafts from one z to another [m], these two among them; none where they do not meet."""
+    low = max([low, *(shaft.start for shaft in shafts)])
+    high = min([high, *(shaft.start + shaft.length for shaft in shafts)])
+    if high - low <= DISTANCE_TOLERANCE:
+        return np.zeros(0)
+    inside = np.concatenate([shaft.start + np.asarray(shaft.places) for shaft in shafts])
+    ends = np.concatenate([[low], np.unique(inside[(inside > low) & (inside < high)]), [high]])
+    return ends[np.append(True, np.diff(ends) > DISTANCE_TOLERANCE)]
+
+
+def _depth(first: BoxShaftSection, second: BoxShaftSection) -> float:
+    """Largest length by which two shafts would have to move apart [m]; zero or less where they do not meet."""
+    where = _common_intervals(-math.inf, math.inf, first, second)
+    if len(where) < 2:
+        return 0.0
+    apart = math.dist(first.axis, second.axis)
+    (bore, outer), (other_bore, other) = (_bounds(shaft, where) for shaft in (first, second))
+    beside, within, around = outer + other - apart, apart + outer - other_bore, apart + other - bore
+    # of every interval the way of lying free that comes the nearest to it
+    return float(_free_depths(beside, within, around).max())
+
+
+def _free_depths(*depths: np.ndarray) -> np.ndarray:
+    """Depths (n,) of n intervals, each in the one way of lying that is free over the whole of it, or nearly."""
+    return np.min([depth.max(axis=1) for depth in depths], axis=0)
+
+
+def _radius(shaft: BoxShaftSection, low: float, high: float) -> float:
+    """Largest outer radius of a shaft from one z to another [m]; zero where it has none there."""
+    where = _common_intervals(low, high, shaft)
+    return float(_bounds(shaft, where)[1].max()) if len(where) > 1 else 0.0
+
+
+def _cylinders(case: GearboxCase) -> Iterator[Cylinder]:
+    """Gears of pairs and of sets whose place and size are known, and the way of the planets."""
+    for number, pair in enumerate(case.pair):
+        yield from _of_pair(case, pair, f"pair[{number}]")
+    for number, stage in enumerate(case.planetary):
+        yield from _of_set(case, stage, f"planetary[{number}]")
+
+
+def _of_pair(case: GearboxCase, pair: PairSection, key: str) -> Iterator[Cylinder]:
+    sizes = pair_sizes(pair)
+    heights = [_circles(pair, i, sizes.base_radii[i] / math.cos(sizes.pressure_angles[0])) for i in (0, 1)]
+    for i, (tip, root, bore) in enumerate(heights):
+        shaft = case.shaft_named(pair.shafts[i])
+        middle = shaft.start + (pair.positions[i] if pair.positions else 0.0)
+        ends = middle - 0.5 * sizes.face_widths[i], middle + 0.5 * sizes.face_widths[i]
+        if not (i and sizes.internal):
+            names = pair.shafts[i], pair.shafts[1 - i]
+            yield Cylinder(f"{key}.shafts", f"gear {i + 1} of {pair.name}", names, shaft.axis, ends, tip, root, bore)
+
+
+def _of_set(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Iterator[Cylinder]:
+    sizes = set_sizes(stage)
+    holder = next(name for name in ("sun", "carrier", "ring") if getattr(stage, name) != CASING)
+    shaft = case.shaft_named(getattr(stage, holder))
+    middle = shaft.start + (getattr(stage, f"{holder}_position") or 0.0)
+    ends = middle - 0.5 * sizes.face_widths[0], middle + 0.5 * sizes.face_widths[0]
+    others = tuple(name for name in (stage.carrier, stage.ring) if name != CASING)
+    sun_radius = sizes.centre_distance - planet_radius(sizes)
+    (tip, root, bore), (planet_tip, *_) = _circles(stage, 0, sun_radius), _circles(stage, 1, planet_radius(sizes))
+    if stage.sun != CASING:
+        yield Cylinder(
+            f"{key}.sun", f"the sun of {stage.name}", (stage.sun, *others), shaft.axis, ends, tip, root, bore
+        )
+    way = sizes.centre_distance + planet_tip
+    members = ("", stage.sun, *others)
+    yield Cylinder(f"{key}.carrier", f"the way of the planets of {stage.name}", members, shaft.axis, ends, way)
+
+
+def _circles(stage: PairSection | BoxPlanetarySection, number: int, pitch: float) -> tuple[float, float, float]:
+    """Radii of tips, roots and bore of an external gear [m]: of its teeth, or around its pitch radius."""
+    if (teeth := teeth_of(stage)) is not None:
+        gears: Any = planetary_set(teeth).gears
+        section = getattr(teeth, teeth.gear_names[number])
+        return gears[number].tip_radius, gears[number].root_radius, getattr(section, "bore_radius", None) or 0.0
+    assert stage.gears is not None
+    module = 2.0 * pitch / stage.gears.teeth[number] * math.cos(stage.gears.helix_angle)
+    return pitch + _ADDENDUM * module, pitch - _DEDENDUM * module, 0.0
