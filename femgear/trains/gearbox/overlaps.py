@@ -37,8 +37,8 @@ _ADDENDUM, _DEDENDUM = 1.0, 1.25
 
 
 @dataclass(frozen=True)
-class Cylinder:
-    """A gear as it stands beside shafts.
+class GearOutline:
+    """The cylinder that a gear takes up beside shafts.
 
     Parameters
     ----------
@@ -88,7 +88,7 @@ def overlaps(case: GearboxCase) -> Iterator[Finding]:
                     yield Finding("W-OVERLAP", gear.key, text, remedy=remedy)
 
 
-def _on_its_shaft(gear: Cylinder, shaft: BoxShaftSection) -> Iterator[Finding]:
+def _on_its_shaft(gear: GearOutline, shaft: BoxShaftSection) -> Iterator[Finding]:
     """A shaft wider than the root circle of its gear, or than the bore that the teeth have."""
     radius, limit = _radius(shaft, *gear.ends), ""
     if radius > gear.root + DISTANCE_TOLERANCE:
@@ -146,7 +146,7 @@ def _radius(shaft: BoxShaftSection, low: float, high: float) -> float:
     return float(_bounds(shaft, where)[1].max()) if len(where) > 1 else 0.0
 
 
-def _cylinders(case: GearboxCase) -> Iterator[Cylinder]:
+def _cylinders(case: GearboxCase) -> Iterator[GearOutline]:
     """Gears of pairs and of sets whose place and size are known, and the way of the planets."""
     for number, pair in enumerate(case.pair):
         yield from _of_pair(case, pair, f"pair[{number}]")
@@ -154,7 +154,7 @@ def _cylinders(case: GearboxCase) -> Iterator[Cylinder]:
         yield from _of_set(case, stage, f"planetary[{number}]")
 
 
-def _of_pair(case: GearboxCase, pair: PairSection, key: str) -> Iterator[Cylinder]:
+def _of_pair(case: GearboxCase, pair: PairSection, key: str) -> Iterator[GearOutline]:
     sizes = pair_sizes(pair)
     heights = [_circles(pair, i, sizes.base_radii[i] / math.cos(sizes.pressure_angles[0])) for i in (0, 1)]
     for i, (tip, root, bore) in enumerate(heights):
@@ -163,10 +163,10 @@ def _of_pair(case: GearboxCase, pair: PairSection, key: str) -> Iterator[Cylinde
         ends = middle - 0.5 * sizes.face_widths[i], middle + 0.5 * sizes.face_widths[i]
         if not (i and sizes.internal):
             names = pair.shafts[i], pair.shafts[1 - i]
-            yield Cylinder(f"{key}.shafts", f"gear {i + 1} of {pair.name}", names, shaft.axis, ends, tip, root, bore)
+            yield GearOutline(f"{key}.shafts", f"gear {i + 1} of {pair.name}", names, shaft.axis, ends, tip, root, bore)
 
 
-def _of_set(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Iterator[Cylinder]:
+def _of_set(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Iterator[GearOutline]:
     sizes = set_sizes(stage)
     holder = next(name for name in ("sun", "carrier", "ring") if getattr(stage, name) != CASING)
     shaft = case.shaft_named(getattr(stage, holder))
@@ -176,12 +176,12 @@ def _of_set(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Iterator
     sun_radius = sizes.centre_distance - planet_radius(sizes)
     (tip, root, bore), (planet_tip, *_) = _circles(stage, 0, sun_radius), _circles(stage, 1, planet_radius(sizes))
     if stage.sun != CASING:
-        yield Cylinder(
+        yield GearOutline(
             f"{key}.sun", f"the sun of {stage.name}", (stage.sun, *others), shaft.axis, ends, tip, root, bore
         )
     way = sizes.centre_distance + planet_tip
     members = ("", stage.sun, *others)
-    yield Cylinder(f"{key}.carrier", f"the way of the planets of {stage.name}", members, shaft.axis, ends, way)
+    yield GearOutline(f"{key}.carrier", f"the way of the planets of {stage.name}", members, shaft.axis, ends, way)
 
 
 def _circles(stage: PairSection | BoxPlanetarySection, number: int, pitch: float) -> tuple[float, float, float]:
