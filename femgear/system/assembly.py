@@ -213,6 +213,19 @@ class Assembly:
         return np.concatenate([np.zeros(0), *(contact.stiffness for contact in self.contacts)])
 
     @cached_property
+    def led(self) -> np.ndarray:
+        """All motions (6n, 6n) per unit of those of stations that follow none; motions of followers have no effect."""
+        led = np.eye(self.count)
+        for follower in self.followers:
+            own = slice(6 * follower.station, 6 * follower.station + 6)
+            led[own, own] = 0.0
+            for at, leader in enumerate(follower.leaders):
+                # motions that do not take place are no one's
+                part = np.where(self.held[own, None], 0.0, follower.rows[:, 6 * at : 6 * at + 6])
+                led[own, 6 * leader : 6 * leader + 6] += part
+        return led
+
+    @cached_property
     def _solved(self) -> tuple[np.ndarray, np.ndarray]:
         """All motions per unit of the free ones, and the places of these."""
         rows = [np.zeros((0, self.count))]
@@ -224,17 +237,11 @@ class Assembly:
                     rows[-1][:, 6 * station : 6 * station + 6] += rigid[:, 6 * at : 6 * at + 6]
         if not self.followers:
             return solved_conditions(np.vstack(rows), self.held)
-        led, held = np.eye(self.count), self.held.copy()
+        held = self.held.copy()
         for follower in self.followers:
-            led_motions = slice(6 * follower.station, 6 * follower.station + 6)
-            led[led_motions, led_motions] = 0.0
-            for at, leader in enumerate(follower.leaders):
-                # motions that do not take place are no one's
-                part = np.where(self.held[led_motions, None], 0.0, follower.rows[:, 6 * at : 6 * at + 6])
-                led[led_motions, 6 * leader : 6 * leader + 6] += part
-            held[led_motions] = True
-        solution, free = solved_conditions(np.vstack(rows) @ led, held)
-        return led @ solution, free
+            held[6 * follower.station : 6 * follower.station + 6] = True
+        found, free = solved_conditions(np.vstack(rows) @ self.led, held)
+        return self.led @ found, free
 
     @property
     def motions(self) -> np.ndarray:

@@ -182,8 +182,8 @@ class RunningResponse(ReadOnlyArrays):
         Side bands of the structure.
     modal : (Q + 1, S, m) complex array
         Coordinates of the modes of the structure [m kg^1/2], in all patterns of the planets.
-    periods : int
-        Mesh periods after which all repeats: line q has the frequency of q/periods mesh frequencies.
+    orders : CarrierOrders
+        Lines and side bands of the forces: line q has the frequency of q/periods mesh frequencies.
     residual, radius : float
         Residual of the equations, and spectral radius of the iteration without GMRES [1].
     products : int
@@ -199,7 +199,7 @@ class RunningResponse(ReadOnlyArrays):
     approach: np.ndarray
     band: np.ndarray
     modal: np.ndarray
-    periods: int
+    orders: CarrierOrders
     residual: float
     radius: float
     products: int
@@ -208,7 +208,7 @@ class RunningResponse(ReadOnlyArrays):
     @property
     def frequency(self) -> np.ndarray:
         """Angular frequencies (Q + 1, S) of the structure [rad/s]."""
-        line = np.arange(len(self.modal))[:, None] / self.periods
+        line = np.arange(len(self.modal))[:, None] / self.orders.periods
         return line * self.mesh_frequency + self.band * self.carrier_speed
 
     def lines(self, shape: np.ndarray) -> np.ndarray:
@@ -216,7 +216,11 @@ class RunningResponse(ReadOnlyArrays):
 
         Of harmonic 0 side bands below zero have none: they are the others' conjugates.
         """
-        found = 2.0 * self.modal @ shape
+        return self.one_sided(self.modal @ shape)
+
+    def one_sided(self, values: np.ndarray) -> np.ndarray:
+        """Amplitudes of two-sided values (Q + 1, S, k), see `lines`."""
+        found = 2.0 * values
         found[0, self.band < 0] = 0.0
         found[0, self.band == 0] *= 0.5
         return found
@@ -275,6 +279,32 @@ class _Part:
     bands: np.ndarray
     met: np.ndarray
     answer: np.ndarray
+
+
+def forces_on_structure(stage: RunningStage, response: RunningResponse, vectors: np.ndarray) -> np.ndarray:
+    """Compute what the contact points of all planets do to motions of the structure, two-sided (Q + 1, S, k) [N, N m].
+
+    Beyond the mean, at the side bands of `RunningResponse.band`.
+
+    Parameters
+    ----------
+    stage : RunningStage
+    response : RunningResponse
+        Of that stage.
+    vectors : (C, W, k) complex array
+        Approach of the contact points of a planet at angle 0 by every motion, wave by wave [1, m].
+    """
+    orders, N, n = response.orders, stage.paths.symmetry, stage.waves
+    psi = np.asarray(stage.paths.planet_angles)[stage.groups[0]]
+    padded = np.concatenate([response.force, np.zeros((*response.force.shape[:3], 1))], axis=3)
+    found = np.zeros((len(orders.base), len(response.band), vectors.shape[2]), complex)
+    for w, wave in enumerate(n):
+        place = orders.place(response.band + stage.sense * wave)
+        around = np.exp(-1j * wave * psi)
+        found -= N * np.einsum("g,gcbs,ck->bsk", around, padded[..., place], vectors[:, w].conj(), optimize=True)
+    moved = (orders.base[:, None] + orders.pattern[:, None] + response.band) % N == 0
+    found[~moved] = 0.0
+    return found.reshape(orders.patterns, -1, *found.shape[1:]).sum(axis=0)
 
 
 class _Problem:
@@ -345,7 +375,7 @@ class _Problem:
         extra = flat.view(complex).reshape(shape)
         force, (band, modal) = self._forces(parts, extra), self._modal(parts, extra, mesh_frequency, speed)
         tail = self._tail(force[:, : self.stage.kinds])
-        figures = approach(extra), band, modal, orders.periods, residual, radius, products, tail
+        figures = approach(extra), band, modal, orders, residual, radius, products, tail
         return RunningResponse(mesh_frequency, speed, force, *figures)
 
     def _groups_of_bands(self, residue: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:

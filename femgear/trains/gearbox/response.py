@@ -21,13 +21,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.case.dependencies import Steps
-from femgear.housing.two_way.running_planets import RunningResponse, RunningStage, solve_running
+from femgear.housing.two_way.running_planets import RunningResponse, solve_running
 from femgear.stages.protocol import Progress, silent
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection
 from femgear.trains.gearbox.deflection import Deflection, spread_rows
 from femgear.trains.gearbox.model import GearboxModel, StageModel
+from femgear.trains.gearbox.paths import CasingPaths, casing_paths, stage_forces
 from femgear.trains.gearbox.sensors import sensor_rows
-from femgear.trains.gearbox.stage_structure import running_stage, stage_excitation
+from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage, stage_excitation
 
 _MOST = 2000
 """Mesh harmonics at most."""
@@ -64,6 +65,8 @@ class StageLines:
         Products with the fluctuating stiffness.
     harmonics : (v,) int array
         Mesh harmonics.
+    paths : (v, P, s, L) complex array, optional
+        Displacements of the sensors by every path into the casing [m], see `CasingPaths`.
     """
 
     name: str
@@ -82,6 +85,7 @@ class StageLines:
     outer: np.ndarray
     products: np.ndarray
     harmonics: np.ndarray
+    paths: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -102,6 +106,8 @@ class GearboxResponse:
         Stages without teeth, which excite nothing.
     up_to : float
         Frequency up to which stages excite [Hz].
+    paths : tuple of str
+        Ways into the casing whose displacements the stages have; none where they were not asked for.
     """
 
     deflection: Deflection
@@ -110,6 +116,7 @@ class GearboxResponse:
     stages: tuple[StageLines, ...]
     missing: tuple[str, ...]
     up_to: float
+    paths: tuple[str, ...] = ()
 
     @property
     def cross_excitation(self) -> np.ndarray:
@@ -166,6 +173,7 @@ def solve_gearbox_response(
     steps: Steps | None = None,
     progress: Progress = silent,
     stage: str = "dynamics",
+    by_path: bool = False,
 ) -> GearboxResponse:
     """Solve for the response of a gearbox to all its stages.
 
@@ -181,6 +189,8 @@ def solve_gearbox_response(
         Called with (stage, done, total).
     stage : str
         Name for it.
+    by_path : bool
+        Find what sensors hear by every way into the casing.
 
     Raises
     ------
@@ -192,17 +202,19 @@ def solve_gearbox_response(
     nominal, speeds = abs(model.flow.speed[reference]), np.asarray(speed, float)
     up_to = case.dynamics.up_to
     rows = np.vstack(output_rows(found))
+    paths = casing_paths(found) if by_path else None
     lines, done = list[StageLines](), 0
     staged = [one for one in model.stages if one.name in found.contacts]
     for one in staged:
         excitation = stage_excitation(found.contacts[one.name], steps=steps)
-        running, motion = running_stage(found, one, excitation)
-        outputs = np.vstack([rows, mesh_rows(model, one)]) @ motion
-        lines.append(_stage_lines(model, one, running, outputs, speeds / nominal, up_to, len(rows)))
+        structured = running_stage(found, one, excitation)
+        outputs = np.vstack([rows, mesh_rows(model, one)]) @ structured.motion
+        lines.append(_stage_lines(found, one, structured, outputs, speeds / nominal, paths))
         done += 1
         progress(stage, done, len(staged))
     missing = tuple(one.name for one in model.stages if one.name not in found.contacts)
-    return GearboxResponse(found, reference, speeds, tuple(lines), missing, up_to)
+    names = () if paths is None else paths.names
+    return GearboxResponse(found, reference, speeds, tuple(lines), missing, up_to, names)
 
 
 def mesh_rows(model: GearboxModel, stage: StageModel) -> np.ndarray:
@@ -216,15 +228,16 @@ def mesh_rows(model: GearboxModel, stage: StageModel) -> np.ndarray:
 
 
 def _stage_lines(
-    model: GearboxModel,
+    found: Deflection,
     stage: StageModel,
-    running: RunningStage,
+    structured: StructuredStage,
     outputs: np.ndarray,
     factors: np.ndarray,
-    up_to: float,
-    measured: int,
+    paths: CasingPaths | None,
 ) -> StageLines:
-    """Lines of one stage at all speeds, of outputs (k, m) per unit of a mode, the first ones ``measured``."""
+    """Lines of one stage at all speeds, of outputs (k, m) per unit of a mode, the last ones approaches of meshes."""
+    model, running = found.model, structured.running
+    measured, up_to = len(outputs) - len(model.assembly.contacts), model.case.dynamics.up_to
     mesh = 2.0 * math.pi * model.flow.mesh_frequency[stage.name]
     section = stage.section
     carrier = 0.0
@@ -249,6 +262,9 @@ def _stage_lines(
     kinds, count = running.kinds, max(len(stage.planets), 1)
     force, dynamic = np.zeros((len(factors), kinds, 3)), np.zeros((len(factors), kinds))
     approach, figures = np.full((len(factors), len(outputs) - measured), np.nan), np.zeros((5, len(factors)))
+    by_path = None
+    if paths is not None:
+        by_path = np.zeros((len(factors), len(paths.names), len(paths.sensors), len(harmonic)), complex)
     mean = running.excitation.force.mean(axis=1).reshape(kinds, count).mean(axis=1)
 
     def keep(i: int) -> None:
@@ -257,6 +273,11 @@ def _stage_lines(
         amplitude = response.lines(outputs.T)[harmonic[few], at[few]]
         motion[i][:, few] = amplitude[:, :measured].T
         approach[i] = np.sqrt(0.5 * (np.abs(amplitude[:, measured:]) ** 2).sum(axis=0))
+        if paths is not None and by_path is not None:
+            forces = response.one_sided(stage_forces(paths, found, stage, structured, response))
+            moved = response.lines(structured.motion[paths.places].T)[harmonic[few], at[few]].T
+            omega = response.frequency[harmonic[few], at[few]]
+            by_path[i][..., few] = paths.heard(np.moveaxis(forces[harmonic[few], at[few]], 0, -1), moved, omega)
         low, high, dynamic[i] = _extremes(response, kinds)
         force[i] = np.stack([mean, mean + high, mean + low], axis=1)
         figures[:, i] = response.residual, response.radius, *response.tail, response.products
@@ -286,6 +307,7 @@ def _stage_lines(
         outer,
         products.astype(int),
         counts,
+        by_path,
     )
 
 
@@ -318,15 +340,20 @@ def _extremes(response: RunningResponse, kinds: int) -> tuple[np.ndarray, np.nda
     return values.min(axis=(0, 2, 3)), values.max(axis=(0, 2, 3)), np.sqrt(energy.max(axis=0))
 
 
-def level(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.ndarray:
-    """R.m.s. (v, k) over the lines (v, k, L) of all stages by name; lines at one order add with their phase."""
+def by_order(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Add lines (v, k, L) of all stages by name that have one order, with their phase: (v, k, orders)."""
     order = np.concatenate([stage.order for stage in response.stages])
     whole = np.concatenate([lines[stage.name] for stage in response.stages], axis=2)
     known, place = np.unique(np.round(order / order.max(initial=1.0), 9), return_inverse=True)
     total = np.zeros((*whole.shape[:2], len(known)), complex)
     for line, at in enumerate(place.tolist()):
         total[..., at] += whole[..., line]
-    return np.sqrt(0.5 * (np.abs(total) ** 2).sum(axis=2))
+    return total
+
+
+def level(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.ndarray:
+    """R.m.s. (v, k) over the lines (v, k, L) of all stages by name; lines at one order add with their phase."""
+    return np.sqrt(0.5 * (np.abs(by_order(response, lines)) ** 2).sum(axis=2))
 
 
 def accelerations(response: GearboxResponse, count: int) -> dict[str, np.ndarray]:

@@ -14,7 +14,7 @@ from femgear.findings import Finding
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
-from femgear.trains.gearbox.response import GearboxResponse, StageLines, accelerations, level
+from femgear.trains.gearbox.response import GearboxResponse, StageLines, accelerations, by_order, level
 from femgear.trains.gearbox.sensors import casing_sensors
 
 if TYPE_CHECKING:
@@ -83,6 +83,7 @@ class GearboxResponseResult(StageResult):
                     "dB",
                     "change of the level by lines beyond half the frequency of the excitation",
                 ),
+                **_of_paths(found, moved),
                 **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
             }
         of_bearings = {stage.name: stage.motion[:, forces] for stage in found.stages}
@@ -115,6 +116,8 @@ class GearboxResponseResult(StageResult):
         }
         if sensors:
             coords["sensor"] = (("sensor",), [one.name for one in casing_sensors(model.case)], "1", "sensor")
+        if found.paths:
+            coords["path"] = (("path",), list(found.paths), "1", "way into the casing")
         if feet:
             coords["foot"] = (("foot",), [one.name for one in feet], "1", "foot of the casing")
         attrs = {
@@ -126,6 +129,26 @@ class GearboxResponseResult(StageResult):
         }
         used = {dim for entry in variables.values() for dim in entry[0].split()}
         return Contents(variables, {name: entry for name, entry in coords.items() if name in used}, attrs)
+
+
+def _of_paths(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
+    """Shares (v, s, P) of the ways into the casing in the power of the acceleration at all sensors."""
+    if not found.paths:
+        return {}
+    stages = [stage for stage in found.stages if stage.paths is not None]
+    parts = {
+        stage.name: -((stage.order * found.speed[:, None])[:, None, None] ** 2) * stage.paths
+        for stage in stages
+        if stage.paths is not None
+    }
+    size = (len(found.speed), len(found.paths), next(iter(moved.values())).shape[1])
+    flat = {name: part.reshape(size[0], -1, part.shape[-1]) for name, part in parts.items()}
+    whole, each = by_order(found, moved), by_order(found, flat)
+    each = each.reshape(*size, -1)
+    power = np.real(each * whole[:, None].conj()).sum(axis=-1)
+    total = np.maximum((np.abs(whole) ** 2).sum(axis=-1), np.finfo(float).tiny)
+    text = "share of the path in the power of the acceleration; negative where it quietens others"
+    return {"path_share": ("speed path sensor", power / total[:, None], "1", text)}
 
 
 def _complex(name: str, dims: str, values: np.ndarray, unit: str, text: str) -> dict[str, tuple]:
@@ -280,6 +303,8 @@ def response_tables(data: xr.Dataset) -> Iterator[Block]:
         yield _levels(data, at)
         if "lines_real" in data:
             yield from (_lines(data, at, sensor) for sensor in range(data.sizes["sensor"]))
+        if "path_share" in data:
+            yield _paths(data, at)
     speed = f"{float(data['speed'].values[at]):.5g} rpm"
     for name, dim in (("bearing", "bearing"), ("foot", "foot")):
         if f"{name}_force_rms" in data:
@@ -308,6 +333,18 @@ def _levels(data: xr.Dataset, at: int) -> Block:
     }
     speed = float(data["speed"].values[at])
     return tabulate(f"Levels at {speed:.5g} rpm, and shares of the stages in their power", range(len(whole)), columns)
+
+
+def _paths(data: xr.Dataset, at: int) -> Block:
+    """Shares of the ways into the casing in the power at all sensors."""
+    share = data["path_share"].values[at]
+    columns = {"path": lambda i: str(data["path"].values[i])} | {
+        str(name): lambda i, sensor=sensor: f"{share[i, sensor]:+.1%}"
+        for sensor, name in enumerate(data["sensor"].values.tolist())
+    }
+    order = np.argsort(-np.abs(share).max(axis=1), kind="stable").tolist()
+    note = "shares in the power of the acceleration add up to 100 %; a negative one quietens what comes by others"
+    return tabulate(f"Which way it comes, {float(data['speed'].values[at]):.5g} rpm", order, columns, (note,))
 
 
 def _lines(data: xr.Dataset, at: int, sensor: int) -> Block:

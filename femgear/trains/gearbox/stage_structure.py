@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -83,10 +83,30 @@ def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> Me
     return steps.keep("excitation of a stage", known, found)
 
 
-def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitation) -> tuple[RunningStage, np.ndarray]:
-    """Take a stage out of a gearbox: its planets and meshes, and the modes of the structure without it.
+@dataclass(frozen=True)
+class StructuredStage:
+    """A stage, and the structure that it runs in.
 
-    The motions (6n, m) of all stations by these modes [kg^-1/2] come with it.
+    Parameters
+    ----------
+    running : RunningStage
+        Planets and meshes, and the modes of the structure.
+    motion : (6n, m) array
+        Motions of all stations by these modes [kg^-1/2].
+    rows : tuple of Row
+        Of every contact point of the first planet: what it does to the structure.
+    meshes : int
+        Number of these that belong to meshes; those of its pin follow.
+    """
+
+    running: RunningStage
+    motion: np.ndarray
+    rows: tuple[Row, ...]
+    meshes: int
+
+
+def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitation) -> StructuredStage:
+    """Take a stage out of a gearbox: its planets and meshes, and the modes of the structure without it.
 
     Parameters
     ----------
@@ -109,36 +129,34 @@ def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitati
     kinds = len(mean) // max(len(stage.planets), 1)
     stiffness[:kinds] = mean.reshape(kinds, -1).mean(axis=1)
     mass, gyroscopic, turning = np.zeros((3, 6, 6))
-    flexibility, free = None, np.zeros(0, int)
+    flexibility, free, meshes = None, np.zeros(0, int), len(rows)
     if planetary:
         own = slice(6 * stage.planets[0], 6 * stage.planets[0] + 6)
         free = np.flatnonzero(~found.model.assembly.held[own])
         used = free[planet_bearing(section)[free] > 0.0]
-        pins, springs, flexibility = _pin_rows(found.model, stage, used, len(rows))
+        pins, springs, flexibility = _pin_rows(found.model, stage, used, meshes)
         rows, stiffness = [*rows, *pins], np.append(stiffness, springs)
         points = np.vstack([points, np.eye(6)[used]])
         mass, gyroscopic, turning = _planet(found.model, stage)
     shape = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rows])
-    return (
-        RunningStage(
-            2.0 * math.pi * modes.frequency,
-            np.zeros(len(modes.frequency)),
-            shape,
-            np.zeros((*shape.shape[:2], *shape.shape[:2])),
-            mass[np.ix_(free, free)],
-            gyroscopic[np.ix_(free, free)],
-            turning[np.ix_(free, free)],
-            points.T[free],
-            stiffness,
-            np.full(len(stiffness), 2.0 * damping),
-            excitation,
-            paths,
-            sense,
-            structure_loss=2.0 * damping,
-            flexibility=flexibility,
-        ),
-        motion,
+    running = RunningStage(
+        2.0 * math.pi * modes.frequency,
+        np.zeros(len(modes.frequency)),
+        shape,
+        np.zeros((*shape.shape[:2], *shape.shape[:2])),
+        mass[np.ix_(free, free)],
+        gyroscopic[np.ix_(free, free)],
+        turning[np.ix_(free, free)],
+        points.T[free],
+        stiffness,
+        np.full(len(stiffness), 2.0 * damping),
+        excitation,
+        paths,
+        sense,
+        structure_loss=2.0 * damping,
+        flexibility=flexibility,
     )
+    return StructuredStage(running, motion, tuple(rows), meshes)
 
 
 def structure_without(found: Deflection, stage: StageModel) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
@@ -241,30 +259,38 @@ def _pin_rows(
     return rows, bearing[used], flexibility
 
 
-def _waves(row: Row, stage: StageModel, motion: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Approach (W, m) of a contact point by the modes, as the planet runs around: waves -1, 0, 1; of a pair 0.
+def row_waves(row: Row, stage: StageModel, station: int, places: np.ndarray) -> np.ndarray:
+    """Approach (W, 6) of a contact point by the motions of a station, as the planet runs around.
 
-    ``places`` (n, 3) are those of the stations [m]. A station beside the axis of the stage, such as the centre of a
-    casing, counts with the motions of the point on the axis: only these turn with the planet.
+    Waves -1, 0, 1; of a pair 0 alone. ``places`` (n, 3) are those of all stations [m]. A station beside the axis of the
+    stage, such as the centre of a casing, counts with the motions of the point on the axis: only these turn with the
+    planet.
     """
-    shape = np.zeros((3 if stage.planets else 1, motion.shape[1]), complex)
+    waves, effect = np.zeros((3 if stage.planets else 1, 6), complex), np.zeros(6)
+    for place, part in row:
+        effect = effect + part if place == station else effect
     if not stage.planets:
-        for station, effect in row:
-            shape[0] += effect @ motion[6 * station : 6 * station + 6]
-        return shape
+        waves[0] = effect
+        return waves
     angle = stage.angles[0]
     axis = places[stage.planets[0]] - stage.sizes.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
-    for station, effect in row:
-        beside = np.append((axis - places[station])[:2], 0.0)
-        moved = rigid_link(beside) @ motion[6 * station : 6 * station + 6]
-        there = effect @ rigid_link(-beside)
-        shape[1] += there[[2, 5]] @ moved[[2, 5]]
-        for first in (0, 3):
-            x, y = there[first : first + 2]
-            # a turn of the row by phi - angle
-            forward = 0.5 * ((x + 1j * y) * moved[first] + (y - 1j * x) * moved[first + 1])
-            shape[2] += np.exp(-1j * angle) * forward
-            shape[0] += np.exp(1j * angle) * forward.conj()
+    beside = np.append((axis - places[station])[:2], 0.0)
+    there, turn = effect @ rigid_link(-beside), np.exp(-1j * angle)
+    waves[1, [2, 5]] = there[[2, 5]]
+    for first in (0, 3):
+        x, y = there[first : first + 2]
+        # the row turns with the planet
+        forward = 0.5 * turn * np.array([x + 1j * y, y - 1j * x])
+        waves[2, first : first + 2] = forward
+        waves[0, first : first + 2] = forward.conj()
+    return waves @ rigid_link(beside)
+
+
+def _waves(row: Row, stage: StageModel, motion: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Approach (W, m) of a contact point by modes whose motions (6n, m) are given, as the planet runs around."""
+    shape = np.zeros((3 if stage.planets else 1, motion.shape[1]), complex)
+    for station in {station for station, _ in row}:
+        shape += row_waves(row, stage, station, places) @ motion[6 * station : 6 * station + 6]
     return shape
 
 

@@ -73,7 +73,9 @@ def solve_box_dynamics(
     """Solve for the response to all stages at the speeds of the chosen load case."""
     state = deflection.state
     speed = [abs(state.model.flow.speed[reference_shaft(state.model)])]
-    return GearboxResponseResult(solve_gearbox_response(state, speed, steps=steps, progress=progress), whole=True)
+    return GearboxResponseResult(
+        solve_gearbox_response(state, speed, steps=steps, progress=progress, by_path=True), whole=True
+    )
 
 
 @one_blas_thread()
