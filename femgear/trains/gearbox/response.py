@@ -246,15 +246,9 @@ def _stage_lines(
     counts = np.clip(np.floor(2.0 * math.pi * up_to / (mesh * factors) * (1.0 + 1e-12)), 1, _MOST).astype(int)
 
     def solve(i: int) -> RunningResponse:
-        both = (int(counts[i]), int(counts[i]))
-        return solve_running(
-            running,
-            mesh * factors[i],
-            carrier * factors[i],
-            harmonics=both,
-            side_bands=model.case.dynamics.side_bands if stage.planets else 0,
-            tolerance=model.case.dynamics.tolerance,
-        )
+        both, bands = (int(counts[i]), int(counts[i])), model.case.dynamics.side_bands if stage.planets else 0
+        known = {"harmonics": both, "side_bands": bands, "tolerance": model.case.dynamics.tolerance}
+        return solve_running(running, mesh * factors[i], carrier * factors[i], **known)
 
     widest = solve(int(counts.argmax()))
     harmonic, band, at = _line_numbers(widest, running.paths.symmetry)
@@ -287,28 +281,12 @@ def _stage_lines(
     approach[:, list(stage.meshes)] = np.nan
     nominal = abs(model.flow.speed[reference_shaft(model)])
     order = (harmonic * mesh + band * carrier) / nominal
-    stiffness = running.excitation.stiffness.reshape(kinds, -1)
-    spread = running.excitation.stiffness.std(axis=1).reshape(kinds, count).max(axis=1)
+    stiffness = running.excitation.stiffness
+    mean_stiffness = stiffness.reshape(kinds, -1).mean(axis=1)
+    spread = stiffness.std(axis=1).reshape(kinds, count).max(axis=1)
     residual, radius, tail, outer, products = figures
-    return StageLines(
-        stage.name,
-        harmonic,
-        band,
-        order,
-        motion,
-        force,
-        stiffness.mean(axis=1),
-        spread,
-        dynamic,
-        approach,
-        residual,
-        radius,
-        tail,
-        outer,
-        products.astype(int),
-        counts,
-        by_path,
-    )
+    lines = stage.name, harmonic, band, order, motion, force, mean_stiffness, spread, dynamic, approach
+    return StageLines(*lines, residual, radius, tail, outer, products.astype(int), counts, by_path)
 
 
 def _line_numbers(response: RunningResponse, symmetry: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
