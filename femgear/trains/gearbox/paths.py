@@ -154,7 +154,7 @@ def _casing_alone(
     return alone.mass[both], stiffness[both]
 
 
-def stage_forces(
+def forces_on_casing(
     paths: CasingPaths, found: Deflection, stage: StageModel, structured: StructuredStage, response: RunningResponse
 ) -> np.ndarray:
     """Two-sided forces (Q + 1, S, P, c) of all paths on the casing while a stage excites the gearbox [N, N m].

@@ -26,7 +26,7 @@ from femgear.stages.protocol import Progress, silent
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection
 from femgear.trains.gearbox.deflection import Deflection, spread_rows
 from femgear.trains.gearbox.model import GearboxModel, StageModel
-from femgear.trains.gearbox.paths import CasingPaths, casing_paths, stage_forces
+from femgear.trains.gearbox.paths import CasingPaths, casing_paths, forces_on_casing
 from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage, stage_excitation
 
@@ -268,7 +268,7 @@ def _stage_lines(
         motion[i][:, few] = amplitude[:, :measured].T
         approach[i] = np.sqrt(0.5 * (np.abs(amplitude[:, measured:]) ** 2).sum(axis=0))
         if paths is not None and by_path is not None:
-            forces = response.one_sided(stage_forces(paths, found, stage, structured, response))
+            forces = response.one_sided(forces_on_casing(paths, found, stage, structured, response))
             moved = response.lines(structured.motion[paths.places].T)[harmonic[few], at[few]].T
             omega = response.frequency[harmonic[few], at[few]]
             by_path[i][..., few] = paths.heard(np.moveaxis(forces[harmonic[few], at[few]], 0, -1), moved, omega)
