@@ -217,12 +217,12 @@ class Assembly:
         """All motions (6n, 6n) per unit of those of stations that follow none; motions of followers have no effect."""
         led = np.eye(self.count)
         for follower in self.followers:
-            own = slice(6 * follower.station, 6 * follower.station + 6)
-            led[own, own] = 0.0
+            place = slice(6 * follower.station, 6 * follower.station + 6)
+            led[place, place] = 0.0
             for at, leader in enumerate(follower.leaders):
                 # motions that do not take place are no one's
-                part = np.where(self.held[own, None], 0.0, follower.rows[:, 6 * at : 6 * at + 6])
-                led[own, 6 * leader : 6 * leader + 6] += part
+                part = np.where(self.held[place, None], 0.0, follower.rows[:, 6 * at : 6 * at + 6])
+                led[place, 6 * leader : 6 * leader + 6] += part
         return led
 
     @cached_property
@@ -240,8 +240,8 @@ class Assembly:
         held = self.held.copy()
         for follower in self.followers:
             held[6 * follower.station : 6 * follower.station + 6] = True
-        found, free = solved_conditions(np.vstack(rows) @ self.led, held)
-        return self.led @ found, free
+        of_free, free = solved_conditions(np.vstack(rows) @ self.led, held)
+        return self.led @ of_free, free
 
     @property
     def motions(self) -> np.ndarray:
