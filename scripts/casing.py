@@ -268,8 +268,8 @@ def write_casing(casing: Casing, folder: Path) -> None:
     moved = np.zeros((len(omega), held, 3))
     moved[:, :p, 0], moved[:, :p, 1], moved[:, p:] = x, y, sensors
     points = np.array([x for _, _, x in nodes[:held]])
-    shapes = Shapes(points, frequency, np.full(len(omega), DAMPING), moved)
-    write_modes(shapes, folder / FILES[3], words="casing")
+    shapes = Shapes(points, frequency, np.full(len(omega), DAMPING), moved, words="casing")
+    write_modes(shapes, folder / FILES[3])
     way = {"sensor top": "z", "sensor flange": "x"}
     rows = [(n, role, *map(float, x), way.get(role, ""), d) for n, (role, d, x) in enumerate(nodes, 1)]
     for name, listed in ((FILES[4], rows), (FILES[5], rows[:held])):
