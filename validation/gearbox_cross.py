@@ -127,7 +127,7 @@ def solve_two_stages(teeth: tuple[int, int]) -> TwoStages:
     steps = Steps()
     found = solve_deflection(read_case(two_pairs(teeth)), steps=steps)
     stages = [
-        running_stage(found, stage, stage_excitation(found.contacts[stage.name], steps=steps))[0]
+        running_stage(found, stage, stage_excitation(found.contacts[stage.name], steps=steps)).running
         for stage in found.model.stages
     ]
     response = solve_gearbox_response(found, RPM * np.array(SPEEDS), steps=steps)

@@ -112,7 +112,7 @@ def input_and_losses() -> tuple[Row, ...]:
     rows = list[Row]()
     system = twin(3, 13)
     found = planets_in_a_casing()
-    box = running_stage(found, found.model.stages[0], synthetic_excitation(found, found.model.stages[0]))[0]
+    box = running_stage(found, found.model.stages[0], synthetic_excitation(found, found.model.stages[0])).running
     nominal = 2.0 * np.pi * found.model.flow.mesh_frequency["set"], abs(found.model.flow.speed["carrier"])
     lossy = replace(running(system), structure_loss=0.04, loss=np.full(4, 0.03))
     stages = {"planets on uneven supports": (lossy, 13 * TURN, TURN), "planetary stage in a casing": (box, *nominal)}
@@ -157,7 +157,8 @@ def casing_forces() -> tuple[Row, ...]:
 def out_of_balance(found: Deflection, drive, factor: float) -> float:
     """Largest force that is left on the casing, over the largest one on it, at a multiple of the speed."""
     stage, outputs = found.model.stages[0], output_rows(found)
-    single, motion = running_stage(found, stage, drive)
+    structured = running_stage(found, stage, drive)
+    single, motion = structured.running, structured.motion
     mesh = 2.0 * np.pi * found.model.flow.mesh_frequency[stage.name] * factor
     carrier = abs(found.model.flow.speed[stage.section.carrier]) * factor if stage.planets else 0.0
     bands = 6 if stage.planets else 0

@@ -51,7 +51,7 @@ def pair_on_bearings() -> tuple[Row, ...]:
     mean = excitation.stiffness.mean(axis=1)
     modes = undamped_modes(pair_model(case, planetary_set(case)).system, mean, damping_ratio=0.0)
     found = solve_deflection(read_case(pair_of_rigid_gears_tables(case, float(mean[0]))))
-    stage = without_loss(running_stage(found, found.model.stages[0], excitation)[0])
+    stage = without_loss(running_stage(found, found.model.stages[0], excitation).running)
     rows = list[Row]()
     for hertz in (300.0, 900.0, 2500.0):
         known = {"excitation_harmonics": 6, "response_harmonics": 12, "method": "direct"}
@@ -95,7 +95,8 @@ def carrier_at_rest() -> tuple[Row, ...]:
     for name, casing in (("ring that stands still", False), ("casing on uneven feet", True)):
         found = stage_in_casing(casing=casing)
         stage = found.model.stages[0]
-        running_one, motion = running_stage(found, stage, synthetic_excitation(found, stage))
+        structured = running_stage(found, stage, synthetic_excitation(found, stage))
+        running_one, motion = structured.running, structured.motion
         running_one = without_loss(running_one)
         for hertz in (150.0, 400.0, 1100.0):
             apart = apart_from_gear_set(found, running_one, motion, hertz)

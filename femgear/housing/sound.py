@@ -510,7 +510,7 @@ def _uniform(order: np.ndarray, values: np.ndarray, start: float, step: float, c
     first = np.exp(2j * np.pi * (np.outer(start + width * step * np.arange(-(-count // width)), order) % 1.0))
     beside = np.exp(2j * np.pi * np.outer(order, step * np.arange(width)))
     parts = np.concatenate([beside.real, -beside.imag])
-    rows = (np.concatenate([(first * line).real, (first * line).imag], axis=1) @ parts for line in values)
+    rows = (np.concatenate([np.real(first * line), np.imag(first * line)], axis=1) @ parts for line in values)
     return np.array([row.ravel()[:count] for row in rows])
 
 

@@ -57,7 +57,8 @@ def test_the_drive_of_the_carrier_has_its_share_of_the_power():
 
 def test_another_mass_shows_in_the_motions():
     found = stage_in_casing()
-    stage, motion = running_stage(found, found.model.stages[0], synthetic_excitation(found, found.model.stages[0]))
+    structured = running_stage(found, found.model.stages[0], synthetic_excitation(found, found.model.stages[0]))
+    stage, motion = structured.running, structured.motion
     stage = without_loss(stage)
     assert apart_from_gear_set(found, stage, motion, 400.0) < 1e-9
     assert apart_from_gear_set(found, replace(stage, mass=1.0001 * stage.mass), motion, 400.0) > 1e-7
