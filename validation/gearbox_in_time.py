@@ -98,7 +98,8 @@ def turning_stage(*, back: bool) -> tuple[TurningSystem, RunningStage, np.ndarra
     """Helical stage in axes at rest, as the response takes it, and the modes (m, 18) of sun, carrier and casing."""
     found = helical_stage(ANGLE, back=back)
     box, assembly = found.model.stages[0], found.model.assembly
-    single, motion = running_stage(found, box, synthetic_excitation(found, box))
+    structured = running_stage(found, box, synthetic_excitation(found, box))
+    single, motion = structured.running, structured.motion
     frequency = single.natural_frequency
     ratio = 0.5 * (BY_MASS / frequency + BY_STIFFNESS * frequency)
     viscous = np.append(np.zeros(single.kinds), PIN_DAMPING)

@@ -509,7 +509,7 @@ def _uniform(order: np.ndarray, values: np.ndarray, start: float, step: float, c
     width = int(np.ceil(np.sqrt(count)))
     first = np.exp(2j * np.pi * (np.outer(start + width * step * np.arange(-(-count // width)), order) % 1.0))
     beside = np.exp(2j * np.pi * np.outer(order, step * np.arange(width)))
-    parts = np.concatenate([beside.real, -beside.imag])
+    parts = np.concatenate([np.real(beside), -np.imag(beside)])
     rows = (np.concatenate([np.real(first * line), np.imag(first * line)], axis=1) @ parts for line in values)
     return np.array([row.ravel()[:count] for row in rows])
 

@@ -103,7 +103,7 @@ class GearboxResponse:
     stages : tuple of StageLines
         Of all stages with teeth.
     missing : tuple of str
-        Stages without teeth, which excite nothing.
+        Stages without teeth, or without torque, which excite nothing.
     up_to : float
         Frequency up to which stages excite [Hz].
     paths : tuple of str

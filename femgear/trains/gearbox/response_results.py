@@ -267,8 +267,8 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         text = f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels there may be higher"
         yield Finding("W-STEPS", "runup.count", text, remedy="take more speeds, or a narrower range")
     if data.attrs["missing"]:
-        text = f"without teeth {data.attrs['missing']} excite nothing"
-        yield Finding("W-EXCITATION", "", text, remedy="give the teeth of these stages")
+        text = f"{data.attrs['missing']} excite nothing, without teeth or without torque"
+        yield Finding("W-EXCITATION", "", text, remedy="give teeth and torque of these stages")
 
 
 def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:

@@ -12,30 +12,35 @@ from femgear.trains.gearbox.case_file import GearboxCase
 from femgear.trains.gearbox.power import gearbox_flow
 
 
+def _silence(case: GearboxCase) -> tuple[str, str]:
+    """Why a case has no response, and what to do about it; empty where it has one."""
+    stages = [stage for stage in (*case.pair, *case.planetary) if stage.teeth]
+    if not stages:
+        return "no stage has computed teeth that excite it", "give the teeth of a stage"
+    if not case.deflection.contact:
+        return "deflection.contact = false leaves the teeth, which excite it, out", "leave deflection.contact out"
+    flow, first = gearbox_flow(case), "operation.first"
+    if not any(flow.first_torque(stage) for stage in stages):
+        return "no stage with teeth carries a torque", f"give a torque that is not zero in the load case of {first}"
+    reference = flow.independent[0] if flow.independent else case.shaft[0].name
+    if not flow.speed[reference]:
+        return "nothing turns", f"give a speed that is not zero in the load case of {first}"
+    return "", ""
+
+
 def why_silent(case: GearboxCase) -> str:
     """Tell why a case has no response, empty where it has one."""
-    if not any(stage.teeth for stage in (*case.pair, *case.planetary)):
-        return "no stage has computed teeth that excite it"
-    if not case.deflection.contact:
-        return "deflection.contact = false leaves the teeth, which excite it, out"
-    flow = gearbox_flow(case)
-    first = flow.independent[0] if flow.independent else case.shaft[0].name
-    return "" if flow.speed[first] else "nothing turns"
+    return _silence(case)[0]
 
 
 def idle_entries(case: GearboxCase) -> Iterator[Finding]:
     """Tell sensors and a run-up of a gearbox that has no response (W-UNUSED)."""
-    if not (case.sensor or case.runup.count) or not (why := why_silent(case)):
+    if not (case.sensor or case.runup.count):
         return
-    remedies = {
-        "no": "give the teeth of a stage",
-        "deflection.contact": "leave deflection.contact out",
-        "nothing": "give a speed that is not zero in the load case of operation.first",
-    }
-    remedy = remedies[why.split()[0]]
-    if case.sensor:
+    why, remedy = _silence(case)
+    if why and case.sensor:
         text = f"the gearbox has no response that sensors could feel, modes at them are all: {why}"
         yield Finding("W-UNUSED", "sensor", text, remedy=remedy)
-    if case.runup.count:
+    if why and case.runup.count:
         text = f"the run-up has no effect, since the gearbox has no response: {why}"
         yield Finding("W-UNUSED", "runup", text, remedy=remedy)

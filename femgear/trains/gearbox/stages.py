@@ -1,4 +1,4 @@
-"""The pipeline of a gearbox case: deflection -> modes; its power flow stands before it."""
+"""The pipeline of a gearbox case: deflection -> modes, response, run-up; its power flow stands before it."""
 
 from __future__ import annotations
 

@@ -95,7 +95,7 @@ def test_forces_follow_from_the_torque():
 
 def test_shares_keep_their_sum_in_other_slices():
     shares = np.array([[0.4, 0.3, 0.2, 0.1]])
-    contact = StageContact(None, np.ones(1), np.ones(1), shares, np.zeros(1))  # type: ignore[arg-type]
+    contact = StageContact(None, np.ones(1), np.ones(1), shares, np.zeros(1), None, None)  # type: ignore[arg-type]
     assert contact.shares_at(0, 4) == pytest.approx(shares[0])
     assert contact.shares_at(0, 2) == pytest.approx([0.7, 0.3])
     assert contact.shares_at(0, 8).sum() == pytest.approx(1.0)

@@ -305,3 +305,19 @@ def test_a_shaft_that_may_slide_grows_without_force():
     along = found.motion.reshape(-1, 6)[list(end), 2]
     # from bearing A, at 5 mm, to the end of the shaft
     assert along[0] - along[1] == pytest.approx(1.15e-5 * 40.0 * 0.085, rel=1e-9)
+
+
+def test_teeth_without_a_torque_touch_nowhere_and_hold_nothing_up():
+    """A shaft that turns along, and a load case at rest beside a loaded one."""
+    tables = pair_tables(teeth=True)
+    tables["operation"]["load_case"].append(
+        {"name": "idle", "torque": {"motor": "0 N m"}, "speed": {"input": "0 rpm"}, "share": 0.5}
+    )
+    tables["operation"]["load_case"][0]["share"] = 0.5
+    case = read_case(tables)
+    loaded, idle = (solve_deflection(case, one) for one in case.operation.load_case)
+    assert list(loaded.contacts) == ["stage"]
+    assert not idle.contacts
+    assert idle.mesh_force == pytest.approx([0.0])
+    assert np.isfinite(idle.motion).all()
+    assert not np.abs(idle.motion).any()
