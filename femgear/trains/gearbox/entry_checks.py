@@ -92,7 +92,7 @@ def coupling_problems(case: GearboxCase) -> Iterator[CaseError]:
 def run_up_problems(case: GearboxCase) -> Iterator[CaseError]:
     """Refuse a run-up of several speeds that are one."""
     start, stop, count = case.runup.start, case.runup.to, case.runup.count
-    if start is not None and start == stop and count > 1:
+    if start is not None and stop is not None and start == stop and count > 1:
         yield CaseError(
             "the run-up ends at the speed that it begins with",
             code="E-RANGE",

@@ -134,6 +134,7 @@ def test_planets_that_do_not_assemble_are_told():
     tables = pair_tables()
     tables["motions"] = "plane"
     tables["shaft"] += [{"name": "sun"}, {"name": "carrier"}]
+    tables["mass"] = [{"shaft": name, "mass": "1 kg", "inertia": "1e-3 kg m^2"} for name in ("sun", "carrier")]
     tables["operation"]["load_case"][0]["speed"]["sun"] = "0 rpm"
     tables["planetary"] = [
         {
