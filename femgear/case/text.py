@@ -8,7 +8,7 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, time
 from functools import lru_cache
@@ -441,6 +441,9 @@ class CaseFile:
         ``(tables) -> str``: what only files of this kind have, such as "bodies"; empty where they have not.
     embed : callable
         ``(tables, name of the file) -> files by key``: puts the points of other files into the tables.
+    beside_refused : callable
+        ``(case, tables) -> problems``: what can be judged of a case without its refused entries, and without what is
+        missing with them in the tables of these keys.
     """
 
     model: type
@@ -448,6 +451,7 @@ class CaseFile:
     notices: Callable[[dict, Any], Iterable[Finding]] = lambda tables, case: ()
     claims: Callable[[dict], str] = lambda tables: ""
     embed: Callable[[dict, str], dict[str, str]] = lambda tables, name: {}
+    beside_refused: Callable[[Any, Sequence[str]], Iterable[CaseError]] = lambda case, tables: ()
 
 
 def shown(number: int) -> str:

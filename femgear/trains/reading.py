@@ -7,6 +7,7 @@ sets without such a section.
 
 from __future__ import annotations
 
+import copy
 import os
 import re
 from collections.abc import Callable, Mapping
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 
 _MOST_UNREAD = 20
 """Files of a case that are refused at once."""
+_MOST_LEVELS = 4
+"""Tables around a refused entry that are left out to judge the others."""
 _REXS = (".rexs", ".rexsj", ".rexsz")
 
 
@@ -89,6 +92,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         # tables whose files cannot be read have no points
         tables = {(problem.key or "").rpartition(".")[0] for problem in unread}
         problems = [problem for problem in translate(error, keys) if problem.key not in tables]
+        problems += [] if unread else _beside_refused(file, data, error)
         raise combine([*unread, *problems], lines, name, error.error_count()) from None
     if unread:
         raise combine(unread, lines, name)
@@ -109,6 +113,45 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         case, estimated = with_estimates(case)
         case._notices += estimated
     return case
+
+
+def _beside_refused(file: case_text.CaseFile, data: dict, error: ValidationError) -> list[CaseError]:
+    """What can be judged of the other entries of a case some of whose entries are refused."""
+    tables, touched = copy.deepcopy(data), list[str]()
+    for _ in range(_MOST_LEVELS):
+        details = error.errors(include_url=False)
+        inside = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
+        for detail in details:
+            if detail["type"] == "too_short" and detail["loc"] in inside:
+                continue  # for the refused ones of its entries
+            # a list of values is left out with a wrong one, a table with an entry that is missing
+            path = list(detail["loc"][:-1] if detail["type"] == "missing" else detail["loc"])
+            while path and isinstance(path[-1], int):
+                path.pop()
+            if len(path) < 2 or not _left_out(tables, path):
+                return []
+            touched.append(case_text.dotted(tuple(path[:2] if isinstance(path[1], int) else path[:-1])))
+        try:
+            case = file.model.model_validate(tables)
+        except ValidationError as further:
+            error = further
+            continue
+        try:
+            return [*file.beside_refused(case, touched)]
+        except CaseError as refused:
+            return [refused]
+    return []
+
+
+def _left_out(tables: Any, path: list[str | int]) -> bool:
+    """Leave an entry out of tables; whether it is not there then."""
+    for part in path[:-1]:
+        if not (part in tables if isinstance(tables, dict) else isinstance(tables, list) and isinstance(part, int)):
+            return False
+        tables = tables[part]
+    if isinstance(tables, dict):
+        tables.pop(path[-1], None)
+    return isinstance(tables, dict)
 
 
 def _embed_of_set(data: dict, name: str) -> dict[str, str]:

@@ -178,7 +178,7 @@ class BoxShaftSection(Section):
 
 
 class SeatSection(Section):
-    """A place on a shaft: ``position`` from its left end; none on a shaft that is one rigid body."""
+    """A place on a shaft: ``position`` from its left end; from the centre of one rigid body, there by default."""
 
     shaft: Name
     position: Along | None = None

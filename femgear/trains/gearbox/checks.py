@@ -31,7 +31,7 @@ from femgear.trains.gearbox.geometry import (
     rolling_bearing,
     set_sizes,
 )
-from femgear.trains.gearbox.holding import floating_shafts, loose_fits, untaken_thrust
+from femgear.trains.gearbox.holding import floating_shafts, loose_fits, tilting_shafts, untaken_thrust
 from femgear.trains.gearbox.materials import material_notices
 from femgear.trains.gearbox.power import gearbox_flow
 
@@ -56,6 +56,16 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     return [*problems, *([] if named else massless_bodies(case)), *_held(case, problems)]
 
 
+def _beside_refused(case: GearboxCase, tables: Sequence[str]) -> Iterator[CaseError]:
+    """Judge a case without its refused entries, which are in these tables: names, and places of others."""
+    yield from (*_names(case), *_references(case))
+    if any(key.startswith("shaft") for key in tables):
+        return  # places are those on shafts
+    for problem in (*_seats(case), *_bearings(case), *_shaft_parts(case), *_stages(case), *coupling_problems(case)):
+        if not any(f"{problem.key}.".startswith((f"{key}.", f"{key}[")) for key in tables):
+            yield problem
+
+
 def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseError]:
     """What holds and drives all shafts, where the entries that it hangs on are sound."""
     keys = [problem.key or "" for problem in problems if not _misplaced(problem)]
@@ -70,6 +80,8 @@ def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseErro
     yield from loose_fits(case, [case.pair[i] for i in judged["pair"]])
     floating = [*floating_shafts(case, judged=judged)]
     yield from floating
+    tilting = [*tilting_shafts(case)] if not any(key.startswith("bearing") for key in keys) else []
+    yield from tilting
     if any(key.startswith(_OF_THE_FLOW) or (key.startswith("shaft") and key.endswith("].name")) for key in keys):
         return
     told: set[str] = set()
@@ -595,4 +607,5 @@ FILE = CaseFile(
     ),
     notices=material_notices,
     embed=embed_stages,
+    beside_refused=_beside_refused,
 )

@@ -101,6 +101,20 @@ def _floating(case: GearboxCase, numbers: Sequence[int]) -> CaseError:
     )
 
 
+def tilting_shafts(case: GearboxCase) -> Iterator[CaseError]:
+    """Refuse shafts that tilt: on one bearing of given stiffnesses without tilt, with at most one pair of gears."""
+    if case.motions != "space":
+        return
+    joined = {name for one in case.coupling for name in one.between}
+    joined |= {name for stage in case.planetary for name in (stage.sun, stage.carrier, stage.ring)}
+    for shaft in case.shaft:
+        bearings = [one for one in case.bearing if shaft.name in (one.shaft, one.outer_shaft)]
+        pairs = [pair for pair in case.pair if shaft.name in pair.shafts]
+        alone = len(bearings) == 1 and bearings[0].kind is None and not bearings[0].tilt
+        if alone and len(pairs) < 2 and shaft.name not in joined:
+            yield _loose(case, shaft.name, (3, 4))
+
+
 def loose_fits(case: GearboxCase, pairs: Sequence[PairSection]) -> Iterator[CaseError]:
     """Refuse bearings whose clearance swallows the load of the gears on their shaft, of pairs with known sizes."""
     for i, bearing in enumerate(case.bearing):

@@ -191,3 +191,53 @@ def test_planets_with_teeth_that_do_not_assemble_or_touch_are_refused(planets, c
     (error,) = problems(tables).values()
     assert (error.code, error.key) == (code, "planetary[0].teeth.set.planets")
     assert error.remedy
+
+
+def test_names_and_places_are_judged_beside_entries_that_cannot_be_read():
+    tables = pair_tables()
+    for key in ("bearing[0].shaft", "bearing[1].position", "pair[0].shafts", "operation.output"):
+        CHANGES[key][0](tables)
+    tables["operation"]["load_case"][0]["torque"]["motor"] = "50 N"
+    tables["bearing"][2]["radail"] = "1 N/m"
+    found = problems(tables)
+    assert found["operation.load_case[0].torque.motor"].code == "E-UNIT"
+    assert found["bearing[2].radail"].code == "E-KEY-UNKNOWN"
+    assert found.keys() == {
+        "operation.load_case[0].torque.motor",
+        "bearing[2].radail",
+        "bearing[0].shaft",
+        "bearing[1].position",
+        "pair[0].shafts",
+        "operation.output",
+    }
+
+
+@pytest.mark.parametrize(
+    "spoil",
+    [
+        lambda t: t["shaft"][1].update(axis=["90 N", "0 mm"]),
+        lambda t: t["shaft"][1]["part"][0].pop("length"),
+        lambda t: t["pair"][0].update(positions=["30 mm", "3 s"]),
+        lambda t: t["pair"][0]["gears"].update(module="3 s"),
+        lambda t: t["bearing"][0].update(position=5),
+        lambda t: t["bearing"][2].update(radial="1 N", axial="1 N"),
+        lambda t: t["operation"]["load_case"][0].pop("torque"),
+        lambda t: t.update(shaft="two"),
+    ],
+)
+def test_what_rests_on_an_entry_that_cannot_be_read_is_not_judged(spoil):
+    tables = pair_tables()
+    spoil(tables)
+    with pytest.raises(CaseError) as error:
+        read_case(tables)
+    assert {one.code for one in error.value.problems or (error.value,)} <= {"E-UNIT", "E-KEY-MISSING", "E-TYPE"}
+    assert len(error.value.problems) <= 2
+
+
+def test_a_name_is_judged_beside_a_shaft_without_length():
+    tables = pair_tables()
+    del tables["shaft"][1]["part"][0]["length"]
+    CHANGES["bearing[0].shaft"][0](tables)
+    # its places are not
+    CHANGES["bearing[1].position"][0](tables)
+    assert problems(tables).keys() == {"shaft[1].part[0].length", "bearing[0].shaft"}

@@ -324,3 +324,18 @@ def test_no_wrong_name_breaks_the_checks(tables):
             read_case(new)
         assert any(problem.value == "nowhere" for problem in caught.value.problems), path
     assert count > 8
+
+
+def test_a_floating_shaft_and_one_that_tilts_are_told_together():
+    tables = pair_tables()
+    del tables["bearing"][0]["axial"], tables["bearing"][3]
+    with pytest.raises(CaseError) as error:
+        read_case(tables)
+    floating, tilting = error.value.problems
+    assert floating.key == "shaft[0].name" and "input floats along the axis" in floating.message
+    assert tilting.key == "shaft[1].name" and "output against tilting" in tilting.message
+    # a bearing that takes tilts holds it
+    tables["bearing"][2]["tilt"] = "1e6 N m/rad"
+    with pytest.raises(CaseError) as error:
+        read_case(tables)
+    assert error.value.key == "shaft[0].name"
