@@ -146,9 +146,12 @@ def _beside_refused(file: case_text.CaseFile, data: dict, error: ValidationError
 def _left_out(tables: Any, path: list[str | int]) -> bool:
     """Leave an entry out of tables; whether it is not there then."""
     for part in path[:-1]:
-        if not (part in tables if isinstance(tables, dict) else isinstance(tables, list) and isinstance(part, int)):
+        if isinstance(tables, dict) and part in tables:
+            tables = tables[part]
+        elif isinstance(tables, list) and isinstance(part, int) and part < len(tables):
+            tables = tables[part]
+        else:
             return False
-        tables = tables[part]
     if isinstance(tables, dict):
         tables.pop(path[-1], None)
     return isinstance(tables, dict)
