@@ -70,6 +70,7 @@ CATALOGUE = {
     "W-RELIEF-SIGN": (NOTE, "A modification adds material."),
     "W-RESIDUAL": (DOUBT, "Static compliance beyond the modes of a casing is missing."),
     "W-RESPONSE": (NOTE, "There are modes alone."),
+    "W-RIGID": (DOUBT, "A response holds bodies rigid that the modes have elastic."),
     "W-RIM": (NOTE, "A rim is thin."),
     "W-REXS": (DOUBT, "A REXS file holds what the case that was made of it has not, or has otherwise."),
     "W-ROWS": (NOTE, "Tables that no sheet can hold are left out."),

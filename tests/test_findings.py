@@ -357,7 +357,19 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
                 "cross_excitation": (("speed", "stage", "other_stage"), [[[0.0, 0.2], [0.0, 0.0]]]),
             },
             coords={"speed": [1000.0], "stage": ["first", "second"], "other_stage": ["first", "second"]},
-            attrs={"missing": "", "up_to": 2e4},
+            attrs={"missing": "", "rigid": "", "up_to": 2e4},
+        ),
+    ),
+    "W-RIGID": lambda: of_stage(
+        "gearbox",
+        "dynamics",
+        xr.Dataset(
+            {
+                "lowest_force": (("speed", "stage", "kind"), [[[1.0], [1.0]]]),
+                "outer": (("speed", "stage"), [[0.0, 0.0]]),
+            },
+            coords={"speed": [1000.0], "stage": ["first", "second"]},
+            attrs={"missing": "", "rigid": "ring of second", "up_to": 2e4},
         ),
     ),
     "W-PLAY": lambda: of_stage(

@@ -125,6 +125,7 @@ class GearboxResponseResult(StageResult):
             "up_to": found.up_to,
             "reference": found.reference,
             "missing": ", ".join(found.missing),
+            "rigid": ", ".join(_rigid_bodies(found)),
             "unresolved_resonances": self.unresolved,
         }
         used = {dim for entry in variables.values() for dim in entry[0].split()}
@@ -149,6 +150,13 @@ def _of_paths(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str,
     total = np.maximum((np.abs(whole) ** 2).sum(axis=-1), np.finfo(float).tiny)
     text = "share of the path in the power of the acceleration; negative where it quietens others"
     return {"path_share": ("speed path sensor", power / total[:, None], "1", text)}
+
+
+def _rigid_bodies(found: GearboxResponse) -> list[str]:
+    """Name the rings and carriers whose own modes the modes of the gearbox have, and the response has not."""
+    stages = found.deflection.model.stages
+    rings = [f"ring of {stage.name}" for stage in stages if getattr(stage.section, "elastic_ring", False)]
+    return rings + [stage.elastic_carrier.name for stage in stages if stage.elastic_carrier is not None]
 
 
 def _complex(name: str, dims: str, values: np.ndarray, unit: str, text: str) -> dict[str, tuple]:
@@ -266,6 +274,9 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if missed := int(data.attrs.get("unresolved_resonances", 0)):
         text = f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels there may be higher"
         yield Finding("W-STEPS", "runup.count", text, remedy="take more speeds, or a narrower range")
+    if data.attrs["rigid"]:
+        text = f"{data.attrs['rigid']}: elastic in the modes, without modes of their own in the response"
+        yield Finding("W-RIGID", "", text, remedy="look at their modes near the lines that matter")
     if data.attrs["missing"]:
         text = f"{data.attrs['missing']} excite nothing, without teeth or without torque"
         yield Finding("W-EXCITATION", "", text, remedy="give teeth and torque of these stages")

@@ -119,3 +119,10 @@ def test_stages_without_teeth_are_told(data):
     (finding,) = gearbox_response_warnings(data)
     assert finding.code == "W-EXCITATION"
     assert "second stage" in finding.text
+
+
+def test_bodies_that_are_elastic_in_modes_alone_are_told(data):
+    data["level_change"].values[:] = 0.0
+    assert data.attrs["rigid"] == ""
+    data.attrs["rigid"] = "ring of second stage"
+    assert codes(data) == ["W-RIGID"]
