@@ -380,7 +380,7 @@ def small(source: Path) -> bytes:
         picture = picture.resize(size, Image.Resampling.LANCZOS)
     stream, plain = io.BytesIO(), Image.Dither.NONE
     # colours far apart: those that are most frequent would be shades of grey alone
-    few = picture.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, dither=plain)
+    few = picture.quantize(COLOURS, method=Image.Quantize.MAXCOVERAGE, kmeans=2, dither=plain)
     few.save(stream, "png", optimize=True)
     if len(data := stream.getvalue()) <= LARGEST:
         return data

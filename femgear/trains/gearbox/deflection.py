@@ -38,8 +38,6 @@ _UPRIGHT = 1e-7
 # below which they are near at any rate [m].
 _COARSE, _NEAR, _NEARLY_UPRIGHT = 12, 3e-3, 1e-6
 _SETTLED = 1e-11  # residual force over the largest one
-# Torque of a stage over the largest one of any that counts as none.
-_IDLE_TORQUE = 1e-9
 _LEAST_LOAD = 1e-3  # against which residuals count where nothing loads a gearbox [N]
 # Load of a rolling element over the largest force of the gearbox up to which it is rounding.
 _PRESSED = 1e-9
@@ -213,7 +211,7 @@ def solve_deflection(
         No balance, as of a bearing whose clearance swallows the load (E-CONVERGENCE).
     """
     model = gearbox_model(case, load_case, estimate=estimate)
-    staged = [stage for stage in model.stages if has_contact(model, stage)]
+    staged = [stage for stage in model.stages if model.flow.touches(stage.section)]
     gap = _first_gaps(model, staged)
     found = solve_state(model, gap)
     if not (staged and case.deflection.contact):
@@ -267,14 +265,6 @@ def _contact(
     except FemgearError as error:
         locate_contact_error(error, model.case, stage.section, torque, stage.width)
         raise
-
-
-def has_contact(model: GearboxModel, stage: StageModel) -> bool:
-    """Whether a stage has teeth that carry: those of a shaft that turns along without a load touch nowhere."""
-    if stage.section.teeth is None:
-        return False
-    torques = [abs(torque) for one in model.flow.stage_torque.values() for torque in one.values()]
-    return abs(model.flow.first_torque(stage.section)) > _IDLE_TORQUE * max(torques)
 
 
 def _first_gaps(model: GearboxModel, staged: Sequence[StageModel]) -> np.ndarray:

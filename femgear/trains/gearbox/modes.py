@@ -242,7 +242,7 @@ def _kinetic(
 
 def _called(kind: str, name: str) -> str:
     """Name of a part with its kind, once."""
-    return name if name.startswith(kind) else f"{kind} {name}"
+    return name if kind in name.split() else f"{kind} {name}"
 
 
 def _strain(

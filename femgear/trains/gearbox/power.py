@@ -14,6 +14,8 @@ from femgear.gears.stage_frequencies import StageFrequencies, stage_frequencies
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, GearboxCase, LoadCaseSection, PairSection
 from femgear.trains.gearbox.geometry import pair_sizes, set_sizes
 
+# Torque of a stage over the largest one of any that counts as none.
+_IDLE = 1e-9
 # Where the refusals of the graph stand in the case file.
 _KEYS = {
     "E-SPEED": "operation.load_case[{}].speed",
@@ -57,6 +59,13 @@ class BoxFlow:
             return torques[stage.sun]
         sun, _, carrier = willis_weights(teeth_sun, teeth_ring)
         return torques[stage.carrier] * sun / carrier
+
+    def touches(self, stage: PairSection | BoxPlanetarySection) -> bool:
+        """Whether a stage has teeth that carry: those of a shaft that turns along without a load touch nowhere."""
+        if stage.teeth is None:
+            return False
+        largest = max(abs(torque) for torques in self.stage_torque.values() for torque in torques.values())
+        return abs(self.first_torque(stage)) > _IDLE * largest
 
     @property
     def mesh_frequency(self) -> dict[str, float]:

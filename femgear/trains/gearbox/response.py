@@ -262,7 +262,7 @@ def _stage_lines(
     mean = running.excitation.force.mean(axis=1).reshape(kinds, count).mean(axis=1)
 
     def keep(i: int) -> None:
-        response = solve(i)
+        response = widest if i == int(counts.argmax()) else solve(i)
         few = harmonic < len(response.modal)
         amplitude = response.lines(outputs.T)[harmonic[few], at[few]]
         motion[i][:, few] = amplitude[:, :measured].T

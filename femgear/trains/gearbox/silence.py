@@ -20,7 +20,7 @@ def _silence(case: GearboxCase) -> tuple[str, str]:
     if not case.deflection.contact:
         return "deflection.contact = false leaves the teeth, which excite it, out", "leave deflection.contact out"
     flow, first = gearbox_flow(case), "operation.first"
-    if not any(flow.first_torque(stage) for stage in stages):
+    if not any(flow.touches(stage) for stage in stages):
         return "no stage with teeth carries a torque", f"give a torque that is not zero in the load case of {first}"
     reference = flow.independent[0] if flow.independent else case.shaft[0].name
     if not flow.speed[reference]:

@@ -1,6 +1,7 @@
 """Speeds, torques and frequencies of a case, and where its refusals stand."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from small_gearbox import pair_tables
@@ -59,3 +60,12 @@ def test_refusals_name_entries_of_the_case(change, code, key):
         gearbox_flow(read_case(tables))
     found = error.value.problems or (error.value,)
     assert [(one.code, one.key) for one in found] == [(code, key)]
+
+
+def test_teeth_touch_where_a_torque_beyond_rounding_acts_on_them():
+    case = read_case(pair_tables(teeth=True))
+    flow = gearbox_flow(case)
+    assert flow.touches(case.pair[0])
+    idle = replace(flow, stage_torque={"stage": {"input": 1e-13, "output": -1e-13}, "other": {"input": 5.0}})
+    assert not idle.touches(case.pair[0])
+    assert not flow.touches(case.pair[0].model_copy(update={"teeth": None}))
