@@ -129,7 +129,6 @@ def running(system: Twin, *, symmetry: int | None = None) -> RunningStage:
         frequency,
         np.where(frequency > 0.0, (20.0 + 3e-5 * frequency**2) / (2.0 * still), 0.0),
         np.stack([waves[2], waves[0], waves[1]], axis=1),
-        np.zeros((4, 3, 4, 3)),
         system.planet,
         np.zeros((3, 3)),
         turning,

@@ -60,8 +60,6 @@ class RunningStage(ReadOnlyArrays):
     shape : (C, W, m) complex array
         Approach P of the contact points of a planet at angle 0 by the waves n = -(W-1)/2 .. (W-1)/2 [kg^-1/2, m
         kg^-1/2 of springs against rotation]; meshes come first.
-    residual : (C, W, C, W) complex array
-        Static compliance of what the modes leave out [m/N].
     mass, gyroscopic : (p, p) arrays
         Of one planet [kg, kg m^2], the latter that of its rotation over the mesh frequency [kg, kg m^2]; p = 0 of a
         pair. Axes: radial, tangential, z.
@@ -92,7 +90,6 @@ class RunningStage(ReadOnlyArrays):
     natural_frequency: np.ndarray
     damping_ratio: np.ndarray
     shape: np.ndarray
-    residual: np.ndarray
     mass: np.ndarray
     gyroscopic: np.ndarray
     turning: np.ndarray
@@ -469,7 +466,7 @@ class _Problem:
         places = orders.place(band + stage.sense * n)
         met = [(w, number[int(place)]) for w, place in enumerate(places) if int(place) in number]
         omega = np.where(np.abs(omega) < _STILL * max(np.abs(omega).max(), 1.0), 0.0, omega)
-        both = (stage.receptance(omega) @ stage.products).reshape(len(omega), C, W, C, W) + stage.residual
+        both = (stage.receptance(omega) @ stage.products).reshape(len(omega), C, W, C, W)
         psi = np.asarray(stage.paths.planet_angles)[self.leaders]
         N = stage.paths.symmetry
         for w, k in met:

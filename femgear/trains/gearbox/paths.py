@@ -84,10 +84,11 @@ def casing_paths(found: Deflection) -> CasingPaths | None:
     sensors = sensor_rows(model)
     if casing is None or not len(sensors):
         return None
-    assembly, loss = linear_system(found)[0], 1.0 + 2j * model.case.modes.damping_ratio
+    assembly, _, slices = linear_system(found)
+    loss = 1.0 + 2j * model.case.modes.damping_ratio
     stations = {*casing.stations, *casing.own.values()}
     places = np.array([6 * station + way for station in casing.stations for way in range(6)])
-    parts = [part for part in _parts(found, assembly) if not stations.isdisjoint(part[1])]
+    parts = [part for part in _parts(found, assembly, slices) if not stations.isdisjoint(part[1])]
     onto = assembly.led[:, places].T
     forces = {name: np.zeros((len(places), assembly.count), complex) for name, *_ in parts}
     rigid = False
@@ -111,8 +112,13 @@ def casing_paths(found: Deflection) -> CasingPaths | None:
     )
 
 
-def _parts(found: Deflection, assembly: Assembly) -> list[tuple[str, Sequence[int], np.ndarray, bool]]:
-    """Springs and meshes: name, stations, stiffness matrix (6n, 6n), and whether some of it is rigid."""
+def _parts(
+    found: Deflection, assembly: Assembly, stiffness: np.ndarray
+) -> list[tuple[str, Sequence[int], np.ndarray, bool]]:
+    """Springs and meshes: name, stations, stiffness matrix (6n, 6n), and whether some of it is rigid.
+
+    ``stiffness`` (g,) is that of all slices of the meshes [N/m].
+    """
     model, parts = found.model, []
     for springs, tangent in zip(model.bearings, found.bearing_stiffness, strict=True):
         rows = spread_rows(springs, assembly)
@@ -124,7 +130,6 @@ def _parts(found: Deflection, assembly: Assembly) -> list[tuple[str, Sequence[in
         rows, holds = spread_rows(springs, assembly), np.isinf(springs.stiffness)
         matrix = (rows.T * np.where(holds, 0.0, springs.stiffness)) @ rows
         parts.append((springs.name, springs.stations, matrix, bool(holds.any())))
-    stiffness = linear_system(found)[2]
     for stage in model.stages:
         for mesh in stage.meshes:
             part = assembly.slices[mesh]

@@ -143,7 +143,6 @@ def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitati
         2.0 * math.pi * modes.frequency,
         np.zeros(len(modes.frequency)),
         shape,
-        np.zeros((*shape.shape[:2], *shape.shape[:2])),
         mass[np.ix_(free, free)],
         gyroscopic[np.ix_(free, free)],
         turning[np.ix_(free, free)],
