@@ -26,7 +26,7 @@ _TABLES: dict[str, Any] = {
             "shafts": ["input", "output"],
             "positions": ["30 mm", "30 mm"],
             "gears": {"teeth": [24, 36], "module": "3 mm", "face_width": "20 mm"},
-            "mesh": {"stiffness": "4e8 N/m", "contact_ratio": 1.6},
+            "mesh": {"stiffness": "4e8 N/m"},
         }
     ],
     "load": [

@@ -31,6 +31,7 @@ from femgear.solvers.linear.modal import modal_damping
 from femgear.stages.static import solve_static
 from femgear.system.force_laws import positive_part
 from femgear.system.fourier import FourierSeries, orders_of, phase_of
+from femgear.system.stiffness_waves import pair_count_wave
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, pair_case_of, torque_histories
 from femgear.trains.drivetrain.kinematics import (
@@ -416,14 +417,15 @@ def _stiffness(train: Drivetrain, place: Coordinates, spin: np.ndarray, harmonic
 def rectangular_series(wave: MeshSection, harmonics: int) -> np.ndarray:
     """Compute the complex harmonics 0 to H (H + 1,) of the rectangular mesh stiffness [N/m].
 
-    With ``low`` pairs always in contact and one more for the share ``e = ratio - low`` of the period, centred
-    at phase zero, ``k = k_low + (k_high - k_low) (e + sum_h 2 / (pi h) sin(pi h e) cos(h omega t))``
-    (Parker and Lin, J. Mech. Des. 126, 2004, 68-76, take the same wave).
+    With as many pairs as the contact ratio has whole ones always in contact, and one more for the rest of it,
+    centred at phase zero: `femgear.system.stiffness_waves.pair_count_wave`, its height that of the two levels.
     """
-    low, high, share = wave.levels
-    h = np.arange(1, harmonics + 1)
-    waves = 2.0 * (high - low) / (math.pi * h) * np.sin(math.pi * h * share)
-    return np.append(wave.stiffness, waves * np.exp(2j * np.pi * h * wave.phase)).astype(complex)
+    low, high, _ = wave.levels
+    ratio, h = wave.contact_ratio, np.arange(1, harmonics + 1)
+    # the middle of a path is half a period from the time of most pairs where the whole number is odd
+    ahead = np.exp(2j * np.pi * h * (wave.phase + 0.5 * math.floor(ratio)))
+    pairs = pair_count_wave(-0.5 * ratio, 0.5 * ratio, harmonics)
+    return np.append(wave.stiffness, (high - low) * ratio * pairs * ahead).astype(complex)
 
 
 def contact_model(model: DrivetrainModel) -> DrivetrainModel:

@@ -274,10 +274,15 @@ class BoxCouplingSection(Section):
 
 
 class BoxMeshSection(Section):
-    """Stiffness of a mesh along its normal where no teeth are given, and its tooth pairs in contact."""
+    """Stiffness of a mesh along its normal where no teeth are given, and its tooth pairs in contact.
+
+    With a transverse ``contact_ratio`` the stiffness is in proportion to the number of tooth pairs. ``phase`` is the
+    share of the mesh period by which a pair of teeth passes the middle of its path before the pitch point.
+    """
 
     stiffness: MeshStiffness
     contact_ratio: Annotated[float, Number(1.0, 20.0)] | None = None
+    phase: Annotated[float, Number(-1.0, 1.0)] = 0.0
 
 
 class PairGearsSection(Section):
@@ -310,6 +315,11 @@ class PairSection(Section):
     teeth: StageTables | None = None
     gears: PairGearsSection | None = None
     mesh: BoxMeshSection | None = None
+
+    @property
+    def counts_pairs(self) -> bool:
+        """Whether the mesh excites by the number of its tooth pairs: without teeth, with a contact ratio."""
+        return self.mesh is not None and self.mesh.contact_ratio is not None
 
 
 class SetGearsSection(Section):
@@ -421,6 +431,11 @@ class BoxPlanetarySection(Section):
     carrier_body: CarrierBodySection | None = None
     elastic_ring: StrictBool = False
     """In modes the ring in the casing is elastic, on the foundation that its teeth give."""
+
+    @property
+    def counts_pairs(self) -> bool:
+        """Whether both meshes excite by the number of their tooth pairs: without teeth, with contact ratios."""
+        return all(mesh is not None and mesh.contact_ratio is not None for mesh in (self.sun_mesh, self.ring_mesh))
 
     @property
     def superelement(self) -> SuperelementSection | None:

@@ -62,8 +62,10 @@ class BoxFlow:
 
     def touches(self, stage: PairSection | BoxPlanetarySection) -> bool:
         """Whether a stage has teeth that carry: those of a shaft that turns along without a load touch nowhere."""
-        if stage.teeth is None:
-            return False
+        return stage.teeth is not None and self.carries(stage)
+
+    def carries(self, stage: PairSection | BoxPlanetarySection) -> bool:
+        """Whether a torque goes through a stage."""
         largest = max(abs(torque) for torques in self.stage_torque.values() for torque in torques.values())
         return abs(self.first_torque(stage)) > _IDLE * largest
 

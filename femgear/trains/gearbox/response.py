@@ -25,10 +25,11 @@ from femgear.housing.two_way.running_planets import RunningResponse, solve_runni
 from femgear.stages.protocol import Progress, silent
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection
 from femgear.trains.gearbox.deflection import Deflection, spread_rows
+from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.paths import CasingPaths, casing_paths, forces_on_casing
 from femgear.trains.gearbox.sensors import sensor_rows
-from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage, stage_excitation
+from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage
 
 _MOST = 2000
 """Mesh harmonics at most."""
@@ -101,9 +102,9 @@ class GearboxResponse:
     speed : (v,) array
         Of the reference shaft [rad/s], positive.
     stages : tuple of StageLines
-        Of all stages with teeth.
+        Of all stages that excite.
     missing : tuple of str
-        Stages without teeth, or without torque, which excite nothing.
+        Stages without teeth or contact ratio, or without torque, which excite nothing.
     up_to : float
         Frequency up to which stages excite [Hz].
     paths : tuple of str
@@ -204,15 +205,14 @@ def solve_gearbox_response(
     rows = np.vstack(output_rows(found))
     paths = casing_paths(found) if by_path else None
     lines, done = list[StageLines](), 0
-    staged = [one for one in model.stages if one.name in found.contacts]
+    staged = exciting_stages(found)
     for one in staged:
-        excitation = stage_excitation(found.contacts[one.name], steps=steps)
-        structured = running_stage(found, one, excitation)
+        structured = running_stage(found, one, excitation_of(found, one, steps=steps))
         outputs = np.vstack([rows, mesh_rows(model, one)]) @ structured.motion
         lines.append(_stage_lines(found, one, structured, outputs, speeds / nominal, paths))
         done += 1
         progress(stage, done, len(staged))
-    missing = tuple(one.name for one in model.stages if one.name not in found.contacts)
+    missing = tuple(one.name for one in model.stages if one not in staged)
     names = () if paths is None else paths.names
     return GearboxResponse(found, reference, speeds, tuple(lines), missing, up_to, names)
 

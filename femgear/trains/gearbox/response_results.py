@@ -278,8 +278,8 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         text = f"{data.attrs['rigid']}: elastic in the modes, without modes of their own in the response"
         yield Finding("W-RIGID", "", text, remedy="look at their modes near the lines that matter")
     if data.attrs["missing"]:
-        text = f"{data.attrs['missing']} excite nothing, without teeth or without torque"
-        yield Finding("W-EXCITATION", "", text, remedy="give teeth and torque of these stages")
+        text = f"{data.attrs['missing']} excite nothing, without teeth or contact ratio, or without torque"
+        yield Finding("W-EXCITATION", "", text, remedy="give teeth or contact_ratio, and torque, of these stages")
 
 
 def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:

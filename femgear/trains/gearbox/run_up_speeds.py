@@ -18,11 +18,11 @@ from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.resonances import crossings, modal_forces, refined_speeds, unresolved
 from femgear.system.system import Modes
 from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
 from femgear.trains.gearbox.model import StageModel
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.response import reference_shaft
 from femgear.trains.gearbox.sensors import sensor_rows
-from femgear.trains.gearbox.stage_structure import stage_excitation
 
 _MOST = 1000
 """Mesh harmonics at most."""
@@ -76,10 +76,8 @@ def gearbox_resonances(
     at_sensors = (sensor_rows(model) @ assembly.motions @ modes.shape).T
     up_to, nominal = case.dynamics.up_to, abs(model.flow.speed[reference_shaft(model)])
     parts = [np.zeros((3, 0))]
-    for stage in model.stages:
-        if stage.name not in found.contacts:
-            continue
-        excitation = stage_excitation(found.contacts[stage.name], steps=steps)
+    for stage in exciting_stages(found):
+        excitation = excitation_of(found, stage, steps=steps)
         mesh_turns = model.flow.mesh_frequency[stage.name] / nominal
         if not mesh_turns > 0.0:
             continue

@@ -1,6 +1,6 @@
 """Why a gearbox has no response, and which entries have no effect then.
 
-Only stages whose teeth are computed excite a gearbox, and only while it turns. Sensors are left with the modes.
+Stages whose teeth are computed, or that have contact ratios, excite a gearbox, and only while it turns. Sensors are left with the modes.
 """
 
 from __future__ import annotations
@@ -14,14 +14,16 @@ from femgear.trains.gearbox.power import gearbox_flow
 
 def _silence(case: GearboxCase) -> tuple[str, str]:
     """Why a case has no response, and what to do about it; empty where it has one."""
-    stages = [stage for stage in (*case.pair, *case.planetary) if stage.teeth]
+    every = (*case.pair, *case.planetary)
+    stages = [stage for stage in every if stage.teeth or stage.counts_pairs]
     if not stages:
-        return "no stage has computed teeth that excite it", "give the teeth of a stage"
-    if not case.deflection.contact:
+        return "no stage has teeth or contact ratios that excite it", "give teeth or contact_ratio of a stage"
+    stages = [stage for stage in stages if stage.counts_pairs or case.deflection.contact]
+    if not stages:
         return "deflection.contact = false leaves the teeth, which excite it, out", "leave deflection.contact out"
     flow, first = gearbox_flow(case), "operation.first"
-    if not any(flow.touches(stage) for stage in stages):
-        return "no stage with teeth carries a torque", f"give a torque that is not zero in the load case of {first}"
+    if not any(flow.carries(stage) for stage in stages):
+        return "no stage that excites it carries a torque", f"give a torque that is not zero in the load case of {first}"
     reference = flow.independent[0] if flow.independent else case.shaft[0].name
     if not flow.speed[reference]:
         return "nothing turns", f"give a speed that is not zero in the load case of {first}"

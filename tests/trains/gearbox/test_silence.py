@@ -29,7 +29,7 @@ def _standing(tables) -> None:
 @pytest.mark.parametrize(
     ("teeth", "change", "words"),
     [
-        (False, lambda tables: None, "no stage has computed teeth"),
+        (False, lambda tables: None, "no stage has teeth or contact ratios"),
         (True, lambda tables: tables.update(deflection={"contact": False}), "deflection.contact = false"),
         (True, _standing, "nothing turns"),
     ],

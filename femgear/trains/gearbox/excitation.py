@@ -1,0 +1,92 @@
+"""What a stage excites a gearbox with: its contact, or the number of tooth pairs where no contact is computed.
+
+Meshes of a given stiffness and contact ratio have the wave of `femgear.system.stiffness_waves` under the constant
+force F that the power flow gives them: ``f = k(t) (approach - mean approach) + F k(t) / k_0``. The pitch point is the
+middle of the path of contact unless a phase is given, and teeth are as thick as their spaces at the pitch circle.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from femgear.case.dependencies import Steps
+from femgear.system.fourier import sample, tooth_lines
+from femgear.system.stiffness_waves import pair_count_wave
+from femgear.system.system import MeshExcitation
+from femgear.trains.gearbox.case_file import BoxMeshSection, PairSection
+from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.geometry import StageSizes
+from femgear.trains.gearbox.model import GearboxModel, StageModel
+from femgear.trains.gearbox.stage_structure import stage_excitation
+
+_RECORD = 2**13
+"""Positions of the mesh period; of sets the next multiple of their planets."""
+
+
+def exciting_stages(found: Deflection) -> list[StageModel]:
+    """List the stages that excite a gearbox: by their contact, or by the contact ratios of meshes that carry."""
+    model = found.model
+    return [
+        stage
+        for stage in model.stages
+        if stage.name in found.contacts or (stage.section.counts_pairs and model.flow.carries(stage.section))
+    ]
+
+
+def excitation_of(found: Deflection, stage: StageModel, *, steps: Steps | None = None) -> MeshExcitation:
+    """Compute the excitation of one of the `exciting_stages`, see `femgear.trains.gearbox.stage_structure`.
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state.
+    stage : StageModel
+    steps : Steps, optional
+        What other computations of the stage have left.
+    """
+    if stage.name in found.contacts:
+        return stage_excitation(found.contacts[stage.name], steps=steps)
+    return pair_count_excitation(found.model, stage)
+
+
+def pair_count_excitation(model: GearboxModel, stage: StageModel) -> MeshExcitation:
+    """Compute mesh stiffness, deflection and force along the normals from the contact ratios of a stage.
+
+    As time goes on where gear 1, or the sun against its carrier, turns counter-clockwise; tau = 0 where a pair of gear
+    1, or of the sun with planet 1, touches at its pitch point.
+    """
+    section, sizes, N = stage.section, stage.sizes, max(len(stage.planets), 1)
+    meshes = (section.mesh,) if isinstance(section, PairSection) else (section.sun_mesh, section.ring_mesh)
+    count = N * -(-_RECORD // N)
+    waves = [_wave(mesh, sizes, stage.flank, count // 2 - 1) for mesh in meshes if mesh is not None]
+    mean = np.repeat([mesh.stiffness for mesh in meshes if mesh is not None], N)[:, None]
+    lines = waves[0][None] if len(waves) == 1 else tooth_lines(waves[0], waves[1], mesh_phases(sizes))
+    stiffness = mean * sample(np.column_stack([np.ones(len(lines)), lines]), count)
+    normal = sizes.base_radii[0] * math.cos(sizes.base_helix)
+    force = abs(model.flow.first_torque(section)) / (N * normal)
+    deflection = np.broadcast_to(force / mean, stiffness.shape)
+    return MeshExcitation(stiffness, deflection, stiffness * force / mean, np.zeros(len(mean)))
+
+
+def _wave(mesh: BoxMeshSection, sizes: StageSizes, flank: int, harmonics: int) -> np.ndarray:
+    """Harmonics (H,) of the stiffness of a mesh over its mean."""
+    # the other flanks are those of the mirrored gears, whose path is passed from its end
+    half, middle = 0.5 * (mesh.contact_ratio or 0.0), -flank * mesh.phase
+    width = min(sizes.face_widths, default=0.0)
+    pitch = 2.0 * math.pi * sizes.base_radii[0] / sizes.teeth[0]
+    overlap = width * abs(math.tan(sizes.base_helix)) / pitch
+    return pair_count_wave(middle - half, middle + half, harmonics, overlap=overlap)
+
+
+def mesh_phases(sizes: StageSizes) -> np.ndarray:
+    """Find the phases (2N,) of the meshes of a set from teeth and angles, as fractions of the mesh period.
+
+    As those of `femgear.gears.planetary.PlanetarySet.mesh_phases`, of teeth as thick as their spaces: the planet tooth
+    that touches the ring is half the planet and half a pitch away from the one that touches the sun.
+    """
+    sun, planet, _ = sizes.teeth
+    psi = np.asarray(sizes.planet_angles)
+    of_sun = -(psi - psi[0]) * sun / (2.0 * math.pi)
+    return np.concatenate([of_sun, of_sun - 0.5 * (planet - 1)]) % 1.0
