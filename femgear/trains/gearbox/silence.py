@@ -1,6 +1,7 @@
 """Why a gearbox has no response, and which entries have no effect then.
 
-Stages whose teeth are computed, or that have contact ratios, excite a gearbox, and only while it turns. Sensors are left with the modes.
+Stages whose teeth are computed, or that have contact ratios, excite a gearbox, and only while it turns. Sensors are
+left with the modes.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ def _silence(case: GearboxCase) -> tuple[str, str]:
         return "deflection.contact = false leaves the teeth, which excite it, out", "leave deflection.contact out"
     flow, first = gearbox_flow(case), "operation.first"
     if not any(flow.carries(stage) for stage in stages):
-        return "no stage that excites it carries a torque", f"give a torque that is not zero in the load case of {first}"
+        why = "no stage that excites it carries a torque"
+        return why, f"give a torque that is not zero in the load case of {first}"
     reference = flow.independent[0] if flow.independent else case.shaft[0].name
     if not flow.speed[reference]:
         return "nothing turns", f"give a speed that is not zero in the load case of {first}"
