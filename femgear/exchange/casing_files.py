@@ -39,6 +39,7 @@ from scipy.linalg import eigh
 from femgear.errors import CaseError, FemgearError, nvh_library
 from femgear.findings import Finding
 from femgear.housing.two_way.structure import ARRAY_NAMES, FixedStructure, from_arrays
+from femgear.storage.files import plain_cell
 
 UNITS = {"SI": (1.0, 1.0), "mm-t-s": (1e-3, 1e3)}
 """Systems of units: metres and kilograms of the units of length and mass; time is in seconds."""
@@ -321,7 +322,7 @@ def read_nodes(path: Path, roles: Mapping[str, bool] = CASING_ROLES) -> tuple[No
             value=", ".join(columns),
             limit="node, role; x, y, z, direction, dofs where needed",
         )
-        table = tuple(_node({key: (row[key] or "").strip() for key in columns}, roles) for row in rows)
+        table = tuple(_node({key: plain_cell((row[key] or "").strip()) for key in columns}, roles) for row in rows)
         ring = "ring" not in roles or any(node.role == "ring" for node in table)
         _check("no points of the ring", ring, code="E-COUNT", key="nodes", limit="nodes of the role ring")
         keys = [(node.number, node.role, node.direction * (node.role == "sensor")) for node in table]

@@ -45,7 +45,12 @@ if TYPE_CHECKING:
 
     from femgear.storage.contents import Contents, Labelled
 
-_NUMBER = re.compile(r"[+-]?\d+(\.\d*)?([eE][+-]?\d+)?")
+_FORMULA = re.compile(r"'*[=+\-@\t\r]")
+"""Beginning of a text that a spreadsheet runs, or that `csv_cell` has marked."""
+_PLAIN = re.compile(
+    r"[+-]((\d+\.?\d*|\.\d+)([eE][+-]?\d+)?( ?[A-Za-zµ°%][A-Za-z0-9µ°%/^* ]{0,20})?|inf|nan|[xyz]|radial|tangential)|-"
+)
+"""Numbers, also with a unit, axes after a sign, and the dash of nothing: no formulas."""
 _RESERVED = re.compile(r'(?i)(con|prn|aux|nul|(com|lpt)[\d¹²³])\s*(\..*)?|.*[/\\:*?"<>|].*|[. ].*|.*[. ]|')
 """Names that some file system gives a meaning of its own, or takes for others."""
 # what `replaced_file` writes under; nobody else has such names
@@ -474,10 +479,18 @@ def write_csv(path: str | os.PathLike, header: Sequence[str], rows: Iterable[Ite
 
 
 def csv_cell(value: object) -> object:
-    """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else."""
-    if not isinstance(value, str) or _NUMBER.fullmatch(value):
+    """Mark a text that a spreadsheet would run as a formula with an apostrophe; give back anything else.
+
+    Numbers, also with their unit, and names of axes such as ``-z`` are none. `plain_cell` takes the mark off.
+    """
+    if not isinstance(value, str) or _PLAIN.fullmatch(value) or not _FORMULA.match(value):
         return value
-    return f"'{value}" if value.startswith(("=", "+", "-", "@", "\t", "\r")) else value
+    return f"'{value}"
+
+
+def plain_cell(text: str) -> str:
+    """Read a cell that `csv_cell` wrote: without its apostrophe, where it has one before a formula."""
+    return text[1:] if text.startswith("'") and _FORMULA.match(text) else text
 
 
 def checksum(path: str | os.PathLike) -> str:

@@ -20,9 +20,11 @@ from femgear.exchange.casing_files import (
     missing_compliance,
     output_names,
     read_casing,
+    read_nodes,
 )
 from femgear.fe.elasticity import Material
 from femgear.housing.two_way.response import MeshPaths, structure_lines
+from femgear.storage.files import write_csv
 from validation.fixed_housing import EQUAL, solved
 from validation.reference.annulus import annulus_frequencies
 
@@ -552,3 +554,15 @@ def test_parts_of_the_surface(folder):
     with np.load(folder / "surface.npz") as stored:
         area, shape = stored["sensor_area"], stored["sensor_shape"]
     assert (area[:2] == 0).all() and (area[2:] > 0).all() and shape.shape[1] == len(area)
+
+
+def test_table_of_nodes_is_read_as_it_was_written(tmp_path):
+    header = ("node", "role", "x", "y", "z", "direction", "dofs")
+    rows = [(1, "seat A", -0.1, 0.0, -2e-3, "", "123456"), (2, "sensor top", "-.5", 0, 0, "-z", "123")]
+    write_csv(tmp_path / "nodes.csv", header, rows)
+    seat, sensor = read_nodes(tmp_path / "nodes.csv", {"seat": True, "sensor": True, "foot": True})
+    assert sensor.direction == "-z" and seat.position.tolist() == [-0.1, 0.0, -2e-3] and sensor.position[0] == -0.5
+    # tables that former versions wrote have an apostrophe before it
+    text = (tmp_path / "nodes.csv").read_text()
+    (tmp_path / "former.csv").write_text(text.replace(",-z,", ",'-z,"))
+    assert read_nodes(tmp_path / "former.csv", {"seat": True, "sensor": True})[1].direction == "-z"

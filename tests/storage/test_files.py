@@ -1,5 +1,6 @@
 """Results on disk: whole or not at all, checked on reading, hostile files refused."""
 
+import csv
 import errno
 import json
 import os
@@ -16,7 +17,15 @@ from edited_manifests import finish
 import femgear
 from femgear.errors import StorageError
 from femgear.storage import files
-from femgear.storage.files import checksum, list_own, read_dataset, write_csv, write_dataset, write_text
+from femgear.storage.files import (
+    checksum,
+    list_own,
+    plain_cell,
+    read_dataset,
+    write_csv,
+    write_dataset,
+    write_text,
+)
 from femgear.storage.results import (
     MANIFEST,
     folder_lock,
@@ -532,10 +541,18 @@ def test_results_and_cases_show_themselves_in_a_line(tmp_path):
     assert case.title in case._repr_html_() and "centre_distance" in case._repr_html_()
 
 
+TEXTS = ["=cmd", "@sum", "+1+1", "-2+3+cmd|' /C calc'!A0", "-a", "'=cmd", "\t=1", "-3.2 kN/m|x"]
+PLAIN = ["-z", "-x", "+y", "-radial", "-3", "-.5", "-1e-3", "-12 N m", "-3 µm", "-inf", "-", "a-b", "it's", "'quoted'"]
+
+
 def test_text_of_a_table_is_no_formula(tmp_path):
-    write_csv(tmp_path / "a.csv", ["=cmd", "level [dB]"], [["@sum", -1.5], ["-3 N m", "+x"], ["-0.32", 2]])
-    written = (tmp_path / "a.csv").read_text()
-    assert written == "'=cmd,level [dB]\n'@sum,-1.5\n'-3 N m,'+x\n-0.32,2\n"
+    rows = [[text, -1.5] for text in (*TEXTS, *PLAIN)]
+    write_csv(tmp_path / "a.csv", ["=head", "level [dB]"], rows)
+    with open(tmp_path / "a.csv", newline="") as stream:
+        cells = [row[0] for row in csv.reader(stream)]
+    assert cells[1 + len(TEXTS) :] == PLAIN
+    assert [cell[:1] for cell in cells[: 1 + len(TEXTS)]] == ["'"] * (1 + len(TEXTS))
+    assert [plain_cell(cell) for cell in cells] == ["=head", *TEXTS, *PLAIN]
     data = xr.Dataset({"name": ("m", ["=1", "b"]), "x": ("m", [-1.0, 2.0])}, attrs={"title": "-a", "n": -3})
     names = write_csv_tables(data, tmp_path, "s")
     written = "".join((tmp_path / name).read_text() for name in names)
