@@ -743,7 +743,7 @@ def compute_sweep(
     *,
     over: Annotated[tuple[str, ...], Parameter(negative="")],
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    of: Annotated[tuple[str, ...], Parameter(negative="")] = ("ste", "ste sun-planet", "ste planet-ring"),
+    of: Annotated[tuple[str, ...], Parameter(negative="")] = (),
     speeds: tuple[str, str] | None = None,
     tasks: Tasks | None = None,
 ) -> int:
@@ -759,18 +759,21 @@ def compute_sweep(
     output
         Folder of sweep.csv, sweep.png and the journal sweep.jsonl.
     of
-        Quantities as in docs/optimise.md: ste, ste overall, mesh force, housing, ...; may be repeated.
+        Quantities as in docs/optimise.md: ste, ste overall, mesh force, housing, ...; of gearboxes K_Hbeta, STE,
+        bearing life, level, ... of the whole or of one part. May be repeated. Default: transmission errors; of
+        gearboxes all that stand for the whole.
     speeds
-        First and last speed of the input, for mesh forces and the housing.
+        First and last speed of the input, for mesh forces and the housing; of gearboxes those of the run-up.
     """
-    from femgear.case.gear_set import need_set
     from femgear.run import grid_cache
+    from femgear.study.objectives import default_quantities, need_quantities
     from femgear.study.runner import open_runner
     from femgear.study.sweep import describe_sweep, sweep_into
     from femgear.trains.reading import read_case
 
     data = read_case(case)
-    need_set(data)
+    need_quantities(data)
+    of = of or default_quantities(data)
     with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
         options = {"speeds": speeds, "cache": grid_cache(), "progress": progress, "runner": runner}
         swept, names = sweep_into(data, output, over=over, of=of, **options)
@@ -905,13 +908,14 @@ class Sought:
     vary
         As "sun.modifications[0].amount=0 um..15 um +- 1 um" with its tolerance, or "KEY1,KEY2=0 um..15 um" of
         entries with one value; may be repeated. Default: a tip relief more on every loaded flank, its amount
-        and its start.
+        and its start; gearboxes have none.
     shape
         Of these reliefs; a linear one begins with a kink, under which the contact pressure rises (W-KINK).
     goal
         What to minimise: ste (largest of the next three), ste overall, ste sun-planet, ste planet-ring, mesh
         force, peak mesh force, housing, contact pressure, root stress sun (planet, ring), contact ratio
-        sun-planet (planet-ring), tip thickness sun (planet, ring).
+        sun-planet (planet-ring), tip thickness sun (planet, ring); of gearboxes K_Hbeta, STE, level, ... of the
+        whole or of one part, as in "level top".
     limit
         As in "root stress sun <= 300 MPa"; of the same quantities. May be repeated.
     of
@@ -921,7 +925,8 @@ class Sought:
     torque
         Of the input. Default: that of the case.
     speeds
-        First and last speed of the input, for mesh forces and the housing.
+        First and last speed of the input, for mesh forces and the housing, by default 1000 and 3500 rpm; of
+        gearboxes those of the run-up, by default as in the case.
     """
 
     vary: Annotated[tuple[str, ...], Parameter(negative="")] = ()
@@ -931,7 +936,7 @@ class Sought:
     of: Annotated[tuple[str, ...], Parameter(negative="")] = ()
     second: str | None = None
     torque: Quantity | None = None
-    speeds: tuple[str, str] = ("1000 rpm", "3500 rpm")
+    speeds: tuple[str, str] | None = None
 
 
 @app.command

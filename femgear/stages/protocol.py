@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from femgear.case.text import ReadCase
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
     from femgear.findings import Finding
+    from femgear.stages.key_figures import KeyFigure
     from femgear.storage.results import Results
 
 Progress = Callable[[str, float, float], None]
@@ -313,6 +314,8 @@ class Train:
         Signals, spectra and modes of its runs; None where there are none.
     verdict : callable
         ``(Results) -> blocks``: what decides, before everything else.
+    key_figures : callable
+        ``(case) -> figures`` by which cases are compared, none of trains whose studies have quantities of their own.
     """
 
     name: str
@@ -324,6 +327,7 @@ class Train:
     remarks: Callable[[Results, str], Iterable[str]] = lambda results, stem: ()
     recorded: Recorded | None = None
     verdict: Callable[[Results], Iterable[Block]] = lambda results: ()
+    key_figures: Callable[[Any], tuple[KeyFigure, ...]] = lambda case: ()
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""

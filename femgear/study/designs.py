@@ -33,7 +33,7 @@ from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.findings import NOTE, Finding, once, tell
 from femgear.stages.protocol import Progress
 from femgear.storage.files import exclusive_lock, storage_errors
-from femgear.study.objectives import STAGES, StudyQuantity
+from femgear.study.objectives import STAGES, StudyQuantity, has_figures
 from femgear.study.problem import Limit, Point, Problem, Variable, Vector
 from femgear.study.runner import Runner, check_complete
 from femgear.trains.live import Answer
@@ -329,7 +329,7 @@ class Designs:
         """
         answer, stages = self.answer(point), {quantity.stage for quantity in quantities}
         findings = [finding for quantity in quantities for finding in quantity.findings(answer)]
-        if stages - {"gears"}:
+        if stages - {"gears"} and not has_figures(self.case):
             findings += answer.static.findings
         if "stress" in stages:
             findings += answer.stress.findings

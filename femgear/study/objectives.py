@@ -8,14 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import partial
-from typing import TYPE_CHECKING, Literal, get_args
+from functools import lru_cache, partial
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from femgear.case.checks import LEAST_TORQUE
 from femgear.case.dependencies import response_entries
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import need_set, planetary_set
+from femgear.case.messages import no_such
 from femgear.case.planetary import Case
 from femgear.case.quantities import ACCELERATION, FREQUENCY, SPEED, TORQUE, Dimension, to_si
 from femgear.case.sections import LARGEST_TORQUE
@@ -23,14 +24,17 @@ from femgear.errors import CaseError
 from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness
 from femgear.moved import former_names
+from femgear.stages.key_figures import NUMBER, KeyFigure, figure_of
 from femgear.stages.static_results import LARGE
 from femgear.system.fourier import sample
 from femgear.trains.elastic import stages as elastic_stages
 from femgear.trains.elastic.checks import case_warnings, response_findings
 from femgear.trains.live import Answer
 from femgear.trains.reading import with_values
+from femgear.trains.registry import train_of
 
 if TYPE_CHECKING:
+    from femgear.stages.protocol import StageResult
     from femgear.system.system import Response
 
 Mesh = Literal["largest", "overall", "sun-planet", "planet-ring"]
@@ -40,11 +44,12 @@ Range = tuple[float, float, int]
 """First and last input speed [rad/s] and number of speeds."""
 Speeds = tuple[str, str]
 """First and last speed of the input, with their units."""
+_SPEEDS = 51
+"""Of a range, by default."""
 _MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 _FORCE = Dimension("a force", "N", "N", 1.0)
 _STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
-NUMBER = Dimension("a number", "1", "1", 1.0)
-STAGES = ("gears", "static", "stress", "modes", "dynamics", "housing")
+STAGES = ("gears", "static", "deflection", "stress", "modes", "dynamics", "runup", "housing")
 """In the order of their effort."""
 
 
@@ -130,7 +135,7 @@ class StudyQuantity:
     dimension : Dimension
         Its units on disk (SI) and in tables.
     stage : str
-        Last stage that it needs: "gears", "static", "stress", "modes", "dynamics" or "housing".
+        Last stage that it needs, one of `STAGES`.
     compute : callable
         ``(Answer) -> float`` in SI units.
     signal : callable, optional
@@ -378,16 +383,87 @@ _OVER_SPEEDS = ("mesh force", "peak mesh force", "housing")
 NAMES = tuple(_WORDS)
 
 
-def named_quantity(words: str, *, speeds: Speeds | None = None) -> StudyQuantity:
-    """Find the quantity of some words, one of `NAMES`.
+def quantity_of_figure(figure: KeyFigure) -> StudyQuantity:
+    """Define the quantity that a key figure of a train is."""
+    findings = partial(_of_figure, figure)
+    return StudyQuantity(figure.name, figure.dimension, figure.stage, partial(_figure, figure), findings=findings)
 
-    Mesh forces and housing levels need the first and the last speed of the input, with units.
 
-    CaseError: no such quantity, or no speeds for one that needs them (E-OBJECTIVE).
+def _figure(figure: KeyFigure, answer: Answer) -> float:
+    return figure.read(_contents(answer[figure.stage]))
+
+
+def _of_figure(figure: KeyFigure, answer: Answer) -> Iterable[Finding]:
+    """Findings of the stage of a key figure that concern it."""
+    return figure.concerned(answer[figure.stage].findings)
+
+
+@lru_cache(maxsize=4)
+def _contents(result: StageResult) -> Any:
+    """Contents of the file of a result, which many figures are read from."""
+    return result.contents()
+
+
+def has_figures(case: Any) -> bool:
+    """Tell whether the quantities of a case are the key figures of its train."""
+    return bool(train_of(case).key_figures(case))
+
+
+def need_quantities(case: Any) -> None:
+    """Refuse a case without a planetary set whose train has no key figures (E-MODEL)."""
+    if not has_figures(case):
+        need_set(case)
+
+
+def with_run_up(case: Any, speeds: Speeds | None) -> Any:
+    """Set first and last speed of the run-up in a case whose quantities are key figures; others stay as they are.
+
+    At as many speeds as its [runup] has, 51 by default.
+    """
+    if speeds is None or not has_figures(case):
+        return case
+    values = {"runup.from": speeds[0], "runup.to": speeds[1], "runup.count": case.runup.count or _SPEEDS}
+    return with_values(case, values)
+
+
+def default_quantities(case: Any) -> tuple[str, ...]:
+    """Name the quantities of a sweep that names none: transmission errors, or the figures of the whole."""
+    figures = train_of(case).key_figures(case)
+    if not figures:
+        return "ste", "ste sun-planet", "ste planet-ring"
+    stages = {stage.name: stage for stage in train_of(case).stages}
+    return tuple(figure.name for figure in figures if figure.whole and not stages[figure.stage].unavailable(case))
+
+
+def _figure_quantity(words: str, case: Any) -> StudyQuantity:
+    """Find the quantity of a key figure of the train of a case, or a natural frequency."""
+    figures = train_of(case).key_figures(case)
+    if (figure := figure_of(figures, words)) is None:
+        names = [figure.name for figure in figures]
+        what, limit = "take one of these names", ", ".join((*names, "natural frequency N"))
+        error = no_such("quantity", "objective", words, names, what, limit=limit)
+        error.code = "E-OBJECTIVE"
+        raise error
+    if why := next((stage.unavailable(case) for stage in train_of(case).stages if stage.name == figure.stage), ""):
+        remedy = "give [runup] with from, to and count" if figure.stage == "runup" else None
+        message = f"{figure.name} needs the stage {figure.stage}: {why}"
+        raise CaseError(message, code="E-STAGE", key="objective", value=words, remedy=remedy)
+    return quantity_of_figure(figure)
+
+
+def named_quantity(words: str, *, speeds: Speeds | None = None, case: Any = None) -> StudyQuantity:
+    """Find the quantity of some words: one of `NAMES`, or a key figure of the train of a case.
+
+    Mesh forces and housing levels of planetary sets need the first and the last speed of the input, with units.
+
+    CaseError: no such quantity, or no speeds for one that needs them (E-OBJECTIVE); a stage that the case has not
+    (E-STAGE).
     """
     name = " ".join(words.split()).lower()
     if (mode := name.removeprefix("natural frequency ")) != name and mode.isdecimal():
         return natural_frequency(int(mode))
+    if case is not None and has_figures(case):
+        return _figure_quantity(words, case)
     if name not in _WORDS:
         raise CaseError(
             "no such quantity",

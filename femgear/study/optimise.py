@@ -23,8 +23,15 @@ from femgear.study.designs import open_designs
 from femgear.study.faults import all_faults
 from femgear.study.figures import before_and_after, front_figure, tolerance_bars
 from femgear.study.front import ParetoFront, check_second, pareto_front
-from femgear.study.objectives import StudyQuantity, forces_over_time, named_quantity
-from femgear.study.problem import Problem, Shape, Variable, parse_limit, parse_variable, tip_reliefs
+from femgear.study.objectives import (
+    STAGES,
+    StudyQuantity,
+    forces_over_time,
+    has_figures,
+    named_quantity,
+    with_run_up,
+)
+from femgear.study.problem import Limit, Problem, Shape, Variable, parse_limit, parse_variable, tip_reliefs
 from femgear.study.runner import Runner
 from femgear.study.search import (
     Method,
@@ -36,6 +43,7 @@ from femgear.study.search import (
     tolerance_rows,
 )
 from femgear.trains.reading import to_toml, with_value, with_values
+from femgear.trains.registry import train_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -47,6 +55,8 @@ _COLUMNS = ("quantity", "before", "optimum", "change")
 _FILES = ("optimum.toml", "optimum.csv", "tolerances.png")
 _FRONT, _CHECK = ("front.csv", "front.png"), ("check.csv", "optimum.png")
 _JOURNALS, _RUNS = ("journal.jsonl", "journal_fine.jsonl"), ("before", "after")
+_SPEEDS = "1000 rpm", "3500 rpm"
+"""Of the input, by default."""
 _FINE = {"static.positions": 128, "static.flank_elements": 32}
 """Of the runs that check the optimum."""
 Run = Callable[[Case, Path, str], Any]
@@ -75,7 +85,8 @@ class SearchRequest:
     torque : str, optional
         Of the input, with its unit; by default that of the case.
     speeds : (str, str)
-        First and last speed of the input, for mesh forces and the housing.
+        First and last speed of the input, for mesh forces and the housing, by default 1000 and 3500 rpm; of
+        gearboxes those of the run-up, by default as in the case.
     """
 
     vary: Sequence[str] = ()
@@ -85,7 +96,7 @@ class SearchRequest:
     of: Sequence[str] = ()
     second: str | None = None
     torque: str | None = None
-    speeds: tuple[str, str] = ("1000 rpm", "3500 rpm")
+    speeds: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True)
@@ -155,6 +166,11 @@ def optimise_into(
     StorageError
         Files of others (E-OUTPUT, E-JOURNAL).
     """
+    if has_figures(case):
+        how = {"cache": cache, "progress": progress, "runner": runner}
+        return _optimise_figures(case, folder, request, effort, run, how, tell)
+    if request.speeds is None:
+        request = replace(request, speeds=_SPEEDS)
     data, problem, second = _problem(case, request, effort)
     runs = _RUNS if effort.check else ()
     names = [*_FILES, *(_FRONT if second else ()), *(_CHECK if effort.check else ())]
@@ -179,21 +195,9 @@ def _problem(case: Case, request: SearchRequest, effort: SearchEffort) -> tuple[
     """The case with its variables, the problem on a coarse grid, and the second goal; all faults at once."""
     need_set(case)
     with all_faults() as part:
-        quantities, limits, variables = [], [], list[Variable]()
-        second = None
         reported = request.of or (*_ERRORS, *(() if case.rigid else _FORCES))
-        for option, words in (("--goal", request.goal), *(("--of", words) for words in reported)):
-            with part(option):
-                quantities.append(named_quantity(words, speeds=request.speeds))
-        for text in request.limit:
-            with part("--limit"):
-                limits.append(parse_limit(text, speeds=request.speeds))
-        for text in request.vary:
-            with part("--vary"):
-                variables.append(parse_variable(text))
-        if request.second is not None:
-            with part("--second"):
-                second = named_quantity(request.second, speeds=request.speeds)
+        asked = _asked(case, request, reported, request.speeds, part)
+        quantities, limits, variables, second = asked
         if request.torque is not None:
             with part("--torque"):
                 case = with_value(case, "operation.torque", request.torque)
@@ -220,6 +224,104 @@ def _problem(case: Case, request: SearchRequest, effort: SearchEffort) -> tuple[
     if second is not None:
         check_second(problem, second)
     return data, problem, second
+
+
+def _asked(
+    case: Any, request: SearchRequest, reported: Sequence[str], speeds: tuple[str, str] | None, part: Any
+) -> tuple[list[StudyQuantity], list[Limit], list[Variable], StudyQuantity | None]:
+    """Quantities, goal first, limits, variables and second goal in words of a command line; faults go to ``part``."""
+    quantities, limits, variables, second = list[StudyQuantity](), list[Limit](), list[Variable](), None
+    for option, words in (("--goal", request.goal), *(("--of", words) for words in reported)):
+        with part(option):
+            quantities.append(named_quantity(words, speeds=speeds, case=case))
+    for text in request.limit:
+        with part("--limit"):
+            limits.append(parse_limit(text, speeds=speeds, case=case))
+    for text in request.vary:
+        with part("--vary"):
+            variables.append(parse_variable(text))
+    if request.second is not None:
+        with part("--second"):
+            second = named_quantity(request.second, speeds=speeds, case=case)
+    return quantities, limits, variables, second
+
+
+def _optimise_figures(
+    case: Any,
+    folder: Path,
+    request: SearchRequest,
+    effort: SearchEffort,
+    run: Run,
+    how: dict[str, Any],
+    tell: Callable[[list[Block]], None],
+) -> list[str]:
+    """Search among the key figures of a train, whose cases have no coarser grid, and check by two runs."""
+    problem, second = _figure_problem(case, request)
+    names = [*_FILES, *(_FRONT if second else ()), *(_CHECK[:1] if effort.check else ())]
+    own_files(folder, names)
+    for name in _RUNS if effort.check and folder.exists() else ():
+        if (folder / name).exists():
+            with run_folder(folder / name, force=True):
+                pass
+    counts = SearchOptions(seed=effort.seed, samples=effort.samples, max_designs=effort.max_designs)
+    # a design is a deflection of the whole: no population can be afforded by default
+    whole = any(variable.integer for variable in problem.variables)
+    method: Method = effort.method if effort.method != "auto" or whole else "simplex"
+    options = {"options": counts, "journal": folder / _JOURNALS[0], **how}
+    with resumable(folder):
+        best = minimise(problem, method=method, **options)
+        tell(_write(best, problem.case, folder))
+        if second is not None:
+            front = pareto_front(problem, second, start=best.x, **options)
+            tell([_write_front(front, problem, second, folder)])
+        if effort.check:
+            tell([_check_figures(best, folder, run)])
+    return [*names, _JOURNALS[0], *(_RUNS if effort.check else ())]
+
+
+def _figure_problem(case: Any, request: SearchRequest) -> tuple[Problem, StudyQuantity | None]:
+    """The problem among the key figures of a case, and the second goal; all faults at once."""
+    with all_faults() as part:
+        with part("--speeds"):
+            case = with_run_up(case, request.speeds)
+        quantities, limits, variables, second = _asked(case, request, request.of, request.speeds, part)
+        with part():
+            if not variables:
+                raise CaseError(
+                    "nothing to vary",
+                    code="E-VARIABLE",
+                    key="--vary",
+                    limit="entries of the case with their bounds",
+                    remedy='--vary "bearing[0].position=5 mm..12 mm"',
+                )
+        with part():
+            if request.torque is not None:
+                message, remedy = "a gearbox has the torques of its load cases", "vary operation.load_case[0].torque"
+                raise CaseError(message, code="E-CHOICE", key="--torque", value=request.torque, remedy=remedy)
+    first, *others = quantities
+    problem = Problem(case, variables, first, also=others, limits=limits)
+    if second is not None:
+        check_second(problem, second)
+    return problem, second
+
+
+def _check_figures(best: Optimum, folder: Path, run: Run) -> Block:
+    """Run case and optimum anew, and read their key figures from the files."""
+    case, stages = best.problem.case, {quantity.stage for quantity in best.problem.reported}
+    only = max(stages, key=STAGES.index)
+    cases = (with_values(case, values) if values else case for values in ({}, best.values))
+    runs = [run(changed, folder / name, only) for name, changed in zip(_RUNS, cases, strict=True)]
+    reported = {quantity.name for quantity in best.problem.reported}
+    rows, shown = [], []
+    for figure in train_of(case).key_figures(case):
+        if figure.stage not in runs[0].stages or not (figure.whole or figure.name in reported):
+            continue
+        before, after = (figure.read(results[figure.stage]) for results in runs)
+        rows.append((figure.name, before, after, figure.dimension.si))
+        texts = (f"{figure.show(value)} {figure.dimension.shown}".removesuffix(" 1") for value in (before, after))
+        shown.append((figure.name, *texts, figure.change(before, after)))
+    write_csv(folder / _CHECK[0], ("quantity", "before", "optimum", "unit"), rows)
+    return Block("Computed anew, from the files of both runs", _COLUMNS, tuple(shown))
 
 
 def _with_option(case: Case, name: str, value: int) -> Case:
@@ -304,8 +406,8 @@ def _refined(rough: Optimum, case: Case, folder: Path, options: dict[str, Any], 
     return minimise(problem, method=local, start=rough.x, **options)
 
 
-def _write(best_found: Optimum, data: Case, folder: Path, rough: Optimum) -> list[Block]:
-    """Write the files of the search, and tabulate it."""
+def _write(best_found: Optimum, data: Case, folder: Path, rough: Optimum | None = None) -> list[Block]:
+    """Write the files of the search, and tabulate it; ``rough`` is what was refined."""
     best, name, dimension = best_found.values, best_found.problem.objective.name, best_found.problem.objective.dimension
     write_text(to_toml(with_values(data, best)), folder / _FILES[0])
     si = [
@@ -322,15 +424,17 @@ def _write(best_found: Optimum, data: Case, folder: Path, rough: Optimum) -> lis
     value, shown = best_found.after[name] / dimension.scale, dimension.shown.replace("um", "µm")
     bars = tolerance_bars(labels, less, more, value, quantity=name, unit=shown)
     save_figure(bars, folder / _FILES[2])
+    title = "Before and after" if rough is None else "At the positions and on the grid of the case"
     blocks = [
-        Block("At the positions and on the grid of the case", _COLUMNS, tuple(comparison_rows(best_found))),
+        Block(title, _COLUMNS, tuple(comparison_rows(best_found))),
         Block("Optimum", ("entry", "value"), tuple((key, str(value)) for key, value in best.items())),
     ]
     if best_found.tolerances:
         header = ("variable", "off by", "less", "more")
         blocks.append(Block(f"{name} with tolerances", header, tuple(tolerance_rows(best_found))))
     notes = [f"at a bound: {variable}" for variable in best_found.at_bounds]
-    ended = f"search: {search_verdict(rough)}", f"refinement: {search_verdict(best_found)}"
+    ended = [f"search: {search_verdict(rough or best_found)}"]
+    ended += [] if rough is None else [f"refinement: {search_verdict(best_found)}"]
     return [*blocks, Block("How it was found", notes=(*notes, *ended))]
 
 

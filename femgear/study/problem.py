@@ -311,8 +311,8 @@ class Problem:
         return tuple(variable.text(float(value)) for variable, value in zip(self.variables, x, strict=True))
 
 
-def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
-    """Read a limit in words such as ``"root stress sun <= 300 MPa"``; speeds as for `named_quantity`.
+def parse_limit(text: str, *, speeds: Speeds | None = None, case: Any = None) -> Limit:
+    """Read a limit in words such as ``"root stress sun <= 300 MPa"``; speeds and case as for `named_quantity`.
 
     CaseError: no limit, no such quantity, or no number (E-OBJECTIVE); E-UNIT.
     """
@@ -320,7 +320,7 @@ def parse_limit(text: str, *, speeds: Speeds | None = None) -> Limit:
     if not match:
         example = '"contact ratio sun-planet >= 1.3" or "root stress sun <= 300 MPa"'
         raise CaseError("not a limit", code="E-OBJECTIVE", key="--limit", value=text, remedy=f"write it as {example}")
-    quantity = named_quantity(match[1], speeds=speeds)
+    quantity = named_quantity(match[1], speeds=speeds, case=case)
     if quantity.dimension is NUMBER:
         bound = _number(match[3])
         if not isinstance(bound, float):

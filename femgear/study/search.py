@@ -29,6 +29,7 @@ from femgear.case.gear_set import set_deviations
 from femgear.case.planetary import Case
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
 from femgear.findings import Finding, tell
+from femgear.stages.key_figures import DECIBEL
 from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.stages.static import record_positions, static_supports
 from femgear.study.designs import OUTSIDE, Enough, Evaluations, Failure, Tolerance, evaluations, tolerances
@@ -453,12 +454,13 @@ def has_derivatives(problem: Problem) -> bool:
     Derivatives are those of the drive flanks in plane contact.
     """
     case = problem.case
+    if problem.objective.signal is None:
+        return False
     plane = case.static.slices < 2 and not case.static.back_flanks
-    sided = problem.objective.signal is not None and plane
     clear = not (case.static.members == "elastic" and case.planet.bearing_clearance)
     keys = [key for variable in problem.variables for key in variable.keys]
     deviations = all(re.split(r"[.\[]", key.partition(".")[2])[0] in FLANK_ENTRIES for key in keys)
-    return bool(sided and clear and deviations and not any(v.integer for v in problem.variables))
+    return bool(plane and clear and deviations and not any(v.integer for v in problem.variables))
 
 
 def descend(evaluations: Evaluations, start: Vector, *, radius: float = 0.15) -> tuple[bool, str]:
@@ -583,6 +585,7 @@ def comparison_rows(optimum: Optimum) -> Iterator[tuple[str, str, str, str]]:
     for quantity in optimum.problem.reported:
         before, after = optimum.before[quantity.name], optimum.after[quantity.name]
         change = f"{after / before - 1.0:+.1%}" if before else ""
+        change = f"{after - before:+.2f} dB" if quantity.dimension.si == DECIBEL.si else change
         yield quantity.name, quantity.show(before), quantity.show(after), change
 
 

@@ -25,7 +25,7 @@ from femgear.stages.protocol import Progress, one_blas_thread
 from femgear.storage.files import own_files, resumable, write_csv
 from femgear.study.designs import Failure, open_designs
 from femgear.study.faults import all_faults
-from femgear.study.objectives import StudyQuantity, named_quantity, need_elastic_ring
+from femgear.study.objectives import StudyQuantity, has_figures, named_quantity, need_elastic_ring, with_run_up
 from femgear.study.problem import Variable, split
 from femgear.study.runner import Runner
 from femgear.trains.reading import with_values
@@ -242,6 +242,8 @@ def _joined(values: Sequence[object]) -> str:
 
 def _check_stages(case: Case, quantities: Sequence[StudyQuantity], keys: Iterable[str] = ()) -> None:
     """Refuse quantities that the case can never have: without torque, or without an elastic ring."""
+    if has_figures(case):
+        return
     stages = {quantity.stage for quantity in quantities}
     elastic = [quantity.name for quantity in quantities if quantity.stage in ("modes", "dynamics", "housing")]
     if elastic:
@@ -368,12 +370,14 @@ def sweep_into(
     """
     parsed, quantities = list[tuple[Any, Sequence[object]]](), list[StudyQuantity]()
     with all_faults() as part:
+        with part("--speeds"):
+            case = with_run_up(case, speeds)
         for text in over:
             with part("--over"):
                 parsed.append(parse_over(text))
         for words in of:
             with part("--of"):
-                quantities.append(named_quantity(words, speeds=speeds))
+                quantities.append(named_quantity(words, speeds=speeds, case=case))
     values = dict(parsed)
     if len(values) < len(parsed):
         twice = next(key for key, _ in parsed if [name for name, _ in parsed].count(key) > 1)
@@ -430,7 +434,7 @@ def _draw(swept: Sweep, axes_of: Mapping[tuple[str, ...], Sequence[tuple[object,
         title = f"{quantity.name} [{quantity.dimension.shown}]".replace("[um]", "[µm]")
         label(axes[q], f"{name_of_axis} [{unit}]" if unit else name_of_axis, fill(title, 36))
     for ax in axes[count:]:
-        ax.set_visible(False)
+        ax.remove()
     legend_below(figure)
     save_figure(figure, path)
 

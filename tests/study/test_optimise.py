@@ -8,9 +8,13 @@ from pathlib import Path
 
 import pytest
 from script_runs import run_femgear, wait_for_lines
+from small_gearbox import pair_tables
 
+from femgear.case import text as case_text
+from femgear.case.dependencies import Steps
 from femgear.stages.static import relief_kinks, solve_static, solve_stress
 from femgear.study.problem import tip_reliefs
+from femgear.trains.live import Answer
 from femgear.trains.reading import read_case
 from validation.soak import programs
 
@@ -159,3 +163,24 @@ def test_reliefs_have_the_shape_that_the_verdict_advises(tmp_path):
     case, _ = tip_reliefs(read_case(CASE))
     kinked, _ = tip_reliefs(read_case(CASE), shape="linear")
     assert relief_kinks(case) == (False, False) and relief_kinks(kinked) == (True, True)
+
+
+@pytest.mark.slow
+def test_a_gearbox_is_searched_among_its_key_figures_and_checked_by_runs(tmp_path):
+    case, out = tmp_path / "box.toml", tmp_path / "out"
+    case.write_text(case_text.write(pair_tables()), encoding="utf-8")
+    # the nearer bearing A is to the gear at 30 mm, the less is left for B
+    arguments = [case, "--vary", "bearing[0].position=5 mm..20 mm +- 0.5 mm", "--goal", "bearing force B", "-o", out]
+    done = run(*arguments, "--of", "natural frequency 2", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    best = read_case(out / "optimum.toml")
+    assert best.bearing[0].position == pytest.approx(20e-3, rel=2e-3)
+    with open(out / "check.csv", newline="", encoding="utf-8") as stream:
+        rows = {row["quantity"]: row for row in csv.DictReader(stream)}
+    force = Answer(best, Steps()).deflection.contents()["radial_force"].values[0, 1]
+    assert float(rows["bearing force B"]["optimum"]) == pytest.approx(force, rel=1e-6)
+    assert force < 0.6 * float(rows["bearing force B"]["before"])
+    again = run(*arguments, "--of", "natural frequency 2", folder=tmp_path)
+    assert again.returncode == 0 and ", 0 computed now" in again.stdout
+    none = run(case, "--torque", "3 N m", "-o", tmp_path / "none", folder=tmp_path)
+    assert none.returncode == 2 and {"--goal", "--vary", "--torque"} <= {*re.findall(r"--\w+", none.stderr)}

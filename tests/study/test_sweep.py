@@ -3,12 +3,16 @@
 import csv
 from pathlib import Path
 
+import numpy as np
 import pytest
 from script_runs import run_femgear
+from small_gearbox import pair_tables
 
+from femgear.case.dependencies import Steps
 from femgear.errors import CaseError
-from femgear.study.objectives import contact_ratio
-from femgear.study.sweep import parse_over, sweep
+from femgear.study.objectives import contact_ratio, named_quantity
+from femgear.study.sweep import parse_over, sweep, sweep_into
+from femgear.trains.live import Answer
 from femgear.trains.reading import read_case, with_values
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
@@ -79,3 +83,46 @@ def test_the_command_writes_a_column_for_every_entry(free, tmp_path):
     assert [[row[key] for key in TEETH] for row in rows] == [["27", "39", "105"], ["30", "39", "108"]]
     assert all(float(row["contact ratio, sun-planet [1]"]) > 1.5 for row in rows)
     assert (tmp_path / "out" / "sweep.png").stat().st_size > 5000
+
+
+@pytest.fixture
+def box():
+    """A gearbox whose meshes have a stiffness: no contact to solve."""
+    return read_case(pair_tables())
+
+
+def test_a_gearbox_is_swept_over_its_bearings_with_its_key_figures(box, tmp_path):
+    over = ["bearing[0].radial=1e8 N/m,2e8 N/m", "operation.load_case[0].torque.motor=50 N m,100 N m"]
+    of = ["bearing force A", "misalignment", "natural frequency 3"]
+    swept, names = sweep_into(box, tmp_path / "out", over=over, of=of)
+    assert not any(swept.errors) and {*names} == {path.name for path in (tmp_path / "out").glob("sweep.*")}
+    direct = Answer(with_values(box, dict(zip(swept.keys, swept.points[2], strict=True))), Steps())
+    force = direct.deflection.contents()
+    assert swept.values[2, 0] == pytest.approx(
+        np.hypot(*(force[f"{w}_force"].values[0, 0] for w in ("radial", "axial")))
+    )
+    assert swept.values[2, 2] == pytest.approx(direct.modes.modes.frequency[2])
+    # twice the torque, twice the force of a linear gearbox
+    assert swept.values[[1, 3], :2] == pytest.approx(2.0 * swept.values[[0, 2], :2], rel=1e-6)
+    again, _ = sweep_into(box, tmp_path / "out", over=over, of=of)
+    assert again.computed == 0 and (again.values == swept.values).all()
+
+
+def test_quantities_that_a_gearbox_has_not_are_refused_by_name(box, tmp_path):
+    for words, code, remedy in (
+        ("ste", "E-OBJECTIVE", None),
+        ("bearing forse A", "E-OBJECTIVE", "did you mean bearing force A?"),
+    ):
+        with pytest.raises(CaseError, match=code) as info:
+            sweep_into(box, tmp_path, over=["bearing[0].radial=1e8 N/m,2e8 N/m"], of=[words])
+        assert remedy is None or info.value.remedy == remedy
+    assert not [*tmp_path.iterdir()]
+    with pytest.raises(CaseError, match="E-STAGE"):
+        named_quantity("run-up force factor", case=read_case(pair_tables(teeth=True)))
+
+
+@pytest.mark.parametrize("count", [1, 3, 4, 5])
+def test_any_number_of_quantities_is_drawn(box, tmp_path, count):
+    of = ["misalignment", "mesh force", "bearing force", "bearing force A", "bearing force B"][:count]
+    sweep_into(box, tmp_path, over=["bearing[0].radial=1e8 N/m,2e8 N/m"], of=of)
+    assert (tmp_path / "sweep.png").stat().st_size > 5000

@@ -24,11 +24,10 @@ from femgear.trains.gearbox.casing_results import (
     casing_coordinates,
     casing_variables,
     describe_feet,
-    largest_foot_force,
 )
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_sizes
-from femgear.trains.gearbox.life import describe_load_cases, life_text, life_variables, shortest_life
+from femgear.trains.gearbox.life import describe_load_cases, life_text, life_variables
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
 from femgear.trains.gearbox.modes import GearboxModes
 from femgear.trains.gearbox.overlaps import overlaps
@@ -369,61 +368,6 @@ class GearboxModesResult(StageResult):
 
 def _largest(names, shares: np.ndarray) -> list[str]:
     return [names[int(column.argmax())] if column.any() else "" for column in shares.T]
-
-
-def gearbox_verdict(results: Any) -> Iterator[Block]:
-    """Tabulate what decides over all load cases: misalignment, K_Hbeta, bearings, modes near the excitation."""
-    rows: list[tuple[str, str]] = []
-    if "deflection" in results.stages:
-        rows += _worst_of_deflection(results.deflection)
-    if "modes" in results.stages:
-        rows += _nearest_mode(results.modes)
-    if rows:
-        yield Block("Verdict", rows=tuple(rows))
-
-
-def _worst_of_deflection(data: Any) -> Iterator[tuple[str, str]]:
-    cases, meshes, bearings = (data[name].values for name in ("load_case", "mesh", "bearing"))
-
-    def where(place, names) -> str:
-        case = f", {cases[place[0]]}" if len(cases) > 1 else ""
-        return f"{names[place[1]]}{case}"
-
-    if len(meshes):
-        misaligned = data["mesh_misalignment"].values
-        at = np.unravel_index(int(np.abs(misaligned).argmax()), misaligned.shape)
-        yield "largest misalignment over the width", f"{1e6 * misaligned[at]:+.2f} um, {where(at, meshes)}"
-        factor = data["face_load_factor"].values
-        if np.isfinite(factor).any():
-            at = np.unravel_index(int(np.nanargmax(factor)), factor.shape)
-            yield "largest face load factor K_Hβ", f"{factor[at]:.3f}, {where(at, meshes)}"
-    sharing = data["planet_load_factor"].values
-    if np.isfinite(sharing).any():
-        at = np.unravel_index(int(np.nanargmax(sharing)), sharing.shape)
-        yield "largest planet load factor K_γ", f"{sharing[at]:.3f}, {where(at, data['stage'].values)}"
-    if len(bearings):
-        force = np.hypot(data["radial_force"].values, data["axial_force"].values)
-        at = np.unravel_index(int(force.argmax()), force.shape)
-        yield "largest bearing force", f"{force[at]:.4g} N, {where(at, bearings)}"
-        yield from shortest_life(data)
-    yield from largest_foot_force(data)
-
-
-def _nearest_mode(data: Any) -> Iterator[tuple[str, str]]:
-    """The mode that a mesh line comes nearest at the speed of operation."""
-    speed, hertz = float(data.attrs["speed"]), data["frequency"].values
-    lines = [(str(n), o * speed / 60.0) for n, o in zip(data["line"].values, data["order"].values) if "mesh" in str(n)]
-    elastic = np.flatnonzero(hertz > 0.0)
-    if not lines or not len(elastic):
-        return
-    apart = np.abs(np.log(np.array([line for _, line in lines])[:, None] / hertz[elastic]))
-    line, mode = np.unravel_index(int(apart.argmin()), apart.shape)
-    number = int(elastic[mode])
-    text = (
-        f"{lines[line][0]} {lines[line][1]:.0f} Hz, mode {number + 1} {hertz[number]:.0f} Hz "
-        f"({data['kind'].values[number]}, {data['main_member'].values[number]})"
-    )
-    yield "mesh line nearest to a mode", text
 
 
 def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:

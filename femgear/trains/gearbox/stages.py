@@ -13,6 +13,7 @@ from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_ver
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import check_held, solve_deflection
+from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
 from femgear.trains.gearbox.response import reference_shaft, solve_gearbox_response
@@ -30,13 +31,13 @@ from femgear.trains.gearbox.results import (
     describe_deflection,
     describe_gearbox_modes,
     gearbox_modes_warnings,
-    gearbox_verdict,
     gearbox_warnings,
 )
 from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_speeds
 from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors
 from femgear.trains.gearbox.signals import GEARBOX_RECORDED
 from femgear.trains.gearbox.silence import why_silent
+from femgear.trains.gearbox.verdict import gearbox_verdict
 
 
 @one_blas_thread()
@@ -206,4 +207,5 @@ GEARBOX = Train(
     figures=FiguresOf("femgear.trains.gearbox.figures:FIGURES"),
     recorded=GEARBOX_RECORDED,
     verdict=gearbox_verdict,
+    key_figures=gearbox_key_figures,
 )

@@ -15,8 +15,9 @@ from femgear.trains.gearbox.casing_results import (
     largest_foot_force,
 )
 from femgear.trains.gearbox.figures import deflected_shafts
-from femgear.trains.gearbox.results import describe_deflection, gearbox_verdict
+from femgear.trains.gearbox.results import describe_deflection
 from femgear.trains.gearbox.stages import solve_deflections
+from femgear.trains.gearbox.verdict import gearbox_verdict
 from femgear.trains.reading import read_case
 
 
@@ -57,7 +58,7 @@ def test_the_verdict_names_the_foot_that_carries_most(data):
     size = np.linalg.norm(data["foot_force"].values[0], axis=1)
     assert float(value.split()[0]) == pytest.approx(size.max(), rel=1e-3)
     assert value.endswith(f"foot {list(FEET)[int(size.argmax())]}")
-    results = SimpleNamespace(stages=("deflection",), deflection=data)
+    results = SimpleNamespace(stages=("deflection",), deflection=data, findings=())
     assert text in [row[0] for block in gearbox_verdict(results) for row in block.rows]
 
 

@@ -8,8 +8,9 @@ from small_gearbox import pair_tables
 from femgear.exchange.formats import Sampling
 from femgear.run import export_results, run_case
 from femgear.storage.results import run_folder
-from femgear.trains.gearbox.results import describe_deflection, describe_gearbox_modes, gearbox_verdict
+from femgear.trains.gearbox.results import describe_deflection, describe_gearbox_modes
 from femgear.trains.gearbox.stages import describe_gearbox
+from femgear.trains.gearbox.verdict import gearbox_verdict
 from femgear.trains.reading import open_results, read_case
 
 

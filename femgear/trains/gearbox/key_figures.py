@@ -1,0 +1,157 @@
+"""Key figures of a gearbox: load distribution, transmission error, bearings, modes, levels at sensors, by name.
+
+Each stands for the whole gearbox, as "K_Hbeta", and for its parts, as "K_Hbeta second stage". Figures of load cases are
+the worst of all of them; those of the response are at the speed of the chosen one, those of the run-up over its speeds.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from femgear.case.quantities import ACCELERATION, RPM, SPEED, Dimension
+from femgear.gears.planetary import mesh_names
+from femgear.stages.key_figures import DECIBEL, NUMBER, KeyFigure, Stored
+from femgear.trains.gearbox.case_file import FORCE, BoxPlanetarySection, GearboxCase, PairSection
+from femgear.trains.gearbox.casing import bearing_name
+from femgear.trains.gearbox.geometry import set_sizes
+from femgear.trains.gearbox.sensors import casing_sensors
+
+MICROMETRES = Dimension("a length", "m", "um", 1e-6)
+HOURS = Dimension("a life", "h", "h", 1.0)
+_RESPONSES = (("", "dynamics"), ("run-up ", "runup"))
+"""Words before the figures of a response, and its stage."""
+_OF_FORCES = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS"
+"""Codes of the findings that concern mesh forces of a response."""
+
+
+def stage_meshes(stage: PairSection | BoxPlanetarySection) -> tuple[str, ...]:
+    """Name the meshes of a stage, as the files do."""
+    if isinstance(stage, PairSection):
+        return (stage.name,)
+    count = len(set_sizes(stage).planet_angles)
+    return tuple(f"{stage.name} {mesh}" for mesh in mesh_names(count))
+
+
+def gearbox_key_figures(case: GearboxCase) -> tuple[KeyFigure, ...]:
+    """List the key figures of a case by name, those of the whole gearbox before those of its parts."""
+    return (*_of_deflection(case), *_of_modes(), *_of_responses(case))
+
+
+def _family(
+    name: str,
+    unit: Dimension,
+    stage: str,
+    stored: Stored,
+    parts: Sequence[tuple[str, tuple[str, ...]]],
+    dim: str,
+    codes: tuple[str, ...] = (),
+) -> Iterator[KeyFigure]:
+    """A figure of the whole, and the same of every part: its name with the labels along a dimension."""
+    yield KeyFigure(name, unit, stage, stored, codes, whole=True)
+    for part, labels in parts:
+        of_part = Stored(stored.variable, dim, labels, stored.pick, stored.factor, stored.decibel)
+        yield KeyFigure(f"{name} {part}", unit, stage, of_part, codes)
+
+
+def _of_deflection(case: GearboxCase) -> Iterator[KeyFigure]:
+    stages = (*case.pair, *case.planetary)
+    meshes = {stage.name: stage_meshes(stage) for stage in stages}
+    with_teeth = [stage.name for stage in stages if stage.teeth and case.deflection.contact]
+    each = [(mesh, (mesh,)) for names in meshes.values() for mesh in names if len(names) > 1]
+    every = [*meshes.items(), *each]
+    solved = [(part, labels) for part, labels in every if any(labels[0] in meshes[name] for name in with_teeth)]
+    of_mesh = partial(_family, stage="deflection", dim="mesh")
+    if with_teeth:
+        yield from of_mesh("K_Hbeta", NUMBER, stored=Stored("face_load_factor"), parts=solved)
+        yield from of_mesh("STE", MICROMETRES, stored=Stored("transmission_error"), parts=solved)
+    if stages:
+        misaligned = Stored("mesh_misalignment", pick="size")
+        yield from of_mesh("misalignment", MICROMETRES, stored=misaligned, parts=every)
+        yield from of_mesh("mesh force", FORCE, stored=Stored("mesh_force"), parts=every)
+    if case.planetary:
+        sets = [(stage.name, (stage.name,)) for stage in case.planetary]
+        sharing = Stored("planet_load_factor")
+        yield from _family("K_gamma", NUMBER, "deflection", sharing, sets, "stage")
+    names = [bearing_name(section, number) for number, section in enumerate(case.bearing)]
+    bearings = [(name, (name,)) for name in names]
+    if bearings:
+        force = partial(_bearing_force, ())
+        yield KeyFigure("bearing force", FORCE, "deflection", force, whole=True)
+        for name, labels in bearings:
+            yield KeyFigure(f"bearing force {name}", FORCE, "deflection", partial(_bearing_force, labels))
+        lives = Stored("spectrum_reference_life", pick="smallest")
+        rated = [
+            (name, labels)
+            for (name, labels), section in zip(bearings, case.bearing, strict=True)
+            if section.kind is not None and section.dynamic_rating is not None
+        ]
+        if rated:
+            yield from _family("bearing life", HOURS, "deflection", lives, rated, "bearing")
+
+
+def _bearing_force(labels: tuple[str, ...], data: Any) -> float:
+    """Largest force of bearings over all load cases [N]."""
+    force = np.hypot(data["radial_force"].values, data["axial_force"].values)
+    names = [str(name) for name in data["bearing"].values]
+    places = [place for place, name in enumerate(names) if not labels or name in labels]
+    return float(force[:, places].max())
+
+
+def _of_modes() -> Iterator[KeyFigure]:
+    yield KeyFigure("mode distance", NUMBER, "modes", mode_distance, whole=True)
+
+
+def mode_distance(data: Any) -> float:
+    """Compute how far the mesh line nearest to a mode is from it, over the frequency of the mode; of modes.nc."""
+    apart, lines, modes = mesh_lines_and_modes(data)
+    if not apart.size:
+        return math.nan
+    line, mode = np.unravel_index(int(apart.argmin()), apart.shape)
+    return float(abs(lines[line][1] / modes[mode] - 1.0))
+
+
+def mesh_lines_and_modes(data: Any) -> tuple[np.ndarray, list[tuple[str, float]], np.ndarray]:
+    """Find how far mesh lines are from modes of modes.nc: |ln f/f_m| (L, m), lines with names [Hz], modes [Hz].
+
+    Modes without stiffness are left out.
+    """
+    speed, hertz = float(data.attrs["speed"]), data["frequency"].values
+    orders = zip(data["line"].values, data["order"].values, strict=True)
+    lines = [(str(name), float(order) * speed / 60.0) for name, order in orders if "mesh" in str(name)]
+    modes = hertz[hertz > 0.0]
+    if not lines or not len(modes):
+        return np.zeros((0, 0)), [], modes
+    return np.abs(np.log(np.array([line for _, line in lines])[:, None] / modes)), lines, modes
+
+
+def _of_responses(case: GearboxCase) -> Iterator[KeyFigure]:
+    sensors = [(sensor.name, (sensor.name,)) for sensor in casing_sensors(case)]
+    excited = [(stage.name, (stage.name,)) for stage in (*case.pair, *case.planetary) if stage.teeth]
+    for words, stage in _RESPONSES:
+        if excited:
+            of_forces = partial(_family, stage=stage, parts=excited, dim="stage", codes=_OF_FORCES)
+            yield from of_forces(f"{words}force factor", NUMBER, stored=Stored("dynamic_factor"))
+            yield from of_forces(f"{words}dynamic mesh force", FORCE, stored=Stored("mesh_force_rms"))
+        if not (excited and sensors):
+            continue
+        level = Stored("level")
+        yield from _family(f"{words}level", ACCELERATION, stage, level, sensors, "sensor")
+        decibel = Stored("level", decibel=True)
+        yield from _family(f"{words}level dB", DECIBEL, stage, decibel, sensors, "sensor")
+        if stage == "runup":
+            for name, labels in (("", ()), *sensors):
+                read = partial(_loudest_speed, labels)
+                yield KeyFigure(f"loudest speed {name}".rstrip(), SPEED, stage, read, whole=not name)
+
+
+def _loudest_speed(labels: tuple[str, ...], data: Any) -> float:
+    """Speed of the reference shaft with the largest level at sensors [rad/s]."""
+    names = [str(name) for name in data["sensor"].values]
+    places = [place for place, name in enumerate(names) if not labels or name in labels]
+    at = int(data["level"].values[:, places].max(axis=1).argmax())
+    return float(data["speed"].values[at]) * RPM

@@ -1,0 +1,160 @@
+"""What decides about a gearbox: its teeth and bearings over all load cases, and what is heard of it, by whom.
+
+A number that a doubt or a fault of its stage concerns has a mark, which a note explains.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from femgear.report.tables import Block, Marks, doubtful_excitation
+from femgear.stages.key_figures import REFERENCE_ACCELERATION
+from femgear.trains.gearbox.casing_results import largest_foot_force
+from femgear.trains.gearbox.key_figures import mesh_lines_and_modes
+from femgear.trains.gearbox.life import shortest_life
+from femgear.trains.gearbox.response_results import line_origin
+
+SENSORS_JUDGED = 3
+"""Sensors in the verdict, at most: the loudest ones."""
+_OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
+_OF_BEARINGS = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-BEARING", "W-PLAY"
+_OF_RESPONSE = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS", "W-RIGID"
+
+
+def gearbox_verdict(results: Any) -> Iterator[Block]:
+    """Tabulate what decides: misalignment, K_Hbeta, bearings, levels with their main line, modes near it."""
+    rows, marks = list[tuple[str, str]](), Marks(results.findings)
+    if "deflection" in results.stages:
+        rows += _worst_of_deflection(results.deflection, marks)
+    modes = results.modes if "modes" in results.stages else None
+    if modes is not None:
+        rows += _nearest_mode(modes)
+    if "dynamics" in results.stages:
+        rows += _heard(results.dynamics, modes, marks)
+    if "runup" in results.stages:
+        rows += _over_speeds(results.runup, marks)
+    if rows:
+        yield Block("Verdict", rows=tuple(rows), notes=marks.notes)
+
+
+def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
+    cases, meshes, bearings = (data[name].values for name in ("load_case", "mesh", "bearing"))
+
+    def where(place, names) -> str:
+        case = f", {cases[place[0]]}" if len(cases) > 1 else ""
+        return f"{names[place[1]]}{case}"
+
+    def of_teeth(text: str) -> str:
+        return marks(text, *_OF_TEETH, of=("deflection",))
+
+    if len(meshes):
+        misaligned = data["mesh_misalignment"].values
+        at = np.unravel_index(int(np.abs(misaligned).argmax()), misaligned.shape)
+        text = of_teeth(f"{1e6 * misaligned[at]:+.2f} um")
+        yield "largest misalignment over the width", f"{text}, {where(at, meshes)}"
+        factor = data["face_load_factor"].values
+        if np.isfinite(factor).any():
+            at = np.unravel_index(int(np.nanargmax(factor)), factor.shape)
+            least = f"; of all meshes from {np.nanmin(factor):.3f}" if np.isfinite(factor).sum() > 1 else ""
+            yield "largest face load factor K_Hβ", f"{of_teeth(f'{factor[at]:.3f}')}, {where(at, meshes)}{least}"
+    sharing = data["planet_load_factor"].values
+    if np.isfinite(sharing).any():
+        at = np.unravel_index(int(np.nanargmax(sharing)), sharing.shape)
+        text = of_teeth(f"{sharing[at]:.3f}")
+        yield "largest planet load factor K_γ", f"{text}, {where(at, data['stage'].values)}"
+    if len(bearings):
+        force = np.hypot(data["radial_force"].values, data["axial_force"].values)
+        at = np.unravel_index(int(force.argmax()), force.shape)
+        text = marks(f"{force[at]:.4g} N", *_OF_BEARINGS, of=("deflection",))
+        yield "largest bearing force", f"{text}, {where(at, bearings)}"
+        yield from shortest_life(data)
+    yield from largest_foot_force(data)
+
+
+def _nearest_mode(data: Any) -> Iterator[tuple[str, str]]:
+    """The mode that a mesh line comes nearest at the speed of operation."""
+    apart, lines, modes = mesh_lines_and_modes(data)
+    if not apart.size:
+        return
+    line, mode = np.unravel_index(int(apart.argmin()), apart.shape)
+    name, hertz = lines[line]
+    yield "mesh line nearest to a mode", f"{name} {hertz:.0f} Hz, {nearest_mode(data, float(modes[mode]))}"
+
+
+def nearest_mode(data: Any, frequency: float) -> str:
+    """Write which mode of modes.nc is nearest to a frequency [Hz], with its kind and what moves most in it."""
+    hertz = data["frequency"].values
+    elastic = np.flatnonzero(hertz > 0.0)
+    if not len(elastic) or not frequency > 0.0:
+        return "no mode"
+    number = int(elastic[np.abs(np.log(hertz[elastic] / frequency)).argmin()])
+    kind, member = data["kind"].values[number], data["main_member"].values[number]
+    return f"mode {number + 1} {hertz[number]:.0f} Hz ({kind if kind == member else f'{kind}, {member}'})"
+
+
+def level_text(level: float) -> str:
+    """Write a level with its decibels re 1 um/s^2."""
+    if not level > 0.0:
+        return "silent"
+    return f"{level:.4g} m/s^2 ({20.0 * math.log10(level / REFERENCE_ACCELERATION):.1f} dB)"
+
+
+def _level_codes(data: Any, speed: int, sensor: int) -> tuple[str, ...]:
+    """Codes of the findings that concern the level of a sensor at a speed, by their numbers."""
+    missing = ("W-EXCITATION",) if data.attrs["missing"] else ()
+    return *missing, *doubtful_excitation(float(data["level_change"].values[speed, sensor])), *_OF_RESPONSE
+
+
+def _judged(data: Any) -> list[int]:
+    """Numbers of the sensors in the verdict, the loudest first."""
+    return np.argsort(-data["level"].values.max(axis=0), kind="stable")[:SENSORS_JUDGED].tolist()
+
+
+def _heard(data: Any, modes: Any, marks: Marks) -> Iterator[tuple[str, str]]:
+    """Rows of the response at the speed of the load case: levels, main lines, ways, and forces of the meshes."""
+    speed = float(data["speed"].values[0])
+    for sensor in _judged(data) if "level" in data else ():
+        name, whole = data["sensor"].values[sensor], float(data["level"].values[0, sensor])
+        text = marks(level_text(whole), *_level_codes(data, 0, sensor), of=("dynamics",))
+        yield f"level at {name}", f"{text} at {speed:.5g} rpm"
+        if whole > 0.0 and "lines_real" in data:
+            yield f"main line at {name}", _main_line(data, sensor, whole, modes)
+        if whole > 0.0 and "path_share" in data:
+            share = data["path_share"].values[0, :, sensor]
+            at = int(share.argmax())
+            yield f"most of it at {name} comes by", f"{data['path'].values[at]} ({share[at]:.0%} of the power)"
+    yield from _forces(data, "largest mesh force over its mean", marks, "dynamics")
+
+
+def _main_line(data: Any, sensor: int, whole: float, modes: Any) -> str:
+    """Write the largest line at a sensor with its origin, its share, and the mode that is nearest."""
+    size = np.hypot(data["lines_real"].values[0, sensor], data["lines_imag"].values[0, sensor])
+    line = int(size.argmax())
+    hertz = float(data["order"].values[line]) * float(data["speed"].values[0]) / 60.0
+    text = f"{hertz:.1f} Hz, {line_origin(data, line)}: {0.5 * (size[line] / whole) ** 2:.0%} of the power"
+    return text if modes is None else f"{text}; {nearest_mode(modes, hertz)}"
+
+
+def _forces(data: Any, name: str, marks: Marks, stage: str) -> Iterator[tuple[str, str]]:
+    factor = data["dynamic_factor"].values
+    if not np.isfinite(factor).any():
+        return
+    speed, number, _ = np.unravel_index(int(np.nanargmax(factor)), factor.shape)
+    text = marks(f"{np.nanmax(factor):.3f}", *_OF_RESPONSE, of=(stage,))
+    yield name, f"{text}, {data['stage'].values[number]} at {float(data['speed'].values[speed]):.5g} rpm"
+
+
+def _over_speeds(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
+    """Rows of the run-up: where it is loudest, and its largest mesh force."""
+    for sensor in _judged(data) if "level" in data else ():
+        level = data["level"].values[:, sensor]
+        at = int(level.argmax())
+        parts = data["level_of_stage"].values[at, sensor]
+        text = marks(level_text(float(level[at])), *_level_codes(data, at, sensor), of=("runup",))
+        speed, stage = float(data["speed"].values[at]), data["stage"].values[int(parts.argmax())]
+        yield f"loudest of the run-up at {data['sensor'].values[sensor]}", f"{text} at {speed:.5g} rpm, by {stage}"
+    yield from _forces(data, "largest mesh force over its mean, run-up", marks, "runup")

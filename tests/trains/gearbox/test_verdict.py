@@ -1,0 +1,65 @@
+"""The verdict of a gearbox: worst numbers with their place, levels with the line, the way and the mode behind them."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from casings import casing_tables
+from small_gearbox import pair_tables
+
+from femgear.case.dependencies import Steps
+from femgear.findings import DOUBT, Finding
+from femgear.trains.gearbox.verdict import gearbox_verdict, level_text, nearest_mode
+from femgear.trains.live import Answer
+from femgear.trains.reading import read_case
+
+
+@pytest.fixture(scope="module")
+def results():
+    tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
+    tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
+    tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
+    answer = Answer(read_case(tables), Steps())
+    data = {name: answer[name].contents() for name in answer}
+    return SimpleNamespace(stages=tuple(data), findings=(), **data)
+
+
+def test_levels_come_with_line_way_and_mode(results):
+    (block,) = gearbox_verdict(results)
+    rows = dict(block.rows)
+    data, size = results.dynamics, np.hypot(*(results.dynamics[f"lines_{part}"].values for part in ("real", "imag")))
+    at = int(size[0, 0].argmax())
+    hertz = data["order"].values[at] * data["speed"].values[0] / 60.0
+    assert rows["level at top"].startswith(level_text(float(data["level"].values[0, 0])))
+    main = rows["main line at top"]
+    assert main.startswith(f"{hertz:.1f} Hz, stage, mesh harmonic {data['harmonic'].values[at]}")
+    assert main.endswith(nearest_mode(results.modes, hertz))
+    way = data["path"].values[int(data["path_share"].values[0, :, 0].argmax())]
+    assert rows["most of it at top comes by"].startswith(str(way))
+    loudest = results.runup["speed"].values[int(results.runup["level"].values[:, 0].argmax())]
+    assert f"at {loudest:.5g} rpm, by stage" in rows["loudest of the run-up at top"]
+
+
+def test_the_nearest_mode_is_the_nearest_in_octaves(results):
+    hertz = results.modes["frequency"].values
+    elastic = np.flatnonzero(hertz > 0.0)
+    for number in elastic[[0, 3, -1]]:
+        assert nearest_mode(results.modes, 1.0001 * float(hertz[number])).startswith(f"mode {number + 1} ")
+
+
+def test_doubtful_numbers_are_marked(results):
+    marked = SimpleNamespace(**vars(results))
+    doubts = {"deflection": "W-PASSES", "dynamics": "W-PULL"}
+    marked.findings = tuple(
+        Finding(code, "", "it is so", severity=DOUBT, stage=stage) for stage, code in doubts.items()
+    )
+    (block,) = gearbox_verdict(marked)
+    (plain,) = gearbox_verdict(results)
+    assert [note.split()[1].rstrip(",") for note in block.notes] == [*doubts.values()]
+    changed = {name for (name, text), (_, before) in zip(block.rows, plain.rows, strict=True) if text != before}
+    assert {"level at top", "largest face load factor K_Hβ", "largest bearing force"} <= changed
+    assert "loudest of the run-up at top" not in changed
+
+
+def test_decibels_are_those_of_iso_1683():
+    assert level_text(1.0) == "1 m/s^2 (120.0 dB)" and level_text(0.0) == "silent"
