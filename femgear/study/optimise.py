@@ -196,8 +196,7 @@ def _problem(case: Case, request: SearchRequest, effort: SearchEffort) -> tuple[
     need_set(case)
     with all_faults() as part:
         reported = request.of or (*_ERRORS, *(() if case.rigid else _FORCES))
-        asked = _asked(case, request, reported, request.speeds, part)
-        quantities, limits, variables, second = asked
+        quantities, limits, variables, second = _read_request(case, request, reported, request.speeds, part)
         if request.torque is not None:
             with part("--torque"):
                 case = with_value(case, "operation.torque", request.torque)
@@ -226,7 +225,7 @@ def _problem(case: Case, request: SearchRequest, effort: SearchEffort) -> tuple[
     return data, problem, second
 
 
-def _asked(
+def _read_request(
     case: Any, request: SearchRequest, reported: Sequence[str], speeds: tuple[str, str] | None, part: Any
 ) -> tuple[list[StudyQuantity], list[Limit], list[Variable], StudyQuantity | None]:
     """Quantities, goal first, limits, variables and second goal in words of a command line; faults go to ``part``."""
@@ -284,7 +283,7 @@ def _figure_problem(case: Any, request: SearchRequest) -> tuple[Problem, StudyQu
     with all_faults() as part:
         with part("--speeds"):
             case = with_run_up(case, request.speeds)
-        quantities, limits, variables, second = _asked(case, request, request.of, request.speeds, part)
+        quantities, limits, variables, second = _read_request(case, request, request.of, request.speeds, part)
         with part():
             if not variables:
                 raise CaseError(
