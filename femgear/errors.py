@@ -54,6 +54,7 @@ CODES = {
     "E-INFEASIBLE": "No design can be computed and lies within the limits.",
     "E-INTEGRATION": "A time integration stopped before its end, or missed a balance.",
     "E-INTERFERENCE": "Tips strike flanks outside the mesh.",
+    "E-ISO1328": "ISO 1328-1 has no flank tolerances for this gear.",
     "E-ISO6336": "The formula of ISO 6336 does not cover this gear pair.",
     "E-JOURNAL": "The journal of a search or sweep is broken, or belongs to another one.",
     "E-KEY-MISSING": "A needed entry of the case file is missing.",

@@ -20,7 +20,7 @@ from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import Grid, mirror, ordered_nodes
 from femgear.fe.meshing import mesh_outlines
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import pair_mesh_stiffness
+from femgear.gears.iso6336_stiffness import pair_mesh_stiffness
 from femgear.gears.kinematics import orientations
 from femgear.gears.pair import GearPair, close_pair
 from femgear.gears.profile import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import mesh_stiffness_method_b, pair_mesh_stiffness, theoretical_single_stiffness
+from femgear.gears.iso6336_stiffness import mesh_stiffness_method_b, pair_mesh_stiffness, theoretical_single_stiffness
 from femgear.gears.pair import GearPair
 from femgear.gears.profile import BasicRack, transverse_rack, transverse_tool
 from validation.planetary import KISSSOFT, nrel_set

@@ -11,7 +11,7 @@ from femgear.contact.assembly import assemble_contact, mesh_windows
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.solve import solve_contact
-from femgear.gears.iso6336 import mesh_stiffness_method_b
+from femgear.gears.iso6336_stiffness import mesh_stiffness_method_b
 from validation.cases import reference_material, reference_static
 from validation.reference.closed_form import share_load
 from validation.reference.tangent import mesh_tangent_matrix

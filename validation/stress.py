@@ -17,10 +17,10 @@ from femgear.gears.iso6336 import (
     contact_ratio_factor,
     helix_of,
     nominal_contact_stress,
-    nominal_root_stress,
     overlap_of,
     zone_factor,
 )
+from femgear.gears.iso6336_root import nominal_root_stress
 from femgear.gears.pair import close_pair
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import BasicRack, PinionCutter
@@ -78,6 +78,7 @@ def nominal_roots() -> tuple[Row, ...]:
             getattr(s, name),
             contact_ratio=getattr(s, f"contact_ratio_{mesh}"),
             tangential_force=REPORT_FORCE,
+            edition=2006,
         )
         words = f" of the {name} in {mesh.replace('_', '-')}"
         rows.append(printed("D6", KISSSOFT, "form factor Y_F" + words, form, ours.form))

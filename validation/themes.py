@@ -58,6 +58,7 @@ from validation import (
     sound,
     standard,
     static,
+    strength,
     stress,
     support_stiffness,
     torque_rotation,
@@ -248,6 +249,22 @@ THEMES = (
         "Compared with: KISSsoft report, Hertz, whole gear in finite elements; gates: printed digits; 1 %; 2 %.",
         (stress.nominal_flanks, stress.nominal_roots, stress.nominal_helical_flanks, stress.hertz_of_teeth),
         (stress.root_against_whole_gear, stress.sharp_root_over_grids, stress.roots_of_high_contact_ratio),
+    ),
+    Theme(
+        "strength",
+        "Strength of ISO 6336",
+        "Nominal stresses, load factors and tolerances by the edition that the reference has: 2006, where no other is "
+        "named. Compared with: KISSsoft reports, ISO/TR 6336-30, FZG test gears, ISO 1328-1; gates: 0.5 %; printed "
+        "digits.",
+        (
+            strength.report_of_stage_1,
+            strength.single_contact_of_stage_1,
+            strength.report_of_stage_3,
+            strength.technical_report,
+            strength.fzg_gears,
+            strength.edition_of_2019,
+            strength.tolerances,
+        ),
     ),
     Theme(
         "rims",

@@ -16,7 +16,7 @@ from femgear.case.quantities import FOUNDATION, INERTIA, MASS, STIFFNESS, TORSIO
 from femgear.case.sections import gear_material
 from femgear.findings import Finding
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import material_factor
+from femgear.gears.iso6336_stiffness import material_factor
 
 USUAL_STIFFNESS = 20e9
 """Mesh stiffness per face width c_gamma of steel gears [N/m^2], 20 N/(mm um): DIN 3990-1:1987, method C."""

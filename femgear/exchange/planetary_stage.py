@@ -38,7 +38,7 @@ from femgear.exchange.flank_modifications import Flank, flank_modifications, wri
 from femgear.exchange.gear_unit import gears_of, loads_on, stage_components, unit_flow, with_load_case
 from femgear.exchange.rexs import Component, Model, Relation
 from femgear.findings import NOTE
-from femgear.gears.iso6336 import STEEL
+from femgear.gears.iso6336_stiffness import STEEL
 from femgear.gears.kinematics import MEMBERS, torque_ratios
 
 if TYPE_CHECKING:

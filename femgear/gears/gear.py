@@ -13,6 +13,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from numbers import Integral
+from typing import Any
 
 import numpy as np
 
@@ -278,14 +279,14 @@ def _suitable_cutter(gear: Gear) -> PinionCutter | None:
             cutter = PinionCutter(teeth=teeth, profile_shift=shift)
             if any(_cutter_faults(gear, cutter)):
                 continue
-            if _cutter_tip(gear, cutter).room >= -ROOM_TOLERANCE:
+            if generating_cutter_tip(gear, cutter).room >= -ROOM_TOLERANCE:
                 return cutter
     return None
 
 
 def _generating_tool(gear: Gear, rounding: float | None = None) -> RackTip | CutterTip:
     """Tool tip that cuts flank and root circle of a gear; its rounding [modules] is by default the gear's."""
-    return _cutter_tip(gear, cutter_of(gear), rounding) if gear.internal else _rack_tip(gear, rounding)
+    return generating_cutter_tip(gear, cutter_of(gear), rounding) if gear.internal else _rack_tip(gear, rounding)
 
 
 def _rack_tip(gear: Gear, rounding: float | None) -> RackTip:
@@ -314,24 +315,37 @@ def _working_angle(involute: float) -> float:
     return arcinv(involute)
 
 
-def _cutter_tip(gear: Gear, cutter: PinionCutter, rounding: float | None = None) -> CutterTip:
-    """Cutter at the centre distance that leaves it no play in the finished gap; lengths in m.
+def generating_cutter_tip(
+    gear: Any, cutter: PinionCutter, rounding: float | None = None, *, teeth: float | None = None
+) -> CutterTip:
+    """Make the tip of a pinion cutter [m] at the centre distance that leaves it no play in the finished gap.
 
     Its shift and that distance give the flank its thickness; its tip radius follows from the root circle.
+
+    Parameters
+    ----------
+    gear : Gear
+        Or the numbers of a virtual gear, whose teeth are no whole number, under the names of `Gear`.
+    cutter : PinionCutter
+        With the shift and the rounding that count.
+    rounding : float, optional
+        Of its tip [modules], in place of the cutter's or the rack's.
+    teeth : float, optional
+        Of the virtual cutter, in place of the cutter's.
     """
+    teeth = cutter.teeth if teeth is None else teeth
     alpha, module = gear.pressure_angle, gear.module
-    if rounding is None:
-        rounding = gear.rack.root_radius if cutter.tip_radius is None else cutter.tip_radius
-    rounding *= module
+    of_tool = gear.rack.root_radius if cutter.tip_radius is None else cutter.tip_radius
+    rounding = float(module * (of_tool if rounding is None else rounding))
     tangent = math.tan(alpha)
     # a thinner tooth is a wider gap: the cutter is fed in as if the flank were shifted further out
     flank_shift = gear.profile_shift + 0.5 * gear.thickness_allowance / (module * tangent)
     shift = flank_shift - cutter.profile_shift
-    working = _working_angle(inv(alpha) + 2.0 * tangent * shift / (gear.teeth - cutter.teeth))
-    base = 0.5 * module * cutter.teeth * math.cos(alpha)
+    working = _working_angle(inv(alpha) + 2.0 * tangent * shift / (gear.teeth - teeth))
+    base = 0.5 * module * teeth * math.cos(alpha)
     pitch, cutter_pitch = gear.base_radius / math.cos(working), base / math.cos(working)
     centre_radius = gear.root_radius - (pitch - cutter_pitch) - rounding
-    base_half = (0.5 * math.pi + 2.0 * cutter.profile_shift * tangent) / cutter.teeth + inv(alpha)
+    base_half = (0.5 * math.pi + 2.0 * cutter.profile_shift * tangent) / teeth + inv(alpha)
     stretch = gear.rack.stretch
     # where the rounding passes into the involute, whose normals touch the base circle
     _, cutter_roll, end = cutter_rounding(base, centre_radius, rounding, stretch)
@@ -481,7 +495,7 @@ def _cutter_faults(gear: Gear, cutter: PinionCutter) -> Iterator[GeometryError]:
         )
         return
     try:
-        tool = _cutter_tip(gear, cutter)
+        tool = generating_cutter_tip(gear, cutter)
     except GeometryError:
         yield _fault(
             gear,

@@ -67,13 +67,8 @@ from femgear.contact.width_waves import (
 from femgear.errors import LESS_TORQUE, CaseError, ContactError, GeometryError
 from femgear.fe.elasticity import Material, foundation, material_of_each
 from femgear.gears.deviations import SetDeviations, common_period
-from femgear.gears.iso6336 import (
-    contact_ratio_factor,
-    nominal_contact_stress,
-    nominal_root_stress,
-    overlap_of,
-    root_face_width,
-)
+from femgear.gears.iso6336 import contact_ratio_factor, nominal_contact_stress, overlap_of
+from femgear.gears.iso6336_root import nominal_root_stress, root_face_width
 from femgear.gears.pair import GearSet
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle
@@ -535,7 +530,7 @@ def nominal_stresses(
     for i, pair in enumerate(s.kinds):
         gear_1, gear_2 = pair.gears
         small, large = (gear_1, gear_2) if gear_2.internal or gear_1.teeth <= gear_2.teeth else (gear_2, gear_1)
-        load = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
+        load: dict[str, Any] = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
         (modulus, ratio), mate = (elastic[number] for number in s.mates[i])
         try:
             contact[i] = nominal_contact_stress(
@@ -552,7 +547,7 @@ def nominal_stresses(
             messages.append(f"{gear_1.name}-{gear_2.name}: {error.message}")
         for j, gear in enumerate((gear_1, gear_2)):
             try:
-                root[i, j] = nominal_root_stress(gear, common_width=pair.face_width, **load).stress
+                root[i, j] = nominal_root_stress(gear, common_width=pair.face_width, edition=2006, **load).stress
             except GeometryError as error:
                 messages.append(f"{gear.name} in {gear_1.name}-{gear_2.name}: {error.message}")
     return NominalStresses(contact, root, ratio_factor, "; ".join(dict.fromkeys(messages)))

@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 from femgear import read_case, solve_static, with_values
-from femgear.gears.iso6336 import pair_mesh_stiffness
+from femgear.gears.iso6336_stiffness import pair_mesh_stiffness
 
 plt.style.use("tableau-colorblind10")
 case = read_case(Path(__file__).parents[2] / "cases" / "spur_pair.toml")

@@ -11,7 +11,9 @@ from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.width_waves import width_waves
 from femgear.fe.elasticity import Material, stiffness
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import elasticity_factor, material_factor, root_face_width
+from femgear.gears.iso6336 import elasticity_factor
+from femgear.gears.iso6336_root import root_face_width
+from femgear.gears.iso6336_stiffness import material_factor
 from femgear.gears.pair import GearPair, close_pair
 
 STEEL, IRON = Material(206e9, 0.3, 7850.0), Material(110e9, 0.26, 7100.0)

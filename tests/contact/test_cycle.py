@@ -13,7 +13,7 @@ from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import mesh_stiffness_method_b
+from femgear.gears.iso6336_stiffness import mesh_stiffness_method_b
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from validation.reference.tangent import mesh_tangent_matrix, tangent_stiffness
 

@@ -12,7 +12,7 @@ from femgear.errors import GeometryError
 from femgear.gears import profile as iv
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear, tooth_thickness
-from femgear.gears.iso6336 import mesh_stiffness_method_b, theoretical_single_stiffness
+from femgear.gears.iso6336_stiffness import mesh_stiffness_method_b, theoretical_single_stiffness
 from femgear.gears.kinematics import torques
 from femgear.gears.pair import working_pressure_angle, zero_backlash_distance
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles, feasible_angles

@@ -20,7 +20,7 @@ from femgear.case.quantities import RPM
 from femgear.case.sections import gear_material
 from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
 from femgear.findings import Finding
-from femgear.gears.iso6336 import contact_safety, root_safety, single_pair_factor
+from femgear.gears.iso6336 import contact_safety, root_safety, single_pair_factors
 from femgear.gears.modifications import FlankForm
 from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
@@ -760,7 +760,7 @@ def _safeties(
     if any(hlims):
         single = np.array(
             [
-                single_pair_factor(*pair.gears, working_angle=pair.working_pressure_angle, path=pair.path)
+                max(single_pair_factors(*pair.gears, working_angle=pair.working_pressure_angle, path=pair.path))
                 for pair in planetary_set(case).kinds
             ]
         )

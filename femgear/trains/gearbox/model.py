@@ -20,7 +20,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.sections import gear_material
 from femgear.errors import CaseError
 from femgear.fe.beam import BeamShaft, ShaftPart, beam_shaft, body_matrices, growth_load, rigid_link
-from femgear.gears.iso6336 import pair_mesh_stiffness
+from femgear.gears.iso6336_stiffness import pair_mesh_stiffness
 from femgear.system.assembly import GROUND, Assembly, Beam, Contact, Inertia, StationSprings, joint, mesh_normal
 from femgear.trains.gearbox.carrier import pin_axes, pin_compliance, planet_springs
 from femgear.trains.gearbox.case_file import (

@@ -32,7 +32,7 @@ from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError
 from femgear.gears import profile
-from femgear.gears.iso6336 import material_factor
+from femgear.gears.iso6336_stiffness import material_factor
 from femgear.gears.kinematics import torques
 from femgear.gears.planetary import virtual_set
 from femgear.solvers.linear.modal import undamped_modes

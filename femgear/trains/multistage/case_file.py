@@ -45,7 +45,7 @@ from femgear.fe.beam import RoundSection, joint_springs
 from femgear.findings import Finding
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import pair_mesh_stiffness
+from femgear.gears.iso6336_stiffness import pair_mesh_stiffness
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.gears.tips import settled_tips

@@ -26,7 +26,7 @@ from femgear.errors import ConvergenceError, GeometryError
 from femgear.findings import Finding
 from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import common_period
-from femgear.gears.iso6336 import material_factor, pair_mesh_stiffness
+from femgear.gears.iso6336_stiffness import material_factor, pair_mesh_stiffness
 from femgear.gears.pair import GearPair
 from femgear.report.tables import Block, chosen, describe_modes, tabulate
 from femgear.solvers.continuation.branches import frequency_response_curve

@@ -11,7 +11,7 @@ from femgear import cli
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
-from femgear.gears.iso6336 import mesh_stiffness_method_b
+from femgear.gears.iso6336_stiffness import mesh_stiffness_method_b
 from femgear.run import grid_cache, run_case
 from femgear.stages.static_results import mean_over_period
 from femgear.storage.results import run_folder

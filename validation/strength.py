@@ -1,0 +1,321 @@
+"""Strength of ISO 6336 by edition: published reports, test gears, tolerances of ISO 1328-1."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+from femgear.gears.gear import Gear
+from femgear.gears.iso6336 import (
+    Edition,
+    bending_face_factor,
+    contact_ratio_factor,
+    nominal_contact_stress,
+    single_pair_factors,
+    zone_factor,
+)
+from femgear.gears.iso6336_load import disc_inertia, dynamic_factor, reduced_mass, resonance_speed
+from femgear.gears.iso6336_root import NominalRootStress, load_distribution_factor, nominal_root_stress
+from femgear.gears.iso6336_stiffness import BENDING_SHARE, gear_blank_factor, pair_mesh_stiffness
+from femgear.gears.pair import GearPair, close_pair
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles
+from femgear.gears.profile import BasicRack, PinionCutter, base_helix_angle, transverse_rack, transverse_tool
+from femgear.gears.tolerances import flank_tolerances
+from validation.rows import Row, printed, within
+
+ALPHA = math.radians(20.0)
+STAGE_1 = "KISSsoft report, NREL 5 MW gearbox, planetary stage 1"
+STAGE_3 = "KISSsoft report, NREL 5 MW gearbox, stage 3 (24/95, 10 deg)"
+EXAMPLE = "ISO/TR 6336-30:2017, worked example 1 (17/103, m_n 8, 15.8 deg)"
+FZG_C = "FZG test gear C, 16/24, m 4.5, 200 N m, ISO 6336:2006 evaluated by hand"
+FZG_H = "FZG test gear H501, 20/30, m_n 3.5, 15 deg, 100 N m, ISO 6336:2006 evaluated by hand"
+EDITION_2019 = "KISSsoft reports by ISO 6336:2019 of planetary stages, m_n 40, 15 deg"
+TOLERANCES = "ISO 1328-1:2013, eq. 5 to 12 with the rounding of 5.2.3, 40 teeth, m 3, b 30, class 6"
+STAGE_1_FORCE, STAGE_3_FORCE = 779454.877, 240064.4
+STEEL = {"youngs_modulus": 206e9, "poisson_ratio": 0.3}
+HALF_PERCENT = 5e-3
+
+
+@lru_cache(maxsize=1)
+def first_stage() -> PlanetarySet:
+    """Planetary stage 1 of the NREL 5 MW gearbox: 19/17/56, m 45, three planets."""
+
+    def gear(teeth, shift, tip, root, rim, rounding, **of_ring) -> Gear:
+        return Gear(
+            teeth,
+            45e-3,
+            ALPHA,
+            shift,
+            0.491,
+            0.5e-3 * rim,
+            rack=BasicRack(1.0, 1.25, rounding),
+            tip_diameter=1e-3 * tip,
+            root_diameter=1e-3 * root,
+            **of_ring,
+        )
+
+    return PlanetarySet(
+        gear(19, 0.6170, 978.808, 798.030, 482.33, 0.38),
+        gear(17, 0.8021, 905.470, 724.692, 408.99, 0.38),
+        gear(56, 0.5013, 2475.118, 2677.618, 2994.24, 0.30, internal=True, cutter=PinionCutter(36, 0.0, 0.30)),
+        0.863,
+        equal_planet_angles(3),
+    )
+
+
+def helical_gears(teeth, shifts, tips, bores, *, module, degrees, width, rack) -> tuple[Gear, ...]:
+    """Make helical gears from their normal section; lengths in mm, None for tips of the rack."""
+    beta = math.radians(degrees)
+    transverse, angle = transverse_tool(module * 1e-3, ALPHA, beta)
+    return tuple(
+        Gear(
+            z,
+            transverse,
+            angle,
+            x * math.cos(beta),
+            width * 1e-3,
+            0.5e-3 * bore,
+            rack=transverse_rack(BasicRack(*rack), beta),
+            tip_diameter=tip and tip * 1e-3,
+            name=name,
+        )
+        for z, x, tip, bore, name in zip(teeth, shifts, tips, bores, ("pinion", "wheel"), strict=True)
+    )
+
+
+@lru_cache(maxsize=1)
+def third_stage() -> GearPair:
+    """Stage 3 of the NREL 5 MW gearbox."""
+    gears = helical_gears(
+        (24, 95),
+        (0.48, 0.6691),
+        (380.747, 1395.376),
+        (179.10, 1193.32),
+        module=14,
+        degrees=10,
+        width=360,
+        rack=(1.0, 1.25, 0.38),
+    )
+    return GearPair(*gears, 0.861)
+
+
+def helical_test_gear(rounding: float) -> GearPair:
+    """Make the FZG test gear H501 with a rounding of the rack [modules]; the wheel's shift is found."""
+    gears = helical_gears(
+        (20, 30),
+        (0.1809, 0.0891),
+        (80.672, 116.264),
+        (30.0, 30.0),
+        module=3.5,
+        degrees=15,
+        width=23,
+        rack=(1.0, 1.25, rounding),
+    )
+    return close_pair(*gears, centre_distance=91.5e-3, find=("wheel",))
+
+
+def contact_stress(pair: GearPair, force: float) -> float:
+    """Compute sigma_H0 [MPa] of a pair of steel under a force at the reference circle [N], gear 1 the pinion."""
+    first, second = pair.gears
+    if not second.internal and second.teeth < first.teeth:
+        first, second = second, first
+    load = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
+    return 1e-6 * nominal_contact_stress(first, second, working_angle=pair.working_pressure_angle, **load, **STEEL)
+
+
+def root_stresses(pair: GearPair, force: float, edition: Edition = 2006) -> tuple[NominalRootStress, ...]:
+    """Compute sigma_F0 of both gears of a pair under a force at the reference circle [N]."""
+    load = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
+    return tuple(nominal_root_stress(gear, edition=edition, **load) for gear in pair.gears)
+
+
+def report_of_stage_1() -> tuple[Row, ...]:
+    """Tooth factors and nominal stresses of all four flanks of the published report."""
+    rows, gears = [], first_stage()
+    flanks = ("sun", "planet, sun side", "planet, ring side", "ring")
+    roots = [root for pair in gears.kinds for root in root_stresses(pair, STAGE_1_FORCE)]
+    prints = (
+        ("1.56", "2.06", 113.46),
+        ("1.44", "2.14", 108.94),
+        ("1.14", "2.38", 95.70),
+        ("1.27", "2.13", 95.32),
+    )
+    for flank, root, (form, correction, stress) in zip(flanks, roots, prints, strict=True):
+        rows += [
+            printed("stage 1", STAGE_1, f"{flank}: form factor Y_F", form, root.form),
+            printed("stage 1", STAGE_1, f"{flank}: stress correction Y_S", correction, root.correction),
+            within(
+                "stage 1",
+                STAGE_1,
+                f"{flank}: nominal root stress sigma_F0 [MPa]",
+                stress,
+                1e-6 * root.stress,
+                HALF_PERCENT,
+            ),
+        ]
+    prints = (("2.06", "0.981", 759.92), ("2.71", "0.952", 588.62))
+    for name, pair, (zone, ratio, stress) in zip(("sun-planet", "planet-ring"), gears.kinds, prints, strict=True):
+        ours = contact_stress(pair, STAGE_1_FORCE)
+        factor = contact_ratio_factor(pair.contact_ratio)
+        rows += [
+            printed("stage 1", STAGE_1, f"{name}: Z_H", zone, zone_factor(ALPHA, pair.working_pressure_angle)),
+            printed("stage 1", STAGE_1, f"{name}: Z_eps", ratio, factor),
+            within("stage 1", STAGE_1, f"{name}: nominal contact stress sigma_H0 [MPa]", stress, ours, HALF_PERCENT),
+        ]
+    return tuple(rows)
+
+
+def single_contact_of_stage_1() -> tuple[Row, ...]:
+    """Z_B and Z_D, and what masses and stiffness make of the mesh resonance."""
+    gears, rows = first_stage(), []
+    for name, pair, factors in zip(
+        ("sun-planet", "planet-ring"), gears.kinds, (("1.04", "1.05"), ("1.00", "1.00")), strict=True
+    ):
+        angle = {"working_angle": pair.working_pressure_angle, "path": pair.path}
+        ours = single_pair_factors(*pair.gears, **angle, edition=2006)
+        for symbol, reference, value in zip(("Z_B", "Z_D"), factors, ours, strict=True):
+            rows.append(printed("stage 1", STAGE_1, f"{name}: {symbol}", reference, value))
+    note = "with the printed C_R 0.862"
+    outer, inner = ([0.862e-9 * value for value in pair_mesh_stiffness(pair)] for pair in gears.kinds)
+    for name, ours, prints in (
+        ("sun-planet", outer, (12.362, 13.426, 11.412)),
+        ("planet-ring", inner, (13.289, 16.063, 13.653)),
+    ):
+        values = (*ours, BENDING_SHARE * ours[1])
+        for symbol, reference, value in zip(("c'", "c_gamma_alpha", "c_gamma_beta"), prints, values, strict=True):
+            quantity = f"{name}: {symbol} [N/(mm um)]"
+            rows.append(within("stage 1", STAGE_1, quantity, reference, value, HALF_PERCENT, note=note))
+    sun, planet, _ = (disc_inertia(gear, 7830.0) for gear in gears.gears)
+    of_mesh = reduced_mass(sun / gears.n_planets, planet), reduced_mass(planet)
+    for name, reference, value in zip(("sun-planet", "planet-ring"), ("0.6606", "2.4597"), of_mesh, strict=True):
+        note = "the sun shared by its planets, the ring fixed"
+        rows.append(printed("stage 1", STAGE_1, f"{name}: m_red [kg/mm]", reference, 1e-3 * value, note=note))
+    return tuple(rows)
+
+
+def report_of_stage_3() -> tuple[Row, ...]:
+    """Helical stage: roots, flanks, stiffness with its gear blank factor, and K_v by method B."""
+    pair = third_stage()
+    rows = [
+        within(
+            "stage 3", STAGE_3, f"{name}: nominal root stress sigma_F0 [MPa]", value, 1e-6 * root.stress, HALF_PERCENT
+        )
+        for name, value, root in zip(
+            ("pinion", "wheel"), (117.92, 127.69), root_stresses(pair, STAGE_3_FORCE), strict=True
+        )
+    ]
+    ours = contact_stress(pair, STAGE_3_FORCE)
+    rows.append(within("stage 3", STAGE_3, "nominal contact stress sigma_H0 [MPa]", 570.79, ours, HALF_PERCENT))
+    blank = gear_blank_factor(0.25, 5.0)
+    rows.append(printed("stage 3", STAGE_3, "gear blank factor C_R, b_s/b 0.25, s_R/m_n 5", "0.898", blank))
+    single, mean = (1e-9 * value for value in pair_mesh_stiffness(pair, math.radians(10.0)))
+    rows.append(within("stage 3", STAGE_3, "c' over C_R [N/(mm um)]", 15.403, single, HALF_PERCENT))
+    rows.append(within("stage 3", STAGE_3, "c_gamma_alpha over C_R [N/(mm um)]", 20.748, mean, HALF_PERCENT))
+    mass = reduced_mass(*(disc_inertia(gear, 7830.0) for gear in pair.gears))
+    rows.append(within("stage 3", STAGE_3, "m_red [kg/mm]", 0.36503, 1e-3 * mass, HALF_PERCENT))
+    resonance = resonance_speed(24, 1e9 * blank * mean, mass)
+    rows.append(within("stage 3", STAGE_3, "n_E1 [1/min]", 2843.0, 30.0 / math.pi * resonance, HALF_PERCENT))
+    ratio = math.pi / 30.0 * 1165.9 / resonance
+    rows.append(printed("stage 3", STAGE_3, "N", "0.410", ratio))
+    factor = dynamic_factor(
+        resonance_ratio=ratio,
+        line_load=1.25 * STAGE_3_FORCE / pair.face_width,
+        stiffness=1e9 * blank * single,
+        contact_ratio=2.884,
+        # ISO 1328-1:1997, class 6: 16 and 22 um, of which 7.5 % run in
+        pitch_deviation=0.925 * 16e-6,
+        profile_deviation=0.925 * 22e-6,
+        tip_relief=2e-6,
+    ).factor
+    rows.append(within("stage 3", STAGE_3, "K_v, method B, C_a 2 um", 1.092, factor, HALF_PERCENT))
+    return tuple(rows)
+
+
+def technical_report() -> tuple[Row, ...]:
+    """Example to the standard: c_gamma_beta and K_Fbeta beside what the theme on teeth has of it."""
+    gears = helical_gears(
+        (17, 103),
+        (0.145, 0.0),
+        (159.66, 872.35),
+        (60.0, 400.0),
+        module=8,
+        degrees=15.8,
+        width=100,
+        rack=(1.0, 1.4, 0.39),
+    )
+    pair = GearPair(*gears, 0.5)
+    stiffness = BENDING_SHARE * pair_mesh_stiffness(pair, math.radians(15.8))[1]
+    height = max(gear.tip_radius - gear.root_radius for gear in gears)
+    ours = contact_stress(pair, 9000.0 / gears[0].reference_radius)
+    return (
+        within("example 1", EXAMPLE, "c_gamma_beta [N/(mm um)]", 14.8451, 1e-9 * stiffness, HALF_PERCENT),
+        within(
+            "example 1",
+            EXAMPLE,
+            "K_Fbeta of K_Hbeta 1.16",
+            1.12803,
+            bending_face_factor(1.16, 0.1, height),
+            HALF_PERCENT,
+        ),
+        within("example 1", EXAMPLE, "nominal contact stress sigma_H0 [MPa]", 1206.58, ours, HALF_PERCENT),
+    )
+
+
+def fzg_gears() -> tuple[Row, ...]:
+    """FZG gears C and H501 by the edition of 2006."""
+    rack, rows = BasicRack(1.0, 1.25, 0.375), []
+    shape = (4.5e-3, ALPHA)
+    spur = GearPair(
+        Gear(16, *shape, 0.1817, 0.014, 0.01, rack=rack, tip_diameter=82.636e-3),
+        Gear(24, *shape, 0.1715, 0.014, 0.01, rack=rack, tip_diameter=118.544e-3),
+        91.5e-3,
+    )
+    note = (
+        "with a rounding of 0.30 modules, which its Y_F 1.479, 1.490 and Y_S 2.047, 2.036 have; 0.38 gives 90.7, 91.1"
+    )
+    for case, source, pair, torque, values, remark in (
+        ("C", FZG_C, spur, 200.0, (275.70, 267.54, 1239.07), ""),
+        ("H501", FZG_H, helical_test_gear(0.30), 100.0, (96.7, 96.9, 652.5), note),
+    ):
+        force = torque / pair.gears[0].reference_radius
+        for gear, value, root in zip(("pinion", "wheel"), values, root_stresses(pair, force), strict=False):
+            quantity = f"{gear}: nominal root stress sigma_F0 [MPa]"
+            rows.append(within(case, source, quantity, value, 1e-6 * root.stress, HALF_PERCENT, note=remark))
+        ours = contact_stress(pair, force)
+        rows.append(within(case, source, "nominal contact stress sigma_H0 [MPa]", values[2], ours, HALF_PERCENT))
+    return tuple(rows)
+
+
+def edition_of_2019() -> tuple[Row, ...]:
+    """f_eps of two published calculations, with tips shortened by what the shifts need."""
+    rows = []
+    for teeth, shifts, width, reference in (
+        ((33, 27), (0.2004, 0.2624), 800, "0.801"),
+        ((41, 34), (0.3698, 0.9220), 750, "0.840"),
+    ):
+        of_rack = {"module": 40, "degrees": 15, "width": width, "rack": (1.0, 1.25, 0.38)}
+        open_tips = helical_gears(teeth, shifts, (None, None), (200.0, 200.0), **of_rack)
+        distance = close_pair(*open_tips).centre_distance
+        reach = sum(gear.reference_radius for gear in open_tips) + 0.04 * sum(shifts) - distance
+        tips = [2e3 * (gear.tip_radius - reach) for gear in open_tips]
+        pair = GearPair(*helical_gears(teeth, shifts, tips, (200.0, 200.0), **of_rack), distance)
+        ratio = pair.contact_ratio / math.cos(base_helix_angle(ALPHA, math.radians(15.0))) ** 2
+        quantity = f"{teeth[0]}/{teeth[1]}: f_eps"
+        rows.append(printed("2019", EDITION_2019, quantity, reference, load_distribution_factor(ratio, 1.0)))
+    return tuple(rows)
+
+
+def tolerances() -> tuple[Row, ...]:
+    """Flank tolerances of a gear; all references are whole or half micrometres."""
+    ours = flank_tolerances(6, diameter=0.12, normal_module=3e-3, face_width=0.03)
+    return tuple(
+        printed("tolerances", TOLERANCES, f"{symbol} [um]", reference, 1e6 * value)
+        for symbol, reference, value in (
+            ("f_pT", "9.0", ours.pitch),
+            ("F_pT", "29", ours.cumulative_pitch),
+            ("F_alphaT", "12", ours.profile),
+            ("f_falphaT", "9.5", ours.profile_form),
+            ("f_HalphaT", "7.5", ours.profile_slope),
+            ("F_rT", "26", ours.runout),
+        )
+    )
