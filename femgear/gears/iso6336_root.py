@@ -346,7 +346,10 @@ def _section_of_the_rack(gear: Gear, tooth: _VirtualTooth) -> tuple[float, float
 class _NormalSection:
     """Numbers of the virtual internal gear of a normal section from which its cutter's tip follows.
 
-    Names are those of `femgear.gears.gear.Gear`, lengths in m; teeth are no whole number.
+    Parameters
+    ----------
+    teeth, module, pressure_angle, profile_shift, thickness_allowance, rack, base_radius, root_radius
+        As of `femgear.gears.gear.Gear`, lengths in m; teeth are no whole number.
     """
 
     teeth: float
