@@ -12,6 +12,7 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from functools import cache
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError, create_model
@@ -78,6 +79,9 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     Messages give the name of the file and, of a ``numbered`` text, which is the user's, its lines.
     """
     data, lines = case_text.parse(text, name), text if numbered else ""
+    if isinstance(model := data.get("model"), str) and model in registry.FORMER:
+        data = _of_former_train(data, model, lines, name)
+        text, lines = case_text.write(data), ""
     try:
         train = _train_of_file(data)
     except CaseError as error:
@@ -113,6 +117,18 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         case, estimated = with_estimates(case)
         case._notices += estimated
     return case
+
+
+def _of_former_train(data: dict, model: str, lines: str, name: str) -> dict:
+    """Tables of today that say what those of a train do that is no more."""
+    section, tables_of = (resolve_name(place) for place in registry.FORMER[model])
+    case_text.check_tree(data, name)
+    try:
+        return tables_of(section.model_validate(data))
+    except ValidationError as error:
+        raise combine(translate(error, section), lines, name, error.error_count()) from None
+    except CaseError as error:
+        raise combine([*error.problems], lines, name) from None
 
 
 def _beside_refused(file: case_text.CaseFile, data: dict, error: ValidationError) -> list[CaseError]:

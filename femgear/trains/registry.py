@@ -34,6 +34,13 @@ class Known:
     train = property(lambda self: cast("Train", resolve_name(self.solves)))
 
 
+FORMER = {
+    "multistage": (
+        "femgear.trains.gearbox.multistage_cases:MultistageFile",
+        "femgear.trains.gearbox.multistage_cases:gearbox_of_multistage",
+    )
+}
+"""Models of files whose train is no more, each with what reads its tables and what makes those of today of them."""
 GROUP = "femgear.trains"
 """Entry points of other packages; the name is that of the train, the value a module with FILE and TRAIN."""
 

@@ -577,11 +577,12 @@ class BoxModesSection(Section):
 class BoxDynamicsSection(Section):
     """Response: reach of the excitation and tolerance of the periodic solution.
 
-    All stages with teeth excite the gearbox up to the frequency ``up_to``. Planets make ``side_bands`` at either side
-    of each mesh harmonic.
+    Stages excite the gearbox up to the frequency ``up_to``, each with ``mesh_harmonics`` at most where they are given.
+    Planets make ``side_bands`` at either side of each mesh harmonic.
     """
 
     up_to: Annotated[float, Quantity(FREQUENCY, 10.0, 200e3)] = 20e3
+    mesh_harmonics: Annotated[int, Count(1, 2000)] | None = None
     side_bands: Annotated[int, Count(1, 60)] = 4
     tolerance: Annotated[float, Number(1e-12, 1e-2)] = 1e-8
 

@@ -14,6 +14,7 @@ from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below
 from femgear.stages.protocol import Drawn, Figures
 from femgear.trains.gearbox.casing_results import seat_curve
 from femgear.trains.gearbox.response_figures import RESPONSE_FIGURES
+from femgear.trains.gearbox.stage_figures import draw_stage_energy
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -247,7 +248,9 @@ def _draw_deflection(drawn: Drawn) -> dict[str, Figure]:
 def _draw_modes(drawn: Drawn) -> dict[str, Figure]:
     data = drawn.data["modes"]
     found = {"campbell": gearbox_campbell(data)}
-    return found | ({"mode_energy": mode_energy(data)} if np.any(data["frequency"].values > 0.0) else {})
+    found |= {"mode_energy": mode_energy(data)} if np.any(data["frequency"].values > 0.0) else {}
+    by_stage = draw_stage_energy(data)
+    return found if by_stage is None else found | {"stage_energy": by_stage}
 
 
 FIGURES = {
@@ -263,6 +266,8 @@ FIGURES = {
         {
             "campbell": "Natural frequencies over the speed, with turns of the shafts and mesh lines of the stages.",
             "mode_energy": "Where the strain energy of every mode lies.",
+            "stage_energy": "Share of every stage in the kinetic energy of the modes; modes of one frequency "
+            "stand once, with their mean share.",
         },
         _draw_modes,
     ),

@@ -18,6 +18,7 @@ from femgear.trains.gearbox.case_file import CASING
 from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_carrier import with_carriers
 from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
+from femgear.trains.gearbox.mode_stages import StageMotions, stage_motions
 from femgear.trains.gearbox.model import GearboxModel, member_of_stations
 
 # Share of the kinetic energy from which a mode is of one kind.
@@ -66,6 +67,8 @@ class GearboxModes:
         Shaft whose speed counts: the first one that is given.
     orders : mapping of str to float
         Lines of excitation by name, over the turn of the reference shaft.
+    stages : StageMotions
+        Shares of the stages in the kinetic energy, and what the planets do.
     """
 
     deflection: Deflection
@@ -78,6 +81,7 @@ class GearboxModes:
     campbell: CampbellData
     reference: str
     orders: dict[str, float]
+    stages: StageMotions
 
 
 def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
@@ -142,8 +146,10 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     count = int(np.clip(np.count_nonzero(modes.frequency > 0.0), 1, _MOST_BRANCHES))
     turning = _in_modes(still, stiffness, system.gyroscopic, speed, count)
     followed = campbell_data(lambda _: turning, speeds, np.zeros(0), orders=tuple(orders.values()), count=count)
+    stages = stage_motions(model, motion, moved, modes.frequency)
+    kept = replace(modes, kind=kinds)
     return GearboxModes(
-        found, replace(modes, kind=kinds), motion, members, kinetic, parts, strain, followed, reference, orders
+        found, kept, motion, members, kinetic, parts, strain, followed, reference, orders, stages
     )
 
 

@@ -137,6 +137,19 @@ class GearboxResponse:
                 found[:, a, b] = (excited.spread * moved / own).max(axis=1)
         return found
 
+    @property
+    def mesh_forces(self) -> np.ndarray:
+        """R.m.s. force (v, M, stages) of every mesh about its mean by every stage [N]; own ones of the leading planet."""
+        model = self.deflection.model
+        loss = abs(1.0 + 2j * model.case.modes.damping_ratio)
+        stiffness = loss * np.array([contact.stiffness.sum() for contact in model.assembly.contacts])
+        found = np.stack([stage.approach * stiffness for stage in self.stages], axis=2)
+        for number, stage in enumerate(self.stages):
+            meshes = next(list(other.meshes) for other in model.stages if other.name == stage.name)
+            own = np.repeat(stage.dynamic_force, len(meshes) // stage.dynamic_force.shape[1], axis=1)
+            found[:, meshes, number] = own
+        return found
+
 
 def reference_shaft(model: GearboxModel) -> str:
     """Name the shaft whose speed counts: the first one that is given."""
@@ -243,7 +256,8 @@ def _stage_lines(
     carrier = 0.0
     if isinstance(section, BoxPlanetarySection) and section.carrier != CASING:
         carrier = abs(model.flow.speed[section.carrier])
-    counts = np.clip(np.floor(2.0 * math.pi * up_to / (mesh * factors) * (1.0 + 1e-12)), 1, _MOST).astype(int)
+    most = model.case.dynamics.mesh_harmonics or _MOST
+    counts = np.clip(np.floor(2.0 * math.pi * up_to / (mesh * factors) * (1.0 + 1e-12)), 1, most).astype(int)
 
     def solve(i: int) -> RunningResponse:
         both, bands = (int(counts[i]), int(counts[i])), model.case.dynamics.side_bands if stage.planets else 0

@@ -8,6 +8,7 @@ import numpy as np
 
 from femgear.report.style import BLACK, COLOURS, DASHES, GREY, SMALL, label, legend_below, new_figure, rpm, stems
 from femgear.stages.protocol import Drawn, Figures
+from femgear.trains.gearbox.stage_figures import draw_stage_forces
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -159,7 +160,9 @@ def _operation(drawn: Drawn) -> float | None:
 def _draw_runup(drawn: Drawn) -> dict[str, Figure]:
     runup, operation = drawn.data["runup"], _operation(drawn)
     levels = {"run_up_levels": draw_run_up_levels(runup, operation)} if "level" in runup else {}
-    return levels | {"run_up_forces": draw_run_up_forces(runup, operation)}
+    by_stage = draw_stage_forces(runup)
+    forces = {"run_up_forces": draw_run_up_forces(runup, operation)}
+    return levels | forces | ({} if by_stage is None else {"stage_forces": by_stage})
 
 
 RESPONSE_FIGURES = {
@@ -178,6 +181,7 @@ RESPONSE_FIGURES = {
             "run_up_levels": "Level at the sensors over the speed, and the part that each stage makes of it.",
             "run_up_forces": "Largest mesh force over its mean over the speed, by stage; of planetary stages with "
             "the sun and with the ring.",
+            "stage_forces": "Dynamic force of the first mesh of every stage over the speed, by the stage that excites.",
         },
         _draw_runup,
     ),

@@ -103,6 +103,8 @@ class GearboxResponseResult(StageResult):
             lines = lines.reshape(len(found.speed), bearings, 3, -1)
             variables |= _complex("bearing_force", "speed bearing axis line", lines, "N", text)
         if len(found.stages) > 1:
+            text = "root mean square of the force of the mesh about its mean by the excitation of the stage"
+            variables["mesh_force_by_stage"] = ("speed mesh stage", found.mesh_forces, "N", text)
             text = "force of k(t) of the stage on the motion by another one, over the dynamic force of the stage"
             variables["cross_excitation"] = ("speed stage other_stage", found.cross_excitation, "1", text)
         names = [stage.name for stage in found.stages]
@@ -112,6 +114,7 @@ class GearboxResponseResult(StageResult):
             "other_stage": (("other_stage",), names, "1", "stage that excites"),
             "kind": (("kind",), list(_KINDS), "1", "kind of mesh; of a pair the first one"),
             "bearing": (("bearing",), list(model.bearing_names), "1", "bearing"),
+            "mesh": (("mesh",), [contact.name for contact in model.assembly.contacts], "1", "gear mesh"),
             "axis": (("axis",), list("xyz"), "1", "coordinate"),
         }
         if sensors:

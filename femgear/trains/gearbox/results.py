@@ -324,7 +324,7 @@ class GearboxModesResult(StageResult):
         """Collect the contents of modes.nc."""
         found = self.found
         modes, model, campbell = found.modes, found.deflection.model, found.campbell
-        critical, shown = campbell.critical, model.places
+        critical, shown, names = campbell.critical, model.places, [stage.name for stage in model.stages]
         variables = mode_entries(modes) | {
             "energy": ("member mode", found.kinetic, "1", "share of the member in the kinetic energy"),
             "strain": ("part mode", found.strain, "1", "share of the part in the strain energy"),
@@ -336,6 +336,9 @@ class GearboxModesResult(StageResult):
                 "kg^-1/2",
                 "mode shape of unit mass; tilts and rotations in kg^-1/2 m^-1",
             ),
+            "planet_kind": ("mode", list(found.stages.kinds), "1", "class of the mode by what planets and shafts do"),
+            "stage_energy": ("stage mode", found.stages.energy, "1", "share of the stage in the kinetic energy"),
+            "main_stage": ("mode", _largest(names, found.stages.energy), "1", "stage with most kinetic energy"),
             "place": ("station axis", model.assembly.places[shown], "m", "place of the station"),
             "order": ("line", list(found.orders.values()), "1", f"over the turn of {found.reference}"),
             "campbell_frequency": (
@@ -352,6 +355,7 @@ class GearboxModesResult(StageResult):
             **coordinates(mode=np.arange(1, len(modes.frequency) + 1)),
             "member": _names("member", found.members, "shaft, or planets of a stage"),
             "part": _names("part", found.parts, "part that is strained"),
+            "stage": _names("stage", names, "stage"),
             "station": _names(
                 "station", np.array(model.assembly.names)[shown].tolist(), "station of a shaft, or planet"
             ),
@@ -512,6 +516,10 @@ def describe_gearbox_modes(data: xr.Dataset) -> Block:
             f"{mode.main_part.item()} ({100.0 * float(mode.strain.max()):.0f} %)" if mode.main_part.item() else "-"
         ),
     }
+    if data.sizes["stage"] > 1:
+        columns["stage"] = lambda mode: f"{mode.main_stage.item()} ({100.0 * float(mode.stage_energy.max()):.0f} %)"
+    if data["planet_kind"].values.any():
+        columns["planets"] = lambda mode: mode.planet_kind.item()
     return describe_modes(data, columns, note="; with most of the kinetic and of the strain energy")
 
 

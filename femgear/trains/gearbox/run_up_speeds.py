@@ -82,7 +82,8 @@ def gearbox_resonances(
         if not mesh_turns > 0.0:
             continue
         own_modes = _with_meshes(modes, found, stage, stiffness, excitation.stiffness.mean(axis=1))
-        most = min(_MOST, excitation.stiffness.shape[1] // (2 * excitation.periods) - 1)
+        most = excitation.stiffness.shape[1] // (2 * excitation.periods) - 1
+        most = min(case.dynamics.mesh_harmonics or _MOST, most)
         count = int(np.clip(up_to / (mesh_turns * slowest), 1, most))
         output = at_sensors if at_sensors.shape[1] else own_modes.mesh_deflection.T
         forces = modal_forces(own_modes, excitation, count, output=output)
