@@ -12,7 +12,6 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.system.rigid_bodies import RigidSet
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of
-from femgear.trains.multistage.model import MultistageSet
 from femgear.trains.reading import read_case
 
 
@@ -26,7 +25,7 @@ def _spring_entries(stiffness) -> dict[str, str]:
     return {key: _n(value, units[key]) for key, value in zip(units, stiffness, strict=True) if value > 0.0}
 
 
-def set_parts(data: RigidSet, teeth, *, name: str = "set", angle: float = 0.0) -> dict[str, list]:
+def set_parts(data: RigidSet, teeth, *, name: str = "set") -> dict[str, list]:
     """Tables of shafts, masses, bearings and stage of a set of rigid bodies; all members are shafts."""
     space = len(data.axes) > 3
     parts: dict[str, list] = {"shaft": [], "mass": [], "bearing": [], "planetary": []}
@@ -68,7 +67,7 @@ def set_parts(data: RigidSet, teeth, *, name: str = "set", angle: float = 0.0) -
             "sun": f"{name} sun",
             "carrier": f"{name} carrier",
             "ring": f"{name} ring",
-            "angle": _n(float(angles[0]) + angle, "rad"),
+            "angle": _n(float(angles[0]), "rad"),
             "gears": gears,
             "planet": own,
             "sun_mesh": {"stiffness": _n(float(np.mean(data.stiffness_sun_planet)), "N/m")},
@@ -91,39 +90,6 @@ def set_tables(data: RigidSet, teeth) -> dict[str, Any]:
             "load_case": [{"torque": {"set sun": "100 N m"}, "speed": {"set sun": "1000 rpm", "set ring": "0 rpm"}}],
         },
     }
-
-
-def multistage_tables(data: MultistageSet) -> dict[str, Any]:
-    """Tables of a gearbox that is planetary stages in series in the plane."""
-    tables: dict[str, Any] = {"model": "gearbox", "title": "stages", "motions": "plane"}
-    fixed = []
-    for number, stage in enumerate(data.stages, 1):
-        name = f"stage {number}"
-        radii = np.array([stage.data.sun_radius, stage.data.planet_radius, stage.data.ring_radius])
-        teeth = stage.teeth or tuple(np.rint(radii / radii[0] * 500).astype(int).tolist())
-        for kind, entries in set_parts(stage.data, teeth, name=name, angle=stage.angle).items():
-            tables.setdefault(kind, []).extend(entries)
-        if stage.fixed:
-            fixed.append(f"{name} {stage.fixed}")
-    tables["coupling"] = [
-        {
-            "between": [str(one.first), str(one.second)],
-            "torsion": _n(one.torsional, "N m/rad"),
-            "radial": _n(one.lateral, "N/m"),
-        }
-        for one in data.couplings
-    ]
-    rings = [f"stage {n} ring" for n in range(1, len(data.stages) + 1)]
-    tables["operation"] = {
-        "output": [str(data.output), *rings],
-        "load_case": [
-            {
-                "torque": {str(data.input): "100 N m"},
-                "speed": {str(data.input): "100 rad/s"} | dict.fromkeys(rings, "0 rpm"),
-            }
-        ],
-    }
-    return tables
 
 
 def drivetrain_tables(case: DrivetrainCase) -> dict[str, Any]:

@@ -145,7 +145,7 @@ def left_out(pairs: TwoStages, i: int) -> Iterator[LeftOut]:
     for a in (0, 1):
         exact = rms(pressed[a] - single[a][1][a])
         share = float(response.cross_excitation[i, a, 1 - a])
-        estimate = float(share * response.stages[a].dynamic_force[i, 0] / exact)
+        estimate = float(share * response.dynamic_forces[i, a, 0] / exact)
         level = rms(at_once[a]) / rms(one_by_one[a]) - 1.0
         yield LeftOut(apart_alone(pairs, a, i), estimate, share, level)
 

@@ -17,7 +17,6 @@ import numpy as np
 from gearbox_equivalents import (
     drivetrain_tables,
     elastic_set_tables,
-    multistage_tables,
     pair_of_rigid_gears_tables,
     set_tables,
 )
@@ -31,10 +30,9 @@ from femgear.system.rigid_bodies import CENTRAL, ROTATIONS, PlanarTorque, RigidS
 from femgear.trains.drivetrain.model import case_model
 from femgear.trains.elastic.model import gears_alone
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
-from femgear.trains.multistage.case_file import multistage_of
-from femgear.trains.multistage.model import joined_motions, multistage_system, stage_slices
 from femgear.trains.pair.model import pair_model
 from femgear.trains.reading import read_case, with_values
+from validation.reference.multistage_train import stored
 from validation.rows import Row, at_most, counted
 
 LARGEST = 1e-9
@@ -179,31 +177,22 @@ def compared(name: str, source: str, ours: LoadedState, other: LoadedState) -> l
     ]
 
 
-def stages_state(data, found: Deflection) -> LoadedState:
-    """The same of stages in series in the plane."""
-    flow = found.model.flow.port_torque
-    system = multistage_system(data, torque=flow[str(data.input)])
-    stages, Z = [stage.data for stage in data.stages], joined_motions(data)
-    T = np.vstack([free_motions(s) @ Z[rows] for s, rows in zip(stages, stage_slices(data), strict=True)])
-    places, first, full = [], 0, np.zeros(len(T))
-    for number, one in enumerate(stages, 1):
-        places.append(slice(first, first + 3 * (one.n_planets + 3)))
-        for name, radius in zip(CENTRAL, one.radii, strict=False):
-            full[first + 3 * CENTRAL.index(name) + 2] = flow.get(f"stage {number} {name}", 0.0) / radius
-        first = places[-1].stop
-    k = np.concatenate([one.mesh_stiffness for one in stages])
-    held = T[places[data.input.stage - 1].start + 3 * CENTRAL.index(data.input.name) + 2]
-    q = held_state(system.K + (system.W * k) @ system.W.T, T.T @ full, held)
-    motion, springs = {}, {}
-    for number, (one, rows) in enumerate(zip(stages, places, strict=True), 1):
-        angle = data.stages[number - 1].angle
-        for name, values in body_motions(one, (T @ q)[rows]).items():
-            c, s = math.cos(angle), math.sin(angle)
-            values[:2] = c * values[0] - s * values[1], s * values[0] + c * values[1]
-            motion[f"stage {number} {name}"] = values
-            if name in CENTRAL and 0.0 < _support(one, name)[0] < math.inf:
-                springs[f"stage {number} {name}"] = -_support(one, name) * values
-    return LoadedState(motion, k * (system.W.T @ q), springs)
+def stages_state(name: str, found: Deflection) -> LoadedState:
+    """The same of stages in series in the plane, by the train that had them before, at the same output torque.
+
+    Of sets without teeth that train had the output torque by base radii, the gearbox has it by the nearest teeth.
+    """
+    former, motion, springs = stored()["statics"][name], {}, {}
+    force, last = np.array(former["mesh_force"]), found.model.stages[-1]
+    sun, _, ring = last.sizes.base_radii
+    torque = -0.5 * force[list(last.meshes)].sum() * (sun + ring)
+    scale = found.model.flow.port_torque[last.section.carrier] / torque
+    for body, (x, y, turn) in former["motion"].items():
+        motion[body] = scale * np.array([x, y, 0.0, 0.0, 0.0, turn])
+    for bearing in found.model.case.bearing:
+        if 0.0 < bearing.stiffness[0] < math.inf:
+            springs[bearing.shaft] = -np.array(bearing.stiffness) * motion[bearing.shaft]
+    return LoadedState(motion, scale * force, springs)
 
 
 def chain_state(case, found: Deflection) -> LoadedState:
@@ -250,10 +239,10 @@ def rigid_sets(weight: bool = True) -> tuple[tuple[str, str, LoadedState, Loaded
 def chains() -> tuple[tuple[str, str, LoadedState, LoadedState], ...]:
     """Loaded states of stages in series and of the drivetrain of 36 coordinates."""
     states = []
-    for case in ("published_four_stages", "four_stage_reducer"):
-        data = multistage_of(read_case(f"cases/{case}.toml"))
-        found = solve_deflection(read_case(standing(multistage_tables(data))))
-        states.append((case, "femgear, multistage", of_gearbox(found), stages_state(data, found)))
+    torque = {"operation.load_case[0].torque": {"stage 1 sun": "350 N m"}}
+    for name in ("published_four_stages", "four_stage_reducer"):
+        found = solve_deflection(with_values(read_case(f"cases/{name}.toml"), torque))
+        states.append((name, "femgear, multistage", of_gearbox(found), stages_state(name, found)))
     case = with_values(read_case("cases/wind_turbine_drivetrain.toml"), {"simulation.turning": False})
     found = solve_deflection(read_case(drivetrain_tables(case) | {"gravity": DOWN}))
     states.append(("36 coordinates", "femgear, drivetrain", of_gearbox(found), chain_state(case, found)))

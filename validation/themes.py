@@ -419,13 +419,18 @@ THEMES = (
     Theme(
         "multistage",
         "Planetary stages in series",
-        "Compared with: Willis in fractions, stages alone, springs one by one, DOP853; gates: 1e-12; 1e-9.",
+        "Compared with: Willis in fractions, stages alone, springs one by one, the train that had them before; gates: 1e-12; "
+        "1e-9; 1e-6.",
         (
             multistage.ratios,
             multistage.uncoupled,
             multistage.structure,
             multistage.soft_shaft,
             multistage.response,
+            multistage.former_modes,
+            multistage.former_response,
+            multistage.turning,
+            multistage.balance,
             multistage.published,
         ),
     ),

@@ -128,7 +128,8 @@ def _of_former_train(data: dict, model: str, lines: str, name: str) -> dict:
     except ValidationError as error:
         raise combine(translate(error, section), lines, name, error.error_count()) from None
     except CaseError as error:
-        raise combine([*error.problems], lines, name) from None
+        problems = [problem for problem in error.problems if isinstance(problem, CaseError)]
+        raise combine(problems, lines, name) from None
 
 
 def _beside_refused(file: case_text.CaseFile, data: dict, error: ValidationError) -> list[CaseError]:

@@ -47,7 +47,6 @@ GROUP = "femgear.trains"
 TRAINS = tuple(
     Known(name, key, f"femgear.{reads}:FILE", f"femgear.trains.{folder}.stages:{name.upper()}")
     for name, key, folder, reads in (
-        ("multistage", "model", "multistage", "trains.multistage.case_file"),
         ("gear_pair", "model", "impacts", "trains.impacts.case_file"),
         ("pair", "model", "pair", "trains.pair.case_file"),
         ("drivetrain", "model", "drivetrain", "trains.drivetrain.case_file"),

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from femgear.trains.multistage.case_file import MultistageCase, multistage_of
-from femgear.trains.multistage.model import MultistageSet
+from femgear.trains.gearbox.case_file import CASING, GearboxCase
 from femgear.trains.reading import read_case, with_values
 
 CASES = Path(__file__).resolve().parents[2] / "cases"
@@ -18,7 +17,7 @@ PUBLISHED_FREQUENCIES = (204.483, 1321.636)
 """Lowest and highest natural frequency that the paper of the table prints [Hz]; it has none at zero."""
 
 
-def four_stage_case(*, lateral: bool = True) -> MultistageCase:
+def four_stage_case(*, lateral: bool = True) -> GearboxCase:
     """The example: sun 1 drives, each carrier turns the next sun, all rings are fixed.
 
     Parameters
@@ -28,16 +27,11 @@ def four_stage_case(*, lateral: bool = True) -> MultistageCase:
         first float in their meshes.
     """
     case = read_case(CASES / "four_stage_reducer.toml")
-    loose = {f"coupling[{n}].lateral": "0 N/m" for n in range(len(case.coupling))}
-    return case if lateral else with_values(case, loose)
+    shafts = [n for n, coupling in enumerate(case.coupling) if CASING not in coupling.between]
+    return case if lateral else with_values(case, {f"coupling[{n}].radial": "0 N/m" for n in shafts})
 
 
-def four_stage_train(*, lateral: bool = True) -> MultistageSet:
-    """The train of `four_stage_case`."""
-    return multistage_of(four_stage_case(lateral=lateral))
-
-
-def published_case(*, planets: int, stiffness_unit: float = 1e3, held: bool = False) -> MultistageCase:
+def published_case(*, planets: int, stiffness_unit: float = 1e3, held: bool = False) -> GearboxCase:
     """The published table in torsion, its four stages joined rigidly.
 
     The paper prints neither number of planets, pressure angles, supports nor couplings. Torsion asks for the
@@ -54,16 +48,14 @@ def published_case(*, planets: int, stiffness_unit: float = 1e3, held: bool = Fa
     held : bool
         The last carrier cannot turn, which leaves no mode at zero.
     """
-    case, values = read_case(CASES / "published_four_stages.toml"), {}
-    for n, stage in enumerate(case.stage):
-        values[f"stage[{n}].planets"] = planets
-        for name, printed in stage.radii.mesh_stiffness:
-            values[f"stage[{n}].radii.mesh_stiffness.{name}"] = f"{printed / 1e3 * stiffness_unit!r} N/m"
+    case = read_case(CASES / "published_four_stages.toml")
+    values: dict[str, object] = {}
+    for n, stage in enumerate(case.planetary):
+        values[f"planetary[{n}].gears.planets"] = planets
+        for mesh in ("sun_mesh", "ring_mesh"):
+            printed = getattr(stage, mesh).stiffness / 1e3
+            values[f"planetary[{n}].{mesh}.stiffness"] = f"{printed * stiffness_unit!r} N/m"
     if held:
-        values["stage[3].carrier.torsional_stiffness"] = "rigid"
+        last = [bearing.shaft for bearing in case.bearing].index("stage 4 carrier")
+        values[f"bearing[{last}].torsional"] = "rigid"
     return with_values(case, values)
-
-
-def published_train(**reading) -> MultistageSet:
-    """The train of `published_case`."""
-    return multistage_of(published_case(**reading))

@@ -53,7 +53,6 @@ SCRIPTS = {
         ("--backlash", "482 um", "--harmonics", "3", "--no-stability", "--sweep", "2", "--steps", "200"),
     ),
     "housing_modulation.py": ((), ("--speed", "3100 rpm", "--harmonic", "5")),
-    "multistage.py": (("--balance", "5"), ("--published",)),
     "readme_images.py": (("docs", "--only", "published_four_stages"),),
 }
 OTHERS = {

@@ -71,7 +71,6 @@ RUNS = {
         },
     ),
     "gearbox": ("e_axle", {"deflection.contact": False}),
-    "multistage": ("four_stage_reducer", {"response.points": 3, "response.balance_points": 1}),
     "gear_pair": (
         "gear_pair",
         {

@@ -26,8 +26,6 @@ from femgear.trains.gearbox.geometry import (
     DISTANCE_TOLERANCE,
     StageSizes,
     pair_sizes,
-    planet_distance,
-    planet_radius,
     rolling_bearing,
     set_sizes,
 )
@@ -469,7 +467,6 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
             limit=f"one angle for each of {stage.gears.planets} planets",
             remedy="give an angle for every planet, or leave planets out",
         )
-    yield from _neighbours(sizes, key)
     yield from (*carrier_problems(stage, key), *superelement_problems(stage, sizes, key))
     shafts = [
         (name, case.shaft_named(getattr(stage, name)))
@@ -488,20 +485,6 @@ def _planetary(case: GearboxCase, stage: BoxPlanetarySection, key: str) -> Itera
     places = [shaft.start + (getattr(stage, f"{name}_position") or 0.0) for name, shaft in shafts]
     for place in places[1:]:
         yield from _mid_planes([places[0], place], sizes, f"{key}.sun_position")
-
-
-def _neighbours(sizes: StageSizes, key: str) -> Iterator[CaseError]:
-    """Planets, listed in any order, whose pitch circles do not overlap."""
-    planet, room = planet_radius(sizes), planet_distance(sizes)
-    if len(sizes.planet_angles) > 1 and room <= 2.0 * planet:
-        yield CaseError(
-            "neighbouring planets overlap",
-            code="E-NEIGHBOURS",
-            key=f"{key}.gears.planets",
-            value=f"{LENGTH.show(room)} from axis to axis",
-            limit=f"more than {LENGTH.show(2.0 * planet)}",
-            remedy="take fewer planets, or smaller ones",
-        )
 
 
 def _wrong_train(teeth, key: str, wanted: str) -> CaseError:

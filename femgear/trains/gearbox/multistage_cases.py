@@ -44,7 +44,7 @@ from femgear.errors import CaseError, FemgearError, refused_at, several
 from femgear.fe.beam import RoundSection, joint_springs
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
-from femgear.gears.iso6336 import pair_mesh_stiffness
+from femgear.gears.iso6336_stiffness import pair_mesh_stiffness
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles
 from femgear.gears.profile import BasicRack
 from femgear.gears.tips import settled_tips
@@ -159,19 +159,18 @@ def gearbox_of_multistage(file: MultistageFile) -> dict[str, Any]:
     """
     tables: dict[str, Any] = {"model": "gearbox", "title": file.title, "motions": "plane"}
     tables |= {"shaft": [], "mass": [], "bearing": [], "coupling": [], "planetary": []}
-    problems = list[CaseError]()
+    count, problems = len(file.stage), list(_unknown_springs(file))
+    if not problems:
+        # in their places of the file, which refusals name
+        joined = [{"between": [f"stage {n} carrier", f"stage {n + 1} sun"]} for n in range(1, count)]
+        tables["coupling"] += list(_shafts(file)) or joined
     for n, stage in enumerate(file.stage):
         try:
             _add_stage(tables, stage, n)
         except FemgearError as error:
             problems += [refused_at(problem, _key(problem, n)) for problem in error.problems]
-    problems += _unknown_springs(file)
     if problems:
         raise several(problems)
-    count = len(file.stage)
-    tables["coupling"] += list(_shafts(file)) or [
-        {"between": [f"stage {n} carrier", f"stage {n + 1} sun"]} for n in range(1, count)
-    ]
     given, response = file.operation, file.response
     driven = given.input if given else "stage 1 sun"
     torque, speed = (given.torque, given.speed) if given else (0.0, 0.0)
@@ -181,7 +180,7 @@ def gearbox_of_multistage(file: MultistageFile) -> dict[str, Any]:
     }
     tables["modes"] = {"up_to": "1 MHz"}
     if response is not None:
-        tables["modes"]["damping_ratio"] = response.damping_ratio
+        tables["modes"] |= {"damping_ratio": response.damping_ratio}
         tables["dynamics"] = {"mesh_harmonics": response.harmonics}
         ends = {"from": f"{response.lowest!r} rad/s", "to": f"{response.highest!r} rad/s"}
         tables["runup"] = ends | {"count": response.points}

@@ -123,9 +123,10 @@ class GearboxResponse:
     def cross_excitation(self) -> np.ndarray:
         """Force (v, stages, stages) of k(t) of a stage (first) on the motion by another one, over its dynamic force.
 
-        R.m.s. values; zero of a stage itself.
+        R.m.s. values, the latter by all stages; zero of a stage itself.
         """
         found = np.zeros((len(self.speed), len(self.stages), len(self.stages)))
+        every = self.dynamic_forces
         meshes = {stage.name: stage.meshes for stage in self.deflection.model.stages}
         for a, excited in enumerate(self.stages):
             count = len(meshes[excited.name]) // len(excited.spread)
@@ -133,8 +134,23 @@ class GearboxResponse:
                 if a == b:
                     continue
                 moved = other.approach[:, list(meshes[excited.name])].reshape(len(self.speed), -1, count).max(axis=2)
-                own = np.maximum(excited.dynamic_force, np.finfo(float).tiny)
-                found[:, a, b] = (excited.spread * moved / own).max(axis=1)
+                whole = np.maximum(every[:, a, : len(excited.spread)], np.finfo(float).tiny)
+                found[:, a, b] = (excited.spread * moved / whole).max(axis=1)
+        return found
+
+    @property
+    def dynamic_forces(self) -> np.ndarray:
+        """R.m.s. force (v, stages, 2) of the meshes of every stage and kind about its mean by all stages [N].
+
+        That of the planet with the largest one; NaN where a pair has no second mesh.
+        """
+        every = np.sqrt((self.mesh_forces**2).sum(axis=2))
+        found = np.full((len(self.speed), len(self.stages), 2), np.nan)
+        meshes = {stage.name: list(stage.meshes) for stage in self.deflection.model.stages}
+        for number, stage in enumerate(self.stages):
+            kinds = len(stage.spread)
+            own = every[:, meshes[stage.name]].reshape(len(every), kinds, -1)
+            found[:, number, :kinds] = own.max(axis=2)
         return found
 
     @property

@@ -105,7 +105,7 @@ class GearboxResponseResult(StageResult):
         if len(found.stages) > 1:
             text = "root mean square of the force of the mesh about its mean by the excitation of the stage"
             variables["mesh_force_by_stage"] = ("speed mesh stage", found.mesh_forces, "N", text)
-            text = "force of k(t) of the stage on the motion by another one, over the dynamic force of the stage"
+            text = "force of k(t) of the stage on the motion by another one, over the dynamic force of its meshes"
             variables["cross_excitation"] = ("speed stage other_stage", found.cross_excitation, "1", text)
         names = [stage.name for stage in found.stages]
         coords: dict[str, Any] = {

@@ -544,7 +544,7 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
 def _given_planets(case: GearboxCase) -> Iterator[Finding]:
     """Planets of given sizes that do not assemble, or whose tips, of an addendum of one module, come close.
 
-    Published sets without teeth have planets that do not assemble: they are told, those with teeth refused.
+    Published sets without teeth have planets that do not assemble, or overlap: they are told, those with teeth refused.
     """
     for i, stage in enumerate(case.planetary):
         if stage.gears is None:
@@ -561,8 +561,12 @@ def _given_planets(case: GearboxCase) -> Iterator[Finding]:
         if len(sizes.planet_angles) > 1 and left < module:
             how = "overlap" if left < 0.0 else f"are {1e3 * left:.4g} mm apart"
             text = f"tips of neighbouring planets with an addendum of one module {how}"
-            severity = DOUBT if left < 0.0 else ""
-            yield Finding("W-NEIGHBOURS", f"planetary[{i}].gears", text, limit=">= one module", severity=severity)
+            severity, remedy = DOUBT if left < 0.0 else "", ""
+            if room <= 2.0 * planet_radius(sizes):
+                text, severity = "neighbouring planets overlap by their pitch circles", FAULT
+                remedy = "take fewer planets, or smaller ones"
+            known = {"limit": ">= one module", "severity": severity, "remedy": remedy}
+            yield Finding("W-NEIGHBOURS", f"planetary[{i}].gears", text, **known)
 
 
 _HOLDS = ("support_stiffness", "bearing_stiffness", "tilt_stiffness", "foundation_radial", "foundation_tangential")

@@ -87,7 +87,6 @@ CHANGES = {
     ),
     "gravity.direction": (lambda t: t.update(gravity={"direction": [0.0, 0.0, 0.0]}), "E-RANGE"),
     "bearing[3].clearance": (_replaced(3, **BALL | {"clearance": "2 mm"}), "E-BEARING"),
-    "planetary[0].gears.planets": (lambda t: _set(t, planets=12), "E-NEIGHBOURS"),
     "planetary[0].gears.planet_angles": (
         lambda t: _set(t, planets=3, planet_angles=["0 deg", "180 deg"]),
         "E-COUNT",

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from gearbox_equivalents import drivetrain_tables, multistage_tables, pair_of_rigid_gears_tables, set_tables
+from gearbox_equivalents import drivetrain_tables, pair_of_rigid_gears_tables, set_tables
 from published.planetary_sets import kahraman_set, lin_parker_set
 from small_gearbox import pair_tables
 
@@ -14,8 +14,6 @@ from femgear.stages.lumped_set import gear_set_modes
 from femgear.trains.drivetrain.stages import solve_drivetrain_modes
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.modes import linear_system
-from femgear.trains.multistage.case_file import multistage_of
-from femgear.trains.multistage.stages import multistage_modes
 from femgear.trains.reading import read_case, with_values
 
 
@@ -43,12 +41,6 @@ def test_the_set_of_lin_and_parker():
     radii = np.array([data.sun_radius, data.planet_radius, data.ring_radius])
     teeth = np.rint(1000 * radii / radii[0]).astype(int).tolist()
     agree(frequencies(set_tables(data, teeth)), gear_set_modes(data).frequency)
-
-
-@pytest.mark.parametrize("name", ["published_four_stages", "four_stage_reducer"])
-def test_planetary_stages_in_series(name):
-    data = multistage_of(read_case(f"cases/{name}.toml"))
-    agree(frequencies(multistage_tables(data)), multistage_modes(data).modes.frequency)
 
 
 def test_the_drivetrain_of_36_coordinates():

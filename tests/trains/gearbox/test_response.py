@@ -77,7 +77,8 @@ def test_what_the_stiffness_of_a_stage_does_on_the_motion_of_another_is_told():
     moved = replace(stage, approach=np.full((2, 1), 3e-8), spread=np.array([2e7]), dynamic_force=np.full((2, 1), 6.0))
     both = replace(found, deflection=replace(found.deflection, model=model), stages=(moved, moved))
     cross = both.cross_excitation
-    assert cross[:, 0, 1] == pytest.approx([0.1, 0.1])
+    # over the force by both stages, which are equally strong here
+    assert cross[:, 0, 1] == pytest.approx(np.sqrt([0.005, 0.005]))
     assert not cross[:, 0, 0].any()
 
 

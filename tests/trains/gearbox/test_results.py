@@ -153,6 +153,9 @@ def test_planets_that_do_not_assemble_are_told():
     assert "0.04954 mm apart" in findings[1].text
     tables["planetary"][0]["gears"]["planets"] = 4
     assert not list(gearbox_warnings(read_case(tables)))
+    tables["planetary"][0]["gears"]["planets"] = 8
+    (overlap,) = gearbox_warnings(read_case(tables))
+    assert (overlap.code, overlap.severity) == ("W-NEIGHBOURS", "fault") and "pitch circles" in overlap.text
 
 
 def test_planets_that_carry_nothing_are_named():

@@ -1,1 +1,0 @@
-"""Planetary stages in series, rigid bodies with torsional and lateral couplings."""
