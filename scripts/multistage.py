@@ -14,9 +14,7 @@ from script_tools import print_table, ready_folder, run_script, say_files, write
 FILES = ["published.csv", "published.png"]
 
 
-def main(
-    *, output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/multistage_published")
-) -> None:
+def main(*, output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/multistage_published")) -> None:
     """Solve for the modes of the table of "Optimized design of dynamic characteristics of planetary gear train".
 
     Its units and missing entries allow several readings: the stiffness unit, the number of planets, the last

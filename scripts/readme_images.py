@@ -143,8 +143,10 @@ RUNS = {
     "five_megawatt_chain": _case(
         "five_megawatt_chain", "Chain of a five-megawatt wind turbine", ("deflected_shafts", "mode_energy")
     ),
-    "four_stage_reducer": _case("four_stage_reducer", "Four planetary stages in series"),
-    "published_four_stages": _case("published_four_stages", "Four published stages in series"),
+    "four_stage_reducer": _case(
+        "four_stage_reducer", "Four planetary stages in series", ("campbell", "stage_energy", "stage_forces")
+    ),
+    "published_four_stages": _case("published_four_stages", "Four published stages in series", ("stage_energy",)),
     "spur_pair": _case("spur_pair", "Spur gear pair from its teeth"),
     "gear_pair": _case("gear_pair", "Gear pair with backlash"),
     "gear_pair_light": _case("gear_pair_light", "Lightly loaded gear pair"),

@@ -1,8 +1,10 @@
 """Trains that tests share: gear pairs."""
 
 import numpy as np
+
 from femgear.system.system import MechanicalSystem
 from femgear.trains.impacts.model import ImpactPair
+
 
 def equivalent_mass(inertia, base_radius):
     """Mass [kg] of two gears that moves along their line of action."""

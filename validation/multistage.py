@@ -16,7 +16,7 @@ from published.planetary_sets import lin_parker_set
 
 from femgear.housing.two_way.running_planets import RunningResponse, solve_running
 from femgear.run import solve
-from femgear.solvers.linear.modal import undamped_modes, viscous_damping
+from femgear.solvers.linear.modal import viscous_damping
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.force_laws import GearMeshes
@@ -387,7 +387,9 @@ def turning() -> tuple[Row, ...]:
     standing = solve_running(running, excited.mesh, 0.0, harmonics=(1, 1), side_bands=0)
     for kind, mesh, reference in zip((0, 1), ("sun-planet 1", "planet 1-ring"), np.array(former["rest"])[[0, 2]]):
         value = abs(2.0 * standing.force[0, kind, 1, 0])
-        rows.append(within("MS", FORMER, f"an error of one mesh, standing: {mesh} of stage 1 [N]", reference, value, 1e-6))
+        rows.append(
+            within("MS", FORMER, f"an error of one mesh, standing: {mesh} of stage 1 [N]", reference, value, 1e-6)
+        )
     response = solve_running(running, excited.mesh, excited.carrier, harmonics=(1, 1), side_bands=4)
     lines = np.abs(response.lines(approach.T)[1] * mesh_stiffness(found))
     note = "in the frame of carrier 2 these lines lie 0.8 Hz nearer to the mesh frequency"
@@ -426,12 +428,17 @@ def balance() -> tuple[Row, ...]:
             (solve_gearbox_response(found, [float(factor) * 50.0 * math.pi]).mesh_forces[0] ** 2).sum(axis=1)
         )
         for number, (stage, reference) in enumerate(zip(stages, entry["rms"], strict=True)):
-            name = f"k(t) of all stages at {1500 * float(factor):.0f} rpm: r.m.s. force in sun-planet 1 of {stage.name} [N]"
+            speed = f"{1500 * float(factor):.0f} rpm"
+            name = f"k(t) of all stages at {speed}: r.m.s. force in sun-planet 1 of {stage.name} [N]"
             rows.append(within("MS", FORMER, name, reference, exact[number], 1e-6))
-            text = f"stage by stage at {1500 * float(factor):.0f} rpm: the same of {stage.name} [N]"
+            text = f"stage by stage at {speed}: the same of {stage.name} [N]"
             rows.append(
                 information(
-                    "MS", "k(t) of all stages", text, exact[number], one_by_one[stage.meshes[0]],
+                    "MS",
+                    "k(t) of all stages",
+                    text,
+                    exact[number],
+                    one_by_one[stage.meshes[0]],
                     note="structural damping beside that of modes",
                 )
             )

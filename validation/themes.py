@@ -419,8 +419,8 @@ THEMES = (
     Theme(
         "multistage",
         "Planetary stages in series",
-        "Compared with: Willis in fractions, stages alone, springs one by one, the train that had them before; gates: 1e-12; "
-        "1e-9; 1e-6.",
+        "Compared with: Willis in fractions, stages alone, springs one by one, the train that had them before; gates: "
+        "1e-12; 1e-9; 1e-6.",
         (
             multistage.ratios,
             multistage.uncoupled,

@@ -148,9 +148,7 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     followed = campbell_data(lambda _: turning, speeds, np.zeros(0), orders=tuple(orders.values()), count=count)
     stages = stage_motions(model, motion, moved, modes.frequency)
     kept = replace(modes, kind=kinds)
-    return GearboxModes(
-        found, kept, motion, members, kinetic, parts, strain, followed, reference, orders, stages
-    )
+    return GearboxModes(found, kept, motion, members, kinetic, parts, strain, followed, reference, orders, stages)
 
 
 def _parts(inner: Mapping[str, np.ndarray]) -> list[slice]:

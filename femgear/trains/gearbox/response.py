@@ -155,7 +155,7 @@ class GearboxResponse:
 
     @property
     def mesh_forces(self) -> np.ndarray:
-        """R.m.s. force (v, M, stages) of every mesh about its mean by every stage [N]; own ones of the leading planet."""
+        """R.m.s. force (v, M, stages) of all meshes about their means by each stage [N]; own ones of planet 1."""
         model = self.deflection.model
         loss = abs(1.0 + 2j * model.case.modes.damping_ratio)
         stiffness = loss * np.array([contact.stiffness.sum() for contact in model.assembly.contacts])

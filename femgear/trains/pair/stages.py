@@ -124,7 +124,7 @@ def iso_stiffness(case: PairCase) -> tuple[float, float]:
     """Compute c' and c_gamma_alpha of ISO 6336-1, method B, of a case [N/m^2].
 
     Both are NaN where the profile shifts are outside the range of the method. They hold for solid discs, see
-    `femgear.gears.iso6336.mesh_stiffness_method_b`; the standard takes them in proportion to Young's modulus
+    `femgear.gears.iso6336_stiffness.mesh_stiffness_method_b`; the standard takes them in proportion to Young's modulus
     over that of steel, and to the fourth root of loads below 100 N/mm at the reference circle.
     """
     gears: GearPair = planetary_set(case)

@@ -47,7 +47,9 @@ def test_a_shaft_of_two_stages_is_half_of_each():
     tables = pair_tables()
     stage = tables["pair"][0]
     tables["shaft"].append(tables["shaft"][1] | {"name": "last", "axis": ["180 mm", "0 mm"]})
-    tables["bearing"] += [bearing | {"name": f"{bearing['name']} 2", "shaft": "last"} for bearing in tables["bearing"][2:]]
+    tables["bearing"] += [
+        bearing | {"name": f"{bearing['name']} 2", "shaft": "last"} for bearing in tables["bearing"][2:]
+    ]
     second = {"name": "second", "shafts": ["output", "last"], "positions": ["60 mm", "60 mm"]}
     tables["pair"].append(stage | second | {"gears": stage["gears"] | {"teeth": [30, 30]}})
     tables["load"][1] |= {"shaft": "last"}

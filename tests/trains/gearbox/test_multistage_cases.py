@@ -104,7 +104,9 @@ def shipped() -> dict:
     kept = ("stage 1", "stage 2")
     for kind, key in (("shaft", "name"), ("planetary", "name"), ("mass", "shaft"), ("bearing", "shaft")):
         tables[kind] = [entry for entry in tables[kind] if entry[key].startswith(kept)]
-    tables["coupling"] = [one for one in tables["coupling"] if all(end.startswith((*kept, "cas")) for end in one["between"])]
+    tables["coupling"] = [
+        one for one in tables["coupling"] if all(end.startswith((*kept, "cas")) for end in one["between"])
+    ]
     tables["operation"]["output"] = ["stage 2 carrier"]
     return tables
 
@@ -168,7 +170,11 @@ def test_stages_may_be_held_elsewhere_and_joined_by_their_rings():
     [
         ({"stage_1": {"gears": {"teeth": [21, 42, 108]}}}, "E-COAXIAL", "stage[0].gears.profile_shifts"),
         ({"stage_2": {"gears": None}}, "E-CHOICE", "stage[1].gears"),
-        ({"stage_1": {"ring": {"torsional_stiffness": "0 N m/rad"}}}, "E-MECHANISM", "stage[0].ring.torsional_stiffness"),
+        (
+            {"stage_1": {"ring": {"torsional_stiffness": "0 N m/rad"}}},
+            "E-MECHANISM",
+            "stage[0].ring.torsional_stiffness",
+        ),
         ({"stage_1": {"sun": {"mas": "1 kg"}}}, "E-KEY-UNKNOWN", "stage[0].sun.mas"),
         ({"coupling_1": {"length": None}}, "E-CHOICE", "coupling[0].between"),
         ({"coupling_1": {"between": ["stage 1 carrier", "stage 3 sun"]}}, "E-CHOICE", "coupling[0].between"),
@@ -182,6 +188,6 @@ def test_refusals_name_the_entry(change, code, key):
 
 def test_refusals_name_the_line(tmp_path):
     path = tmp_path / "former.toml"
-    path.write_text(FORMER.replace('points = 5', 'points = "five"'))
+    path.write_text(FORMER.replace("points = 5", 'points = "five"'))
     with pytest.raises(CaseError, match=r"former\.toml:64: response\.points"):
         read_case(path)
