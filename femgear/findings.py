@@ -69,7 +69,6 @@ CATALOGUE = {
     "W-RECORD": (NOTE, "A record ends below a frequency that matters."),
     "W-RELIEF-SIGN": (NOTE, "A modification adds material."),
     "W-RESIDUAL": (DOUBT, "Static compliance beyond the modes of a casing is missing."),
-    "W-RESPONSE": (NOTE, "There are modes alone."),
     "W-RIGID": (DOUBT, "A response holds bodies rigid that the modes have elastic."),
     "W-RIM": (NOTE, "A rim is thin."),
     "W-REXS": (DOUBT, "A REXS file holds what the case that was made of it has not, or has otherwise."),

@@ -281,7 +281,6 @@ def transient(contact: str = "linear", **values) -> xr.Dataset:
 
 
 PROFILE = {"kind": "measured profile", "diameters": ["41 mm", "41.5 mm"], "deviations": ["0 um", "1 um"]}
-ASKED = {"lowest": "1 rpm", "highest": "2 rpm"}
 CLOSE = ["0 deg", f"{29 * 360 / 135} deg", "200 deg"]
 SHARP = {
     "sun.teeth": 14,
@@ -413,7 +412,6 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-RELIEF-SIGN": lambda: of_case(
         PLANETARY, {"sun.modifications": [{"kind": "profile crowning", "amount": "-5 um"}]}
     ),
-    "W-RESPONSE": lambda: of_case("published_four_stages", {"response": ASKED}),
     "W-RIM": lambda: of_case(PLANETARY, {"ring.outer_radius": "85 mm"}),
     "W-SIZE": large,
     "W-SLICES": lambda: of_case(HELICAL, {"helical.slices": 30}),

@@ -102,11 +102,7 @@ class GearboxResponseResult(StageResult):
             lines = np.concatenate(list(of_bearings.values()), axis=2)
             lines = lines.reshape(len(found.speed), bearings, 3, -1)
             variables |= _complex("bearing_force", "speed bearing axis line", lines, "N", text)
-        if len(found.stages) > 1:
-            text = "root mean square of the force of the mesh about its mean by the excitation of the stage"
-            variables["mesh_force_by_stage"] = ("speed mesh stage", found.mesh_forces, "N", text)
-            text = "force of k(t) of the stage on the motion by another one, over the dynamic force of its meshes"
-            variables["cross_excitation"] = ("speed stage other_stage", found.cross_excitation, "1", text)
+        variables |= _of_several(found)
         names = [stage.name for stage in found.stages]
         coords: dict[str, Any] = {
             "speed": (("speed",), found.speed / RPM, "rpm", f"speed of {found.reference}"),
@@ -133,6 +129,18 @@ class GearboxResponseResult(StageResult):
         }
         used = {dim for entry in variables.values() for dim in entry[0].split()}
         return Contents(variables, {name: entry for name, entry in coords.items() if name in used}, attrs)
+
+
+def _of_several(found: GearboxResponse) -> dict[str, tuple]:
+    """Forces that stages make in the meshes of one another."""
+    if len(found.stages) < 2:
+        return {}
+    by_stage = "root mean square of the force of the mesh about its mean by the excitation of the stage"
+    cross = "force of k(t) of the stage on the motion by another one, over the dynamic force of its meshes"
+    return {
+        "mesh_force_by_stage": ("speed mesh stage", found.mesh_forces, "N", by_stage),
+        "cross_excitation": ("speed stage other_stage", found.cross_excitation, "1", cross),
+    }
 
 
 def _of_paths(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
