@@ -35,6 +35,7 @@ def response_data(*, speeds=5, sensors=2) -> xr.Dataset:
             "lines_real": (("speed", "sensor", "line"), lines[0]),
             "lines_imag": (("speed", "sensor", "line"), lines[1]),
             "dynamic_factor": (("speed", "stage", "kind"), factor),
+            "mesh_force_by_stage": (("speed", "mesh", "stage"), rng.uniform(1.0, 9.0, (speeds, 2, 2))),
             "order": ("line", order),
             "origin": ("line", ["first"] * 3 + ["second"] * 5),
             "harmonic": ("line", [1, 2, 3, 1, 2, 2, 2, 0]),
@@ -44,6 +45,7 @@ def response_data(*, speeds=5, sensors=2) -> xr.Dataset:
             "speed": np.linspace(1000.0, 3000.0, speeds) if speeds > 1 else [2000.0],
             "stage": STAGES,
             "kind": ["sun", "ring"],
+            "mesh": ["first", "second sun-planet 1"],
             "sensor": [f"s{number}" for number in range(sensors)],
         },
         {"reference": "rotor"},
@@ -163,4 +165,4 @@ def test_the_pictures_of_both_stages_are_among_those_of_a_gearbox():
         assert FIGURES[stage].captions.keys() == FIGURES[stage].draw(drawn).keys()
     silent = {stage: data.drop_vars(["level", "level_of_stage"]) for stage, data in drawn.data.items()}
     assert not FIGURES["dynamics"].draw(Drawn(None, silent))
-    assert [*FIGURES["runup"].draw(Drawn(None, {"runup": silent["runup"]}))] == ["run_up_forces"]
+    assert [*FIGURES["runup"].draw(Drawn(None, {"runup": silent["runup"]}))] == ["run_up_forces", "stage_forces"]
