@@ -43,6 +43,7 @@ CATALOGUE = {
     ),
     "W-FACE-LOAD": (DOUBT, "Slices are too wide for the load distribution over the face width."),
     "W-FILLET": (NOTE, "A tip runs into the root fillet of its mate by a little."),
+    "W-FORMER": (NOTE, "A file of a former model is read as one of today."),
     "W-FREE": (DOUBT, "More modes have no stiffness than a gearbox has ways to turn."),
     "W-GROWTH": (DOUBT, "The free motion grows: a parametric resonance."),
     "W-HELIX": (DOUBT, "The helix angle lies outside what is validated."),

@@ -73,6 +73,18 @@ def of_case(name: str, changes: dict | None = None) -> tuple[Finding, ...]:
 PLANETARY, HELICAL, CHAIN = "planetary_27_40_108", "helical_30_20_70", "own_chain"
 
 
+def former_file() -> tuple[Finding, ...]:
+    """Findings of a file of planetary stages in series."""
+    body = {"mass": "1 kg", "inertia": "1e-2 kg m^2", "support_stiffness": "1e8 N/m"}
+    bodies = dict.fromkeys(("sun", "carrier", "ring"), body)
+    ring = bodies["ring"] | {"torsional_stiffness": "1e9 N m/rad"}
+    planet = {"mass": "1 kg", "inertia": "1e-3 kg m^2", "bearing_stiffness": "1e8 N/m"}
+    gears = {"teeth": [24, 24, 72], "module": "4 mm", "face_width": "40 mm"}
+    stage = bodies | {"ring": ring, "planet": planet, "gears": gears}
+    read = read_case({"model": "multistage", "title": "one stage", "stage": [stage]})
+    return train_of(read).case_warnings(read)
+
+
 def of_text(change: Callable[[str], str]) -> tuple[Finding, ...]:
     """Findings of the reference case with its text changed before it is read."""
     read = read_case(change((CASES / f"{PLANETARY}.toml").read_text(encoding="utf-8")))
@@ -400,6 +412,7 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-ESTIMATED": lambda: of_case(PLANETARY, {"sun.mass": None}),
     "W-EXCITATION": lambda: of_case("gear_pair", {"mesh.error": None, "mesh.stiffness_waves": None}),
     "W-FILLET": lambda: of_case(PLANETARY, {"rack.root_radius": 0.26, "sun.profile_shift": None}),
+    "W-FORMER": former_file,
     "W-HELIX": lambda: of_case(HELICAL, {"helical.helix_angle": "31 deg", "helical.mesh_stiffness": None}),
     "W-LOAD": lambda: of_case("gear_pair", {"operation.torque": "0 N m"}),
     "W-NEIGHBOURS": lambda: of_case(PLANETARY, {"set.planet_angles": CLOSE}),

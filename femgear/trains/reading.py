@@ -79,8 +79,9 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     Messages give the name of the file and, of a ``numbered`` text, which is the user's, its lines.
     """
     data, lines = case_text.parse(text, name), text if numbered else ""
+    former: tuple[Finding, ...] = ()
     if isinstance(model := data.get("model"), str) and model in registry.FORMER:
-        data = _of_former_train(data, model, lines, name)
+        data, former = _of_former_train(data, model, lines, name)
         text, lines = case_text.write(data), ""
     try:
         train = _train_of_file(data)
@@ -108,7 +109,7 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         problems = [error]
     if problems:
         raise combine(problems, lines, name)
-    said = file.notices(data, case)
+    said = (*former, *file.notices(data, case))
     said = (*notices(data, case), *said, *added_material(case)) if of_set else said
     case.read_from(text, lines, name, notices=said, profile_files=files)
     if hasattr(case, "gear_names"):
@@ -119,12 +120,15 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
     return case
 
 
-def _of_former_train(data: dict, model: str, lines: str, name: str) -> dict:
-    """Tables of today that say what those of a train do that is no more."""
+def _of_former_train(data: dict, model: str, lines: str, name: str) -> tuple[dict, tuple[Finding, ...]]:
+    """Tables of today that say what those of a train do that is no more, and what is to be said of it."""
     section, tables_of = (resolve_name(place) for place in registry.FORMER[model])
     case_text.check_tree(data, name)
     try:
-        return tables_of(section.model_validate(data))
+        tables, unlike = tables_of(section.model_validate(data))
+        text = f"the file of the former model {model} is read as a {tables['model']}, whose entries have other names"
+        remedy = "write it anew with femgear.trains.reading.to_toml"
+        return tables, (Finding("W-FORMER", "model", text, remedy=remedy), *unlike)
     except ValidationError as error:
         raise combine(translate(error, section), lines, name, error.error_count()) from None
     except CaseError as error:

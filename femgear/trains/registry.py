@@ -40,7 +40,8 @@ FORMER = {
         "femgear.trains.gearbox.multistage_cases:gearbox_of_multistage",
     )
 }
-"""Models of files whose train is no more, each with what reads its tables and what makes those of today of them."""
+"""Models of files whose train is no more, each with the section that reads its tables, and what makes those of today
+and the findings on what these have not of it."""
 GROUP = "femgear.trains"
 """Entry points of other packages; the name is that of the train, the value a module with FILE and TRAIN."""
 

@@ -42,6 +42,7 @@ from femgear.case.sections import (
 )
 from femgear.errors import CaseError, FemgearError, refused_at, several
 from femgear.fe.beam import RoundSection, joint_springs
+from femgear.findings import Finding
 from femgear.gears.checks import check_set
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336_stiffness import pair_mesh_stiffness
@@ -152,8 +153,8 @@ class MultistageFile(Section):
     response: _ResponseSection | None = None
 
 
-def gearbox_of_multistage(file: MultistageFile) -> dict[str, Any]:
-    """Make the tables of the gearbox that a file describes.
+def gearbox_of_multistage(file: MultistageFile) -> tuple[dict[str, Any], tuple[Finding, ...]]:
+    """Make the tables of the gearbox that a file describes, and the findings on what it has not.
 
     CaseError: stages without sizes, gears that do not close, fixed members that nothing holds.
     """
@@ -184,7 +185,15 @@ def gearbox_of_multistage(file: MultistageFile) -> dict[str, Any]:
         tables["dynamics"] = {"mesh_harmonics": response.harmonics}
         ends = {"from": f"{response.lowest!r} rad/s", "to": f"{response.highest!r} rad/s"}
         tables["runup"] = ends | {"count": response.points}
-    return {key: entry for key, entry in tables.items() if entry != []}
+    return {key: entry for key, entry in tables.items() if entry != []}, tuple(_without_effect(file))
+
+
+def _without_effect(file: MultistageFile) -> Iterator[Finding]:
+    """Entries that a gearbox has no place for."""
+    if file.response is not None and file.response.balance_points:
+        text = "response.balance_points has no effect: a gearbox is solved stage by stage"
+        remedy = "leave it out; W-CROSS tells what stages do to one another"
+        yield Finding("W-UNUSED", "response.balance_points", text, remedy=remedy)
 
 
 def _key(problem: FemgearError, n: int) -> str:

@@ -524,7 +524,8 @@ def describe_gearbox_modes(data: xr.Dataset) -> Block:
 
 
 def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
-    """List what of a gearbox case deserves a look: entries that have no effect, bodies that overlap."""
+    """List what of a gearbox case deserves a look: how it was read, entries without effect, bodies that overlap."""
+    yield from case.notices
     if not case.deflection.contact and any(stage.teeth is not None for stage in (*case.pair, *case.planetary)):
         text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
         yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")

@@ -89,7 +89,7 @@ def changed(**entries) -> dict:
     tables = tomllib.loads(FORMER)
     for key, values in entries.items():
         name, _, number = key.partition("_")
-        table = tables[name][int(number) - 1] if number else tables
+        table = tables[name][int(number) - 1] if number else tables[name]
         for entry, value in values.items():
             if value is None:
                 del table[entry]
@@ -123,8 +123,9 @@ def test_a_former_file_is_the_gearbox_that_says_the_same(tmp_path):
         lines = [harmonics_of(excitation_of(state, state.model.stages[number]).stiffness, 6) for state in states]
         assert lines[0] == pytest.approx(lines[1], rel=1e-9, abs=1.0)
     assert former.runup.count == 5 and former.dynamics.mesh_harmonics == 4 and former.modes.damping_ratio == 0.02
+    assert [(one.code, one.key) for one in former.notices] == [("W-FORMER", "model")]
     # what is written and changed is the gearbox
-    assert read_case(to_toml(former)) == former
+    assert read_case(to_toml(former)) == former and not read_case(to_toml(former)).notices
     assert with_values(former, {"runup.count": 7}).runup.count == 7
 
 
@@ -163,6 +164,11 @@ def test_stages_may_be_held_elsewhere_and_joined_by_their_rings():
     assert 21.0 * (speed["stage 1 sun"] - w1) == pytest.approx(-105.0 * (w2 - w1))
     assert 21.0 * w2 == pytest.approx(-87.0 * w1)
     assert solve_gearbox_modes(solve_deflection(case)).modes.frequency.min() == 0.0
+
+
+def test_what_a_gearbox_has_no_place_for_is_told():
+    told = read_case(changed(response={"balance_points": 3})).notices
+    assert [(one.code, one.key) for one in told[1:]] == [("W-UNUSED", "response.balance_points")]
 
 
 @pytest.mark.parametrize(
