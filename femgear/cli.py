@@ -793,16 +793,22 @@ class DrawnSamples:
     Parameters
     ----------
     number
-        Number of samples.
+        Number of samples. Default: 1000; 100 of gearboxes, each of which is solved as a run solves it.
     seed
         Sample i of a seed is the same whatever the number of samples.
     index
         Write this sample as a case file, sample_INDEX.toml, and compute none.
+    of
+        Of gearboxes: quantities as of femgear sweep; may be repeated. Default: all that stand for the whole.
+    speeds
+        Of gearboxes: first and last speed of the run-up.
     """
 
-    number: Annotated[int, Parameter(name=("--number", "-n"))] = 1000
+    number: Annotated[int | None, Parameter(name=("--number", "-n"))] = None
     seed: Whole = 1
     index: int | None = None
+    of: Annotated[tuple[str, ...], Parameter(negative="")] = ()
+    speeds: tuple[str, str] | None = None
 
 
 @app.command
@@ -812,13 +818,13 @@ def samples(
     *,
     tolerances: Path,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    positions: Whole = 16,
+    positions: Whole | None = None,
     method: Literal["spring", "exact"] | None = None,
     force: bool = False,
     drawn: DrawnSamples | None = None,
     tasks: Tasks | None = None,
 ) -> int:
-    """Compute as-built sets: transmission error, load sharing and mesh stiffness over tolerances.
+    """Compute as-built sets over tolerances of teeth and pins, or as-built gearboxes over those of their entries.
 
     Parameters
     ----------
@@ -827,31 +833,38 @@ def samples(
     tolerances
         TOML file of the distributions of errors, as in docs/samples.md.
     output
-        Folder of samples.nc, samples.png and worst.toml.
+        Folder of samples.nc, samples.png and worst.toml; of gearboxes samples.csv and percentiles.csv in place of
+        the first.
     positions
-        Equidistant ones of one mesh period; those of the peaks of the set and its end come beside them.
+        Of sets: equidistant ones of one mesh period; those of the peaks of the set and its end come beside them.
+        Default: 16.
     method
         Tooth pairs as springs, whose error is stated, or the whole contact problem. Default: springs, but for
         helical teeth, back flanks and bearings with clearance, which have none.
     force
-        Replace the results that the folder holds, once the new ones are computed.
+        Of sets: replace the results that the folder holds, once the new ones are computed.
     """
     from femgear.run import grid_cache
     from femgear.storage.files import own_files, write_text
+    from femgear.study.objectives import has_figures
     from femgear.study.runner import open_runner
     from femgear.study.sample_results import samples_into
     from femgear.study.samples import checked, prepared, sample_case
     from femgear.trains.reading import read_case, to_toml
 
     drawn = drawn or DrawnSamples()
-    number, seed, index = drawn.number, drawn.seed, drawn.index
-    checked(number, "--number", 1)
-    checked(seed, "--seed", 0, 2**32)
-    checked(index or 0, "--index", 0)
+    checked(1 if drawn.number is None else drawn.number, "--number", 1)
+    checked(drawn.seed, "--seed", 0, 2**32)
+    checked(drawn.index or 0, "--index", 0)
     data = read_case(case)
+    if has_figures(data):
+        others = {"positions": positions, "method": method, "force": force or None}
+        return _samples_of_entries(data, output, tolerances, drawn, tasks, others)
+    _refuse_options({"of": drawn.of or None, "speeds": drawn.speeds}, "gearboxes", "leave it out")
+    number, seed, index = drawn.number or 1000, drawn.seed, drawn.index
     with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
         progress("curves of tooth pairs")
-        basis = prepared(data, tolerances, positions=positions, cache=grid_cache())
+        basis = prepared(data, tolerances, positions=positions or 16, cache=grid_cache())
         progress("curves of tooth pairs", 1.0)
         if index is None:
             options = {"count": number, "seed": seed, "exact": None if method is None else method == "exact"}
@@ -860,6 +873,39 @@ def samples(
             blocks, names = [], [f"sample_{index}.toml"]
             own_files(output, names)
             write_text(to_toml(sample_case(data, basis[0], seed, index)), output / names[0])
+    if blocks:
+        _print(blocks)
+    _say(f"files in {output}: {', '.join(names)}")
+    return 0
+
+
+def _refuse_options(options: Mapping[str, Any], of: str, remedy: str) -> None:
+    """Refuse (E-ARGUMENTS) options that are given, and that other cases alone have."""
+    for name, value in options.items():
+        if value is not None:
+            message = f"an option of samples of {of}"
+            raise CaseError(message, code="E-ARGUMENTS", key=f"--{name}", value=value, remedy=remedy)
+
+
+def _samples_of_entries(
+    data: Any,
+    output: Path,
+    tolerances: Path,
+    drawn: DrawnSamples,
+    tasks: Tasks | None,
+    others: Mapping[str, Any],
+) -> int:
+    """Compute samples of a gearbox, tabulate them and name the files; ``others`` are options that it has not."""
+    from femgear.run import grid_cache
+    from femgear.study.entry_samples import ENTRY_SAMPLES, EntryRequest, entry_samples_into
+    from femgear.study.runner import open_runner
+
+    _refuse_options(others, "planetary sets", "leave it out: samples of gearboxes are solved as femgear run does")
+    with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
+        count = ENTRY_SAMPLES if drawn.number is None else drawn.number
+        request = EntryRequest(drawn.of, drawn.speeds, count, drawn.seed, drawn.index)
+        options = {"cache": grid_cache(), "progress": progress, "runner": runner}
+        blocks, names = entry_samples_into(data, output, tolerances, request, **options)
     if blocks:
         _print(blocks)
     _say(f"files in {output}: {', '.join(names)}")

@@ -190,15 +190,21 @@ def split(value: object, key: str) -> tuple[float, str]:
     return number, unit
 
 
-def _current(case: Case, variable: Variable) -> float | None:
-    """Value that the case has now, in the unit of the variable; None where its file leaves the entry out."""
+def current_value(case: Any, key: str) -> Any:
+    """Read an entry of the file of a case as it stands there; None where the file leaves it out."""
     table: Any = case_text.parse(case.source, case.name)
-    for part in re.findall(r"\[(\d+)\]|([^.\[\]]+)", variable.keys[0]):
+    for part in re.findall(r"\[(\d+)\]|([^.\[\]]+)", key):
         try:
             table = table[int(part[0])] if part[0] else table[part[1]]
         except (KeyError, IndexError, TypeError):
             return None
-    return variable.number(table)
+    return table
+
+
+def _current(case: Any, variable: Variable) -> float | None:
+    """Value that the case has now, in the unit of the variable; None where its file leaves the entry out."""
+    value = current_value(case, variable.keys[0])
+    return None if value is None else variable.number(value)
 
 
 def start_point(case: Case, variables: Sequence[Variable]) -> np.ndarray:

@@ -112,6 +112,21 @@ NUMBERS = {
 """What is computed of a sample: dimensions, unit and words."""
 
 
+def share_quantiles(
+    share: np.ndarray, *, distribution: str, mean: float, sigma: float | None, limit: float | None
+) -> np.ndarray:
+    """Find the values of a law below which the given shares of all lie, an array of the same shape.
+
+    Uniform between mean -+ limit, or normal, there cut off at mean -+ limit where one is given.
+    """
+    if distribution == "uniform":
+        return mean + (limit or 0.0) * (2.0 * share - 1.0)
+    from scipy.special import ndtr, ndtri
+
+    below = 0.0 if limit is None or not sigma else float(ndtr(-limit / sigma))
+    return mean + (sigma or 0.0) * ndtri(np.maximum(below + share * (1.0 - 2.0 * below), 1e-17))
+
+
 SlopeAmplitude = Annotated[float, Quantity(ANGLE, 0.0, LARGEST_SLOPE)]
 
 
@@ -154,12 +169,8 @@ class Law(Section):
 
     def at(self, share: np.ndarray) -> np.ndarray:
         """Find the errors [m] below which the given shares of all lie, an array of the same shape."""
-        if self.distribution == "uniform":
-            return self.mean + (self.limit or 0.0) * (2.0 * share - 1.0)
-        from scipy.special import ndtr, ndtri
-
-        below = 0.0 if self.limit is None or not self.sigma else float(ndtr(-self.limit / self.sigma))
-        return self.mean + (self.sigma or 0.0) * ndtri(np.maximum(below + share * (1.0 - 2.0 * below), 1e-17))
+        kind = self.distribution
+        return share_quantiles(share, distribution=kind, mean=self.mean, sigma=self.sigma, limit=self.limit)
 
 
 class SlopeLaw(Law):

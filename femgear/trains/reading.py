@@ -232,8 +232,8 @@ def with_value(case: Case, key: str, value: object) -> Case:
     case : Case
         From `read_case`; it stays as it is.
     key : str
-        Dotted key such as ``"operation.torque"``, with a number for one of a list of tables, as in
-        ``"sun.modifications[0].amount"``.
+        Dotted key such as ``"operation.torque"``, with a number for one of a list, as in
+        ``"sun.modifications[0].amount"`` and ``"shaft[0].axis[1]"``.
     value : object
         As the file would hold it: ``"50 N m"``, 0.3, 27, a list or table of such; None leaves the entry out.
     """
@@ -299,6 +299,9 @@ def _change(data: dict, key: str, value: object, name: str) -> None:
     table: Any = data
     for part, following in zip(tables, parts[1:], strict=True):
         table = _inside(table, part, key, name, wanted=list if following.startswith("[") else dict)
+    if last.startswith("[") and _is_value_of(table, int(last[1:-1]), value):
+        table[int(last[1:-1])] = value
+        return
     if last.startswith("["):
         remedy = "give the whole list, or the key of an entry of one of its tables"
         raise CaseError("a list is changed as a whole", code="E-TYPE", key=key, file=name or None, remedy=remedy)
@@ -306,6 +309,12 @@ def _change(data: dict, key: str, value: object, name: str) -> None:
         table.pop(last, None)
     else:
         table[last] = value
+
+
+def _is_value_of(table: Any, number: int, value: object) -> bool:
+    """Tell whether a list holds plain values, one of them at a number, and another one can stand there."""
+    plain = isinstance(table, list) and not any(isinstance(entry, (dict, list)) for entry in table)
+    return plain and number < len(table) and value is not None and not isinstance(value, (dict, list))
 
 
 def _inside(table: dict | list, part: str, key: str, name: str, *, wanted: type) -> dict | list:
