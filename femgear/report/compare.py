@@ -23,6 +23,8 @@ _EXCITED = "excited up to"
 """Column of where the excitation ends, on which levels depend."""
 NO_CHANGE = "-"
 """Change of a number of which only a bound is known."""
+_LEAST_CHANGE = 1e-3
+"""Change of the key figure of a part from which on it is listed."""
 _FADED = 0.55
 """Opacity of the curves of the second run."""
 
@@ -32,12 +34,36 @@ def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]
     cases = [(run.case.source, run.case.model_dump(by_alias=True)) for run in (first, second)]
     rows = tuple(_entries(*cases))
     entries = Block("Cases", ("entry", "first", "second") if rows else (), rows, () if rows else ("the same",))
-    others = {block.title: block for block in train.describe_results(second)}
-    blocks = [entries]
-    for block in train.describe_results(first):
-        if block.title in others and block.title not in ("Time", WARNINGS):
-            blocks.append(_differences(block, others[block.title]))
+    blocks, others = [entries, *_key_figures(train, first, second)], train.describe_stages(second)
+    verdicts = {block.title: block for block in train.verdict(second)}
+    for block in train.verdict(first):
+        if block.title in verdicts:
+            blocks.append(_differences(block, verdicts[block.title]))
+    for title, block in train.describe_stages(first).items():
+        if title in others:
+            blocks.append(_differences(block, others[title]))
     return (*blocks, _findings(first, second))
+
+
+def _key_figures(train: Train, first: Results, second: Results) -> Iterator[Block]:
+    """Tabulate the key figures of both runs with their changes: of the whole, and of parts that change."""
+    runs = [first, second]
+    both = [{figure.name: figure for figure in train.key_figures(run.case)} for run in runs]
+    if not any(both):
+        return
+    rows, same = [], 0
+    for name, figure in both[0].items():
+        if name not in both[1] or not all(figure.stage in run.stages for run in runs):
+            continue
+        x, y = (figure.read(run[figure.stage]) for run in runs)
+        alike = math.isclose(x, y, rel_tol=_LEAST_CHANGE) or (math.isnan(x) and math.isnan(y))
+        if not figure.whole and alike:
+            same += 1
+            continue
+        unit = f" [{figure.dimension.shown}]".replace(" [1]", "")
+        rows.append((f"{name}{unit}", figure.show(x), figure.show(y), "" if alike else figure.change(x, y)))
+    notes = (f"{same} figures of parts change by less than {_LEAST_CHANGE:.1%}",) if same else ()
+    yield Block("Key figures", ("figure", "first", "second", "change"), tuple(rows), notes)
 
 
 def _findings(first: Results, second: Results) -> Block:

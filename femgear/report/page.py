@@ -149,7 +149,7 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
         pictures = [picture for picture in pictures if picture.name not in DRAWN]
         data["charts"] = {name: value for name, value in data.get("charts", {}).items() if name not in DRAWN}
     warnings = [*by_severity(results.findings), *skipped]
-    numbers = {block.title: block for block in train.describe_results(results)}
+    numbers = {block.title: block for block in train.describe_results(results)} | train.describe_stages(results)
     sections = [*(stage.title for stage in train.stages), _OTHER]
     notice = f'<p class="warn"><a href="#warnings">Warnings: {_counted(warnings)}</a></p>\n' if warnings else ""
     head = "".join(

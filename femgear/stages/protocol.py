@@ -340,10 +340,14 @@ class Train:
 
     def describe_results(self, results: Results) -> tuple[Block, ...]:
         """Tabulate the numbers of a run: its verdict, one block a stage, and the time that each took."""
-        blocks = [stage.describe(results) for stage in self._in(results)]
+        blocks = self.describe_stages(results).values()
         timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
         time = Block("Time", ("stage", "[s]"), tuple(timings))
         return (*self.verdict(results), *blocks, *listed(results.findings), time)
+
+    def describe_stages(self, results: Results) -> dict[str, Block]:
+        """Tabulate the numbers of the stages of a run, by the titles of the stages."""
+        return {stage.title: stage.describe(results) for stage in self._in(results)}
 
     def case_warnings(self, case: Any) -> tuple[Finding, ...]:
         """List what a case is allowed to be but deserves a look, each once.

@@ -3,9 +3,16 @@
 import json
 from pathlib import Path
 
+import numpy as np
+import pytest
+from small_gearbox import pair_tables
+
 from femgear.report import compare
 from femgear.report.tables import Block
-from femgear.trains.reading import read_case, with_value, with_values
+from femgear.run import run_case
+from femgear.storage.results import run_folder
+from femgear.trains.reading import open_results, read_case, with_value, with_values
+from femgear.trains.registry import train_of
 
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 
@@ -115,3 +122,23 @@ def test_a_bound_has_no_change_and_marks_keep_their_meaning():
     assert found.notes[0].startswith("-: one of both is a bound") and found.notes[1:] == (f"first: † {meaning}",)
     back = compare._differences(whole, short)
     assert back.rows[0][-1] == "-" and back.notes[-1] == f"second: † {meaning}"
+
+
+def test_key_figures_of_two_runs_are_compared_by_name(tmp_path):
+    case = read_case(pair_tables())
+    runs = []
+    for name, changed in (("a", case), ("b", with_value(case, "bearing[0].radial", "1e8 N/m"))):
+        with run_folder(tmp_path / name) as place:
+            run_case(changed, place, pictures=False)
+        runs.append(open_results(tmp_path / name))
+    blocks = {block.title: block for block in compare.compared(train_of(case), *runs)}
+    assert [row[0] for row in blocks["Cases"].rows] == ["bearing[0].radial"]
+    rows = {row[0]: row[1:] for row in blocks["Key figures"].rows}
+    slopes = [float(np.abs(run.deflection["mesh_misalignment"].values).max()) for run in runs]
+    shown, other, change = rows["misalignment [um]"]
+    assert [float(shown), float(other)] == pytest.approx([1e6 * slope for slope in slopes], rel=1e-4)
+    assert float(change.split()[0]) == pytest.approx(100.0 * (slopes[1] / slopes[0] - 1.0), rel=1e-2)
+    # the mesh force follows the torque: of the whole it stays, of parts it is left out
+    assert rows["mesh force [N]"][2] == "" and "mesh force stage [N]" not in rows
+    # both tables of stages, each with its own of the other run
+    assert {"Meshes", "Modes"} <= blocks.keys()

@@ -299,7 +299,7 @@ def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:
     return f"{some[0]:.5g} rpm" if len(some) == 1 else f"{len(some)} speeds, {some.min():.5g} to {some.max():.5g} rpm"
 
 
-def describe_gearbox_response(data: xr.Dataset) -> Block:
+def describe_gearbox_response(data: xr.Dataset, title: str = "Response of the stages") -> Block:
     """Tabulate mesh forces of all stages, at the speed with the largest factor of each."""
     factor = np.nan_to_num(data["dynamic_factor"].values)
 
@@ -314,7 +314,7 @@ def describe_gearbox_response(data: xr.Dataset) -> Block:
         "mesh harmonics": lambda i: f"{int(data['mesh_harmonics'].values[worst(i), i])}",
     }
     note = f"excitation up to {1e-3 * data.attrs['up_to']:g} kHz; speeds are those of {data.attrs['reference']}"
-    return tabulate("Response of the stages", range(data.sizes["stage"]), columns, (note,))
+    return tabulate(title, range(data.sizes["stage"]), columns, (note,))
 
 
 def response_tables(data: xr.Dataset) -> Iterator[Block]:

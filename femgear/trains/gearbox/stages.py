@@ -197,7 +197,7 @@ GEARBOX = Train(
             wanted=lambda case: not _no_runup(case),
             unavailable=_no_runup,
             verdict=_response_verdict,
-            describe=lambda results: describe_gearbox_response(results.runup),
+            describe=lambda results: describe_gearbox_response(results.runup, "Run-up of the stages"),
             tables=lambda results: response_tables(results.runup),
             warnings=gearbox_response_warnings,
         ),

@@ -61,6 +61,8 @@ def test_tables_tell_meshes_bearings_and_modes(results):
 def test_pictures_are_there(results):
     names = {path.name for path in results.folder.iterdir()}
     assert {"deflected_shafts.png", "load_patterns.png", "campbell.png", "mode_energy.png", "report.html"} <= names
+    page = (results.folder / "report.html").read_text(encoding="utf-8")
+    assert "<caption>Meshes in load case full</caption>" in page and "<caption>Modes</caption>" in page
 
 
 def test_the_verdict_names_the_worst_of_all_load_cases(results):
