@@ -436,6 +436,9 @@ def export_results(
             header, rows = recorded.cuts(results, how.level)
             write_csv(folder / "order_cuts.csv", header, ([float(x) for x in row] for row in rows))
             files.append("order_cuts.csv")
+        for name, header, rows in recorded.tables(results) if recorded is not None else ():
+            write_csv(folder / f"{name}.csv", header, rows)
+            files.append(f"{name}.csv")
     if "xlsx" in formats:
         tables = (table for stage in results for table in tables_of(results[stage], stage))
         if long := write_workbook(tables, folder / "results.xlsx"):

@@ -113,7 +113,7 @@ class Signal:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """Lines of a sensor at the multiples 0, 1, 2, .. of a frequency ``step`` [Hz].
+    """Lines of a sensor at the multiples 0, 1, 2, .. of a frequency ``step`` [Hz], or at a ``frequency`` (n,) each.
 
     ``name`` is what files call it; ``values`` (n,) are complex peak amplitudes in its ``unit``.
     """
@@ -122,6 +122,7 @@ class Spectrum:
     unit: str
     step: float
     values: np.ndarray
+    frequency: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -195,21 +196,26 @@ def write_functions(signals: Iterable[Signal], spectra: Iterable[Spectrum], path
     """Write signals and spectra as universal file, datasets 164 (SI units) and 58.
 
     Spectra have the function type 0: of complex lines the library writes no other. The format holds the step
-    of the abscissa with six digits and values with twelve; ID line 2 tells the rate or step in full.
+    of the abscissa with six digits and values with twelve; ID line 2 tells the rate or step in full. Lines at
+    frequencies of their own have an uneven abscissa.
     """
     unused = {f"{name}_spec_data_type": 0 for name in ("orddenom", "z_axis")} | {"z_axis_value": 0.0}
     scalar = {"rsp_dir": 0, "ref_node": 0, "ref_dir": 0, "binary": 0, "abscissa_spacing": 1, **unused}
     with _universal_file(path) as write:
         for number, signal in enumerate([*signals, *spectra], 1):
+            uneven = signal.frequency if isinstance(signal, Spectrum) else None
             if isinstance(signal, Signal):
                 step, words = 1 / signal.rate, f"samples a second [Hz]: {signal.rate!r}"
                 kind = {"func_type": 1, "abscissa_spec_data_type": 17, "abscissa_axis_units_lab": "s"}
             else:
                 step, words = signal.step, f"peak amplitudes, step [Hz]: {signal.step!r}"
+                words = words if uneven is None else "peak amplitudes of lines, which are not evenly spaced"
                 kind = {"func_type": 0, "abscissa_spec_data_type": 18, "abscissa_axis_units_lab": "Hz"}
             unit = {"ordinate_spec_data_type": _QUANTITIES[signal.unit], "ordinate_axis_units_lab": signal.unit}
-            data = {"data": signal.values, "x": step * np.arange(len(signal.values)), "id1": signal.name, "id2": words}
-            write(58, rsp_node=number, **data, **kind, **unit, **scalar)
+            x = step * np.arange(len(signal.values)) if uneven is None else uneven
+            data = {"data": signal.values, "x": x, "id1": signal.name, "id2": words}
+            spaced = scalar | {"abscissa_spacing": int(uneven is None)}
+            write(58, rsp_node=number, **data, **kind, **unit, **spaced)
 
 
 def write_modes(shapes: Shapes, path: Path) -> None:

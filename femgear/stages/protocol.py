@@ -278,7 +278,8 @@ class Recorded:
 
     ``needs`` are the stages that each format takes, of "wav", "uff" and "quality" those that there are, the
     first one that of the signals, of which every speed and the run-up have ``each(results)``. ``cuts`` takes
-    results and a form of `femgear.housing.sound.LEVELS`, and gives header and rows of a table;
+    results and a form of `femgear.housing.sound.LEVELS`, and gives header and rows of a table; ``tables`` gives
+    names, headers and rows of further ones;
     ``extent`` takes results and a rate [Hz], and gives by unit the largest sum of the amplitudes of a speed,
     and the largest level that lines at half the rate and above have, with that of all lines, r.m.s.
     """
@@ -290,6 +291,7 @@ class Recorded:
     spectra: Callable[[Results], Iterator[Spectrum]] = lambda results: iter(())
     shapes: Callable[[Results], Shapes] | None = None
     cuts: Callable[[Results, str], tuple[Sequence[str], Iterable[Sequence[float]]]] | None = None
+    tables: Callable[[Results], Iterable[tuple[str, Sequence[str], Iterable[Sequence[object]]]]] = lambda results: ()
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ the worst of all of them; those of the response are at the speed of the chosen o
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any
@@ -19,7 +18,11 @@ from femgear.stages.key_figures import DECIBEL, NUMBER, KeyFigure, Stored
 from femgear.trains.gearbox.case_file import FORCE, BoxPlanetarySection, GearboxCase, PairSection
 from femgear.trains.gearbox.casing import bearing_name
 from femgear.trains.gearbox.geometry import set_sizes
+from femgear.trains.gearbox.mode_words import mode_distance
+from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.resonance_table import resonance_speed
 from femgear.trains.gearbox.sensors import casing_sensors
+from femgear.trains.gearbox.silence import exciting_sections
 
 MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 HOURS = Dimension("a life", "h", "h", 1.0)
@@ -106,32 +109,10 @@ def _of_modes() -> Iterator[KeyFigure]:
     yield KeyFigure("mode distance", NUMBER, "modes", mode_distance, whole=True)
 
 
-def mode_distance(data: Any) -> float:
-    """Compute how far the mesh line nearest to a mode is from it, over the frequency of the mode; of modes.nc."""
-    apart, lines, modes = mesh_lines_and_modes(data)
-    if not apart.size:
-        return math.nan
-    line, mode = np.unravel_index(int(apart.argmin()), apart.shape)
-    return float(abs(lines[line][1] / modes[mode] - 1.0))
-
-
-def mesh_lines_and_modes(data: Any) -> tuple[np.ndarray, list[tuple[str, float]], np.ndarray]:
-    """Find how far mesh lines are from modes of modes.nc: |ln f/f_m| (L, m), lines with names [Hz], modes [Hz].
-
-    Modes without stiffness are left out.
-    """
-    speed, hertz = float(data.attrs["speed"]), data["frequency"].values
-    orders = zip(data["line"].values, data["order"].values, strict=True)
-    lines = [(str(name), float(order) * speed / 60.0) for name, order in orders if "mesh" in str(name)]
-    modes = hertz[hertz > 0.0]
-    if not lines or not len(modes):
-        return np.zeros((0, 0)), [], modes
-    return np.abs(np.log(np.array([line for _, line in lines])[:, None] / modes)), lines, modes
-
-
 def _of_responses(case: GearboxCase) -> Iterator[KeyFigure]:
     sensors = [(sensor.name, (sensor.name,)) for sensor in casing_sensors(case)]
-    excited = [(stage.name, (stage.name,)) for stage in (*case.pair, *case.planetary) if stage.teeth]
+    flow = gearbox_flow(case)
+    excited = [(stage.name, (stage.name,)) for stage in exciting_sections(case) if flow.carries(stage)]
     for words, stage in _RESPONSES:
         if excited:
             of_forces = partial(_family, stage=stage, parts=excited, dim="stage", codes=_OF_FORCES)
@@ -144,9 +125,12 @@ def _of_responses(case: GearboxCase) -> Iterator[KeyFigure]:
         decibel = Stored("level", decibel=True)
         yield from _family(f"{words}level dB", DECIBEL, stage, decibel, sensors, "sensor")
         if stage == "runup":
-            for name, labels in (("", ()), *sensors):
-                read = partial(_loudest_speed, labels)
-                yield KeyFigure(f"loudest speed {name}".rstrip(), SPEED, stage, read, whole=not name)
+            for figure, reads, parts in (
+                ("loudest speed", _loudest_speed, sensors),
+                ("resonance speed", resonance_speed, excited),
+            ):
+                for name, labels in (("", ()), *parts):
+                    yield KeyFigure(f"{figure} {name}".rstrip(), SPEED, stage, partial(reads, labels), whole=not name)
 
 
 def _loudest_speed(labels: tuple[str, ...], data: Any) -> float:

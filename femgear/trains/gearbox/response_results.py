@@ -14,7 +14,9 @@ from femgear.findings import Finding
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
+from femgear.trains.gearbox.resonance_table import resonance_variables
 from femgear.trains.gearbox.response import GearboxResponse, StageLines, accelerations, by_order, level
+from femgear.trains.gearbox.run_up_speeds import GearboxResonances
 from femgear.trains.gearbox.sensors import casing_sensors
 
 if TYPE_CHECKING:
@@ -36,12 +38,13 @@ class GearboxResponseResult(StageResult):
     """Response of a gearbox at some speeds.
 
     ``found`` is the response; ``whole`` keeps the lines of bearings too; ``unresolved`` counts the resonances of a
-    run-up whose peaks its speeds miss.
+    run-up whose peaks its speeds miss, ``resonances`` are all of them.
     """
 
     found: GearboxResponse
     whole: bool
     unresolved: int = 0
+    resonances: GearboxResonances | None = None
 
     @property
     def residual(self) -> float:
@@ -86,6 +89,8 @@ class GearboxResponseResult(StageResult):
                 **_of_paths(found, moved),
                 **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
             }
+        if self.resonances is not None:
+            variables |= resonance_variables(found, self.resonances, moved)
         of_bearings = {stage.name: stage.motion[:, forces] for stage in found.stages}
         size = (len(found.speed), bearings, 3)
         rms = level(found, of_bearings).reshape(size)

@@ -43,11 +43,20 @@ class GearboxResonances:
         Without sensors that of the approach of the flanks.
     damping : array
         Damping ratio of the mode [1].
+    stage : tuple of str
+        Stage whose harmonic meets the mode.
+    harmonic : int array
+        Mesh harmonic.
+    frequency : array
+        Of the mode [Hz].
     """
 
     speed: np.ndarray
     heard: np.ndarray
     damping: np.ndarray
+    stage: tuple[str, ...]
+    harmonic: np.ndarray
+    frequency: np.ndarray
 
     @property
     def expected(self) -> np.ndarray:
@@ -75,7 +84,7 @@ def gearbox_resonances(
     modes = undamped_modes(still, stiffness, damping_ratio=case.modes.damping_ratio)
     at_sensors = (sensor_rows(model) @ assembly.motions @ modes.shape).T
     up_to, nominal = case.dynamics.up_to, abs(model.flow.speed[reference_shaft(model)])
-    parts = [np.zeros((3, 0))]
+    parts, names = [np.zeros((5, 0))], list[str]()
     for stage in exciting_stages(found):
         excitation = excitation_of(found, stage, steps=steps)
         mesh_turns = model.flow.mesh_frequency[stage.name] / nominal
@@ -89,8 +98,11 @@ def gearbox_resonances(
         forces = modal_forces(own_modes, excitation, count, output=output)
         met = crossings(forces, mesh_turns * slowest, mesh_turns * fastest, up_to)
         heard = forces.heard[met.row, met.harmonic - 1]
-        parts.append(np.array([met.mesh_frequency / mesh_turns, heard, forces.damping_ratio[met.row]]))
-    return GearboxResonances(*np.concatenate(parts, axis=1))
+        modal = forces.damping_ratio[met.row], met.harmonic, forces.frequency[met.row]
+        parts.append(np.array([met.mesh_frequency / mesh_turns, heard, *modal]))
+        names += [stage.name] * len(met.row)
+    speed, heard, damping, harmonic, frequency = np.concatenate(parts, axis=1)
+    return GearboxResonances(speed, heard, damping, tuple(names), harmonic.astype(int), frequency)
 
 
 def _with_meshes(modes: Modes, found: Deflection, stage: StageModel, stiffness: np.ndarray, mean: np.ndarray) -> Modes:

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError
-from femgear.exchange.formats import Sampling, Shapes, Signal, line_extent
+from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
 from femgear.findings import Finding, tell
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
+from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.protocol import Recorded
 
 if TYPE_CHECKING:
@@ -27,6 +28,22 @@ if TYPE_CHECKING:
 
 RESPONSE_STAGES = "dynamics", "runup"
 """Stages that have lines at the sensors."""
+ORDER_HEADER = (
+    "sensor",
+    "speed [rpm]",
+    "frequency [Hz]",
+    "order [1]",
+    "stage",
+    "mesh harmonic [1]",
+    "turns of the carrier beside it [1]",
+    "amplitude [m/s^2]",
+    "level, r.m.s. re 1e-6 m/s^2 [dB]",
+    "share of the power [1]",
+    "nearest mode [Hz]",
+)
+"""Columns of the table of all lines."""
+_DIGITS = 9
+"""Decimal places of a frequency [Hz] in which lines of one agree."""
 _NAME = 60
 """Characters of the name of a sensor in that of a file, at most."""
 
@@ -83,6 +100,45 @@ def gearbox_signal_extent(results: Results, rate: float) -> dict[str, tuple[floa
     return line_extent((("m/s^2", *recording) for recording in recordings), rate)
 
 
+def gearbox_spectra(results: Results) -> Iterator[Spectrum]:
+    """Give the lines of every sensor at the speed of the load case; those of one frequency add with their phase."""
+    if "dynamics" not in results.stages:
+        return
+    for name, order, speed, values in _lines_of_sensors(results, "dynamics"):
+        hertz = order * speed[0] / (2.0 * np.pi)
+        known, place = np.unique(np.round(hertz, _DIGITS), return_inverse=True)
+        lines = np.zeros(len(known), complex)
+        np.add.at(lines, place.ravel(), values[0])
+        kept = np.abs(lines) > 0.0
+        yield Spectrum(f"{name}_lines", "m/s^2", 0.0, lines[kept], known[kept])
+
+
+def gearbox_order_tables(results: Results) -> Iterator[tuple[str, Sequence[str], Iterator[Sequence[object]]]]:
+    """Give the table of all lines at the sensors at the speed of the load case, each with its origin."""
+    if "dynamics" in results.stages and "lines_real" in results["dynamics"]:
+        modes = results["modes"] if "modes" in results.stages else None
+        yield "order_table", ORDER_HEADER, _order_rows(results["dynamics"], modes)
+
+
+def _order_rows(data: xr.Dataset, modes: xr.Dataset | None) -> Iterator[Sequence[object]]:
+    """Rows of `ORDER_HEADER`, the largest line of a sensor first."""
+    speed = float(data["speed"].values[0])
+    size = np.hypot(data["lines_real"].values[0], data["lines_imag"].values[0])
+    own = ("order", "origin", "harmonic", "side_band")
+    orders, stages, harmonics, bands = (data[name].values for name in own)
+    elastic = np.zeros(0) if modes is None else modes["frequency"].values[modes["frequency"].values > 0.0]
+    for number, sensor in enumerate(data["sensor"].values):
+        whole = float(data["level"].values[0, number])
+        for line in np.argsort(-size[number], kind="stable").tolist():
+            amplitude, hertz = float(size[number, line]), float(orders[line]) * speed / 60.0
+            if not amplitude > 0.0:
+                break
+            level = 20.0 * np.log10(amplitude / np.sqrt(2.0) / REFERENCE_ACCELERATION)
+            near = float(elastic[np.abs(np.log(elastic / hertz)).argmin()]) if len(elastic) else float("nan")
+            origin = float(orders[line]), str(stages[line]), int(harmonics[line]), int(bands[line])
+            yield (str(sensor), speed, hertz, *origin, amplitude, float(level), 0.5 * (amplitude / whole) ** 2, near)
+
+
 def gearbox_shapes(results: Results) -> Shapes:
     """Read the modes of modes.nc at the stations of shafts and planets."""
     modes = results["modes"]
@@ -110,5 +166,7 @@ GEARBOX_RECORDED = Recorded(
     gearbox_signal_extent,
     {"wav": ("dynamics",), "uff": ("dynamics", "modes")},
     lambda results: results["dynamics"].sizes.get("sensor", 0),
+    spectra=gearbox_spectra,
     shapes=gearbox_shapes,
+    tables=gearbox_order_tables,
 )

@@ -9,8 +9,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from femgear.findings import Finding
-from femgear.trains.gearbox.case_file import GearboxCase
+from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection
 from femgear.trains.gearbox.power import gearbox_flow
+
+
+def exciting_sections(case: GearboxCase) -> list[PairSection | BoxPlanetarySection]:
+    """List the stages that excite a gearbox where they carry: by the contact of their teeth, or by contact ratios."""
+    every = (*case.pair, *case.planetary)
+    return [stage for stage in every if stage.counts_pairs or (stage.teeth and case.deflection.contact)]
 
 
 def _silence(case: GearboxCase) -> tuple[str, str]:
@@ -19,7 +25,7 @@ def _silence(case: GearboxCase) -> tuple[str, str]:
     stages = [stage for stage in every if stage.teeth or stage.counts_pairs]
     if not stages:
         return "no stage has teeth or contact ratios that excite it", "give teeth or contact_ratio of a stage"
-    stages = [stage for stage in stages if stage.counts_pairs or case.deflection.contact]
+    stages = exciting_sections(case)
     if not stages:
         return "deflection.contact = false leaves the teeth, which excite it, out", "leave deflection.contact out"
     flow, first = gearbox_flow(case), "operation.first"

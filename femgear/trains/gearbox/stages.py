@@ -16,6 +16,7 @@ from femgear.trains.gearbox.deflection import check_held, solve_deflection
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
+from femgear.trains.gearbox.resonance_table import describe_resonances
 from femgear.trains.gearbox.response import reference_shaft, solve_gearbox_response
 from femgear.trains.gearbox.response_results import (
     GearboxResponseResult,
@@ -91,9 +92,10 @@ def solve_box_runup(
     nominal = abs(state.model.flow.speed[reference_shaft(state.model)])
     start, stop = case.runup.start or 0.25 * nominal, case.runup.to or 1.25 * nominal
     equal_steps = np.linspace(start, stop, case.runup.count)
-    speeds, missed = run_up_speeds(equal_steps, gearbox_resonances(state, start, stop, steps=steps))
+    resonances = gearbox_resonances(state, start, stop, steps=steps)
+    speeds, missed = run_up_speeds(equal_steps, resonances)
     found = solve_gearbox_response(state, speeds, steps=steps, progress=progress, stage="runup")
-    return GearboxResponseResult(found, whole=False, unresolved=missed)
+    return GearboxResponseResult(found, whole=False, unresolved=missed, resonances=resonances)
 
 
 def _no_runup(case: GearboxCase) -> str:
@@ -198,7 +200,10 @@ GEARBOX = Train(
             unavailable=_no_runup,
             verdict=_response_verdict,
             describe=lambda results: describe_gearbox_response(results.runup, "Run-up of the stages"),
-            tables=lambda results: response_tables(results.runup),
+            tables=lambda results: (
+                *describe_resonances(results.runup, results.modes if "modes" in results.stages else None),
+                *response_tables(results.runup),
+            ),
             warnings=gearbox_response_warnings,
         ),
     ),

@@ -14,8 +14,8 @@ import numpy as np
 from femgear.report.tables import Block, Marks, doubtful_excitation
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.trains.gearbox.casing_results import largest_foot_force
-from femgear.trains.gearbox.key_figures import mesh_lines_and_modes
 from femgear.trains.gearbox.life import shortest_life
+from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
 from femgear.trains.gearbox.response_results import line_origin
 
 SENSORS_JUDGED = 3
@@ -83,17 +83,6 @@ def _nearest_mode(data: Any) -> Iterator[tuple[str, str]]:
     line, mode = np.unravel_index(int(apart.argmin()), apart.shape)
     name, hertz = lines[line]
     yield "mesh line nearest to a mode", f"{name} {hertz:.0f} Hz, {nearest_mode(data, float(modes[mode]))}"
-
-
-def nearest_mode(data: Any, frequency: float) -> str:
-    """Write which mode of modes.nc is nearest to a frequency [Hz], with its kind and what moves most in it."""
-    hertz = data["frequency"].values
-    elastic = np.flatnonzero(hertz > 0.0)
-    if not len(elastic) or not frequency > 0.0:
-        return "no mode"
-    number = int(elastic[np.abs(np.log(hertz[elastic] / frequency)).argmin()])
-    kind, member = data["kind"].values[number], data["main_member"].values[number]
-    return f"mode {number + 1} {hertz[number]:.0f} Hz ({kind if kind == member else f'{kind}, {member}'})"
 
 
 def level_text(level: float) -> str:

@@ -6,7 +6,7 @@ from casings import casing_tables
 from small_gearbox import pair_tables, planetary_tables
 
 from femgear.case.dependencies import Steps
-from femgear.trains.gearbox.key_figures import gearbox_key_figures, mesh_lines_and_modes, mode_distance, stage_meshes
+from femgear.trains.gearbox.key_figures import gearbox_key_figures, stage_meshes
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case
 
@@ -40,6 +40,9 @@ def test_every_figure_is_a_number_of_the_file(answer, data):
         "level dB": 20.0 * np.log10(dynamics["level"].values[0, 0] / 1e-6),
         "run-up level top": runup["level"].values.max(),
         "run-up force factor stage": np.nanmax(runup["dynamic_factor"].values),
+        "resonance speed": np.pi
+        / 30.0
+        * runup["resonance_speed"].values[runup["resonance_level"].values[:, 0].argmax()],
         "loudest speed": np.pi / 30.0 * runup["speed"].values[runup["level"].values[:, 0].argmax()],
     }
     assert {name: values[name] for name in expected} == pytest.approx(expected, rel=1e-12)
@@ -52,13 +55,6 @@ def test_parts_are_named_as_in_the_file(answer, data):
         assert f"bearing force {bearing}" in names
     # without catalogue numbers there is no life
     assert "bearing life" not in names
-
-
-def test_mode_distance_is_that_of_the_nearest_line(data):
-    distance = mode_distance(data["modes"])
-    _, lines, modes = mesh_lines_and_modes(data["modes"])
-    every = [abs(line / mode - 1.0) for _, line in lines for mode in modes]
-    assert distance == pytest.approx(min(every), rel=1e-12) and len(every) == len(lines) * len(modes)
 
 
 def test_meshes_of_a_set_without_teeth():

@@ -7,12 +7,14 @@ import pytest
 import xarray as xr
 
 from femgear.errors import CaseError
-from femgear.exchange.formats import Sampling
+from femgear.exchange.formats import Sampling, write_functions
 from femgear.trains.gearbox.signals import (
     GEARBOX_RECORDED,
+    gearbox_order_tables,
     gearbox_shapes,
     gearbox_signal_extent,
     gearbox_signals,
+    gearbox_spectra,
     sensor_file_names,
 )
 
@@ -134,3 +136,45 @@ def test_shapes_are_motions_of_the_stations():
     assert shapes.shape[2, 1] == pytest.approx(motion[1, :3, 2])
     assert shapes.points == pytest.approx(np.eye(3)[:2])
     assert shapes.words == "stations of shafts and planets"
+
+
+def with_origins(data: xr.Dataset) -> xr.Dataset:
+    """The same lines of two stages, the last two of one order, with their level."""
+    size = np.hypot(data["lines_real"], data["lines_imag"])
+    named = {
+        "order": ("line", np.array([25.0, 6.065, 6.065])),
+        "origin": ("line", ["first", "first", "second"]),
+        "harmonic": ("line", [4, 1, 2]),
+        "side_band": ("line", [0, 0, -1]),
+        "level": (("speed", "sensor"), np.sqrt(0.5 * (size**2).sum("line").values)),
+    }
+    return data.assign(named)
+
+
+def test_lines_of_one_frequency_are_one_in_the_spectrum_that_a_universal_file_holds(results, tmp_path):
+    pyuff = pytest.importorskip("pyuff")
+    data = results["dynamics"] = with_origins(results["dynamics"])
+    lines = (data["lines_real"] + 1j * data["lines_imag"]).values[0, 1]
+    write_functions((), gearbox_spectra(results), tmp_path / "a.uff")
+    top, side = pyuff.UFF(str(tmp_path / "a.uff")).read_sets()[1:]
+    assert (top["id1"], side["id1"]) == ("sensor_top_left_lines", "sensor_side_lines")
+    assert side["x"] == pytest.approx([606.5, 2500.0], rel=1e-5) and side["abscissa_spacing"] == 0
+    assert side["data"] == pytest.approx([lines[1] + lines[2], lines[0]], rel=1e-9)
+    assert side["ordinate_axis_units_lab"].strip() == "m/s^2"
+
+
+def test_the_order_table_has_every_line_with_its_origin(results):
+    data = results["dynamics"] = with_origins(results["dynamics"])
+    results["modes"] = xr.Dataset({"frequency": ("mode", [0.0, 590.0, 2600.0])})
+    ((name, header, rows),) = gearbox_order_tables(results)
+    table = [dict(zip(header, row, strict=True)) for row in rows]
+    assert name == "order_table" and len(table) == 6
+    side = [row for row in table if row["sensor"] == "side"]
+    amplitudes = np.hypot(data["lines_real"], data["lines_imag"]).values[0, 1]
+    assert [row["amplitude [m/s^2]"] for row in side] == pytest.approx(np.sort(amplitudes)[::-1])
+    assert sum(row["share of the power [1]"] for row in side) == pytest.approx(1.0)
+    first = next(row for row in side if row["mesh harmonic [1]"] == 4)
+    assert (first["frequency [Hz]"], first["stage"], first["nearest mode [Hz]"]) == (2500.0, "first", 2600.0)
+    level = 20.0 * np.log10(amplitudes[0] / np.sqrt(2.0) / 1e-6)
+    assert first["level, r.m.s. re 1e-6 m/s^2 [dB]"] == pytest.approx(level)
+    assert not [*gearbox_order_tables(Stored())]

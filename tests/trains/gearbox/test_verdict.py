@@ -9,7 +9,8 @@ from small_gearbox import pair_tables
 
 from femgear.case.dependencies import Steps
 from femgear.findings import DOUBT, Finding
-from femgear.trains.gearbox.verdict import gearbox_verdict, level_text, nearest_mode
+from femgear.trains.gearbox.mode_words import nearest_mode
+from femgear.trains.gearbox.verdict import gearbox_verdict, level_text
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case
 
@@ -38,13 +39,6 @@ def test_levels_come_with_line_way_and_mode(results):
     assert rows["most of it at top comes by"].startswith(str(way))
     loudest = results.runup["speed"].values[int(results.runup["level"].values[:, 0].argmax())]
     assert f"at {loudest:.5g} rpm, by stage" in rows["loudest of the run-up at top"]
-
-
-def test_the_nearest_mode_is_the_nearest_in_octaves(results):
-    hertz = results.modes["frequency"].values
-    elastic = np.flatnonzero(hertz > 0.0)
-    for number in elastic[[0, 3, -1]]:
-        assert nearest_mode(results.modes, 1.0001 * float(hertz[number])).startswith(f"mode {number + 1} ")
 
 
 def test_doubtful_numbers_are_marked(results):

@@ -1,0 +1,42 @@
+"""Modes of modes.nc beside lines of the excitation: which is nearest, how far it is, and what moves in it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+
+def mode_distance(data: Any) -> float:
+    """Compute how far the mesh line nearest to a mode is from it, over the frequency of the mode; of modes.nc."""
+    apart, lines, modes = mesh_lines_and_modes(data)
+    if not apart.size:
+        return math.nan
+    line, mode = np.unravel_index(int(apart.argmin()), apart.shape)
+    return float(abs(lines[line][1] / modes[mode] - 1.0))
+
+
+def mesh_lines_and_modes(data: Any) -> tuple[np.ndarray, list[tuple[str, float]], np.ndarray]:
+    """Find how far mesh lines are from modes of modes.nc: |ln f/f_m| (L, m), lines with names [Hz], modes [Hz].
+
+    Modes without stiffness are left out.
+    """
+    speed, hertz = float(data.attrs["speed"]), data["frequency"].values
+    orders = zip(data["line"].values, data["order"].values, strict=True)
+    lines = [(str(name), float(order) * speed / 60.0) for name, order in orders if "mesh" in str(name)]
+    modes = hertz[hertz > 0.0]
+    if not lines or not len(modes):
+        return np.zeros((0, 0)), [], modes
+    return np.abs(np.log(np.array([line for _, line in lines])[:, None] / modes)), lines, modes
+
+
+def nearest_mode(data: Any, frequency: float) -> str:
+    """Write which mode of modes.nc is nearest to a frequency [Hz], with its kind and what moves most in it."""
+    hertz = data["frequency"].values
+    elastic = np.flatnonzero(hertz > 0.0)
+    if not len(elastic) or not frequency > 0.0:
+        return "no mode"
+    number = int(elastic[np.abs(np.log(hertz[elastic] / frequency)).argmin()])
+    kind, member = data["kind"].values[number], data["main_member"].values[number]
+    return f"mode {number + 1} {hertz[number]:.0f} Hz ({kind if kind == member else f'{kind}, {member}'})"

@@ -1,0 +1,35 @@
+"""Which mode is nearest to a line, and how far it is."""
+
+import pytest
+
+from femgear.storage.contents import Contents
+from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, mode_distance, nearest_mode
+
+
+@pytest.fixture(scope="module")
+def modes():
+    """Contents of modes.nc as far as they are read: lines of 10 and 20 Hz, one of a shaft, a rigid motion."""
+    values = {
+        "frequency": [0.0, 5.0, 10.4, 19.9, 80.0],
+        "kind": ["rigid", "axial", "casing", "bending", "mixed"],
+        "main_member": ["rotor", "rotor", "casing", "rotor", "output"],
+        "line": ["stage mesh", "2 x stage mesh", "shaft rotor"],
+        "order": [10.0, 20.0, 5.0],
+    }
+
+    dims = {"frequency": "mode", "kind": "mode", "main_member": "mode", "line": "line", "order": "line"}
+    variables = {name: (dims[name], entries, "1", name) for name, entries in values.items()}
+    return Contents(variables, {}, {"speed": 60.0})
+
+
+def test_the_nearest_mode_is_the_nearest_in_octaves(modes):
+    assert nearest_mode(modes, 10.0) == "mode 3 10 Hz (casing)"
+    assert nearest_mode(modes, 40.0) == "mode 5 80 Hz (mixed, output)"
+    assert nearest_mode(modes, 39.8) == "mode 4 20 Hz (bending, rotor)"
+    assert nearest_mode(modes, 0.0) == "no mode"
+
+
+def test_distance_is_that_of_the_mesh_line_nearest_to_an_elastic_mode(modes):
+    _, lines, elastic = mesh_lines_and_modes(modes)
+    assert [hertz for _, hertz in lines] == [10.0, 20.0] and len(elastic) == 4
+    assert mode_distance(modes) == pytest.approx(20.0 / 19.9 - 1.0)
