@@ -89,8 +89,7 @@ class GearboxResponseResult(StageResult):
                 **_of_paths(found, moved),
                 **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
             }
-        if self.resonances is not None:
-            variables |= resonance_variables(found, self.resonances, moved)
+        variables |= {} if self.resonances is None else resonance_variables(found, self.resonances, moved)
         of_bearings = {stage.name: stage.motion[:, forces] for stage in found.stages}
         size = (len(found.speed), bearings, 3)
         rms = level(found, of_bearings).reshape(size)
