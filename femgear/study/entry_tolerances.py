@@ -167,8 +167,8 @@ def _drawn_entry(case: Any, law: EntryTolerance) -> DrawnEntry:
                 remedy="write the entry into the case with the value about which it is spread",
             )
         number, unit = split(raw, key)
-        one = f"{number + 1.0!r} {unit}".strip()
-        variable = variable or Variable(law.key, f"{number!r} {unit}".strip(), one)
+        higher = f"{number + 1.0!r} {unit}".strip()
+        variable = variable or Variable(law.key, f"{number!r} {unit}".strip(), higher)
         values.append(variable.number(raw))
     assert variable is not None
     entry = DrawnEntry(variable, tuple(values), law)

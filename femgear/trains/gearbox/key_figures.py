@@ -20,7 +20,7 @@ from femgear.trains.gearbox.casing import bearing_name
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.mode_words import mode_distance
 from femgear.trains.gearbox.power import gearbox_flow
-from femgear.trains.gearbox.resonance_table import resonance_speed
+from femgear.trains.gearbox.resonance_table import loudest_resonance
 from femgear.trains.gearbox.sensors import casing_sensors
 from femgear.trains.gearbox.silence import exciting_sections
 
@@ -127,7 +127,7 @@ def _of_responses(case: GearboxCase) -> Iterator[KeyFigure]:
         if stage == "runup":
             for figure, reads, parts in (
                 ("loudest speed", _loudest_speed, sensors),
-                ("resonance speed", resonance_speed, excited),
+                ("resonance speed", loudest_resonance, excited),
             ):
                 for name, labels in (("", ()), *parts):
                     yield KeyFigure(f"{figure} {name}".rstrip(), SPEED, stage, partial(reads, labels), whole=not name)

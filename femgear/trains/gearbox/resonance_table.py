@@ -80,7 +80,7 @@ def describe_resonances(runup: xr.Dataset, modes: Any = None) -> Iterator[Block]
     yield tabulate("Resonances of the run-up", order, columns, notes)
 
 
-def resonance_speed(labels: tuple[str, ...], data: Any) -> float:
+def loudest_resonance(labels: tuple[str, ...], data: Any) -> float:
     """Find the speed of the loudest resonance of some stages, of all where none is named, in runup.nc [rad/s]."""
     if "resonance_level" not in data:
         return float("nan")

@@ -5,7 +5,7 @@ import pytest
 from casings import RPM, pair_in_a_casing
 
 from femgear.storage.contents import as_dataset
-from femgear.trains.gearbox.resonance_table import describe_resonances, resonance_speed
+from femgear.trains.gearbox.resonance_table import describe_resonances, loudest_resonance
 from femgear.trains.gearbox.response import accelerations, solve_gearbox_response
 from femgear.trains.gearbox.response_results import GearboxResponseResult
 from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_speeds
@@ -48,6 +48,6 @@ def test_the_table_begins_with_the_loudest(solved):
     (block,) = describe_resonances(data)
     loudest = data["resonance_level"].values.max(axis=1)
     assert float(block.rows[0][4]) == pytest.approx(loudest.max(), rel=1e-3)
-    speed = resonance_speed((), data)
+    speed = loudest_resonance((), data)
     assert float(block.rows[0][0]) == pytest.approx(speed / RPM, rel=1e-4)
-    assert np.isnan(resonance_speed(("none",), data)) and resonance_speed(("stage",), data) == speed
+    assert np.isnan(loudest_resonance(("none",), data)) and loudest_resonance(("stage",), data) == speed
