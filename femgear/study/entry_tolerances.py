@@ -145,7 +145,8 @@ def read_entry_tolerances(path: str | os.PathLike, case: Any) -> tuple[tuple[Dra
             problems.append(error)
     keys = [key for entry in entries for key in entry.variable.keys]
     for key in sorted({key for key in keys if keys.count(key) > 1}):
-        problems.append(CaseError("an entry has two tolerances", code="E-DUPLICATE", value=key, file=name))
+        message, remedy = "an entry has two tolerances", "keep one of them"
+        problems.append(CaseError(message, code="E-DUPLICATE", value=key, remedy=remedy, file=name))
     if not problems:
         problems += _refused_ends(case, entries, name)
     if problems:
