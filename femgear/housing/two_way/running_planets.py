@@ -34,9 +34,12 @@ from femgear.housing.sensor import ReadOnlyArrays
 from femgear.housing.two_way.carrier_orders import CarrierOrders, MeshPaths, planet_groups
 from femgear.housing.two_way.mesh_fluctuation import CYCLES, MeshFluctuation, gmres
 from femgear.housing.two_way.response import check_repeated
+from femgear.housing.two_way.running_ring import RunningRing, ring_compliance, ring_motion
 from femgear.system.fourier import Product, pad
 from femgear.system.system import MeshExcitation, mesh_harmonics
 
+RING = 1
+"""Contact point of a planet with the ring."""
 _RESIDUAL = 1e-6
 """Residual that is refused."""
 _STILL = 1e-12
@@ -85,6 +88,8 @@ class RunningStage(ReadOnlyArrays):
     flexibility : (N, C, N, C) array, optional
         Compliance between the springs of all planets by bodies that they have in common, such as an elastic
         carrier, in series with the springs [m/N]. A turn from planet to planet maps it on itself.
+    ring : RunningRing, optional
+        Elastic ring in series with the meshes planet-ring.
     """
 
     natural_frequency: np.ndarray
@@ -102,6 +107,7 @@ class RunningStage(ReadOnlyArrays):
     structure_loss: float = 0.0
     viscous: np.ndarray | None = None
     flexibility: np.ndarray | None = None
+    ring: RunningRing | None = None
 
     @property
     def waves(self) -> np.ndarray:
@@ -304,6 +310,27 @@ def forces_on_structure(stage: RunningStage, response: RunningResponse, vectors:
     return found.reshape(orders.patterns, -1, *found.shape[1:]).sum(axis=0)
 
 
+def ring_lines(stage: RunningStage, response: RunningResponse, angles, directions) -> np.ndarray:
+    """Compute amplitudes (Q + 1, S, k) at fixed places of the elastic ring of a stage, beyond those of its seat [m].
+
+    Parameters
+    ----------
+    stage : RunningStage
+    response : RunningResponse
+        Of that stage.
+    angles : (k,) array
+        Of the places around the ring [rad].
+    directions : (k, 2) array
+        Shares of radial (outwards) and tangential displacement.
+    """
+    if stage.ring is None or not len(angles):
+        return np.zeros((*response.modal.shape[:2], len(angles)), complex)
+    psi = np.asarray(stage.paths.planet_angles)[stage.groups[0]]
+    speeds, places = (response.mesh_frequency, response.carrier_speed), (angles, directions)
+    heard = ring_motion(stage.ring, response.orders, response.force[:, RING], psi, speeds, places, response.band)
+    return response.one_sided(heard)
+
+
 class _Problem:
     """A stage with so many harmonics of the excitation and of the response, at any speed."""
 
@@ -428,6 +455,11 @@ class _Problem:
             shared = stage.shared(whole, omega)
             for k in range(b):
                 inner[:, k, :, :, k] += shared[:, k]
+        if stage.ring is not None:
+            angles = np.asarray(stage.paths.planet_angles)[self.leaders]
+            ring = ring_compliance(stage.ring, orders, blocks, orders.bands[bands], angles, (mesh_frequency, speed))
+            for k in range(b):
+                inner[:, k, :, RING, k, :, RING] += ring[:, k]
         system[:, :points, :points] = inner.reshape(len(blocks), points, points)
         A = np.kron(np.eye(b * G), stage.approach)
         system[:, points:, :points], system[:, :points, points:] = A, -A.T
@@ -512,7 +544,7 @@ class _Problem:
         """Side bands (S,) of the structure, and the coordinates (Q + 1, S, m) of its modes."""
         stage, orders = self.stage, self.orders
         N, n, G, C = stage.paths.symmetry, stage.waves, len(self.leaders), len(stage.stiffness)
-        reach = int(orders.bands[-1]) + int(n[-1])
+        reach = int(orders.bands[-1]) + max(int(n[-1]), 0 if stage.ring is None else int(stage.ring.diameter.max()))
         every = np.arange(-reach, reach + 1)
         found = np.zeros((orders.lines + 1, len(every), len(stage.natural_frequency)), complex)
         psi = np.asarray(stage.paths.planet_angles)[self.leaders]

@@ -368,6 +368,9 @@ class RingModel:
         The same with the outer surface held [m/N].
     sector : (Grid, sparse matrix), optional
         Grid of one sector, and its stiffness on the foundation [N/m].
+    participation : (m,) complex array, optional
+        Mass times displacement of every mode along rigid motions of the whole, of one sector: n = 1 along the
+        translation of local components (1, i) [kg^1/2], n = 0 along the rotation [m kg^1/2]; zero of other modes.
     """
 
     modes: CyclicModes
@@ -375,6 +378,7 @@ class RingModel:
     compliance: np.ndarray
     held_compliance: np.ndarray
     sector: tuple[Grid, Any] | None = None
+    participation: np.ndarray | None = None
 
     @cached_property
     def rim_compliance(self) -> np.ndarray | None:
@@ -442,7 +446,18 @@ def ring_model(
         compliance=compliance[0],
         held_compliance=compliance[1],
         sector=(grid, sector.stiffness + foundation),
+        participation=_participation(modes, grid, mass),
     )
+
+
+def _participation(modes: CyclicModes, grid: Grid, mass) -> np.ndarray:
+    """Mass times displacement of every mode along rigid motions, see `RingModel`."""
+    turn = np.column_stack([-grid.points[:, 1], grid.points[:, 0]]).ravel()
+    moved = np.zeros(len(modes.nodal_diameter), complex)
+    for diameter, rigid in ((0, turn), (1, np.tile([1.0, 1j], len(grid.points)))):
+        chosen = modes.nodal_diameter == diameter
+        moved[chosen] = (mass @ rigid) @ (modes.recovery @ modes.reduced[:, chosen]).conj()
+    return moved
 
 
 def _outer_surface_outputs(grid: Grid) -> np.ndarray:

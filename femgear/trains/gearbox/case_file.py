@@ -430,7 +430,7 @@ class BoxPlanetarySection(Section):
     pins: PinSection | None = None
     carrier_body: CarrierBodySection | None = None
     elastic_ring: StrictBool = False
-    """In modes the ring in the casing is elastic, on the foundation that its teeth give."""
+    """In modes and response the ring in the casing is elastic, on the foundation that its teeth give."""
 
     @property
     def counts_pairs(self) -> bool:
@@ -516,13 +516,17 @@ class BoxCasingSection(Section):
 
 
 class BoxSensorSection(Section):
-    """A sensor on the casing, which feels its motion in a ``direction``: along an axis, or a vector of three numbers.
+    """A sensor, which feels the motion of its place in a ``direction``: along an axis, or a vector of three numbers.
 
     On a rigid casing it is at a ``position`` in the coordinates of the case. On one from a file ``name`` is that of a
     node of the role sensor, whose row of the table of nodes has place and direction; a direction here goes before it.
+    On the elastic ``ring`` of a stage it is at an ``angle`` from x on the outer surface, and feels along the radius
+    where no direction is given.
     """
 
     name: Name
+    ring: Name | None = None
+    angle: Angle | None = None
     position: Annotated[tuple[Along, ...], TRIPLE] | None = None
     direction: Annotated[SensorDirection, BeforeValidator(_axis_vector)] | None = None
 

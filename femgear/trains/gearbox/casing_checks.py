@@ -28,21 +28,6 @@ def check_casing(case: GearboxCase) -> Iterator[CaseError]:
     yield from _inertia(section)
     yield from _feet(section)
     yield from _standing(case, section)
-    yield from _elastic_rings(case, section)
-
-
-def _elastic_rings(case: GearboxCase, section: BoxCasingSection) -> Iterator[CaseError]:
-    """Elastic rings in what stands still."""
-    for i, stage in enumerate(case.planetary):
-        if stage.elastic_ring and f"ring of {stage.name}" not in section.stands_still:
-            yield CaseError(
-                "an elastic ring stands on its foundation, which does not move",
-                code="E-CHOICE",
-                key=f"planetary[{i}].elastic_ring",
-                value=True,
-                limit="a ring in a casing that stands still",
-                remedy=f'leave elastic_ring out, or give casing.stands_still = ["ring of {stage.name}"]',
-            )
 
 
 def _motions(case: GearboxCase) -> Iterator[CaseError]:
@@ -172,14 +157,14 @@ def _standing(case: GearboxCase, section: BoxCasingSection) -> Iterator[CaseErro
 
 
 def _sensors(case: GearboxCase) -> Iterator[CaseError]:
-    """Sensors on a casing that moves, each with a name, a direction and a place."""
-    if case.sensor and case.casing is None:
+    """Sensors on a casing that moves or on an elastic ring, each with a name, a direction and a place."""
+    if case.casing is None and any(sensor.ring is None for sensor in case.sensor):
         yield CaseError(
             "a casing that stands still has no motion for a sensor",
             code="E-KEY-MISSING",
             key="casing",
-            limit="a casing on feet, rigid or from a file",
-            remedy="give [casing] with mass, centre, inertia and [[casing.foot]], or leave [[sensor]] out",
+            limit="a casing on feet, rigid or from a file, or a sensor on an elastic ring",
+            remedy="give [casing] with mass, centre, inertia and [[casing.foot]], or ring and angle of the sensor",
         )
     names = [sensor.name for sensor in case.sensor]
     for number, sensor in enumerate(case.sensor):
@@ -201,8 +186,28 @@ def _sensors(case: GearboxCase) -> Iterator[CaseError]:
                 limit="a vector that is not zero",
                 remedy='write direction = "y"',
             )
-        if case.casing is not None:
+        if sensor.ring is not None:
+            yield from _ring_of_sensor(case, key, sensor)
+        elif sensor.angle is not None:
+            limit, remedy = "the angle of a sensor on a ring", 'name its stage, as in ring = "set"'
+            yield CaseError("an angle without a ring", code="E-CHOICE", key=f"{key}.angle", limit=limit, remedy=remedy)
+        elif case.casing is not None:
             yield from _place_of_sensor(key, sensor, case.casing)
+
+
+def _ring_of_sensor(case: GearboxCase, key: str, sensor: BoxSensorSection) -> Iterator[CaseError]:
+    """Ring and angle of a sensor on the elastic ring of a stage."""
+    rings = [stage.name for stage in case.planetary if stage.elastic_ring]
+    if sensor.ring not in rings:
+        limit = ", ".join(rings) or "none: no stage has elastic_ring = true"
+        what = "name a planetary stage whose ring is elastic, or give the position of the sensor on a casing"
+        yield no_such("elastic ring", f"{key}.ring", sensor.ring or "", rings, what, limit=limit)
+    if sensor.angle is None:
+        message, limit = "the angle of the sensor is missing", "where it is around the ring, from x"
+        yield CaseError(message, code="E-KEY-MISSING", key=f"{key}.angle", limit=limit, remedy='write angle = "90 deg"')
+    if sensor.position is not None:
+        message, limit = "a sensor on a ring is at an angle of it", "ring and angle, or a position on the casing"
+        yield CaseError(message, code="E-CHOICE", key=f"{key}.position", limit=limit, remedy="leave it out")
 
 
 def _place_of_sensor(key: str, sensor: BoxSensorSection, casing: BoxCasingSection) -> Iterator[CaseError]:

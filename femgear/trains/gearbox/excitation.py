@@ -8,6 +8,7 @@ middle of the path of contact unless a phase is given, and teeth are as thick as
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from femgear.system.stiffness_waves import pair_count_wave
 from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.case_file import BoxMeshSection, PairSection
 from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.elastic_ring import ElasticRing
 from femgear.trains.gearbox.geometry import StageSizes
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.stage_structure import stage_excitation
@@ -35,7 +37,9 @@ def exciting_stages(found: Deflection) -> list[StageModel]:
     ]
 
 
-def excitation_of(found: Deflection, stage: StageModel, *, steps: Steps | None = None) -> MeshExcitation:
+def excitation_of(
+    found: Deflection, stage: StageModel, rings: Sequence[ElasticRing] = (), *, steps: Steps | None = None
+) -> MeshExcitation:
     """Compute the excitation of one of the `exciting_stages`, see `femgear.trains.gearbox.stage_structure`.
 
     Parameters
@@ -43,9 +47,14 @@ def excitation_of(found: Deflection, stage: StageModel, *, steps: Steps | None =
     found : Deflection
         Loaded state.
     stage : StageModel
+    rings : sequence of ElasticRing
+        Of the gearbox: the meshes of their stages have what the ring leaves.
     steps : Steps, optional
         What other computations of the stage have left.
     """
+    for ring in rings:
+        if ring.stage is stage:
+            return ring.excitation
     if stage.name in found.contacts:
         return stage_excitation(found.contacts[stage.name], steps=steps)
     return pair_count_excitation(found.model, stage)

@@ -21,6 +21,7 @@ from femgear.trains.gearbox.deflection import Deflection, laws_of
 from femgear.trains.gearbox.elastic_carrier import with_carriers
 from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
 from femgear.trains.gearbox.model import GearboxModel, StageModel, member_of_stations
+from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 
 # Share of the kinetic energy from which a mode is of one kind.
 _PURE = 0.8
@@ -96,6 +97,8 @@ class GearboxModes:
         Lines of excitation by name, over the turn of the reference shaft.
     stages : StageMotions
         Shares of the stages in the kinetic energy, and what the planets do.
+    at_sensors : (s, m) array
+        Displacements of all sensors along their directions [kg^-1/2].
     """
 
     deflection: Deflection
@@ -109,6 +112,7 @@ class GearboxModes:
     reference: str
     orders: dict[str, float]
     stages: StageMotions
+    at_sensors: np.ndarray
 
 
 def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
@@ -149,7 +153,7 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     frequencies = [hertz for hertz in model.flow.mesh_frequency.values() if hertz]
     top = case.modes.up_to or (_HARMONICS * max(frequencies) if frequencies else None)
     rings = elastic_rings(model, steps=steps)
-    system, stiffness = with_rings(system, stiffness, model, rings)
+    system, stiffness = with_rings(system, stiffness, assembly, dict(enumerate(assembly.slices)), rings)
     carriers = [stage.elastic_carrier for stage in model.stages if stage.elastic_carrier is not None]
     carriers = [carrier.below(math.inf if top is None else _REACH * top) for carrier in carriers]
     system = with_carriers(system, assembly, carriers)
@@ -160,6 +164,8 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     squares = {ring.name: ring.stiffness for ring in rings} | {one.name: one.frequency**2 for one in carriers}
     inner = _inner_energies(squares, waves * (system.M @ modes.shape)[count:])
     moved = assembly.mass @ motion
+    for ring, part in zip(rings, _parts(squares), strict=False):
+        moved += ring.mass_coupling(assembly).T @ waves[part]
     for carrier, part in zip(carriers, _parts(squares)[len(rings) :], strict=True):
         moved += carrier.on_all_motions(assembly.count) @ waves[part]
     named = [ring.name for ring in rings], [carrier.name for carrier in carriers]
@@ -174,8 +180,11 @@ def solve_gearbox_modes(found: Deflection, *, steps: Steps | None = None) -> Gea
     turning = _in_modes(still, stiffness, system.gyroscopic, speed, count)
     followed = campbell_data(lambda _: turning, speeds, np.zeros(0), orders=tuple(orders.values()), count=count)
     stages = stage_motions(model, motion, moved, modes.frequency)
-    kept = replace(modes, kind=kinds)
-    return GearboxModes(found, kept, motion, members, kinetic, parts, strain, followed, reference, orders, stages)
+    sensors, at_sensors = gearbox_sensors(case), sensor_rows(model) @ motion
+    for ring, part in zip(rings, _parts(squares), strict=False):
+        at_sensors += ring.sensor_rows(sensors) @ waves[part]
+    named = reference, orders, stages, at_sensors
+    return GearboxModes(found, replace(modes, kind=kinds), motion, members, kinetic, parts, strain, followed, *named)
 
 
 def _parts(inner: Mapping[str, np.ndarray]) -> list[slice]:
@@ -191,15 +200,21 @@ def _inner_energies(inner: Mapping[str, np.ndarray], energy: np.ndarray) -> dict
 
 def _mesh_energies(system: MechanicalSystem, stiffness: np.ndarray, modes: Modes) -> np.ndarray:
     """Energy (g, m) of all slices in all modes, with what bodies give way between them."""
-    approach = system.W.T @ modes.shape
+    return spring_forces(system, stiffness, modes.shape) * (system.W.T @ modes.shape)
+
+
+def spring_forces(system: MechanicalSystem, stiffness: np.ndarray, shape: np.ndarray) -> np.ndarray:
+    """Compute forces (g, m) of all slices by motions (n, m), with what bodies give way between them.
+
+    ``stiffness`` (g,) is that of the slices [N/m].
+    """
+    approach = system.W.T @ shape
     if system.flexibility is None:
-        return stiffness[:, None] * approach**2
-    carrying = np.flatnonzero(stiffness > 0.0)
-    force, energy = np.zeros_like(approach), np.zeros_like(approach)
+        return stiffness[:, None] * approach
+    carrying, force = np.flatnonzero(stiffness > 0.0), np.zeros_like(approach)
     compliance = np.diag(1.0 / stiffness[carrying]) + system.flexibility[np.ix_(carrying, carrying)]
     force[carrying] = np.linalg.solve(compliance, approach[carrying])
-    energy[carrying] = force[carrying] * approach[carrying]
-    return energy
+    return force
 
 
 def _in_modes(still: MechanicalSystem, stiffness, gyroscopic, speed: float, count: int) -> MechanicalSystem:

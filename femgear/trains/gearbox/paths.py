@@ -169,9 +169,20 @@ def forces_on_casing(
     names, model = list(paths.names), found.model
     own, pins = f"meshes of {stage.name}", f"pins of {stage.name}"
     by_modes = np.einsum("pcn,nm->pcm", paths.forces, structured.motion)
-    by_modes[[name in (own, pins) for name in names]] = 0.0
+    loss = 1.0 + 2j * model.case.modes.damping_ratio
+    ringed = {f"meshes of {part.ring.stage.name}" for part in structured.rings}
+    by_modes[[name in {own, pins, *ringed} for name in names]] = 0.0
+    for part in structured.rings:
+        if (name := f"meshes of {part.ring.stage.name}") in names:
+            by_modes[names.index(name)] += loss * (model.assembly.led[:, paths.places].T @ part.force)
     size = len(names) * len(paths.places)
     forces = (response.modal @ by_modes.reshape(size, -1).T).reshape(*response.modal.shape[:2], len(names), -1)
+    for part in structured.rings:
+        # its coordinates are relative to the casing, whose acceleration its mass follows
+        if (name := f"meshes of {part.ring.stage.name}") in names:
+            coupling = (part.ring.mass_coupling(model.assembly) @ model.assembly.led)[:, paths.places]
+            pushed = response.modal @ (coupling.T @ part.coordinates).T
+            forces[:, :, names.index(name)] += response.frequency[..., None] ** 2 * pushed
     assembly, casing = model.assembly, model.casing
     assert casing is not None
     of_meshes = np.arange(len(structured.rows)) < structured.meshes

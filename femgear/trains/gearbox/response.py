@@ -21,14 +21,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.case.dependencies import Steps
-from femgear.housing.two_way.running_planets import RunningResponse, solve_running
+from femgear.housing.two_way.running_planets import RunningResponse, ring_lines, solve_running
 from femgear.stages.protocol import Progress, silent
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection
 from femgear.trains.gearbox.deflection import Deflection, spread_rows
+from femgear.trains.gearbox.elastic_ring import elastic_rings
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.paths import CasingPaths, casing_paths, forces_on_casing
-from femgear.trains.gearbox.sensors import sensor_rows
+from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage
 
 _MOST = 2000
@@ -228,16 +229,18 @@ def solve_gearbox_response(
         A mesh that opens (E-CONTACT-OPEN), equations that are nearly singular (E-RESONANCE).
     """
     model, steps = found.model, steps or Steps()
+    rings = elastic_rings(model, steps=steps)
     case, reference = model.case, reference_shaft(model)
     nominal, speeds = abs(model.flow.speed[reference]), np.asarray(speed, float)
     up_to = case.dynamics.up_to
-    rows = np.vstack(output_rows(found))
+    rows, sensors = np.vstack(output_rows(found)), gearbox_sensors(case)
     paths = casing_paths(found) if by_path else None
     lines, done = list[StageLines](), 0
     staged = exciting_stages(found)
     for one in staged:
-        structured = running_stage(found, one, excitation_of(found, one, steps=steps))
-        outputs = np.vstack([rows, mesh_rows(model, one)]) @ structured.motion
+        structured = running_stage(found, one, excitation_of(found, one, rings, steps=steps), rings)
+        forces = np.vstack([rows[len(sensors) :], mesh_rows(model, one)])
+        outputs = np.vstack([structured.at_sensors(rows[: len(sensors)], sensors), forces @ structured.motion])
         lines.append(_stage_lines(found, one, structured, outputs, speeds / nominal, paths))
         done += 1
         progress(stage, done, len(staged))
@@ -280,8 +283,10 @@ def _stage_lines(
         known = {"harmonics": both, "side_bands": bands, "tolerance": model.case.dynamics.tolerance}
         return solve_running(running, mesh * factors[i], carrier * factors[i], **known)
 
-    widest = solve(int(counts.argmax()))
-    harmonic, band, at = _line_numbers(widest, running.paths.symmetry)
+    widest, sensors = solve(int(counts.argmax())), gearbox_sensors(model.case)
+    on_own_ring = [number for number, sensor in enumerate(sensors) if sensor.ring == stage.name]
+    places = np.array([sensors[i].angle for i in on_own_ring]), np.array([sensors[i].on_ring for i in on_own_ring])
+    harmonic, band, at = _line_numbers(widest, running.paths.symmetry, ring_lines(running, widest, *places))
     motion = np.zeros((len(factors), measured, len(harmonic)), complex)
     kinds, count = running.kinds, max(len(stage.planets), 1)
     force, dynamic = np.zeros((len(factors), kinds, 3)), np.zeros((len(factors), kinds))
@@ -295,6 +300,7 @@ def _stage_lines(
         response = widest if i == int(counts.argmax()) else solve(i)
         few = harmonic < len(response.modal)
         amplitude = response.lines(outputs.T)[harmonic[few], at[few]]
+        amplitude[:, on_own_ring] += ring_lines(running, response, *places)[harmonic[few], at[few]]
         motion[i][:, few] = amplitude[:, :measured].T
         approach[i] = np.sqrt(0.5 * (np.abs(amplitude[:, measured:]) ** 2).sum(axis=0))
         if paths is not None and by_path is not None:
@@ -319,9 +325,11 @@ def _stage_lines(
     return StageLines(*lines, residual, radius, tail, outer, products.astype(int), counts, by_path)
 
 
-def _line_numbers(response: RunningResponse, symmetry: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Harmonic and side band (L,) of the lines of the structure, and the places of these bands."""
-    moved = np.abs(response.modal).max(axis=2) > 0.0
+def _line_numbers(
+    response: RunningResponse, symmetry: int, on_ring: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Harmonic and side band (L,) of the lines of structure and ring, and the places of these bands."""
+    moved = (np.abs(response.modal).max(axis=2) > 0.0) | (np.abs(on_ring).max(axis=2, initial=0.0) > 0.0)
     if symmetry > 1:
         moved[0, response.band % symmetry != 0] = False
     moved[0, response.band <= 0] = False

@@ -17,7 +17,7 @@ from femgear.storage.contents import Contents
 from femgear.trains.gearbox.resonance_table import resonance_variables
 from femgear.trains.gearbox.response import GearboxResponse, StageLines, accelerations, by_order, level
 from femgear.trains.gearbox.run_up_speeds import GearboxResonances
-from femgear.trains.gearbox.sensors import casing_sensors
+from femgear.trains.gearbox.sensors import gearbox_sensors
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -66,7 +66,7 @@ class GearboxResponseResult(StageResult):
         """Collect the contents of dynamics.nc or runup.nc."""
         found = self.found
         model = found.deflection.model
-        sensors, bearings = len(casing_sensors(model.case)), len(model.bearings)
+        sensors, bearings = len(gearbox_sensors(model.case)), len(model.bearings)
         forces = slice(sensors, sensors + 3 * bearings)
         variables = _of_stages(found) | _of_lines(found)
         moved = accelerations(found, sensors)
@@ -118,7 +118,7 @@ class GearboxResponseResult(StageResult):
             "axis": (("axis",), list("xyz"), "1", "coordinate"),
         }
         if sensors:
-            coords["sensor"] = (("sensor",), [one.name for one in casing_sensors(model.case)], "1", "sensor")
+            coords["sensor"] = (("sensor",), [one.name for one in gearbox_sensors(model.case)], "1", "sensor")
         if found.paths:
             coords["path"] = (("path",), list(found.paths), "1", "way into the casing")
         if feet:
@@ -163,15 +163,17 @@ def _of_paths(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str,
     each = each.reshape(*size, -1)
     power = np.real(each * whole[:, None].conj()).sum(axis=-1)
     total = np.maximum((np.abs(whole) ** 2).sum(axis=-1), np.finfo(float).tiny)
-    text = "share of the path in the power of the acceleration; negative where it quietens others"
-    return {"path_share": ("speed path sensor", power / total[:, None], "1", text)}
+    share = power / total[:, None]
+    # what a ring does beyond its seat comes by none of these paths
+    share[..., [bool(sensor.ring) for sensor in gearbox_sensors(found.deflection.model.case)]] = np.nan
+    text = "share of the path in the power of the acceleration; negative where it quietens others, NaN on a ring"
+    return {"path_share": ("speed path sensor", share, "1", text)}
 
 
 def _rigid_bodies(found: GearboxResponse) -> list[str]:
-    """Name the rings and carriers whose own modes the modes of the gearbox have, and the response has not."""
+    """Name the carriers whose own modes the modes of the gearbox have, and the response has not."""
     stages = found.deflection.model.stages
-    rings = [f"ring of {stage.name}" for stage in stages if getattr(stage.section, "elastic_ring", False)]
-    return rings + [stage.elastic_carrier.name for stage in stages if stage.elastic_carrier is not None]
+    return [stage.elastic_carrier.name for stage in stages if stage.elastic_carrier is not None]
 
 
 def _complex(name: str, dims: str, values: np.ndarray, unit: str, text: str) -> dict[str, tuple]:
@@ -365,10 +367,10 @@ def _paths(data: xr.Dataset, at: int) -> Block:
     """Shares of the ways into the casing in the power at all sensors."""
     share = data["path_share"].values[at]
     columns = {"path": lambda i: str(data["path"].values[i])} | {
-        str(name): lambda i, sensor=sensor: f"{share[i, sensor]:+.1%}"
+        str(name): lambda i, sensor=sensor: "-" if np.isnan(share[i, sensor]) else f"{share[i, sensor]:+.1%}"
         for sensor, name in enumerate(data["sensor"].values.tolist())
     }
-    order = np.argsort(-np.abs(share).max(axis=1), kind="stable").tolist()
+    order = np.argsort(-np.nan_to_num(np.abs(share)).max(axis=1), kind="stable").tolist()
     note = "shares in the power of the acceleration add up to 100 %; a negative one quietens what comes by others"
     return tabulate(f"Which way it comes, {float(data['speed'].values[at]):.5g} rpm", order, columns, (note,))
 

@@ -350,7 +350,7 @@ class GearboxModesResult(StageResult):
             "critical_speed": ("crossing", [one.speed / RPM for one in critical], "rpm", "speed of a line on a branch"),
             "critical_frequency": ("crossing", [one.frequency for one in critical], "Hz", "frequency there"),
         }
-        variables |= modal_sensor_variables(model, found.motion)
+        variables |= modal_sensor_variables(model, found.at_sensors)
         coords = {
             **coordinates(mode=np.arange(1, len(modes.frequency) + 1)),
             "member": _names("member", found.members, "shaft, or planets of a stage"),

@@ -18,11 +18,12 @@ from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.resonances import crossings, modal_forces, refined_speeds, unresolved
 from femgear.system.system import Modes
 from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
 from femgear.trains.gearbox.model import StageModel
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.response import reference_shaft
-from femgear.trains.gearbox.sensors import sensor_rows
+from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 
 _MOST = 1000
 """Mesh harmonics at most."""
@@ -80,22 +81,28 @@ def gearbox_resonances(
     """
     model, case = found.model, found.model.case
     assembly, system, stiffness = linear_system(found)
+    rings, count = elastic_rings(model, steps=steps), len(system.dofs)
+    system, stiffness = with_rings(system, stiffness, assembly, dict(enumerate(assembly.slices)), rings)
     still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
     modes = undamped_modes(still, stiffness, damping_ratio=case.modes.damping_ratio)
-    at_sensors = (sensor_rows(model) @ assembly.motions @ modes.shape).T
+    at_sensors = (sensor_rows(model) @ assembly.motions @ modes.shape[:count]).T
+    for ring in rings:
+        part = modes.shape[count : count + len(ring.stiffness)]
+        at_sensors += (ring.sensor_rows(gearbox_sensors(case)) @ part).T
+        count += len(ring.stiffness)
     up_to, nominal = case.dynamics.up_to, abs(model.flow.speed[reference_shaft(model)])
     parts, names = [np.zeros((5, 0))], list[str]()
     for stage in exciting_stages(found):
-        excitation = excitation_of(found, stage, steps=steps)
+        excitation = excitation_of(found, stage, rings, steps=steps)
         mesh_turns = model.flow.mesh_frequency[stage.name] / nominal
         if not mesh_turns > 0.0:
             continue
         own_modes = _with_meshes(modes, found, stage, stiffness, excitation.stiffness.mean(axis=1))
         most = excitation.stiffness.shape[1] // (2 * excitation.periods) - 1
         most = min(case.dynamics.mesh_harmonics or _MOST, most)
-        count = int(np.clip(up_to / (mesh_turns * slowest), 1, most))
+        harmonics = int(np.clip(up_to / (mesh_turns * slowest), 1, most))
         output = at_sensors if at_sensors.shape[1] else own_modes.mesh_deflection.T
-        forces = modal_forces(own_modes, excitation, count, output=output)
+        forces = modal_forces(own_modes, excitation, harmonics, output=output)
         met = crossings(forces, mesh_turns * slowest, mesh_turns * fastest, up_to)
         heard = forces.heard[met.row, met.harmonic - 1]
         modal = forces.damping_ratio[met.row], met.harmonic, forces.frequency[met.row]

@@ -1,23 +1,27 @@
-"""Sensors on the casing of a gearbox: their motion, what files are refused for, and what results have of it.
+"""Sensors on a gearbox: their motion, what files are refused for, and what results have of it.
 
-A sensor is a point of the casing and a direction. On a rigid casing the point moves as u + phi x r, by the rigid link
-from the station of the casing; on one from a file as its node, by the rigid body and all elastic motions.
+A sensor is a point and a direction. On a rigid casing the point moves as u + phi x r, by the rigid link from the
+station of the casing; on one from a file as its node, by the rigid body and all elastic motions. On the outer surface
+of an elastic ring it moves as the seat of the ring does, and as the ring does beyond that.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.case.gear_set import planetary_set
 from femgear.case.messages import no_such
 from femgear.errors import CaseError, several
 from femgear.fe.beam import rigid_link
 from femgear.findings import Finding
 from femgear.report.tables import Block, tabulate
-from femgear.trains.gearbox.case_file import DIRECTION_VECTORS, GearboxCase
+from femgear.system.assembly import GROUND
+from femgear.trains.gearbox.case_file import CASING, DIRECTION_VECTORS, BoxSensorSection, GearboxCase, teeth_of
 from femgear.trains.gearbox.casing_file import casing_at_hand, casing_element, casing_file_paths, elastic_casing
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.model import GearboxModel, gearbox_model
@@ -34,7 +38,7 @@ _STILL = 1e-9
 
 
 @dataclass(frozen=True)
-class CasingSensor:
+class BoxSensor:
     """A sensor in the model.
 
     Parameters
@@ -47,19 +51,31 @@ class CasingSensor:
         Unit vector along which it feels.
     node : int or None
         Its node in the file of the casing; None on a rigid one.
+    ring : str
+        Stage on whose elastic ring it is; empty of those on the casing.
+    angle : float
+        Of its place around the ring, from x [rad].
     """
 
     name: str
     place: np.ndarray
     direction: np.ndarray
     node: int | None = None
+    ring: str = ""
+    angle: float = 0.0
+
+    @property
+    def on_ring(self) -> np.ndarray:
+        """Shares (2,) of its direction along the radius, outwards, and along the circumference of the ring."""
+        cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        return np.array([[cosine, sine], [-sine, cosine]]) @ self.direction[:2]
 
 
 def sensor_node_problems(case: GearboxCase, element: Superelement) -> Iterator[CaseError]:
     """List sensors without a node, rows of one name, and nodes that do not move as their sensor feels."""
     names = [node.name for node in element.nodes if node.role == "sensor"]
     for number, sensor in enumerate(case.sensor):
-        if sensor.name not in names:
+        if sensor.ring is None and sensor.name not in names:
             limit = ", ".join(names[:20]) or "none: the table has no nodes of the role sensor NAME"
             what, key = "name a sensor of the table of nodes", f"sensor[{number}].name"
             yield no_such("sensor", key, sensor.name, names, what, limit=limit)
@@ -86,13 +102,13 @@ def sensor_node_problems(case: GearboxCase, element: Superelement) -> Iterator[C
             )
 
 
-def _sensors_of_nodes(case: GearboxCase, element: Superelement) -> Iterator[tuple[CasingSensor, int]]:
+def _sensors_of_nodes(case: GearboxCase, element: Superelement) -> Iterator[tuple[BoxSensor, int]]:
     """Sensors of a table of nodes that have a direction, of the case or of the table, with their nodes."""
-    given = {sensor.name: sensor.direction for sensor in case.sensor}
+    given = {sensor.name: sensor.direction for sensor in case.sensor if sensor.ring is None}
     for node in element.nodes:
         vector = given.get(node.name) or DIRECTION_VECTORS.get(node.direction)
         if node.role == "sensor" and vector is not None:
-            yield CasingSensor(node.name, element.place[node.number], _unit(vector), node.number), node.number
+            yield BoxSensor(node.name, element.place[node.number], _unit(vector), node.number), node.number
 
 
 def _unit(vector: Sequence[float]) -> np.ndarray:
@@ -100,24 +116,38 @@ def _unit(vector: Sequence[float]) -> np.ndarray:
     return np.asarray(vector, float) / np.linalg.norm(vector)
 
 
-def casing_sensors(case: GearboxCase) -> tuple[CasingSensor, ...]:
-    """List the sensors on the casing of a case: those of the case, or of the table of nodes of a file.
+def gearbox_sensors(case: GearboxCase) -> tuple[BoxSensor, ...]:
+    """List the sensors of a case: on the casing those of the case or of the table of nodes of a file, then on rings.
 
     CaseError: see `femgear.trains.gearbox.casing_file.casing_element`.
     """
-    if case.casing is None:
-        return ()
-    if case.casing.file is not None:
-        return tuple(sensor for sensor, _ in _sensors_of_nodes(case, casing_element(case)))
-    return tuple(
-        CasingSensor(sensor.name, np.array(sensor.position), _unit(sensor.direction or ())) for sensor in case.sensor
-    )
+    on_casing, on_rings = list[BoxSensor](), list[BoxSensor]()
+    if case.casing is not None and case.casing.file is not None:
+        on_casing = [sensor for sensor, _ in _sensors_of_nodes(case, casing_element(case))]
+    for sensor in case.sensor:
+        if sensor.ring is not None:
+            on_rings.append(_ring_sensor(case, sensor))
+        elif case.casing is not None and case.casing.file is None:
+            on_casing.append(BoxSensor(sensor.name, np.array(sensor.position), _unit(sensor.direction or ())))
+    return (*on_casing, *on_rings)
+
+
+def _ring_sensor(case: GearboxCase, section: BoxSensorSection) -> BoxSensor:
+    """Sensor on the outer surface of a ring, in the middle of its width, by default along the radius."""
+    stage = next(stage for stage in case.planetary if stage.name == section.ring)
+    angle = section.angle or 0.0
+    out = np.array([math.cos(angle), math.sin(angle), 0.0])
+    shaft = case.shaft_named(stage.sun if stage.sun != CASING else stage.carrier)
+    position = stage.member_position("sun" if stage.sun != CASING else "carrier") or 0.0
+    centre = np.array([*shaft.axis, shaft.start + position])
+    place = centre + planetary_set(teeth_of(stage)).ring.rim_radius * out
+    return BoxSensor(section.name, place, _unit(section.direction or tuple(out)), None, stage.name, angle)
 
 
 def sensor_rows(model: GearboxModel) -> np.ndarray:
     """Compute the displacement (s, 6n) [m] of all sensors along their directions per unit of all motions.
 
-    Rows are those of `casing_sensors`. A motion of the gearbox moves the sensors by ``sensor_rows(model) @ motion``, a
+    Rows are those of `gearbox_sensors`. A motion of the gearbox moves the sensors by ``sensor_rows(model) @ motion``, a
     mode in all motions likewise.
 
     Parameters
@@ -125,18 +155,27 @@ def sensor_rows(model: GearboxModel) -> np.ndarray:
     model : GearboxModel
         With n stations.
     """
-    case, casing, sensors = model.case, model.casing, casing_sensors(model.case)
+    case, casing, sensors = model.case, model.casing, gearbox_sensors(model.case)
     rows = np.zeros((len(sensors), model.assembly.count))
-    if casing is None or not sensors:
-        return rows
     body = None if case.casing is None or case.casing.file is None else elastic_casing(case)[1]
+    seats = {stage.name: stage.members[-1] for stage in model.stages}
     for row, sensor in zip(rows, sensors, strict=True):
-        own = 6 * casing.station
-        row[own : own + 6] = sensor.direction @ rigid_link(sensor.place - casing.centre)[:3]
+        if sensor.ring:
+            _on_seat(row, sensor, seats[sensor.ring], model.assembly.places)
+        elif casing is not None:
+            _on_seat(row, sensor, casing.station, model.assembly.places)
+        if casing is None:
+            continue
         if body is not None and sensor.node is not None and casing.elastic:
             shape, first = body.shape[sensor.node], 6 * casing.elastic[0]
             row[first : first + shape.shape[1]] = sensor.direction @ shape[:3]
     return rows
+
+
+def _on_seat(row: np.ndarray, sensor: BoxSensor, station: int, places: np.ndarray) -> None:
+    """Put into the row (6n,) of a sensor that it moves as a rigid part of a station."""
+    if station != GROUND:
+        row[6 * station : 6 * station + 6] = sensor.direction @ rigid_link(sensor.place - places[station])[:3]
 
 
 def check_sensors(case: GearboxCase) -> None:
@@ -144,21 +183,20 @@ def check_sensors(case: GearboxCase) -> None:
 
     CaseError: see `sensor_node_problems`; E-CHOICE: a direction in which the casing is held.
     """
-    if case.casing is None:
-        return
-    if case.casing.file is not None:
+    if case.casing is not None and case.casing.file is not None:
         problems = [*sensor_node_problems(case, casing_element(case))]
         for problem in problems:
             problem.file = str(casing_file_paths(case)[1]) if problem.key == "casing.nodes" else problem.file
         if problems:
             raise several(problems)
-    sensors = casing_sensors(case)
+    sensors = gearbox_sensors(case)
     if not sensors:
         return
     model = gearbox_model(case)
     motions = model.assembly.motions
     largest = np.abs(sensor_rows(model) @ motions).max(axis=1, initial=0.0)
     still = largest <= _STILL * np.abs(motions).max(initial=1.0)
+    still &= np.array([not np.any(sensor.on_ring) if sensor.ring else True for sensor in sensors])
     if still.any():
         names = ", ".join(sensor.name for sensor, held in zip(sensors, still, strict=True) if held)
         raise CaseError(
@@ -166,7 +204,7 @@ def check_sensors(case: GearboxCase) -> None:
             code="E-CHOICE",
             key="sensor" if case.sensor else "casing.nodes",
             value=names,
-            limit="a direction in which the casing moves",
+            limit="a direction in which the casing moves, or the ring, in its plane",
             remedy='choose another direction, feet that give way, or motions = "space"',
         )
 
@@ -185,13 +223,13 @@ def sensor_notices(case: GearboxCase) -> Iterator[Finding]:
 
 def sensor_coordinates(model: GearboxModel) -> dict[str, tuple]:
     """Collect the names of the sensors, by their dimension; none without sensors."""
-    names = [sensor.name for sensor in casing_sensors(model.case)]
-    return {"sensor": (("sensor",), names, "1", "sensor on the casing")} if names else {}
+    names = [sensor.name for sensor in gearbox_sensors(model.case)]
+    return {"sensor": (("sensor",), names, "1", "sensor")} if names else {}
 
 
 def _places(model: GearboxModel) -> dict[str, tuple]:
     """Variables of place and direction of all sensors."""
-    sensors = casing_sensors(model.case)
+    sensors = gearbox_sensors(model.case)
     return {
         "sensor_place": ("sensor axis", [sensor.place for sensor in sensors], "m", "place of the sensor"),
         "sensor_direction": (
@@ -219,13 +257,12 @@ def static_sensor_variables(states: Sequence[Deflection]) -> dict[str, tuple]:
     }
 
 
-def modal_sensor_variables(model: GearboxModel, motion: np.ndarray) -> dict[str, tuple]:
-    """Collect the shapes of modes (6n, m) at all sensors; none without sensors."""
-    rows = sensor_rows(model)
-    if not len(rows):
+def modal_sensor_variables(model: GearboxModel, at_sensors: np.ndarray) -> dict[str, tuple]:
+    """Collect the shapes (s, m) of modes at all sensors; none without sensors."""
+    if not len(at_sensors):
         return {}
     text = "mode shape of unit mass along the direction of the sensor"
-    return {"sensor_shape": ("sensor mode", rows @ motion, "kg^-1/2", text), **_places(model)}
+    return {"sensor_shape": ("sensor mode", at_sensors, "kg^-1/2", text), **_places(model)}
 
 
 def describe_sensors(data: xr.Dataset, at: int, name: str) -> Iterator[Block]:

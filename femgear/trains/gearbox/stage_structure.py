@@ -23,7 +23,7 @@ from femgear.fe.beam import rigid_link
 from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.profile import base_helix_angle
 from femgear.housing.two_way.carrier_orders import MeshPaths, mean_excitation
-from femgear.housing.two_way.running_planets import RunningStage
+from femgear.housing.two_way.running_planets import RING, RunningStage
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.static import over_width, record_positions, static_supports
 from femgear.system.assembly import GROUND, Assembly, Inertia
@@ -33,8 +33,10 @@ from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, teeth_
 from femgear.trains.gearbox.contact import StageContact
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.elastic_carrier import pin_flexibility
+from femgear.trains.gearbox.elastic_ring import ElasticRing, stage_centre, with_rings
 from femgear.trains.gearbox.model import GearboxModel, StageModel, planet_bearing
-from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.modes import linear_system, spring_forces
+from femgear.trains.gearbox.sensors import BoxSensor
 
 _RECORD = 2**13
 """Positions of the excitation in the mesh period; of sets the next multiple of their planets."""
@@ -84,6 +86,25 @@ def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> Me
 
 
 @dataclass(frozen=True)
+class RingInStructure:
+    """An elastic ring in the structure of a stage.
+
+    Parameters
+    ----------
+    ring : ElasticRing
+        With the coordinates that are in the structure.
+    coordinates : (r, m) array
+        By the modes of the structure [1].
+    force : (6n, m) array
+        What its meshes do to all motions by these modes [N kg^-1/2]; zero of the stage that is taken out.
+    """
+
+    ring: ElasticRing
+    coordinates: np.ndarray
+    force: np.ndarray
+
+
+@dataclass(frozen=True)
 class StructuredStage:
     """A stage, and the structure that it runs in.
 
@@ -97,15 +118,24 @@ class StructuredStage:
         Of every contact point of the first planet: what it does to the structure.
     meshes : int
         Number of these that belong to meshes; those of its pin follow.
+    rings : tuple of RingInStructure
+        Elastic rings in the structure: of other stages, and of its own ring what moves with the casing.
     """
 
     running: RunningStage
     motion: np.ndarray
     rows: tuple[Row, ...]
     meshes: int
+    rings: tuple[RingInStructure, ...] = ()
+
+    def at_sensors(self, rows: np.ndarray, sensors: Sequence[BoxSensor]) -> np.ndarray:
+        """Displacements (s, m) of sensors by the modes, of which all motions make those by the rows (s, 6n)."""
+        return rows @ self.motion + sum(part.ring.sensor_rows(sensors) @ part.coordinates for part in self.rings)
 
 
-def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitation) -> StructuredStage:
+def running_stage(
+    found: Deflection, stage: StageModel, excitation: MeshExcitation, rings: Sequence[ElasticRing] = ()
+) -> StructuredStage:
     """Take a stage out of a gearbox: its planets and meshes, and the modes of the structure without it.
 
     Parameters
@@ -115,11 +145,23 @@ def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitati
     stage : StageModel
         With teeth.
     excitation : MeshExcitation
-        See `stage_excitation`.
+        See `stage_excitation`; with an elastic ring that of `ElasticRing`.
+    rings : sequence of ElasticRing
+        Of all stages that have one.
     """
-    assembly, system, slices = structure_without(found, stage)
+    ring = next((ring for ring in rings if ring.stage.name == stage.name), None)
+    joined = tuple(other.with_structure if other is ring else other for other in rings)
+    assembly, system, slices = structure_without(found, stage, joined)
     modes = undamped_modes(system, slices, damping_ratio=0.0)
-    motion = assembly.motions @ modes.shape
+    count = assembly.motions.shape[1]
+    motion, inner = assembly.motions @ modes.shape[:count], list[RingInStructure]()
+    pressed = spring_forces(system, slices, modes.shape)
+    for other in joined:
+        names = {found.model.assembly.contacts[mesh].name for mesh in other.stage.meshes}
+        ours = [part for part, contact in zip(assembly.slices, assembly.contacts, strict=True) if contact.name in names]
+        pushed = -sum((assembly.columns[:, part] @ pressed[part] for part in ours), np.zeros_like(motion))
+        inner.append(RingInStructure(other, modes.shape[count : count + len(other.stiffness)], pushed))
+        count += len(other.stiffness)
     damping = found.model.case.modes.damping_ratio
     section = stage.section
     planetary = isinstance(section, BoxPlanetarySection)
@@ -131,14 +173,20 @@ def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitati
     mass, gyroscopic, turning = np.zeros((3, 6, 6))
     flexibility, free, meshes = None, np.zeros(0, int), len(rows)
     if planetary:
-        own = slice(6 * stage.planets[0], 6 * stage.planets[0] + 6)
-        free = np.flatnonzero(~found.model.assembly.held[own])
+        first = 6 * stage.planets[0]
+        free = np.flatnonzero(~found.model.assembly.held[first : first + 6])
         used = free[planet_bearing(section)[free] > 0.0]
         pins, springs, flexibility = _pin_rows(found.model, stage, used, meshes)
         rows, stiffness = [*rows, *pins], np.append(stiffness, springs)
         points = np.vstack([points, np.eye(6)[used]])
         mass, gyroscopic, turning = _planet(found.model, stage)
     shape = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rows])
+    waves = None
+    if ring is not None:
+        flexibility = _with_bodies(flexibility, ring.flexibility, len(stage.planets), len(rows))
+        waves = ring.running(2.0 * damping)
+        own = next(part for part in inner if part.ring.stage is stage)
+        shape[RING] += _ring_waves(own.ring, own.coordinates)
     running = RunningStage(
         2.0 * math.pi * modes.frequency,
         np.zeros(len(modes.frequency)),
@@ -154,12 +202,39 @@ def running_stage(found: Deflection, stage: StageModel, excitation: MeshExcitati
         sense,
         structure_loss=2.0 * damping,
         flexibility=flexibility,
+        ring=waves,
     )
-    return StructuredStage(running, motion, tuple(rows), meshes)
+    return StructuredStage(running, motion, tuple(rows), meshes, tuple(inner))
 
 
-def structure_without(found: Deflection, stage: StageModel) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
-    """Take planets, pins and meshes of a stage out of the linear gearbox; stiffness (g,) of the slices left [N/m]."""
+def _ring_waves(ring: ElasticRing, inner: np.ndarray) -> np.ndarray:
+    """Approach (3, m) of the flanks of the ring by modes with these coordinates (r, m), wave by wave from -1 to 1."""
+    waves = np.zeros((3, inner.shape[1]), complex)
+    for n in (0, 1):
+        found = ring.wave[ring.diameter == n] @ inner[ring.diameter == n]
+        waves[1 + n] += found if n == 0 else 0.5 * found
+        if n:
+            # the coordinates are real
+            waves[1 - n] += 0.5 * ring.wave[ring.diameter == n].conj() @ inner[ring.diameter == n]
+    return waves
+
+
+def _with_bodies(flexibility: np.ndarray | None, between: np.ndarray, planets: int, springs: int) -> np.ndarray | None:
+    """Add the compliance (2N, 2N) of the bodies between the meshes to that (N, C, N, C) of the springs [m/N]."""
+    if not between.any():
+        return flexibility
+    whole = np.zeros((planets, springs, planets, springs)) if flexibility is None else flexibility.copy()
+    whole[:, :2, :, :2] += between.reshape(2, planets, 2, planets).transpose(1, 0, 3, 2)
+    return whole
+
+
+def structure_without(
+    found: Deflection, stage: StageModel, rings: Sequence[ElasticRing] = ()
+) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
+    """Take planets, pins and meshes of a stage out of the linear gearbox; stiffness (g,) of the slices left [N/m].
+
+    Coordinates of elastic ``rings`` follow those of the assembly.
+    """
     assembly, _, stiffness = linear_system(found)
     carrier = stage.elastic_carrier
     gone = {*stage.planets, *(carrier.stations[1:] if carrier else ())}
@@ -179,8 +254,12 @@ def structure_without(found: Deflection, stage: StageModel) -> tuple[Assembly, M
         springs=tuple(one for one in assembly.springs if gone.isdisjoint(one.stations)),
         contacts=tuple(one for i, one in enumerate(assembly.contacts) if i not in stage.meshes),
     )
-    system = rest.system()
-    return rest, replace(system, gyroscopic=None), stiffness[kept]
+    system, first, slices = rest.system(), 0, dict[int, slice]()
+    for number, part in enumerate(assembly.slices):
+        if number not in stage.meshes:
+            slices[number] = slice(first, first + part.stop - part.start)
+            first = slices[number].stop
+    return rest, *with_rings(replace(system, gyroscopic=None), stiffness[kept], rest, slices, rings)
 
 
 def _rigid_carrier(model: GearboxModel, stage: StageModel) -> Inertia:
@@ -271,10 +350,8 @@ def row_waves(row: Row, stage: StageModel, station: int, places: np.ndarray) -> 
     if not stage.planets:
         waves[0] = effect
         return waves
-    angle = stage.angles[0]
-    axis = places[stage.planets[0]] - stage.sizes.centre_distance * np.array([math.cos(angle), math.sin(angle), 0.0])
-    beside = np.append((axis - places[station])[:2], 0.0)
-    there, turn = effect @ rigid_link(-beside), np.exp(-1j * angle)
+    beside = np.append((stage_centre(stage, places) - places[station])[:2], 0.0)
+    there, turn = effect @ rigid_link(-beside), np.exp(-1j * stage.angles[0])
     waves[1, [2, 5]] = there[[2, 5]]
     for first in (0, 3):
         x, y = there[first : first + 2]

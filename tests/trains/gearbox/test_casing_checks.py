@@ -47,15 +47,15 @@ def test_a_casing_does_not_move_where_shafts_only_rotate():
     assert problems(pair_tables() | {"casing": casing_tables(), "motions": "rotation"}) == {"casing": "E-CHOICE"}
 
 
-def test_an_elastic_ring_needs_a_casing_that_stands_still():
-    tables = pair_tables() | {"casing": casing_tables()}
-    teeth = {"model": "elastic"}
-    stage = {"name": "set", "sun": "sun", "carrier": "carrier", "elastic_ring": True, "teeth": teeth}
-    tables["shaft"] += [{"name": "sun"}, {"name": "carrier"}]
-    tables["planetary"] = [stage]
-    assert "planetary[0].elastic_ring" in problems(tables)
-    tables["casing"]["stands_still"] = ["ring of set"]
-    assert "planetary[0].elastic_ring" not in problems(tables)
+def test_a_sensor_on_a_ring_needs_an_elastic_ring_and_an_angle():
+    tables = pair_tables()
+    tables["sensor"] = [{"name": "top", "ring": "set"}, {"name": "side", "angle": "20 deg"}]
+    assert problems(tables) == {
+        "casing": "E-KEY-MISSING",
+        "sensor[0].ring": "E-CHOICE",
+        "sensor[0].angle": "E-KEY-MISSING",
+        "sensor[1].angle": "E-CHOICE",
+    }
 
 
 def test_bearings_are_not_called_as_other_seats():

@@ -12,9 +12,9 @@ from femgear.trains.gearbox.model import gearbox_model
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.results import describe_deflection
 from femgear.trains.gearbox.sensors import (
-    casing_sensors,
     check_sensors,
     describe_modes_at_sensors,
+    gearbox_sensors,
     sensor_notices,
     sensor_rows,
 )
@@ -62,7 +62,7 @@ def test_words_for_directions_are_vectors(word):
 
 
 def test_a_direction_of_any_length_counts_as_a_unit_vector():
-    long, short = (casing_sensors(read_case(on_rigid(TOP | {"direction": [0.3 * f, 0.4 * f, 0]})))[0] for f in (2, 1))
+    long, short = (gearbox_sensors(read_case(on_rigid(TOP | {"direction": [0.3 * f, 0.4 * f, 0]})))[0] for f in (2, 1))
     assert long.direction == pytest.approx([0.6, 0.8, 0.0], rel=1e-15)
     assert short.direction == pytest.approx(long.direction, rel=1e-15)
 
@@ -92,7 +92,7 @@ def test_sensors_of_a_file_move_as_their_nodes(tmp_path):
     """Those on seats as these, and one at the body that the seats hang on as the matrices say."""
     rows = [(2, "A up", "y"), (4, "C along", "-z")]
     case = box(tmp_path, rows, [{"name": "body", "direction": [0.6, 0.8, 0.0]}])
-    names = [sensor.name for sensor in casing_sensors(case)]
+    names = [sensor.name for sensor in gearbox_sensors(case)]
     assert names == ["body", "A up", "C along"]
     found = solve_deflection(case)
     moved, stations = sensor_rows(found.model) @ found.motion, found.motion.reshape(-1, 6)
