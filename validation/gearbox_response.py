@@ -65,7 +65,8 @@ def pair_on_bearings() -> tuple[Row, ...]:
 
 def without_loss(stage: RunningStage) -> RunningStage:
     """Stage without damping and without the gyroscopic terms of its planets."""
-    return replace(stage, loss=0.0 * stage.loss, structure_loss=0.0, gyroscopic=0.0 * stage.gyroscopic)
+    ring = None if stage.ring is None else replace(stage.ring, loss=0.0)
+    return replace(stage, loss=0.0 * stage.loss, structure_loss=0.0, gyroscopic=0.0 * stage.gyroscopic, ring=ring)
 
 
 def synthetic_excitation(found: Deflection, stage: StageModel) -> MeshExcitation:

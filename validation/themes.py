@@ -27,6 +27,7 @@ from validation import (
     gearbox_in_time,
     gearbox_power,
     gearbox_response,
+    gearbox_rings,
     gearbox_statics,
     geometry,
     helical,
@@ -361,15 +362,18 @@ THEMES = (
         "uneven springs, helical ones with tilts and gyroscopic terms in a casing beside their axis. Compared with: "
         "the same bodies in axes at rest, integrated over a turn by DOP853; the solution for gear sets, on pairs and "
         "on planets whose carrier stands still; symmetry; power put in and lost; inertia and forces of the casing; "
-        "two stages whose stiffness fluctuates at once. Gates: 1e-6 in time; 1e-10 of lines that symmetry forbids; "
-        "1e-9; a factor of two for the estimate of what one stage after the other leaves out.",
+        "two stages whose stiffness fluctuates at once; elastic rings: the set on its foundation at full band, all nodes "
+        "of a ring in a casing. Gates: 1e-6 in time; 1e-10 of lines that symmetry forbids; 1e-9, of elastic rings "
+        "1e-8 and 1e-4 of frequencies; a factor of two for the estimate of what one stage after the other leaves out.",
         (
+            gearbox_rings.on_foundation,
             gearbox_response.equal_planets,
             gearbox_response.pair_on_bearings,
             gearbox_response.carrier_at_rest,
             gearbox_power.input_and_losses,
         ),
         (
+            gearbox_rings.in_casing,
             gearbox_in_time.in_time,
             gearbox_in_time.six_motions,
             gearbox_power.casing_forces,
