@@ -21,7 +21,7 @@ from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.mode_words import mode_distance
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.resonance_table import loudest_resonance
-from femgear.trains.gearbox.sensors import casing_sensors
+from femgear.trains.gearbox.sensors import gearbox_sensors
 from femgear.trains.gearbox.silence import exciting_sections
 
 MICROMETRES = Dimension("a length", "m", "um", 1e-6)
@@ -110,7 +110,7 @@ def _of_modes() -> Iterator[KeyFigure]:
 
 
 def _of_responses(case: GearboxCase) -> Iterator[KeyFigure]:
-    sensors = [(sensor.name, (sensor.name,)) for sensor in casing_sensors(case)]
+    sensors = [(sensor.name, (sensor.name,)) for sensor in gearbox_sensors(case)]
     flow = gearbox_flow(case)
     excited = [(stage.name, (stage.name,)) for stage in exciting_sections(case) if flow.carries(stage)]
     for words, stage in _RESPONSES:
