@@ -364,7 +364,8 @@ THEMES = (
         "on planets whose carrier stands still; symmetry; power put in and lost; inertia and forces of the casing; "
         "two stages whose stiffness fluctuates at once; elastic rings: the set on its foundation at full band, all "
         "nodes of a ring in a casing. Gates: 1e-6 in time; 1e-10 of lines that symmetry forbids; 1e-9, of elastic "
-        "rings 1e-8 and 1e-4 of frequencies; a factor of two for the estimate of what one stage after the other leaves out.",
+        "rings 1e-8 and 1e-4 of frequencies; a factor of two for the estimate of what one stage after the other "
+        "leaves out.",
         (
             gearbox_rings.on_foundation,
             gearbox_response.equal_planets,
