@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
@@ -18,11 +19,12 @@ from femgear.housing.two_way.running_planets import RunningResponse, solve_runni
 from femgear.run import solve
 from femgear.solvers.linear.modal import viscous_damping
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.stages.lumped_set import gear_set_modes
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import FourierSeries, distinct_lines, harmonics_of, orders_of, sample
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet
-from femgear.system.system import MeshExcitation, NonlinearSystem
+from femgear.system.system import MechanicalSystem, MeshExcitation, NonlinearSystem
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import excitation_of, mesh_phases
 from femgear.trains.gearbox.model import StageModel
@@ -401,47 +403,98 @@ def turning() -> tuple[Row, ...]:
     return tuple(rows)
 
 
+@dataclass(frozen=True)
+class AtOnce:
+    """The example at rest with k(t) of its stages, three harmonics each, as one system for harmonic balance.
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state.
+    system : MechanicalSystem
+        About that state, all modes with a damping ratio of 0.03.
+    """
+
+    found: Deflection
+    system: MechanicalSystem
+
+    def solve(self, factor: float, orders: Iterable[np.ndarray], only: int | None = None) -> PeriodicSolution:
+        """Lines of all meshes at a factor of the speed of operation; k(t) of one stage ``only``, by its number."""
+        elements, stages = [], self.found.model.stages
+        for number, stage in enumerate(stages, 1):
+            lines = harmonics_of(with_pairs(self.found, number).excitation.stiffness, 3)
+            lines[:, 1:] *= only in (None, number)
+            series = FourierSeries(lines)
+            base = orders_of(number - 1, len(stages), 1)
+            series = replace(series, orders=tuple(series.orders[0] * order for order in base))
+            elements.append(GearMeshes(np.array(stage.meshes), series, separates=False))
+        mesh = [2.0 * math.pi * factor * self.found.model.flow.mesh_frequency[stage.name] for stage in stages]
+        problem = NonlinearSystem(self.system, tuple(elements))
+        solution = solve_harmonic_balance(problem, np.array(mesh), orders=distinct_lines(orders), stability=False)
+        assert solution.converged
+        return solution
+
+    def pressed(self, solution: PeriodicSolution, stage: StageModel) -> dict[tuple[int, ...], np.ndarray]:
+        """Forces (M,) of the meshes of a stage beyond their mean stiffness, line by line."""
+        own = list(stage.meshes)
+        beyond = solution.force[own] - mesh_stiffness(self.found)[own, None] * solution.deflection[own]
+        return {tuple(order.tolist()): beyond[:, line] for line, order in enumerate(solution.orders) if order.any()}
+
+
+def at_once() -> AtOnce:
+    """Assemble the example about its loaded state."""
+    found = loaded()
+    system, stiffness = linear_system(found)[1:]
+    load = found.model.assembly.motions.T @ found.model.load
+    still = replace(system, gyroscopic=None, load=load)
+    return AtOnce(found, replace(still, C=viscous_damping(still, stiffness, 0.03)))
+
+
 def balance() -> tuple[Row, ...]:
     """All stages with k(t) at once by harmonic balance, beside the former train and beside stage by stage."""
-    rows, former, found = list[Row](), stored()["balance"], loaded()
-    stages = found.model.stages
-    system, stiffness = linear_system(found)[1:]
-    assembly = found.model.assembly
-    still = replace(system, gyroscopic=None, load=assembly.motions.T @ found.model.load)
-    elements = []
-    for number, stage in enumerate(stages, 1):
-        excitation, orders = with_pairs(found, number).excitation, orders_of(number - 1, len(stages), 1)
-        series = FourierSeries(harmonics_of(excitation.stiffness, 3))
-        series = replace(series, orders=tuple(series.orders[0] * order for order in orders))
-        elements.append(GearMeshes(np.array(stage.meshes), series, separates=False))
-    damped = replace(still, C=viscous_damping(still, stiffness, 0.03))
-    problem = NonlinearSystem(damped, tuple(elements))
-    unit = np.eye(len(stages), dtype=int)
-    for factor, entry in former.items():
-        orders = distinct_lines([np.array(line) for line in entry["orders"] if any(line)])
-        mesh = [2.0 * math.pi * float(factor) * found.model.flow.mesh_frequency[stage.name] for stage in stages]
-        solution = solve_harmonic_balance(problem, np.array(mesh), orders=orders, stability=False)
-        assert solution.converged and len(unit) == len(stages)
+    rows, example = list[Row](), at_once()
+    stages = example.found.model.stages
+    note = "structural damping beside that of modes"
+    for text, entry in stored()["balance"].items():
+        factor = float(text)
+        solution = example.solve(factor, [np.array(line) for line in entry["orders"] if any(line)])
         force = solution.force[[stage.meshes[0] for stage in stages]][:, 1:]
         exact = np.sqrt(0.5 * (np.abs(force) ** 2).sum(axis=1))
-        one_by_one = np.sqrt(
-            (solve_gearbox_response(found, [float(factor) * 50.0 * math.pi]).mesh_forces[0] ** 2).sum(axis=1)
-        )
+        response = solve_gearbox_response(example.found, [factor * 50.0 * math.pi])
+        one_by_one = np.sqrt((response.mesh_forces[0] ** 2).sum(axis=1))
         for number, (stage, reference) in enumerate(zip(stages, entry["rms"], strict=True)):
-            speed = f"{1500 * float(factor):.0f} rpm"
+            speed, alone = f"{1500 * factor:.0f} rpm", one_by_one[stage.meshes[0]]
             name = f"k(t) of all stages at {speed}: r.m.s. force in sun-planet 1 of {stage.name} [N]"
             rows.append(within("MS", FORMER, name, reference, exact[number], 1e-6))
-            text = f"stage by stage at {speed}: the same of {stage.name} [N]"
-            rows.append(
-                information(
-                    "MS",
-                    "k(t) of all stages",
-                    text,
-                    exact[number],
-                    one_by_one[stage.meshes[0]],
-                    note="structural damping beside that of modes",
-                )
-            )
+            name = f"stage by stage at {speed}: the same of {stage.name} [N]"
+            rows.append(information("MS", "k(t) of all stages", name, exact[number], alone, note=note))
+    return tuple(rows)
+
+
+def left_out() -> tuple[Row, ...]:
+    """What W-CROSS says of every stage, beside k(t) of all of them at once with sums and differences of their lines."""
+    rows, example, unit = list[Row](), at_once(), np.eye(4, dtype=int)
+    single = [[h * base for h in (1, 2, 3)] for base in unit]
+    orders = [order for own in single for order in own]
+    orders += [
+        first + sign * second
+        for a, own in enumerate(single)
+        for other in single[:a]
+        for first in own
+        for second in other
+        for sign in (-1, 1)
+    ]
+    for factor in (0.7, 1.0):
+        whole = example.solve(factor, orders)
+        response = solve_gearbox_response(example.found, [factor * 50.0 * math.pi])
+        shares = np.sqrt((response.cross_excitation[0] ** 2).sum(axis=1))
+        for number, stage in enumerate(example.found.model.stages):
+            alone = example.pressed(example.solve(factor, single[number], number + 1), stage)
+            lines = [force - alone.get(order, 0.0) for order, force in example.pressed(whole, stage).items()]
+            exact = np.sqrt(0.5 * (np.abs(lines) ** 2).sum(axis=0)).reshape(2, -1).max(axis=1)
+            share = float((exact / response.dynamic_forces[0, number]).max())
+            name = f"force left out of {stage.name} at {1500 * factor:.0f} rpm, estimate over exact, binary logarithm"
+            rows.append(at_most("MS", "k(t) of all stages", name, 1.0, math.log2(shares[number] / share)))
     return tuple(rows)
 
 

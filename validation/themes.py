@@ -436,6 +436,7 @@ THEMES = (
             multistage.former_response,
             multistage.turning,
             multistage.balance,
+            multistage.left_out,
             multistage.published,
         ),
     ),
