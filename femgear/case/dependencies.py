@@ -45,6 +45,13 @@ _DYNAMIC = _WORDS | {"static.stresses", "static.members"}
 """What decides neither modes nor response."""
 _SOLUTION = {f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")}
 """How the contact is solved, whatever the grids."""
+_BESIDE = {
+    "deflection": {"modes", "dynamics", "runup"},
+    "modes": {"dynamics", "runup"},
+    "dynamics": {"modes", "runup"},
+    "runup": {"modes"},
+}
+"""Tables of a gearbox that are those of other stages, by stage."""
 _HELIX = {"helical.helix_angle"}
 """All that the transverse section of helical gears depends on."""
 
@@ -101,6 +108,12 @@ def runup_entries(case: Case) -> Entries:
     return _entries(case, (_DYNAMIC - {"housing", "runup"}) | {"housing.published"})
 
 
+def box_entries(stage: str, case: ReadCase) -> Entries:
+    """List the entries of a gearbox that decide a stage, which goes on from the deflection alone."""
+    kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup") else frozenset()
+    return _entries(case, {"format", "title"} | _BESIDE[stage], kept=kept)
+
+
 def every_entry(case: ReadCase) -> Entries:
     """List all entries, of which a stage that names none may take any."""
     return {key: value for key, value, *_ in _entries_of(case)}
@@ -118,7 +131,7 @@ def ring_entries(case: Case) -> Entries:
     return _entries(case, left_out, FLANK_ENTRIES | _SUPPORTS | _WIDTH | {"mass", "inertia"}, kept=_HELIX)
 
 
-def _entries(case: Case, left_out: Set[str], parts: Set[str] = frozenset(), *, kept: Set[str] = frozenset()) -> Entries:
+def _entries(case: Any, left_out: Set[str], parts: Set[str] = frozenset(), *, kept: Set[str] = frozenset()) -> Entries:
     """Entries without tables and keys that are left out, but for those kept, and without parts of keys."""
     return {
         key: value

@@ -11,10 +11,11 @@ from small_gearbox import pair_tables
 
 from femgear.exchange.casing_files import read_nodes
 from femgear.exchange.superelement import SUPERELEMENT_ROLES
-from femgear.trains.gearbox.case_file import BoxCasingSection
+from femgear.trains.gearbox.case_file import BoxBearingSection, BoxCasingSection
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.reading import read_case
+from validation.tools import gearbox_keys
 
 PAGE = (Path(__file__).parents[2] / "docs" / "gearbox.md").read_text(encoding="utf-8")
 CASING = PAGE[PAGE.index("## The casing") : PAGE.index("## What comes out")]
@@ -43,3 +44,10 @@ def test_the_elastic_casing_of_the_page_has_entries_and_roles_that_there_are(tmp
     assert next(csv.reader(StringIO(text[1])))[:2] == ["node", "role"]
     (tmp_path / "nodes.csv").write_text(text[1])
     assert [node.role for node in read_nodes(tmp_path / "nodes.csv", SUPERELEMENT_ROLES)] == ["seat", "seat", "foot"]
+
+
+def test_the_table_of_keys_is_that_of_the_sections():
+    assert gearbox_keys.page_with_table(PAGE) == PAGE, "run python validation/tools/gearbox_keys.py"
+    rows = dict(re.findall(r"^\| `\[\[bearing\]\]` \| `(\w+)` \| .* \| (.*) \|$", PAGE, flags=re.M))
+    assert rows.keys() == BoxBearingSection.model_fields.keys()
+    assert rows["shaft"] == "needed" and rows["inner_osculation"] == "0.52" and rows["estimated"] == "`false`"

@@ -23,6 +23,7 @@ TUTORIAL = ("drawing_to_ste",)
 HOW_TO = (
     "how_to",
     "silent_without_load",
+    "which_part_makes_the_noise",
     "choosing_teeth",
     "optimise",
     "side_bands",

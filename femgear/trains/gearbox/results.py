@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,6 +71,16 @@ class DeflectionResult(StageResult):
     states: tuple[Deflection, ...]
     chosen: int
     estimates: tuple[Deflection, ...] = ()
+
+    def of(self, case: GearboxCase) -> DeflectionResult:
+        """Give the same states to a case that differs in entries of later stages alone."""
+        if case is self.case:
+            return self
+        states, estimates = (
+            tuple(replace(state, model=replace(state.model, case=case)) for state in every)
+            for every in (self.states, self.estimates)
+        )
+        return replace(self, case=case, states=states, estimates=estimates)
 
     @property
     def state(self) -> Deflection:

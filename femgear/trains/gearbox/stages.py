@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
-from femgear.case.dependencies import Steps
+from femgear.case.dependencies import Steps, box_entries
 from femgear.case.quantities import RPM
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
@@ -65,7 +66,7 @@ def solve_box_modes(
     case: GearboxCase, deflection: DeflectionResult, *, steps: Steps | None = None
 ) -> GearboxModesResult:
     """Solve for the modes of the gearbox about the loaded state of its chosen load case."""
-    return GearboxModesResult(solve_gearbox_modes(deflection.state, steps=steps))
+    return GearboxModesResult(solve_gearbox_modes(deflection.of(case).state, steps=steps))
 
 
 @one_blas_thread()
@@ -73,7 +74,7 @@ def solve_box_dynamics(
     case: GearboxCase, deflection: DeflectionResult, *, progress: Progress = silent, steps: Steps | None = None
 ) -> GearboxResponseResult:
     """Solve for the response to all stages at the speeds of the chosen load case."""
-    state = deflection.state
+    state = deflection.of(case).state
     speed = [abs(state.model.flow.speed[reference_shaft(state.model)])]
     return GearboxResponseResult(
         solve_gearbox_response(state, speed, steps=steps, progress=progress, by_path=True), whole=True
@@ -88,7 +89,7 @@ def solve_box_runup(
 
     Resonances whose peaks are narrower than the steps get speeds of their own.
     """
-    state = deflection.state
+    state = deflection.of(case).state
     nominal = abs(state.model.flow.speed[reference_shaft(state.model)])
     start, stop = case.runup.start or 0.25 * nominal, case.runup.to or 1.25 * nominal
     equal_steps = np.linspace(start, stop, case.runup.count)
@@ -157,6 +158,7 @@ GEARBOX = Train(
     stages=(
         Stage(
             name="deflection",
+            decided_by=partial(box_entries, "deflection"),
             title="System deflection",
             solve=solve_deflections,
             options=("progress", "steps"),
@@ -168,6 +170,7 @@ GEARBOX = Train(
         ),
         Stage(
             name="modes",
+            decided_by=partial(box_entries, "modes"),
             title="Modes",
             solve=solve_box_modes,
             takes=("deflection",),
@@ -179,6 +182,7 @@ GEARBOX = Train(
         ),
         Stage(
             name="dynamics",
+            decided_by=partial(box_entries, "dynamics"),
             title="Response",
             solve=solve_box_dynamics,
             takes=("deflection",),
@@ -192,6 +196,7 @@ GEARBOX = Train(
         ),
         Stage(
             name="runup",
+            decided_by=partial(box_entries, "runup"),
             title="Run-up",
             solve=solve_box_runup,
             takes=("deflection",),

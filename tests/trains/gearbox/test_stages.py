@@ -5,12 +5,14 @@ import pytest
 from casings import casing_tables
 from small_gearbox import pair_tables
 
+from femgear.case.dependencies import Steps
 from femgear.exchange.formats import Sampling
 from femgear.run import export_results, run_case
 from femgear.storage.results import run_folder
 from femgear.trains.gearbox.results import describe_deflection, describe_gearbox_modes
 from femgear.trains.gearbox.stages import describe_gearbox
 from femgear.trains.gearbox.verdict import gearbox_verdict
+from femgear.trains.live import Answer, Live
 from femgear.trains.reading import open_results, read_case
 
 
@@ -90,3 +92,23 @@ def test_a_run_on_feet_has_pictures_tables_and_signals_of_its_response(tmp_path)
     files = export_results(results, tmp_path / "exported", ["wav", "uff"], Sampling(duration=0.1, run_up=0.1))
     assert files == ["signals.uff", "modes.uff", "sensor_top_1000_rpm.wav", "sensor_top_run_up.wav"]
     assert {path.name for path in (tmp_path / "exported").iterdir()} == {*files}
+
+
+def test_changes_leave_the_stages_that_they_do_not_decide():
+    tables = pair_tables() | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
+    tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
+    tables["pair"][0]["mesh"]["contact_ratio"] = 1.6
+    tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
+    handle = Live(read_case(tables))
+    deflection, dynamics = handle.answer.deflection, handle.answer.dynamics
+    assert handle.change({"title": "another", "runup.count": 3}).dynamics is dynamics
+    damped = handle.change({"modes.damping_ratio": 0.06, "modes.up_to": "1 kHz"})
+    assert handle.changed == {"deflection": False, "modes": True, "dynamics": True, "runup": True}
+    assert damped.deflection is deflection
+    alone = Answer(damped.case, Steps()).dynamics.contents()
+    for name in ("level", "mesh_force_rms", "path_share"):
+        assert damped.dynamics.contents()[name].values == pytest.approx(alone[name].values, rel=1e-12, nan_ok=True)
+    assert (damped.dynamics.contents()["level"].values < dynamics.contents()["level"].values).all()
+    assert damped.modes.contents()["damping_ratio"].values[-1] == pytest.approx(0.06)
+    handle.change({"bearing[0].radial": "1e8 N/m"})
+    assert all(handle.changed.values())
