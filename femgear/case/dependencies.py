@@ -33,7 +33,7 @@ _GEARS = ("sun", "planet", "ring", "gear_1", "gear_2")
 _LIMITS = {
     f"{of}material.{name}_stress_limit" for of in ("", *(f"{gear}." for gear in _GEARS)) for name in ("root", "contact")
 }
-_WORDS = {"format", "title", "housing", "runup", *_LIMITS}
+_WORDS = {"format", "title", "housing", "runup", "strength", *_LIMITS}
 """No stage before housing and run-up depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _WIDTH = {"tilt_stiffness", "misalignment", "torque_end", "torsion_diameter"}
@@ -72,6 +72,11 @@ def solution_entries(case: Any) -> Entries:
     given = {key: value for key, value in every_entry(case).items() if key.startswith("operation.")}
     given.pop("operation.speeds", None)
     return {**static_entries(case), **given, "static.stresses": case.static.stresses}
+
+
+def stress_entries(case: Any) -> Entries:
+    """List all that decides stresses: that of the static solution, and by what the nominal ones are rated."""
+    return {**solution_entries(case), "strength": repr(case.strength)}
 
 
 def state_entries(case: Case) -> Entries:

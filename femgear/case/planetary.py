@@ -27,6 +27,7 @@ from femgear.case.sections import (
     RunupSection,
     SetSection,
     StaticSection,
+    StrengthSection,
     SunSection,
 )
 from femgear.case.teeth import GearCase, case_overlap, flank_form, free_tips, gear_of, pitch_of, runout_of
@@ -65,6 +66,7 @@ class Case(GearCase):
     dynamics: DynamicsSection = DynamicsSection()
     housing: HousingSection = HousingSection()
     runup: RunupSection = RunupSection()
+    strength: StrengthSection = StrengthSection()
 
     @property
     def module(self) -> float:

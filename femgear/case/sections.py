@@ -334,6 +334,19 @@ class GearMaterialSection(Section):
     contact_stress_limit: _StressLimit | None = None
 
 
+class StrengthSection(Section):
+    """How teeth are rated by ISO 6336.
+
+    ``quality`` is the flank tolerance class of ISO 1328-1, from which K_v, K_Halpha and K_Falpha of part 1 follow;
+    ``modification`` how helical teeth are modified: by experience, or as a calculation has proven (f_ZCa).
+    """
+
+    edition: Literal[2006, 2019] = 2019
+    application_factor: Annotated[float, Number(0.1, 10.0)] = 1.0
+    quality: Annotated[int, Count(1, 11)] | None = None
+    modification: Literal["none", "experience", "proven"] | None = None
+
+
 class ShaftPartSection(Section):
     """One part of a stepped shaft of the material of its member."""
 

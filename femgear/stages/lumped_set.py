@@ -51,26 +51,26 @@ def entries_with_verb(names: list[str]) -> str:
     return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
 
 
-def entries_without_effect(data: dict, others: Sequence[str] = ()) -> list[str]:
-    """List entries that no set of rigid bodies takes up: machines, housing, run-up, foundation of the ring,
-    strength, others.
+def entries_without_effect(data: dict, others: Sequence[str] = (), *, rated: bool = False) -> list[str]:
+    """List entries that no set of rigid bodies takes up: machines, housing, run-up, foundation of the ring, others.
 
-    ``data`` are the tables of a case file that was checked.
+    ``data`` are the tables of a case file that was checked; strength has an effect where teeth are ``rated``.
     """
     machines = [name for name in ("motor", "brake", "housing", "runup") if name in data]
     keys = ("foundation_radial", "foundation_tangential")
     foundation = (f"ring.{key}" for key in keys if key in data["ring"])
-    return [*machines, *others, *foundation, *strength_entries(data)]
+    return [*machines, *others, *foundation, *([] if rated else strength_entries(data))]
 
 
 def strength_entries(data: dict) -> list[str]:
-    """List the limits of the materials, from which elastic sets alone find safeties."""
+    """List the entries of safeties: the section ``strength``, and limits of the materials."""
     tables = {"material": data["material"]} | {
         f"{gear}.material": data[gear]["material"]
         for gear in ("sun", "planet", "ring", "gear_1", "gear_2")
         if "material" in data.get(gear, {})
     }
-    return [f"{name}.{key}" for name, table in tables.items() for key in table if key.endswith("_stress_limit")]
+    limits = [f"{name}.{key}" for name, table in tables.items() for key in table if key.endswith("_stress_limit")]
+    return [*limits, *(["strength"] if "strength" in data else [])]
 
 
 def flank_entries(data: dict) -> list[str]:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -25,6 +24,7 @@ from femgear.case.dependencies import (
     compliance_entries,
     solution_entries,
     static_entries,
+    stress_entries,
 )
 from femgear.case.gear_set import (
     material_of,
@@ -64,23 +64,22 @@ from femgear.contact.width_waves import (
     waves_of_gears,
     with_ring_waves,
 )
-from femgear.errors import LESS_TORQUE, CaseError, ContactError, GeometryError
-from femgear.fe.elasticity import Material, foundation, material_of_each
+from femgear.errors import LESS_TORQUE, CaseError, ContactError
+from femgear.fe.elasticity import foundation
 from femgear.gears.deviations import SetDeviations, common_period
-from femgear.gears.iso6336 import contact_ratio_factor, nominal_contact_stress, overlap_of
-from femgear.gears.iso6336_root import nominal_root_stress, root_face_width
+from femgear.gears.iso6336_root import root_face_width
 from femgear.gears.pair import GearSet
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.stages.static_results import (
     SLICES,
-    NominalStresses,
     StaticResult,
     StressResult,
     describe_static,
     describe_stress,
 )
+from femgear.stages.strength import case_stresses
 
 if TYPE_CHECKING:
     from femgear.case.teeth import GearCase
@@ -494,7 +493,7 @@ def solve_stress(case: Case, static: StaticResult, *, progress: Progress = silen
         between=tuple(root_stress_cycle(gears, influences, record, reverse=reverse) for record in between),
         ranges=ranges,
         spectrum=load_spectrum(gears, teeth, closes=closes),
-        nominal=nominal_stresses(gears, static.sun_torque, materials_of(case)),
+        nominal=case_stresses(case, static.sun_torque),
         sun_torque=static.sun_torque,
         closes=closes,
         relief_kinks=relief_kinks(case),
@@ -509,48 +508,6 @@ def relief_kinks(case: Case) -> tuple[bool, ...]:
         any(getattr(law, "power", 2.0) <= 1.0 for form in given.mesh_forms(kind, back) for law in form.profile)
         for kind in kinds
     )
-
-
-def nominal_stresses(
-    planetary_set: GearSet, sun_torque: float, material: Material | Sequence[Material]
-) -> NominalStresses:
-    """Compute sigma_H0 and sigma_F0 of both kinds of mesh under the mean load of a planet.
-
-    The torque on the sun may have either sign [N m]; the material is that of all gears or one for each.
-    """
-    s = planetary_set
-    # torque over reference radius: the same at all gears
-    force = abs(sun_torque) / (s.n_planets * s.gears[0].reference_radius)
-    elastic = [
-        (material_of_gear.youngs_modulus, material_of_gear.poisson_ratio)
-        for material_of_gear in material_of_each(material, len(s.gears))
-    ]
-    contact, root, messages = np.full(len(s.kinds), math.nan), np.full((len(s.kinds), 2), math.nan), []
-    ratio_factor = contact.copy()
-    for i, pair in enumerate(s.kinds):
-        gear_1, gear_2 = pair.gears
-        small, large = (gear_1, gear_2) if gear_2.internal or gear_1.teeth <= gear_2.teeth else (gear_2, gear_1)
-        load: dict[str, Any] = {"contact_ratio": pair.contact_ratio, "tangential_force": force}
-        (modulus, ratio), mate = (elastic[number] for number in s.mates[i])
-        try:
-            contact[i] = nominal_contact_stress(
-                small,
-                large,
-                working_angle=pair.working_pressure_angle,
-                youngs_modulus=modulus,
-                poisson_ratio=ratio,
-                mate=mate,
-                **load,
-            )
-            ratio_factor[i] = contact_ratio_factor(pair.contact_ratio, overlap_of(small, pair.face_width))
-        except GeometryError as error:
-            messages.append(f"{gear_1.name}-{gear_2.name}: {error.message}")
-        for j, gear in enumerate((gear_1, gear_2)):
-            try:
-                root[i, j] = nominal_root_stress(gear, common_width=pair.face_width, edition=2006, **load).stress
-            except GeometryError as error:
-                messages.append(f"{gear.name} in {gear_1.name}-{gear_2.name}: {error.message}")
-    return NominalStresses(contact, root, ratio_factor, "; ".join(dict.fromkeys(messages)))
 
 
 def ring_foundation(case: Case, sector: Sector):
@@ -705,7 +662,7 @@ STRESS = Stage(
     solve=solve_stress,
     takes=("static",),
     options=("progress",),
-    decided_by=solution_entries,
+    decided_by=stress_entries,
     verdict=lambda result: {
         "root_points": sum(len(root.arc) for root in result.roots),
         "iso": result.nominal.message,

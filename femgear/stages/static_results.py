@@ -39,6 +39,7 @@ from femgear.gears.tooth import ROOT_RADIUS_LIMIT, root_notches
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, chosen, significant, tabulate
 from femgear.stages.protocol import StageResult
+from femgear.stages.strength import SIDES, NominalStresses
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, declared
 
@@ -217,6 +218,7 @@ STRESS_VARIABLES = {
     "iso_contact_ratio_factor": ("mesh", "1", "contact ratio factor Z_eps in it, ISO 6336-2"),
     "iso_contact_stress": ("mesh", "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
     "iso_root_stress": ("mesh gear", "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
+    "iso_single_pair_factor": ("mesh gear", "1", "single pair factor Z_B or Z_D, ISO 6336-2"),
 }
 """Variables of stress.nc; records of one mesh period have none of single teeth, longer ones no pressures.
 
@@ -241,8 +243,6 @@ LARGE = "W-DEFLECTION", "W-MOTION", "W-ENDS"
 """Findings that concern transmission errors and stiffnesses."""
 LARGEST_PRESSURE = 4e9
 """Contact pressure that no steel carries [Pa]."""
-SIDES = {"sun-planet": ("sun", "planet, sun side"), "planet-ring": ("planet, ring side", "ring")}
-"""Names of the flanks in both kinds of mesh of a planetary set; those of a pair are its gears."""
 _SHORT = dict(zip(KINDS, ("in", "counter", "sequential", "unequal")))
 
 
@@ -422,21 +422,6 @@ def _slice_places(width: float, count: int) -> tuple:
 
 
 @dataclass(frozen=True)
-class NominalStresses:
-    """Nominal stresses after ISO 6336 with equal load on all planets and no load factors.
-
-    ``contact`` (2,) is sigma_H0 of sun-planet and planet-ring [Pa] (ISO 6336-2, method B), ``root`` (2, 2)
-    sigma_F0 of gear 1 and gear 2 of both [Pa] (ISO 6336-3, method B), ``contact_ratio_factor`` (2,) Z_eps;
-    ``message`` tells why a value is NaN, of gears outside the range of the method.
-    """
-
-    contact: np.ndarray
-    root: np.ndarray
-    contact_ratio_factor: np.ndarray
-    message: str
-
-
-@dataclass(frozen=True)
 class StressResult(StageResult):
     """Stresses of all meshes and gears over the mesh cycle.
 
@@ -530,6 +515,7 @@ class StressResult(StageResult):
             "iso_contact_helix_factor": contact_helix_factor(helix_of(self.planetary_set.gears[0])[0]),
             "load_counting": _COUNTING,
             "iso": self.nominal.message,
+            "iso_edition": self.nominal.edition,
         }
         return Contents(declared(STRESS_VARIABLES, values), coords, attributes)
 
@@ -664,6 +650,7 @@ class StressResult(StageResult):
             "iso_contact_ratio_factor": np.repeat(nominal.contact_ratio_factor, N),
             "iso_contact_stress": np.repeat(nominal.contact, N),
             "iso_root_stress": np.repeat(nominal.root, N, axis=0),
+            "iso_single_pair_factor": np.repeat(nominal.single_pair, N, axis=0),
         }
 
 
@@ -1059,8 +1046,9 @@ def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block
             roots.append(_root_row(title, of_kind, partial(_marked, marks, doubts)))
     equal, against = ("", "") if len(names) == 1 else ("equal load on all planets and ", " against the carrier")
     header = "[MPa]", "FE", "ISO 6336", "FE/ISO", "position", "arc [mm]", "tangent [deg]", "range", "cycles"
+    edition = f":{data.attrs['iso_edition']}" if "iso_edition" in data.attrs else ""
     notes = [
-        f"ISO 6336: nominal stresses sigma_H0 and sigma_F0 (method B) with {equal}no "
+        f"ISO 6336{edition}: nominal stresses sigma_H0 and sigma_F0 (method B) with {equal}no "
         "load factors; FE, under the loads of static.nc: largest contact pressure away from flank ends, and "
         "largest tension in the root",
         "position in mesh periods; arc from the end of the flank, tangent to the centreline of the tooth; "

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from femgear.case.estimates import estimates
@@ -10,8 +9,8 @@ from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.sections import face_width, gear_material
 from femgear.errors import CaseError
 from femgear.gears.deviations import lead_separation
-from femgear.stages.static import nominal_stresses
 from femgear.stages.static_results import describe_set, width_warnings
+from femgear.stages.strength import nominal_stresses
 from femgear.trains.elastic.results import _safeties
 from femgear.trains.reading import read_case, with_value, with_values
 
@@ -86,24 +85,29 @@ def test_safeties_are_those_of_every_gear(case):
     other = with_values(case, strong | weak | tips)
     stresses = nominal_stresses(planetary_set(other), 100.0, materials_of(other))
     notes: list[str] = []
-    arguments = stresses.root.ravel(), stresses.contact, np.ones(2), "", notes
-    rows = dict(_safeties(other, *arguments))
-    assert rows["safety S_F, ISO 6336-3"].startswith("sun 6.75, planet, sun side")
+    rows = dict(_safeties(other, {}, notes))
+    sun_root = 2 * 461e6 / stresses.root[0, 0]
+    assert rows["safety S_F, ISO 6336-3:2019"].startswith(f"sun {sun_root:.2f}, planet, sun side")
     sun, sun_side, ring_side, ring = (
-        float(one.split()[-1]) for one in rows["safety S_H, ISO 6336-2"].split(", ") if one[-1].isdigit()
+        float(one.split()[-1]) for one in rows["safety S_H, ISO 6336-2:2019"].split(", ") if one[-1].isdigit()
     )
-    assert sun == sun_side == pytest.approx(2.25, abs=0.015)
-    assert ring == pytest.approx(740.0 / 1500.0 * ring_side, abs=0.01)
+    single = (1500e6 / (value * stresses.contact[0]) for value in (sun, sun_side))
+    assert max(single) == pytest.approx(1500e6 / (2.25 * stresses.contact[0]), rel=0.007)
+    assert ring == pytest.approx(740e6 / stresses.contact[1], abs=0.005)
+    assert ring_side < 1500.0 / 740.0 * ring  # Z_B of the planet; Z_D of an internal gear is 1
     assert any("306 MPa (ring)" in note for note in notes)
-    alike = dict(_safeties(with_values(case, strong | tips), *arguments))
-    assert alike["safety S_H, ISO 6336-2"].startswith(f"sun-planet {sun:.2f}, planet-ring")
+    alike = dict(_safeties(with_values(case, strong | tips), {}, notes))
+    assert alike["safety S_H, ISO 6336-2:2019"].startswith(f"sun-planet {min(sun, sun_side):.2f}, planet-ring")
 
 
 def test_some_limits_give_some_safeties(case):
     other, notes = with_value(case, "ring.material.root_stress_limit", "306 MPa"), list[str]()
-    rows = dict(_safeties(other, np.full(4, 100e6), np.full(2, 500e6), np.ones(2), "", notes))
-    assert rows == {"safety S_F, ISO 6336-3": "sun -, planet, sun side -, planet, ring side -, ring 6.12"}
-    assert any("of all gears would give safeties" in note for note in notes)
+    rows = dict(_safeties(other, {}, notes))
+    root = nominal_stresses(planetary_set(other), 100.0, materials_of(other)).root[1, 1]
+    found = f"sun -, planet, sun side -, planet, ring side -, ring {2 * 306e6 / root:.2f}"
+    assert rows["safety S_F, ISO 6336-3:2019"] == found and "S_H" not in " ".join(rows)
+    lacking = "sun.material.root_stress_limit, planet.material.root_stress_limit, material.contact_stress_limit"
+    assert f"give {lacking} to get all safeties" in notes
 
 
 def test_check_shows_materials_and_widths_where_they_differ(case):

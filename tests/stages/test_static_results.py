@@ -17,8 +17,9 @@ from femgear.findings import Finding
 from femgear.gears.gear import half_thickness_angle
 from femgear.report.tables import unmarked
 from femgear.stages import static as static_stages
-from femgear.stages.static import nominal_stresses, relief_kinks, solve_static, solve_stress
+from femgear.stages.static import relief_kinks, solve_static, solve_stress
 from femgear.stages.static_results import _peak_doubt, describe_set, describe_stress, stress_warnings
+from femgear.stages.strength import nominal_stresses
 from femgear.trains.reading import read_case, with_value
 from validation.reference.root_stress import set_root_stress
 

@@ -17,10 +17,8 @@ import numpy as np
 from femgear.case.dependencies import Entries
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.quantities import RPM
-from femgear.case.sections import gear_material
 from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum, line_extent
 from femgear.findings import Finding
-from femgear.gears.iso6336 import contact_safety, root_safety, single_pair_factors
 from femgear.gears.modifications import FlankForm
 from femgear.gears.planetary import mesh_names
 from femgear.housing.orders import OrderSpectrum, analyse_band, order_level
@@ -75,6 +73,8 @@ from femgear.stages.static_results import (
     root_doubts,
     shares,
 )
+from femgear.stages.strength import Rating, rate_case, rating_wanted
+from femgear.stages.strength_results import safety_notes, safety_rows, strength_block
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
     FOURIER,
@@ -110,7 +110,6 @@ _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with th
 _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
 _PARTS = ("sun", "planet, sun side", "planet, ring side", "ring")
 """Flanks in the order of their meshes, below their gears."""
-_GEARS = ("sun", "planet", "planet", "ring")
 _FORMS = ("sun", "planet_sun_side", "planet_ring_side", "ring")
 _OF_LEVEL = "dynamics", "housing"
 """Stages whose findings concern what is heard at operating speeds."""
@@ -598,7 +597,7 @@ def verdict(results: Results) -> Iterator[Block]:
         shown = [f"{significant(value, 3)} um" for value in map(float, error)]
         text = _kinds("{}", shown, lambda text: marks(text, *LARGE, "W-POSITIONS", of=("static",)))
         rows.append((f"transmission error, peak to peak{_where(static, '')}", text))
-    factors, load_factors, doubts = np.ones((1, 2)), dict[str, np.ndarray](), dict[int, tuple[str, ...]]()
+    factors, computed, doubts = np.ones((1, 2)), dict[str, np.ndarray](), dict[int, tuple[str, ...]]()
     if "dynamics" in stages:
         factors, sharing = _load_factors(results.dynamics)
         if "housing" in stages and "dynamic_factor" in results.housing:
@@ -610,19 +609,21 @@ def verdict(results: Results) -> Iterator[Block]:
         codes = _all_of(doubts)
         text = _kinds("{:.3f}", factors.max(axis=0), lambda text: marks(text, *codes, of=_OF_LEVEL))
         rows.append(("largest dynamic factor K_v, at operating speeds", text))
-        load_factors = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
+        computed = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
     if "stress" in stages:
         static = results.static
         if "face_load_factor" in static:
-            load_factors["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
-            text = _kinds("{:.3f}", load_factors["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
+            computed["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+            text = _kinds("{:.3f}", computed["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
             rows.append(("face load factor K_Hβ", text))
-        rows += _strength(results, load_factors, notes, marks, _all_of(doubts))
+        rows += _strength(results, computed, notes, marks, _all_of(doubts))
     if "runup" in stages:
         rows.append(("largest dynamic factor K_v of the run-up", largest_factors(results.runup, marks)))
         rows.append(("largest level of the run-up", loudest(results.runup, marks)))
     if rows:
         yield Block("Verdict", rows=tuple(rows), notes=(*notes, *marks.notes))
+    if "stress" in stages and rating_wanted(results.case):
+        yield strength_block(_rated(results.case, computed), KINDS)
     if "dynamics" in stages:
         yield _operating_points(results, factors, doubts)
     if "runup" in stages:
@@ -708,7 +709,7 @@ def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _strength(
-    results: Results, load_factors: Mapping[str, Any], notes: list[str], marks: Marks, doubts: tuple[str, ...]
+    results: Results, computed: Mapping[str, Any], notes: list[str], marks: Marks, doubts: tuple[str, ...]
 ) -> Iterator[tuple[str, str]]:
     """Rows of the largest stresses, and of the safeties of ISO 6336 with known load factors (2,).
 
@@ -719,9 +720,8 @@ def _strength(
     def largest(name: str) -> np.ndarray:
         return np.array([half.max(axis=0) for half in np.split(stress[name].values, 2)])
 
-    root, nominal = largest("root_worst").ravel(), largest("iso_root_stress").ravel()
+    root = largest("root_worst").ravel()
     contact, worst = largest_pressure(stress).reshape(2, -1).max(axis=1), int(root.argmax())
-    nominals, factors = largest("iso_contact_stress"), np.prod([np.ones(2), *load_factors.values()], axis=0)
     where = _where(results.static, ", static")
     titles, number = SIDES[KINDS[worst // 2]], worst % 2
     kinked = root_doubts(results.findings, titles[number], titles[1 - number])
@@ -731,71 +731,21 @@ def _strength(
         for kind, pressure in zip(KINDS, contact)
     ]
     yield f"largest contact pressure{where}", ", ".join(pressures)
-    for name, text in _safeties(results.case, nominal, nominals, factors, tuple(load_factors), notes):
+    for name, text in _safeties(results.case, computed, notes):
         yield name, marks(text, *doubts, "W-FACE-LOAD", "W-THRUST", of=("static", *_OF_LEVEL))
 
 
-def _safeties(
-    case: Case, root: np.ndarray, contact: np.ndarray, factors: np.ndarray, names: tuple[str, ...], notes: list[str]
-) -> Iterator[tuple[str, str]]:
-    """Rows of S_F and S_H of ISO 6336, each gear with the limits of its own material.
-
-    Of sigma_F0 (4,) of `_PARTS` and sigma_H0 (2,) of both kinds of mesh [Pa], with the products (2,) of the
-    load factors of these ``names``.
-    """
-    of_parts, over = [gear_material(case, gear) for gear in _GEARS], " ".join(names)
-    flims, hlims = (
-        [getattr(material, f"{kind}_stress_limit") for material in of_parts] for kind in ("root", "contact")
-    )
-    safe = [
-        None if limit is None else root_safety(limit, root[i], factors[i // 2], reversed_bending=i in (1, 2))
-        for i, limit in enumerate(flims)
-    ]
-    if any(flims):
-        yield "safety S_F, ISO 6336-3", _of_parts(safe)
-        notes.append(
-            f"S_F = 2 sigma_Flim Y_M/({f'sigma_F0 {over}'.rstrip()}): sigma_Flim = {_limits(flims)} "
-            "of ISO 6336-5 (Y_ST = 2), not the permissible sigma_FP; Y_M = 0.7 for planets (bent both ways)"
-        )
-    if any(hlims):
-        single = np.array(
-            [
-                max(single_pair_factors(*pair.gears, working_angle=pair.working_pressure_angle, path=pair.path))
-                for pair in planetary_set(case).kinds
-            ]
-        )
-        safe = [
-            None if limit is None else contact_safety(limit, (contact * single)[i // 2], factors[i // 2])
-            for i, limit in enumerate(hlims)
-        ]
-        one_limit = len(set(hlims)) == 1
-        yield "safety S_H, ISO 6336-2", _kinds("{:.2f}", safe[::2]) if one_limit else _of_parts(safe)
-        notes.append(
-            f"S_H = sigma_Hlim/(Z sigma_H0{f' sqrt({over})' * bool(over)}): sigma_Hlim = "
-            f"{_limits(hlims)} of ISO 6336-5, not the permissible sigma_HP; Z: larger of Z_B, Z_D"
-        )
-    if None in (*flims, *hlims):
-        which = "" if not any((*flims, *hlims)) else " of all gears"
-        notes.append(f"material.root_stress_limit and contact_stress_limit{which} would give safeties")
-    if any((*flims, *hlims)):
-        missing = "" if "K_v" in names else "; K_gamma and K_v were not computed"
-        wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "K_Hβ" in names else ""
-        notes.append(f"long life, every other factor of ISO 6336-2 and -3 is 1{missing}{wide}")
+def _safeties(case: Case, computed: Mapping[str, np.ndarray], notes: list[str]) -> Iterator[tuple[str, str]]:
+    """Rows of S_F and S_H of ISO 6336 with the load factors (2,) that were computed, by their symbols."""
+    rating = _rated(case, computed)
+    yield from safety_rows(rating, KINDS)
+    notes += safety_notes(rating)
 
 
-def _of_parts(values: list[float | None]) -> str:
-    """Write a number, where there is one, of every one of `_PARTS`."""
-    return ", ".join(f"{part} {'-' if value is None else f'{value:.2f}'}" for part, value in zip(_PARTS, values))
-
-
-def _limits(limits: list[float | None]) -> str:
-    """Write the limits of the materials [Pa] of `_PARTS`, one where they are the same for all gears."""
-    if len(set(limits)) == 1:
-        return f"{1e-6 * (limits[0] or 0.0):g} MPa"
-    of_gears = dict(zip(_GEARS, limits))
-    return ", ".join(
-        f"{'none' if limit is None else f'{1e-6 * limit:g} MPa'} ({gear})" for gear, limit in of_gears.items()
-    )
+def _rated(case: Case, computed: Mapping[str, np.ndarray]) -> Rating:
+    """Rate the flanks of a planetary set with the load factors (2,) that were computed, by their symbols."""
+    sharing, dynamic, face = (computed.get(symbol) for symbol in ("K_gamma", "K_v", "K_Hβ"))
+    return rate_case(case, sharing=sharing, dynamic=dynamic, face=face)
 
 
 def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int, tuple[str, ...]]) -> Block:

@@ -42,7 +42,17 @@ from femgear.case.quantities import (
     Title,
     Values,
 )
-from femgear.case.sections import FORMAT, Angle, DampingRatio, End, PressureAngle, Radius, RunupSection, Teeth
+from femgear.case.sections import (
+    FORMAT,
+    Angle,
+    DampingRatio,
+    End,
+    PressureAngle,
+    Radius,
+    RunupSection,
+    StrengthSection,
+    Teeth,
+)
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError
 from femgear.trains.gearbox.materials import with_materials
@@ -621,6 +631,7 @@ class GearboxCase(Section, ReadCase):
     modes: BoxModesSection = BoxModesSection()
     dynamics: BoxDynamicsSection = BoxDynamicsSection()
     runup: RunupSection = RunupSection(count=0)
+    strength: StrengthSection = StrengthSection()
 
     @model_validator(mode="before")
     @classmethod

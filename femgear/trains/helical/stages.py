@@ -40,6 +40,7 @@ from femgear.stages.protocol import (
 )
 from femgear.stages.static import STATIC, STRESS, mesh_backlash, solve_static, solve_stress
 from femgear.stages.static_results import StaticResult, StressResult, describe_set, set_warnings
+from femgear.stages.strength_results import strength_verdict
 from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
@@ -274,4 +275,5 @@ HELICAL = Train(
     warnings=set_warnings,
     figures=FiguresOf("femgear.trains.helical.figures:FIGURES"),
     remarks=_remarks,
+    verdict=strength_verdict,
 )

@@ -36,6 +36,7 @@ from femgear.case.sections import (
     Speed,
     StaticSection,
     Stiffness,
+    StrengthSection,
     TipDiameter,
     speed_range,
 )
@@ -47,7 +48,6 @@ from femgear.gears.checks import check_meshes
 from femgear.gears.deviations import SetDeviations, no_deviations
 from femgear.gears.pair import GearPair, close_pair
 from femgear.gears.tips import settled_tips
-from femgear.stages.lumped_set import entries_with_verb, strength_entries
 
 
 class PairSetSection(Section):
@@ -135,6 +135,7 @@ class PairCase(GearCase):
     static: StaticSection = StaticSection()
     dynamics: DynamicsSection = DynamicsSection()
     runup: RunupSection = RunupSection()
+    strength: StrengthSection = StrengthSection()
 
     @property
     def module(self) -> float:
@@ -228,11 +229,9 @@ def check_pair_entries(case: PairCase) -> Iterator[CaseError]:
     yield from check_gear_deviations(case)
 
 
-def pair_notices(data: dict, case: PairCase) -> Iterator[Finding]:
+def pair_notices(_data: dict, case: PairCase) -> Iterator[Finding]:
     """List what a pair gives in a way that deserves to be said, by the tables of its checked file."""
     yield from added_material(case)
-    if unused := strength_entries(data):
-        yield Finding("W-UNUSED", "", f"{entries_with_verb(unused)} no effect on a pair, which has no safeties")
 
 
 FILE = CaseFile(PairCase, check_pair_entries, notices=pair_notices, embed=embed_profiles)

@@ -66,6 +66,7 @@ from femgear.stages.static_results import (
     load_warnings,
     mean_over_period,
 )
+from femgear.stages.strength_results import strength_verdict
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import fluctuation, sample
 from femgear.system.system import Modes, NonlinearSystem, Response
@@ -454,4 +455,5 @@ PAIR = Train(
     }
     | {"dynamics": DYNAMICS, "runup": RUNUP},
     recorded=Recorded(pair_signals, pair_signal_extent, {"wav": ("dynamics",)}, lambda results: 3),
+    verdict=strength_verdict,
 )

@@ -78,10 +78,3 @@ def test_speeds_without_effect_are_told(changes, why):
     found = [one for one in found if one.key == "operation.speeds"]
     assert [one.code for one in found] == ["W-UNUSED"] * (why is not None)
     assert all(why in one.text for one in found)
-
-
-def test_limits_of_the_material_without_effect_are_said():
-    limits = {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1400 MPa"}
-    said = f"[W-UNUSED] {', '.join(limits)} have no effect on a pair, which has no safeties"
-    assert said in map(str, pair_case(limits).notices)
-    assert not any("safeties" in str(one) for one in pair_case().notices)
