@@ -10,6 +10,7 @@ from femgear.case.dependencies import (
     modal_entries,
     ring_entries,
     static_entries,
+    stress_entries,
 )
 from femgear.trains.reading import read_case, with_value
 
@@ -35,3 +36,9 @@ KINDS = (static_entries, compliance_entries, ring_entries, modal_entries, dynami
 def test_steps_notice_what_they_depend_on(case, key, value, changes):
     other = with_value(case, key, value)
     assert tuple(fingerprint(kind(case)) != fingerprint(kind(other)) for kind in KINDS) == changes
+
+
+def test_the_edition_of_the_standard_decides_nominal_stresses_alone(case):
+    other = with_value(case, "strength.edition", 2006)
+    assert stress_entries(other) != stress_entries(case)
+    assert static_entries(other) == static_entries(case) and modal_entries(other) == modal_entries(case)

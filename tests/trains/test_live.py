@@ -45,6 +45,12 @@ CHANGES: tuple[dict[str, object], ...] = (
     {"material.poisson_ratio": 0.29},
     {"material.density": "7700 kg/m^3"},
     {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"},
+    {
+        "strength.edition": 2006,
+        "strength.application_factor": 1.25,
+        "strength.quality": 6,
+        "strength.modification": "proven",
+    },
     {"sun.pressure_angle": "20.1 deg", "sun.profile_shift": None},
     {"sun.bore_radius": "9.5 mm"},
     {"sun.face_width": "26 mm"},
