@@ -113,7 +113,7 @@ class StandardFactors:
 
 
 @dataclass(frozen=True)
-class LoadFactors:
+class MeshLoadFactors:
     """Load factors of all kinds of mesh of gears, and where they come from.
 
     Parameters
@@ -400,7 +400,7 @@ def mesh_frequencies(case: Any) -> tuple[float, ...]:
     )
 
 
-def load_factors(
+def mesh_load_factors(
     case: Any,
     torque: float,
     *,
@@ -409,7 +409,7 @@ def load_factors(
     face: np.ndarray | None = None,
     frequencies: Sequence[float] = (),
     strength: StrengthSection | None = None,
-) -> tuple[LoadFactors, tuple[StandardFactors | None, ...]]:
+) -> tuple[MeshLoadFactors, tuple[StandardFactors | None, ...]]:
     """Collect the load factors of all kinds of mesh of a case, computed ones and those of part 1.
 
     Parameters
@@ -427,7 +427,7 @@ def load_factors(
 
     Returns
     -------
-    factors : LoadFactors
+    factors : MeshLoadFactors
     standard : tuple of StandardFactors or None
         Those of part 1 by kind of mesh, None where no class or speed is given.
     """
@@ -458,7 +458,9 @@ def load_factors(
         sources["transverse"] = f"part 1, class {given.quality}"
         sources.setdefault("dynamic", f"part 1, method B, class {given.quality}")
     dynamic = of_part_1 if dynamic is None else dynamic
-    return LoadFactors(given.application_factor, sharing, dynamic, face, transverse, root_transverse, sources), standard
+    return MeshLoadFactors(
+        given.application_factor, sharing, dynamic, face, transverse, root_transverse, sources
+    ), standard
 
 
 def _largest_standard(
@@ -481,7 +483,7 @@ class Rating:
         By kind of mesh and gear.
     nominal : NominalStresses
         Without load factors.
-    factors : LoadFactors
+    factors : MeshLoadFactors
         Those of the safeties.
     standard : tuple of StandardFactors or None
         Of part 1, by kind of mesh.
@@ -489,7 +491,7 @@ class Rating:
 
     flanks: tuple[RatedFlank, ...]
     nominal: NominalStresses
-    factors: LoadFactors
+    factors: MeshLoadFactors
     standard: tuple[StandardFactors | None, ...]
 
 
@@ -512,17 +514,17 @@ def rate_case(
     frequencies : sequence of float, optional
         Mesh frequencies [Hz], by default those of the operating speeds.
     sharing, dynamic, face, strength
-        As for `load_factors`.
+        As for `mesh_load_factors`.
     """
     driving = float(case.torque_on_first_gear() if torque is None else torque)
     nominal = case_stresses(case, driving, strength)
     computed: dict[str, Any] = {"sharing": sharing, "dynamic": dynamic, "face": face}
     turning = mesh_frequencies(case) if frequencies is None else frequencies
-    factors, standard = load_factors(case, driving, frequencies=turning, strength=strength, **computed)
+    factors, standard = mesh_load_factors(case, driving, frequencies=turning, strength=strength, **computed)
     return Rating(tuple(_flanks(case, planetary_set(case), nominal, factors)), nominal, factors, standard)
 
 
-def _flanks(case: Any, gears: GearSet, nominal: NominalStresses, factors: LoadFactors) -> Iterator[RatedFlank]:
+def _flanks(case: Any, gears: GearSet, nominal: NominalStresses, factors: MeshLoadFactors) -> Iterator[RatedFlank]:
     for kind, (pair, numbers) in enumerate(zip(gears.kinds, gears.mates, strict=True)):
         titles = SIDES.get(f"{pair.gear_1.name}-{pair.gear_2.name}") or tuple(
             gear.name.replace("_", " ") for gear in pair.gears

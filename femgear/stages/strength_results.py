@@ -14,7 +14,7 @@ import numpy as np
 from femgear.report.response import stored_harmonics
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, tabulate
-from femgear.stages.strength import LoadFactors, RatedFlank, Rating, rate_case, rating_wanted
+from femgear.stages.strength import MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
 from femgear.system.fourier import sample
 
 if TYPE_CHECKING:
@@ -139,13 +139,13 @@ def safety_notes(rating: Rating) -> Iterator[str]:
         yield from _missing_factors(factors)
 
 
-def factor_names(factors: LoadFactors) -> list[str]:
+def factor_names(factors: MeshLoadFactors) -> list[str]:
     """List the symbols of the load factors that are known."""
     known = [symbol for name, symbol in SYMBOLS.items() if name in factors.sources]
     return ["K_A", *known] if factors.application != 1.0 else known
 
 
-def _missing_factors(factors: LoadFactors) -> Iterator[str]:
+def _missing_factors(factors: MeshLoadFactors) -> Iterator[str]:
     """Say of the load factors that nothing told what would give them."""
     missing = [text for name, text in _GIVEN_BY.items() if name not in factors.sources]
     if missing:
