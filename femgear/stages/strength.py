@@ -221,7 +221,9 @@ def nominal_stresses(
     """
     # torque over reference radius: the same at all gears
     force = abs(torque) / (gears.n_planets * gears.gears[0].reference_radius)
-    elastic = [(one.youngs_modulus, one.poisson_ratio) for one in material_of_each(material, len(gears.gears))]
+    elastic = [
+        (of_gear.youngs_modulus, of_gear.poisson_ratio) for of_gear in material_of_each(material, len(gears.gears))
+    ]
     contact, root = np.full(len(gears.kinds), math.nan), np.full((len(gears.kinds), 2), math.nan)
     ratio_factor, single, messages, roots = contact.copy(), root.copy(), list[str](), list[tuple]()
     for i, pair in enumerate(gears.kinds):
@@ -361,8 +363,8 @@ def _effective_deviations(
         )
         for gear in pair.gears
     ]
-    pitch = max(one.base_pitch(pair.gear_1.pressure_angle) for one in tolerances)
-    profile = max(one.profile_form for one in tolerances)
+    pitch = max(of_gear.base_pitch(pair.gear_1.pressure_angle) for of_gear in tolerances)
+    profile = max(of_gear.profile_form for of_gear in tolerances)
     limits = [gear_material(case, case.gear_names[number]).contact_stress_limit for number in numbers]
     left = []
     for deviation in (pitch, profile):
@@ -551,5 +553,5 @@ def _flanks(case: Any, gears: GearSet, nominal: NominalStresses, factors: MeshLo
 def rating_wanted(case: Any) -> bool:
     """Tell whether a case asks for safeties: by a section ``strength`` or by a limit of a material."""
     limits = (gear_material(case, gear) for gear in case.gear_names)
-    asked = "strength" in case.model_fields_set
-    return asked or any(one.root_stress_limit or one.contact_stress_limit for one in limits)
+    given = "strength" in case.model_fields_set
+    return given or any(material.root_stress_limit or material.contact_stress_limit for material in limits)

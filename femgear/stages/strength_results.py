@@ -141,8 +141,8 @@ def safety_notes(rating: Rating) -> Iterator[str]:
 
 def factor_names(factors: MeshLoadFactors) -> list[str]:
     """List the symbols of the load factors that are known."""
-    known = [symbol for name, symbol in SYMBOLS.items() if name in factors.sources]
-    return ["K_A", *known] if factors.application != 1.0 else known
+    computed = [symbol for name, symbol in SYMBOLS.items() if name in factors.sources]
+    return ["K_A", *computed] if factors.application != 1.0 else computed
 
 
 def _missing_factors(factors: MeshLoadFactors) -> Iterator[str]:
