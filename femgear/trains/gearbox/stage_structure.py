@@ -166,7 +166,7 @@ def running_stage(
     section = stage.section
     planetary = isinstance(section, BoxPlanetarySection)
     rows, stiffness, points = _mesh_rows(found, stage)
-    excitation, paths, sense = _in_time(found.model, stage, excitation)
+    excitation, paths, sense = in_time(found.model, stage, excitation)
     mean = excitation.stiffness.mean(axis=1)
     kinds = len(mean) // max(len(stage.planets), 1)
     stiffness[:kinds] = mean.reshape(kinds, -1).mean(axis=1)
@@ -380,10 +380,10 @@ def _planet(model: GearboxModel, stage: StageModel) -> tuple[np.ndarray, np.ndar
     return np.asarray(mass), np.asarray(gyroscopic) / frequency, turning
 
 
-def _in_time(
+def in_time(
     model: GearboxModel, stage: StageModel, excitation: MeshExcitation
 ) -> tuple[MeshExcitation, MeshPaths, int]:
-    """Excitation as time goes on, paths of its meshes, and the sense of the carrier.
+    """Give an excitation as time goes on, the paths of its meshes, and the sense of the carrier.
 
     Planets that only the gearbox loads unequally are taken as equal, with the mean of all of them.
     """

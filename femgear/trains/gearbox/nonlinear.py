@@ -1,0 +1,517 @@
+"""A gearbox whose teeth part and touch their back flanks, as one system for harmonic balance and time integration.
+
+Its coordinates are those of the gearbox about its loaded state: shafts, bearings by their tangents, casing, planets
+with their pins and, of a set whose carrier turns, the waves of the planets (`femgear.system.turning_meshes`), with
+which everything but the directions of the meshes stands still. Meshes of the chosen stages are elements along their
+normals: ``max(F + k(t) (approach - deflection), 0)`` of the drive flank with k, F and deflection of its contact, and
+the same on the back flank, whose normal has the tangential and the axial part reversed, beyond the backlash (Y. Guo
+and R. G. Parker, Eur. J. Mech. A 29, 2010, 1022-1033). Slopes along the width are held by a constant spring, apart or
+not. Meshes of other stages are springs of their mean stiffness.
+
+Motions are those from the unloaded gearbox, loads are torques, forces and weight: a mesh carries what all of them give
+it at every angle. Of a turning planet the Coriolis terms count, and the centrifugal ones with the pull of its pin,
+which turns with the carrier: a carrier that turns or tilts as a whole feels nothing of them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from femgear.case.gear_set import line_play, planetary_set
+from femgear.fe.beam import rigid_link
+from femgear.gears.profile import base_helix_angle
+from femgear.solvers.linear.modal import modal_damping
+from femgear.stages.static import mesh_backlash
+from femgear.system.assembly import GROUND, Assembly, Contact, assemble, point_approach
+from femgear.system.force_laws import Element, GearMeshes, turning_wave
+from femgear.system.fourier import FourierSeries, harmonics_of, orders_of
+from femgear.system.system import MechanicalSystem, MeshExcitation, NonlinearSystem
+from femgear.system.turning_meshes import (
+    TurningDirections,
+    TurningMeshes,
+    independent_directions,
+    planet_wave_generator,
+    planet_waves,
+    turned_row,
+)
+from femgear.trains.gearbox.carrier import pin_axes
+from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, PairSection, teeth_of
+from femgear.trains.gearbox.deflection import Deflection, laws_of, spread_rows
+from femgear.trains.gearbox.model import GearboxModel, StageModel
+from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.stage_structure import in_time
+
+_TURNING = np.kron(np.eye(2), np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
+"""Time derivative of the axes of a planet at unit speed of its carrier, ``e_r' = e_t``."""
+
+
+@dataclass(frozen=True)
+class NonlinearStage:
+    """A stage whose flanks part.
+
+    Parameters
+    ----------
+    name : str
+        Of the stage.
+    meshes : tuple of str
+        Names of its M meshes: of a set those of the sun, then of the ring.
+    excitation : MeshExcitation
+        As time goes on; deflections are approaches of the flanks from the unloaded gearbox, backlash is along the
+        normals, zero without back flanks.
+    drive, back, slope : TurningDirections
+        Approach (M, n) of drive flanks and back flanks, and slope (M', n) of that of the drive flanks along the width
+        of the M' meshes that have one, per unit of the coordinates [1, m].
+    slope_stiffness, slope_moment, slope_start : (M',) arrays
+        Stiffness against slopes [N m/rad], and moment [N m] and slope [rad] of the loaded state.
+    mesh_base, turn_base : int
+        Numbers of the base frequencies of mesh and carrier; -1 for a carrier that stands still.
+    sense : int
+        Of the carrier, 1 or -1.
+    """
+
+    name: str
+    meshes: tuple[str, ...]
+    excitation: MeshExcitation
+    drive: TurningDirections
+    back: TurningDirections
+    slope: TurningDirections
+    slope_stiffness: np.ndarray
+    slope_moment: np.ndarray
+    slope_start: np.ndarray
+    mesh_base: int
+    turn_base: int
+    sense: int
+
+    @property
+    def turns(self) -> bool:
+        """Whether the directions of its meshes turn with a carrier."""
+        return self.turn_base >= 0
+
+    @property
+    def back_flanks(self) -> np.ndarray:
+        """Numbers of the meshes that have back flanks."""
+        return np.flatnonzero((self.excitation.backlash > 0.0) & np.isfinite(self.excitation.backlash))
+
+
+@dataclass(frozen=True)
+class NonlinearGearbox:
+    """A gearbox ready for harmonic balance and time integration.
+
+    Parameters
+    ----------
+    deflection : Deflection
+        Loaded state about which bearings and other stages are linear.
+    problem : NonlinearSystem
+        Of coordinates n; of every stage drive flanks, back flanks where there are some, and slopes, as elements.
+    motion : (6s, n) array
+        Motions of all stations per unit of the coordinates; those of planets where their carrier stood.
+    bases : tuple of str
+        Names of the base frequencies.
+    frequency : (b,) array
+        These at the speeds of the load case [rad/s].
+    stages : tuple of NonlinearStage
+        Whose flanks part.
+    flanks : tuple of two-tuples of Element
+        By stage the elements of drive flanks and back flanks; None without these.
+    """
+
+    deflection: Deflection
+    problem: NonlinearSystem
+    motion: np.ndarray
+    bases: tuple[str, ...]
+    frequency: np.ndarray
+    stages: tuple[NonlinearStage, ...]
+    flanks: tuple[tuple[Element, Element | None], ...]
+
+
+def nonlinear_gearbox(
+    found: Deflection,
+    excitations: Mapping[str, MeshExcitation],
+    *,
+    harmonics: int,
+    separates: bool = True,
+    back_flanks: bool = True,
+    gyroscopic: bool = True,
+    damping_ratio: float | None = None,
+) -> NonlinearGearbox:
+    """Assemble a gearbox with the meshes of some stages as elements.
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state.
+    excitations : mapping of str to MeshExcitation
+        Of the stages whose flanks part, by name, see `femgear.trains.gearbox.stage_structure.stage_excitation`. A
+        backlash that is zero is that of the teeth.
+    harmonics : int
+        Mesh harmonics of the excitation.
+    separates : bool
+        Whether flanks part; without it they are springs that may pull.
+    back_flanks : bool
+        Teeth that part touch their back flanks beyond the backlash.
+    gyroscopic : bool
+        With the gyroscopic moments of shafts and planets.
+    damping_ratio : float, optional
+        Of all modes with the planets where they stand, viscous; by default that of the case.
+
+    Raises
+    ------
+    CaseError
+        Planets that are not equally spaced, or two, on a carrier that turns (E-TURNING).
+    """
+    model = found.model
+    chosen = [stage for stage in model.stages if stage.name in excitations]
+    assembly, stiffness, load = _structure(found, chosen)
+    T = assembly.motions
+    bases, frequency, staged = list[str](), list[float](), list[NonlinearStage]()
+    for stage in chosen:
+        turn = _carrier_speed(model, stage)
+        if turn:
+            bases.append(f"{stage.name} carrier")
+            frequency.append(abs(turn))
+        made = _stage(found, stage, excitations[stage.name], len(bases), turn, back=separates and back_flanks)
+        bases.append(f"{stage.name} mesh")
+        frequency.append(2.0 * math.pi * model.flow.mesh_frequency[stage.name] / made.excitation.periods)
+        staged.append(made)
+    coriolis, centrifugal = _turning_terms(model, chosen, assembly, gyroscopic=gyroscopic)
+    system = assemble(
+        assembly.mass, stiffness + centrifugal, np.zeros((len(T), 0)), load, motions=T, dofs=assembly.free_names
+    )
+    ratio = model.case.modes.damping_ratio if damping_ratio is None else damping_ratio
+    damping = _damping(replace(system, K=T.T @ stiffness @ T), staged, ratio)
+    columns, elements, flanks = _elements(system.M, staged, harmonics, len(bases), separates=separates)
+    system = replace(system, C=damping + T.T @ coriolis @ T, W=columns)
+    problem = NonlinearSystem(system, elements)
+    return NonlinearGearbox(found, problem, T, tuple(bases), np.array(frequency), tuple(staged), flanks)
+
+
+def _carrier_speed(model: GearboxModel, stage: StageModel) -> float:
+    """Speed of the carrier of a set [rad/s]; zero of a pair and of one that stands still."""
+    section = stage.section
+    if not isinstance(section, BoxPlanetarySection) or section.carrier == CASING:
+        return 0.0
+    return model.flow.speed[section.carrier]
+
+
+def _structure(found: Deflection, chosen: Sequence[StageModel]) -> tuple[Assembly, np.ndarray, np.ndarray]:
+    """Gearbox with its stiffness (6s, 6s) and load (6s,), the meshes of the chosen stages left out.
+
+    The load has what nonlinear bearings and meshes carry at the loaded state beyond what their tangents would.
+    """
+    model = found.model
+    assembly, _, tangents = linear_system(found)
+    stiffness, load, motion = assembly.stiffness, model.load.copy(), found.motion
+    bearings = assembly.beams[len(model.assembly.beams) :]
+    for beam, (_, law, springs) in zip(bearings, laws_of(model, model.estimate), strict=True):
+        rows = spread_rows(springs, assembly)
+        load -= rows.T @ law.force(rows @ motion)[0]
+        moved = np.zeros(6 * len(beam.stations))
+        parts = [(6 * at, 6 * station) for at, station in enumerate(beam.stations) if station != GROUND]
+        for at, place in parts:
+            moved[at : at + 6] = motion[place : place + 6]
+        for at, place in parts:
+            load[place : place + 6] += (beam.stiffness @ moved)[at : at + 6]
+    gone = {mesh for stage in chosen for mesh in stage.meshes}
+    for mesh, part in enumerate(assembly.slices):
+        if mesh not in gone:
+            W, k = assembly.columns[:, part], tangents[part]
+            stiffness = stiffness + (W * k) @ W.T
+            load -= W @ (found.slice_force[part] - k * (W.T @ motion))
+    return assembly, stiffness, load
+
+
+def _stage(
+    found: Deflection, stage: StageModel, excitation: MeshExcitation, mesh_base: int, turn: float, *, back: bool
+) -> NonlinearStage:
+    """Take a stage with the approaches of its flanks per unit of the coordinates, and its excitation."""
+    model, (assembly, _, tangents) = found.model, linear_system(found)
+    T, kinds = assembly.motions, len(stage.meshes) // max(len(stage.planets), 1)
+    excitation, _, _ = in_time(model, stage, excitation)
+    play = excitation.backlash if np.any(excitation.backlash) else normal_backlash(stage)
+    deflection = excitation.deflection + _mean_approach(found, stage, excitation)[:, None]
+    excitation = replace(excitation, deflection=deflection, backlash=play if back else np.zeros_like(play))
+    drive, behind, slope, springs = list[np.ndarray](), list[np.ndarray](), list[np.ndarray](), list[np.ndarray]()
+    sloping = list[int]()
+    for number, mesh in enumerate(stage.meshes):
+        contact, part = assembly.contacts[mesh], assembly.slices[mesh]
+        k, force = tangents[part], found.slice_force[part]
+        weight = k / k.sum()
+        drive.append(np.einsum("s,gsm->gm", weight, contact.approach))
+        behind.append(np.einsum("s,gsm->gm", weight, _back_approach(contact, _radial(model, stage, number))))
+        height = contact.heights - weight @ contact.heights
+        if float(k @ height**2) > 0.0:
+            sloping.append(number)
+            effect = contact.approach[:, -1] - contact.approach[:, 0]
+            slope.append(effect / (contact.heights[-1] - contact.heights[0]))
+            springs.append(np.array([k @ height**2, force @ height, 0.0]))
+    turning = [_directions(model, stage, rows, turns=bool(turn)) for rows in (drive, behind)]
+    sloped = _directions(model, stage, slope, turns=bool(turn), numbers=sloping)
+    table = np.array(springs).reshape(-1, 3).T
+    table[2] = sloped.at(0.0) @ found.motion
+    if stage.planets and table.size:
+        # as planets that only the gearbox loads unequally are taken: each as the mean of all
+        table = table.reshape(3, kinds, -1).mean(axis=2, keepdims=True).repeat(len(stage.planets), 2).reshape(3, -1)
+    names = tuple(assembly.contacts[mesh].name for mesh in stage.meshes)
+    parts = [directions.along(T) for directions in (*turning, sloped)]
+    sense = -1 if turn < 0.0 else 1
+    base = mesh_base - 1 if turn else -1
+    springs = table[0], table[1], table[2]
+    return NonlinearStage(
+        stage.name, names, excitation, parts[0], parts[1], parts[2], *springs, mesh_base, base, sense
+    )
+
+
+def normal_backlash(stage: StageModel) -> np.ndarray:
+    """Find the play (M,) of the meshes of a stage along their normals [m]; zero where no teeth are given."""
+    case = teeth_of(stage.section)
+    if case is None:
+        return np.zeros(len(stage.meshes))
+    cosine = math.cos(base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
+    gears: Any = planetary_set(case)
+    play = np.array([line_play(case)]) if isinstance(stage.section, PairSection) else mesh_backlash(gears)
+    return cosine * np.maximum(play, 0.0)
+
+
+def _mean_approach(found: Deflection, stage: StageModel, excitation: MeshExcitation) -> np.ndarray:
+    """What to add (M,) to the deflections of an excitation that they are those of the contact, on an average [m]."""
+    contact = found.contacts.get(stage.name)
+    if contact is None:
+        return np.zeros(len(stage.meshes))
+    count = max(len(stage.planets), 1)
+    apart = contact.approach - excitation.deflection.mean(axis=1)
+    return apart.reshape(-1, count).mean(axis=1).repeat(count)
+
+
+def _radial(model: GearboxModel, stage: StageModel, number: int) -> np.ndarray:
+    """Direction (3,) from axis to axis of both gears of a mesh."""
+    if stage.planets:
+        angle = stage.angles[number % len(stage.planets)]
+        return np.array([math.cos(angle), math.sin(angle), 0.0])
+    assert isinstance(stage.section, PairSection)
+    first, second = (
+        np.array(_axis(model, shaft, other))
+        for shaft, other in zip(stage.section.shafts, reversed(stage.section.shafts), strict=True)
+    )
+    return np.append((second - first) / np.linalg.norm(second - first), 0.0)
+
+
+def _axis(model: GearboxModel, shaft: str, other: str) -> tuple[float, ...]:
+    """Place of the axis of a shaft [m]; of the casing that of the other gear."""
+    return model.case.shaft_named(other if shaft == CASING else shaft).axis
+
+
+def _back_approach(contact: Contact, radial: np.ndarray) -> np.ndarray:
+    """Approach (2, S, 6) of the back flanks of a mesh: the tangential and the axial part of the normal reversed."""
+    first, second = (
+        point_approach(2.0 * (normal @ radial) * radial - normal, points)
+        for normal, points in zip(contact.normals, contact.points, strict=True)
+    )
+    return np.stack([first, -second])
+
+
+def _directions(
+    model: GearboxModel,
+    stage: StageModel,
+    rows: Sequence[np.ndarray],
+    *,
+    turns: bool,
+    numbers: Sequence[int] | None = None,
+) -> TurningDirections:
+    """Spread approaches (2, 6) of both gears of meshes over all motions (6s,), as they turn with the carrier.
+
+    ``numbers`` are those of the meshes in the stage, by default all.
+    """
+    numbers = range(len(rows)) if numbers is None else numbers
+    assembly, count = model.assembly, len(stage.planets)
+    parts = np.zeros((3, len(rows), assembly.count))
+    waves = planet_waves(stage.angles) if turns else None
+    for i, (number, row) in enumerate(zip(numbers, rows, strict=True)):
+        for station, effect in zip(assembly.contacts[stage.meshes[number]].stations, row, strict=True):
+            if station == GROUND:
+                continue
+            at = 6 * station + np.arange(6)
+            if waves is None:
+                parts[0, i, at] += effect
+            elif station in stage.planets:
+                parts[:, i] += _of_planet(stage, number % count, effect, waves, assembly.count)
+            else:
+                axis = assembly.places[stage.planets[0]][:2] - stage.sizes.centre_distance * np.array(
+                    [math.cos(stage.angles[0]), math.sin(stage.angles[0])]
+                )
+                beside = np.append(axis - assembly.places[station][:2], 0.0)
+                # the row turns about the axis of the stage
+                there = effect @ rigid_link(-beside)
+                turned = turned_row(there)
+                lateral = -turned_row(turned)
+                for part, value in zip(parts, (there - lateral, lateral, turned), strict=True):
+                    part[i, at] += value @ rigid_link(beside)
+    return TurningDirections(*parts)
+
+
+def _of_planet(stage: StageModel, planet: int, effect: np.ndarray, waves: TurningDirections, count: int) -> np.ndarray:
+    """Approach (3, 6s) by the motions of all planets of a row (6,) of one of them: fixed, even and odd part."""
+    parts = np.zeros((3, count))
+    axes = [np.kron(np.eye(2), pin_axes(psi)) for psi in stage.angles]
+    along = axes[planet] @ effect
+    # pins do not hold rotations, which stay those of the planets
+    waved, rotation = along.copy(), along[5]
+    waved[5] = 0.0
+    for other, station in enumerate(stage.planets):
+        for part, wave in zip(parts, (waves.fixed, waves.even, waves.odd), strict=True):
+            part[6 * station : 6 * station + 6] += wave[planet, other] * waved @ axes[other]
+    parts[0, 6 * stage.planets[planet] + 5] += rotation
+    return parts
+
+
+def _turning_terms(
+    model: GearboxModel, stages: Sequence[StageModel], assembly: Assembly, *, gyroscopic: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gyroscopic and Coriolis terms (6s, 6s) beside the damping, and centrifugal ones beside the stiffness."""
+    velocity = assembly.gyroscopic if gyroscopic else np.zeros((assembly.count, assembly.count))
+    displacement = np.zeros_like(velocity)
+    for stage in stages:
+        if not (speed := _carrier_speed(model, stage)):
+            continue
+        Z = _generator(stage, assembly.count)
+        own = replace(assembly, inertias=tuple(one for one in assembly.inertias if one.stations[0] in stage.planets))
+        mass = assembly.mass
+        displacement += speed**2 * Z @ own.mass @ Z + centrifugal_pull(model, stage, own.mass, speed)
+        if gyroscopic:
+            turned = speed * own.gyroscopic @ Z
+            displacement += 0.5 * (turned + turned.T)
+        velocity = velocity + speed * (mass @ Z + Z @ mass)
+    return velocity, displacement
+
+
+def _generator(stage: StageModel, count: int) -> np.ndarray:
+    """Rate of change (6s, 6s) of the motions of planets and pins by the turn of their carrier at unit speed."""
+    gamma = planet_wave_generator(stage.angles)
+    pins = stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ()
+    Z = np.zeros((count, count))
+    axes = [np.kron(np.eye(2), pin_axes(psi)) for psi in stage.angles]
+    for stations, waved in ((stage.planets, np.diag([1.0, 1.0, 1.0, 1.0, 1.0, 0.0])), (pins, np.eye(6))):
+        for j, first in enumerate(stations):
+            for k, second in enumerate(stations):
+                rate = gamma[j, k] * waved + (_TURNING if j == k else 0.0)
+                Z[6 * first : 6 * first + 6, 6 * second : 6 * second + 6] = axes[j].T @ rate @ axes[k]
+    return Z
+
+
+def centrifugal_pull(model: GearboxModel, stage: StageModel, mass: np.ndarray, speed: float) -> np.ndarray:
+    """Compute the stiffness (6s, 6s) of the pull of the pins on turning planets, which turns with the carrier.
+
+    With the pull ``F = m a speed^2`` and the turn phi of the carrier at the pin it has the energy ``F (phi_z x_t -
+    phi_t x_z) - F a (phi_z^2 + phi_t^2)/2`` of displacements x of the planet, along the axes of the pin.
+    """
+    found = np.zeros_like(mass)
+    arm = stage.sizes.centre_distance
+    for j, (planet, psi) in enumerate(zip(stage.planets, stage.angles, strict=True)):
+        holder = stage.members[1] if stage.elastic_carrier is None else stage.elastic_carrier.stations[1 + j]
+        pull = mass[6 * planet, 6 * planet] * arm * speed**2
+        axes = pin_axes(psi)
+        x, turn = np.zeros((2, 3, len(mass)))
+        x[:, 6 * planet : 6 * planet + 3] = axes
+        turn[:, 6 * holder + 3 : 6 * holder + 6] = axes
+        for first, second, value in ((turn[2], x[1], pull), (turn[1], x[2], -pull)):
+            found += value * (np.outer(first, second) + np.outer(second, first))
+        found -= pull * arm * (np.outer(turn[2], turn[2]) + np.outer(turn[1], turn[1]))
+    return found
+
+
+def _damping(system: MechanicalSystem, stages: Sequence[NonlinearStage], ratio: float) -> np.ndarray:
+    """Viscous damping (n, n) of all modes with the meshes at their means, planets where they stand."""
+    rows = [np.zeros((0, len(system.M)))]
+    stiffness = [np.zeros(0)]
+    for stage in stages:
+        rows += [stage.drive.at(0.0), stage.slope.at(0.0)]
+        stiffness += [stage.excitation.stiffness.mean(axis=1), stage.slope_stiffness]
+    return modal_damping(replace(system, W=np.vstack(rows).T), np.concatenate(stiffness), ratio)
+
+
+def _elements(
+    mass: np.ndarray, stages: Sequence[NonlinearStage], harmonics: int, bases: int, *, separates: bool
+) -> tuple[np.ndarray, tuple[Element, ...], tuple[tuple[Element, Element | None], ...]]:
+    """Columns (n, c), all elements, and of every stage those of drive flanks and back flanks."""
+    columns, elements, flanks, count = [np.zeros((len(mass), 0))], list[Element](), [], 0
+    for stage in stages:
+        behind = stage.back_flanks
+        groups = [(stage.drive, np.arange(len(stage.meshes))), (stage.back, behind)]
+        stacked = [stage.drive.stacked, np.vstack([part[behind] for part in _parts(stage.back)]), stage.slope.stacked]
+        if stage.turns:
+            basic = independent_directions(np.vstack(stacked), mass)
+            at = np.arange(basic.shape[1])
+        else:
+            basic = np.vstack([stage.drive.fixed, stage.back.fixed[behind], stage.slope.fixed]).T
+            at = np.arange(basic.shape[1])
+        made: list[Element | None] = []
+        place, step = count, int(not stage.turns)
+        for directions, chosen in groups:
+            series = _flank_series(stage, chosen, harmonics, bases, back=directions is stage.back)
+            own = TurningDirections(*(part[chosen] for part in _parts(directions)))
+            made.append(_element(stage, own, basic, place, series, bases, separates=separates))
+            place += step * len(chosen)
+        slope = {
+            name: FourierSeries(getattr(stage, key)[:, None])
+            for name, key in (
+                ("stiffness", "slope_stiffness"),
+                ("force", "slope_moment"),
+                ("deflection", "slope_start"),
+            )
+            if len(stage.slope_stiffness)
+        }
+        made.append(_element(stage, stage.slope, basic, place, slope, bases, separates=False))
+        elements += [element for element in made if element is not None]
+        assert made[0] is not None
+        flanks.append((made[0], made[1]))
+        columns.append(basic)
+        count += len(at)
+    return np.hstack(columns), tuple(elements), tuple(flanks)
+
+
+def _parts(directions: TurningDirections) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    return directions.fixed, directions.even, directions.odd
+
+
+def _flank_series(
+    stage: NonlinearStage, chosen: np.ndarray, harmonics: int, bases: int, *, back: bool
+) -> dict[str, FourierSeries]:
+    """Series of stiffness, deflection and force of drive flanks, or of back flanks, of so many mesh harmonics."""
+    if not len(chosen):
+        return {}
+    excitation, orders = stage.excitation, orders_of(stage.mesh_base, bases)
+    lines = {
+        name: harmonics_of(getattr(excitation, name)[chosen], harmonics * excitation.periods)
+        for name in ("stiffness", "deflection", "force")
+    }
+    if back:
+        # the gap behind closes as flanks in front part: the line of the drive flank, mirrored beyond the backlash
+        lines["force"], lines["deflection"] = -lines["force"], -lines["deflection"]
+        lines["deflection"][:, 0] += excitation.backlash[chosen]
+    return {name: FourierSeries(values, orders) for name, values in lines.items()}
+
+
+def _element(
+    stage: NonlinearStage,
+    directions: TurningDirections,
+    basic: np.ndarray,
+    first: int,
+    series: dict[str, Any],
+    bases: int,
+    *,
+    separates: bool,
+) -> Element | None:
+    """Element of flanks, or of slopes, whose columns begin at the ``first`` or that turn on basic columns (n, d)."""
+    count = len(directions.fixed)
+    if not count:
+        return None
+    if not stage.turns:
+        return GearMeshes(first + np.arange(count), **series, separates=separates)
+    on = directions.on(basic)
+    columns = np.tile(first + np.arange(basic.shape[1]), (count, 1))
+    wave = turning_wave(orders_of(stage.turn_base, bases, stage.sense))
+    return TurningMeshes(columns, *_parts(on), wave, **series, separates=separates)
