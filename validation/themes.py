@@ -25,6 +25,7 @@ from validation import (
     gearbox_carriers,
     gearbox_cross,
     gearbox_in_time,
+    gearbox_nonlinear,
     gearbox_power,
     gearbox_response,
     gearbox_rings,
@@ -380,6 +381,16 @@ THEMES = (
             gearbox_power.casing_forces,
             gearbox_cross.two_stages,
         ),
+    ),
+    Theme(
+        "gearbox_nonlinear",
+        "Gearboxes whose teeth part",
+        "Contact loss, back flanks that wedge, weight and turning planets on uneven supports, on one assembled system. "
+        "Compared with: the trains of a pair and of a planar set, by harmonic balance; the linear response; the "
+        "drivetrain of a wind turbine, matrices and history; the same bodies in axes at rest, integrated by DOP853. "
+        "Gates: 1e-9; 1e-8 of the linear response; 1e-6 in time.",
+        (gearbox_nonlinear.pairs, gearbox_nonlinear.linear_meshes, gearbox_nonlinear.wind_turbine),
+        (gearbox_nonlinear.planar_sets, gearbox_nonlinear.turning_in_time),
     ),
     Theme(
         "moving",

@@ -125,6 +125,11 @@ class TurningMeshes:
         S, k = self.fixed + c * self.even + s * self.odd, self.stiffness.at(theta)
         return S, k, self.force.at(theta) + k * ((S * x).sum(axis=-1) - self.deflection.at(theta))
 
+    def forces(self, x, theta) -> np.ndarray:
+        """Compute the force (..., g) [N] of every flank at deflections x (..., g, d) of the columns [m]."""
+        line = self._lines(x, theta)[2]
+        return positive_part(line)[0] if self.separates else line
+
     def switches(self, x, theta) -> np.ndarray:
         """Compute the linear forces (..., g) [N], whose signs tell which flanks touch; none of a linear law."""
         if not self.separates:

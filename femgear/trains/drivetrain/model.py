@@ -29,10 +29,11 @@ from femgear.errors import CaseError, FemgearError
 from femgear.fe.beam import beam_element, body_matrices
 from femgear.solvers.linear.modal import modal_damping
 from femgear.stages.static import solve_static
-from femgear.system.force_laws import positive_part
-from femgear.system.fourier import FourierSeries, orders_of, phase_of
+from femgear.system.force_laws import turning_wave
+from femgear.system.fourier import FourierSeries, constant, orders_of
 from femgear.system.stiffness_waves import pair_count_wave
 from femgear.system.system import MechanicalSystem, NonlinearSystem
+from femgear.system.turning_meshes import TurningMeshes
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of, pair_case_of, torque_histories
 from femgear.trains.drivetrain.kinematics import (
     ENDS,
@@ -257,44 +258,7 @@ def drivetrain_problem(
     return NonlinearSystem(system, tuple(elements), speed=speed)
 
 
-@dataclass(frozen=True)
-class _TurningMeshes:
-    """Meshes of one stage, or one of their flanks, as an element on simple motions.
-
-    ``columns`` (g, d): those that every mesh takes part in, by ``S = fixed + cos phi even + sin phi odd``
-    (g, d); ``turn``: orders of the carrier's angle ``phi`` in the base frequencies; ``stiffness`` [N/m].
-    Flanks that may part (``separates``) have the force ``k max(x - gap, 0)`` with the gap (g,) [m], others ``k x``.
-    """
-
-    columns: np.ndarray
-    fixed: np.ndarray
-    even: np.ndarray
-    odd: np.ndarray
-    stiffness: FourierSeries
-    turn: tuple[int, ...]
-    gap: np.ndarray
-    separates: bool = False
-
-    @property
-    def reference(self) -> np.ndarray:
-        """Mean stiffness of the columns by themselves (g, d) [N/m]."""
-        square = self.fixed**2 + 0.5 * (self.even**2 + self.odd**2)
-        return self.stiffness.mean[:, None] * square
-
-    def evaluate(self, x, theta):
-        """Forces (..., g, d) and tangents (..., g, d, d)."""
-        phi = phase_of(theta, self.turn)[..., None, None]
-        S = self.fixed + np.cos(phi) * self.even + np.sin(phi) * self.odd
-        k, approach = self.stiffness.at(theta), (S * x).sum(axis=-1)
-        if self.separates:
-            overlap, closed = positive_part(approach - self.gap)
-            force, slope = k * overlap, k * closed
-        else:
-            force, slope = k * approach, np.broadcast_to(k, approach.shape)
-        return force[..., None] * S, slope[..., None, None] * S[..., :, None] * S[..., None, :]
-
-
-def _flanks(model: DrivetrainModel, geometry: MeshGeometry, chosen, stage: int, separates: bool) -> _TurningMeshes:
+def _flanks(model: DrivetrainModel, geometry: MeshGeometry, chosen, stage: int, separates: bool) -> TurningMeshes:
     """Element of like flanks of a stage."""
     contacts, planetary = model.contacts, stage < len(geometry.even)
     meshes, n_bases = contacts.mesh[chosen], len(model.bases)
@@ -307,7 +271,9 @@ def _flanks(model: DrivetrainModel, geometry: MeshGeometry, chosen, stage: int, 
     turn = orders_of(2 * stage, n_bases, int(planetary))
     fixed, even, odd = (np.array([s[u, j] for u, j in zip(used, chosen)]) for s in (fixed, even, odd))
     stiffness = FourierSeries(model.stiffness[meshes], order)
-    return _TurningMeshes(np.array(used), fixed, even, odd, stiffness, turn, contacts.gap[chosen], separates)
+    gap = constant(contacts.gap[chosen])
+    wave = turning_wave(turn)
+    return TurningMeshes(np.array(used), fixed, even, odd, wave, stiffness, gap, separates=separates)
 
 
 def balanced_torque(model: DrivetrainModel, driver: str, torque: float, output: str) -> dict[str, float]:

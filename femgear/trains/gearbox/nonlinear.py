@@ -25,7 +25,7 @@ import numpy as np
 from femgear.case.gear_set import line_play, planetary_set
 from femgear.fe.beam import rigid_link
 from femgear.gears.profile import base_helix_angle
-from femgear.solvers.linear.modal import modal_damping
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.static import mesh_backlash
 from femgear.system.assembly import GROUND, Assembly, Contact, assemble, point_approach
 from femgear.system.force_laws import Element, GearMeshes, turning_wave
@@ -183,9 +183,11 @@ def nonlinear_gearbox(
         assembly.mass, stiffness + centrifugal, np.zeros((len(T), 0)), load, motions=T, dofs=assembly.free_names
     )
     ratio = model.case.modes.damping_ratio if damping_ratio is None else damping_ratio
-    damping = _damping(replace(system, K=T.T @ stiffness @ T), staged, ratio)
+    damping, free = _damping(replace(system, K=T.T @ stiffness @ T), staged, ratio)
+    # torques that radii beside their tooth numbers leave out of balance speed the gearbox up as a whole
+    balanced = system.load - system.M @ (free @ (free.T @ system.load))
     columns, elements, flanks = _elements(system.M, staged, harmonics, len(bases), separates=separates)
-    system = replace(system, C=damping + T.T @ coriolis @ T, W=columns)
+    system = replace(system, C=damping + T.T @ coriolis @ T, W=columns, load=balanced)
     problem = NonlinearSystem(system, elements)
     return NonlinearGearbox(found, problem, T, tuple(bases), np.array(frequency), tuple(staged), flanks)
 
@@ -261,9 +263,7 @@ def _stage(
     sense = -1 if turn < 0.0 else 1
     base = mesh_base - 1 if turn else -1
     springs = table[0], table[1], table[2]
-    return NonlinearStage(
-        stage.name, names, excitation, parts[0], parts[1], parts[2], *springs, mesh_base, base, sense
-    )
+    return NonlinearStage(stage.name, names, excitation, parts[0], parts[1], parts[2], *springs, mesh_base, base, sense)
 
 
 def normal_backlash(stage: StageModel) -> np.ndarray:
@@ -377,7 +377,7 @@ def _turning_terms(
     for stage in stages:
         if not (speed := _carrier_speed(model, stage)):
             continue
-        Z = _generator(stage, assembly.count)
+        Z = wave_generator(stage, assembly.count)
         own = replace(assembly, inertias=tuple(one for one in assembly.inertias if one.stations[0] in stage.planets))
         mass = assembly.mass
         displacement += speed**2 * Z @ own.mass @ Z + centrifugal_pull(model, stage, own.mass, speed)
@@ -388,8 +388,8 @@ def _turning_terms(
     return velocity, displacement
 
 
-def _generator(stage: StageModel, count: int) -> np.ndarray:
-    """Rate of change (6s, 6s) of the motions of planets and pins by the turn of their carrier at unit speed."""
+def wave_generator(stage: StageModel, count: int) -> np.ndarray:
+    """Compute the rate of change (6s, 6s) of motions of planets and pins by the turn of their carrier at unit speed."""
     gamma = planet_wave_generator(stage.angles)
     pins = stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ()
     Z = np.zeros((count, count))
@@ -423,14 +423,21 @@ def centrifugal_pull(model: GearboxModel, stage: StageModel, mass: np.ndarray, s
     return found
 
 
-def _damping(system: MechanicalSystem, stages: Sequence[NonlinearStage], ratio: float) -> np.ndarray:
-    """Viscous damping (n, n) of all modes with the meshes at their means, planets where they stand."""
+def _damping(system: MechanicalSystem, stages: Sequence[NonlinearStage], ratio: float) -> tuple[np.ndarray, np.ndarray]:
+    """Viscous damping (n, n) of all modes with the meshes at their means, planets where they stand, and free motions.
+
+    The latter (n, r) have a modal mass of one.
+    """
     rows = [np.zeros((0, len(system.M)))]
     stiffness = [np.zeros(0)]
     for stage in stages:
         rows += [stage.drive.at(0.0), stage.slope.at(0.0)]
         stiffness += [stage.excitation.stiffness.mean(axis=1), stage.slope_stiffness]
-    return modal_damping(replace(system, W=np.vstack(rows).T), np.concatenate(stiffness), ratio)
+    unloaded = replace(system, W=np.vstack(rows).T, load=0.0 * system.load)
+    modes = undamped_modes(unloaded, np.concatenate(stiffness), damping_ratio=ratio)
+    carried = system.M @ modes.shape
+    damping = (carried * (4.0 * np.pi * modes.damping_ratio * modes.frequency)) @ carried.T
+    return damping, modes.shape[:, modes.frequency == 0.0]
 
 
 def _elements(
