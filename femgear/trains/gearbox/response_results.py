@@ -126,6 +126,7 @@ class GearboxResponseResult(StageResult):
         attrs = {
             "title": "response of the gearbox to its stages",
             "up_to": found.up_to,
+            "most_harmonics": model.case.dynamics.mesh_harmonics or 0,
             "reference": found.reference,
             "missing": ", ".join(found.missing),
             "rigid": ", ".join(_rigid_bodies(found)),
@@ -245,11 +246,12 @@ def _of_lines(found: GearboxResponse) -> dict[str, tuple]:
 
 
 def _change(found: GearboxResponse, moved: dict[str, np.ndarray]) -> np.ndarray:
-    """Change of the levels (v, s) by lines beyond half the frequency of the excitation [dB]."""
-    half = math.pi * found.up_to
+    """Change of the levels (v, s) by lines beyond half the frequency, or half the harmonics, of the excitation [dB]."""
+    half, most = math.pi * found.up_to, found.deflection.model.case.dynamics.mesh_harmonics or math.inf
 
     def low(stage: StageLines) -> np.ndarray:
-        return moved[stage.name] * (stage.order * found.speed[:, None] <= half)[:, None]
+        kept = (stage.order * found.speed[:, None] <= half) & (2 * stage.harmonic <= most)
+        return moved[stage.name] * kept[:, None]
 
     less = level(found, {stage.name: low(stage) for stage in found.stages})
     whole = level(found, moved)
@@ -275,10 +277,12 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
         if change.max(initial=0.0) > _CHANGE:
             speed, sensor = np.unravel_index(int(change.argmax()), change.shape)
             text = (
-                f"the upper half of the excitation, to {1e-3 * data.attrs['up_to']:g} kHz, changes the level of "
+                f"the upper half of the excitation, to {_reach(data)}, changes the level of "
                 f"{data['sensor'].values[sensor]} at {speeds[speed]:.5g} rpm by {change.max():.2g} dB"
             )
-            yield Finding("W-EXCITATION", "dynamics.up_to", text, remedy="a higher frequency")
+            few = bool(data.attrs.get("most_harmonics"))
+            key, remedy = ("mesh_harmonics", "more of them") if few else ("up_to", "a higher frequency")
+            yield Finding("W-EXCITATION", f"dynamics.{key}", text, remedy=remedy)
     if "cross_excitation" in data:
         cross = data["cross_excitation"].values
         if cross.max(initial=0.0) > _CROSS:
@@ -297,6 +301,12 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
     if data.attrs["missing"]:
         text = f"{data.attrs['missing']} excite nothing, without teeth or contact ratio, or without torque"
         yield Finding("W-EXCITATION", "", text, remedy="give teeth or contact_ratio, and torque, of these stages")
+
+
+def _reach(data: xr.Dataset) -> str:
+    """Words for the reach of the excitation."""
+    most = int(data.attrs.get("most_harmonics", 0))
+    return f"{1e-3 * data.attrs['up_to']:g} kHz" + (f", at most {most} mesh harmonics" if most else "")
 
 
 def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:
@@ -319,7 +329,7 @@ def describe_gearbox_response(data: xr.Dataset, title: str = "Response of the st
         "smallest force [N]": lambda i: f"{np.nanmin(data['lowest_force'].values[worst(i), i]):.5g}",
         "mesh harmonics": lambda i: f"{int(data['mesh_harmonics'].values[worst(i), i])}",
     }
-    note = f"excitation up to {1e-3 * data.attrs['up_to']:g} kHz; speeds are those of {data.attrs['reference']}"
+    note = f"excitation up to {_reach(data)}; speeds are those of {data.attrs['reference']}"
     return tabulate(title, range(data.sizes["stage"]), columns, (note,))
 
 

@@ -1,9 +1,12 @@
 """Files and tables of the response of a gearbox, and what they say against themselves."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from casings import response
+from casings import RPM, pair_in_a_casing, response
 
+from femgear.trains.gearbox.response import solve_gearbox_response
 from femgear.trains.gearbox.response_results import (
     GearboxResponseResult,
     describe_gearbox_response,
@@ -126,3 +129,17 @@ def test_bodies_that_are_elastic_in_modes_alone_are_told(data):
     assert data.attrs["rigid"] == ""
     data.attrs["rigid"] = "ring of second stage"
     assert codes(data) == ["W-RIGID"]
+
+
+def test_a_response_of_few_harmonics_tells_what_its_upper_half_does():
+    found = pair_in_a_casing()
+    dynamics = found.model.case.dynamics.model_copy(update={"mesh_harmonics": 2})
+    case = found.model.case.model_copy(update={"dynamics": dynamics})
+    found = replace(found, model=replace(found.model, case=case))
+    few = GearboxResponseResult(solve_gearbox_response(found, [1000.0 * RPM]), whole=True).dataset()
+    assert few["harmonic"].values.tolist() == [1, 2]
+    lines = np.hypot(few["lines_real"], few["lines_imag"]).values[0]
+    first = lines[:, 0] / np.sqrt((lines**2).sum(axis=1))
+    assert few["level_change"].values[0] == pytest.approx(-20.0 * np.log10(first))
+    (finding,) = [one for one in gearbox_response_warnings(few) if one.code == "W-EXCITATION"]
+    assert finding.key == "dynamics.mesh_harmonics" and "at most 2 mesh harmonics" in finding.text
