@@ -70,25 +70,7 @@ class GearboxResponseResult(StageResult):
         forces = slice(sensors, sensors + 3 * bearings)
         variables = _of_stages(found) | _of_lines(found)
         moved = accelerations(found, sensors)
-        if sensors:
-            lines = np.concatenate([moved[stage.name] for stage in found.stages], axis=2)
-            variables |= {
-                "level": ("speed sensor", level(found, moved), "m/s^2", "root mean square of the acceleration"),
-                "level_of_stage": (
-                    "speed sensor stage",
-                    np.stack([_rms(moved[stage.name]) for stage in found.stages], axis=2),
-                    "m/s^2",
-                    "the same by the lines of one stage",
-                ),
-                "level_change": (
-                    "speed sensor",
-                    _change(found, moved),
-                    "dB",
-                    "change of the level by lines beyond half the frequency of the excitation",
-                ),
-                **_of_paths(found, moved),
-                **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
-            }
+        variables |= _at_sensors(found, moved) if sensors else {}
         variables |= {} if self.resonances is None else resonance_variables(found, self.resonances, moved)
         of_bearings = {stage.name: stage.motion[:, forces] for stage in found.stages}
         size = (len(found.speed), bearings, 3)
@@ -134,6 +116,20 @@ class GearboxResponseResult(StageResult):
         }
         used = {dim for entry in variables.values() for dim in entry[0].split()}
         return Contents(variables, {name: entry for name, entry in coords.items() if name in used}, attrs)
+
+
+def _at_sensors(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[str, tuple]:
+    """Levels, shares of stages and ways, and lines at the sensors, of accelerations by stage."""
+    lines = np.concatenate([moved[stage.name] for stage in found.stages], axis=2)
+    by_stage = np.stack([_rms(moved[stage.name]) for stage in found.stages], axis=2)
+    change = "change of the level by lines beyond half the frequency of the excitation"
+    return {
+        "level": ("speed sensor", level(found, moved), "m/s^2", "root mean square of the acceleration"),
+        "level_of_stage": ("speed sensor stage", by_stage, "m/s^2", "the same by the lines of one stage"),
+        "level_change": ("speed sensor", _change(found, moved), "dB", change),
+        **_of_paths(found, moved),
+        **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
+    }
 
 
 def _of_several(found: GearboxResponse) -> dict[str, tuple]:
