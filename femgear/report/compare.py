@@ -198,7 +198,7 @@ def compare_page(train: Train, first: Results, second: Results) -> str:
 
 
 def _overlaid(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any] | None:
-    """Draw the curves of two charts over each other; None where their panels differ."""
+    """Draw the curves of two charts over each other; None where their panels differ, or have areas in place of them."""
     if len(first["panels"]) != len(second["panels"]):
         return None
     panels = []
@@ -210,6 +210,8 @@ def _overlaid(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any] |
             for trace in other["traces"]
             if trace.get("hoverinfo") != "skip"
         ]
+        if not faded:
+            return None
         ranges = {axis: panel[axis] | _joint(panel[axis], other[axis]) for axis in ("x", "y")}
         panels.append(panel | ranges | {"traces": [*panel["traces"], *faded], "words": []})
     return first | {"panels": panels}

@@ -36,6 +36,8 @@ _PANELS = 9
 """Quantities that are drawn, at most."""
 _TOLD = 3
 """Tolerances that are named for a quantity, at most."""
+_ROUNDING = 1e-9
+"""Spread of a quantity over its size that is none."""
 _ENOUGH = 20
 """Samples from which correlations are told."""
 
@@ -112,7 +114,9 @@ class EntrySamples:
 
     def correlation(self) -> np.ndarray:
         """Compute Spearman's rank correlation of quantities and laws (quantities, laws); 0 where nothing changes."""
-        ranks = [_ranks(values[self.whole]) for values in (self.values, self.drawn)]
+        values = self.values[self.whole]
+        alike = np.ptp(values, axis=0) <= _ROUNDING * np.abs(values).max(axis=0)
+        ranks = [_ranks(part) for part in (np.where(alike, 0.0, values), self.drawn[self.whole])]
         centred = [rank - rank.mean(axis=0) for rank in ranks]
         sizes = [np.sqrt((part**2).sum(axis=0)) for part in centred]
         product = centred[0].T @ centred[1]

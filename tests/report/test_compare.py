@@ -142,3 +142,15 @@ def test_key_figures_of_two_runs_are_compared_by_name(tmp_path):
     assert rows["mesh force [N]"][2] == "" and "mesh force stage [N]" not in rows
     # both tables of stages, each with its own of the other run
     assert {"Meshes", "Modes"} <= blocks.keys()
+
+
+def test_charts_of_areas_are_not_laid_over_each_other():
+    curve = {"x": [0.0, 1.0], "y": [1.0, 2.0], "name": "level"}
+    area = curve | {"hoverinfo": "skip", "fill": "toself"}
+
+    def drawn(*traces):
+        return {"panels": [{"x": {"range": [0, 1]}, "y": {"range": [0, 2]}, "traces": [*traces], "words": []}]}
+
+    both = compare._overlaid(drawn(curve), drawn(curve | {"y": [2.0, 3.0]}))
+    assert [trace["name"] for trace in both["panels"][0]["traces"]] == ["level", "level, second"]
+    assert compare._overlaid(drawn(area), drawn(area)) is None

@@ -69,6 +69,9 @@ def test_the_tolerance_that_makes_it_is_named(drawn):
             assert correlation[q, k] == pytest.approx(expected, abs=1e-12)
     # the nearer the other bearing the less is left for this one; the mesh force follows the torque alone
     assert correlation[0, 0] < -0.99 and correlation[1, 1] > 0.99
+    # what changes by rounding alone is made by none
+    still = samples.values * [0.0, 1e-12] + 1.0
+    assert (replace(samples, values=still).correlation() == 0.0).all()
     distribution, made = describe_entry_samples(samples, entries)
     assert made.rows[0][1].startswith("bearing[0].position (-") and len(distribution.rows) == 2
     assert [float(cell) for cell in distribution.rows[1][4:]] == pytest.approx(

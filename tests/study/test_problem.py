@@ -1,6 +1,8 @@
 """Variables and limits of a search: reliefs on the loaded flanks, words of the command line, refusals."""
 
 import pytest
+from casings import casing_tables
+from small_gearbox import pair_tables
 from study.test_designs import CASE, SPEEDS
 
 from femgear.case.quantities import FREQUENCY
@@ -73,3 +75,18 @@ def test_words_of_the_command_line():
 def test_refusals(call, message):
     with pytest.raises(CaseError, match=message):
         call()
+
+
+def test_limits_of_a_gearbox_have_units_of_its_key_figures():
+    tables = pair_tables(teeth=True)
+    tables["bearing"][0] = {"name": "A", "shaft": "input", "position": "5 mm", "kind": "ball", "rolling_elements": 9}
+    tables["bearing"][0] |= {"element_diameter": "9.5 mm", "pitch_diameter": "46 mm", "dynamic_rating": "19.5 kN"}
+    tables |= {"casing": casing_tables(), "sensor": [{"name": "top", "position": ["0 mm"] * 3, "direction": "y"}]}
+    case = read_case(tables)
+    limits = {"level dB top <= 140 dB": 140.0, "K_Hbeta stage <= 1.2": 1.2, "STE <= 2 um": 2e-6}
+    for text, bound in limits.items():
+        assert parse_limit(text, case=case).high == pytest.approx(bound)
+    assert parse_limit("bearing life >= 7200 s", case=case).low == pytest.approx(2.0)
+    assert parse_limit("bearing life a >= 20000 h", case=case).low == 20000.0
+    with pytest.raises(CaseError, match="E-UNIT"):
+        parse_limit("bearing life >= 20 mm", case=case)
