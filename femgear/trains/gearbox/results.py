@@ -40,6 +40,7 @@ from femgear.trains.gearbox.sensors import (
     static_sensor_variables,
 )
 from femgear.trains.gearbox.silence import idle_entries
+from femgear.trains.gearbox.strength import describe_strength, strength_contents
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -177,7 +178,9 @@ class DeflectionResult(StageResult):
             ),
         }
         coords |= casing_coordinates(state) | sensor_coordinates(state.model)
-        return Contents(variables, coords, {"title": "system deflection", "load_case": self.chosen})
+        rated, gears, editions = strength_contents(every)
+        attrs = {"title": "system deflection", "load_case": self.chosen} | editions
+        return Contents(variables | rated, coords | gears, attrs)
 
 
 def _names(dim: str, names: Iterable[str], words: str) -> tuple:
@@ -419,6 +422,7 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
     return (
         tabulate(f"Meshes{name}{brackets}", range(data.sizes["mesh"]), meshes, (note,)),
         tabulate(f"Bearings{name}", range(data.sizes["bearing"]), bearings),
+        *describe_strength(data, at, name),
         *describe_feet(data, at, name),
         *describe_sensors(data, at, name),
         *describe_load_cases(data),

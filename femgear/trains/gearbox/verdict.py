@@ -17,6 +17,7 @@ from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
 from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
 from femgear.trains.gearbox.response_results import line_origin
+from femgear.trains.gearbox.strength import smallest_safeties
 
 SENSORS_JUDGED = 3
 """Sensors in the verdict, at most: the loudest ones."""
@@ -30,6 +31,8 @@ def gearbox_verdict(results: Any) -> Iterator[Block]:
     rows, marks = list[tuple[str, str]](), Marks(results.findings)
     if "deflection" in results.stages:
         rows += _worst_of_deflection(results.deflection, marks)
+        response = results.dynamics if "dynamics" in results.stages else None
+        rows += smallest_safeties(results.deflection, response, marks)
     modes = results.modes if "modes" in results.stages else None
     if modes is not None:
         rows += _nearest_mode(modes)

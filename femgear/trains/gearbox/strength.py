@@ -1,0 +1,192 @@
+"""Strength of the teeth of all stages of a gearbox after ISO 6336, in every load case.
+
+Torques are those of the power flow, K_gamma and K_Hbeta those of the contact with the misalignment that the gearbox
+gives it. The edition is that of the stage's teeth where they have a section ``strength``, else that of the gearbox. In
+deflection.nc K_v is that of part 1, or 1; the verdict puts that of the response in its place.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from femgear.report.tables import Block, Marks, tabulate
+from femgear.stages.strength import Rating, rate_case, rating_wanted
+from femgear.stages.strength_results import factor_names, kind_names, safety_notes
+from femgear.trains.gearbox.case_file import GearboxCase
+from femgear.trains.gearbox.contact import StageContact
+from femgear.trains.gearbox.deflection import Deflection
+
+_OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
+_SAFETIES = {"iso_root_safety": "S_F", "iso_contact_safety": "S_H"}
+_STRESSES = {"S_F": "sigma_F0", "S_H": "Z sigma_H0"}
+_WORDS = {
+    "iso_root_stress": ("Pa", "nominal root stress sigma_F0 under the mean load of a planet, ISO 6336-3"),
+    "iso_contact_stress": ("Pa", "nominal contact stress sigma_H0 times Z_B or Z_D, ISO 6336-2"),
+    "iso_root_safety": ("1", "safety S_F with the load factors of the static load; NaN without a limit"),
+    "iso_contact_safety": ("1", "safety S_H with the load factors of the static load; NaN without a limit"),
+}
+"""Variables over load case, mesh and gear: unit and text."""
+
+
+def rated_stage(case: GearboxCase, name: str, contact: StageContact, mesh_frequency: float) -> Rating | None:
+    """Rate the teeth of a stage under a load case; None where nothing asks for safeties.
+
+    Parameters
+    ----------
+    case : GearboxCase
+        With the section ``strength`` of stages that have none of their own.
+    name : str
+        Of the stage, before the names of its flanks.
+    contact : StageContact
+        With K_gamma and K_Hbeta.
+    mesh_frequency : float
+        [Hz]
+    """
+    teeth = contact.case
+    if not (rating_wanted(teeth) or "strength" in case.model_fields_set):
+        return None
+    kinds = len(kind_names(contact.result.planetary_set.mesh_names))
+    force, face = (values.reshape(kinds, -1) for values in (contact.normal_force, contact.face_load_factor))
+    mean = force.mean(axis=1)
+    sharing = np.divide(force.max(axis=1), mean, out=np.ones(kinds), where=mean > 0.0)
+    return rate_case(
+        teeth,
+        torque=contact.result.sun_torque,
+        sharing=sharing if force.shape[1] > 1 else None,
+        face=face.max(axis=1) if contact.result.cycle.face_load_factor is not None else None,
+        frequencies=(abs(mesh_frequency),) if mesh_frequency else (),
+        strength=teeth.strength if "strength" in teeth.model_fields_set else case.strength,
+    )
+
+
+def rated_stages(state: Deflection) -> dict[str, Rating]:
+    """Rate all stages of a loaded state whose teeth are computed and that ask for safeties, by their names."""
+    case, flow = state.model.case, state.model.flow
+    ratings = {
+        name: rated_stage(case, name, contact, flow.mesh_frequency[name]) for name, contact in state.contacts.items()
+    }
+    return {name: rating for name, rating in ratings.items() if rating is not None}
+
+
+def strength_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], dict[str, tuple], dict[str, Any]]:
+    """Collect variables, coordinates and attributes of deflection.nc; all empty where no stage is rated."""
+    ratings = [rated_stages(state) for state in states]
+    if not any(ratings):
+        return {}, {}, {}
+    model = states[0].model
+    count = len(model.assembly.contacts)
+    values = {name: np.full((len(states), count, 2), np.nan) for name in _WORDS}
+    dynamic, flanks = np.ones((len(states), count)), [["", ""] for _ in range(count)]
+    for number, of_state in enumerate(ratings):
+        for stage in model.stages:
+            for mesh, gear, flank, factor in _places(stage, of_state.get(stage.name)):
+                flanks[mesh][gear], dynamic[number, mesh] = f"{stage.name} {flank.name}", factor
+                values["iso_root_stress"][number, mesh, gear] = flank.root_stress
+                values["iso_contact_stress"][number, mesh, gear] = flank.contact_stress
+                values["iso_root_safety"][number, mesh, gear] = flank.root_safety
+                values["iso_contact_safety"][number, mesh, gear] = flank.contact_safety
+    variables: dict[str, tuple] = {
+        name: ("load_case mesh gear", values[name], *words) for name, words in _WORDS.items()
+    }
+    variables["iso_dynamic_factor"] = ("load_case mesh", dynamic, "1", "K_v of part 1 in these safeties, or 1")
+    variables["iso_flank"] = ("mesh gear", flanks, "1", "stage and flank")
+    coords = {"gear": (("gear",), ["first", "second"], "1", "gear of the mesh")}
+    first = next(filter(None, ratings))
+    notes = [f"{name}: {note}" for name, rating in first.items() for note in _notes(rating)]
+    editions = ", ".join(dict.fromkeys(str(rating.nominal.edition) for rating in first.values()))
+    return variables, coords, {"iso_edition": editions, "iso_notes": " | ".join(notes)}
+
+
+def _places(stage: Any, rating: Rating | None) -> Iterator[tuple[int, int, Any, float]]:
+    """Mesh, gear, flank and K_v of part 1 of every flank of a stage."""
+    if rating is None:
+        return
+    kinds = len(rating.standard)
+    for number, flank in enumerate(rating.flanks):
+        meshes = np.array(stage.meshes).reshape(kinds, -1)[flank.kind]
+        for mesh in meshes.tolist():
+            yield mesh, number % 2, flank, float(rating.factors.dynamic[flank.kind])
+
+
+def _notes(rating: Rating) -> Iterator[str]:
+    """Load factors that the safeties have, and what is missing."""
+    yield f"load factors {' '.join(factor_names(rating.factors)) or 'none'}"
+    yield from (note for note in safety_notes(rating) if note.startswith(("give ", "taken as 1")))
+
+
+def describe_strength(data: Any, load_case: int, name: str) -> tuple[Block, ...]:
+    """Tabulate stresses and safeties of all flanks in a load case of deflection.nc; nothing where none is rated."""
+    if "iso_flank" not in data:
+        return ()
+    at = data.isel(load_case=load_case)
+    rows = dict[str, tuple[int, int]]()
+    for mesh, names in enumerate(data["iso_flank"].values):
+        for gear, flank in enumerate(names):
+            if flank:
+                rows.setdefault(str(flank), (mesh, gear))
+
+    def number(name: str, form: str, factor: float = 1.0):
+        def text(flank: str) -> str:
+            value = factor * float(at[name].values[rows[flank]])
+            return f"{value:{form}}" if math.isfinite(value) else "-"
+
+        return text
+
+    columns = {
+        "flank": lambda flank: flank,
+        "sigma_F0 [MPa]": number("iso_root_stress", ".2f", 1e-6),
+        "S_F": number("iso_root_safety", ".2f"),
+        "Z sigma_H0 [MPa]": number("iso_contact_stress", ".2f", 1e-6),
+        "S_H": number("iso_contact_safety", ".2f"),
+    }
+    notes = [note for note in str(data.attrs["iso_notes"]).split(" | ") if note]
+    return (tabulate(f"Strength{name}, ISO 6336:{data.attrs['iso_edition']}", rows, columns, notes),)
+
+
+def smallest_safeties(data: Any, response: Any, marks: Marks) -> Iterator[tuple[str, str]]:
+    """Write rows of the smallest S_F and S_H over all load cases, with K_v of the response where there is one.
+
+    Parameters
+    ----------
+    data : dataset
+        deflection.nc.
+    response : dataset or None
+        dynamics.nc, whose load case is the chosen one.
+    marks : Marks
+        Of the findings of the run.
+    """
+    if "iso_flank" not in data:
+        return
+    ratio = np.ones(data["iso_dynamic_factor"].shape)
+    if response is not None:
+        chosen = int(data.attrs["load_case"])
+        computed = _computed_factors(data, response)
+        ratio[chosen] = np.where(np.isfinite(computed), data["iso_dynamic_factor"].values[chosen] / computed, 1.0)
+    cases, flanks = data["load_case"].values, data["iso_flank"].values
+    for name, symbol in _SAFETIES.items():
+        values = data[name].values * (ratio if symbol == "S_F" else np.sqrt(ratio))[..., None]
+        if not np.isfinite(values).any():
+            continue
+        case, mesh, gear = np.unravel_index(int(np.nanargmin(values)), values.shape)
+        stress = name.replace("_safety", "_stress")
+        cause = f"{_STRESSES[symbol]} {1e-6 * float(data[stress].values[case, mesh, gear]):.1f} MPa"
+        where = f", {cases[case]}" if len(cases) > 1 else ""
+        text = marks(f"{values[case, mesh, gear]:.2f}", *_OF_TEETH, of=("deflection",))
+        edition = data.attrs["iso_edition"]
+        yield f"smallest safety {symbol}, ISO 6336:{edition}", f"{text}, {flanks[mesh, gear]}{where}: {cause}"
+
+
+def _computed_factors(data: Any, response: Any) -> np.ndarray:
+    """K_v (M,) of the response for every mesh of deflection.nc; NaN of stages that it has not."""
+    factor = response["dynamic_factor"].max("speed").values
+    computed = np.full(data.sizes["mesh"], np.nan)
+    for mesh, (first, _) in enumerate(data["iso_flank"].values):
+        for number, stage in enumerate(response["stage"].values):
+            if str(first).startswith(f"{stage} "):
+                ring = "ring side" in str(first)
+                computed[mesh] = factor[number, int(ring)]
+    return computed

@@ -1,0 +1,130 @@
+"""Safeties of the stages of a gearbox: load cases, planets, K_v of the response, what is missing."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from femgear.case.gear_set import planetary_set
+from femgear.case.sections import StrengthSection
+from femgear.report.tables import Marks
+from femgear.stages.strength import rate_case
+from femgear.trains.gearbox.strength import describe_strength, rated_stage, smallest_safeties, strength_contents
+from femgear.trains.reading import read_case, with_values
+
+CASES = Path(__file__).parents[3] / "cases"
+LIMITS = {"material.root_stress_limit": "461 MPa", "material.contact_stress_limit": "1500 MPa"}
+
+
+@pytest.fixture(scope="module")
+def pair():
+    return with_values(read_case(CASES / "spur_pair.toml"), LIMITS)
+
+
+@pytest.fixture(scope="module")
+def planetary():
+    return with_values(read_case(CASES / "planetary_27_40_108.toml"), LIMITS)
+
+
+def contact_of(case, torque, force, face=None):
+    """What a contact of a stage has that ratings take."""
+    factor = None if face is None else np.array(face)
+    cycle = SimpleNamespace(face_load_factor=factor)
+    result = SimpleNamespace(planetary_set=planetary_set(case), sun_torque=torque, cycle=cycle)
+    shown = np.ones(len(force)) if factor is None else factor
+    return SimpleNamespace(case=case, result=result, normal_force=np.array(force), face_load_factor=shown)
+
+
+def box(**given):
+    """A gearbox with or without a section strength."""
+    return SimpleNamespace(strength=StrengthSection(**given), model_fields_set={"strength"} if given else set())
+
+
+def state_of(case, contacts):
+    stages, first = [], 0
+    for name, contact in contacts.items():
+        count = len(contact.normal_force)
+        stages.append(SimpleNamespace(name=name, meshes=tuple(range(first, first + count))))
+        first += count
+    flow = SimpleNamespace(mesh_frequency=dict.fromkeys(contacts, 500.0))
+    assembly = SimpleNamespace(contacts=[None] * first)
+    model = SimpleNamespace(case=case, flow=flow, stages=stages, assembly=assembly)
+    return SimpleNamespace(model=model, contacts=contacts)
+
+
+@pytest.fixture(scope="module")
+def data(pair, planetary):
+    """deflection.nc of two load cases, the second with twice the torque."""
+    share = [900.0, 1000.0, 1100.0] * 2
+    states = [
+        state_of(
+            box(quality=6),
+            {
+                "pair stage": contact_of(pair, load * 100.0, [1000.0], [1.2]),
+                "set": contact_of(planetary, load * 50.0, share, [1.0, 1.1, 1.3, 1.0, 1.0, 1.05]),
+            },
+        )
+        for load in (1.0, 2.0)
+    ]
+    variables, coords, attrs = strength_contents(states)
+    values = {name: (tuple(dims.split()), value) for name, (dims, value, *_) in variables.items()}
+    return xr.Dataset(values, coords={"load_case": ["half", "full"], "gear": coords["gear"][1]}, attrs=attrs)
+
+
+def test_stages_are_rated_with_their_own_sharing_and_face_load(planetary):
+    contact = contact_of(planetary, 50.0, [900.0, 1000.0, 1100.0] * 2, [1.0, 1.1, 1.3, 1.0, 1.0, 1.05])
+    rating = rated_stage(box(), "set", contact, 500.0)
+    assert rating.factors.sharing == pytest.approx([1.1, 1.1])
+    assert rating.factors.face == pytest.approx([1.3, 1.05])
+    assert rating.nominal.edition == 2019
+    assert rated_stage(box(edition=2006), "set", contact, 500.0).nominal.edition == 2006
+    own = contact_of(with_values(planetary, {"strength.edition": 2006}), 50.0, [1000.0] * 6)
+    assert rated_stage(box(edition=2019), "set", own, 500.0).nominal.edition == 2006
+
+
+def test_nothing_is_stored_where_nothing_asks(planetary):
+    plain = with_values(planetary, dict.fromkeys(LIMITS))
+    assert rated_stage(box(), "set", contact_of(plain, 50.0, [1000.0] * 6), 500.0) is None
+    assert strength_contents([state_of(box(), {"set": contact_of(plain, 50.0, [1.0] * 6)})]) == ({}, {}, {})
+    assert describe_strength(xr.Dataset(), 0, "") == () and not list(smallest_safeties(xr.Dataset(), None, Marks(())))
+
+
+def test_files_hold_stresses_and_safeties_of_all_load_cases(data, pair):
+    half, full = data["iso_root_stress"].values
+    assert full == pytest.approx(2.0 * half)
+    rating = rate_case(
+        pair, torque=200.0, face=np.array([1.2]), frequencies=(500.0,), strength=StrengthSection(quality=6)
+    )
+    assert data["iso_root_safety"].values[1, 0, 1] == pytest.approx(rating.flanks[1].root_safety)
+    assert data["iso_contact_safety"].values[1, 0, 0] == pytest.approx(rating.flanks[0].contact_safety)
+    assert data["iso_dynamic_factor"].values[1, 0] == pytest.approx(rating.standard[0].dynamic.factor)
+    assert data["iso_flank"].values[4].tolist() == ["set planet, ring side", "set ring"]
+    (block,) = describe_strength(data, 1, "")
+    assert [row[0] for row in block.rows] == [
+        "pair stage gear 1",
+        "pair stage gear 2",
+        "set sun",
+        "set planet, sun side",
+        "set planet, ring side",
+        "set ring",
+    ]
+    assert block.title.endswith("ISO 6336:2019")
+
+
+def test_the_verdict_has_the_dynamic_factor_of_the_response(data):
+    """Of the chosen load case alone; the smallest of all load cases stands with flank and stress."""
+    alone = dict(smallest_safeties(data.assign_attrs(load_case=1), None, Marks(())))
+    least = np.nanmin(data["iso_root_safety"].values)
+    text = alone["smallest safety S_F, ISO 6336:2019"]
+    assert text.startswith(f"{least:.2f}, ") and ", full: sigma_F0" in text
+    factor = np.array([[[3.0, np.nan], [3.0, 3.0]]])
+    response = xr.Dataset(
+        {"dynamic_factor": (("speed", "stage", "kind"), factor)}, coords={"stage": ["pair stage", "set"]}
+    )
+    running = dict(smallest_safeties(data.assign_attrs(load_case=1), response, Marks(())))
+    expected = np.nanmin(data["iso_root_safety"].values[1] * data["iso_dynamic_factor"].values[1, :, None] / 3.0)
+    assert running["smallest safety S_F, ISO 6336:2019"].startswith(f"{expected:.2f}, ")
+    other = dict(smallest_safeties(data.assign_attrs(load_case=0), response, Marks(())))
+    assert other["smallest safety S_F, ISO 6336:2019"] != running["smallest safety S_F, ISO 6336:2019"]
