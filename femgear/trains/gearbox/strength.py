@@ -81,10 +81,12 @@ def strength_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], d
     count = len(model.assembly.contacts)
     values = {name: np.full((len(states), count, 2), np.nan) for name in _WORDS}
     dynamic, flanks = np.ones((len(states), count)), [["", ""] for _ in range(count)]
+    places = np.full((count, 2), -1)
     for number, of_state in enumerate(ratings):
-        for stage in model.stages:
+        for place, stage in enumerate(model.stages):
             for mesh, gear, flank, factor in _places(stage, of_state.get(stage.name)):
                 flanks[mesh][gear], dynamic[number, mesh] = f"{stage.name} {flank.name}", factor
+                places[mesh] = place, flank.kind
                 values["iso_root_stress"][number, mesh, gear] = flank.root_stress
                 values["iso_contact_stress"][number, mesh, gear] = flank.contact_stress
                 values["iso_root_safety"][number, mesh, gear] = flank.root_safety
@@ -93,8 +95,13 @@ def strength_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], d
         name: ("load_case mesh gear", values[name], *words) for name, words in _WORDS.items()
     }
     variables["iso_dynamic_factor"] = ("load_case mesh", dynamic, "1", "K_v of part 1 in these safeties, or 1")
+    text = "number of the stage and of the kind of mesh; -1 of meshes that are not rated"
+    variables["iso_place"] = ("mesh numbering", places, "1", text)
     variables["iso_flank"] = ("mesh gear", flanks, "1", "stage and flank")
-    coords = {"gear": (("gear",), ["first", "second"], "1", "gear of the mesh")}
+    coords = {
+        "gear": (("gear",), ["first", "second"], "1", "gear of the mesh"),
+        "numbering": (("numbering",), ["stage", "kind"], "1", "what is numbered"),
+    }
     first = next(filter(None, ratings))
     notes = [f"{name}: {note}" for name, rating in first.items() for note in _notes(rating)]
     editions = ", ".join(dict.fromkeys(str(rating.nominal.edition) for rating in first.values()))
@@ -183,10 +190,10 @@ def smallest_safeties(data: Any, response: Any, marks: Marks) -> Iterator[tuple[
 def _computed_factors(data: Any, response: Any) -> np.ndarray:
     """K_v (M,) of the response for every mesh of deflection.nc; NaN of stages that it has not."""
     factor = response["dynamic_factor"].max("speed").values
+    rows = {str(name): row for row, name in enumerate(response["stage"].values)}
+    names = [str(name) for name in data["stage"].values]
     computed = np.full(data.sizes["mesh"], np.nan)
-    for mesh, (first, _) in enumerate(data["iso_flank"].values):
-        for number, stage in enumerate(response["stage"].values):
-            if str(first).startswith(f"{stage} "):
-                ring = "ring side" in str(first)
-                computed[mesh] = factor[number, int(ring)]
+    for mesh, (stage, kind) in enumerate(data["iso_place"].values.tolist()):
+        if stage >= 0 and names[stage] in rows:
+            computed[mesh] = factor[rows[names[stage]], kind]
     return computed

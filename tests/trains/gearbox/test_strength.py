@@ -70,7 +70,11 @@ def data(pair, planetary):
     ]
     variables, coords, attrs = strength_contents(states)
     values = {name: (tuple(dims.split()), value) for name, (dims, value, *_) in variables.items()}
-    return xr.Dataset(values, coords={"load_case": ["half", "full"], "gear": coords["gear"][1]}, attrs=attrs)
+    return xr.Dataset(
+        values,
+        coords={"load_case": ["half", "full"], "gear": coords["gear"][1], "stage": ["pair stage", "set"]},
+        attrs=attrs,
+    )
 
 
 def test_stages_are_rated_with_their_own_sharing_and_face_load(planetary):
@@ -119,7 +123,7 @@ def test_the_verdict_has_the_dynamic_factor_of_the_response(data):
     least = np.nanmin(data["iso_root_safety"].values)
     text = alone["smallest safety S_F, ISO 6336:2019"]
     assert text.startswith(f"{least:.2f}, ") and ", full: sigma_F0" in text
-    factor = np.array([[[3.0, np.nan], [3.0, 3.0]]])
+    factor = np.array([[[3.0, 3.0], [3.0, np.nan]]])
     response = xr.Dataset(
         {"dynamic_factor": (("speed", "stage", "kind"), factor)}, coords={"stage": ["pair stage", "set"]}
     )
