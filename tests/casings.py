@@ -14,6 +14,7 @@ from small_gearbox import pair_tables
 from femgear.case.dependencies import Steps
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.response import GearboxResponse, solve_gearbox_response
+from femgear.trains.live import Answer
 from femgear.trains.reading import read_case
 
 FEET = {
@@ -184,3 +185,12 @@ def pair_in_a_casing() -> Deflection:
 def response() -> GearboxResponse:
     """Response of that pair at two speeds."""
     return solve_gearbox_response(pair_in_a_casing(), [1000.0 * RPM, 2500.0 * RPM])
+
+
+@cache
+def answer_in_a_casing() -> Answer:
+    """Answer of the pair with teeth in a casing on feet, with a sensor and a run-up of two speeds."""
+    tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
+    tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
+    tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
+    return Answer(read_case(tables), Steps())

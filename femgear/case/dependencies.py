@@ -18,6 +18,8 @@ from femgear.errors import CaseError
 from femgear.remembered import remembered
 
 if TYPE_CHECKING:
+    from pydantic import BaseModel
+
     from femgear.case.planetary import Case
     from femgear.case.text import ReadCase
 
@@ -117,6 +119,13 @@ def box_entries(stage: str, case: ReadCase) -> Entries:
     """List the entries of a gearbox that decide a stage, which goes on from the deflection alone."""
     kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup") else frozenset()
     return _entries(case, {"format", "title"} | _BESIDE[stage], kept=kept)
+
+
+def load_case_entries(case: ReadCase, load_case: BaseModel) -> Entries:
+    """List the entries of a gearbox that decide its state under one load case: not the others, nor its share."""
+    others = _BESIDE["deflection"] | {"format", "title", "sensor", "operation.load_case", "operation.first"}
+    of_load_case = load_case.model_dump(exclude={"name", "share"})
+    return {**_entries(case, others), **{f"load case.{key}": value for key, value in _flat(of_load_case)}}
 
 
 def every_entry(case: ReadCase) -> Entries:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
-from femgear.case.dependencies import Steps, box_entries
+from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
-from femgear.trains.gearbox.deflection import check_held, solve_deflection
+from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
@@ -52,13 +53,21 @@ def solve_deflections(
     factors = ESTIMATES if any(bearing.estimated for bearing in case.bearing) else ()
     for number, load_case in enumerate(cases):
         progress("deflection", number, len(cases) + len(factors))
-        states.append(solve_deflection(case, load_case, steps=steps))
+        states.append(_load_case_state(case, load_case, steps))
     estimates = []
     for number, factor in enumerate(factors, len(cases)):
         progress("deflection", number, len(cases) + len(factors))
         start = states[chosen].slopes[-1]
         estimates.append(solve_deflection(case, cases[chosen], slopes=start, steps=steps, estimate=factor))
     return DeflectionResult(case, tuple(states), chosen, tuple(estimates))
+
+
+def _load_case_state(case: GearboxCase, load_case: LoadCaseSection, steps: Steps) -> Deflection:
+    """Loaded state of a load case: as it was kept, whatever the others are, or solved now."""
+    entries = load_case_entries(case, load_case)
+    if (kept := steps.kept("state of a load case", entries)) is not None:
+        return replace(kept, model=replace(kept.model, case=case))
+    return steps.keep("state of a load case", entries, solve_deflection(case, load_case, steps=steps))
 
 
 @one_blas_thread()

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from casings import casing_tables
-from small_gearbox import pair_tables, planetary_tables
+from casings import answer_in_a_casing
+from small_gearbox import planetary_tables
 
 from femgear.case.dependencies import Steps
 from femgear.trains.gearbox.key_figures import gearbox_key_figures, stage_meshes
@@ -13,11 +13,7 @@ from femgear.trains.reading import read_case
 
 @pytest.fixture(scope="module")
 def answer():
-    """A pair with teeth in a casing on feet, with a run-up."""
-    tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
-    tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
-    tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
-    return Answer(read_case(tables), Steps())
+    return answer_in_a_casing()
 
 
 @pytest.fixture(scope="module")

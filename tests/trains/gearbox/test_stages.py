@@ -112,3 +112,22 @@ def test_changes_leave_the_stages_that_they_do_not_decide():
     assert damped.modes.contents()["damping_ratio"].values[-1] == pytest.approx(0.06)
     handle.change({"bearing[0].radial": "1e8 N/m"})
     assert all(handle.changed.values())
+
+
+def test_a_load_case_is_solved_once_whatever_the_others_are():
+    tables = pair_tables()
+    first = tables["operation"]["load_case"][0]
+    back = first | {"name": "back", "torque": {"motor": "-60 N m"}, "share": 0.5}
+    tables["operation"]["load_case"] = [first | {"share": 0.5}, back]
+    handle = Live(read_case(tables))
+    before = handle.answer.deflection
+    after = handle.change({"operation.load_case[1].torque.motor": "-50 N m", "operation.load_case[0].share": 0.4})
+    states, alone = after.deflection.states, Answer(after.case, Steps()).deflection.contents()
+    assert states[0].motion is before.states[0].motion and states[1].motion is not before.states[1].motion
+    assert all(state.model.case is after.case for state in states)
+    contents = after.deflection.contents()
+    for name in ("mesh_force", "share", "speed", "torque", "bearing_force"):
+        assert contents[name].values == pytest.approx(alone[name].values, rel=1e-12, nan_ok=True)
+    # what holds shafts decides all of them
+    stiff = handle.change({"bearing[0].radial": "1e8 N/m"}).deflection
+    assert stiff.states[0].motion is not states[0].motion

@@ -4,23 +4,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from casings import casing_tables
-from small_gearbox import pair_tables
+from casings import answer_in_a_casing
 
-from femgear.case.dependencies import Steps
 from femgear.findings import DOUBT, Finding
 from femgear.trains.gearbox.mode_words import nearest_mode
 from femgear.trains.gearbox.verdict import gearbox_verdict, level_text
-from femgear.trains.live import Answer
-from femgear.trains.reading import read_case
 
 
 @pytest.fixture(scope="module")
 def results():
-    tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
-    tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
-    tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
-    answer = Answer(read_case(tables), Steps())
+    answer = answer_in_a_casing()
     data = {name: answer[name].contents() for name in answer}
     return SimpleNamespace(stages=tuple(data), findings=(), **data)
 
