@@ -445,10 +445,13 @@ THEMES = (
             multistage.response,
             multistage.former_modes,
             multistage.former_response,
-            multistage.turning,
-            multistage.balance,
-            multistage.left_out,
+            multistage.turning_frames,
             multistage.published,
+        ),
+        slow_parts=(
+            multistage.balance,
+            multistage.balance_running,
+            multistage.left_out,
         ),
     ),
     Theme(
