@@ -48,10 +48,11 @@ _DYNAMIC = _WORDS | {"static.stresses", "static.members"}
 _SOLUTION = {f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")}
 """How the contact is solved, whatever the grids."""
 _BESIDE = {
-    "deflection": {"modes", "dynamics", "runup"},
-    "modes": {"dynamics", "runup"},
-    "dynamics": {"modes", "runup"},
-    "runup": {"modes"},
+    "deflection": {"modes", "dynamics", "runup", "balance"},
+    "modes": {"dynamics", "runup", "balance"},
+    "dynamics": {"modes", "runup", "balance"},
+    "runup": {"modes", "balance"},
+    "balance": {"modes", "dynamics", "runup"},
 }
 """Tables of a gearbox that are those of other stages, by stage."""
 _HELIX = {"helical.helix_angle"}
@@ -117,7 +118,7 @@ def runup_entries(case: Case) -> Entries:
 
 def box_entries(stage: str, case: ReadCase) -> Entries:
     """List the entries of a gearbox that decide a stage, which goes on from the deflection alone."""
-    kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup") else frozenset()
+    kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup", "balance") else frozenset()
     return _entries(case, {"format", "title"} | _BESIDE[stage], kept=kept)
 
 

@@ -287,12 +287,14 @@ class BoxMeshSection(Section):
     """Stiffness of a mesh along its normal where no teeth are given, and its tooth pairs in contact.
 
     With a transverse ``contact_ratio`` the stiffness is in proportion to the number of tooth pairs. ``phase`` is the
-    share of the mesh period by which a pair of teeth passes the middle of its path before the pitch point.
+    share of the mesh period by which a pair of teeth passes the middle of its path before the pitch point. ``backlash``
+    is along the line of action in the transverse section.
     """
 
     stiffness: MeshStiffness
     contact_ratio: Annotated[float, Number(1.0, 20.0)] | None = None
     phase: Annotated[float, Number(-1.0, 1.0)] = 0.0
+    backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.05)] | None = None
 
 
 class PairGearsSection(Section):
@@ -601,6 +603,18 @@ class BoxDynamicsSection(Section):
     tolerance: Annotated[float, Number(1e-12, 1e-2)] = 1e-8
 
 
+class BoxBalanceSection(Section):
+    """Teeth that part, by harmonic balance: harmonics of excitation and motion; none leaves it out.
+
+    Planets on a carrier that turns make ``side_bands`` at either side of each mesh harmonic. Teeth that part touch
+    their ``back_flanks`` beyond their backlash.
+    """
+
+    harmonics: Annotated[int, Count(0, 64)] = 0
+    side_bands: Annotated[int, Count(0, 24)] = 3
+    back_flanks: StrictBool = True
+
+
 class GearboxCase(Section, ReadCase):
     """A gearbox, its load cases and how to compute it, in SI units.
 
@@ -631,6 +645,7 @@ class GearboxCase(Section, ReadCase):
     modes: BoxModesSection = BoxModesSection()
     dynamics: BoxDynamicsSection = BoxDynamicsSection()
     runup: RunupSection = RunupSection(count=0)
+    balance: BoxBalanceSection = BoxBalanceSection()
     strength: StrengthSection = StrengthSection()
 
     @model_validator(mode="before")

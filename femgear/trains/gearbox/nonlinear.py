@@ -267,10 +267,12 @@ def _stage(
 
 
 def normal_backlash(stage: StageModel) -> np.ndarray:
-    """Find the play (M,) of the meshes of a stage along their normals [m]; zero where no teeth are given."""
-    case = teeth_of(stage.section)
+    """Find the play (M,) of the meshes of a stage along their normals [m]; zero where it is not known."""
+    section, case = stage.section, teeth_of(stage.section)
     if case is None:
-        return np.zeros(len(stage.meshes))
+        meshes = (section.mesh,) if isinstance(section, PairSection) else (section.sun_mesh, section.ring_mesh)
+        play = [0.0 if mesh is None else mesh.backlash or 0.0 for mesh in meshes]
+        return math.cos(stage.sizes.base_helix) * np.repeat(play, len(stage.meshes) // len(meshes))
     cosine = math.cos(base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
     gears: Any = planetary_set(case)
     play = np.array([line_play(case)]) if isinstance(stage.section, PairSection) else mesh_backlash(gears)

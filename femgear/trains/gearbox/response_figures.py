@@ -165,6 +165,31 @@ def _draw_runup(drawn: Drawn) -> dict[str, Figure]:
     return levels | forces | ({} if by_stage is None else {"stage_forces": by_stage})
 
 
+def draw_flank_forces(balance: xr.Dataset) -> Figure:
+    """Draw the forces of drive flanks, and of back flanks below zero, over the period of the excitation, of balance.nc.
+
+    The first mesh of every stage is drawn in full colour, the others of its kind pale.
+    """
+    stages, names = balance["stage"].values.tolist(), balance["mesh"].values.tolist()
+    owner, instant = balance["stage_of_mesh"].values.tolist(), balance["instant"].values
+    figure, axes = new_figure(rows=len(stages), height=0.9 + 2.7 * len(stages), sharex=True)
+    for ax, stage in zip(axes, stages, strict=True):
+        of_stage = [i for i, name in enumerate(owner) if name == stage]
+        leaders = of_stage[:: max(len(of_stage) // 2, 1)]
+        for mesh in of_stage:
+            number = sum(mesh >= leader for leader in leaders) - 1
+            style = _stage_style(number) | {"linewidth": 2.0 if mesh in leaders else 0.9}
+            style |= {"alpha": 1.0 if mesh in leaders else 0.35}
+            ax.plot(instant, balance["drive_force"].values[mesh], label=names[mesh] if mesh in leaders else None, **style)
+            if balance["largest_back_force"].values[mesh] > 0.0:
+                ax.plot(instant, -balance["back_force"].values[mesh], **style)
+        ax.axhline(0.0, color=GREY, linewidth=0.8)
+        label(ax, y="force of the flanks [N]", title=stage)
+        ax.legend(fontsize=SMALL, loc="upper right")
+    label(axes[-1], "share of the period of the excitation")
+    return figure
+
+
 RESPONSE_FIGURES = {
     "dynamics": Figures(
         {
@@ -184,5 +209,12 @@ RESPONSE_FIGURES = {
             "stage_forces": "Dynamic force of the first mesh of every stage over the speed, by the stage that excites.",
         },
         _draw_runup,
+    ),
+    "balance": Figures(
+        {
+            "flank_forces": "Forces of the drive flanks over the period of the excitation, those of the back flanks "
+            "below zero; the first mesh of every kind strong, those of the other planets pale.",
+        },
+        lambda drawn: {"flank_forces": draw_flank_forces(drawn.data["balance"])},
     ),
 }

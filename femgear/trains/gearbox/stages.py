@@ -12,6 +12,7 @@ from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
+from femgear.trains.gearbox.balance import GearboxBalanceResult, balance_warnings, describe_balance, solve_balance
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
@@ -106,6 +107,18 @@ def solve_box_runup(
     speeds, missed = run_up_speeds(equal_steps, resonances)
     found = solve_gearbox_response(state, speeds, steps=steps, progress=progress, stage="runup")
     return GearboxResponseResult(found, whole=False, unresolved=missed, resonances=resonances)
+
+
+@one_blas_thread()
+def solve_box_balance(
+    case: GearboxCase, deflection: DeflectionResult, *, progress: Progress = silent, steps: Steps | None = None
+) -> GearboxBalanceResult:
+    """Solve for motions with teeth that part at the speed of the chosen load case, stage by stage."""
+    return GearboxBalanceResult(tuple(solve_balance(deflection.state, steps=steps, progress=progress)))
+
+
+def _no_balance(case: GearboxCase) -> str:
+    return why_silent(case) or ("" if case.balance.harmonics else "[balance] gives no harmonics")
 
 
 def _no_runup(case: GearboxCase) -> str:
@@ -219,6 +232,19 @@ GEARBOX = Train(
                 *response_tables(results.runup),
             ),
             warnings=gearbox_response_warnings,
+        ),
+        Stage(
+            name="balance",
+            decided_by=partial(box_entries, "balance"),
+            title="Teeth that part",
+            solve=solve_box_balance,
+            takes=("deflection",),
+            options=("progress", "steps"),
+            wanted=lambda case: not _no_balance(case),
+            unavailable=_no_balance,
+            verdict=lambda result: {"stages": [stage.name for stage in result.stages]},
+            describe=lambda results: describe_balance(results.balance),
+            warnings=balance_warnings,
         ),
     ),
     describe=describe_gearbox,

@@ -1,0 +1,254 @@
+"""Teeth that part in a gearbox, by harmonic balance at the speed of the load case, and the results of it.
+
+Stage by stage, as the response is solved: flanks of one stage part, and touch their back flanks, while meshes of all
+others are springs about the loaded state (`femgear.trains.gearbox.nonlinear`). A pair has the mesh frequency alone, a
+set whose carrier turns that of the carrier too, by which weight and uneven supports act on its planets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.case.dependencies import Steps
+from femgear.findings import Finding
+from femgear.report.tables import Block, tabulate
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.solution import PeriodicSolution
+from femgear.stages.protocol import Progress, StageResult, silent
+from femgear.storage.contents import Contents
+from femgear.system.force_laws import Element, GearMeshes, positive_part
+from femgear.system.fourier import harmonic_lines, side_bands
+from femgear.system.system import NonlinearSystem
+from femgear.system.turning_meshes import TurningMeshes
+from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
+from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_INSTANTS, _TURNS = 512, 48
+"""Instants of a mesh period, and angles of the carrier, at which forces are looked at."""
+_TAIL = 0.05
+"""Share of the amplitude in the upper half of the lines that is told."""
+
+
+@dataclass(frozen=True)
+class StageBalance:
+    """Periodic motion of a gearbox with one stage whose flanks part.
+
+    Parameters
+    ----------
+    name : str
+        Of the stage.
+    meshes : tuple of str
+        Names of its M meshes.
+    solution : PeriodicSolution
+        Of the harmonic balance.
+    drive, back : (T, I, M) arrays
+        Forces of drive flanks and back flanks [N] at I instants of the mesh period, or of the period of the
+        excitation, at T angles of the carrier.
+    """
+
+    name: str
+    meshes: tuple[str, ...]
+    solution: PeriodicSolution
+    drive: np.ndarray
+    back: np.ndarray
+
+    def share(self, force: np.ndarray) -> np.ndarray:
+        """Share (M,) of the time in which flanks with a force (T, I, M) [N] touch."""
+        return (force > 0.0).mean(axis=(0, 1))
+
+
+def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Progress = silent) -> list[StageBalance]:
+    """Solve for the periodic motion with flanks that part, of all stages that excite the gearbox, one after the other.
+
+    CaseError: planets that are not equally spaced on a carrier that turns (E-TURNING). ConvergenceError: an undamped
+    resonance (E-RESONANCE).
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state.
+    steps : Steps, optional
+        What other computations have left: excitations are kept in it.
+    progress : callable
+        Called with ("balance", done, total).
+    """
+    wanted, solved = found.model.case.balance, list[StageBalance]()
+    stages = exciting_stages(found)
+    for number, stage in enumerate(stages):
+        progress("balance", number, len(stages))
+        drive = excitation_of(found, stage, steps=steps)
+        known = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
+        box = nonlinear_gearbox(found, {stage.name: drive}, **known)
+        lines = wanted.harmonics * drive.periods
+        orders = harmonic_lines(lines)
+        if len(box.frequency) > 1:
+            orders = side_bands(wanted.side_bands, lines, wanted.side_bands)
+        options = {"orders": orders, "stability": False, "radius": False}
+        held = solve_harmonic_balance(held_together(box), box.frequency, **options)
+        solution = solve_harmonic_balance(box.problem, box.frequency, start=held, **options)
+        if not solution.converged:
+            solution = solve_harmonic_balance(box.problem, box.frequency, **options)
+        solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *flank_forces(box, solution)))
+    return solved
+
+
+def held_together(box: NonlinearGearbox) -> NonlinearSystem:
+    """Take a gearbox with drive flanks that may pull and no back flanks, in the same columns."""
+    behind = [id(back) for _, back in box.flanks if back is not None]
+    kept = (element for element in box.problem.elements if id(element) not in behind)
+    linear = (replace(element, separates=False) for element in kept if isinstance(element, GearMeshes | TurningMeshes))
+    return replace(box.problem, elements=tuple(linear))
+
+
+def flank_forces(box: NonlinearGearbox, solution: PeriodicSolution) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the forces (T, I, M) of drive flanks and back flanks of the one stage of a system [N].
+
+    At equal instants of the mesh period and equal angles of the carrier, see `StageBalance`.
+    """
+    (stage,), ((front, behind),) = box.stages, box.flanks
+    phases = [2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS]
+    if stage.turns:
+        phases = [2.0 * np.pi * np.arange(_TURNS) / _TURNS, *phases]
+    theta = np.stack(np.meshgrid(*phases, indexing="ij"), axis=-1).reshape(-1, len(phases))
+    x = np.real(np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T)
+    shape = (-1, _INSTANTS, len(stage.meshes))
+    back = np.zeros((len(theta), len(stage.meshes)))
+    if behind is not None:
+        back[:, stage.back_flanks] = _forces(behind, x, theta)
+    return _forces(front, x, theta).reshape(shape), back.reshape(shape)
+
+
+def _forces(element: Element, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    """Forces (points, flanks) of an element whose flanks part, at deflections of all columns [N]."""
+    x = x[:, element.columns]
+    if isinstance(element, TurningMeshes):
+        return element.forces(x, theta)
+    assert isinstance(element, GearMeshes)
+    return positive_part(element.flank_forces(x, theta)[1])[0]
+
+
+@dataclass(frozen=True, eq=False)
+class GearboxBalanceResult(StageResult):
+    """Motions with flanks that part at the speed of the load case, stage by stage: ``stages``."""
+
+    stages: tuple[StageBalance, ...]
+
+    @property
+    def converged(self) -> bool:
+        """Whether the balance of every stage converged."""
+        return all(stage.solution.converged for stage in self.stages)
+
+    @property
+    def residual(self) -> float:
+        """Largest relative residual of all stages."""
+        return max(float(stage.solution.residual) for stage in self.stages)
+
+    @property
+    def message(self) -> str:
+        """How the solutions were found."""
+        return "; ".join(f"{stage.name}: {stage.solution.message}" for stage in self.stages)
+
+    @staticmethod
+    def warnings(data: xr.Dataset) -> Iterator[Finding]:
+        """List what the file says against itself, see `balance_warnings`."""
+        return balance_warnings(data)
+
+    def contents(self) -> Contents:
+        """Collect the contents of balance.nc."""
+        stages = self.stages
+        drive = np.concatenate([np.moveaxis(stage.drive[0], 0, -1) for stage in stages])
+        back = np.concatenate([np.moveaxis(stage.back[0], 0, -1) for stage in stages])
+
+        def joined(values) -> np.ndarray:
+            return np.concatenate([values(stage) for stage in stages])
+
+        def of_stages(name: str) -> np.ndarray:
+            return np.array([float(getattr(stage.solution, name)) for stage in stages])
+
+        start = "over the period of the excitation, the carrier where it stood at its beginning"
+        variables = {
+            "stage_of_mesh": ("mesh", [stage.name for stage in stages for _ in stage.meshes], "1", "stage of the mesh"),
+            "mean_force": ("mesh", joined(lambda s: (s.drive - s.back).mean(axis=(0, 1))), "N", "mean mesh force"),
+            "largest_force": ("mesh", joined(lambda s: s.drive.max(axis=(0, 1))), "N", "largest force of drive flanks"),
+            "lowest_force": ("mesh", joined(lambda s: s.drive.min(axis=(0, 1))), "N", "smallest force of drive flanks"),
+            "largest_back_force": (
+                "mesh",
+                joined(lambda s: s.back.max(axis=(0, 1))),
+                "N",
+                "largest force of back flanks",
+            ),
+            "parted_share": (
+                "mesh",
+                joined(lambda s: 1.0 - s.share(s.drive)),
+                "1",
+                "share of the time in which drive flanks are apart",
+            ),
+            "back_share": (
+                "mesh",
+                joined(lambda s: s.share(s.back)),
+                "1",
+                "share of the time in which back flanks touch",
+            ),
+            "wedged_share": (
+                "mesh",
+                joined(lambda s: s.share(np.minimum(s.drive, s.back))),
+                "1",
+                "share of the time in which both flanks touch",
+            ),
+            "drive_force": ("mesh instant", drive, "N", f"force of drive flanks {start}"),
+            "back_force": ("mesh instant", back, "N", f"force of back flanks {start}"),
+            "converged": ("stage", of_stages("converged"), "1", "1 where the harmonic balance converged, else 0"),
+            "residual": ("stage", of_stages("residual"), "1", "relative residual of the equations"),
+            "tail": ("stage", of_stages("tail"), "1", "share of the amplitude in the upper half of the lines"),
+        }
+        coords: dict[str, Any] = {
+            "mesh": (("mesh",), [name for stage in stages for name in stage.meshes], "1", "gear mesh"),
+            "stage": (("stage",), [stage.name for stage in stages], "1", "stage whose flanks part"),
+            "instant": (("instant",), np.arange(_INSTANTS) / _INSTANTS, "1", "share of the period of the excitation"),
+        }
+        return Contents(variables, coords, {"title": "teeth that part, by harmonic balance"})
+
+
+def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
+    """List what balance.nc says against itself."""
+    for number, name in enumerate(data["stage"].values.tolist()):
+        if not data["converged"].values[number]:
+            residual = float(data["residual"].values[number])
+            text = f"the harmonic balance of {name} did not converge: relative residual {residual:.2g}"
+            yield Finding("W-BALANCE", "balance.harmonics", text, remedy="take fewer harmonics, or more damping")
+        tail = float(data["tail"].values[number])
+        if tail > _TAIL:
+            text = f"{tail:.2g} of the amplitude of {name} is in the upper half of the lines"
+            yield Finding("W-TAIL", "balance.harmonics", text, remedy="more harmonics")
+    for name, code, words in (
+        ("parted_share", "W-SEPARATION", "part for"),
+        ("wedged_share", "W-WEDGED", "are loaded on both flanks for"),
+    ):
+        share = data[name].values
+        if share.max(initial=0.0) > 0.0:
+            mesh = data["mesh"].values[int(share.argmax())]
+            text = f"{int((share > 0.0).sum())} of {len(share)} meshes {words} a part of the time, {mesh} {share.max():.1%}"
+            yield Finding(code, "operation.load_case", text)
+
+
+def describe_balance(data: xr.Dataset) -> Block:
+    """Tabulate forces and contact of all meshes."""
+    columns = {
+        "mesh": lambda i: str(data["mesh"].values[i]),
+        "mean force [N]": lambda i: f"{float(data['mean_force'].values[i]):.5g}",
+        "largest [N]": lambda i: f"{float(data['largest_force'].values[i]):.5g}",
+        "smallest [N]": lambda i: f"{float(data['lowest_force'].values[i]):.5g}",
+        "back flank [N]": lambda i: f"{float(data['largest_back_force'].values[i]):.5g}",
+        "apart": lambda i: f"{float(data['parted_share'].values[i]):.1%}",
+        "on the back": lambda i: f"{float(data['back_share'].values[i]):.1%}",
+    }
+    note = "each stage with the meshes of the others as springs"
+    return tabulate("Teeth that part, harmonic balance", range(data.sizes["mesh"]), columns, (note,))

@@ -1,0 +1,84 @@
+"""Teeth that part in a gearbox: balance of torques, the same motion by time integration, what the file says."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from small_gearbox import pair_tables, planetary_tables
+
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.time.transient import solve_transient
+from femgear.trains.gearbox.balance import (
+    GearboxBalanceResult,
+    describe_balance,
+    flank_forces,
+    held_together,
+    solve_balance,
+)
+from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.excitation import excitation_of
+from femgear.trains.gearbox.nonlinear import nonlinear_gearbox
+from femgear.trains.reading import read_case
+
+
+def heavy_set(torque: str, **balance) -> Deflection:
+    """Plane set with play and tooth pairs that come and go, under its weight."""
+    mesh = {"stiffness": "3e8 N/m", "contact_ratio": 1.6, "backlash": "20 um"}
+    tables = planetary_tables(sun_mesh=mesh, ring_mesh=mesh)
+    tables["planetary"][0]["planet"]["bearing"] = {"radial": "3e8 N/m"}
+    tables["operation"]["load_case"][0]["torque"] = {"sun": torque}
+    tables |= {"motions": "plane", "gravity": {}, "balance": {"harmonics": 3, "side_bands": 3} | balance}
+    return solve_deflection(read_case(tables))
+
+
+def test_mesh_forces_of_planets_under_load_are_those_of_the_torque():
+    found = heavy_set("100 N m", side_bands=1)
+    (stage,) = solve_balance(found)
+    assert stage.solution.converged and (stage.drive > 0.0).all() and not stage.back.any()
+    radius = found.model.stages[0].sizes.base_radii[0]
+    sums = stage.drive.mean(axis=(0, 1)).reshape(2, 3).sum(axis=1)
+    assert sums == pytest.approx([100.0 / radius] * 2, rel=1e-8)
+    # the weight loads planets unequally as they go round
+    assert np.ptp(stage.drive.mean(axis=1)[:, 0]) > 1.0
+
+
+@pytest.mark.slow
+def test_teeth_part_under_a_small_torque_and_the_torque_stays():
+    found = heavy_set("0.1 N m", harmonics=2, side_bands=1)
+    (stage,) = solve_balance(found)
+    result = GearboxBalanceResult((stage,))
+    data = result.dataset()
+    assert result.converged and result.residual < 1e-9
+    assert data["parted_share"].values.max() > 0.05
+    radius = found.model.stages[0].sizes.base_radii[0]
+    # forces are evaluated between the lines, of which there are few
+    assert data["mean_force"].values[:3].sum() == pytest.approx(0.1 / radius, rel=2e-2)
+    assert {finding.code for finding in result.warnings(data)} >= {"W-SEPARATION"}
+    block = describe_balance(data)
+    assert len(block.rows) == 6
+
+
+def test_a_pair_that_parts_is_met_in_time():
+    tables = pair_tables() | {"motions": "rotation"}
+    tables["pair"][0]["mesh"] |= {"backlash": "40 um", "contact_ratio": 1.6}
+    tables["mass"] = [
+        {"shaft": "input", "mass": "1 kg", "inertia": "2e-3 kg m^2", "position": "30 mm"},
+        {"shaft": "output", "mass": "1 kg", "inertia": "5e-3 kg m^2", "position": "30 mm"},
+    ]
+    found = solve_deflection(read_case(tables))
+    drive = excitation_of(found, found.model.stages[0])
+    drive = replace(drive, stiffness=drive.stiffness[:, ::64], deflection=drive.deflection[:, ::64])
+    drive = replace(drive, force=drive.force[:, ::64])
+    box = nonlinear_gearbox(found, {"stage": drive}, harmonics=4, damping_ratio=0.04)
+    linear, omega = held_together(box), 2.0 * np.pi * 1700.0
+    options = {"harmonics": 96, "stability": False, "radius": False, "samples": 8192}
+    held = solve_harmonic_balance(linear, omega, **options)
+    solution = solve_harmonic_balance(box.problem, omega, start=held, **options)
+    force, back = flank_forces(box, solution)
+    assert solution.converged and 0.02 < (force == 0.0).mean() and back.shape == force.shape
+    lines, order = displacements(box.problem, solution), np.arange(97)
+    start = lines.sum(axis=1).real, (1j * omega * order * lines).sum(axis=1).real
+    times = np.linspace(0.0, 4.0 * np.pi / omega, 65)
+    motion = solve_transient(box.problem, omega, times, start=start, method="DOP853", tolerance=1e-10, events=True)
+    wanted = solution.at(times)[:, 0]
+    assert np.abs(motion.deflection[:, 0] - wanted).max() < 1e-6 * np.ptp(wanted)
