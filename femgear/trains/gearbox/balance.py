@@ -96,7 +96,7 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
         solution = solve_harmonic_balance(box.problem, box.frequency, start=held, **options)
         if not solution.converged:
             solution = solve_harmonic_balance(box.problem, box.frequency, **options)
-        solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *flank_forces(box, solution)))
+        solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *forces_of_flanks(box, solution)))
     return solved
 
 
@@ -108,7 +108,7 @@ def held_together(box: NonlinearGearbox) -> NonlinearSystem:
     return replace(box.problem, elements=tuple(linear))
 
 
-def flank_forces(box: NonlinearGearbox, solution: PeriodicSolution) -> tuple[np.ndarray, np.ndarray]:
+def forces_of_flanks(box: NonlinearGearbox, solution: PeriodicSolution) -> tuple[np.ndarray, np.ndarray]:
     """Compute the forces (T, I, M) of drive flanks and back flanks of the one stage of a system [N].
 
     At equal instants of the mesh period and equal angles of the carrier, see `StageBalance`.
@@ -235,7 +235,8 @@ def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
         share = data[name].values
         if share.max(initial=0.0) > 0.0:
             mesh = data["mesh"].values[int(share.argmax())]
-            text = f"{int((share > 0.0).sum())} of {len(share)} meshes {words} a part of the time, {mesh} {share.max():.1%}"
+            count = f"{int((share > 0.0).sum())} of {len(share)} meshes"
+            text = f"{count} {words} a part of the time, {mesh} for {share.max():.1%}"
             yield Finding(code, "operation.load_case", text)
 
 

@@ -180,7 +180,8 @@ def draw_flank_forces(balance: xr.Dataset) -> Figure:
             number = sum(mesh >= leader for leader in leaders) - 1
             style = _stage_style(number) | {"linewidth": 2.0 if mesh in leaders else 0.9}
             style |= {"alpha": 1.0 if mesh in leaders else 0.35}
-            ax.plot(instant, balance["drive_force"].values[mesh], label=names[mesh] if mesh in leaders else None, **style)
+            name = names[mesh] if mesh in leaders else None
+            ax.plot(instant, balance["drive_force"].values[mesh], label=name, **style)
             if balance["largest_back_force"].values[mesh] > 0.0:
                 ax.plot(instant, -balance["back_force"].values[mesh], **style)
         ax.axhline(0.0, color=GREY, linewidth=0.8)

@@ -11,7 +11,7 @@ from femgear.solvers.time.transient import solve_transient
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
     describe_balance,
-    flank_forces,
+    forces_of_flanks,
     held_together,
     solve_balance,
 )
@@ -74,7 +74,7 @@ def test_a_pair_that_parts_is_met_in_time():
     options = {"harmonics": 96, "stability": False, "radius": False, "samples": 8192}
     held = solve_harmonic_balance(linear, omega, **options)
     solution = solve_harmonic_balance(box.problem, omega, start=held, **options)
-    force, back = flank_forces(box, solution)
+    force, back = forces_of_flanks(box, solution)
     assert solution.converged and 0.02 < (force == 0.0).mean() and back.shape == force.shape
     lines, order = displacements(box.problem, solution), np.arange(97)
     start = lines.sum(axis=1).real, (1j * omega * order * lines).sum(axis=1).real
