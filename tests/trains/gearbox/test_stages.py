@@ -131,3 +131,53 @@ def test_a_load_case_is_solved_once_whatever_the_others_are():
     # what holds shafts decides all of them
     stiff = handle.change({"bearing[0].radial": "1e8 N/m"}).deflection
     assert stiff.states[0].motion is not states[0].motion
+
+
+CHANGES = (
+    {"title": "another"},
+    {"modes.damping_ratio": 0.05},
+    {"modes.up_to": "3 kHz"},
+    {"modes.speeds": 5},
+    {"dynamics.up_to": "3 kHz"},
+    {"dynamics.mesh_harmonics": 4},
+    {"runup.count": 3},
+    {"runup.to": "1200 rpm"},
+    {"sensor": [{"name": "side", "position": ["180 mm", "0 mm", "40 mm"], "direction": "x"}]},
+    {"operation.load_case[1].share": 0.3},
+    {"operation.load_case[1].name": "reverse"},
+    {"operation.load_case[0].speed.input": "1100 rpm"},
+    {"operation.first": 2},
+    {"operation.load_case[0].torque.motor": "70 N m"},
+    {"thermal.casing_rise": "20 K"},
+    {"gravity": {"acceleration": "9.81 m/s^2"}},
+    {"bearing[2].axial": "2e8 N/m"},
+    {"casing.foot[0].stiffness[1]": "1e8 N/m"},
+    {"pair[0].mesh.contact_ratio": 1.5},
+    {"shaft[1].axis[1]": "1 mm"},
+    {"motions": "plane", "sensor": None, "thermal": None, "gravity": None},
+)
+
+
+@pytest.mark.slow
+def test_answers_after_changes_are_those_of_fresh_cases():
+    tables = pair_tables() | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
+    tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]
+    tables["pair"][0]["mesh"]["contact_ratio"] = 1.6
+    tables["runup"] = {"from": "900 rpm", "to": "1100 rpm", "count": 2}
+    first = tables["operation"]["load_case"][0]
+    back = first | {"name": "back", "torque": {"motor": "-60 N m"}, "share": 0.5}
+    tables["operation"]["load_case"] = [first | {"share": 0.5}, back]
+    handle = Live(read_case(tables))
+    for changes in CHANGES:
+        answer = handle.change(changes)
+        fresh = Answer(answer.case, Steps())
+        assert [*answer] == [*fresh]
+        for stage in fresh:
+            there, alone = answer[stage].dataset(), fresh[stage].dataset()
+            assert {*there.variables} == {*alone.variables}, (changes, stage)
+            for name in alone.variables:
+                values, expected = there[name].values, alone[name].values
+                if expected.dtype.kind in "fc":
+                    assert values == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True), (changes, stage, name)
+                else:
+                    assert values.tolist() == expected.tolist(), (changes, stage, name)
