@@ -6,6 +6,7 @@ import math
 from functools import lru_cache
 
 from femgear.gears.gear import Gear
+from femgear.gears.gear_steels import GEAR_STEELS, stress_limit
 from femgear.gears.iso6336 import (
     Edition,
     bending_face_factor,
@@ -302,6 +303,50 @@ def edition_of_2019() -> tuple[Row, ...]:
         ratio = pair.contact_ratio / math.cos(base_helix_angle(ALPHA, math.radians(15.0))) ** 2
         quantity = f"{teeth[0]}/{teeth[1]}: f_eps"
         rows.append(printed("2019", EDITION_2019, quantity, reference, load_distribution_factor(ratio, 1.0)))
+    return tuple(rows)
+
+
+def life_factors() -> tuple[Row, ...]:
+    """Z_NT and Y_NT of case hardened steel at the load cycles of published calculations, and slopes of damage."""
+    steel, soft = GEAR_STEELS["case hardened steel"], GEAR_STEELS["through hardened alloy steel"]
+    cases = (
+        ("stage 1", STAGE_1, "sun, 1124.7e6 cycles: Z_NT", "0.909", steel.contact_life.at(1124.7e6)),
+        ("stage 1", STAGE_1, "planet, 419e6 cycles: Z_NT", "0.937", steel.contact_life.at(419.0e6)),
+        ("stage 1", STAGE_1, "ring, 381.6e6 cycles: Z_NT", "0.940", soft.contact_life.at(381.6e6)),
+        ("stage 1", STAGE_1, "sun, 1124.7e6 cycles: Y_NT", "0.888", steel.root_life.at(1124.7e6)),
+        ("stage 1", STAGE_1, "planet, 419e6 cycles: Y_NT", "0.906", steel.root_life.at(419.0e6)),
+        ("stage 1", STAGE_1, "ring, 381.6e6 cycles: Y_NT", "0.907", soft.root_life.at(381.6e6)),
+        ("example 1", EXAMPLE, "pinion, 1.080e9 cycles: Z_NT", "0.910", steel.contact_life.at(1.080e9)),
+        ("example 1", EXAMPLE, "wheel, 1.783e8 cycles: Z_NT", "0.962", steel.contact_life.at(1.783e8)),
+    )
+    exponent = "exponent of flanks, ln(5e7/1e5)/ln 1.6"
+    return (
+        *(printed(*case, digits=1.1) for case in cases),
+        printed("materials", "ISO 6336-2, table 2", exponent, "13.22", steel.contact_life.slope),
+    )
+
+
+def materials() -> tuple[Row, ...]:
+    """Limits of ISO 6336-5 beside the numbers of published calculations and of a public program."""
+    program = "github.com/waa552/fyp-website, data.js: upper ends of the lines of ME"
+    rows = []
+    for treatment, hardness, contact, root in (
+        ("normalised steel", 210, 1.520 * 210 + 250, 0.386 * 210 + 147),
+        ("through hardened carbon steel", 210, 0.838 * 210 + 432, 0.283 * 210 + 202),
+        ("through hardened alloy steel", 390, 2.213 * 390 + 260, 0.358 * 390 + 231),
+        ("through hardened cast alloy steel", 360, 1.350 * 360 + 356, 0.356 * 360 + 186),
+        ("case hardened steel", 700, 1650.0, 525.0),
+        ("flame hardened steel", 615, 0.505 * 615 + 1013, 0.271 * 615 + 237),
+        ("nitrided steel", 700, 1450.0, 468.0),
+        ("nitrided through hardening steel", 600, 1217.0, 432.0),
+        ("nitrocarburised steel", 600, 950.0, 388.0),
+    ):
+        for symbol, kind, value in (("sigma_Hlim", "contact", contact), ("sigma_Flim", "root", root)):
+            ours = 1e-6 * stress_limit(treatment, "ME", hardness, kind)
+            quantity = f"{treatment}, ME, {hardness}: {symbol} [MPa]"
+            rows.append(within("materials", program, quantity, value, ours, HALF_PERCENT))
+    flank = 1e-6 * stress_limit("case hardened steel", "MQ", 720, "contact")
+    rows.append(within("materials", STAGE_1, "case hardened steel, MQ: sigma_Hlim [MPa]", 1500.0, flank, HALF_PERCENT))
     return tuple(rows)
 
 

@@ -266,6 +266,8 @@ THEMES = (
             strength.fzg_gears,
             strength.edition_of_2019,
             strength.tolerances,
+            strength.life_factors,
+            strength.materials,
         ),
     ),
     Theme(

@@ -15,7 +15,7 @@ import numpy as np
 
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, SPEED
-from femgear.case.sections import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors, face_width
+from femgear.case.sections import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors, face_width, gear_material
 from femgear.errors import CaseError
 from femgear.findings import Finding, remark
 
@@ -31,9 +31,29 @@ def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
     """List the refusals of entries that do not go together; `more` are those of the train."""
     if missing := list(check_face_widths(case)):
         return missing
-    checks = (_check_operation, _check_set, _check_supports, _check_ends, _check_numbers, _check_deviations)
+    checks = (
+        _check_operation,
+        _check_set,
+        _check_supports,
+        _check_ends,
+        _check_numbers,
+        _check_deviations,
+        check_materials,
+    )
     problems = [problem for check in checks for problem in check(case)] + list(more)
     return problems or list(check_published(case))
+
+
+def check_materials(case: Any) -> Iterator[CaseError]:
+    """Refuse treatments of gears without a hardness, and hardnesses that ISO 6336-5 does not have; each once."""
+    keys = set[str | None]()
+    for name in case.gear_names:
+        try:
+            gear_material(case, name)
+        except CaseError as error:
+            if error.key not in keys:
+                keys.add(error.key)
+                yield error
 
 
 def check_face_widths(case: Any) -> Iterator[CaseError]:

@@ -33,7 +33,9 @@ FLANK_ENTRIES = frozenset({"modifications", "errors", "individual", "pin_errors"
 
 _GEARS = ("sun", "planet", "ring", "gear_1", "gear_2")
 _LIMITS = {
-    f"{of}material.{name}_stress_limit" for of in ("", *(f"{gear}." for gear in _GEARS)) for name in ("root", "contact")
+    f"{of}material.{name}"
+    for of in ("", *(f"{gear}." for gear in _GEARS))
+    for name in ("root_stress_limit", "contact_stress_limit", "treatment", "grade", "hardness")
 }
 _WORDS = {"format", "title", "housing", "runup", "strength", *_LIMITS}
 """No stage before housing and run-up depends on them."""

@@ -37,7 +37,8 @@ from femgear.case.quantities import (
     at_most,
 )
 from femgear.case.text import described
-from femgear.errors import CaseError
+from femgear.errors import CaseError, GeometryError
+from femgear.gears.gear_steels import Grade, Treatment, stress_limit
 
 LARGEST_DEVIATION = 0.2
 """Largest plausible amount of any modification or error, in modules."""
@@ -309,12 +310,14 @@ _PoissonRatio = Annotated[
 ]
 _Density = Annotated[float, Quantity(DENSITY, 100.0, 25000.0)]
 _StressLimit = Annotated[float, Quantity(STRESS, 1e6, 5e9)]
+_Hardness = Annotated[float, Number(10.0, 2000.0, note="HBW of normalised steel and irons, HV of all others")]
 
 
 class MaterialSection(Section):
     """Isotropic elastic material of all gears; its strength, where it is known, gives safeties.
 
-    ``root_stress_limit`` and ``contact_stress_limit`` are sigma_Flim and sigma_Hlim of ISO 6336-5.
+    ``root_stress_limit`` and ``contact_stress_limit`` are sigma_Flim and sigma_Hlim of ISO 6336-5; where they are left
+    out they follow from ``treatment``, ``grade`` and ``hardness``.
     """
 
     youngs_modulus: _YoungsModulus
@@ -322,6 +325,9 @@ class MaterialSection(Section):
     density: _Density
     root_stress_limit: _StressLimit | None = None
     contact_stress_limit: _StressLimit | None = None
+    treatment: Treatment | None = None
+    grade: Grade = "MQ"
+    hardness: _Hardness | None = None
 
 
 class GearMaterialSection(Section):
@@ -332,6 +338,9 @@ class GearMaterialSection(Section):
     density: _Density | None = None
     root_stress_limit: _StressLimit | None = None
     contact_stress_limit: _StressLimit | None = None
+    treatment: Treatment | None = None
+    grade: Grade | None = None
+    hardness: _Hardness | None = None
 
 
 class StrengthSection(Section):
@@ -644,7 +653,49 @@ def face_width(case: Any, gear: str) -> float:
 
 
 def gear_material(case: Any, gear: str) -> MaterialSection:
-    """Find the material of a gear of a case: its own entries, and for others those of ``material``."""
-    material = getattr(case, gear).material
-    given = {} if material is None else material.model_dump(exclude_none=True)
-    return case.material.model_copy(update=given)
+    """Find the material of a gear of a case: its own entries, and for others those of ``material``.
+
+    Limits that are left out are those of treatment, grade and hardness, where there is a treatment. A gear with a
+    treatment, grade or hardness of its own does not take the limits of ``material``.
+
+    CaseError: a treatment without a hardness (E-KEY-MISSING), or with one that ISO 6336-5 does not have (E-RANGE).
+    """
+    section = getattr(case, gear).material
+    given = {} if section is None else section.model_dump(exclude_none=True)
+    material = case.material.model_copy(update=given)
+    if material.treatment is None:
+        return material
+    own_treatment = any(name in given for name in ("treatment", "grade", "hardness"))
+    limits: dict[str, float] = {}
+    for kind in ("root", "contact"):
+        name = f"{kind}_stress_limit"
+        if name in given or (not own_treatment and getattr(material, name) is not None):
+            continue
+        limits[name] = _limit_of_treatment(case, gear, material, kind)
+    return material.model_copy(update=limits)
+
+
+def _limit_of_treatment(case: Any, gear: str, material: MaterialSection, kind: Literal["contact", "root"]) -> float:
+    """Limit of a treatment [Pa], refused in terms of the case."""
+    section = getattr(case, gear).material
+    key = f"{gear}.material.hardness" if section is not None and section.hardness is not None else "material.hardness"
+    if material.treatment is None or material.hardness is None:
+        raise CaseError(
+            f"{material.treatment} has limits by its hardness, which is missing",
+            code="E-KEY-MISSING",
+            key=key,
+            file=case.location("material.treatment"),
+            remedy="give hardness = 700, in HV, or in HBW of normalised steel and irons",
+        )
+    try:
+        return stress_limit(material.treatment, material.grade, material.hardness, kind)
+    except GeometryError as error:
+        raise CaseError(
+            error.message,
+            code="E-RANGE",
+            key=key,
+            file=case.location(key),
+            value=material.hardness,
+            limit=error.limit,
+            remedy=error.remedy,
+        ) from None

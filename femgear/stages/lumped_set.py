@@ -69,7 +69,8 @@ def strength_entries(data: dict) -> list[str]:
         for gear in ("sun", "planet", "ring", "gear_1", "gear_2")
         if "material" in data.get(gear, {})
     }
-    limits = [f"{name}.{key}" for name, table in tables.items() for key in table if key.endswith("_stress_limit")]
+    entries = ("root_stress_limit", "contact_stress_limit", "treatment", "grade", "hardness")
+    limits = [f"{name}.{key}" for name, table in tables.items() for key in table if key in entries]
     return [*limits, *(["strength"] if "strength" in data else [])]
 
 

@@ -160,7 +160,8 @@ def _missing_limits(flanks: Sequence[RatedFlank]) -> str:
         for kind in ("root", "contact")
     }
     if all(len(names) == len(gears) for names in lacking.values()):
-        return "give material.root_stress_limit and material.contact_stress_limit to get S_F and S_H"
+        limits = "material.root_stress_limit and material.contact_stress_limit"
+        return f"give {limits}, or material.treatment and hardness, to get S_F and S_H"
     keys = [
         f"material.{limit}" if len(names) == len(gears) else f"{name}.material.{limit}"
         for limit, names in lacking.items()

@@ -136,3 +136,38 @@ def test_leads_are_taken_over_the_common_width(case):
     one, two = (with_values(case, slope | {"sun.face_width": width}) for width in ("25 mm", "50 mm"))
     found = [lead_separation(set_deviations(of), planetary_set(of), 25)[0] for of in (one, two)]
     assert found[1] == pytest.approx(0.5 * found[0])
+
+
+def test_limits_follow_from_treatment_grade_and_hardness(case):
+    """Case hardened sun and planets of MQ, a quenched ring; limits that are given go before them."""
+    treated = {"material.treatment": "case hardened steel", "material.hardness": 720}
+    ring = {"ring.material.treatment": "through hardened alloy steel", "ring.material.hardness": 300}
+    other = with_values(case, treated | ring | {"sun.material.root_stress_limit": "500 MPa"})
+    sun, planet, quenched = (gear_material(other, gear) for gear in other.gear_names)
+    assert (sun.root_stress_limit, sun.contact_stress_limit) == (500e6, 1500e6)
+    assert (planet.root_stress_limit, planet.contact_stress_limit) == (425e6, 1500e6)
+    assert quenched.contact_stress_limit == pytest.approx((1.313 * 300 + 373) * 1e6)
+    better = with_values(other, {"material.root_stress_limit": "461 MPa", "ring.material.grade": "ME"})
+    assert gear_material(better, "planet").root_stress_limit == 461e6
+    assert gear_material(better, "ring").contact_stress_limit == pytest.approx((2.213 * 300 + 260) * 1e6)
+
+
+@pytest.mark.parametrize(
+    ("changes", "code", "key"),
+    [
+        ({"material.treatment": "case hardened steel"}, "E-KEY-MISSING", "material.hardness"),
+        ({"material.treatment": "case hardened steel", "material.hardness": 62}, "E-RANGE", "material.hardness"),
+        (
+            {"ring.material.treatment": "grey iron", "ring.material.hardness": 500},
+            "E-RANGE",
+            "ring.material.hardness",
+        ),
+        ({"material.treatment": "unobtainium", "material.hardness": 700}, "E-CHOICE", "material.treatment"),
+        ({"material.treatment": "grey iron", "material.grade": "MX"}, "E-CHOICE", "material.grade"),
+    ],
+)
+def test_materials_that_the_standard_does_not_have_are_refused(case, changes, code, key):
+    with pytest.raises(CaseError) as caught:
+        with_values(case, changes)
+    problems = caught.value.problems or (caught.value,)
+    assert (code, key) in {(problem.code, problem.key) for problem in problems}

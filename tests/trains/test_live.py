@@ -45,6 +45,7 @@ CHANGES: tuple[dict[str, object], ...] = (
     {"material.poisson_ratio": 0.29},
     {"material.density": "7700 kg/m^3"},
     {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"},
+    {"material.treatment": "case hardened steel", "material.grade": "ME", "material.hardness": 720},
     {
         "strength.edition": 2006,
         "strength.application_factor": 1.25,

@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from femgear.case.checks import check_face_widths, check_gear_deviations, check_speeds, check_torque
+from femgear.case.checks import check_face_widths, check_gear_deviations, check_materials, check_speeds, check_torque
 from femgear.case.csv_columns import embed_profiles
 from femgear.case.messages import added_material
 from femgear.case.quantities import ANGLE, LENGTH, TORQUE, Count, Quantity, Section, Title, Values
@@ -224,6 +224,7 @@ def check_pair_entries(case: PairCase) -> Iterator[CaseError]:
             remedy="leave static.members out",
         )
     yield from check_face_widths(case)
+    yield from check_materials(case)
     yield from check_torque(case.operation.torque)
     yield from check_speeds(case) if case.operation.speeds else ()
     yield from check_gear_deviations(case)
