@@ -3,7 +3,8 @@
 The allowable stress numbers sigma_Hlim and sigma_Flim are straight lines over the hardness, ``A x + B`` in N/mm^2,
 within the limits that the standard gives; of hardened surfaces they are constant. Hardness is Brinell (HBW) of steels
 that are normalised and of irons, Vickers (HV) of all others. The root limit of case hardened steel of grade MQ is that
-of the lowest core hardness, 425 N/mm^2: with 25 HRC and a Jominy hardness of 28 HRC at 12 mm it is 461, with 30 HRC 500.
+of the lowest core hardness, 425 N/mm^2; with 25 HRC and a Jominy hardness of 28 HRC at 12 mm it is 461, with 30 HRC
+500.
 """
 
 from __future__ import annotations
