@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import Steps
+from femgear.errors import CaseError, several
 from femgear.findings import Finding
 from femgear.report.tables import Block, tabulate
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
@@ -23,10 +24,14 @@ from femgear.storage.contents import Contents
 from femgear.system.force_laws import Element, GearMeshes, positive_part
 from femgear.system.fourier import harmonic_lines, side_bands
 from femgear.system.system import NonlinearSystem
-from femgear.system.turning_meshes import TurningMeshes
+from femgear.system.turning_meshes import TurningMeshes, planet_wave_generator
+from femgear.trains.gearbox.case_file import CASING, GearboxCase, PairSection
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
+from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
+from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.silence import exciting_sections
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,6 +105,27 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
     return solved
 
 
+def check_balance(case: GearboxCase) -> None:
+    """Refuse planets that are not equally spaced, or two, on a carrier that turns.
+
+    CaseError: one for every such stage that excites the gearbox (E-TURNING).
+    """
+    flow, problems = gearbox_flow(case), list[CaseError]()
+    for stage in exciting_sections(case) if case.balance.harmonics else ():
+        if isinstance(stage, PairSection) or not flow.carries(stage):
+            continue
+        if stage.carrier == CASING or not flow.speed[stage.carrier]:
+            continue
+        try:
+            planet_wave_generator(set_sizes(stage).planet_angles)
+        except CaseError as error:
+            error.key = f"planetary[{case.planetary.index(stage)}]"
+            error.file = case.location(error.key)
+            problems.append(error)
+    if problems:
+        raise several(problems)
+
+
 def held_together(box: NonlinearGearbox) -> NonlinearSystem:
     """Take a gearbox with drive flanks that may pull and no back flanks, in the same columns."""
     behind = [id(back) for _, back in box.flanks if back is not None]
@@ -137,9 +163,13 @@ def _forces(element: Element, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False)
 class GearboxBalanceResult(StageResult):
-    """Motions with flanks that part at the speed of the load case, stage by stage: ``stages``."""
+    """Motions with flanks that part at the speed of the load case, stage by stage: ``stages``.
+
+    ``rigid`` names the rings that modes and response have elastic.
+    """
 
     stages: tuple[StageBalance, ...]
+    rigid: tuple[str, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -214,7 +244,8 @@ class GearboxBalanceResult(StageResult):
             "stage": (("stage",), [stage.name for stage in stages], "1", "stage whose flanks part"),
             "instant": (("instant",), np.arange(_INSTANTS) / _INSTANTS, "1", "share of the period of the excitation"),
         }
-        return Contents(variables, coords, {"title": "teeth that part, by harmonic balance"})
+        attrs = {"title": "teeth that part, by harmonic balance", "rigid": ", ".join(self.rigid)}
+        return Contents(variables, coords, attrs)
 
 
 def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
@@ -228,6 +259,9 @@ def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
         if tail > _TAIL:
             text = f"{tail:.2g} of the amplitude of {name} is in the upper half of the lines"
             yield Finding("W-TAIL", "balance.harmonics", text, remedy="more harmonics")
+    if data.attrs["rigid"]:
+        text = f"{data.attrs['rigid']}: elastic in modes and response, rigid where teeth part"
+        yield Finding("W-RIGID", "balance.harmonics", text, remedy="compare forces of the response before teeth part")
     for name, code, words in (
         ("parted_share", "W-SEPARATION", "part for"),
         ("wedged_share", "W-WEDGED", "are loaded on both flanks for"),

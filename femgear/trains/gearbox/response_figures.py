@@ -186,7 +186,7 @@ def draw_flank_forces(balance: xr.Dataset) -> Figure:
                 ax.plot(instant, -balance["back_force"].values[mesh], **style)
         ax.axhline(0.0, color=GREY, linewidth=0.8)
         label(ax, y="force of the flanks [N]", title=stage)
-        ax.legend(fontsize=SMALL, loc="upper right")
+        ax.legend(fontsize=SMALL, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, frameon=False)
     label(axes[-1], "share of the period of the excitation")
     return figure
 

@@ -44,8 +44,8 @@ def why_silent(case: GearboxCase) -> str:
 
 
 def idle_entries(case: GearboxCase) -> Iterator[Finding]:
-    """Tell sensors and a run-up of a gearbox that has no response (W-UNUSED)."""
-    if not (case.sensor or case.runup.count):
+    """Tell sensors, a run-up and a balance of a gearbox that has no response (W-UNUSED)."""
+    if not (case.sensor or case.runup.count or case.balance.harmonics):
         return
     why, remedy = _silence(case)
     if why and case.sensor:
@@ -54,3 +54,5 @@ def idle_entries(case: GearboxCase) -> Iterator[Finding]:
     if why and case.runup.count:
         text = f"the run-up has no effect, since the gearbox has no response: {why}"
         yield Finding("W-UNUSED", "runup", text, remedy=remedy)
+    if why and case.balance.harmonics:
+        yield Finding("W-UNUSED", "balance", f"no teeth are looked at that might part: {why}", remedy=remedy)

@@ -12,7 +12,13 @@ from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
 from femgear.report.tables import Block, tabulate
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
-from femgear.trains.gearbox.balance import GearboxBalanceResult, balance_warnings, describe_balance, solve_balance
+from femgear.trains.gearbox.balance import (
+    GearboxBalanceResult,
+    balance_warnings,
+    check_balance,
+    describe_balance,
+    solve_balance,
+)
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
@@ -114,7 +120,8 @@ def solve_box_balance(
     case: GearboxCase, deflection: DeflectionResult, *, progress: Progress = silent, steps: Steps | None = None
 ) -> GearboxBalanceResult:
     """Solve for motions with teeth that part at the speed of the chosen load case, stage by stage."""
-    return GearboxBalanceResult(tuple(solve_balance(deflection.state, steps=steps, progress=progress)))
+    rings = tuple(f"ring of {stage.name}" for stage in case.planetary if stage.elastic_ring)
+    return GearboxBalanceResult(tuple(solve_balance(deflection.state, steps=steps, progress=progress)), rings)
 
 
 def _no_balance(case: GearboxCase) -> str:
@@ -130,6 +137,7 @@ def check_before_run(case: GearboxCase) -> None:
     check_casing_file(case)
     check_held(case)
     check_sensors(case)
+    check_balance(case)
 
 
 def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:

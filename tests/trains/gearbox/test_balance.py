@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 from small_gearbox import pair_tables, planetary_tables
 
+from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
+    check_balance,
     describe_balance,
     forces_of_flanks,
     held_together,
@@ -18,6 +20,7 @@ from femgear.trains.gearbox.balance import (
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import excitation_of
 from femgear.trains.gearbox.nonlinear import nonlinear_gearbox
+from femgear.trains.gearbox.silence import idle_entries
 from femgear.trains.reading import read_case
 
 
@@ -56,6 +59,21 @@ def test_teeth_part_under_a_small_torque_and_the_torque_stays():
     assert {finding.code for finding in result.warnings(data)} >= {"W-SEPARATION"}
     block = describe_balance(data)
     assert len(block.rows) == 6
+
+
+def test_unequal_planets_are_refused_before_a_run_where_teeth_may_part():
+    mesh = {"stiffness": "3e8 N/m", "contact_ratio": 1.6}
+    tables = planetary_tables(sun_mesh=mesh, ring_mesh=mesh)
+    tables["planetary"][0]["gears"] |= {"planets": 2, "teeth": [20, 20, 60]}
+    check_balance(read_case(tables))
+    with pytest.raises(CaseError) as error:
+        check_balance(read_case(tables | {"balance": {"harmonics": 1}}))
+    assert error.value.code == "E-TURNING" and error.value.key == "planetary[0]"
+
+
+def test_a_balance_of_meshes_that_nothing_excites_is_told_to_have_no_effect():
+    case = read_case(planetary_tables() | {"balance": {"harmonics": 1}})
+    assert [(finding.code, finding.key) for finding in idle_entries(case)] == [("W-UNUSED", "balance")]
 
 
 def test_a_pair_that_parts_is_met_in_time():

@@ -11,6 +11,7 @@ from femgear.trains.gearbox.figures import FIGURES
 from femgear.trains.gearbox.response_figures import (
     LINES_NAMED,
     SENSORS_DRAWN,
+    draw_flank_forces,
     draw_run_up_forces,
     draw_run_up_levels,
     draw_sensor_spectra,
@@ -166,3 +167,24 @@ def test_the_pictures_of_both_stages_are_among_those_of_a_gearbox():
     silent = {stage: data.drop_vars(["level", "level_of_stage"]) for stage, data in drawn.data.items()}
     assert not FIGURES["dynamics"].draw(Drawn(None, silent))
     assert [*FIGURES["runup"].draw(Drawn(None, {"runup": silent["runup"]}))] == ["run_up_forces", "stage_forces"]
+
+
+def test_back_flanks_are_drawn_below_zero_and_every_mesh_of_its_stage():
+    instant = np.arange(8) / 8
+    drive = np.maximum(np.sin(2.0 * np.pi * (instant + np.arange(3)[:, None] / 3)), 0.0)
+    back = np.zeros_like(drive)
+    back[2] = 0.5 * np.maximum(-np.sin(2.0 * np.pi * instant), 0.0)
+    data = xr.Dataset(
+        {
+            "drive_force": (("mesh", "instant"), drive),
+            "back_force": (("mesh", "instant"), back),
+            "largest_back_force": ("mesh", back.max(axis=1)),
+            "stage_of_mesh": ("mesh", ["pair", "set", "set"]),
+        },
+        {"mesh": ["pair", "set sun-planet 1", "set planet 1-ring"], "stage": ["pair", "set"], "instant": instant},
+    )
+    figure = draw_flank_forces(data)
+    curves = [[line.get_ydata() for line in ax.lines if len(line.get_xdata()) == 8] for ax in figure.axes]
+    assert [len(lines) for lines in curves] == [1, 3]
+    np.testing.assert_array_equal(curves[0][0], drive[0])
+    np.testing.assert_array_equal(curves[1][2], -back[2])
