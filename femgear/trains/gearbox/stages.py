@@ -121,7 +121,8 @@ def solve_box_balance(
 ) -> GearboxBalanceResult:
     """Solve for motions with teeth that part at the speed of the chosen load case, stage by stage."""
     rings = tuple(f"ring of {stage.name}" for stage in case.planetary if stage.elastic_ring)
-    return GearboxBalanceResult(tuple(solve_balance(deflection.state, steps=steps, progress=progress)), rings)
+    state = deflection.of(case).state
+    return GearboxBalanceResult(tuple(solve_balance(state, steps=steps, progress=progress)), rings)
 
 
 def _no_balance(case: GearboxCase) -> str:

@@ -135,6 +135,8 @@ def test_a_load_case_is_solved_once_whatever_the_others_are():
 
 CHANGES = (
     {"title": "another"},
+    {"balance.harmonics": 2},
+    {"balance.harmonics": 3},
     {"modes.damping_ratio": 0.05},
     {"modes.up_to": "3 kHz"},
     {"modes.speeds": 5},
