@@ -7,6 +7,7 @@ set whose carrier turns that of the carrier too, by which weight and uneven supp
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -179,7 +180,7 @@ class GearboxBalanceResult(StageResult):
     @property
     def residual(self) -> float:
         """Largest relative residual of all stages."""
-        return max(float(stage.solution.residual) for stage in self.stages)
+        return max((float(stage.solution.residual) for stage in self.stages), default=math.nan)
 
     @property
     def message(self) -> str:
