@@ -9,6 +9,7 @@ import pytest
 from page_examples import read_page, run_examples
 
 from femgear.stages.static import solve_static, solve_stress
+from femgear.stages.strength import rate_case
 from femgear.study.relief import design_basis, harris_map, with_tip_relief
 from femgear.trains.pair.stages import iso_stiffness
 from femgear.trains.reading import read_case, with_values
@@ -105,3 +106,20 @@ def test_rotors_of_ross_carry_the_torque(tmp_path, monkeypatch):
     ]
     assert numbers[0] == pytest.approx(numbers[1], rel=5e-3)
     assert numbers[0][0] == pytest.approx(read_case(CASE).operation.torque, rel=5e-3)
+
+
+def test_safeties_of_the_page():
+    """Of the case that the page shows, with the K_v that it states."""
+    section = PAGE.partition("## Is it strong enough?")[2].partition("\n## ")[0]
+    factor, method_b, method_c = (
+        float(re.search(pattern, section)[1])
+        for pattern in (r"computed ([\d.]+);", r"it is ([\d.]+) \(method B", r"and ([\d.]+)\s\(method C")
+    )
+    treated = {"material.treatment": "case hardened steel", "material.hardness": 720}
+    case = with_values(read_case(CASE), treated | {"strength.quality": 6, "strength.application_factor": 1.25})
+    rating = rate_case(case, dynamic=np.array([factor]))
+    roots = re.search(r"S_F is ([\d.]+) of gear 1 and ([\d.]+) of gear 2, S_H ([\d.]+) and ([\d.]+)", section)
+    safeties = [flank.root_safety for flank in rating.flanks] + [flank.contact_safety for flank in rating.flanks]
+    assert safeties == pytest.approx([float(value) for value in roots.groups()], abs=0.006)
+    standard = rating.standard[0]
+    assert (standard.dynamic.factor, standard.by_speed) == pytest.approx((method_b, method_c), abs=6e-4)
