@@ -124,6 +124,8 @@ class MeshLoadFactors:
         K_gamma, K_v, K_Hbeta, K_Halpha and K_Falpha. K_Hbeta stands for K_Fbeta too, on the safe side.
     sources : mapping of str
         By the names of these arrays where each comes from; none of factors that nothing told, which are 1.
+    message : str
+        Why there are no factors of part 1 although the case gives a flank tolerance class.
     """
 
     application: float
@@ -133,6 +135,7 @@ class MeshLoadFactors:
     transverse: np.ndarray
     root_transverse: np.ndarray
     sources: Mapping[str, str] = field(default_factory=dict)
+    message: str = ""
 
     @property
     def contact(self) -> np.ndarray:
@@ -438,18 +441,14 @@ def mesh_load_factors(
     computed = {"sharing": sharing, "dynamic": dynamic, "face": face}
     sources |= {name: "computed" for name, values in computed.items() if values is not None}
     sharing, face = (ones if values is None else values for values in (sharing, face))
-    standard = tuple(
-        _largest_standard(
-            case,
-            kind,
-            frequencies,
-            torque=torque,
-            application=given.application_factor * float(sharing[kind]),
-            face=float(face[kind]),
-            quality=given.quality,
-        )
-        for kind in range(len(gears.kinds))
-    )
+    standard, messages = list[StandardFactors | None](), list[str]()
+    for kind in range(len(gears.kinds)):
+        load = {"application": given.application_factor * float(sharing[kind]), "face": float(face[kind])}
+        try:
+            standard.append(_largest_standard(case, kind, frequencies, torque=torque, quality=given.quality, **load))
+        except GeometryError as error:
+            standard.append(None)
+            messages.append(error.message)
     transverse, root_transverse = ones.copy(), ones.copy()
     of_part_1 = ones.copy()
     for kind, factors in enumerate(standard):
@@ -460,9 +459,17 @@ def mesh_load_factors(
         sources["transverse"] = f"part 1, class {given.quality}"
         sources.setdefault("dynamic", f"part 1, method B, class {given.quality}")
     dynamic = of_part_1 if dynamic is None else dynamic
-    return MeshLoadFactors(
-        given.application_factor, sharing, dynamic, face, transverse, root_transverse, sources
-    ), standard
+    factors = MeshLoadFactors(
+        given.application_factor,
+        sharing,
+        dynamic,
+        face,
+        transverse,
+        root_transverse,
+        sources,
+        "; ".join(dict.fromkeys(messages)),
+    )
+    return factors, tuple(standard)
 
 
 def _largest_standard(

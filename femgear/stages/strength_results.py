@@ -137,6 +137,8 @@ def safety_notes(rating: Rating) -> Iterator[str]:
         transverse = "; roots have K_Fα in the place of K_Hα" if "transverse" in factors.sources else ""
         yield f"long life, every other factor of ISO 6336-2 and -3 is 1{wide}{transverse}"
         yield from _missing_factors(factors)
+    if factors.message:
+        yield f"no load factors of part 1: {factors.message}"
 
 
 def factor_names(factors: MeshLoadFactors) -> list[str]:

@@ -10,6 +10,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.gears.iso6336 import overlap_of
 from femgear.gears.iso6336_load import dynamic_factor_of_speed
 from femgear.stages.strength import case_stresses, mesh_frequencies, rate_case, rating_wanted, standard_factors
+from femgear.stages.strength_results import safety_notes
 from femgear.trains.reading import read_case, with_values
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -115,3 +116,12 @@ def test_a_flank_tolerance_class_gives_the_factors_of_part_1(helical, planetary)
         standard_factors(case, 1, mesh_frequency=500.0, **load).dynamic.resonance_ratio for case in (hard, turning)
     )
     assert loose < fixed  # less mass moves
+
+
+def test_sizes_without_tolerances_are_said_and_not_rated_by_part_1(helical):
+    """ISO 1328-1 begins at a face width of 4 mm."""
+    narrow = with_values(helical, {**LIMITS, "strength.quality": 6, "set.face_width": "3.5 mm", "static.slices": 3})
+    rating = rate_case(narrow)
+    assert rating.standard == (None,) and rating.factors.dynamic[0] == 1.0
+    assert "face width of 0.0035 m" in rating.factors.message and math.isfinite(rating.flanks[0].root_safety)
+    assert any("face width of 0.0035 m" in note for note in safety_notes(rating))

@@ -122,7 +122,7 @@ def _places(stage: Any, rating: Rating | None) -> Iterator[tuple[int, int, Any, 
 def _notes(rating: Rating) -> Iterator[str]:
     """Load factors that the safeties have, and what is missing."""
     yield f"load factors {' '.join(factor_names(rating.factors)) or 'none'}"
-    yield from (note for note in safety_notes(rating) if note.startswith(("give ", "taken as 1")))
+    yield from (note for note in safety_notes(rating) if note.startswith(("give ", "taken as 1", "no load factors")))
 
 
 def describe_strength(data: Any, load_case: int, name: str) -> tuple[Block, ...]:
