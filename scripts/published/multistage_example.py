@@ -7,6 +7,7 @@ of planetary gear train" as printed; `published_case` reads it with what the pap
 
 from __future__ import annotations
 
+import tomllib
 from pathlib import Path
 
 from femgear.trains.gearbox.case_file import CASING, GearboxCase
@@ -56,6 +57,7 @@ def published_case(*, planets: int, stiffness_unit: float = 1e3, held: bool = Fa
             printed = getattr(stage, mesh).stiffness / 1e3
             values[f"planetary[{n}].{mesh}.stiffness"] = f"{printed * stiffness_unit!r} N/m"
     if held:
-        last = [bearing.shaft for bearing in case.bearing].index("stage 4 carrier")
-        values[f"bearing[{last}].torsional"] = "rigid"
+        rings = tomllib.loads(case.source)["coupling"]
+        last = {"between": ["stage 4 carrier", CASING], "torsion": "rigid", "transmits": False}
+        values["coupling"] = [*rings, last]
     return with_values(case, values)
