@@ -34,6 +34,8 @@ from femgear.trains.gearbox.stage_structure import StructuredStage, running_stag
 
 _MOST = 2000
 """Mesh harmonics at most."""
+_TOGETHER = 16
+"""Speeds whose levels are computed at once."""
 _INSTANTS, _TURNS = 256, 16
 """Instants of a mesh period, and angles of the carrier, at which mesh forces are looked at."""
 
@@ -360,16 +362,21 @@ def by_order(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.n
     """Add lines (v, k, L) of all stages by name that have one order, with their phase: (v, k, orders)."""
     order = np.concatenate([stage.order for stage in response.stages])
     whole = np.concatenate([lines[stage.name] for stage in response.stages], axis=2)
-    known, place = np.unique(np.round(order / order.max(initial=1.0), 9), return_inverse=True)
-    total = np.zeros((*whole.shape[:2], len(known)), complex)
-    for line, at in enumerate(place.tolist()):
-        total[..., at] += whole[..., line]
-    return total
+    rounded = np.round(order / order.max(initial=1.0), 9)
+    ascending = np.argsort(rounded, kind="stable")
+    first = np.flatnonzero(np.diff(rounded[ascending], prepend=-1.0))
+    return np.add.reduceat(whole[..., ascending], first, axis=2)
 
 
 def level(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.ndarray:
     """R.m.s. (v, k) over the lines (v, k, L) of all stages by name; lines at one order add with their phase."""
-    return np.sqrt(0.5 * (np.abs(by_order(response, lines)) ** 2).sum(axis=2))
+    speeds = len(response.speed)
+    # some speeds after the others: lines of all outputs in order would be twice what the response itself fills
+    parts = [
+        0.5 * (np.abs(by_order(response, {name: values[some] for name, values in lines.items()})) ** 2).sum(axis=2)
+        for some in np.array_split(np.arange(speeds), math.ceil(speeds / _TOGETHER))
+    ]
+    return np.sqrt(np.concatenate(parts))
 
 
 def accelerations(response: GearboxResponse, count: int) -> dict[str, np.ndarray]:
