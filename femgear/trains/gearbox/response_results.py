@@ -207,6 +207,12 @@ def _of_stages(found: GearboxResponse) -> dict[str, tuple]:
             "N",
             "smallest mesh force along the normal; below zero real flanks part",
         ),
+        "mean_force": (
+            "speed stage kind",
+            kinds(lambda stage: stage.force[..., 0]),
+            "N",
+            "mean mesh force along the normal",
+        ),
         "mesh_force_rms": (
             "speed stage kind",
             kinds(lambda stage: stage.dynamic_force),
@@ -279,15 +285,8 @@ def gearbox_response_warnings(data: xr.Dataset) -> Iterator[Finding]:
             few = bool(data.attrs.get("most_harmonics"))
             key, remedy = ("mesh_harmonics", "more of them") if few else ("up_to", "a higher frequency")
             yield Finding("W-EXCITATION", f"dynamics.{key}", text, remedy=remedy)
-    if "cross_excitation" in data:
-        cross = data["cross_excitation"].values
-        if cross.max(initial=0.0) > _CROSS:
-            speed, first, second = np.unravel_index(int(cross.argmax()), cross.shape)
-            text = (
-                f"the stiffness of {stages[first]} on the motion by {stages[second]} makes {cross.max():.0%} of its "
-                f"dynamic force at {speeds[speed]:.5g} rpm, and is left out"
-            )
-            yield Finding("W-CROSS", "", text, limit=f"{_CROSS:.0%}")
+    if "cross_excitation" in data and data["cross_excitation"].max() > _CROSS:
+        yield _cross_finding(data)
     if missed := int(data.attrs.get("unresolved_resonances", 0)):
         text = f"run-up: peaks of {missed} resonances are too narrow for its speeds: levels there may be higher"
         yield Finding("W-STEPS", "runup.count", text, remedy="take more speeds, or a narrower range")
@@ -303,6 +302,22 @@ def _reach(data: xr.Dataset) -> str:
     """Words for the reach of the excitation."""
     most = int(data.attrs.get("most_harmonics", 0))
     return f"{1e-3 * data.attrs['up_to']:g} kHz" + (f", at most {most} mesh harmonics" if most else "")
+
+
+def _cross_finding(data: xr.Dataset) -> Finding:
+    """Tell what a stage after the other leaves out most, and what that is of mesh forces and levels (W-CROSS)."""
+    cross, names = data["cross_excitation"].values, data["stage"].values
+    speed, first, second = np.unravel_index(int(cross.argmax()), cross.shape)
+    largest, stage = cross.max(), int(first)
+    of_mean = largest * np.nanmax((data["mesh_force_rms"] / data["mean_force"]).values[speed, stage])
+    text = (
+        f"the stiffness of {names[first]} on the motion by {names[second]} makes {largest:.0%} of its dynamic force at "
+        f"{data['speed'].values[speed]:.5g} rpm, and is left out: {of_mean:.2g} of its mean force"
+    )
+    if "level_of_stage" in data:
+        share = data["level_of_stage"].values[speed, :, stage] / data["level"].values[speed]
+        text += f", {largest * np.nanmax(share):.2g} of the level at {data['sensor'].values[int(np.nanargmax(share))]}"
+    return Finding("W-CROSS", "", text, limit=f"{_CROSS:.0%}")
 
 
 def _of_speeds(speeds: np.ndarray, chosen: np.ndarray) -> str:

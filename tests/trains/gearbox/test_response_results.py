@@ -104,7 +104,8 @@ def test_stages_that_change_one_another_are_told(data):
     cross = xr.DataArray(np.array([[[0.0]], [[0.2]]]), dims=("speed", "stage", "other_stage"))
     (finding,) = gearbox_response_warnings(data.assign(cross_excitation=cross))
     assert finding.code == "W-CROSS"
-    assert "20%" in finding.text
+    part = 0.2 * float((data["mesh_force_rms"] / data["mean_force"]).values[1, 0, 0])
+    assert "20%" in finding.text and f"{part:.2g} of its mean force, 0.2 of the level at" in finding.text
 
 
 def test_peaks_between_the_speeds_of_a_run_up_are_told(data):
