@@ -366,6 +366,8 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
                 "lowest_force": (("speed", "stage", "kind"), [[[1.0], [1.0]]]),
                 "outer": (("speed", "stage"), [[0.0, 0.0]]),
                 "cross_excitation": (("speed", "stage", "other_stage"), [[[0.0, 0.2], [0.0, 0.0]]]),
+                "mesh_force_rms": (("speed", "stage", "kind"), [[[1.0, 2.0], [1.0, 1.0]]]),
+                "mean_force": (("speed", "stage", "kind"), [[[10.0, 10.0], [10.0, 10.0]]]),
             },
             coords={"speed": [1000.0], "stage": ["first", "second"], "other_stage": ["first", "second"]},
             attrs={"missing": "", "rigid": "", "up_to": 2e4},
