@@ -238,6 +238,11 @@ RUNS = {
         ring_resonance="Resonance of the ring: its peak moves down with the clearance.",
         tooth_contact="Contact of both flanks over frequency and clearance: above the line teeth wedge.",
     ),
+    "stiff_surroundings": _script(
+        "stiff_surroundings.py",
+        "What do bearings and casing change?",
+        stiff_surroundings="Levels of the electric axle with bearings, shafts, planets, casing and feet made stiff in turn.",
+    ),
     "bearing_stiffness": _script(
         "bearing_stiffness.py",
         "Stiffness of rolling bearings",

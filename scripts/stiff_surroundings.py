@@ -30,7 +30,7 @@ def main(
     output: Annotated[Path, Parameter(name=("--output", "-o"))] = Path("out/stiff_surroundings"),
     lowest: str = "3000 rpm",
     highest: str = "12000 rpm",
-    speeds: int = 181,
+    speeds: int = 91,
 ) -> None:
     """Run the axle of cases/e_axle_in_a_casing.toml up with each of its surroundings made stiff in turn.
 
@@ -167,6 +167,8 @@ def sensor_levels(tables: dict[str, Any], speed: np.ndarray, folder: Path, steps
 
 def draw_levels(speed, levels: dict[str, np.ndarray], sensors: list[str]):
     """Figure of the levels at every sensor over the speed [rpm], one curve a variant."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
     from femgear.report.style import BLACK, COLOURS, DASHES, label, legend_below, new_figure
 
     figure, axes = new_figure(rows=len(sensors), height=0.9 + 2.7 * len(sensors), sharex=True)
@@ -176,6 +178,9 @@ def draw_levels(speed, levels: dict[str, np.ndarray], sensors: list[str]):
             style = {"color": BLACK, "linewidth": 2.2} if place == 0 else {"color": others[place - 1], "linewidth": 1.3}
             ax.plot(speed, values[:, number], label=name, linestyle=DASHES[place % len(DASHES)], **style)
         ax.set_yscale("log")
+        ax.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        ax.yaxis.set_minor_formatter(NullFormatter())
         ax.set_xlim(speed[0], speed[-1])
         label(ax, y="level, r.m.s. [m/s²]", title=f"sensor {sensor}")
     label(axes[-1], "speed of the rotor [rpm]")

@@ -35,6 +35,7 @@ SET_SCRIPTS = (
     "bearing_stiffness.py",
     "planet_phasing.py",
     "multistage.py",
+    "stiff_surroundings.py",
 )
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 PAIR = ROOT / "cases" / "spur_pair.toml"
@@ -115,6 +116,7 @@ def test_help(name, tmp_path):
         ("bearing_clearance.py", ["--clearance=-1 um"], 2, "clearances of 0 or more"),
         ("bearing_clearance.py", ["--points", "1"], 2, "two frequencies"),
         ("bearing_stiffness.py", ["--load", "0"], 2, "above 0 N"),
+        ("stiff_surroundings.py", ["--lowest", "9000 rpm", "--highest", "3000 rpm"], 2, "the lowest above 0"),
         ("planet_phasing.py", ["--points", "1"], 2, "2 frequencies"),
         ("planet_phasing.py", ["--angle", "0", "--angle", "100"], 2, "100.800000"),
         ("planet_phasing.py", ["--distance", "50"], 2, "0 to 30"),
