@@ -241,7 +241,8 @@ RUNS = {
     "stiff_surroundings": _script(
         "stiff_surroundings.py",
         "What do bearings and casing change?",
-        stiff_surroundings="Levels of the electric axle with bearings, shafts, planets, casing and feet made stiff in turn.",
+        stiff_surroundings="Levels of the electric axle with bearings, shafts, planets, casing and feet made stiff "
+        "in turn.",
     ),
     "bearing_stiffness": _script(
         "bearing_stiffness.py",
