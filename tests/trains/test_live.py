@@ -333,7 +333,7 @@ def test_handles_of_other_trains_keep_their_static_solution(name, kept, anew, gr
 
 def test_handles_of_other_trains_answer_too():
     """A train that names no entries computes its stages anew after every change."""
-    handle = femgear.live(CASES / "four_stage_reducer.toml")
+    handle = femgear.live(CASES / "gear_pair_light.toml")
     last = next(iter(handle.answer))
     first = handle.answer[last]
     assert handle.change({"title": "another"}).case.title == "another"
