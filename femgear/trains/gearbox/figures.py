@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 _ARROW = 46.0  # length of the longest arrow [points]
 _HEAD = 9.0  # length of its head [points]
 _BESIDE = 6.0  # distance of a name beside its arrow [points]
+_NAME_HEIGHT = 0.035  # of the names of lines of excitation, over that of the picture
 _STEP, _MOST_STEPS = 4.0, 60  # by which names are pushed on [points], and how often
 _NEAR = 16  # first places of a name, which are near enough to its arrow to leave a curve for
 _LEAST = 0.04  # force that is drawn, over the largest
@@ -197,8 +198,9 @@ def gearbox_campbell(modes: xr.Dataset) -> Figure:
             continue
         kind = str(kinds[np.abs(hertz - start[0]).argmin()])
         ax.plot(speed, branch, linewidth=1.5, color=_KIND_COLOURS.get(kind, BLACK), label=kind)
-    for name, order in zip(modes["line"].values, modes["order"].values, strict=True):
-        _excitation_line(ax, str(name), order / 60.0, float(speed.max()), top)
+    named = 0.0
+    for order, name in sorted(zip(modes["order"].values.tolist(), modes["line"].values.tolist(), strict=True)):
+        named = _excitation_line(ax, str(name), order / 60.0, float(speed.max()), top, named)
     ax.plot(
         modes["critical_speed"].values,
         modes["critical_frequency"].values,
@@ -218,16 +220,21 @@ def gearbox_campbell(modes: xr.Dataset) -> Figure:
     return figure
 
 
-def _excitation_line(ax, name: str, slope: float, fastest: float, top: float) -> None:
-    """Draw a line of excitation [Hz per rpm] with its name where it leaves the picture; flat ones are left out."""
+def _excitation_line(ax, name: str, slope: float, fastest: float, top: float, named: float) -> float:
+    """Draw a line of excitation [Hz per rpm] with its name where it leaves the picture; flat ones are left out.
+
+    At the right end it stands above the names of flatter lines, the last of which is at ``named`` [Hz]; gives where
+    the last one is now.
+    """
     if slope * fastest < 0.02 * top:
-        return
+        return named
     end = min(fastest, top / slope)
     ax.plot([0.0, end], [0.0, slope * end], color=GREY, linewidth=1.0, linestyle="--", zorder=1.0)
     inside = end < fastest
+    height = slope * end if inside else max(slope * end, named + _NAME_HEIGHT * top)
     ax.annotate(
         name,
-        (end, slope * end),
+        (end, height),
         (0, 4) if inside else (4, 0),
         textcoords="offset points",
         rotation=45 if inside else 0,
@@ -236,6 +243,7 @@ def _excitation_line(ax, name: str, slope: float, fastest: float, top: float) ->
         fontsize=SIZE - 3,
         annotation_clip=False,
     )
+    return named if inside else height
 
 
 def _draw_deflection(drawn: Drawn) -> dict[str, Figure]:

@@ -75,3 +75,15 @@ def test_the_campbell_diagram_has_modes_by_kind_lines_by_name_and_the_speed_of_o
     operation = next(line for line in ax.lines if line.get_label() == "speed of operation")
     assert operation.get_xdata() == pytest.approx([1000.0, 1000.0])
     assert ax.get_xlabel() == "speed of input [rpm]"
+
+
+def test_names_of_lines_of_excitation_do_not_lie_on_one_another(data):
+    modes = data[1].copy(deep=True)
+    # all leave at the right end, half way up
+    middle = 30.0 * float(modes["campbell_frequency"].max() / modes["campbell_speed"].max())
+    modes["order"].values[:] = middle * (1.0 + 0.01 * np.arange(modes.sizes["line"]))
+    figure = gearbox_campbell(modes)
+    figure.canvas.draw()
+    boxes = [text.get_window_extent() for text in figure.axes[0].texts]
+    assert len(boxes) == modes.sizes["line"] > 2
+    assert not any(a.overlaps(b) for i, a in enumerate(boxes) for b in boxes[:i])
