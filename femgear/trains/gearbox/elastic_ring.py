@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -139,11 +140,7 @@ def elastic_ring(model: GearboxModel, stage: StageModel, *, steps: Steps | None 
     assert isinstance(section, BoxPlanetarySection)
     tables = loaded_tables(section, -model.flow.first_torque(section), 0)
     tables.setdefault("dynamics", {}).setdefault("up_to", f"{model.case.dynamics.up_to:.15g} Hz")
-    case = stage_case_of(case_text.write(tables))
-    train = train_of(case)
-    static, modes = train.stage("static"), train.stage("modes")
-    assert static is not None and modes is not None
-    solved = modes.solve(case, static.solve(case, steps=steps), steps=steps)
+    solved = _set_modes(stage_case_of(case_text.write(tables)), steps)
     model_of_set, springs = solved.model, (len(stage.meshes),) * 2
     flexibility = model_of_set.system.flexibility
     mode, sine = model_of_set.ring_mode, model_of_set.ring_phase == 1
@@ -166,6 +163,18 @@ def elastic_ring(model: GearboxModel, stage: StageModel, *, steps: Steps | None 
         solved.excitation,
         np.zeros(springs) if flexibility is None else flexibility,
     )
+
+
+def _set_modes(case: Any, steps: Steps) -> Any:
+    """Modes of the set that teeth alone make, solved once for modes, response and run-up of the gearbox."""
+    known = {"teeth": case.source}
+    if (kept := steps.kept("set of an elastic ring", known)) is not None:
+        return kept
+    train = train_of(case)
+    static, modes = train.stage("static"), train.stage("modes")
+    assert static is not None and modes is not None
+    solved = modes.solve(case, static.solve(case, steps=steps), steps=steps)
+    return steps.keep("set of an elastic ring", known, solved)
 
 
 def _participation(diameter: np.ndarray, moved: np.ndarray, sectors: int) -> np.ndarray:

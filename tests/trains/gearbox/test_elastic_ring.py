@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from gearbox_equivalents import elastic_set_tables
 
+from femgear.case.dependencies import Steps
 from femgear.errors import CaseError
 from femgear.housing.two_way.running_planets import ring_lines, solve_running
 from femgear.run import solve
@@ -162,6 +163,16 @@ def test_shares_of_paths_add_up_on_the_casing_and_none_are_given_on_the_ring():
     assert share[:, 0].sum() == pytest.approx(1.0, abs=1e-9)
     assert np.isnan(share[:, 1:]).all()
     assert (data["level"].values > 0.0).all()
+
+
+def test_the_set_of_a_ring_is_solved_once(in_casing, monkeypatch):
+    found, ring = in_casing
+    steps = Steps()
+    first = elastic_ring(found.model, found.model.stages[0], steps=steps)
+    monkeypatch.setattr("femgear.trains.gearbox.elastic_ring.train_of", None)
+    again = elastic_ring(found.model, found.model.stages[0], steps=steps)
+    assert again.excitation is first.excitation
+    assert np.array_equal(again.approach, ring.approach)
 
 
 def test_a_ring_without_a_grid_is_refused():
