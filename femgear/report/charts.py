@@ -148,15 +148,19 @@ def _plane(angle: np.ndarray, radius: np.ndarray, origin: float) -> dict[str, An
 
 def _axis(axis, limits) -> dict[str, Any]:
     """Read title, scale, limits and the ticks that are words."""
-    from matplotlib.ticker import FixedFormatter
+    from matplotlib.ticker import FixedLocator, FuncFormatter
 
     scale = axis.get_scale()
     if scale not in ("linear", "log"):
         raise _PictureOnly
     described = {"title": axis.get_label_text(), "log": scale == "log", "range": [float(end) for end in limits]}
-    if isinstance(axis.get_major_formatter(), FixedFormatter):
-        texts = [text.get_text() for text in axis.get_ticklabels()]
-        described |= {"ticks": _numbers(axis.get_majorticklocs()), "texts": texts}
+    if isinstance(axis.get_major_locator(), FixedLocator) and isinstance(axis.get_major_formatter(), FuncFormatter):
+        labels = axis.get_ticklabels()
+        described |= {
+            "ticks": _numbers(axis.get_majorticklocs()),
+            "texts": [text.get_text() for text in labels],
+            "angle": -float(labels[0].get_rotation()) if labels else 0.0,
+        }
     return described
 
 

@@ -45,6 +45,18 @@ def test_curve_axes_and_names():
     assert found["title"] == "title"
 
 
+def test_names_of_ticks_stay_names_and_numbers_numbers():
+    def draw(ax):
+        ax.bar([0, 1], [1.0, 2.0])
+        ax.set_xticks([0, 1], ["122 Hz\ntorsional", "258 Hz\nmixed"], rotation=90)
+        ax.set_yticks([0.0, 2.0])
+
+    panel_drawn = panel(draw)
+    assert panel_drawn["x"]["ticks"] == [0, 1] and panel_drawn["x"]["angle"] == -90.0
+    assert panel_drawn["x"]["texts"] == ["122 Hz\ntorsional", "258 Hz\nmixed"]
+    assert "texts" not in panel_drawn["y"]
+
+
 def test_long_curves_keep_their_extremes():
     x = np.linspace(0.0, 1.0, 100_001)
     y = np.sin(5000 * x)

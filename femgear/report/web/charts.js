@@ -75,7 +75,8 @@ page.axis = (axis, share, other, narrow, pixels) => {
     showline: true, ticks: "outside", tickcolor: page.style("--soft"), exponentformat: "power", automargin: true,
     title: { text: page.wrapped(axis.title || "", pixels).text, standoff: 8 }, type: axis.log ? "log" : "linear" };
   if (axis.range) found.range = axis.log ? axis.range.map(Math.log10) : axis.range;
-  if (axis.ticks) Object.assign(found, { tickmode: "array", tickvals: axis.ticks, ticktext: axis.texts.map(page.clear) });
+  if (axis.ticks) Object.assign(found, { tickmode: "array", tickvals: axis.ticks, tickangle: axis.angle,
+    ticktext: axis.texts.map((text) => page.clear(narrow && axis.angle ? text.split("\n")[0] : text)) });
   if (axis.log) found.dtick = 1;
   else found.tickformat = ",~r";
   if (axis.hidden) Object.assign(found, { visible: false });
@@ -83,11 +84,25 @@ page.axis = (axis, share, other, narrow, pixels) => {
   return found;
 };
 
+// length of a word along an axis, of a slanted one its share [px]
+page.along = (word, share) => 6.6 * Math.abs(share(word.angle * Math.PI / 180)) * Math.max(...word.text.split("\n").map((line) => line.length));
+
+// room that slanted words at the upper end of the first panels need above it [px]
+page.headroom = (chart) => Math.max(0, ...chart.panels.flatMap((panel) => panel.words.map((word) => {
+  if (word.paper || !word.angle || !panel.y.range || panel.place[0] || word.align[1] !== "bottom") return 0;
+  const at = panel.y.log ? Math.log10 : Number, [low, high] = panel.y.range.map(at);
+  return page.along(word, Math.sin) + 14 - word.shift[1] - (Math.max(0, high - at(word.y)) / (high - low)) * 210;
+})));
+
+// room that upright names of ticks need below the panels [px]
+page.footroom = (chart) => Math.max(0, ...chart.panels.map(({ x }) => (x.texts && x.angle && !x.hidden
+  ? 6.6 * Math.max(...x.texts.flatMap((text) => text.split("\n")).map((line) => line.length)) : 0)));
+
 // room that words at the right end of the panels need beyond it [px]
 page.overhang = (chart, columns, width) => Math.max(20, ...chart.panels.flatMap((panel) => panel.words.map((word) => {
   if (word.paper || panel.x.hidden || !panel.x.range) return 0;
   const at = panel.x.log ? Math.log10 : Number, [low, high] = panel.x.range.map(at);
-  const long = word.angle ? 14 : 6.6 * Math.max(...word.text.split("\n").map((line) => line.length));
+  const long = 14 * Math.abs(Math.sin(word.angle * Math.PI / 180)) + page.along(word, Math.cos);
   const beyond = { left: long, center: long / 2, right: 0 }[word.align[0]] + word.shift[0];
   return beyond - (Math.max(0, high - at(word.x)) / (high - low)) * (width / columns) + 6;
 })));
@@ -100,7 +115,8 @@ page.arrange = (chart, width) => {
   const pixels = (width - left - right + across) / columns - across;
   const lines = Math.max(1, ...chart.panels.map((panel) => page.wrapped(panel.title, pixels).lines));
   const title = chart.title ? page.wrapped(chart.title, 0.8 * width) : { text: "", lines: 0 };
-  const gaps = { x: across, y: hidden ? 14 + 16 * lines : (single ? 74 : 66) + 16 * lines, left, right, top: 20 + 16 * lines + (title.lines && 10 + 20 * title.lines), bottom: 62 };
+  const foot = page.footroom(chart), above = 20 + 16 * lines + (title.lines && 10 + 20 * title.lines);
+  const gaps = { x: across, y: hidden ? 14 + 16 * lines : (single ? 74 : 66) + 16 * lines + foot, left, right, top: Math.max(above, page.headroom(chart)), bottom: 62 + foot };
   const ratio = chart.size[1] / chart.size[0];
   const cell = chart.panels[0].square ? Math.min((width - 40) / columns, 460) * 1.02 : single ? 250 : Math.min(Math.max((width * ratio) / rows, 210), 340);
   const height = rows * cell + gaps.top + gaps.bottom;
@@ -121,7 +137,7 @@ page.draw = (div) => {
   const layout = { height, width, margin: { l: gaps.left, r: gaps.right, t: gaps.top, b: gaps.bottom }, paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: narrow ? 11 : 13, color: page.style("--ink") },
     hovermode: "closest", hoverlabel: { align: "left" }, dragmode: narrow ? false : "zoom",
-    legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0 } };
+    legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0, maxheight: 0.9 } };
   if (chart.title) layout.title = { text: title, x: 0.01, xref: "container", y: 1, yref: "container", yanchor: "top", pad: { t: 18 }, font: { size: 15 } };
   chart.panels.forEach((panel, i) => {
     const end = i ? String(i + 1) : "", key = { x: "x" + end, y: "y" + end };
@@ -153,6 +169,9 @@ page.draw = (div) => {
   layout.showlegend = seen.size > 1;
   Plotly.react(div, traces, layout, { displaylogo: false, responsive: false, displayModeBar: "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] });
+  // a legend of several lines makes the picture higher, not the panels lower
+  const legend = layout.showlegend ? div._fullLayout.legend._height - 34 : 0;
+  if (legend > 0) Plotly.relayout(div, { height: height + legend, "margin.b": gaps.bottom + legend });
   div.style.minHeight = "";
   div.dataset.drawn = String(width);
 };

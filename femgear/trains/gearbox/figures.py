@@ -29,7 +29,9 @@ _NAME_HEIGHT = 0.035  # of the names of lines of excitation, over that of the pi
 _STEP, _MOST_STEPS = 4.0, 60  # by which names are pushed on [points], and how often
 _NEAR = 16  # first places of a name, which are near enough to its arrow to leave a curve for
 _LEAST = 0.04  # force that is drawn, over the largest
+_STILL = 1e-12  # motion aside that is rounding [m]
 _MOST_MODES = 24
+_EQUAL = 1e-6  # difference of two frequencies of one pair, over them
 _KIND_COLOURS: dict[str, str] = dict(
     zip(("torsional", "bending", "axial", "mixed", "ring", "casing", "carrier"), COLOURS, strict=False)
 )
@@ -37,14 +39,16 @@ _DASHES = ("-", "--", "-.", ":")
 _PLANES = ((0, "x"), (1, "y"))
 
 
-def deflected_shafts(deflection: xr.Dataset) -> Figure:
+def deflected_shafts(deflection: xr.Dataset) -> Figure | None:
     """Draw the deflection of all shafts along their axes in both planes, with the forces of the bearings.
 
-    Of deflection.nc at its chosen load case.
+    Of deflection.nc at its chosen load case; nothing where no shaft has a length or none moves aside.
     """
     one = deflection.isel(load_case=int(deflection.attrs["load_case"]))
     place, moved = one["place"].values, one["displacement"].values[:, :3]
     member, shafts = one["member"].values, one["shaft"].values
+    if all(np.ptp(place[member == shaft, 2]) == 0.0 for shaft in shafts) or np.abs(moved[:, :2]).max() < _STILL:
+        return None
     figure, axes = new_figure(columns=2, width=12.0, height=5.4)
     for ax, (way, axis) in zip(axes, _PLANES, strict=True):
         for number, shaft in enumerate(shafts):
@@ -160,9 +164,10 @@ def load_patterns(deflection: xr.Dataset) -> Figure | None:
 
 
 def mode_energy(modes: xr.Dataset) -> Figure:
-    """Draw which part holds the strain energy of the elastic modes of modes.nc."""
+    """Draw which part holds the strain energy of the elastic modes of modes.nc, one of each pair of equal ones."""
     hertz = modes["frequency"].values
-    chosen = np.flatnonzero(hertz > 0.0)[:_MOST_MODES]
+    chosen = np.flatnonzero(hertz > 0.0)
+    chosen = chosen[np.diff(hertz[chosen], prepend=0.0) > _EQUAL * hertz[chosen]][:_MOST_MODES]
     strain, parts = modes["strain"].values[:, chosen], modes["part"].values
     figure, (ax,) = new_figure(width=10.0, height=5.0)
     order = np.argsort(-strain.sum(axis=1))
@@ -248,9 +253,8 @@ def _excitation_line(ax, name: str, slope: float, fastest: float, top: float, na
 
 def _draw_deflection(drawn: Drawn) -> dict[str, Figure]:
     data = drawn.data["deflection"]
-    found = {"deflected_shafts": deflected_shafts(data)}
-    pattern = load_patterns(data)
-    return found if pattern is None else found | {"load_patterns": pattern}
+    pictures = {"deflected_shafts": deflected_shafts(data), "load_patterns": load_patterns(data)}
+    return {name: picture for name, picture in pictures.items() if picture is not None}
 
 
 def _draw_modes(drawn: Drawn) -> dict[str, Figure]:

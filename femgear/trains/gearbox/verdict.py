@@ -21,6 +21,8 @@ from femgear.trains.gearbox.strength import smallest_safeties
 
 SENSORS_JUDGED = 3
 """Sensors in the verdict, at most: the loudest ones."""
+_ROUNDING = 1e-9
+"""Share of the mesh forces under which the force of a bearing is rounding: planets balance one another."""
 _OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
 _OF_BEARINGS = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-BEARING", "W-PLAY"
 _OF_RESPONSE = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS", "W-RIGID"
@@ -72,8 +74,9 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
     if len(bearings):
         force = np.hypot(data["radial_force"].values, data["axial_force"].values)
         at = np.unravel_index(int(force.argmax()), force.shape)
-        text = marks(f"{force[at]:.4g} N", *_OF_BEARINGS, of=("deflection",))
-        yield "largest bearing force", f"{text}, {where(at, bearings)}"
+        if force[at] > _ROUNDING * np.nanmax(data["mesh_force"].values, initial=0.0):
+            text = marks(f"{force[at]:.4g} N", *_OF_BEARINGS, of=("deflection",))
+            yield "largest bearing force", f"{text}, {where(at, bearings)}"
         yield from shortest_life(data)
     yield from largest_foot_force(data)
 

@@ -28,6 +28,12 @@ def test_every_shaft_has_a_curve_in_both_planes_and_bearings_their_forces(data):
         assert {text.get_text().split("\n")[0] for text in ax.texts if text.get_text()} == {"A", "B", "C", "D"}
 
 
+def test_shafts_that_stay_where_they_are_have_no_picture(data):
+    still = data[0].copy(deep=True)
+    still["displacement"][..., :2] = 1e-15
+    assert deflected_shafts(still) is None
+
+
 @pytest.mark.parametrize("forces", ["alike", "near one another", "one of them small"])
 def test_no_name_of_a_bearing_lies_on_another_or_on_an_arrow(data, forces):
     near = data[0].copy(deep=True)
@@ -59,8 +65,11 @@ def test_loads_over_the_width_integrate_to_the_force(data):
     assert line.get_ydata().sum() * step == pytest.approx(force, rel=1e-9)
 
 
-def test_energies_fill_their_bars(data):
+def test_energies_fill_their_bars_and_equal_modes_have_one(data):
+    twice = data[1].copy(deep=True)
+    twice["frequency"][-1] = twice["frequency"][-2]
     (ax,) = mode_energy(data[1]).axes
+    assert len(ax.get_xticks()) == len(mode_energy(twice).axes[0].get_xticks()) + 1 <= 24
     tops = {}
     for bar in ax.patches:
         tops[round(bar.get_x(), 3)] = max(tops.get(round(bar.get_x(), 3), 0.0), bar.get_y() + bar.get_height())
