@@ -16,6 +16,7 @@ from validation import (
     calculix_solid,
     casings,
     contact,
+    drawing,
     drivetrain,
     dynamics,
     elasticity,
@@ -84,6 +85,21 @@ THEMES = (
             geometry.limits,
             geometry.internal_interference,
             geometry.helical,
+        ),
+    ),
+    Theme(
+        "drawing",
+        "Measures of drawings",
+        "Gears of a normal module of 3 mm; internal gears have negative tooth numbers, their shifts are positive where "
+        "they move the flank outwards. Rows of the profile: points of the flanks, on planes and on a ball that touch "
+        "them, found without a formula. Compared with: closed forms by hand; the generated profile; DIN 3967; gates: "
+        "1e-12; 1e-9; printed digits.",
+        (
+            drawing.textbook,
+            drawing.helical_by_section,
+            drawing.on_the_profile,
+            drawing.there_and_back,
+            drawing.fits,
         ),
     ),
     Theme(

@@ -16,6 +16,7 @@ import numpy as np
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, SPEED
 from femgear.case.sections import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors, face_width, gear_material
+from femgear.case.tooth_measures import check_allowances, shift_open
 from femgear.errors import CaseError
 from femgear.findings import Finding, remark
 
@@ -39,6 +40,7 @@ def cross_check(case: Case, more: Iterable[CaseError] = ()) -> list[CaseError]:
         _check_numbers,
         _check_deviations,
         check_materials,
+        check_allowances,
     )
     problems = [problem for check in checks for problem in check(case)] + list(more)
     return problems or list(check_published(case))
@@ -168,7 +170,7 @@ def _check_set(case: Case):
             limit=f"{count} angles",
             remedy="give one angle a planet, or leave planet_angles out for equal spacing",
         )
-    if case.set.centre_distance is case.sun.profile_shift is case.ring.profile_shift is None:
+    if case.set.centre_distance is None and shift_open(case.sun) and shift_open(case.ring):
         yield CaseError(
             "neither the centre distance nor a profile shift of sun or ring is given",
             code="E-KEY-MISSING",

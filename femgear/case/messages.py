@@ -20,6 +20,7 @@ from femgear.case import text as case_text
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, wrong_length
 from femgear.case.sections import RackSection
+from femgear.case.tooth_measures import MEASURES
 from femgear.errors import CaseError, GeometryError, several
 from femgear.findings import Finding, remark
 
@@ -29,6 +30,8 @@ _DIMENSIONS = {
     "outer_radius": LENGTH,
     "tip_diameter": LENGTH,
     "root_diameter": LENGTH,
+    "over_balls": LENGTH,
+    "ball_diameter": LENGTH,
     "module": LENGTH,
     "pressure_angle": ANGLE,
 }
@@ -231,6 +234,13 @@ def _shift_left_out(error: GeometryError, case: Case) -> None:
     others = {"sun": "ring", "ring": "sun", "gear_1": "gear_2", "gear_2": "gear_1"}
     sections = {name: getattr(case, name) for name in case.gear_names if name in others}
     gear, _, entry = (error.key or "").partition(".")
+    if gear in case.gear_names and entry == "profile_shift":
+        section = getattr(case, gear)
+        measures = section.given(*MEASURES)
+        if measures and (section.profile_shift is None or entry not in section.model_fields_set):
+            error.message += f" (the {gear}'s {measures[0]} makes its profile shift {error.value})"
+            error.key, error.value = f"{gear}.{measures[0]}", LENGTH.show(getattr(section, measures[0]))
+            return
     if gear not in sections or entry != "profile_shift" or sections[gear].profile_shift is not None:
         return
     if case.set.centre_distance is not None:

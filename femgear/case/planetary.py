@@ -32,6 +32,7 @@ from femgear.case.sections import (
 )
 from femgear.case.teeth import GearCase, case_overlap, flank_form, free_tips, gear_of, pitch_of, runout_of
 from femgear.case.text import CaseFile
+from femgear.case.tooth_measures import shift_open
 from femgear.errors import GeometryError
 from femgear.gears.checks import check_set
 from femgear.gears.deviations import Ovality, SetDeviations, no_deviations
@@ -181,14 +182,13 @@ FILE = CaseFile(Case)
 def _closed_set(case: Case) -> PlanetarySet:
     """Gears of a case, closed on their centre distance but not yet checked as a set."""
     ring = case.ring
-    left_open = (("sun", case.sun.profile_shift), ("ring", ring.profile_shift))
     closed = close_set(
         gear_of(case, case.sun, "sun", case.sun.bore_radius),
         gear_of(case, case.planet, "planet", case.planet.bore_radius),
         gear_of(case, ring, "ring", ring.outer_radius, internal=True),
         planet_angles=case.set.planet_angles or equal_planet_angles(case.set.planets),
         centre_distance=case.set.centre_distance,
-        find=tuple(name for name, shift in left_open if shift is None),
+        find=tuple(name for name in ("sun", "ring") if shift_open(getattr(case, name))),
     )
     return settled_tips(closed, free=free_tips(case))
 

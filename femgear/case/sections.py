@@ -37,6 +37,7 @@ from femgear.case.quantities import (
     at_most,
 )
 from femgear.case.text import described
+from femgear.case.tooth_measures import ToothMeasures
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.gear_steels import Grade, Treatment, stress_limit
 
@@ -367,7 +368,7 @@ class ShaftPartSection(Section):
 _Shaft = Annotated[tuple[ShaftPartSection, ...], Field(max_length=50)]
 
 
-class SunSection(Section):
+class SunSection(ToothMeasures):
     """The sun, and with it the module and the pressure angle of the set."""
 
     teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
@@ -392,7 +393,7 @@ class SunSection(Section):
     errors: GearErrors | None = None
 
 
-class PlanetSection(Section):
+class PlanetSection(ToothMeasures):
     """One of the equal planets."""
 
     teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
@@ -414,7 +415,7 @@ class PlanetSection(Section):
     individual: Annotated[tuple[IndividualPlanet, ...], Field(max_length=1000)] = ()
 
 
-class RingSection(Section):
+class RingSection(ToothMeasures):
     """The internal gear; a positive profile shift moves its flanks outwards, to larger radii."""
 
     teeth: Annotated[int, Count(10, 5000, note=_MANY_TEETH, signed=True)]

@@ -15,6 +15,7 @@ import numpy as np
 from femgear.case.quantities import FREE, Section
 from femgear.case.sections import CarrierErrors, GearErrors, face_width
 from femgear.case.text import ReadCase
+from femgear.case.tooth_measures import gear_allowances, measured_gear
 from femgear.errors import GeometryError
 from femgear.gears.deviations import Runout, SetDeviations, tooth_displacements
 from femgear.gears.gear import Gear
@@ -70,6 +71,7 @@ class GearCase(Section, ReadCase):
 def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = False) -> Gear:
     """Make a gear of a case from its section; the rim is its bore or outer radius [m].
 
+    Its measures give its profile shift, or what its teeth are thinner, see `femgear.case.tooth_measures`.
     Its tip is open until the gears are closed, see `femgear.gears.tips.settled_tips`.
     """
     given, module, pressure_angle = section.rack or case.rack, case.module, case.pressure_angle
@@ -81,7 +83,7 @@ def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = 
     if internal and section.cutter_teeth is not None:
         shift = section.cutter_profile_shift * _normal_modules(case)
         cutter = PinionCutter(teeth=section.cutter_teeth, profile_shift=shift)
-    return Gear(
+    gear = Gear(
         teeth=section.teeth,
         module=module,
         pressure_angle=pressure_angle,
@@ -93,10 +95,18 @@ def gear_of(case: Any, section: Any, name: str, rim: float, *, internal: bool = 
         cutter=cutter,
         tip_diameter=tip,
         root_diameter=section.root_diameter,
-        thickness_allowance=0.5 * case.set.backlash,
+        thickness_allowance=_thickness_allowance(case, name),
         name=name,
         tip_open=True,
     )
+    return measured_gear(case, section, gear)
+
+
+def _thickness_allowance(case: Any, name: str) -> float:
+    """What the teeth of a gear are thinner [m]: the mean of its allowances, or half of the backlash."""
+    if (allowances := gear_allowances(case, name)) is not None:
+        return -0.5 * sum(allowances) / _normal_modules(case)
+    return 0.5 * case.set.backlash
 
 
 def _normal_modules(case: Any) -> float:

@@ -71,6 +71,7 @@ from femgear.gears.iso6336_root import root_face_width
 from femgear.gears.pair import GearSet
 from femgear.gears.planetary import PlanetarySet
 from femgear.gears.profile import base_helix_angle
+from femgear.stages.drawing_tables import drawing_attributes
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.stages.static_results import (
     SLICES,
@@ -165,7 +166,8 @@ def solve_static(
     overlap = _overlap(case, gears) if cycle.helical else 0.0
     base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
     parts = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
-    return StaticResult(*parts, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"))
+    drawing = drawing_attributes(case)
+    return StaticResult(*parts, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"), drawing=drawing)
 
 
 def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:

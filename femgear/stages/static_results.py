@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -38,6 +38,7 @@ from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.gears.tooth import ROOT_RADIUS_LIMIT, root_notches
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, chosen, significant, tabulate
+from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import StageResult
 from femgear.stages.strength import SIDES, NominalStresses
 from femgear.storage.contents import Contents
@@ -272,6 +273,8 @@ class StaticResult(StageResult):
         Of helical teeth [rad], positive where the sun is right-handed.
     waves : WidthWaves, optional
         What bodies yield across the width, where it is solved in slices.
+    drawing : dict, optional
+        Attributes that tell what a drawing carries, see `femgear.stages.drawing_tables.drawing_attributes`.
     """
 
     planetary_set: Any
@@ -284,6 +287,7 @@ class StaticResult(StageResult):
     overlap_ratio: float = 0.0
     base_helix_angle: float = 0.0
     waves: WidthWaves | None = None
+    drawing: dict[str, Any] = field(default_factory=dict)
 
     @property
     def residual(self) -> float:
@@ -344,6 +348,7 @@ class StaticResult(StageResult):
                 "free_ends": self._free_ends(),
                 "teeth": np.array([gear.teeth for gear in gears.gears]),
                 "sun_torque": self.sun_torque,
+                **self.drawing,
                 "contact": cycle.contact,
                 "mesh_periods": cycle.periods,
                 **({} if cycle.between is None else {"peak_doubt": cycle.between.doubt}),
@@ -1198,6 +1203,7 @@ def describe_set(case: Case) -> tuple[Block, ...]:
     planetary = planetary_set(case)
     return (
         describe_gears(planetary, case.helix_angle),
+        *describe_drawing(case),
         *describe_materials(case),
         describe_meshes(planetary, case.helix_angle),
         _harmonics(planetary),

@@ -467,8 +467,8 @@ CASES = Path(__file__).resolve().parents[2] / "cases"
 
 
 def tables(case):
-    _, _, harmonics, neighbours, _ = describe_set(case)
-    return harmonics, neighbours
+    blocks = {block.title: block for block in describe_set(case)}
+    return blocks["Mesh phasing"], blocks["Neighbouring tooth numbers"]
 
 
 def test_reference_set_is_in_phase():
@@ -494,7 +494,8 @@ def test_few_planets(planets):
 
 
 def test_lead_of_the_ring_meshes_is_that_of_the_phases():
-    _, meshes, harmonics, _, _ = describe_set(read_case(CASES / "planetary_27_40_108.toml"))
+    blocks = {block.title: block for block in describe_set(read_case(CASES / "planetary_27_40_108.toml"))}
+    meshes, harmonics = blocks["Meshes"], blocks["Mesh phasing"]
     phase = dict((row[0], row[1:]) for row in meshes.rows)["mesh phases [periods]"][1].split(", ")[0]
     assert phase == "0.4636" and f"a planet's ring mesh is {phase} periods ahead" in harmonics.notes[1]
 

@@ -42,6 +42,7 @@ from femgear.case.sections import (
 )
 from femgear.case.teeth import GearCase, case_overlap, flank_form, free_tips, gear_of, pitch_of, runout_of
 from femgear.case.text import CaseFile
+from femgear.case.tooth_measures import ToothMeasures, check_allowances, shift_open
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.checks import check_meshes
@@ -68,7 +69,7 @@ class PairSetSection(Section):
     helix_angle: Annotated[float, Quantity(ANGLE, -LARGEST_HELIX, LARGEST_HELIX)] = 0.0
 
 
-class GearSection(Section):
+class GearSection(ToothMeasures):
     """Gear 1, the driving one.
 
     Mass and inertia left out are estimated; without a bearing stiffness the axis is held.
@@ -159,7 +160,7 @@ class PairCase(GearCase):
             gear_of(self, self.gear_1, "gear_1", self.gear_1.bore_radius),
             gear_of(self, two, "gear_2", two.outer_radius or two.bore_radius or 0.0, internal=two.internal),
             centre_distance=self.set.centre_distance,
-            find=tuple(name for name in self.gear_names if getattr(self, name).profile_shift is None),
+            find=tuple(name for name in self.gear_names if shift_open(getattr(self, name))),
         )
         settled = settled_tips(pair, free=free_tips(self))
         check_meshes(settled, overlap=case_overlap(self, settled))
@@ -192,7 +193,7 @@ class PairCase(GearCase):
 
 def check_pair_entries(case: PairCase) -> Iterator[CaseError]:
     """Refuse what no entry shows alone."""
-    two, shifts = case.gear_2, [getattr(case, name).profile_shift for name in case.gear_names]
+    two, shifts_open = case.gear_2, [shift_open(getattr(case, name)) for name in case.gear_names]
     if (two.bore_radius is None) == (two.outer_radius is None):
         yield CaseError(
             "gear 2 needs one radius of its rim",
@@ -207,12 +208,12 @@ def check_pair_entries(case: PairCase) -> Iterator[CaseError]:
             key="gear_2.cutter_teeth",
             remedy="leave it out, or give outer_radius in place of bore_radius",
         )
-    if shifts.count(None) > (case.set.centre_distance is not None):
+    if shifts_open.count(True) > (case.set.centre_distance is not None):
         yield CaseError(
             "the profile shifts leave the pair open",
             code="E-KEY-MISSING",
-            key=f"gear_{1 + shifts.index(None)}.profile_shift",
-            remedy="give both profile shifts, or one of them and set.centre_distance",
+            key=f"gear_{1 + shifts_open.index(True)}.profile_shift",
+            remedy="give both profile shifts, or measures of the teeth, or one of them and set.centre_distance",
         )
     if case.static.members != "fixed":
         yield CaseError(
@@ -225,6 +226,7 @@ def check_pair_entries(case: PairCase) -> Iterator[CaseError]:
         )
     yield from check_face_widths(case)
     yield from check_materials(case)
+    yield from check_allowances(case)
     yield from check_torque(case.operation.torque)
     yield from check_speeds(case) if case.operation.speeds else ()
     yield from check_gear_deviations(case)

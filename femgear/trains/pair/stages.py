@@ -44,6 +44,7 @@ from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmo
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
+from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.lumped_set import parts_of_speeds
 from femgear.stages.protocol import (
     Figures,
@@ -152,7 +153,8 @@ def _describe_case(case: PairCase) -> tuple[Block, ...]:
     notes = [f"torque on gear 1 {operation.torque:.6g} N m, on gear 2 {-operation.torque / ratio:.6g} N m"]
     helix = case.helix_angle
     speeds = tabulate("Operation", shown, columns, notes)
-    return describe_gears(gears, helix), *describe_materials(case), describe_meshes(gears, helix), speeds
+    meshes = describe_meshes(gears, helix)
+    return describe_gears(gears, helix), *describe_drawing(case), *describe_materials(case), meshes, speeds
 
 
 def _describe_static(results: Results) -> Block:
