@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.optimize import brentq, root
+from scipy.optimize import root, root_scalar
 
 from femgear.gears.allowances import thickness_allowances
 from femgear.gears.drawing import (
@@ -72,7 +72,7 @@ def planes_on_the_profile(gear: Gear, teeth: int, helix: float) -> tuple[float, 
 
     # in the transverse section first, where only the point furthest out counts
     ends = 0.5 * gear.form_roll, 1.25 * gear.tip_roll
-    start = 1e3 * brentq(lambda roll: _slopes(half, np.array([roll, 0.0]))[0], *ends)
+    start = 1e3 * root_scalar(lambda roll: _slopes(half, np.array([roll, 0.0]))[0], bracket=ends).root
     stationary = root(lambda at: _slopes(half, 1e-3 * at), [start, 0.0], tol=1e-12)
     roll, place = 1e-3 * stationary.x
     return 2.0 * half(roll, place), math.hypot(gear.base_radius, roll)
@@ -113,7 +113,7 @@ def textbook() -> tuple[Row, ...]:
         ball = usual_ball(gear) or 0.0
         half_gap = 0.5 * math.pi / teeth - 2.0 * shift * math.tan(ALPHA) / teeth * sign
         wanted = involute + sign * (1e3 * ball / (3.0 * teeth * math.cos(ALPHA)) - half_gap)
-        angle = brentq(lambda a, wanted=wanted: math.tan(a) - a - wanted, 0.01, 1.4, xtol=1e-15, rtol=1e-15)
+        angle = root_scalar(lambda a, wanted=wanted: math.tan(a) - a - wanted, bracket=(0.01, 1.4), xtol=1e-15).root
         across = 3.0 * teeth * math.cos(ALPHA) / math.cos(angle) * (math.cos(math.pi / 2 / teeth) if teeth % 2 else 1)
         reference = across + sign * 1e3 * ball
         quantity = f"M_dK, ball {1e3 * ball:g} mm [mm]"

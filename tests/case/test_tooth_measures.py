@@ -2,6 +2,7 @@
 
 import math
 import re
+from typing import Any
 
 import pytest
 
@@ -45,9 +46,14 @@ def pair_case(gear_1=SHIFTED, gear_2="", helix=0.0, of_set=""):
     return parse_case(text.replace("[set]", f"[set]\n{of_set}"), name="pair.toml")
 
 
-def made(gear_1=SHIFTED, gear_2="", helix=0.0, of_set=""):
+def made(gear_1=SHIFTED, gear_2="", helix=0.0, of_set="") -> Any:
     """Make the gears of that case."""
     return planetary_set(pair_case(gear_1, gear_2, helix, of_set))
+
+
+def made_of(text) -> Any:
+    """Make the gears of the text of a case."""
+    return planetary_set(parse_case(text, name="pair.toml"))
 
 
 def measures_of(gear, helix):
@@ -107,8 +113,9 @@ def test_a_measure_within_allowances_is_taken_and_one_beyond_is_refused():
 
 @pytest.mark.parametrize(("helix", "named"), [(0.0, '"25cd"'), (12.0, '["-70 um", "-110 um"]')])
 def test_allowances_thin_the_teeth_of_the_normal_section_by_their_mean(helix, named):
-    case = pair_case(f"{SHIFTED}\ntooth_thickness_allowance = {named}", helix=helix)
-    nominal, thin = made(helix=helix).gear_1, planetary_set(case).gear_1
+    entry = f"{SHIFTED}\ntooth_thickness_allowance = {named}"
+    case = pair_case(entry, helix=helix)
+    nominal, thin = made(helix=helix).gear_1, made(entry, helix=helix).gear_1
     assert gear_allowances(case, "gear_1") == pytest.approx((-70e-6, -110e-6), rel=1e-12)
     assert gear_allowances(case, "gear_2") is None
     beta = math.radians(helix)
@@ -148,13 +155,12 @@ def test_backlash_and_allowances_are_refused_together_with_both_values():
 def test_rings_have_no_span_and_are_measured_between_balls():
     text = PAIR.replace('teeth = 36\nbore_radius = "25 mm"', 'teeth = 72\nouter_radius = "125 mm"')
     text = text.replace("91.5 mm", "72 mm").replace("HELIX", "0").replace("GEAR_1", "profile_shift = 0.1")
-    plain = planetary_set(parse_case(text.replace("GEAR_2", ""), name="pair.toml"))
+    plain = made_of(text.replace("GEAR_2", ""))
     assert plain.gear_2.profile_shift == pytest.approx(0.1, abs=1e-12)
     balls = f'over_balls = "{1e3 * over_balls(plain.gear_2, 5e-3)!r} mm"\nball_diameter = "5 mm"'
-    measured = planetary_set(parse_case(text.replace("GEAR_2", balls), name="pair.toml"))
-    assert measured.gear_2.profile_shift == pytest.approx(0.1, abs=1e-12)
+    assert made_of(text.replace("GEAR_2", balls)).gear_2.profile_shift == pytest.approx(0.1, abs=1e-12)
     with pytest.raises(FemgearError, match="E-CHOICE") as refusal:
-        planetary_set(parse_case(text.replace("GEAR_2", 'span = "50 mm"\nspan_teeth = 5'), name="pair.toml"))
+        made_of(text.replace("GEAR_2", 'span = "50 mm"\nspan_teeth = 5'))
     assert refusal.value.key == "gear_2.span"
 
 

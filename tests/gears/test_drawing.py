@@ -66,6 +66,20 @@ GEARS = [
 EXTERNAL = [(gear, helix) for gear, helix in GEARS if not gear.internal]
 
 
+def spans_of(gear: Gear, helix: float) -> tuple[int, int]:
+    """Fewest and most teeth of a span, which there is."""
+    ends = span_teeth_range(gear, helix)
+    assert ends is not None
+    return ends
+
+
+def balls_of(gear: Gear, helix: float) -> tuple[float, float, float]:
+    """Smallest, usual and largest ball, which there are."""
+    ends, usual = ball_range(gear, helix), usual_ball(gear, helix)
+    assert ends is not None and usual is not None
+    return ends[0], usual, ends[1]
+
+
 def test_span_and_balls_of_a_spur_gear_are_those_of_the_textbook():
     gear, teeth, ball = gear_of(24, 0.3), 4, 3.5e-3
     involute = math.tan(ALPHA) - ALPHA
@@ -81,7 +95,7 @@ def test_span_and_balls_of_a_spur_gear_are_those_of_the_textbook():
 
 @pytest.mark.parametrize(("gear", "helix"), EXTERNAL)
 def test_two_planes_that_touch_the_generated_profile_are_a_span_apart(gear, helix):
-    low, high = span_teeth_range(gear, helix)
+    low, high = spans_of(gear, helix)
     for teeth in range(low, high + 1):
         measured, radius = planes_on_the_profile(gear, teeth, helix)
         assert measured == pytest.approx(span(gear, teeth, helix), rel=1e-9)
@@ -90,7 +104,8 @@ def test_two_planes_that_touch_the_generated_profile_are_a_span_apart(gear, heli
 
 @pytest.mark.parametrize(("gear", "helix"), GEARS)
 def test_a_ball_that_touches_the_generated_profile_is_at_its_place(gear, helix):
-    for ball in (usual_ball(gear, helix), 1.01 * ball_range(gear, helix)[0]):
+    smallest, usual, _ = balls_of(gear, helix)
+    for ball in (usual, 1.01 * smallest):
         measured, radius = ball_between_flanks(gear, ball, helix)
         assert measured == pytest.approx(over_balls(gear, ball, helix), rel=1e-9)
         assert radius == pytest.approx(ball_contact_radius(gear, ball, helix), rel=1e-6)
@@ -98,13 +113,14 @@ def test_a_ball_that_touches_the_generated_profile_is_at_its_place(gear, helix):
 
 @pytest.mark.parametrize(("gear", "helix"), GEARS)
 def test_every_measure_leads_back_to_shift_and_allowance(gear, helix):
-    ball = usual_ball(gear, helix)
+    _, ball, _ = balls_of(gear, helix)
     angles = [
         half_angle_of_balls(gear, ball, over_balls(gear, ball, helix), helix),
         half_angle_of_thickness(gear, normal_thickness(gear, helix), helix),
     ]
     if not gear.internal:
         teeth = usual_span_teeth(gear, helix)
+        assert teeth is not None
         angles.append(half_angle_of_span(gear, teeth, span(gear, teeth, helix), helix))
     for angle in angles:
         unshifted = replace(gear, profile_shift=0.0, tip_open=True)
@@ -114,7 +130,7 @@ def test_every_measure_leads_back_to_shift_and_allowance(gear, helix):
 
 @pytest.mark.parametrize(("gear", "helix"), GEARS)
 def test_ends_of_the_ball_range_touch_ends_of_flanks_roots_or_tips(gear, helix):
-    low, high = ball_range(gear, helix)
+    low, _, high = balls_of(gear, helix)
     for ball in (low * (1.0 + 1e-9), high * (1.0 - 1e-9)):
         check_ball(gear, ball, helix)
     for ball in (0.999 * low, 1.001 * high):
@@ -132,9 +148,8 @@ def test_thinner_teeth_have_a_smaller_span_and_a_larger_gap():
     assert over_balls(gear_at_allowance(external, -1e-4), 3.5e-3) < over_balls(external, 3.5e-3)
     assert over_balls(gear_at_allowance(internal, -1e-4), 3.5e-3) > over_balls(internal, 3.5e-3)
     helical = gear_of(23, 0.2, helix=0.35)
-    assert normal_thickness(helical, 0.35) - normal_thickness(
-        gear_at_allowance(helical, -1e-4, 0.35), 0.35
-    ) == pytest.approx(1e-4)
+    thin = gear_at_allowance(helical, -1e-4, 0.35)
+    assert normal_thickness(helical, 0.35) - normal_thickness(thin, 0.35) == pytest.approx(1e-4, rel=1e-9)
 
 
 def test_the_chord_is_that_between_the_flanks_on_the_reference_circle():
