@@ -51,6 +51,7 @@ CATALOGUE = {
     "W-KINK": (DOUBT, "A stress stands at a kink, or at an end of what was searched."),
     "W-LIFTED": (NOTE, "Parts of the face width never carry."),
     "W-LOAD": (NOTE, "Without load nothing keeps the flanks on one side."),
+    "W-LOSSES": (NOTE, "Losses of a part are left out, or rest on a simpler model."),
     "W-MOTION": (DOUBT, "A member moves far enough to change contact points and arms."),
     "W-NEIGHBOURS": (NOTE, "Neighbouring planets come close to one another."),
     "W-ONE-WAY": (NOTE, "Supports or a casing change the level that load factors are computed without."),

@@ -39,6 +39,7 @@ from validation import (
     impacts,
     integration,
     levels,
+    losses,
     members,
     modulation,
     moving_force,
@@ -116,6 +117,14 @@ THEMES = (
         "fractions. Compared with: Willis' table, closed forms of Simpson, Ravigneaux, Lepelletier and Wolfrom sets, "
         "printed ratios of transmissions, power and torque balance; gates: exact; 1e-15; printed digits.",
         (power_flow.ratios, power_flow.refusals, power_flow.frequencies),
+    ),
+    Theme(
+        "losses",
+        "Losses",
+        "Loss factors, coefficients of friction and efficiencies. Rows *C14*, *A* and *H501* are FZG test gears. "
+        "Compared with: reports of GEARpie, closed forms, sums over the path; gates: printed digits; 5 % between loads "
+        "of finite elements and those of a formula; 1e-9 for balances of powers.",
+        (losses.fzg_gears, losses.sets, losses.computed_loads),
     ),
     Theme(
         "ISO 6336",

@@ -37,7 +37,8 @@ _LIMITS = {
     for of in ("", *(f"{gear}." for gear in _GEARS))
     for name in ("root_stress_limit", "contact_stress_limit", "treatment", "grade", "hardness")
 }
-_WORDS = {"format", "title", "housing", "runup", "strength", *_LIMITS}
+_OIL = {"lubricant", "losses"}
+_WORDS = {"format", "title", "housing", "runup", "strength", *_OIL, *_LIMITS}
 """No stage before housing and run-up depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _WIDTH = {"tilt_stiffness", "misalignment", "torque_end", "torsion_diameter"}
@@ -84,6 +85,11 @@ def stress_entries(case: Any) -> Entries:
     return {**solution_entries(case), "strength": repr(case.strength)}
 
 
+def loss_entries(case: ReadCase) -> Entries:
+    """List all that decides losses beside the loads of the teeth: everything, as these go into torques and speeds."""
+    return _entries(case, {"format", "title", "housing", "runup", "dynamics", "balance", "modes", "sensor"})
+
+
 def state_entries(case: Case) -> Entries:
     """List the entries that decide the loaded state on the supports: neither masses nor what turns fast."""
     left_out = _DYNAMIC | {"operation.speeds", "dynamics", "motor", "brake"}
@@ -121,12 +127,12 @@ def runup_entries(case: Case) -> Entries:
 def box_entries(stage: str, case: ReadCase) -> Entries:
     """List the entries of a gearbox that decide a stage, which goes on from the deflection alone."""
     kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup", "balance") else frozenset()
-    return _entries(case, {"format", "title"} | _BESIDE[stage], kept=kept)
+    return _entries(case, {"format", "title"} | _OIL | _BESIDE[stage], kept=kept)
 
 
 def load_case_entries(case: ReadCase, load_case: BaseModel) -> Entries:
     """List the entries of a gearbox that decide its state under one load case: not the others, nor its share."""
-    others = _BESIDE["deflection"] | {"format", "title", "sensor", "operation.load_case", "operation.first"}
+    others = _BESIDE["deflection"] | _OIL | {"format", "title", "sensor", "operation.load_case", "operation.first"}
     of_load_case = load_case.model_dump(exclude={"name", "share"})
     return {**_entries(case, others), **{f"load case.{key}": value for key, value in _flat(of_load_case)}}
 

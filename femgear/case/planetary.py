@@ -9,6 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
+from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.quantities import Count, Title
 from femgear.case.sections import (
     FORMAT,
@@ -68,6 +69,8 @@ class Case(GearCase):
     housing: HousingSection = HousingSection()
     runup: RunupSection = RunupSection()
     strength: StrengthSection = StrengthSection()
+    lubricant: LubricantSection | None = None
+    losses: LossesSection | None = None
 
     @property
     def module(self) -> float:

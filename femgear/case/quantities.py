@@ -44,6 +44,8 @@ _FACTORS = {
     "dB": {"dB": 1.0},
     "m/s^2": {"m/s^2": 1.0},
     "N/m^3": {"N/m^3": 1.0},
+    "m^2/s": {"m^2/s": 1.0, "mm^2/s": 1e-6},
+    "m/s": {"m/s": 1.0},
 }
 # Words of drawings and other programs that pint does not know, or takes for something else.
 _WORDS = {
@@ -104,6 +106,11 @@ TORSION = Dimension("a torsional stiffness", "N m/rad", "N m/rad", 1.0)
 FREQUENCY = Dimension("a frequency", "Hz", "Hz", 1.0)
 TIME = Dimension("a time", "s", "s", 1.0)
 ACCELERATION = Dimension("an acceleration", "m/s^2", "m/s^2", 1.0)
+VISCOSITY = Dimension("a kinematic viscosity", "m^2/s", "mm^2/s", 1e-6)
+VELOCITY = Dimension("a velocity", "m/s", "m/s", 1.0)
+LINE_LOAD = Dimension("a load over width", "N/m", "N/mm", 1e3)
+CELSIUS = 273.15
+"""Zero degrees Celsius [K]."""
 FOUNDATION = Dimension("a foundation stiffness per area", "N/m^3", "N/m^3", 1.0)
 
 
@@ -393,6 +400,30 @@ def StiffnessOrRigid(dimension: Dimension, low: float, high: float) -> _Reader:
         return math.inf if value == RIGID else _read_or_word(stiffness, value, RIGID)
 
     return _Reader(rigid_too, {"type": "string", "description": f'{dimension.name}, or "{RIGID}"'})
+
+
+_DEGREES = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+))\s*(degC|°C|C|K)\s*")
+
+
+def Temperature(low: float, high: float) -> _Reader:
+    """Make the reader of a temperature such as ``"90 degC"`` or ``"363 K"``, kelvins in the model.
+
+    ``low`` and ``high`` are the ends of the plausible window in degrees Celsius.
+    """
+    window = f"{low:g} to {high:g} degC"
+
+    def convert(value: object) -> float:
+        match = _DEGREES.fullmatch(value) if isinstance(value, str) else None
+        if match is None:
+            message = "a temperature is a number with degC or K"
+            raise CaseError(message, code="E-UNIT", value=value, limit=window, remedy='write it as in "90 degC"')
+        kelvin = float(match[1]) + (0.0 if match[2] == "K" else CELSIUS)
+        if not low <= kelvin - CELSIUS <= high:
+            what = f"a temperature of {kelvin - CELSIUS:g} degC is not plausible"
+            raise CaseError(what, code="E-RANGE", value=value, limit=window)
+        return kelvin
+
+    return _Reader(convert, {"type": "string", "description": f"a temperature with its unit, {window}"})
 
 
 FREE = "free"

@@ -327,14 +327,27 @@ class MeshCycle:
         Of every mesh (M,). Stiffnesses jump where tooth pairs come and go, which a few equidistant positions
         place some per cent of a mesh period off.
         """
-        values, between = np.asarray(getattr(self, name)), self.between
-        if between is None:
+        between = None if self.between is None else getattr(self.between, name)
+        return self.mean_with(np.asarray(getattr(self, name)), between)
+
+    def mean_with(
+        self, values: np.ndarray, between: np.ndarray | None, position: np.ndarray | None = None
+    ) -> np.ndarray:
+        """Compute the mean over the record of values of the meshes (M, P) with those at positions between (M, E).
+
+        Parameters
+        ----------
+        position : (E,) array, optional
+            Of the values between [mesh periods]; by default those of `Between`.
+        """
+        if between is None or self.between is None:
             return values.mean(axis=-1)
-        weights = mean_weights(np.append(self.position, between.position), self.periods)
-        of_meshes = np.concatenate([values, getattr(between, name)], axis=-1) @ weights
+        place = self.between.position if position is None else position
+        weights = mean_weights(np.append(self.position, place), self.periods)
+        of_meshes = np.concatenate([values, between], axis=-1) @ weights
         # of planets that go through the same states those count whose jumps are enclosed
-        classes = len(between.looked) // self.alike
-        looked = between.looked.reshape(self.alike, classes)
+        classes = len(self.between.looked) // self.alike
+        looked = self.between.looked.reshape(self.alike, classes)
         of_class = np.where(looked, of_meshes.reshape(-1, self.alike, classes), 0.0).sum(axis=1)
         return np.repeat(of_class[:, None] / looked.sum(axis=0), self.alike, axis=1).ravel()
 

@@ -11,13 +11,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from femgear.case.quantities import Dimension
+from femgear.case.quantities import VISCOSITY
 from femgear.errors import CaseError
 from femgear.exchange.gear_unit import unit_flow, with_load_case
 from femgear.exchange.rexs import Component, Model
 from femgear.system.bearing_life import VISCOSITY_RATIOS, oil_viscosity, reference_viscosity
 
-VISCOSITY = Dimension("a kinematic viscosity", "m^2/s", "mm^2/s", 1e-6)
 _CONTAMINATION = ("contamination_factor_according_to_iso_281_2007", "contamination_factor_according_to_din_26281")
 _OIL_TEMPERATURE, _MEAN, _REFERENCE = "temperature_lubricant", "mean_operating_temperature", "reference_temperature"
 # The same in degrees of either scale.

@@ -14,6 +14,7 @@ import numpy as np
 from femgear.report.response import stored_harmonics
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, tabulate
+from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.strength import MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
 from femgear.system.fourier import sample
 
@@ -33,13 +34,17 @@ _GIVEN_BY = {
 
 
 def strength_verdict(results: Results) -> Iterator[Block]:
-    """Tabulate the safeties of a pair or a set of rigid bodies, where the case asks for them.
+    """Tabulate safeties and efficiency of a pair or a set of rigid bodies, where the case asks for them.
 
     K_gamma and K_Hbeta are those of the static solution, K_v that of the response, as far as they were computed.
     """
+    marks = Marks(results.findings)
+    rows = list(efficiency_rows(results, marks))
     if "static" not in results.stages or not rating_wanted(results.case):
+        if rows:
+            yield Block("Verdict", rows=tuple(rows), notes=marks.notes)
         return
-    static, marks, dynamic = results.static, Marks(results.findings), None
+    static, dynamic = results.static, None
     kinds = kind_names(static["mesh"].values.tolist())
     share = static["load_share"].mean("position").values.max() * static.sizes["planet"]
     if "dynamics" in results.stages:
@@ -51,7 +56,7 @@ def strength_verdict(results: Results) -> Iterator[Block]:
         face=_largest_of_kinds(static["face_load_factor"].values, kinds) if "face_load_factor" in static else None,
     )
     doubts = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
-    rows = [(name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)]
+    rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *rows]
     yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
     yield strength_block(rating, kinds)
 

@@ -66,6 +66,7 @@ RUNS = {
             "static.positions": 16,
             "static.stresses": False,
             "set.backlash": "0.1 mm",
+            "losses": {"friction": "constant", "coefficient": 0.05, "torque_shares": [1.0], "speed_shares": [1.0]},
             "operation.speeds": ["15200 rpm"],
             "runup": {"from": "14000 rpm", "to": "16000 rpm", "count": 3},
         },

@@ -57,6 +57,7 @@ from femgear.solvers.linear.resonances import (
 )
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics
+from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import member_speeds, parts_of_speeds
 from femgear.stages.protocol import (
     FiguresOf,
@@ -756,6 +757,7 @@ ELASTIC = Train(
     stages=(
         STATIC,
         STRESS,
+        LOSSES,
         Stage(
             name="modes",
             title="Modes",

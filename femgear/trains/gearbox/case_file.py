@@ -18,6 +18,7 @@ from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema, model_v
 
 from femgear.case import text as case_text
 from femgear.case.csv_columns import add_checksum, embed_profiles, embedded
+from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.quantities import (
     ACCELERATION,
     ANGLE,
@@ -647,6 +648,8 @@ class GearboxCase(Section, ReadCase):
     runup: RunupSection = RunupSection(count=0)
     balance: BoxBalanceSection = BoxBalanceSection()
     strength: StrengthSection = StrengthSection()
+    lubricant: LubricantSection | None = None
+    losses: LossesSection | None = None
 
     @model_validator(mode="before")
     @classmethod

@@ -20,6 +20,7 @@ from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
+from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import (
     driving_torque,
     gear_set_modes,
@@ -247,6 +248,7 @@ HELICAL = Train(
             wanted=lambda case: not _given(case) and case.static.slices > 1 and case.static.stresses,
             unavailable=lambda case: _NO_TEETH if _given(case) else STRESS.unavailable(case),
         ),
+        replace(LOSSES, unavailable=lambda case: _NO_TEETH if _given(case) else LOSSES.unavailable(case)),
         Stage(
             name="modes",
             title="Modes",

@@ -11,6 +11,7 @@ from pydantic import BeforeValidator, Field
 
 from femgear.case.checks import check_face_widths, check_gear_deviations, check_materials, check_speeds, check_torque
 from femgear.case.csv_columns import embed_profiles
+from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.messages import added_material
 from femgear.case.quantities import ANGLE, LENGTH, TORQUE, Count, Quantity, Section, Title, Values
 from femgear.case.sections import (
@@ -137,6 +138,8 @@ class PairCase(GearCase):
     dynamics: DynamicsSection = DynamicsSection()
     runup: RunupSection = RunupSection()
     strength: StrengthSection = StrengthSection()
+    lubricant: LubricantSection | None = None
+    losses: LossesSection | None = None
 
     @property
     def module(self) -> float:

@@ -45,6 +45,7 @@ from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.stages.drawing_tables import describe_drawing
+from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import parts_of_speeds
 from femgear.stages.protocol import (
     Figures,
@@ -416,6 +417,7 @@ PAIR = Train(
     stages=(
         replace(STATIC, describe=_describe_static),
         STRESS,
+        LOSSES,
         Stage(
             name="modes",
             title="Modes",

@@ -14,11 +14,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.gear_set import planetary_set
+from femgear.case.lubrication import losses_wanted
 from femgear.case.quantities import RPM
 from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.stages.losses import LOSSES
+from femgear.stages.losses_results import efficiency_verdict
 from femgear.stages.lumped_set import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
 from femgear.stages.protocol import (
     FiguresOf,
@@ -387,8 +390,9 @@ PLANAR = Train(
     name="planar",
     words="a planar case",
     stages=(
-        replace(STATIC, wanted=lambda case: bool(_needs_static(case))),
+        replace(STATIC, wanted=lambda case: bool(_needs_static(case)) or losses_wanted(case)),
         replace(STRESS, wanted=lambda case: bool(_needs_static(case)) and case.static.stresses),
+        LOSSES,
         Stage(
             name="modes",
             title="Modes",
@@ -428,5 +432,6 @@ PLANAR = Train(
     describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),
     warnings=planar_warnings,
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
+    verdict=efficiency_verdict,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
 )

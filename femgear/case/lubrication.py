@@ -1,0 +1,155 @@
+"""Sections ``lubricant`` and ``losses`` of a case file: the oil, and how its friction is found.
+
+They are the same for pairs, planetary sets and gearboxes. What they lack for the friction that is asked for is refused,
+with the entry that would give it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import StrictBool, model_validator
+
+from femgear.case.quantities import (
+    CELSIUS,
+    DENSITY,
+    LENGTH,
+    LINE_LOAD,
+    VELOCITY,
+    VISCOSITY,
+    Number,
+    Quantity,
+    Section,
+    Temperature,
+    Values,
+)
+from femgear.errors import CaseError
+from femgear.gears.friction import LUBRICANT_FACTORS
+from femgear.system.bearing_life import oil_viscosity
+
+Viscosity = Annotated[float, Quantity(VISCOSITY, 0.5e-6, 0.1)]
+OilTemperature = Annotated[float, Temperature(-50.0, 250.0)]
+_Share = Annotated[float, Number(0.0, 10.0, open_low=True)]
+_Coefficient = Annotated[float, Number(0.0, 0.5, open_low=True)]
+_Load = Annotated[float, Quantity(LINE_LOAD, 0.0, 1e8)]
+_Velocity = Annotated[float, Quantity(VELOCITY, 0.0, 1e3)]
+_Grid = Values(min_length=1, max_length=100)
+
+
+class LubricantSection(Section):
+    """The oil: its viscosity at 40 and 100 degrees Celsius, or at the temperature that it has in operation.
+
+    ``temperature`` is that of the oil in operation, ``density`` the one it has there. ``friction_factor`` is X_L, by
+    default that of the ``kind``.
+    """
+
+    kind: Literal["mineral", "PAO", "polyglycol", "water-soluble polyglycol"] = "mineral"
+    viscosity_40: Viscosity | None = None
+    viscosity_100: Viscosity | None = None
+    viscosity: Viscosity | None = None
+    temperature: OilTemperature | None = None
+    density: Annotated[float, Quantity(DENSITY, 500.0, 2000.0)] = 870.0
+    friction_factor: Annotated[float, Number(0.1, 3.0)] | None = None
+
+    @model_validator(mode="after")
+    def _thinner_when_hot(self):
+        cold, hot = self.viscosity_40, self.viscosity_100
+        if cold is not None and hot is not None and not cold > hot:
+            raise CaseError(
+                "the oil is not thinner at 100 degC than at 40 degC",
+                code="E-RANGE",
+                key="lubricant.viscosity_100",
+                value=f"{1e6 * hot:g} mm^2/s",
+                limit=f"below {1e6 * cold:g} mm^2/s",
+                remedy="check which of both is at 40 degC",
+            )
+        return self
+
+    @property
+    def factor(self) -> float:
+        """X_L: as given, or that of the kind."""
+        return LUBRICANT_FACTORS[self.kind] if self.friction_factor is None else self.friction_factor
+
+
+class FrictionTableSection(Section):
+    """Coefficients of friction over line load (rows) and pitch line speed (columns), linear between them."""
+
+    line_loads: Annotated[tuple[_Load, ...], _Grid]
+    speeds: Annotated[tuple[_Velocity, ...], _Grid]
+    coefficients: Annotated[tuple[Annotated[tuple[_Coefficient, ...], _Grid], ...], _Grid]
+
+    @model_validator(mode="after")
+    def _is_a_table(self):
+        rows, columns = len(self.line_loads), len(self.speeds)
+        if len(self.coefficients) != rows or any(len(row) != columns for row in self.coefficients):
+            message = "the coefficients of friction do not fit their loads and speeds"
+            raise CaseError(message, code="E-COUNT", limit=f"{rows} rows of {columns} numbers")
+        if any(list(grid) != sorted({*grid}) for grid in (self.line_loads, self.speeds)):
+            message = "loads and speeds of a table of friction ascend"
+            raise CaseError(message, code="E-RANGE", remedy="sort rows and columns, and keep one of each")
+        return self
+
+
+class LossesSection(Section):
+    """How losses are found: the coefficient of friction of the teeth, bearings, and a map over torque and speed.
+
+    ``friction`` names the formula, or says that it is the ``coefficient`` or the ``table``. ``roughness`` is the mean
+    R_a of both flanks. The map has the ``torque_shares`` and ``speed_shares`` of the torque and the speed of operation.
+    """
+
+    friction: Literal["constant", "schlenk", "niemann", "iso", "table"] = "schlenk"
+    coefficient: _Coefficient | None = None
+    table: FrictionTableSection | None = None
+    roughness: Annotated[float, Quantity(LENGTH, 1e-9, 2e-5)] | None = None
+    bearings: StrictBool = True
+    torque_shares: Annotated[tuple[_Share, ...], Values(max_length=50)] = ()
+    speed_shares: Annotated[tuple[_Share, ...], Values(max_length=200)] = ()
+
+
+def losses_wanted(case: Any) -> bool:
+    """Tell whether a case asks for losses: it has a section ``losses``."""
+    return case.losses is not None
+
+
+def oil_at(case: Any, temperature: float | None = None) -> float:
+    """Compute the dynamic viscosity of the oil of a case [Pa s] at a temperature [K], by default that of operation.
+
+    CaseError: the viscosity, or the temperature at which it is wanted, is missing (E-KEY-MISSING).
+    """
+    oil: LubricantSection = case.lubricant or LubricantSection()
+    if temperature is None and oil.viscosity is not None:
+        return oil.viscosity * oil.density
+    if oil.viscosity_40 is None or oil.viscosity_100 is None:
+        key = "lubricant.viscosity_100" if oil.viscosity_40 is not None else "lubricant.viscosity_40"
+        raise _missing(
+            case,
+            "the viscosity of the oil is missing",
+            key,
+            'give lubricant.viscosity_40 = "100 mm^2/s", viscosity_100 and temperature'
+            + ("" if temperature is not None else ", or the viscosity in operation alone"),
+        )
+    hot = oil.temperature if temperature is None else temperature
+    if hot is None:
+        remedy = 'give lubricant.temperature = "70 degC", that of the oil in operation'
+        raise _missing(case, "the temperature of the oil is missing", "lubricant.temperature", remedy)
+    return oil_viscosity(oil.viscosity_40, oil.viscosity_100, hot - CELSIUS) * oil.density
+
+
+def check_losses(case: Any) -> None:
+    """Refuse a section ``losses`` that lacks what its friction needs (CaseError, E-KEY-MISSING)."""
+    losses: LossesSection | None = case.losses
+    if losses is None:
+        return
+    needs: dict[str, tuple[str, str]] = {
+        "constant": ("coefficient", "give losses.coefficient = 0.05"),
+        "table": ("table", "give losses.table with line_loads, speeds and coefficients"),
+    }
+    name, remedy = needs.get(losses.friction, ("roughness", 'give losses.roughness = "0.4 um", the mean R_a of flanks'))
+    if getattr(losses, name) is None:
+        raise _missing(case, f'friction = "{losses.friction}" needs its {name}', f"losses.{name}", remedy)
+    if losses.friction not in needs:
+        oil_at(case)
+
+
+def _missing(case: Any, message: str, key: str, remedy: str) -> CaseError:
+    return CaseError(message, code="E-KEY-MISSING", key=key, file=case.location(key), remedy=remedy)

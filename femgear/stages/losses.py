@@ -1,0 +1,321 @@
+"""Losses of the teeth by the loads that the contact has: loss factors, friction, torques of pairs and sets with them.
+
+The loss of a mesh is the mean over its period of the sum over all tooth pairs, and all slices of the width, of
+``mu F |v_s|``: of a coefficient of friction that holds for the whole path that is mu times the loss factor of the
+computed loads, which stands beside that of equal loads on all pairs, the figure of the standards (`loss_factor`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from femgear.case.dependencies import loss_entries
+from femgear.case.lubrication import LubricantSection, check_losses, losses_wanted, oil_at
+from femgear.errors import CaseError
+from femgear.gears.friction import (
+    FRICTION_LAWS,
+    closed_loss_factor,
+    loss_factor,
+    path_speeds,
+    sliding_per_path,
+    table_friction,
+)
+from femgear.gears.kinematics import speeds
+from femgear.gears.power_flow import pair_condition, planetary_condition
+from femgear.gears.power_losses import LossyFlow, lossy_flow
+from femgear.gears.profile import base_helix_angle
+from femgear.stages.losses_results import (
+    LossesResult,
+    LossPoint,
+    MeshFriction,
+    describe_losses,
+    loss_tables,
+)
+from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
+from femgear.stages.static import slices_ahead, solve_static
+
+if TYPE_CHECKING:
+    from femgear.case.dependencies import Steps
+    from femgear.contact.cycle import MeshCycle
+    from femgear.gears.pair import GearPair, GearSet
+    from femgear.gears.shaft_graph import SpeedCondition
+    from femgear.stages.static_results import StaticResult
+
+NO_LOSSES = "no section [losses] asks for them"
+
+
+@dataclass(frozen=True)
+class _Operation:
+    """Stage of a case of a pair or a set between its shafts.
+
+    ``shafts``, ``condition``, what is ``held``, the shaft that the torque is ``given`` of, and the ``output``.
+    """
+
+    shafts: tuple[str, ...]
+    condition: SpeedCondition
+    held: tuple[str, ...]
+    given: str
+    output: str
+
+
+def computed_loss_factor(cycle: MeshCycle, gears: GearSet, *, overlap: float = 0.0, base_helix: float = 0.0):
+    """Compute H_V (M,) of all meshes from the computed loads of the tooth pairs; zero of meshes without load.
+
+    ``mean(sum F |zeta|) / mean(F)`` times sliding speed over path and speed of the base circle of gear 1, over
+    cos(beta_b): forces of the cycle are those of the transverse section.
+
+    Parameters
+    ----------
+    overlap : float
+        Overlap ratio of helical teeth in slices, signed as slices run ahead.
+    base_helix : float
+        Helix angle on the base cylinder [rad].
+    """
+    moments = [_moment(record, gears.base_pitch, overlap) for record in _records(cycle)]
+    forces = [record.force + record.back_force for record in _records(cycle)]
+    place = np.concatenate([record.position for record in _records(cycle)[1:]]) if len(moments) > 1 else None
+    means = []
+    for first, *others in (moments, forces):
+        between = np.concatenate(others, axis=-1) if others else None
+        inside = None if place is None else np.abs(place) < cycle.periods - 1e-9
+        if between is not None and place is not None:
+            means.append(cycle.mean_with(first, between[:, inside], place[inside]))
+        else:
+            means.append(cycle.mean_with(first, None))
+    arm = np.divide(means[0], means[1], out=np.zeros(len(means[0])), where=means[1] > 0.0)
+    per_path = [sliding_per_path(pair) / pair.gear_1.base_radius for pair in gears.kinds]
+    return arm * gears.of_kinds(per_path) / math.cos(base_helix)
+
+
+def _records(cycle: MeshCycle) -> list[MeshCycle]:
+    return [cycle, *(() if cycle.between is None else cycle.between.records)]
+
+
+def _moment(cycle: MeshCycle, pitch: float, overlap: float) -> np.ndarray:
+    """Sum of force times distance from the pitch point over all tooth pairs of every mesh (M, P) [N m]."""
+    back = (cycle.back_tooth_load * np.abs(cycle.back_path)).sum(axis=1)
+    if cycle.slice_load is None:
+        return (cycle.tooth_load * np.abs(cycle.path)).sum(axis=1) + back
+    count = cycle.slice_load.shape[2]
+    path = cycle.path[:, :, None] + pitch * slices_ahead(overlap, count)[:, None]
+    return (cycle.slice_load * np.abs(path)).sum(axis=1).mean(axis=1) + back
+
+
+def mesh_friction(
+    case: Any, static: StaticResult, mesh_frequency: float, *, helix_angle: float, rules: Any = None
+) -> MeshFriction:
+    """Find friction and loss factors of all meshes of a stage.
+
+    Parameters
+    ----------
+    case : case of gears
+        Whose teeth they are.
+    static : StaticResult
+        Loads of the teeth.
+    mesh_frequency : float
+        [Hz]
+    helix_angle : float
+        Normal one at the reference circle [rad], 0 of spur teeth.
+    rules : case, optional
+        With the sections ``losses`` and ``lubricant``, where these are not those of the case.
+    """
+    gears, rules = static.planetary_set, case if rules is None else rules
+    base_helix = abs(base_helix_angle(case.pressure_angle, helix_angle))
+    overlap = static.overlap_ratio
+    factor = computed_loss_factor(static.cycle, gears, overlap=overlap, base_helix=base_helix)
+    force = (static.cycle.force + static.cycle.back_force).mean(axis=-1)
+    kinds = range(len(gears.kinds))
+    friction = np.zeros(len(force))
+    for kind in kinds:
+        rows = gears.kind_rows[kind]
+        friction[rows] = friction_coefficient(rules, gears.kinds[kind], force[rows], mesh_frequency, base_helix)
+    lines = abs(overlap) or (abs(math.tan(base_helix)) * gears.mesh_widths[0] / gears.base_pitch)
+    rigid = [loss_factor(pair, lines, base_helix) for pair in gears.kinds]
+    closed = [closed_loss_factor(pair, base_helix) for pair in gears.kinds]
+    passed = []
+    for rows in gears.kind_rows:
+        whole = force[rows].sum()
+        share = force[rows] / whole if whole > 0.0 else np.zeros(len(force[rows]))
+        passed.append(1.0 - float(share @ (friction[rows] * factor[rows])))
+    return MeshFriction(friction, factor, gears.of_kinds(rigid), gears.of_kinds(closed), force, tuple(passed))
+
+
+def friction_coefficient(
+    case: Any, pair: GearPair, force: np.ndarray, mesh_frequency: float, base_helix: float
+) -> np.ndarray:
+    """Compute the coefficient of friction of meshes of one kind by the section ``losses`` of a case.
+
+    Parameters
+    ----------
+    force : (m,) array
+        Mean force along the line of action of every mesh [N].
+    mesh_frequency : float
+        [Hz]
+    base_helix : float
+        [rad]
+    """
+    losses, line_load = case.losses, np.abs(force) / pair.face_width
+    if losses.friction == "constant":
+        return np.full(len(force), losses.coefficient)
+    at_pitch = path_speeds(pair, 0.0, mesh_frequency, base_helix)
+    if losses.friction == "table":
+        pitch_speed = 2.0 * math.pi * mesh_frequency / pair.gear_1.teeth * pair.gear_1.base_radius
+        grid = losses.table
+        return table_friction(
+            line_load,
+            pitch_speed / math.cos(pair.working_pressure_angle),
+            loads=grid.line_loads,
+            speeds=grid.speeds,
+            coefficients=grid.coefficients,
+        )
+    if not mesh_frequency:
+        return np.zeros(len(force))
+    oil: LubricantSection = case.lubricant
+    law = FRICTION_LAWS[losses.friction]
+    return law(
+        line_load,
+        float(at_pitch.sum_speed),
+        float(at_pitch.radius),
+        viscosity=oil_at(case),
+        roughness=losses.roughness,
+        lubricant=oil.factor,
+    )
+
+
+def losses_of_meshes(flow: LossyFlow, stage: str, friction: MeshFriction, gears: GearSet) -> np.ndarray:
+    """Share the losses of the kinds of mesh of a stage among its meshes (M,) [W]."""
+    losses = np.zeros(len(friction.force))
+    for rows, loss in zip(gears.kind_rows, flow.mesh_loss[stage], strict=True):
+        share = friction.force[rows] * friction.coefficient[rows] * friction.factor[rows]
+        losses[rows] = loss * share / share.sum() if share.sum() > 0.0 else 0.0
+    return losses
+
+
+def _operation(case: Any, gears: GearSet) -> _Operation:
+    """Shafts and stage of a case of a pair or a planetary set."""
+    if not gears.members:
+        first, second = (gear.name.replace("_", " ") for gear in gears.gears)
+        teeth = (gear.teeth for gear in gears.gears)
+        condition = pair_condition("mesh", first, second, *teeth, internal=gears.gears[1].internal)
+        return _Operation((first, second), condition, (), first, second)
+    members = ("sun", "carrier", "ring")
+    held, given = case.operation.fixed, case.operation.input
+    shafts = tuple(name for name in members if name != held)
+    on = {name: name if name != held else None for name in members}
+    condition = planetary_condition("set", on["sun"], on["carrier"], on["ring"], case.sun.teeth, abs(case.ring.teeth))
+    return _Operation(shafts, condition, (), given, next(name for name in shafts if name != given))
+
+
+def _speeds(case: Any, gears: Any, speed: float) -> tuple[dict[str, float], float]:
+    """Speeds of all shafts [rad/s], and the mesh frequency [Hz], at a speed of the input [rad/s]."""
+    if gears.members:
+        of_set = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
+        return {"sun": of_set.sun, "carrier": of_set.carrier, "ring": of_set.ring}, of_set.mesh_frequency
+    first, second = (gear.name.replace("_", " ") for gear in gears.gears)
+    ratio = gears.senses[1] * gears.gears[0].teeth / gears.gears[1].teeth
+    return {first: speed, second: ratio * speed}, abs(speed) * gears.gears[0].teeth / (2.0 * math.pi)
+
+
+def _point(case: Any, static: StaticResult, torque: float, speed: float) -> LossPoint:
+    """Losses at a torque [N m] and a speed [rad/s] of the input."""
+    gears, helix = static.planetary_set, case.helix_angle or 0.0
+    turning, frequency = _speeds(case, gears, speed)
+    friction, operation = mesh_friction(case, static, frequency, helix_angle=helix), _operation(case, gears)
+    name = operation.condition.name
+    flow = lossy_flow(
+        operation.shafts,
+        (operation.condition,),
+        speeds=turning,
+        torques={operation.given: torque},
+        outputs=(operation.output,),
+        efficiencies={name: friction.passed},
+    )
+    return LossPoint(flow, {name: friction}, {name: losses_of_meshes(flow, name, friction, gears)}, {})
+
+
+@one_blas_thread()
+def solve_losses(
+    case: Any, static: StaticResult, *, progress: Progress = silent, steps: Steps | None = None
+) -> LossesResult:
+    """Compute losses and efficiency at the torque and all speeds of operation, and over the map that the case asks for.
+
+    The contact is solved again for every torque of the map.
+    """
+    operation, losses = case.operation, case.losses
+    points = tuple(_point(case, static, operation.torque, speed) for speed in operation.speeds)
+    efficiency = np.zeros((len(losses.torque_shares), len(losses.speed_shares)))
+    for row, share in enumerate(losses.torque_shares):
+        progress("losses", row, len(efficiency))
+        torque = share * operation.torque
+        loaded = case.model_copy(update={"operation": operation.model_copy(update={"torque": torque})})
+        loads = static if share == 1.0 else solve_static(loaded, steps=steps)
+        efficiency[row] = [
+            _point(loaded, loads, torque, each * operation.speeds[-1]).flow.efficiency for each in losses.speed_shares
+        ]
+    speed = np.array(operation.speeds)
+    return LossesResult(
+        points,
+        {points[0].stages[0]: static.planetary_set.mesh_names},
+        "speed",
+        speed,
+        losses,
+        efficiency,
+        tuple(_simplified(case, static)),
+    )
+
+
+def _simplified(case: Any, static: StaticResult) -> Iterator[str]:
+    """Say what losses of a case leave out, or take simpler than it is."""
+    if (case.helix_angle or 0.0) and not static.cycle.helical:
+        yield (
+            "loss factors of helical teeth by the loads of their spur transverse section; static.slices gives those "
+            "over the width"
+        )
+    if static.planetary_set.members:
+        yield "bearings of planets and members are left out: nothing tells their friction"
+
+
+def no_losses(case: Any) -> str:
+    """Tell why a case of teeth has no losses; empty where it has."""
+    if not losses_wanted(case):
+        return NO_LOSSES
+    if case.operation.torque == 0.0:
+        return "without torque no flanks touch"
+    return "" if case.operation.speeds else "operation.speeds gives no speed"
+
+
+def check_loss_entries(case: Any) -> None:
+    """Refuse sections of losses that lack something, or that a set cannot have (CaseError)."""
+    check_losses(case)
+    losses = case.losses
+    if losses is not None and bool(losses.torque_shares) != bool(losses.speed_shares):
+        key = f"losses.{'speed' if losses.torque_shares else 'torque'}_shares"
+        raise CaseError(
+            "a map of losses goes over torque and speed",
+            code="E-KEY-MISSING",
+            key=key,
+            file=case.location(key),
+            remedy=f"give {key.removeprefix('losses.')} = [0.5, 1.0] too",
+        )
+
+
+LOSSES = Stage(
+    name="losses",
+    title="Losses",
+    solve=solve_losses,
+    takes=("static",),
+    options=("progress", "steps"),
+    decided_by=loss_entries,
+    wanted=losses_wanted,
+    unavailable=no_losses,
+    check=check_loss_entries,
+    verdict=lambda result: {"points": len(result.points)},
+    describe=lambda results: describe_losses(results.losses),
+    tables=lambda results: loss_tables(results.losses),
+    warnings=LossesResult.warnings,
+)

@@ -1,0 +1,64 @@
+"""Sections of oil and losses: what they give, and what they refuse."""
+
+import pytest
+
+from femgear.case.lubrication import check_losses, oil_at
+from femgear.errors import CaseError
+from femgear.trains.reading import read_case, with_values
+
+PAIR = "cases/spur_pair.toml"
+OIL = {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s", "temperature": "70 degC", "density": "900 kg/m^3"}
+SCHLENK = {"friction": "schlenk", "roughness": "0.4 um"}
+
+
+def pair(losses=SCHLENK, oil=OIL):
+    return with_values(read_case(PAIR), {"losses": losses, **({"lubricant": oil} if oil else {})})
+
+
+def test_the_viscosity_is_that_at_the_temperature_of_operation_or_as_given():
+    assert oil_at(pair(oil=OIL | {"temperature": "100 degC"})) == pytest.approx(11e-6 * 900.0)
+    assert oil_at(pair(oil=OIL | {"temperature": "373.15 K"})) == pytest.approx(11e-6 * 900.0)
+    assert oil_at(pair(oil=OIL), 313.15) == pytest.approx(100e-6 * 900.0)
+    assert oil_at(pair(oil={"viscosity": "15 mm^2/s"})) == pytest.approx(15e-6 * 870.0)
+
+
+@pytest.mark.parametrize(
+    "losses, oil, key",
+    [
+        (SCHLENK, None, "lubricant.viscosity_40"),
+        (SCHLENK, {"viscosity_40": "100 mm^2/s", "temperature": "70 degC"}, "lubricant.viscosity_100"),
+        (SCHLENK, {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s"}, "lubricant.temperature"),
+        ({"friction": "niemann"}, OIL, "losses.roughness"),
+        ({"friction": "constant"}, None, "losses.coefficient"),
+        ({"friction": "table"}, None, "losses.table"),
+    ],
+)
+def test_what_is_missing_for_the_friction_is_named(losses, oil, key):
+    with pytest.raises(CaseError) as refused:
+        check_losses(pair(losses, oil))
+    assert (refused.value.code, refused.value.key) == ("E-KEY-MISSING", key) and refused.value.remedies
+
+
+@pytest.mark.parametrize(
+    "changes, code",
+    [
+        ({"lubricant": OIL | {"viscosity_100": "120 mm^2/s"}}, "E-RANGE"),
+        ({"lubricant": OIL | {"temperature": "700 degC"}}, "E-RANGE"),
+        ({"lubricant": OIL | {"temperature": "70"}}, "E-UNIT"),
+        ({"lubricant": OIL | {"viscosity_40": "100 mPa s"}}, "E-UNIT"),
+        ({"losses": {"friction": "constant", "coefficient": 0.0}}, "E-RANGE"),
+        ({"losses": {"friction": "wimmer"}}, "E-CHOICE"),
+        (
+            {"losses": {"table": {"line_loads": ["1 N/mm"], "speeds": ["1 m/s"], "coefficients": [[0.05, 0.04]]}}},
+            "E-COUNT",
+        ),
+        (
+            {"losses": {"table": {"line_loads": ["1 N/mm"] * 2, "speeds": ["1 m/s"], "coefficients": [[0.05]] * 2}}},
+            "E-RANGE",
+        ),
+    ],
+)
+def test_values_that_cannot_be_are_refused(changes, code):
+    with pytest.raises(CaseError) as refused:
+        with_values(read_case(PAIR), changes)
+    assert refused.value.code == code

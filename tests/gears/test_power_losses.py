@@ -1,0 +1,95 @@
+"""Torques with losses: efficiencies of Willis' sets, balances of powers, directions of power."""
+
+import pytest
+
+from femgear.gears.power_flow import pair_condition, planetary_condition, power_flow
+from femgear.gears.power_losses import FrictionTorque, basic_efficiency, lossy_flow, planetary_efficiency
+
+ETA = (0.99, 0.995)
+
+
+def flows(condition, shafts, speeds, torques, outputs, *, held=(), joined=(), efficiencies=None, friction=()):
+    """Flow with and without losses."""
+    conditions = condition if isinstance(condition, list) else [condition]
+    given = {"torques": torques, "outputs": outputs, "held": held, "joined": joined}
+    ideal = power_flow(shafts, conditions, speeds=speeds, **given)
+    efficiencies = efficiencies or {each.name: ETA for each in conditions}
+    return ideal, lossy_flow(
+        shafts, conditions, speeds=ideal.speed, efficiencies=efficiencies, friction=friction, **given
+    )
+
+
+@pytest.mark.parametrize("torque", [100.0, -100.0])
+def test_a_set_with_the_ring_held_has_the_efficiency_of_its_closed_form(torque):
+    condition = planetary_condition("set", "sun", "carrier", None, 27, 108)
+    _, flow = flows(condition, ["sun", "carrier"], {"sun": 300.0}, {"sun": torque}, ["carrier"])
+    expected = planetary_efficiency(basic_efficiency(ETA), 4.0, sun_drives=torque > 0.0)
+    assert flow.efficiency == pytest.approx(expected, rel=1e-12)
+    assert flow.first_drives["set"] is (torque > 0.0)
+    assert abs(flow.imbalance) < 1e-12
+
+
+def test_with_a_held_carrier_both_ways_have_one_efficiency():
+    condition = planetary_condition("set", "sun", None, "ring", 27, 108)
+    for torque in (100.0, -100.0):
+        _, flow = flows(condition, ["sun", "ring"], {"sun": 300.0}, {"sun": torque}, ["ring"])
+        assert flow.efficiency == pytest.approx(0.99 * 0.995, rel=1e-12)
+
+
+def test_losses_add_up_meshes_and_bearings_in_a_train_of_stages():
+    conditions = [
+        pair_condition("first", "a", "b", 20, 61),
+        planetary_condition("set", "b", "c", None, 21, 87),
+        pair_condition("last", "c", "d", 33, 50, internal=True),
+    ]
+    friction = (FrictionTorque("outer", ("a", None), 0.5), FrictionTorque("between", ("b", "c"), 0.8))
+    ideal, flow = flows(
+        conditions,
+        ["a", "b", "c", "d"],
+        {"a": 400.0},
+        {"a": 50.0},
+        ["d"],
+        efficiencies={"first": (0.99,), "set": ETA, "last": (0.985,)},
+        friction=friction,
+    )
+    assert abs(flow.imbalance) < 1e-12
+    assert flow.friction_loss["outer"] == pytest.approx(200.0)
+    assert flow.friction_loss["between"] == pytest.approx(0.8 * abs(ideal.speed["b"] - ideal.speed["c"]))
+    product = 0.99 * planetary_efficiency(basic_efficiency(ETA), 87 / 21) * 0.985
+    _, alone = flows(
+        conditions,
+        ["a", "b", "c", "d"],
+        {"a": 400.0},
+        {"a": 50.0},
+        ["d"],
+        efficiencies={"first": (0.99,), "set": ETA, "last": (0.985,)},
+    )
+    assert alone.efficiency == pytest.approx(product, rel=1e-12) and flow.efficiency < alone.efficiency
+
+
+@pytest.mark.parametrize("teeth, link, drives", [(33, 0.98, True), (31, 0.98, True), (31, 0.9, False)])
+def test_power_that_circulates_loses_many_times_what_goes_through(teeth, link, drives):
+    """A set whose ring is driven by its own carrier: it turns the sun slowly, and may lock when that drives."""
+    conditions = [
+        planetary_condition("set", "sun", "carrier", "ring", 30, 90),
+        pair_condition("link", "carrier", "ring", 40, teeth, internal=True),
+    ]
+    _, flow = flows(
+        conditions,
+        ["sun", "carrier", "ring"],
+        {"sun": 100.0},
+        {"sun": 10.0},
+        ["carrier"],
+        efficiencies={"set": ETA, "link": (link,)},
+    )
+    assert abs(flow.imbalance) < 1e-10
+    assert flow.rolling_power["link"] > 10.0 * flow.input_power or not drives
+    # one that locks takes power at both its ends
+    assert (flow.output_power > 0.0) is drives
+    assert flow.efficiency < 0.8
+
+
+def test_an_idle_stage_loses_nothing():
+    conditions = [pair_condition("first", "a", "b", 20, 61), pair_condition("idle", "b", "c", 30, 31)]
+    _, flow = flows(conditions, ["a", "b", "c"], {"a": 1.0}, {"a": 1.0}, ["b"])
+    assert flow.mesh_loss["idle"] == pytest.approx((0.0, 0.0), abs=1e-12) and flow.first_drives["idle"] is None
