@@ -319,6 +319,9 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-GROWTH": lambda: of_stage("drivetrain", "transient", transient(growth=2.0)),
     "W-KINK": lambda: of_stage("elastic", "stress", corner()),
     "W-LIFTED": lambda: of_stage("elastic", "static", over_width(lifted=True)),
+    "W-LOSSES": lambda: of_stage(
+        "pair", "losses", xr.Dataset({"efficiency": ("speed", [0.0])}, {"speed": [250.0]}, {"missing": ""})
+    ),
     "W-MOTION": lambda: of_stage("elastic", "static", moved()),
     "W-ONE-WAY": lambda: of_stage("elastic", "housing", housing(one_way_difference=[0.1, 5.0])),
     "W-OPEN": lambda: of_stage("elastic", "static", edge("mesh_force", 0.0)),

@@ -157,7 +157,7 @@ def lossy_flow(
             _member_weights(condition, way, efficiencies.get(condition.name, ()))
             for condition, way in zip(conditions, drives, strict=True)
         ]
-        scale, found = _balance(graph, members, given, (*held, *outputs))
+        scale, reactions = _balance(graph, members, given, (*held, *outputs))
         rolling = [
             _rolling_power(condition, weights, factor, speeds)
             for condition, weights, factor in zip(conditions, members, scale, strict=True)
@@ -166,7 +166,7 @@ def lossy_flow(
         ways = [power > 0.0 if abs(power) > least else None for power in rolling]
         if ways == drives:
             external = dict.fromkeys(graph.shafts, 0.0)
-            for shaft, torque in (*torques.items(), *found.items()):
+            for shaft, torque in (*torques.items(), *reactions.items()):
                 external[shaft] += float(torque)
             stages = members, scale, rolling, ways
             return _collected(graph, stages, external, speeds, efficiencies, friction)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.quantities import RPM
-from femgear.findings import Finding
+from femgear.findings import DOUBT, Finding
 from femgear.gears.power_losses import LossyFlow, basic_efficiency
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.protocol import StageResult
@@ -194,9 +194,13 @@ def _joined(parts: Iterable[np.ndarray]) -> np.ndarray:
 
 
 def loss_warnings(data: xr.Dataset) -> Iterator[Finding]:
-    """List what was left out of the losses."""
+    """List what was left out of the losses, and where these lock."""
     for text in filter(None, str(data.attrs["missing"]).split(" | ")):
         yield Finding("W-LOSSES", "losses", text)
+    values = np.asarray(data["efficiency"].values, float)
+    if (locked := np.flatnonzero(values <= 0.0)).size:
+        text = f"all power is lost at {_label(data, int(locked[0]))}: losses lock what the torque would turn"
+        yield Finding("W-LOSSES", "losses.friction", text, severity=DOUBT, remedy="drive it from its other side")
 
 
 def point_dim(data: Any) -> str:
@@ -217,8 +221,8 @@ def describe_losses(data: Any) -> Block:
 
     def watts(name: str, number: int) -> str:
         values = np.asarray(data[name].values[number], float)
-        known = values[np.isfinite(values)]
-        return f"{known.sum():.5g}" if known.size else "-"
+        finite = values[np.isfinite(values)]
+        return f"{finite.sum():.5g}" if finite.size else "-"
 
     columns = {
         "speed" if dim == "speed" else "load case": lambda i: _label(data, i),
