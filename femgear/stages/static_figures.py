@@ -48,7 +48,8 @@ from femgear.report.style import (
 )
 from femgear.stages.protocol import Drawn, Figures
 from femgear.stages.static import over_width, static_supports
-from femgear.stages.static_results import SIDES, UNEQUAL, StaticResult, largest_pressure, peak_to_peak, shares
+from femgear.stages.static_results import SIDES, UNEQUAL, StaticResult, peak_to_peak, shares
+from femgear.stages.stress_reasons import largest_pressure
 from femgear.storage.files import write_text
 
 if TYPE_CHECKING:

@@ -41,6 +41,7 @@ from femgear.report.tables import Block, Marks, chosen, significant, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import StageResult
 from femgear.stages.strength import SIDES, NominalStresses
+from femgear.stages.stress_reasons import largest_pressure, over_hertz, reason_values, stress_reasons
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, declared
 
@@ -220,6 +221,11 @@ STRESS_VARIABLES = {
     "iso_contact_stress": ("mesh", "Pa", "nominal contact stress sigma_H0, ISO 6336-2"),
     "iso_root_stress": ("mesh gear", "Pa", "nominal root stress sigma_F0, ISO 6336-3 method B"),
     "iso_single_pair_factor": ("mesh gear", "1", "single pair factor Z_B or Z_D, ISO 6336-2"),
+    "iso_rim_factor": ("mesh gear", "1", "rim factor Y_B in sigma_F0, ISO 6336-3"),
+    "rim_thickness": ("mesh gear", "1", "thickness of the rim over the height of the teeth"),
+    "contact_ratio": ("mesh", "1", "transverse contact ratio of the involutes"),
+    "path_start": ("mesh", "1", "start of the path of contact from the pitch point in base pitches"),
+    "path_end": ("mesh", "1", "end of the path of contact from the pitch point in base pitches"),
 }
 """Variables of stress.nc; records of one mesh period have none of single teeth, longer ones no pressures.
 
@@ -232,10 +238,6 @@ _HARMONICS, _ROWS = 6, 8
 """Harmonics whose phasing is listed, and neighbouring sets."""
 _DISTANCE, _TOLERANCE = 3, 0.02
 """How far teeth and ratio of neighbouring sets may lie away."""
-DIFFERS = 1.3
-"""Largest stress of finite elements over the nominal one, or that over it, for which a reason is given."""
-_AS_HERTZ = 1.1
-"""Ratio of the largest pressure and that of Hertz up to which cells and deformation explain it."""
 _KINKED = 1.3
 """Largest pressure over that of Hertz with a kink in the contact that is told."""
 UNEQUAL = 1.03
@@ -488,7 +490,7 @@ class StressResult(StageResult):
         """Collect the contents of stress.nc."""
         cycle, edges = self.cycle, self.spectrum.edges
         values: dict[str, Any] = root_values(self.roots) | self.worst_roots() | self._ranges() | self._loads()
-        values |= self._contacts()
+        values |= self._contacts() | reason_values(self.planetary_set, self.nominal)
         values["contact_pressure"] = cycle.max_pressure
         if cycle.pressure is not None:
             values |= {
@@ -801,7 +803,7 @@ def _kinked_reliefs(data: xr.Dataset) -> Iterator[Finding]:
     """
     if "slice" in data.sizes or data.attrs["nominal_load"] == 0.0:
         return  # slices have the pressure of Hertz
-    excess = _over_hertz(data)
+    excess = over_hertz(data)
     names = [family(str(name)) for name in data["mesh"].values]
     for kind in dict.fromkeys(names):
         largest = max(ratio for ratio, name in zip(excess, names, strict=True) if name == kind)
@@ -815,20 +817,6 @@ def _kinked_reliefs(data: xr.Dataset) -> Iterator[Finding]:
                 remedy='shape = "parabolic" makes no kink',
                 concerns=kind,
             )
-
-
-def _over_hertz(data: xr.Dataset) -> np.ndarray:
-    """Largest pressure of every mesh over that of Hertz for load and curvature; 0 without sigma_H0."""
-    load, curvature = data["contact_worst_load"].values, data["contact_worst_curvature"].values
-    hertz = data["iso_contact_stress"].values / _nominal_over_hertz(data)
-    hertz = hertz * np.sqrt(load / data.attrs["nominal_load"] * curvature)
-    largest = largest_pressure(data)
-    return np.divide(largest, hertz, out=np.zeros(len(hertz)), where=hertz > 0.0)
-
-
-def _nominal_over_hertz(data: xr.Dataset) -> np.ndarray:
-    """Z_eps Z_beta of every mesh: sigma_H0 over the pressure of Hertz at the pitch point."""
-    return data["iso_contact_ratio_factor"].values * data.attrs.get("iso_contact_helix_factor", 1.0)
 
 
 def _more_slices(data: xr.Dataset, module: float) -> str:
@@ -944,13 +932,6 @@ def mean_over_period(data: xr.Dataset, name: str) -> np.ndarray:
     return data[name].values.mean(axis=-1) if stored is None else stored.values
 
 
-def largest_pressure(data: xr.Dataset) -> np.ndarray:
-    """Find the largest contact pressures of the meshes in static.nc or stress.nc [Pa]."""
-    if (stored := data.get("largest_pressure")) is not None:
-        return stored.values
-    return data["max_pressure" if "max_pressure" in data else "contact_pressure"].values.max(axis=-1)
-
-
 def describe_static(data: xr.Dataset) -> Block:
     """Tabulate transmission errors, stiffnesses and load sharing of static.nc."""
     lowest, highest = (data.get(f"{end}_load_share", data.load_share) for end in ("smallest", "largest"))
@@ -1062,7 +1043,7 @@ def describe_stress(data: xr.Dataset, findings: Iterable[Finding] = ()) -> Block
     ]
     if data.attrs.get("iso"):
         notes.append(f"not by ISO 6336: {data.attrs['iso']}")
-    notes += _reasons(data)
+    notes += [reason.sentence for reason in stress_reasons(data)]
     if "root_face_factor" in data:
         header = *header, "K_Fbeta", "by ISO"
         contact = [(*row, "-", "-") for row in contact]
@@ -1097,63 +1078,6 @@ def _concerns(finding: Finding, title: str, mate: str) -> bool:
     if finding.code == "W-FILLET":
         return finding.concerns == gear and finding.key.startswith(f"{other}.")
     return finding.code == "W-KINK" and finding.concerns in (gear, title)
-
-
-def _reasons(data: xr.Dataset) -> Iterator[str]:
-    """Say why stresses differ from nominal ones by more than `DIFFERS`, factor by factor."""
-    names = [str(name) for name in data["mesh"].values]
-    nominal_load = float(data.attrs.get("nominal_load", 0.0))  # files of format 4 have none
-    if nominal_load == 0.0:
-        return
-    excess = _over_hertz(data)
-    factors = "Z_eps Z_beta" if data.attrs.get("iso_contact_helix_factor", 1.0) > 1.0 else "Z_eps"
-    for kind in dict.fromkeys(map(family, names)):
-        meshes = [i for i, name in enumerate(names) if family(name) == kind]
-        mesh = meshes[int(largest_pressure(data)[meshes].argmax())]
-        worst = data.isel(mesh=mesh)
-        ratio = float(largest_pressure(worst) / worst["iso_contact_stress"])
-        if ratio > DIFFERS or 0.0 < ratio < 1.0 / DIFFERS:
-            curvature, load = float(worst["contact_worst_curvature"]), float(worst["contact_worst_load"])
-            ends = sorted(zip(worst["contact_start"].values, kind.split("-")))
-            flank = ends[0][1] if ends[0][1].startswith("gear") else f"the {ends[0][1]}"
-            near = f"; on {flank} contact begins {1e3 * ends[0][0]:.2g} mm above the base circle"
-            yield (
-                f"contact {kind}, FE/ISO = {ratio:.2f}: x {math.sqrt(curvature):.2f} by the relative "
-                f"curvature where the pressure is largest, {curvature:.2f} times that of the pitch point"
-                f"{near if curvature > DIFFERS else ''}; x {math.sqrt(load / nominal_load):.2f} by the load "
-                f"of the tooth pair, {load / nominal_load:.2f} of the nominal one; x "
-                f"{1.0 / _nominal_over_hertz(data)[mesh]:.2f}: sigma_H0 has {factors}; x "
-                f"{excess[mesh]:.2f} {_beside_hertz(worst, float(excess[mesh]), curvature)}"
-            )
-        for number, title in enumerate(SIDES.get(kind, tuple(kind.split("-")))):
-            mesh = meshes[int(data["root_worst"].values[meshes, number].argmax())]
-            worst = data.isel(mesh=mesh, gear=number)
-            ratio = float(worst["root_worst"] / worst["iso_root_stress"])
-            if ratio > DIFFERS or 0.0 < ratio < 1.0 / DIFFERS:
-                share = float(worst["root_worst_load"]) / nominal_load
-                rest = f"x {ratio / share:.2f} by all else" if share > 0.0 else "the tooth itself is not loaded"
-                radius = float(worst["root_notch_radius"]) / data.attrs["module"]
-                yield (
-                    f"root {title}, FE/ISO = {ratio:.2f}: x {share:.2f} by the load of the tooth pair; "
-                    f"{rest}: its place, rim and neighbouring teeth, which ISO 6336-3 takes in part, the "
-                    f"notch, sharpest radius {radius:.3f} modules"
-                )
-
-
-def _beside_hertz(flank: xr.Dataset, excess: float, curvature: float) -> str:
-    """Say why the largest pressure of a mesh is not that of Hertz for its load and curvature."""
-    if 1.0 / _AS_HERTZ < excess < _AS_HERTZ:
-        return "by all else: cells, and teeth that deform"
-    margin = float(flank.get("contact_worst_margin", 0.0))
-    if excess > 1.0 and int(flank["relief_kink"]):
-        return "by the kink with which a linear relief begins: under it pressure has no limit"
-    if excess > 1.0 and margin < 0.0:
-        return f"by the tip corner: loaded teeth touch {-1e3 * margin:.2g} mm beyond the end of the path"
-    if curvature > DIFFERS:
-        return "by the curvature, which changes over the width of the contact so near to the base circle"
-    if excess > 1.0:
-        return "by the shape of the flanks: modifications, or the end of a flank beside the contact"
-    return "by contact that touches the end of a flank, whose pressure is left out, or by modifications"
 
 
 def _contact_row(kind: str, data: xr.Dataset, marked: Callable[[str], str]) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from femgear.report.style import family
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.strength import MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
+from femgear.stages.stress_reasons import reason_row
 from femgear.system.fourier import sample
 
 if TYPE_CHECKING:
@@ -36,10 +37,13 @@ _GIVEN_BY = {
 def strength_verdict(results: Results) -> Iterator[Block]:
     """Tabulate safeties and efficiency of a pair or a set of rigid bodies, where the case asks for them.
 
+    Among them stands which stresses of finite elements differ from nominal ones, and why, where there are such.
+
     K_gamma and K_Hbeta are those of the static solution, K_v that of the response, as far as they were computed.
     """
     marks = Marks(results.findings)
-    rows = list(efficiency_rows(results, marks))
+    reasons = list(reason_row(results.stress)) if "stress" in results.stages else []
+    rows = [*reasons, *efficiency_rows(results, marks)]
     if "static" not in results.stages or not rating_wanted(results.case):
         if rows:
             yield Block("Verdict", rows=tuple(rows), notes=marks.notes)

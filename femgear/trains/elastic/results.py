@@ -68,7 +68,6 @@ from femgear.stages.static_results import (
     LARGE,
     SIDES,
     UNEQUAL,
-    largest_pressure,
     peak_to_peak,
     pressure_doubts,
     root_doubts,
@@ -76,6 +75,7 @@ from femgear.stages.static_results import (
 )
 from femgear.stages.strength import Rating, rate_case, rating_wanted
 from femgear.stages.strength_results import safety_notes, safety_rows, strength_block
+from femgear.stages.stress_reasons import largest_pressure, reason_row
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
     FOURIER,
@@ -733,6 +733,7 @@ def _strength(
         for kind, pressure in zip(KINDS, contact)
     ]
     yield f"largest contact pressure{where}", ", ".join(pressures)
+    yield from reason_row(stress)
     for name, text in _safeties(results.case, computed, notes):
         yield name, marks(text, *doubts, "W-FACE-LOAD", "W-THRUST", of=("static", *_OF_LEVEL))
 
