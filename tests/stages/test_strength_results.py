@@ -79,8 +79,8 @@ def test_a_verdict_takes_computed_factors_where_there_are_any(pair):
     rating = rate_case(results.case, dynamic=np.array([1.4]), face=np.array([1.3]))
     assert dict(verdict.rows)["safety S_F, ISO 6336-3:2019"].startswith(f"gear 1 {rating.flanks[0].root_safety:.2f}")
     assert "K_v 1.400 (computed), K_Hβ 1.300 (computed)" in table.notes[0]
-    assert not list(strength_verdict(SimpleNamespace(case=pair, stages=("static",))))
-    assert not list(strength_verdict(SimpleNamespace(case=results.case, stages=())))
+    assert not list(strength_verdict(SimpleNamespace(case=pair, stages=("static",), findings=())))
+    assert not list(strength_verdict(SimpleNamespace(case=results.case, stages=(), findings=())))
 
 
 def test_dynamic_factor_of_harmonics_is_the_largest_over_the_mean():
