@@ -49,6 +49,7 @@ CATALOGUE = {
     "W-HELIX": (DOUBT, "The helix angle lies outside what is validated."),
     "W-JOURNAL": (NOTE, "Lines of a journal were damaged and are left out."),
     "W-KINK": (DOUBT, "A stress stands at a kink, or at an end of what was searched."),
+    "W-LIFE": (FAULT, "Teeth or bearings fail before the life that the case asks for."),
     "W-LIFTED": (NOTE, "Parts of the face width never carry."),
     "W-LOAD": (NOTE, "Without load nothing keeps the flanks on one side."),
     "W-LOSSES": (NOTE, "Losses of a part are left out, or rest on a simpler model."),

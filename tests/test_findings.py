@@ -97,6 +97,14 @@ def of_stage(train: str, stage: str, data: xr.Dataset) -> tuple[Finding, ...]:
     return known.stage(stage).findings(data)
 
 
+def short_life() -> xr.Dataset:
+    """A root that fails before its time."""
+    return xr.Dataset(
+        {"root_damage": ("root", [0.5, 2.0]), "root_damage_share": (("load_case", "root"), [[0.4, 0.7], [0.6, 0.3]])},
+        coords={"load_case": ["start", "run"], "root": ["gear 1", "gear 2"]},
+    )
+
+
 def told(work: Callable[[], object]) -> tuple[Finding, ...]:
     """Findings that exports and studies tell beside results."""
     with warnings.catch_warnings(record=True) as said:
@@ -318,6 +326,7 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-FACE-LOAD": lambda: of_stage("elastic", "static", over_width()),
     "W-GROWTH": lambda: of_stage("drivetrain", "transient", transient(growth=2.0)),
     "W-KINK": lambda: of_stage("elastic", "stress", corner()),
+    "W-LIFE": lambda: of_stage("pair", "life", short_life()),
     "W-LIFTED": lambda: of_stage("elastic", "static", over_width(lifted=True)),
     "W-LOSSES": lambda: of_stage(
         "pair", "losses", xr.Dataset({"efficiency": ("speed", [0.0])}, {"speed": [250.0]}, {"missing": ""})

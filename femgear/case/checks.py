@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case.load_spectrum import check_load_spectrum
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, SPEED
 from femgear.case.sections import LARGEST_DEVIATION, ROUNDING, CarrierErrors, GearErrors, face_width, gear_material
@@ -102,6 +103,7 @@ def _check_operation(case: Case):
         )
     yield from check_speeds(case)
     yield from check_torque(operation.torque)
+    yield from check_load_cases(case)
     if not case.rigid and operation.fixed == "ring" and ring.foundation_tangential == 0.0:
         yield CaseError(
             "the ring is the fixed member but nothing keeps it from turning",
@@ -141,13 +143,20 @@ def check_speeds(case: Any) -> Iterator[CaseError]:
         )
 
 
-def check_torque(torque: float) -> Iterator[CaseError]:
-    """Refuse a torque [N m] that is neither none nor enough to be told from none."""
+def check_load_cases(case: Any) -> Iterator[CaseError]:
+    """Refuse load cases of the life of a set or a pair, see `check_load_spectrum`, and torques next to none."""
+    yield from check_load_spectrum(case)
+    for number, load_case in enumerate(case.operation.load_case):
+        yield from check_torque(load_case.torque, f"operation.load_case[{number}].torque")
+
+
+def check_torque(torque: float, key: str = "operation.torque") -> Iterator[CaseError]:
+    """Refuse a torque [N m] that is neither none nor enough to be told from none; ``key`` is its entry."""
     if 0.0 < abs(torque) < LEAST_TORQUE:
         yield CaseError(
             "the torque is too small to be told from none",
             code="E-RANGE",
-            key="operation.torque",
+            key=key,
             value=f"{torque:g} N m",
             limit=f"0 N m, or at least {LEAST_TORQUE:g} N m of either sign",
         )

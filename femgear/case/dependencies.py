@@ -38,7 +38,9 @@ _LIMITS = {
     for name in ("root_stress_limit", "contact_stress_limit", "treatment", "grade", "hardness")
 }
 _OIL = {"lubricant", "losses"}
-_WORDS = {"format", "title", "housing", "runup", "strength", *_OIL, *_LIMITS}
+SPECTRUM_ENTRIES = {"operation.load_case", "operation.required_hours"}
+"""Of lives alone."""
+_WORDS = {"format", "title", "housing", "runup", "strength", *_OIL, *_LIMITS, *SPECTRUM_ENTRIES}
 """No stage before housing and run-up depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}
 _WIDTH = {"tilt_stiffness", "misalignment", "torque_end", "torsion_diameter"}
@@ -76,7 +78,8 @@ def static_entries(case: Any) -> Entries:
 def solution_entries(case: Any) -> Entries:
     """List all that decides the last digit of static solution and stresses: the torque as it is given too."""
     given = {key: value for key, value in every_entry(case).items() if key.startswith("operation.")}
-    given.pop("operation.speeds", None)
+    for name in ("operation.speeds", *SPECTRUM_ENTRIES):
+        given.pop(name, None)
     return {**static_entries(case), **given, "static.stresses": case.static.stresses}
 
 
@@ -132,8 +135,8 @@ def box_entries(stage: str, case: ReadCase) -> Entries:
 
 def load_case_entries(case: ReadCase, load_case: BaseModel) -> Entries:
     """List the entries of a gearbox that decide its state under one load case: not the others, nor its share."""
-    others = _BESIDE["deflection"] | _OIL | {"format", "title", "sensor", "operation.load_case", "operation.first"}
-    of_load_case = load_case.model_dump(exclude={"name", "share"})
+    others = _BESIDE["deflection"] | _OIL | {"format", "title", "sensor", "operation.first", *SPECTRUM_ENTRIES}
+    of_load_case = load_case.model_dump(exclude={"name", "share", "hours"})
     return {**_entries(case, others), **{f"load case.{key}": value for key, value in _flat(of_load_case)}}
 
 

@@ -348,13 +348,17 @@ class StrengthSection(Section):
     """How teeth are rated by ISO 6336.
 
     ``quality`` is the flank tolerance class of ISO 1328-1, from which K_v, K_Halpha and K_Falpha of part 1 follow;
-    ``modification`` how helical teeth are modified: by experience, or as a calculation has proven (f_ZCa).
+    ``modification`` how helical teeth are modified: by experience, or as a calculation has proven (f_ZCa). Of lives
+    over load cases ``pitting`` says whether flanks may pit to a limited extent, and ``reversal_factor`` is Y_M of
+    gears whose load cases load both flanks.
     """
 
     edition: Literal[2006, 2019] = 2019
     application_factor: Annotated[float, Number(0.1, 10.0)] = 1.0
     quality: Annotated[int, Count(1, 11)] | None = None
     modification: Literal["none", "experience", "proven"] | None = None
+    pitting: Literal["none", "limited"] = "none"
+    reversal_factor: Annotated[float, Number(0.1, 1.0)] = 0.7
 
 
 class ShaftPartSection(Section):
@@ -482,13 +486,39 @@ class _SpeedRange(Section):
     count: Annotated[int, Count(2, 100_000, remedy="take fewer; a single speed stands in a list")]
 
 
+Share = Annotated[float, Number(0.0, 1.0, open_low=True)]
+Hours = Annotated[float, Number(0.0, 1e7, open_low=True, note="a number of hours")]
+MOST_LOAD_CASES = 1000
+
+
+class SpectrumLoadSection(Section):
+    """One load case of a load spectrum: torque and speed as those of the operation, and its part of the life.
+
+    A negative torque loads the other flanks. Parts are shares of the running time, or hours, in all load cases.
+    """
+
+    name: Annotated[str, Field(min_length=1, max_length=60)] | None = None
+    torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
+    speed: Speed
+    share: Share = 1.0
+    hours: Hours | None = None
+
+
+LoadSpectrum = Annotated[tuple[SpectrumLoadSection, ...], Field(max_length=MOST_LOAD_CASES)]
+
+
 class OperationSection(Section):
-    """Torque and speeds of the input member; a negative torque loads the other flanks."""
+    """Torque and speeds of the input member; a negative torque loads the other flanks.
+
+    Load cases are those of the life, which ``required_hours`` asks for.
+    """
 
     input: Member
     fixed: Member
     torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
     speeds: Annotated[tuple[Speed, ...], Values(max_length=100_000), BeforeValidator(speed_range)]
+    load_case: LoadSpectrum = ()
+    required_hours: Hours | None = None
 
 
 class StaticSection(Section):

@@ -13,6 +13,8 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from femgear.errors import GeometryError
 
 Grade = Literal["ML", "MQ", "ME"]
@@ -82,6 +84,17 @@ class LifeLine:
                 share = math.log(cycles / start) / math.log(end / start)
                 return from_factor * (to_factor / from_factor) ** share
         return self.factors[-1]
+
+    def cycles_at(self, ratio: np.ndarray) -> np.ndarray:
+        """Compute the load cycles that stresses stand, given over those of long life.
+
+        None above the first factor, which is the static strength; any number of them, infinite, below the last.
+        """
+        stress = np.asarray(ratio, float)
+        with np.errstate(divide="ignore"):
+            logarithm = np.interp(-np.log(stress), -np.log(self.factors), np.log(self.cycles))
+        inside = np.where(stress > self.factors[0], 0.0, np.exp(logarithm))
+        return np.where(stress < self.factors[-1], np.inf, inside)
 
     @property
     def slope(self) -> float:

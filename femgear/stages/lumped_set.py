@@ -63,7 +63,7 @@ def entries_without_effect(data: dict, others: Sequence[str] = (), *, rated: boo
 
 
 def strength_entries(data: dict) -> list[str]:
-    """List the entries of safeties: the section ``strength``, and limits of the materials."""
+    """List the entries of safeties and lives: the section ``strength``, limits of the materials, load cases."""
     tables = {"material": data["material"]} | {
         f"{gear}.material": data[gear]["material"]
         for gear in ("sun", "planet", "ring", "gear_1", "gear_2")
@@ -71,7 +71,8 @@ def strength_entries(data: dict) -> list[str]:
     }
     entries = ("root_stress_limit", "contact_stress_limit", "treatment", "grade", "hardness")
     limits = [f"{name}.{key}" for name, table in tables.items() for key in table if key in entries]
-    return [*limits, *(["strength"] if "strength" in data else [])]
+    spectrum = [f"operation.{key}" for key in ("load_case", "required_hours") if key in data["operation"]]
+    return [*limits, *(["strength"] if "strength" in data else []), *spectrum]
 
 
 def flank_entries(data: dict) -> list[str]:

@@ -14,6 +14,7 @@ import numpy as np
 from femgear.report.response import stored_harmonics
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, tabulate
+from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.strength import MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
 from femgear.stages.stress_reasons import reason_row
@@ -60,7 +61,8 @@ def strength_verdict(results: Results) -> Iterator[Block]:
         face=_largest_of_kinds(static["face_load_factor"].values, kinds) if "face_load_factor" in static else None,
     )
     doubts = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
-    rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *rows]
+    lives = life_rows(results.life, marks) if "life" in results.stages else ()
+    rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *lives, *rows]
     yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
     yield strength_block(rating, kinds)
 

@@ -1,6 +1,7 @@
 """The numbers of docs/pair.md are what the package computes."""
 
 import re
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import numpy as np
 import pytest
 from page_examples import read_page, run_examples
 
+from femgear.stages.life import solve_life
 from femgear.stages.static import solve_static, solve_stress
 from femgear.stages.strength import rate_case
 from femgear.study.relief import design_basis, harris_map, with_tip_relief
@@ -49,6 +51,29 @@ def test_the_internal_pair_can_be_solved():
     changes |= {"gear_2.bore_radius": None, "static.positions": 8}
     changes |= {"set.centre_distance": "54 mm", "gear_1.profile_shift": 0.0, "gear_1.tip_diameter": None}
     assert solve_static(with_values(read_case(CASE), changes)).cycle.stiffness.min() > 0.0
+
+
+def test_lives_over_load_cases():
+    """The table, and what the load case backwards does to roots."""
+    strong, spectrum = (tomllib.loads(text) for text in re.findall(r"```toml\n(\[(?:mat|op).*?)```", PAGE, re.DOTALL))
+    tables = tomllib.loads(CASE.read_text(encoding="utf-8"))
+    for section in (strong, spectrum):
+        for name, entries in section.items():
+            tables.setdefault(name, {}).update(entries)
+    case = read_case(tables)
+    static = solve_static(case)
+    data = solve_life(case, static).dataset()
+    rows = re.findall(r"(?m)^\| (root|flank) of gear (\d) \|(.*)\|$", PAGE)
+    for kind, gear, numbers in rows:
+        names = "life", "damage", "spectrum_safety", "equivalent_torque"
+        found = [float(data[f"{kind}_{name}"].values[int(gear) - 1]) for name in names]
+        assert found == pytest.approx([float(number) for number in numbers.split("|")], rel=2e-3)
+    assert len(rows) == 4 and data["flank_damage_share"].values[1, 0] == pytest.approx(0.53, abs=5e-3)
+    assert list(data["flank_damage"].values[2:]) == [0.0, 0.0]
+    tables["operation"]["load_case"][2]["torque"] = "120 N m"
+    forwards = solve_life(read_case(tables), static).dataset()
+    assert f"S_F is {forwards['root_spectrum_safety'].min():.2f}, and no root" in PAGE
+    assert not forwards["root_damage"].any()
 
 
 @pytest.mark.slow

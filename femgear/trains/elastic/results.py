@@ -61,6 +61,7 @@ from femgear.report.tables import (
 )
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.solvers.stability.parametric import stability
+from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.protocol import StageResult, one_blas_thread
 from femgear.stages.static_results import (
@@ -618,6 +619,8 @@ def verdict(results: Results) -> Iterator[Block]:
             text = _kinds("{:.3f}", computed["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
             rows.append(("face load factor K_Hβ", text))
         rows += _strength(results, computed, notes, marks, _all_of(doubts))
+    if "life" in stages:
+        rows += life_rows(results.life, marks)
     if "runup" in stages:
         rows.append(("largest dynamic factor K_v of the run-up", largest_factors(results.runup, marks)))
         rows.append(("largest level of the run-up", loudest(results.runup, marks)))

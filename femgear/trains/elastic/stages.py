@@ -57,6 +57,7 @@ from femgear.solvers.linear.resonances import (
 )
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics
+from femgear.stages.life import LIFE
 from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import member_speeds, parts_of_speeds
 from femgear.stages.protocol import (
@@ -758,6 +759,7 @@ ELASTIC = Train(
         STATIC,
         STRESS,
         LOSSES,
+        LIFE,
         Stage(
             name="modes",
             title="Modes",

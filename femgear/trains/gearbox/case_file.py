@@ -48,9 +48,11 @@ from femgear.case.sections import (
     Angle,
     DampingRatio,
     End,
+    Hours,
     PressureAngle,
     Radius,
     RunupSection,
+    Share,
     StrengthSection,
     Teeth,
 )
@@ -545,7 +547,7 @@ class BoxSensorSection(Section):
 
 
 class LoadCaseSection(Section):
-    """Torques at loads and speeds of shafts of one load case, and its share of the time.
+    """Torques at loads and speeds of shafts of one load case, and its share of the running time, or its hours.
 
     ``force`` (along x, y, z) and ``tilting_moment`` (about x and y) act at loads beside what these have always.
     """
@@ -555,17 +557,21 @@ class LoadCaseSection(Section):
     speed: dict[Name, ShaftSpeed]
     force: dict[Name, Annotated[tuple[Force, ...], TRIPLE]] = Field(default_factory=dict)
     tilting_moment: dict[Name, Annotated[tuple[Torque, ...], PAIR]] = Field(default_factory=dict)
-    share: Annotated[float, Number(0.0, 1.0, open_low=True)] = 1.0
+    share: Share = 1.0
+    hours: Hours | None = None
 
 
 class BoxOperationSection(Section):
-    """Load cases; ``output`` are the loads whose torques balance the others, ``fixed`` shafts that the casing holds."""
+    """Load cases, and the life that they ask for, by default all their hours.
+
+    ``output`` are the loads whose torques balance the others, ``fixed`` shafts that the casing holds."""
 
     load_case: Annotated[tuple[LoadCaseSection, ...], Field(min_length=1, max_length=1000)]
     output: tuple[Name, ...] = ()
     fixed: tuple[Name, ...] = ()
     first: Annotated[int, Count(1, 1000)] = 1
     """Number of the load case that contact, modes and pictures are of."""
+    required_hours: Hours | None = None
 
 
 class DeflectionSection(Section):

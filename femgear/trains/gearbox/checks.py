@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
+from femgear.case.load_spectrum import check_running_shares
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
 from femgear.case.text import CaseFile
@@ -32,6 +33,7 @@ from femgear.trains.gearbox.geometry import (
 from femgear.trains.gearbox.holding import floating_shafts, loose_fits, tilting_shafts, untaken_thrust
 from femgear.trains.gearbox.materials import material_notices
 from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.tooth_life import pitting_problems
 
 # Entries that speeds and torques hang on.
 _OF_THE_FLOW = ("pair", "planetary", "coupling", "operation", "load")
@@ -50,6 +52,7 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     problems = [*named, *_seats(case), *_bearings(case), *_shaft_parts(case), *stages, *loads, *_weight(case)]
     problems += [*coupling_problems(case), *run_up_problems(case)]
     problems += [] if named else check_casing(case)
+    problems += [] if stages else pitting_problems(case, (*case.pair, *case.planetary))
     # what has no mass turns and is held as what has
     return [*problems, *([] if named else massless_bodies(case)), *_held(case, problems)]
 
@@ -547,16 +550,7 @@ def _loads(case: GearboxCase) -> Iterator[CaseError]:
             value=case.operation.first,
             limit=f"1 to {len(case.operation.load_case)}",
         )
-    share = sum(one.share for one in case.operation.load_case)
-    if len(case.operation.load_case) > 1 and share > 1.0 + 1e-6:
-        yield CaseError(
-            "the shares of the load cases are more than the whole time",
-            code="E-RANGE",
-            key="operation.load_case[0].share",
-            value=f"{share:.6g} in all",
-            limit="at most 1 in all",
-            remedy="give every load case its share of the time",
-        )
+    yield from check_running_shares(case.operation)
 
 
 def _outputs(case: GearboxCase) -> Iterator[CaseError]:

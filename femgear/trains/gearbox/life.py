@@ -1,6 +1,6 @@
 """Lives of the bearings of a gearbox in every load case, and over all of them.
 
-Shares of load cases are those of all time; what they leave of it stands still. Damages add (A. Palmgren, M. A. Miner):
+Shares of load cases are those of the running time, and lives hours of it. Damages add (A. Palmgren, M. A. Miner):
 1/L = sum q_i / L_i in hours, with the share q_i and the life L_i of load case i. Of L10 that is the life under the
 equivalent load P = (sum q_i n_i P_i^p / sum q_i n_i)^(1/p) of ISO 281.
 """
@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.report.tables import Block, tabulate
+from femgear.findings import Finding
+from femgear.report.tables import Block, Marks, tabulate
 from femgear.system.bearing_life import (
     basic_rating_life,
     life_exponent,
@@ -89,7 +90,7 @@ def added_damage(hours: np.ndarray, shares: Sequence[float] | np.ndarray) -> np.
         return 1.0 / damage
 
 
-def spectrum_lives(states: Sequence[Deflection], shares: Sequence[float]) -> SpectrumLives:
+def spectrum_lives(states: Sequence[Deflection], shares: Sequence[float] | np.ndarray) -> SpectrumLives:
     """Compute the lives of all bearings over load cases with their shares of the time."""
     q, case = np.asarray(shares, float), states[0].model.case
     lives = np.array([bearing_lives(state) for state in states]).reshape(len(states), -1, 3)
@@ -109,7 +110,7 @@ def spectrum_lives(states: Sequence[Deflection], shares: Sequence[float]) -> Spe
     return SpectrumLives(hours, damage, load)
 
 
-def life_variables(states: Sequence[Deflection], shares: Sequence[float]) -> dict[str, tuple]:
+def life_variables(states: Sequence[Deflection], shares: Sequence[float] | np.ndarray) -> dict[str, tuple]:
     """Variables of deflection.nc on the lives of bearings."""
     lives = np.array([bearing_lives(state) for state in states]).reshape(len(states), -1, 3)
     over = spectrum_lives(states, shares)
@@ -132,7 +133,7 @@ def life_text(hours: Any, how: str = ".4g") -> str:
     return "-" if math.isnan(value) else "no load" if math.isinf(value) else format(value, how)
 
 
-def shortest_life(data: xr.Dataset) -> Iterator[tuple[str, str]]:
+def shortest_life(data: xr.Dataset, marks: Marks | None = None) -> Iterator[tuple[str, str]]:
     """Rows of a verdict: the bearings that fail first over all load cases, and which load case damages them most."""
     cases = [str(case) for case in data["load_case"].values]
     for name, words in (("reference_life", "L10r"), ("modified_life", "a_ISO L10r")):
@@ -140,11 +141,30 @@ def shortest_life(data: xr.Dataset) -> Iterator[tuple[str, str]]:
         if not np.isfinite(life).any():
             continue
         at = int(np.nanargmin(life))
-        text = f"{life_text(life[at])} h, {data['bearing'].values[at]}"
+        hours = f"{life_text(life[at])} h"
+        hours = hours if marks is None else marks(hours, "W-LIFE", of=("deflection",))
+        text = f"{hours}, {data['bearing'].values[at]}"
         if len(cases) > 1:
             damage = np.nan_to_num(data["damage_share"].values[:, at])
             text += f", over all load cases; {damage.max():.0%} of the damage in {cases[int(damage.argmax())]}"
         yield f"shortest bearing life {words}", text
+
+
+def bearing_life_findings(data: Any) -> Iterator[Finding]:
+    """List bearings whose life over all load cases ends before the one that the case asks for (W-LIFE).
+
+    By a_ISO L10r where there is one, else by L10r.
+    """
+    if "required_hours" not in data.attrs or "spectrum_reference_life" not in data:
+        return
+    required, modified = float(data.attrs["required_hours"]), data["spectrum_modified_life"].values
+    life = np.where(np.isnan(modified), data["spectrum_reference_life"].values, modified)
+    short = [number for number in np.argsort(life) if life[number] < required]
+    if short:
+        shown = ", ".join(f"{data['bearing'].values[number]} {life_text(life[number])} h" for number in short[:5])
+        text = f"bearings live shorter than the {required:g} h asked for, at 90 % reliability: {shown}"
+        remedy = "larger bearings, or less torque or time in the load case that damages them most"
+        yield Finding("W-LIFE", "operation.required_hours", text, remedy=remedy)
 
 
 def describe_load_cases(data: xr.Dataset) -> Iterator[Block]:
@@ -189,6 +209,4 @@ def describe_load_cases(data: xr.Dataset) -> Iterator[Block]:
         },
         "most damage": most,
     }
-    share = float(data["share"].values.sum())
-    notes = () if abs(share - 1.0) < 1e-6 else (f"hours of all time, of which {1.0 - share:.4g} stands still",)
-    yield tabulate("Bearings over all load cases", range(len(bearings)), columns, notes)
+    yield tabulate("Bearings over all load cases", range(len(bearings)), columns)

@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.case.load_spectrum import running_shares
 from femgear.case.quantities import RPM
 from femgear.errors import GeometryError
 from femgear.findings import DOUBT, FAULT, Finding
 from femgear.gears.planetary import assembly_positions
 from femgear.report.tables import Block, describe_modes, tabulate
+from femgear.stages.life_results import describe_damage, describe_life, life_findings
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
@@ -27,7 +29,7 @@ from femgear.trains.gearbox.casing_results import (
 )
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.geometry import planet_distance, planet_radius, set_sizes
-from femgear.trains.gearbox.life import describe_load_cases, life_text, life_variables
+from femgear.trains.gearbox.life import bearing_life_findings, describe_load_cases, life_text, life_variables
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
 from femgear.trains.gearbox.modes import GearboxModes
 from femgear.trains.gearbox.overlaps import overlaps
@@ -41,6 +43,7 @@ from femgear.trains.gearbox.sensors import (
 )
 from femgear.trains.gearbox.silence import idle_entries
 from femgear.trains.gearbox.strength import describe_strength, strength_contents
+from femgear.trains.gearbox.tooth_life import tooth_life_contents
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -115,8 +118,7 @@ class DeflectionResult(StageResult):
         case, state, every = self.case, self.state, self.states
         assembly, load_case, mesh = state.model.assembly, "load_case", "load_case mesh"
         shown = state.model.places
-        slopes = np.array([one.mesh_slope for one in every])
-        widths = _mesh_widths(state)
+        slopes, widths = np.array([one.mesh_slope for one in every]), _mesh_widths(state)
         face = np.array([_face_factors(one) for one in every])
         variables = {
             "speed": ("load_case shaft", _speeds(every, case) / RPM, "rpm", "speed of the shaft"),
@@ -128,7 +130,7 @@ class DeflectionResult(StageResult):
                 "1",
                 "K_gamma: largest force of the planets' meshes over their mean; NaN of pairs",
             ),
-            "share": (load_case, [one.share for one in case.operation.load_case], "1", "share of the time"),
+            "share": (load_case, running_shares(case.operation.load_case), "1", "share of the running time"),
             "mesh_force": (mesh, [one.mesh_force for one in every], "N", "force along the normal of the flanks"),
             "mesh_slope": (mesh, slopes, "rad", "slope of the approach along the width, closer at z > 0 positive"),
             "mesh_misalignment": (
@@ -179,8 +181,9 @@ class DeflectionResult(StageResult):
         }
         coords |= casing_coordinates(state) | sensor_coordinates(state.model)
         rated, gears, editions = strength_contents(every)
-        attrs = {"title": "system deflection", "load_case": self.chosen} | editions
-        return Contents(variables | rated, coords | gears, attrs)
+        lives, teeth, required = tooth_life_contents(every)
+        attrs = {"title": "system deflection", "load_case": self.chosen} | editions | required
+        return Contents(variables | rated | lives, coords | gears | teeth, attrs)
 
 
 def _names(dim: str, names: Iterable[str], words: str) -> tuple:
@@ -276,7 +279,7 @@ def _of_bearings(every: Sequence[Deflection], state: Deflection) -> dict[str, tu
             "1",
             "1 where the bearing holds no such motion for want of load and its shaft is free; else 0",
         ),
-        **life_variables(every, [one.share for one in state.model.case.operation.load_case]),
+        **life_variables(every, running_shares(state.model.case.operation.load_case)),
     }
 
 
@@ -426,6 +429,8 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
         *describe_feet(data, at, name),
         *describe_sensors(data, at, name),
         *describe_load_cases(data),
+        *describe_life(data),
+        *describe_damage(data),
     )
 
 
@@ -451,6 +456,8 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield from play_findings(data)
     if "planet_load_factor" in data:
         yield from _idle_planets(data)
+    yield from life_findings(data)
+    yield from bearing_life_findings(data)
     if "estimate_face_load_factor" in data:
         spread = np.ptp(data["estimate_face_load_factor"].values, axis=0)
         worst = int(np.nan_to_num(spread).argmax()) if len(spread) else 0

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case.sections import StrengthSection
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.strength import Rating, rate_case, rating_wanted
 from femgear.stages.strength_results import factor_names, kind_names, safety_notes
@@ -59,8 +60,13 @@ def rated_stage(case: GearboxCase, name: str, contact: StageContact, mesh_freque
         sharing=sharing if force.shape[1] > 1 else None,
         face=face.max(axis=1) if contact.result.cycle.face_load_factor is not None else None,
         frequencies=(abs(mesh_frequency),) if mesh_frequency else (),
-        strength=teeth.strength if "strength" in teeth.model_fields_set else case.strength,
+        strength=strength_of_stage(case, teeth),
     )
+
+
+def strength_of_stage(case: GearboxCase, teeth: Any) -> StrengthSection:
+    """Find the section ``strength`` of the teeth of a stage: its own, else that of the gearbox."""
+    return teeth.strength if "strength" in teeth.model_fields_set else case.strength
 
 
 def rated_stages(state: Deflection) -> dict[str, Rating]:

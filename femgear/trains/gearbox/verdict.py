@@ -13,6 +13,7 @@ import numpy as np
 
 from femgear.report.tables import Block, Marks, doubtful_excitation
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
+from femgear.stages.life_results import life_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
 from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
@@ -35,6 +36,7 @@ def gearbox_verdict(results: Any) -> Iterator[Block]:
         rows += _worst_of_deflection(results.deflection, marks)
         response = results.dynamics if "dynamics" in results.stages else None
         rows += smallest_safeties(results.deflection, response, marks)
+        rows += life_rows(results.deflection, marks, of=("deflection",))
     modes = results.modes if "modes" in results.stages else None
     if modes is not None:
         rows += _nearest_mode(modes)
@@ -77,7 +79,7 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         if force[at] > _ROUNDING * np.nanmax(data["mesh_force"].values, initial=0.0):
             text = marks(f"{force[at]:.4g} N", *_OF_BEARINGS, of=("deflection",))
             yield "largest bearing force", f"{text}, {where(at, bearings)}"
-        yield from shortest_life(data)
+        yield from shortest_life(data, marks)
     yield from largest_foot_force(data)
 
 

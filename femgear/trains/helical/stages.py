@@ -20,6 +20,7 @@ from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
+from femgear.stages.life import LIFE, LifeResult, solve_life
 from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import (
     driving_torque,
@@ -88,6 +89,18 @@ def solve_helical_static(
 def solve_helical_stress(case: HelicalCase, static: StaticResult, *, progress: Progress = silent) -> StressResult:
     """Find the stresses of the teeth whose contact was solved in slices over the width."""
     return solve_stress(_drive_flanks(case), static, progress=progress)
+
+
+def solve_helical_life(
+    case: HelicalCase,
+    static: StaticResult,
+    *,
+    cache: Path | None = None,
+    progress: Progress = silent,
+    steps: Steps | None = None,
+) -> LifeResult:
+    """Solve for the lives of all roots and flanks over the load cases, on drive flanks alone."""
+    return solve_life(_drive_flanks(case), static, cache=cache, progress=progress, steps=steps)
 
 
 def _drive_flanks(case: HelicalCase) -> HelicalCase:
@@ -249,6 +262,11 @@ HELICAL = Train(
             unavailable=lambda case: _NO_TEETH if _given(case) else STRESS.unavailable(case),
         ),
         replace(LOSSES, unavailable=lambda case: _NO_TEETH if _given(case) else LOSSES.unavailable(case)),
+        replace(
+            LIFE,
+            solve=solve_helical_life,
+            unavailable=lambda case: _NO_TEETH if _given(case) else LIFE.unavailable(case),
+        ),
         Stage(
             name="modes",
             title="Modes",

@@ -9,7 +9,14 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field
 
-from femgear.case.checks import check_face_widths, check_gear_deviations, check_materials, check_speeds, check_torque
+from femgear.case.checks import (
+    check_face_widths,
+    check_gear_deviations,
+    check_load_cases,
+    check_materials,
+    check_speeds,
+    check_torque,
+)
 from femgear.case.csv_columns import embed_profiles
 from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.messages import added_material
@@ -23,7 +30,9 @@ from femgear.case.sections import (
     FaceWidth,
     GearErrors,
     GearMaterialSection,
+    Hours,
     Inertia,
+    LoadSpectrum,
     MachineSection,
     Mass,
     MaterialSection,
@@ -108,11 +117,14 @@ class WheelSection(GearSection):
 class PairOperationSection(Section):
     """Torque on gear 1, of either sign, and speeds of gear 1; gear 2 is held while the contact is solved.
 
-    Behind couplings the torques act on motor and brake.
+    Behind couplings the torques act on motor and brake. Load cases are those of the life, which ``required_hours``
+    asks for.
     """
 
     torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
     speeds: Annotated[tuple[Speed, ...], Values(max_length=100_000), BeforeValidator(speed_range)] = ()
+    load_case: LoadSpectrum = ()
+    required_hours: Hours | None = None
 
 
 class PairCase(GearCase):
@@ -231,6 +243,7 @@ def check_pair_entries(case: PairCase) -> Iterator[CaseError]:
     yield from check_materials(case)
     yield from check_allowances(case)
     yield from check_torque(case.operation.torque)
+    yield from check_load_cases(case)
     yield from check_speeds(case) if case.operation.speeds else ()
     yield from check_gear_deviations(case)
 

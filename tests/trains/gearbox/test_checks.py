@@ -151,11 +151,14 @@ def test_an_output_that_is_missing_is_told_in_newton_metres():
     assert problems(tables)["operation.output"].value == "100 N m"
 
 
-def test_shares_of_the_time_are_at_most_the_whole():
-    tables = pair_tables()
-    one = tables["operation"]["load_case"][0]
-    tables["operation"]["load_case"] = [one | {"name": "a", "share": 0.7}, one | {"name": "b", "share": 0.4}]
-    assert "operation.load_case[0].share" in problems(tables)
+def test_shares_are_the_running_time_in_all_and_limited_pitting_is_that_of_materials_that_have_it():
+    tables = pair_tables(teeth=True)
+    first = tables["operation"]["load_case"][0]
+    tables["pair"][0]["teeth"]["material"] |= {"treatment": "nitrided steel", "hardness": 700}
+    tables["strength"] = {"pitting": "limited"}
+    for share in (0.2, 0.4):
+        tables["operation"]["load_case"] = [first | {"name": "a", "share": 0.7}, first | {"name": "b", "share": share}]
+        assert {"operation.load_case[0].share", "strength.pitting"} <= problems(tables).keys()
 
 
 def test_planets_may_be_listed_in_any_order():

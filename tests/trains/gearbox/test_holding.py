@@ -190,7 +190,7 @@ def test_thrust_is_told_once_of_all_load_cases():
     tables = pair_tables()
     one_sided(tables)
     case = tables["operation"]["load_case"][0]
-    tables["operation"]["load_case"] = [case | {"name": name, "share": 0.3} for name in ("a", "b", "c")]
+    tables["operation"]["load_case"] = [case | {"name": name, "share": 1.0 / 3.0} for name in ("a", "b", "c")]
     with pytest.raises(CaseError) as caught:
         read_case(tables)
     assert [one.key for one in caught.value.problems] == ["bearing[0].axial_sense", "bearing[2].axial_sense"]

@@ -29,7 +29,7 @@ BALL = {
     "clearance": "-3 um",
     "dynamic_rating": "19.5 kN",
 }
-CASES = (("start", "150 N m", "500 rpm", 0.1), ("run", "60 N m", "2000 rpm", 0.6), ("back", "-40 N m", "900 rpm", 0.2))
+CASES = (("start", "150 N m", "500 rpm", 0.1), ("run", "60 N m", "2000 rpm", 0.6), ("back", "-40 N m", "900 rpm", 0.3))
 
 
 def tables_of(*cases):
@@ -110,7 +110,6 @@ def test_tables_and_verdict_tell_which_load_case_decides(result):
     assert [row[0] for row in load_cases.rows] == ["start", "run", "back"]
     assert bearings.header[:2] == ("bearing", "equivalent load [N]")
     assert bearings.rows[3][1:3] == ("-", "-")
-    assert "0.1 stands still" in bearings.notes[0]
     ((name, text),) = shortest_life(data)
     lives = data["spectrum_reference_life"].values
     assert name == "shortest bearing life L10r"

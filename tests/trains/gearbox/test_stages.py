@@ -121,7 +121,10 @@ def test_a_load_case_is_solved_once_whatever_the_others_are():
     tables["operation"]["load_case"] = [first | {"share": 0.5}, back]
     handle = Live(read_case(tables))
     before = handle.answer.deflection
-    after = handle.change({"operation.load_case[1].torque.motor": "-50 N m", "operation.load_case[0].share": 0.4})
+    after = handle.change(
+        {"operation.load_case[1].torque.motor": "-50 N m", "operation.load_case[1].share": 0.6}
+        | {"operation.load_case[0].share": 0.4}
+    )
     states, alone = after.deflection.states, Answer(after.case, Steps()).deflection.contents()
     assert states[0].motion is before.states[0].motion and states[1].motion is not before.states[1].motion
     assert all(state.model.case is after.case for state in states)

@@ -1,0 +1,139 @@
+"""Tables, rows of a verdict and findings on the lives of teeth over load cases, the same of all trains."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from femgear.findings import Finding
+from femgear.report.tables import Block, Marks, tabulate
+
+SYMBOLS = {"root": "S_F", "flank": "S_H"}
+"""Safeties by what they are of."""
+_NO_DAMAGE = "none fails: all stresses lie below those of 1e10 load cycles"
+_MOST = 40  # rows of load cases in a table
+
+
+def life_findings(data: Any) -> Iterator[Finding]:
+    """List roots and flanks whose life ends before the one that the case asks for (W-LIFE)."""
+    for kind in SYMBOLS:
+        if f"{kind}_damage" not in data:
+            continue
+        damage, names = data[f"{kind}_damage"].values, data[kind].values
+        failing = [str(names[number]) for number in np.argsort(-damage) if damage[number] > 1.0]
+        if failing:
+            most, load_case = float(np.nanmax(damage)), _most_damage(data, kind, int(np.nanargmax(damage)))
+            text = f"the damage of the {kind} of {failing[0]} is {_number(most)} over the life asked for, {load_case}"
+            others = f"; beyond 1 too: {', '.join(failing[1:5])}" if len(failing) > 1 else ""
+            remedy = "less torque or time in that load case, a wider face, a larger module, or another treatment"
+            yield Finding("W-LIFE", "operation.load_case", text + others, remedy=remedy, limit="at most 1")
+
+
+def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Iterator[tuple[str, str]]:
+    """Write rows of a verdict: what fails first and when, and the smallest safeties over the life asked for.
+
+    Parameters
+    ----------
+    data : dataset
+        With the variables of `tooth_life_variables`.
+    marks : Marks
+        Of the findings of the run.
+    of : tuple of str
+        Stage whose findings count.
+    """
+    kinds = [kind for kind in SYMBOLS if f"{kind}_life" in data]
+    if not kinds:
+        return
+    shortest = min(kinds, key=lambda kind: float(data[f"{kind}_life"].values.min()))
+    lives = data[f"{shortest}_life"].values
+    at = _first_to_fail(data, shortest)
+    if math.isinf(lives[at]):
+        yield "shortest life of the teeth, ISO 6336-6", _NO_DAMAGE
+    else:
+        hours = marks(f"{hours_text(lives[at])} h", "W-LIFE", of=of)
+        what = f"{shortest} of {data[shortest].values[at]}"
+        yield "shortest life of the teeth, ISO 6336-6", f"{hours}, {what}: {_most_damage(data, shortest, at)}"
+    for kind in kinds:
+        safety = data[f"{kind}_spectrum_safety"].values
+        if np.isnan(safety).all():
+            continue
+        at = int(np.nanargmin(safety))
+        cause = f", {_most_damage(data, kind, at)}" if math.isfinite(data[f"{kind}_life"].values[at]) else ""
+        damage = float(data[f"{kind}_damage"].values[at])
+        text = marks(f"{safety[at]:.2f}", "W-LIFE", of=of)
+        name = f"smallest {SYMBOLS[kind]} over the life asked for"
+        yield name, f"{text}, {kind} of {data[kind].values[at]}: damage {_number(damage)}{cause}"
+
+
+def _first_to_fail(data: Any, kind: str) -> int:
+    """Number of the root or flank with the shortest life; of those without any damage that with the largest stress."""
+    lives = data[f"{kind}_life"].values
+    return int(np.lexsort((-data[f"{kind}_stress_ratio"].values.max(axis=0), lives))[0])
+
+
+def _most_damage(data: Any, kind: str, number: int) -> str:
+    """Say which load case makes most of the damage of a root or flank."""
+    share = data[f"{kind}_damage_share"].values[:, number]
+    at = int(share.argmax())
+    return f"{share[at]:.0%} of the damage in {data['load_case'].values[at]}"
+
+
+def hours_text(hours: float) -> str:
+    """Write a life [h]."""
+    return "no damage" if math.isinf(hours) else "0" if hours == 0.0 else f"{hours:.4g}"
+
+
+def _number(value: float) -> str:
+    return "-" if math.isnan(value) else "beyond the static strength" if math.isinf(value) else f"{value:.3g}"
+
+
+def describe_life(data: Any, name: str = "") -> Iterator[Block]:
+    """Tabulate the lives of all roots and flanks, and the shares of load cases in the damage."""
+    rows = [(kind, number) for kind in SYMBOLS if f"{kind}_life" in data for number in range(len(data[kind].values))]
+    if not rows:
+        return
+
+    def value(end: str, form):
+        return lambda row: form(float(data[f"{row[0]}_{end}"].values[row[1]]))
+
+    columns = {
+        "": lambda row: f"{row[0]} of {data[row[0]].values[row[1]]}",
+        "life [h]": value("life", hours_text),
+        "damage": value("damage", _number),
+        "safety": value("spectrum_safety", lambda number: "-" if math.isnan(number) else f"{number:.3f}"),
+        "T_eq [N m]": value("equivalent_torque", lambda number: f"{number:.5g}"),
+        "cycles/h": lambda row: f"{data[f'{row[0]}_load_cycles'].values[:, row[1]].sum():.4g}",
+        "most damage": lambda row: (
+            _most_damage(data, *row) if data[f"{row[0]}_damage_share"].values[:, row[1]].any() else "-"
+        ),
+    }
+    notes = [
+        "damage and safety are those over the life asked for (operation.required_hours, or all hours)",
+        "T_eq: equivalent torque on the sun or gear 1; K_v of part 1 at the speed of each load case, or 1",
+    ]
+    yield tabulate(f"Life of the teeth{name}", rows, columns, notes)
+
+
+def describe_damage(data: Any) -> Iterator[Block]:
+    """Tabulate load cases with their largest stresses and their shares in the damage of what fails first."""
+    kinds = [kind for kind in SYMBOLS if f"{kind}_life" in data]
+    count = data.sizes["load_case"]
+    if not kinds or count < 2:
+        return
+    first = {kind: _first_to_fail(data, kind) for kind in kinds}
+    columns = {
+        "load case": lambda i: str(data["load_case"].values[i]),
+        "share": lambda i: f"{float(data['share'].values[i]):.4g}",
+    }
+    for kind, at in first.items():
+        columns[f"largest stress over long life, {kind}s"] = lambda i, kind=kind: (
+            f"{data[f'{kind}_stress_ratio'].values[i].max():.3f}"
+        )
+        columns[f"damage of the {kind} of {data[kind].values[at]}"] = lambda i, kind=kind, at=at: (
+            f"{data[f'{kind}_damage_share'].values[i, at]:.2%}"
+        )
+    left = (f"the first {_MOST} of {count}",) if count > _MOST else ()
+    yield tabulate("Damage by load case", range(min(count, _MOST)), columns, left)

@@ -1,0 +1,69 @@
+"""Lives of the teeth of all stages of a gearbox over its load cases, ISO 6336-6.
+
+Ratings are those of the loaded states: torques of the power flow, K_gamma and K_Hbeta of the contact with the
+misalignment of each load case. Torques of a stage are those on its sun or gear 1. Gears of different stages are
+different gears: where one gear meets two mates, as an idler does, a crack of its root by both is not added.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+from femgear.case.load_spectrum import check_pitting, required_life, running_shares
+from femgear.errors import CaseError
+from femgear.stages.tooth_spectra import (
+    RatedLoad,
+    RatedSpectrum,
+    rated_spectra,
+    tooth_life_coordinates,
+    tooth_life_variables,
+)
+from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, teeth_of
+from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.strength import rated_stages, strength_of_stage
+
+
+def stage_spectra(states: Sequence[Deflection]) -> tuple[RatedSpectrum, ...]:
+    """Collect the spectra of all roots and flanks that have a limit and a treatment, stage by stage."""
+    case = states[0].model.case
+    shares, ratings = running_shares(case.operation.load_case), [rated_stages(state) for state in states]
+    spectra = list[RatedSpectrum]()
+    for stage in states[0].model.stages:
+        contacts = [state.contacts.get(stage.name) for state in states]
+        teeth = next((contact.case for contact in contacts if contact is not None), None)
+        if teeth is None:
+            continue
+        loads = [
+            RatedLoad(
+                rating.get(stage.name),
+                0.0 if contact is None else contact.result.sun_torque,
+                state.model.flow.mesh_frequency[stage.name],
+                share,
+            )
+            for state, rating, contact, share in zip(states, ratings, contacts, shares.tolist(), strict=True)
+        ]
+        for rated in rated_spectra(teeth, loads, strength_of_stage(case, teeth)):
+            spectra.append(replace(rated, name=f"{stage.name} {rated.name}"))
+    return tuple(spectra)
+
+
+def tooth_life_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], dict[str, tuple], dict[str, float]]:
+    """Collect variables, coordinates and attributes of deflection.nc on the lives of teeth.
+
+    Without variables where no tooth has a line of life; the attribute is the life asked for [h], where there is one.
+    """
+    spectra, required = stage_spectra(states), required_life(states[0].model.case.operation)
+    attrs = {} if required is None else {"required_hours": required}
+    return tooth_life_variables(spectra, required), tooth_life_coordinates(spectra), attrs
+
+
+def pitting_problems(case: GearboxCase, stages: Sequence[PairSection | BoxPlanetarySection]) -> Iterator[CaseError]:
+    """Refuse limited pitting of stages whose materials have no such line, by the entry that asks for it."""
+    for stage in stages:
+        teeth = teeth_of(stage)
+        if teeth is None or "strength" in teeth.model_fields_set:
+            continue  # the case of the teeth refuses its own
+        for problem in check_pitting(teeth.model_copy(update={"strength": case.strength})):
+            problem.message = f"stage {stage.name}: {problem.message}"
+            yield problem
