@@ -687,6 +687,41 @@ def import_rexs(
 
 
 @app.command
+def gearbox(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write a planetary set or a pair as a gearbox of one stage; say what a gearbox has no place for.
+
+    Its members are bodies on springs. Shafts, rolling bearings, a casing and more stages can be added to the file.
+
+    Parameters
+    ----------
+    case
+        TOML case file of a set, with or without the sections planar and helical, or of a pair.
+    output
+        Case file to write. Default: NAME_gearbox.toml.
+    force
+        Replace the file.
+    """
+    from femgear.case import text as case_text
+    from femgear.trains.gearbox.from_case import gearbox_of_case
+    from femgear.trains.reading import parse_case, read_case
+
+    written = gearbox_of_case(read_case(case))
+    text = case_text.write(written.tables)
+    parse_case(text)  # what is no gearbox is refused before a file is written
+    _warn(written.findings)
+    output = output or Path(f"{case.stem}_gearbox.toml")
+    _write_case(text, output, force=force)
+    _say(f"next:    femgear run {shlex.quote(str(output))}")
+    return 0
+
+
+@app.command
 def rexs(
     case: Path,
     /,

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import tomllib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,6 +10,7 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.system.rigid_bodies import RigidSet
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of
+from femgear.trains.gearbox.from_case import gearbox_of_case
 from femgear.trains.reading import read_case
 
 
@@ -185,45 +184,9 @@ def drivetrain_tables(case: DrivetrainCase) -> dict[str, Any]:
 
 def elastic_set_tables(path: str) -> dict[str, Any]:
     """Tables of a gearbox that is a planetary set with an elastic ring, in the plane, from the file of its case."""
-    teeth = tomllib.loads(Path(path).read_text(encoding="utf-8"))
-    case = read_case(path)
-    shafts = [{"name": name} for name in ("sun", "carrier", "motor", "brake")]
-    members = [(name, _n(getattr(case, name).support_stiffness, "N/m")) for name in ("sun", "carrier")]
-    own = {"mass": "1 kg"}
-    return {
-        "model": "gearbox",
-        "title": "a set with an elastic ring",
-        "motions": "plane",
-        "shaft": shafts,
-        "mass": [
-            {"shaft": name, "inertia": _n(getattr(case, name).inertia, "kg m^2"), **own} for name in ("motor", "brake")
-        ],
-        "bearing": [{"shaft": name, "radial": stiffness} for name, stiffness in members]
-        + [{"shaft": name, "radial": "rigid"} for name in ("motor", "brake")],
-        "coupling": [
-            {"between": [name, member], "torsion": _n(getattr(case, name).coupling_stiffness, "N m/rad")}
-            for name, member in (("motor", "sun"), ("brake", "carrier"))
-        ],
-        "planetary": [
-            {
-                "name": "set",
-                "sun": "sun",
-                "carrier": "carrier",
-                "elastic_ring": True,
-                "teeth": teeth,
-                "planet": {
-                    "mass": _n(case.planet.mass, "kg"),
-                    "inertia": _n(case.planet.inertia, "kg m^2"),
-                    "bearing": {"radial": _n(case.planet.bearing_stiffness, "N/m")},
-                },
-            }
-        ],
-        "operation": {
-            "output": ["brake"],
-            "load_case": [{"torque": {"motor": _n(case.operation.torque, "N m")}, "speed": {"sun": "100 rad/s"}}],
-        },
-        "deflection": {"contact": False},
-    }
+    tables = gearbox_of_case(read_case(path)).tables
+    del tables["sensor"]
+    return tables | {"deflection": {"contact": False}}
 
 
 def pair_of_rigid_gears_tables(case, stiffness: float) -> dict[str, Any]:

@@ -112,6 +112,17 @@ class MeshExcitation:
         )
         return stiffness, deflection, force
 
+    def along_normal(self, cosine: float) -> MeshExcitation:
+        """Turn what is along the line of action of the transverse section into what is along the tooth normal.
+
+        Of a base helix angle of this ``cosine`` the force along the normal is 1/cos(beta_b) of that in the transverse
+        section, the approach cos(beta_b) of it.
+        """
+        stiffness, force = self.stiffness / cosine**2, self.force / cosine
+        return replace(
+            self, stiffness=stiffness, deflection=self.deflection * cosine, force=force, backlash=self.backlash * cosine
+        )
+
 
 @dataclass(frozen=True)
 class Modes:

@@ -238,6 +238,8 @@ def loaded_tables(
         static["slices"] = max(int(static.get("slices", 0)), slices)
     if positions is not None:
         static["positions"] = min(int(static.get("positions", positions)), positions)
+        # so few positions carry no excitation, which is not computed from them
+        tables["dynamics"] = {"mesh_harmonics": 1}
     static["stresses"] = False
     static.pop("members", None)
     for gear in ("sun", "planet", "carrier"):

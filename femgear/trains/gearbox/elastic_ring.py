@@ -149,19 +149,21 @@ def elastic_ring(model: GearboxModel, stage: StageModel, *, steps: Steps | None 
     # angles of the teeth count from their own axis
     turned = np.exp(-1j * diameter * (stage.angles[0] - stage.sizes.planet_angles[0]))
     factor = modes.norm[mode] * np.where(sine, -1j, 1.0) * turned
+    # along the normal the approach is cos(beta_b) of that in the transverse section, the force 1/cos(beta_b) of it
+    cosine = math.cos(stage.sizes.base_helix)
     # flanks approach where the ring does not give way
-    wave = -factor * modes.load[mode, 0] * np.exp(1j * diameter * ring.load_angle)
+    wave = -cosine * factor * modes.load[mode, 0] * np.exp(1j * diameter * ring.load_angle)
     return ElasticRing(
         f"ring of {stage.name}",
         stage,
         np.diag(model_of_set.system.K)[model_of_set.ring_slice],
         diameter,
-        model_of_set.system.W[model_of_set.ring_slice],
+        cosine * model_of_set.system.W[model_of_set.ring_slice],
         wave,
         factor[:, None] * modes.output[mode],
         _participation(diameter, factor.conj() * ring.participation[mode], modes.count),
-        solved.excitation,
-        np.zeros(springs) if flexibility is None else flexibility,
+        solved.excitation.along_normal(cosine),
+        np.zeros(springs) if flexibility is None else cosine**2 * flexibility,
     )
 
 

@@ -81,8 +81,8 @@ def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> Me
     cosine = math.cos(base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
     stiffness, deflection, force = (state.resampled(name, count) for name in ("stiffness", "deflection", "force"))
     play = np.zeros(len(force))
-    found = MeshExcitation(stiffness / cosine**2, deflection * cosine, force / cosine, play, state.periods)
-    return steps.keep("excitation of a stage", known, found)
+    transverse = MeshExcitation(stiffness, deflection, force, play, state.periods)
+    return steps.keep("excitation of a stage", known, transverse.along_normal(cosine))
 
 
 @dataclass(frozen=True)

@@ -171,7 +171,7 @@ def test_the_set_of_a_ring_is_solved_once(in_casing, monkeypatch):
     first = elastic_ring(found.model, found.model.stages[0], steps=steps)
     monkeypatch.setattr("femgear.trains.gearbox.elastic_ring.train_of", None)
     again = elastic_ring(found.model, found.model.stages[0], steps=steps)
-    assert again.excitation is first.excitation
+    assert np.array_equal(again.excitation.stiffness, first.excitation.stiffness)
     assert np.array_equal(again.approach, ring.approach)
 
 

@@ -1,0 +1,292 @@
+"""A set or a pair written as a gearbox: its members are bodies on springs, to which shafts and a casing can be added.
+
+Sun, carrier, ring, or both gears, become shafts without parts, each one rigid body on a bearing of the stiffnesses that
+the case gives it. Teeth, machines, weight, sensors, response and run-up go along.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+from femgear.case import text as case_text
+from femgear.case.gear_set import planetary_set, support_stiffness
+from femgear.case.planetary import output_member
+from femgear.errors import CaseError
+from femgear.findings import Finding
+from femgear.gears.profile import base_helix_angle
+from femgear.trains.gearbox.case_file import CASING
+
+PAIR, SET = "pair", "set"
+"""Names of the only stage."""
+MEMBERS = ("sun", "carrier", "ring")
+_MACHINES = "motor", "brake"
+_STAYS = ("title", "set", "rack", "material", "sun", "planet", "ring", "carrier", "gear_1", "gear_2", "static")
+_TEETH = (*_STAYS, "strength", "helical", "planar", "model", "format")
+"""Sections of a case that the teeth of a stage have."""
+_NO_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
+"""What names of parts do not have."""
+_MACHINE_MASS = "1 kg"
+"""Mass of a motor or brake, whose axis is held."""
+_SPRING_UNITS = {"radial": "N/m", "axial": "N/m", "tilt": "N m/rad", "torsional": "N m/rad"}
+
+
+@dataclass(frozen=True)
+class WrittenAsGearbox:
+    """Tables of the gearbox that a case is, and what these leave out.
+
+    Parameters
+    ----------
+    tables : dict
+        Of a case file of a gearbox.
+    findings : tuple of Finding
+        Entries of the case that the gearbox has no place for (W-UNUSED).
+    """
+
+    tables: dict[str, Any]
+    findings: tuple[Finding, ...]
+
+
+def gearbox_of_case(case: Any) -> WrittenAsGearbox:
+    """Write a planetary set or a pair as a gearbox of one stage.
+
+    Parameters
+    ----------
+    case : Case
+        Of an elastic, planar or helical set, or of a pair, from `femgear.read_case`.
+
+    Raises
+    ------
+    CaseError
+        A case of another train (E-CHOICE).
+    """
+    if case.train not in ("elastic", "planar", "helical", "pair"):
+        raise CaseError(
+            "only a planetary set or a pair of gears is one stage of a gearbox",
+            code="E-CHOICE",
+            key="model",
+            value=case.train,
+            limit="a set, with or without the sections planar and helical, or a pair",
+        )
+    given = case_text.parse(case.source, "")
+    tables = {"model": "gearbox", "title": case.title, "motions": _motions(case), "shaft": [], "mass": []}
+    tables |= {"bearing": [], "coupling": []}
+    tables |= _pair(case, given, tables) if case.train == "pair" else _planetary(case, given, tables)
+    driven, taking = _ends(case)
+    for name, member in zip(_MACHINES, (driven, taking), strict=True):
+        if (machine := getattr(case, name)) is not None:
+            _add_machine(tables, name, member, machine)
+    speeds = case.operation.speeds or (0.0,)
+    driver, output = (name if getattr(case, name) else at for name, at in zip(_MACHINES, (driven, taking), strict=True))
+    speed = {driven: quantity(speeds[0], "rad/s")}
+    tables["operation"] = {
+        "output": [output],
+        "load_case": [{"torque": {driver: quantity(case.operation.torque, "N m")}, "speed": speed}],
+    }
+    tables["modes"] = {"damping_ratio": case.dynamics.damping_ratio}
+    up_to = case.dynamics.up_to
+    dynamics = {"mesh_harmonics": _mesh_harmonics(case), "up_to": None if up_to is None else quantity(up_to, "Hz")}
+    tables["dynamics"] = {key: value for key, value in dynamics.items() if value is not None}
+    if "runup" in given:
+        tables["runup"] = given["runup"]
+    kept = {key: value for key, value in tables.items() if value not in ([], {})}
+    return WrittenAsGearbox(kept, tuple(_left_out(case, given)))
+
+
+def quantity(value: float, unit: str) -> str:
+    """Write a number with its unit, or ``"rigid"`` where it is infinite."""
+    return "rigid" if math.isinf(value) else f"{float(value)!r} {unit}"
+
+
+def spring_entries(stiffness: Mapping[str, float | None]) -> dict[str, str]:
+    """Write the entries of a bearing from its stiffnesses [N/m, N m/rad]; those of zero or None are left out."""
+    return {key: quantity(value, _SPRING_UNITS[key]) for key, value in stiffness.items() if value}
+
+
+def _motions(case: Any) -> str:
+    """Motions of the bodies: helical teeth push along the axes."""
+    return "space" if getattr(case, "helix_angle", None) or case.train == "helical" else "plane"
+
+
+def _ends(case: Any) -> tuple[str, str]:
+    """Shafts at which torque enters and leaves."""
+    if case.train == "pair":
+        return "gear 1", "gear 2"
+    return case.operation.input, output_member(case)
+
+
+def _mesh_harmonics(case: Any) -> int | None:
+    """Harmonics of the excitation, no more than the positions of the static contact carry."""
+    kept, most = case.dynamics.mesh_harmonics, (case.static.positions - 1) // 2
+    return None if kept is None else min(kept, most)
+
+
+def _teeth_tables(given: Mapping[str, Any], torque: str) -> dict[str, Any]:
+    """Tables of a case that the teeth of a stage keep."""
+    operation = {key: value for key, value in given["operation"].items() if key in ("input", "fixed")}
+    speeds = {"speeds": given["operation"]["speeds"]} if "input" in operation else {}
+    return {key: given[key] for key in _TEETH if key in given} | {
+        "operation": operation | {"torque": torque} | speeds
+    }
+
+
+def _pair(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
+    """Add both gears of a pair with their bearings; the tables of the stage."""
+    pair = planetary_set(case)
+    places = ["0 mm", "0 mm"], [quantity(pair.centre_distance, "m"), "0 mm"]
+    for name, axis in zip(case.gear_names, places, strict=True):
+        section, shaft = getattr(case, name), name.replace("_", " ")
+        radial = math.inf if section.bearing_stiffness is None else section.bearing_stiffness
+        tables["shaft"].append({"name": shaft, "axis": axis})
+        held = {"axial": math.inf, "tilt": math.inf} if _motions(case) == "space" else {}
+        tables["bearing"].append({"shaft": shaft} | spring_entries({"radial": radial} | held))
+    teeth = _teeth_tables(given, quantity(case.operation.torque, "N m"))
+    return {"pair": [{"name": PAIR, "shafts": ["gear 1", "gear 2"], "teeth": teeth}]}
+
+
+def _planetary(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
+    """Add sun, carrier and ring of a set with what holds them; the tables of the stage, its weight and sensors."""
+    fixed = case.operation.fixed
+    elastic = case.train == "elastic"
+    members = dict.fromkeys(MEMBERS)
+    for member in MEMBERS:
+        if elastic and member == "ring" and fixed == "ring":
+            members[member] = CASING
+            continue
+        members[member] = member
+        tables["shaft"].append({"name": member})
+        springs = _support(case, member)
+        if member == fixed:
+            held = springs.pop("torsional", None) or math.inf
+            entries = {"torsion": held, "radial": springs.get("radial") or 0.0}
+            others = {"axial": springs.get("axial") or 0.0, "bending": springs.get("tilt") or 0.0}
+            units = {"torsion": "N m/rad", "bending": "N m/rad", "radial": "N/m", "axial": "N/m"}
+            texts = {key: quantity(value, units[key]) for key, value in (entries | others).items() if value}
+            tables["coupling"].append({"between": [member, CASING]} | texts)
+        elif entries := spring_entries(springs):
+            tables["bearing"].append({"shaft": member} | entries)
+    stage = {"name": SET, **members, "angle": quantity(planetary_set(case).planet_angles[0], "rad")}
+    stage |= _gears(case, given, tables) | {"planet": _planet(case)}
+    if elastic and members["ring"] == CASING:
+        stage["elastic_ring"] = True
+        tables["sensor"] = [*_sensors(case)]
+    gravity = case.planar.gravity if case.train == "planar" else None
+    if gravity is not None:
+        way = [math.cos(gravity.direction), math.sin(gravity.direction), 0.0]
+        tables["gravity"] = {"acceleration": quantity(gravity.acceleration, "m/s^2"), "direction": way}
+    return {"planetary": [stage]}
+
+
+def _gears(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
+    """Teeth of a set, or its sizes where the case gives the stiffness of its meshes, and then the masses of members."""
+    section = getattr(case, case.train, None)
+    stiffness = getattr(section, "mesh_stiffness", None)
+    if section is None or stiffness is None:
+        torque = quantity(case.torque_on_first_gear(), "N m")
+        return {"teeth": _teeth_tables(given, torque)}
+    gears = planetary_set(case)
+    alphas = gears.working_pressure_angle_sun_planet, gears.working_pressure_angle_planet_ring
+    base = base_helix_angle(case.sun.pressure_angle, section.signed_helix_angle) if case.train == "helical" else 0.0
+    sizes = {
+        "teeth": [gear.teeth for gear in gears.gears],
+        "planets": gears.n_planets,
+        "planet_angles": [quantity(angle, "rad") for angle in gears.planet_angles],
+        "base_radii": [quantity(gear.base_radius, "m") for gear in gears.gears],
+        "pressure_angles": [quantity(alpha, "rad") for alpha in alphas],
+        "helix_angle": quantity(math.atan(math.tan(base) / math.cos(alphas[0])), "rad"),
+    }
+    for member in MEMBERS:
+        body = getattr(section, "ring") if member == "ring" else getattr(case, member)
+        entries = {"mass": quantity(body.mass, "kg"), "inertia": quantity(body.inertia, "kg m^2")}
+        if case.train == "helical":
+            entries["transverse_inertia"] = quantity(getattr(section, member).diametral_inertia, "kg m^2")
+        tables["mass"].append({"shaft": member} | entries)
+    return {
+        "gears": sizes,
+        "sun_mesh": {"stiffness": quantity(stiffness.sun_planet, "N/m")},
+        "ring_mesh": {"stiffness": quantity(stiffness.planet_ring, "N/m")},
+    }
+
+
+def _support(case: Any, member: str) -> dict[str, float | None]:
+    """Stiffnesses that hold a member [N/m, N m/rad], a loose elastic ring as a rigid one on its foundation."""
+    if case.train == "elastic":
+        if member != "ring":
+            # helical teeth push members that stay upright where the case lets none of them tilt
+            tilt = getattr(case, member).tilt_stiffness
+            held = {"axial": math.inf, "tilt": math.inf if tilt is None else tilt} if case.helix_angle else {}
+            return {"radial": support_stiffness(case, member)} | held
+        ring = planetary_set(case).ring
+        face = math.pi * ring.rim_radius * ring.face_width
+        turning = 2.0 * face * ring.rim_radius**2 * case.ring.foundation_tangential
+        radial = face * (case.ring.foundation_radial + case.ring.foundation_tangential)
+        return {"radial": radial, "torsional": turning}
+    section = getattr(case, case.train)
+    if case.train == "planar":
+        body = section.ring if member == "ring" else getattr(case, member)
+        radial = support_stiffness(case, member, body)
+        return {"radial": radial, "torsional": getattr(section.torsion, member)}
+    space = getattr(section, member)
+    radial = support_stiffness(case, member, space if member == "ring" else None)
+    springs = {"axial": space.axial_stiffness, "tilt": space.tilt_stiffness, "torsional": space.torsional_stiffness}
+    return {"radial": radial} | springs
+
+
+def _planet(case: Any) -> dict[str, Any]:
+    """Mass, inertias and bearing of a planet."""
+    planet = case.planet
+    entries: dict[str, Any] = {"mass": quantity(planet.mass, "kg"), "inertia": quantity(planet.inertia, "kg m^2")}
+    bearing = {"radial": quantity(planet.bearing_stiffness, "N/m")}
+    if case.train == "helical":
+        space = case.helical.planet
+        entries["transverse_inertia"] = quantity(space.diametral_inertia, "kg m^2")
+        bearing |= {"axial": quantity(space.axial_stiffness, "N/m"), "tilt": quantity(space.tilt_stiffness, "N m/rad")}
+    return entries | {"bearing": bearing}
+
+
+def _sensors(case: Any) -> Iterator[dict[str, Any]]:
+    """Sensors on the elastic ring: the one of the housing, and those that have names."""
+    housing = case.housing
+    yield {"name": "sensor", "ring": SET, "angle": quantity(housing.sensor_angle, "rad")}
+    for sensor in housing.sensor:
+        way = sensor.angle + sensor.direction
+        direction = [math.cos(way), math.sin(way), 0.0]
+        place = {"ring": SET, "angle": quantity(sensor.angle, "rad")}
+        yield {"name": _NO_NAME.sub(" ", sensor.name).strip()[:40], "direction": direction} | place
+
+
+def _add_machine(tables: dict[str, Any], name: str, member: str, machine: Any) -> None:
+    """Add a rotor on an axis that is held, behind its torsional coupling."""
+    axis = next((shaft["axis"] for shaft in tables["shaft"] if shaft["name"] == member and "axis" in shaft), None)
+    tables["shaft"].append({"name": name} | ({} if axis is None else {"axis": axis}))
+    tables["mass"].append({"shaft": name, "mass": _MACHINE_MASS, "inertia": quantity(machine.inertia, "kg m^2")})
+    tables["bearing"].append(
+        {"shaft": name, "radial": "rigid"} | ({"axial": "rigid", "tilt": "rigid"} if tables["motions"] == "space" else {})
+    )
+    tables["coupling"].append(
+        {"between": [name, member], "torsion": quantity(machine.coupling_stiffness, "N m/rad")}
+    )
+
+
+def _left_out(case: Any, given: Mapping[str, Any]) -> Iterator[Finding]:
+    """Entries without a place in the gearbox."""
+    housing, planar = given.get("housing", {}), given.get("planar", {})
+    entries = {
+        "operation.speeds": len(case.operation.speeds) > 1,
+        "dynamics.response_harmonics": "response_harmonics" in given.get("dynamics", {}),
+        "dynamics.tolerance": "tolerance" in given.get("dynamics", {}),
+        **{f"housing.{key}": key in housing for key in ("form", "points", "microphone", "published", "support")},
+        "housing.structure": "structure" in housing,
+        **{f"planar.{key}": key in planar for key in ("branch", "response", "published", "carrier_bearing")},
+        "planet.bearing_clearance": bool(given.get("planet", {}).get("bearing_clearance")),
+    }
+    for key, there in entries.items():
+        if there:
+            text = f"{key} has no place in a gearbox of one stage"
+            if key == "operation.speeds":
+                text = "of operation.speeds the first one is that of the load case"
+            yield Finding("W-UNUSED", key, text)

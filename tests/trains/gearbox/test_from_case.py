@@ -1,0 +1,67 @@
+"""Sets and pairs as gearboxes have the modes, the torque and the sensors of their cases."""
+
+import numpy as np
+import pytest
+
+from femgear import cli
+from femgear.errors import CaseError
+from femgear.run import solve
+from femgear.trains.gearbox.from_case import gearbox_of_case
+from femgear.trains.reading import read_case
+
+CASES = (
+    "planetary_27_40_108",
+    "on_six_bolts",
+    "in_a_casing",
+    "nrel_pgb",
+    "nrel_pga",
+    "helical_30_20_70",
+    "helical_23_24_73",
+    "spur_pair",
+)
+
+
+def frequencies(case):
+    """Natural frequencies above 1 Hz, ascending."""
+    found = np.sort(solve(case, only="modes")["modes"].modes.frequency)
+    return found[found > 1.0]
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_shipped_case_is_a_gearbox_under_its_torque(name):
+    case = read_case(f"cases/{name}.toml")
+    box = read_case(gearbox_of_case(case).tables)
+    assert list(box.load_case.torque.values()) == [case.operation.torque]
+    stage = (*box.pair, *box.planetary)[0]
+    assert stage.teeth is None or stage.teeth["set"]
+    assert len(box.sensor) == (1 + len(case.housing.sensor) if case.train == "elastic" else 0)
+
+
+@pytest.mark.parametrize(
+    "name", ["nrel_pgb", pytest.param("helical_23_24_73", marks=pytest.mark.slow, id="helical, elastic ring")]
+)
+def test_modes_are_those_of_the_case(name):
+    case = read_case(f"cases/{name}.toml")
+    expected = frequencies(case)
+    box = read_case(gearbox_of_case(case).tables | {"modes": {"up_to": "300 kHz"}})
+    assert frequencies(box)[: len(expected)] == pytest.approx(expected, rel=1e-7)
+
+
+def test_entries_without_a_place_are_told():
+    written = gearbox_of_case(read_case("cases/nrel_pga.toml"))
+    assert {"planar.branch", "planar.carrier_bearing"} <= {one.key for one in written.findings}
+    assert written.tables["gravity"]["direction"][2] == 0.0
+
+
+def test_what_is_no_set_is_refused():
+    with pytest.raises(CaseError) as refused:
+        gearbox_of_case(read_case("cases/gear_pair.toml"))
+    assert refused.value.key == "model" and refused.value.value == "gear_pair"
+
+
+def test_the_command_writes_a_case_that_runs_and_replaces_none(tmp_path, monkeypatch, capsys):
+    path = str(tmp_path / "box.toml")
+    assert cli.main(["gearbox", "cases/spur_pair.toml", "-o", path]) == 0
+    assert read_case(path).train == "gearbox" and cli.main(["check", path]) == 0
+    assert cli.main(["gearbox", "cases/spur_pair.toml", "-o", path]) == 2
+    assert "--force" in capsys.readouterr().err
