@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set, support_stiffness
 from femgear.case.planetary import output_member
@@ -129,9 +128,7 @@ def _teeth_tables(given: Mapping[str, Any], torque: str) -> dict[str, Any]:
     """Tables of a case that the teeth of a stage keep."""
     operation = {key: value for key, value in given["operation"].items() if key in ("input", "fixed")}
     speeds = {"speeds": given["operation"]["speeds"]} if "input" in operation else {}
-    return {key: given[key] for key in _TEETH if key in given} | {
-        "operation": operation | {"torque": torque} | speeds
-    }
+    return {key: given[key] for key in _TEETH if key in given} | {"operation": operation | {"torque": torque} | speeds}
 
 
 def _pair(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> dict[str, Any]:
@@ -200,7 +197,7 @@ def _gears(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> dict[
         "helix_angle": quantity(math.atan(math.tan(base) / math.cos(alphas[0])), "rad"),
     }
     for member in MEMBERS:
-        body = getattr(section, "ring") if member == "ring" else getattr(case, member)
+        body = section.ring if member == "ring" else getattr(case, member)
         entries = {"mass": quantity(body.mass, "kg"), "inertia": quantity(body.inertia, "kg m^2")}
         if case.train == "helical":
             entries["transverse_inertia"] = quantity(getattr(section, member).diametral_inertia, "kg m^2")
@@ -264,12 +261,9 @@ def _add_machine(tables: dict[str, Any], name: str, member: str, machine: Any) -
     axis = next((shaft["axis"] for shaft in tables["shaft"] if shaft["name"] == member and "axis" in shaft), None)
     tables["shaft"].append({"name": name} | ({} if axis is None else {"axis": axis}))
     tables["mass"].append({"shaft": name, "mass": _MACHINE_MASS, "inertia": quantity(machine.inertia, "kg m^2")})
-    tables["bearing"].append(
-        {"shaft": name, "radial": "rigid"} | ({"axial": "rigid", "tilt": "rigid"} if tables["motions"] == "space" else {})
-    )
-    tables["coupling"].append(
-        {"between": [name, member], "torsion": quantity(machine.coupling_stiffness, "N m/rad")}
-    )
+    in_space = {"axial": "rigid", "tilt": "rigid"} if tables["motions"] == "space" else {}
+    tables["bearing"].append({"shaft": name, "radial": "rigid"} | in_space)
+    tables["coupling"].append({"between": [name, member], "torsion": quantity(machine.coupling_stiffness, "N m/rad")})
 
 
 def _left_out(case: Any, given: Mapping[str, Any]) -> Iterator[Finding]:
