@@ -708,7 +708,7 @@ def gearbox(
         Replace the file.
     """
     from femgear.case import text as case_text
-    from femgear.trains.gearbox.from_case import gearbox_of_case
+    from femgear.trains.gearbox_of_case import gearbox_of_case
     from femgear.trains.reading import parse_case, read_case
 
     written = gearbox_of_case(read_case(case))

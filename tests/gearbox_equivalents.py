@@ -10,7 +10,7 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.system.rigid_bodies import RigidSet
 from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of
-from femgear.trains.gearbox.from_case import gearbox_of_case
+from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case
 
 

@@ -22,8 +22,8 @@ from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.lumped_set import gear_set_modes
 from femgear.trains.drivetrain.stages import solve_drivetrain_modes
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
-from femgear.trains.gearbox.from_case import gearbox_of_case
 from femgear.trains.gearbox.modes import linear_system, solve_gearbox_modes
+from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case, with_values
 from validation.reference.multistage_train import stored
 from validation.rows import Row, at_most, counted, within

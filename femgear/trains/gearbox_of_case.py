@@ -18,11 +18,11 @@ from femgear.case.planetary import output_member
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.profile import base_helix_angle
-from femgear.trains.gearbox.case_file import CASING
 
+_CASING = "casing"
 PAIR, SET = "pair", "set"
 """Names of the only stage."""
-MEMBERS = ("sun", "carrier", "ring")
+_MEMBERS = ("sun", "carrier", "ring")
 _MACHINES = "motor", "brake"
 _STAYS = ("title", "set", "rack", "material", "sun", "planet", "ring", "carrier", "gear_1", "gear_2", "static")
 _TEETH = (*_STAYS, "strength", "helical", "planar", "model", "format")
@@ -149,10 +149,10 @@ def _planetary(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> d
     """Add sun, carrier and ring of a set with what holds them; the tables of the stage, its weight and sensors."""
     fixed = case.operation.fixed
     elastic = case.train == "elastic"
-    members = dict.fromkeys(MEMBERS)
-    for member in MEMBERS:
+    members = dict.fromkeys(_MEMBERS)
+    for member in _MEMBERS:
         if elastic and member == "ring" and fixed == "ring":
-            members[member] = CASING
+            members[member] = _CASING
             continue
         members[member] = member
         tables["shaft"].append({"name": member})
@@ -163,12 +163,12 @@ def _planetary(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> d
             others = {"axial": springs.get("axial") or 0.0, "bending": springs.get("tilt") or 0.0}
             units = {"torsion": "N m/rad", "bending": "N m/rad", "radial": "N/m", "axial": "N/m"}
             texts = {key: quantity(value, units[key]) for key, value in (entries | others).items() if value}
-            tables["coupling"].append({"between": [member, CASING]} | texts)
+            tables["coupling"].append({"between": [member, _CASING]} | texts)
         elif entries := spring_entries(springs):
             tables["bearing"].append({"shaft": member} | entries)
     stage = {"name": SET, **members, "angle": quantity(planetary_set(case).planet_angles[0], "rad")}
     stage |= _gears(case, given, tables) | {"planet": _planet(case)}
-    if elastic and members["ring"] == CASING:
+    if elastic and members["ring"] == _CASING:
         stage["elastic_ring"] = True
         tables["sensor"] = [*_sensors(case)]
     gravity = case.planar.gravity if case.train == "planar" else None
@@ -196,7 +196,7 @@ def _gears(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> dict[
         "pressure_angles": [quantity(alpha, "rad") for alpha in alphas],
         "helix_angle": quantity(math.atan(math.tan(base) / math.cos(alphas[0])), "rad"),
     }
-    for member in MEMBERS:
+    for member in _MEMBERS:
         body = section.ring if member == "ring" else getattr(case, member)
         entries = {"mass": quantity(body.mass, "kg"), "inertia": quantity(body.inertia, "kg m^2")}
         if case.train == "helical":

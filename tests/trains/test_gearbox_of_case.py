@@ -6,7 +6,7 @@ import pytest
 from femgear import cli
 from femgear.errors import CaseError
 from femgear.run import solve
-from femgear.trains.gearbox.from_case import gearbox_of_case
+from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case
 
 CASES = (
