@@ -96,7 +96,7 @@ def fzg_gears() -> tuple[Row, ...]:
         within("C14", INTEGRAL, "loss with H_V 0.19863 and mu 0.04487 [W]", 280.0, power * factor * friction, 1e-3),
         printed("A", CLOSED, "H_V of the closed form beyond its range, eps_1 1.111", "0.3064", beyond),
         within("A", INTEGRAL, "loss factor H_V", 0.3023, factor_of_a := loss_factor(a), 5e-4),
-        at_most("A", "", "H_V less the closed form: the integral is smaller", 0.0, max(factor_of_a - beyond, 0.0)),
+        at_most("A", CLOSED, "H_V less the closed form: the integral is smaller", 0.0, max(factor_of_a - beyond, 0.0)),
         printed("H501", GEARPIE_H, "loss factor H_V, closed form", "0.1639", closed_loss_factor(helical, base)),
         within("H501", GEARPIE_H, "H_V, equal loads on lines", 0.1869, loss_factor(helical, overlap, base), 5e-3),
         within("H501", "sum over 4000 x 2000 points", "the same", _summed(helical, overlap, base),
