@@ -305,10 +305,3 @@ def efficiency_rows(results: Any, marks: Marks) -> Iterator[tuple[str, str]]:
     where = f" at {_label(data, at)}" if point_dim(data) == "speed" else f", {_label(data, at)}"
     least = "smallest " if len(values) > 1 else ""
     yield f"{least}efficiency", f"{text}{where}: {loss:.4g} W of losses"
-
-
-def efficiency_verdict(results: Any) -> Iterator[Block]:
-    """Tabulate the efficiency alone, as the verdict of trains that have no other rows."""
-    marks = Marks(results.findings)
-    if rows := tuple(efficiency_rows(results, marks)):
-        yield Block("Verdict", rows=rows, notes=marks.notes)

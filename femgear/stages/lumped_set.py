@@ -51,28 +51,16 @@ def entries_with_verb(names: list[str]) -> str:
     return f"{', '.join(names)} {'has' if len(names) == 1 else 'have'}"
 
 
-def entries_without_effect(data: dict, others: Sequence[str] = (), *, rated: bool = False) -> list[str]:
+def entries_without_effect(data: dict, others: Sequence[str] = (), *, lives: bool = False) -> list[str]:
     """List entries that no set of rigid bodies takes up: machines, housing, run-up, foundation of the ring, others.
 
-    ``data`` are the tables of a case file that was checked; strength has an effect where teeth are ``rated``.
+    ``data`` are the tables of a case file that was checked; load cases have an effect where ``lives`` are computed.
     """
     machines = [name for name in ("motor", "brake", "housing", "runup") if name in data]
     keys = ("foundation_radial", "foundation_tangential")
     foundation = (f"ring.{key}" for key in keys if key in data["ring"])
-    return [*machines, *others, *foundation, *([] if rated else strength_entries(data))]
-
-
-def strength_entries(data: dict) -> list[str]:
-    """List the entries of safeties and lives: the section ``strength``, limits of the materials, load cases."""
-    tables = {"material": data["material"]} | {
-        f"{gear}.material": data[gear]["material"]
-        for gear in ("sun", "planet", "ring", "gear_1", "gear_2")
-        if "material" in data.get(gear, {})
-    }
-    entries = ("root_stress_limit", "contact_stress_limit", "treatment", "grade", "hardness")
-    limits = [f"{name}.{key}" for name, table in tables.items() for key in table if key in entries]
-    spectrum = [f"operation.{key}" for key in ("load_case", "required_hours") if key in data["operation"]]
-    return [*limits, *(["strength"] if "strength" in data else []), *spectrum]
+    spectrum = (f"operation.{key}" for key in ("load_case", "required_hours") if key in data["operation"])
+    return [*machines, *others, *foundation, *(() if lives else spectrum)]
 
 
 def flank_entries(data: dict) -> list[str]:

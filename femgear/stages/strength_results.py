@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.case.gear_set import planetary_set
 from femgear.report.response import stored_harmonics
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, tabulate
@@ -28,8 +29,9 @@ if TYPE_CHECKING:
 SYMBOLS = {"sharing": "K_gamma", "dynamic": "K_v", "face": "K_Hβ", "transverse": "K_Hα"}
 """Symbols of the load factors by the names of their arrays."""
 _GIVEN_BY = {
+    "sharing": "K_γ (a response, or of rigid bodies a static solution)",
     "dynamic": "K_v (a response, or operation.speeds with strength.quality)",
-    "face": "K_Hβ (static.slices = 25)",
+    "face": "K_Hβ (a static solution with static.slices = 25)",
     "transverse": "K_Hα and K_Fα (strength.quality)",
 }
 """Load factors that may be missing, with the entries that give them."""
@@ -40,31 +42,56 @@ def strength_verdict(results: Results) -> Iterator[Block]:
 
     Among them stands which stresses of finite elements differ from nominal ones, and why, where there are such.
 
-    K_gamma and K_Hbeta are those of the static solution, K_v that of the response, as far as they were computed.
+    Safeties need teeth and a torque alone: K_gamma and K_Hbeta are those of the static solution, K_v that of the
+    response, as far as they were computed.
     """
-    marks = Marks(results.findings)
-    reasons = list(reason_row(results.stress)) if "stress" in results.stages else []
+    marks, stages = Marks(results.findings), results.stages
+    reasons = list(reason_row(results.stress)) if "stress" in stages else []
     rows = [*reasons, *efficiency_rows(results, marks)]
-    if "static" not in results.stages or not rating_wanted(results.case):
+    if not rating_wanted(results.case):
         if rows:
             yield Block("Verdict", rows=tuple(rows), notes=marks.notes)
         return
-    static, dynamic = results.static, None
-    kinds = kind_names(static["mesh"].values.tolist())
-    share = static["load_share"].mean("position").values.max() * static.sizes["planet"]
-    if "dynamics" in results.stages:
+    kinds, dynamic = kind_names(planetary_set(results.case).mesh_names), None
+    sharing, face = computed_load_factors(results.static, kinds) if "static" in stages else (None, None)
+    if "dynamics" in stages:
         dynamic = computed_dynamic_factor(results.dynamics, len(kinds))
-    rating = rate_case(
-        results.case,
-        sharing=np.full(len(kinds), share) if static.sizes["planet"] > 1 else None,
-        dynamic=dynamic,
-        face=_largest_of_kinds(static["face_load_factor"].values, kinds) if "face_load_factor" in static else None,
-    )
+    elif "response" in stages:
+        dynamic = factor_of_two_frequencies(results.response, len(kinds))
+    rating = rate_case(results.case, sharing=sharing, dynamic=dynamic, face=face)
     doubts = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
     lives = life_rows(results.life, marks) if "life" in results.stages else ()
     rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *lives, *rows]
     yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
     yield strength_block(rating, kinds)
+
+
+def computed_load_factors(static: xr.Dataset, kinds: Sequence[str]) -> tuple[np.ndarray | None, np.ndarray | None]:
+    """Find K_gamma and K_Hbeta (kinds,) of static.nc; None of one planet, and without slices."""
+    planets, face = static.sizes["planet"], None
+    if "face_load_factor" in static:
+        face = _largest_of_kinds(static["face_load_factor"].values, kinds)
+    if planets == 1:
+        return None, face
+    share = static["load_share"].mean("position").values.max() * planets
+    return np.full(len(kinds), share), face
+
+
+def factor_of_two_frequencies(response: xr.Dataset, kinds: int) -> np.ndarray:
+    """Find K_v (kinds,) of response.nc, whose lines have multiples of two frequencies.
+
+    The largest force of a mesh at any phases of weight and mesh over its mean, at any speed.
+    """
+    orders = np.stack([response["carrier_order"].values, response["mesh_order"].values])
+    phases = [2.0 * np.pi * np.arange(count) / count for count in (4 * np.abs(orders).max(axis=1) + 8)]
+    turned = sum(order[:, None] * phase.ravel() for order, phase in zip(orders, np.meshgrid(*phases), strict=True))
+    mean = (orders == 0).all(axis=0)
+    factors = []
+    for i in range(response.sizes["speed"]):
+        force = stored_harmonics(response.isel(speed=i), "mesh_force")
+        peak = np.real(force @ np.exp(1j * turned)).max(axis=1)
+        factors.append((peak / np.real(force[:, mean].sum(axis=1))).reshape(kinds, -1).max(axis=1))
+    return np.max(factors, axis=0)
 
 
 def computed_dynamic_factor(dynamics: xr.Dataset, kinds: int) -> np.ndarray:
@@ -147,7 +174,7 @@ def safety_notes(rating: Rating) -> Iterator[str]:
         wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "face" in factors.sources else ""
         transverse = "; roots have K_Fα in the place of K_Hα" if "transverse" in factors.sources else ""
         yield f"long life, every other factor of ISO 6336-2 and -3 is 1{wide}{transverse}"
-        yield from _missing_factors(factors)
+        yield from _missing_factors(factors, planets=any(flank.reversed_bending for flank in flanks))
     if factors.message:
         yield f"no load factors of part 1: {factors.message}"
 
@@ -158,9 +185,10 @@ def factor_names(factors: MeshLoadFactors) -> list[str]:
     return ["K_A", *computed] if factors.application != 1.0 else computed
 
 
-def _missing_factors(factors: MeshLoadFactors) -> Iterator[str]:
-    """Say of the load factors that nothing told what would give them."""
-    missing = [text for name, text in _GIVEN_BY.items() if name not in factors.sources]
+def _missing_factors(factors: MeshLoadFactors, *, planets: bool) -> Iterator[str]:
+    """Say of the load factors that nothing told what would give them; without planets there is no K_gamma."""
+    wanted = {name: text for name, text in _GIVEN_BY.items() if planets or name != "sharing"}
+    missing = [text for name, text in wanted.items() if name not in factors.sources]
     if missing:
         yield f"taken as 1, in brackets what gives them: {', '.join(missing)}"
 

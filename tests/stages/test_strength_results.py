@@ -10,6 +10,7 @@ import xarray as xr
 from femgear.stages.strength import rate_case
 from femgear.stages.strength_results import (
     computed_dynamic_factor,
+    factor_of_two_frequencies,
     kind_names,
     safety_notes,
     safety_rows,
@@ -52,7 +53,7 @@ def test_what_is_missing_is_named_by_its_entry(planetary):
     assert notes({}).startswith("give material.root_stress_limit and material.contact_stress_limit, or")
     some = notes({"sun.material.contact_stress_limit": "1500 MPa", "material.root_stress_limit": "430 MPa"})
     assert "give planet.material.contact_stress_limit, ring.material.contact_stress_limit to get" in some
-    assert "K_Hβ (static.slices = 25)" in some and "strength.quality" in some
+    assert "K_Hβ (a static solution with static.slices = 25)" in some and "strength.quality" in some
     assert "strength.quality" not in notes({**LIMITS, "strength.quality": 6})
 
 
@@ -80,7 +81,52 @@ def test_a_verdict_takes_computed_factors_where_there_are_any(pair):
     assert dict(verdict.rows)["safety S_F, ISO 6336-3:2019"].startswith(f"gear 1 {rating.flanks[0].root_safety:.2f}")
     assert "K_v 1.400 (computed), K_Hβ 1.300 (computed)" in table.notes[0]
     assert not list(strength_verdict(SimpleNamespace(case=pair, stages=("static",), findings=())))
-    assert not list(strength_verdict(SimpleNamespace(case=results.case, stages=(), findings=())))
+
+
+@pytest.mark.parametrize(
+    ("name", "given"),
+    [
+        ("nrel_pgb.toml", {}),
+        (
+            "helical_30_20_70.toml",
+            {"helical.mesh_stiffness.sun_planet": "4e8 N/m", "helical.mesh_stiffness.planet_ring": "5e8 N/m"},
+        ),
+    ],
+)
+def test_sets_whose_mesh_stiffness_is_given_are_rated_by_teeth_and_torque(name, given):
+    case = with_values(read_case(Path("cases") / name), {**LIMITS, **given})
+    assert not any("root_stress_limit" in str(finding) for finding in case.notices)
+    verdict, table = strength_verdict(SimpleNamespace(case=case, stages=("modes",), findings=()))
+    rating = rate_case(case)
+    rows = dict(verdict.rows)
+    assert rows["safety S_F, ISO 6336-3:2019"].startswith(f"sun {rating.flanks[0].root_safety:.2f}")
+    assert "smallest safety" in rows and len(table.rows) == 4
+    (missing,) = [note for note in verdict.notes if note.startswith("taken as 1")]
+    assert all(symbol in missing for symbol in ("K_γ (", "K_v (", "K_Hβ (", "K_Hα"))
+
+
+def test_what_is_missing_for_a_safety_is_named_by_its_key(pair):
+    """By [strength] alone: limits; with one of them the other."""
+    (asked, _) = strength_verdict(
+        SimpleNamespace(case=with_values(pair, {"strength.edition": 2019}), stages=(), findings=())
+    )
+    assert any("material.root_stress_limit and material.contact_stress_limit" in note for note in asked.notes)
+    halved = with_values(pair, {"gear_1.material.root_stress_limit": "430 MPa"})
+    (half, _) = strength_verdict(SimpleNamespace(case=halved, stages=(), findings=()))
+    keys = next(note for note in half.notes if note.startswith("give "))
+    assert "gear_2.material.root_stress_limit" in keys and "material.contact_stress_limit" in keys
+
+
+def test_the_factor_of_two_frequencies_is_the_largest_force_at_any_phases_over_the_mean():
+    """10 + 2 cos(carrier) + 3 sin(mesh) is 15 at most; the second mesh has 11 at the second speed."""
+    orders = {"carrier_order": ("line", [0, 1, 0, 1]), "mesh_order": ("line", [0, 0, 1, 1])}
+    real = np.zeros((2, 2, 4))
+    real[:, :, 0], imaginary = 10.0, np.zeros((2, 2, 4))
+    real[0, 0, 1:], imaginary[0, 0, 2] = [2.0, 0.0, 0.0], -3.0
+    real[1, 1, 1] = 1.0
+    lines = ("speed", "mesh", "line")
+    data = xr.Dataset({"mesh_force_real": (lines, real), "mesh_force_imag": (lines, imaginary)}, coords=orders)
+    assert factor_of_two_frequencies(data, 2) == pytest.approx([1.5, 1.1], rel=1e-12)
 
 
 def test_dynamic_factor_of_harmonics_is_the_largest_over_the_mean():

@@ -13,13 +13,15 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case import text as case_text
 from femgear.case.sections import StrengthSection
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.strength import Rating, rate_case, rating_wanted
 from femgear.stages.strength_results import factor_names, kind_names, safety_notes
-from femgear.trains.gearbox.case_file import GearboxCase
-from femgear.trains.gearbox.contact import StageContact
+from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
+from femgear.trains.gearbox.contact import StageContact, loaded_tables
 from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.power import BoxFlow
 
 _OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
 _SAFETIES = {"iso_root_safety": "S_F", "iso_contact_safety": "S_H"}
@@ -69,12 +71,32 @@ def strength_of_stage(case: GearboxCase, teeth: Any) -> StrengthSection:
     return teeth.strength if "strength" in teeth.model_fields_set else case.strength
 
 
+def _rated_teeth(case: GearboxCase, stage: PairSection | BoxPlanetarySection, flow: BoxFlow) -> Rating | None:
+    """Rate the teeth of a stage whose contact is not computed, with equal shares and K_Hbeta 1."""
+    torque, frequency = -flow.first_torque(stage), abs(flow.mesh_frequency[stage.name])
+    teeth = stage_case_of(case_text.write(loaded_tables(stage, torque, 0)))
+    if not (rating_wanted(teeth) or "strength" in case.model_fields_set):
+        return None
+    return rate_case(
+        teeth,
+        torque=torque,
+        frequencies=(frequency,) if frequency else (),
+        strength=strength_of_stage(case, teeth),
+    )
+
+
 def rated_stages(state: Deflection) -> dict[str, Rating]:
-    """Rate all stages of a loaded state whose teeth are computed and that ask for safeties, by their names."""
+    """Rate all stages of a loaded state that have teeth and ask for safeties, by their names.
+
+    Without ``deflection.contact`` the torque alone rates them.
+    """
     case, flow = state.model.case, state.model.flow
     ratings = {
         name: rated_stage(case, name, contact, flow.mesh_frequency[name]) for name, contact in state.contacts.items()
     }
+    for stage in state.model.stages:
+        if stage.name not in ratings and flow.touches(stage.section):
+            ratings[stage.name] = _rated_teeth(case, stage.section, flow)
     return {name: rating for name, rating in ratings.items() if rating is not None}
 
 

@@ -76,7 +76,7 @@ class HelicalSection(Section):
 
 def helical_notices(data: dict, helix_angle: float) -> Iterator[Finding]:
     """List what deserves a look in a helical case, by the tables of its checked file and its helix [rad]."""
-    unused = entries_without_effect(data, rated="mesh_stiffness" not in data["helical"])
+    unused = entries_without_effect(data, lives="mesh_stiffness" not in data["helical"])
     static = data.get("static", {})
     without = ("back_flanks",) if static.get("slices", 0) > 1 else ("stresses", "back_flanks")
     unused += [f"static.{key}" for key in without if key in static]

@@ -21,7 +21,6 @@ from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.stages.losses import LOSSES
-from femgear.stages.losses_results import efficiency_verdict
 from femgear.stages.lumped_set import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
 from femgear.stages.protocol import (
     FiguresOf,
@@ -35,6 +34,7 @@ from femgear.stages.protocol import (
 )
 from femgear.stages.static import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
 from femgear.stages.static_results import StaticResult, describe_set
+from femgear.stages.strength_results import strength_verdict
 from femgear.system.fourier import side_bands
 from femgear.trains.planar.model import (
     carrier_sense,
@@ -432,6 +432,6 @@ PLANAR = Train(
     describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),
     warnings=planar_warnings,
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
-    verdict=efficiency_verdict,
+    verdict=strength_verdict,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
 )

@@ -11,7 +11,15 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.sections import StrengthSection
 from femgear.report.tables import Marks
 from femgear.stages.strength import rate_case
-from femgear.trains.gearbox.strength import describe_strength, rated_stage, smallest_safeties, strength_contents
+from femgear.trains.gearbox.case_file import teeth_of
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.strength import (
+    describe_strength,
+    rated_stage,
+    rated_stages,
+    smallest_safeties,
+    strength_contents,
+)
 from femgear.trains.reading import read_case, with_values
 
 CASES = Path(__file__).parents[3] / "cases"
@@ -75,6 +83,20 @@ def data(pair, planetary):
         coords={"load_case": ["half", "full"], "gear": coords["gear"][1], "stage": ["pair stage", "set"]},
         attrs=attrs,
     )
+
+
+def test_without_contact_the_torque_of_a_stage_rates_its_teeth():
+    axle = read_case(CASES / "e_axle.toml")
+    state = solve_deflection(with_values(axle, {"deflection.contact": False, "strength.edition": 2006}))
+    assert not state.contacts
+    ratings = rated_stages(state)
+    assert list(ratings) == ["first stage", "second stage"]
+    pair = ratings["first stage"]
+    teeth, torque = teeth_of(axle.pair[0]), abs(state.model.flow.first_torque(axle.pair[0]))
+    nominal = rate_case(teeth, torque=torque, strength=StrengthSection(edition=2006)).nominal
+    assert [flank.root_stress for flank in pair.flanks] == pytest.approx(nominal.root[0].tolist(), rel=1e-12)
+    assert all(flank.root_factor == 1.0 for flank in pair.flanks)
+    assert not rated_stages(solve_deflection(with_values(axle, {"deflection.contact": False})))
 
 
 def test_stages_are_rated_with_their_own_sharing_and_face_load(planetary):
