@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -21,6 +22,8 @@ from femgear.gears.power_losses import basic_efficiency, planetary_efficiency
 from femgear.gears.profile import base_helix_angle, overlap_ratio
 from femgear.stages.losses import computed_loss_factor, solve_losses
 from femgear.stages.static import solve_static
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.losses import loss_point
 from femgear.trains.reading import read_case, with_values
 from validation.rows import Row, at_most, information, printed, within
 from validation.strength import ALPHA, helical_test_gear
@@ -133,6 +136,27 @@ def computed_loads() -> tuple[Row, ...]:
         printed("C14", GEARPIE, "coefficient of friction of the case", "0.0449", data["friction_coefficient"][0, 0]),
         at_most("C14", "power that enters", "balance of powers, relative", 1e-9, float(data["power_imbalance"][0])),
     )
+
+
+def gearbox() -> tuple[Row, ...]:
+    """Balance and efficiency of a gearbox of two stages with bearings."""
+    losses = {"friction": "constant", "coefficient": 0.05}
+    oil = {"viscosity": "20 mm^2/s"}
+    case = with_values(read_case("cases/e_axle.toml"), {"losses": losses, "lubricant": oil, "deflection.slices": 11})
+    state = solve_deflection(case)
+    whole = loss_point(state, case.load_case)
+    teeth = with_values(case, {"losses": losses | {"bearings": False}})
+    alone = loss_point(replace(state, model=replace(state.model, case=teeth)), teeth.load_case)
+    pair, planetary = (alone.friction[name].passed for name in ("first stage", "second stage"))
+    expected = pair[0] * planetary_efficiency(basic_efficiency(planetary), 73 / 23)
+    bearings = sum(whole.bearing_loss.values())
+    name = "electric axle"
+    return (
+        at_most(name, "power that enters", "balance of powers, relative", 1e-9, abs(whole.flow.imbalance)),
+        within(name, MULLER, "efficiency of both stages without bearings", expected, alone.flow.efficiency, 1e-12),
+        at_most(name, "meshes and bearings", "losses less their sum [W]", 1e-9,
+                abs(whole.flow.loss - bearings - sum(map(np.sum, whole.mesh_loss.values())))),
+    )  # fmt: skip
 
 
 def sets() -> tuple[Row, ...]:

@@ -125,6 +125,7 @@ THEMES = (
         "Compared with: reports of GEARpie, closed forms, sums over the path; gates: printed digits; 5 % between loads "
         "of finite elements and those of a formula; 1e-9 for balances of powers.",
         (losses.fzg_gears, losses.sets, losses.computed_loads),
+        (losses.gearbox,),
     ),
     Theme(
         "ISO 6336",

@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case.quantities import RPM
+from femgear.case.quantities import RPM, Dimension
 from femgear.findings import DOUBT, Finding
 from femgear.gears.power_losses import LossyFlow, basic_efficiency
 from femgear.report.tables import Block, Marks, tabulate
+from femgear.stages.key_figures import NUMBER, KeyFigure, Stored
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import as_written, declared
@@ -22,6 +23,12 @@ if TYPE_CHECKING:
 
     from femgear.case.lubrication import LossesSection
 
+POWER = Dimension("a power", "W", "W", 1.0)
+LOSS_FIGURES = (
+    KeyFigure("efficiency", NUMBER, "losses", Stored("efficiency", pick="smallest"), whole=True),
+    KeyFigure("losses", POWER, "losses", Stored("loss"), whole=True),
+)
+"""Key figures of all trains with losses: the worst of all operating points."""
 _SHOWN = 12
 """Operating points in a table, at most."""
 LOSS_VARIABLES = {
@@ -190,7 +197,7 @@ class LossesResult(StageResult):
 
 
 def _joined(parts: Iterable[np.ndarray]) -> np.ndarray:
-    return np.concatenate([*parts]) if parts else np.zeros(0)
+    return np.concatenate([np.zeros(0), *parts])
 
 
 def loss_warnings(data: xr.Dataset) -> Iterator[Finding]:

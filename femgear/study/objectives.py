@@ -25,6 +25,7 @@ from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness
 from femgear.moved import former_names
 from femgear.stages.key_figures import NUMBER, KeyFigure, figure_of
+from femgear.stages.losses_results import LOSS_FIGURES
 from femgear.stages.static_results import LARGE
 from femgear.system.fourier import sample
 from femgear.trains.elastic import stages as elastic_stages
@@ -49,7 +50,7 @@ _SPEEDS = 51
 _MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 _FORCE = Dimension("a force", "N", "N", 1.0)
 _STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
-STAGES = ("gears", "static", "deflection", "stress", "modes", "dynamics", "runup", "housing")
+STAGES = ("gears", "static", "deflection", "stress", "losses", "modes", "dynamics", "runup", "housing")
 """In the order of their effort."""
 
 
@@ -367,6 +368,12 @@ def _words(at: Range) -> str:
     return f"{at[0] / SPEED.scale:.6g} to {SPEED.show(at[1])} ({at[2]} speeds)"
 
 
+def quantity_of_figure(figure: KeyFigure) -> StudyQuantity:
+    """Define the quantity that a key figure of a train is."""
+    findings = partial(_of_figure, figure)
+    return StudyQuantity(figure.name, figure.dimension, figure.stage, partial(_figure, figure), findings=findings)
+
+
 _WORDS: dict[str, Callable[..., StudyQuantity]] = {
     "ste": transmission_error,
     **{f"ste {mesh}": partial(transmission_error, mesh) for mesh in get_args(Mesh)[1:]},
@@ -377,16 +384,11 @@ _WORDS: dict[str, Callable[..., StudyQuantity]] = {
     **{f"tip thickness {gear}": partial(tip_thickness, gear) for gear in get_args(_GearName)},
     "contact pressure": contact_pressure,
     **{f"root stress {gear}": partial(root_stress, gear) for gear in get_args(_GearName)},
+    **{figure.name: partial(quantity_of_figure, figure) for figure in LOSS_FIGURES},
 }
 _OVER_SPEEDS = ("mesh force", "peak mesh force", "housing")
 """Quantities that take the first and the last speed."""
 NAMES = tuple(_WORDS)
-
-
-def quantity_of_figure(figure: KeyFigure) -> StudyQuantity:
-    """Define the quantity that a key figure of a train is."""
-    findings = partial(_of_figure, figure)
-    return StudyQuantity(figure.name, figure.dimension, figure.stage, partial(_figure, figure), findings=findings)
 
 
 def _figure(figure: KeyFigure, answer: Answer) -> float:

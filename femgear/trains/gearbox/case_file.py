@@ -221,7 +221,7 @@ class BoxBearingSection(SeatSection):
     stiffness follows the load; ``contact_angle`` above zero takes thrust on the shaft towards +z, below zero
     towards -z. With an ``axial_sense`` it takes thrust on the shaft that way alone, with "none" of it nothing: a ring
     slides in its seat. ``clearance`` is the radial play, ``preload`` the axial approach of the rings. The ratings are
-    those of the catalogue.
+    those of the catalogue. ``load_friction`` and ``lubricant_friction`` are f_1 and f_0 of Palmgren's friction torque.
     """
 
     name: Name | None = None
@@ -249,6 +249,8 @@ class BoxBearingSection(SeatSection):
     fatigue_limit: Annotated[float, Quantity(FORCE, 1e-3, _LARGEST_FORCE)] | None = None
     viscosity_ratio: Annotated[float, Number(0.1, 100.0)] | None = None
     contamination: Annotated[float, Number(0.0, 1.0)] | None = None
+    load_friction: Annotated[float, Number(0.0, 0.1)] | None = None
+    lubricant_friction: Annotated[float, Number(0.0, 100.0)] | None = None
     estimated: StrictBool = False
 
     @property

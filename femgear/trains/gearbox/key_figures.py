@@ -15,6 +15,7 @@ import numpy as np
 from femgear.case.quantities import ACCELERATION, RPM, SPEED, Dimension
 from femgear.gears.planetary import mesh_names
 from femgear.stages.key_figures import DECIBEL, NUMBER, KeyFigure, Stored
+from femgear.stages.losses_results import LOSS_FIGURES
 from femgear.trains.gearbox.case_file import FORCE, BoxPlanetarySection, GearboxCase, PairSection
 from femgear.trains.gearbox.casing import bearing_name
 from femgear.trains.gearbox.geometry import set_sizes
@@ -42,7 +43,7 @@ def stage_meshes(stage: PairSection | BoxPlanetarySection) -> tuple[str, ...]:
 
 def gearbox_key_figures(case: GearboxCase) -> tuple[KeyFigure, ...]:
     """List the key figures of a case by name, those of the whole gearbox before those of its parts."""
-    return (*_of_deflection(case), *_of_modes(), *_of_responses(case))
+    return (*_of_deflection(case), *_of_losses(case), *_of_modes(), *_of_responses(case))
 
 
 def _family(
@@ -103,6 +104,16 @@ def _bearing_force(labels: tuple[str, ...], data: Any) -> float:
     names = [str(name) for name in data["bearing"].values]
     places = [place for place, name in enumerate(names) if not labels or name in labels]
     return float(force[:, places].max())
+
+
+def _of_losses(case: GearboxCase) -> Iterator[KeyFigure]:
+    if case.losses is None:
+        return
+    yield from LOSS_FIGURES
+    stages = [stage for stage in (*case.pair, *case.planetary) if stage.teeth and case.deflection.contact]
+    for stage in stages:
+        of_stage = Stored("stage_efficiency", "stage", (stage.name,), "smallest")
+        yield KeyFigure(f"efficiency {stage.name}", NUMBER, "losses", of_stage)
 
 
 def _of_modes() -> Iterator[KeyFigure]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from femgear.case.quantities import TORQUE
 from femgear.errors import CaseError, FemgearError
@@ -102,24 +103,9 @@ def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) ->
     balance; the entries that it names are those of the case file.
     """
     load_case = load_case or case.load_case
-    shaft_of = port_shafts(case)
-    joined = [one.between for one in case.coupling if one.transmits and one.torsion > 0.0]
-    held = {*case.operation.fixed, *(name for pair in joined if CASING in pair for name in pair if name != CASING)}
-    torques: dict[str, float] = {}
-    for port, torque in load_case.torque.items():
-        torques[shaft_of[port]] = torques.get(shaft_of[port], 0.0) + torque
-    outputs = [shaft_of[port] for port in case.operation.output]
-    conditions = stage_conditions(case)
+    shaft_of, conditions, given = port_shafts(case), stage_conditions(case), flow_entries(case, load_case)
     try:
-        graph = power_flow(
-            [shaft.name for shaft in case.shaft],
-            conditions,
-            speeds=load_case.speed,
-            torques={shaft: torque for shaft, torque in torques.items() if shaft not in outputs},
-            held=sorted(held),
-            outputs=outputs,
-            joined=[pair for pair in joined if CASING not in pair],
-        )
+        graph = power_flow([shaft.name for shaft in case.shaft], conditions, speeds=load_case.speed, **given)
     except FemgearError as error:
         _locate(error, case, load_case)
         raise
@@ -137,13 +123,30 @@ def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) ->
         )
         for one in conditions
     }
-    independent = _independent(case, conditions, sorted(held), joined, load_case)
+    independent = _independent(case, conditions, given["held"], given["joined"], load_case)
     return BoxFlow(dict(graph.stage_torque), {**graph.speed, CASING: 0.0}, ports, independent, frequencies)
+
+
+def flow_entries(case: GearboxCase, load_case: LoadCaseSection) -> dict[str, Any]:
+    """Collect what a power flow takes beside shafts, stages and speeds: torques, outputs, held and joined shafts."""
+    shaft_of = port_shafts(case)
+    joined = [one.between for one in case.coupling if one.transmits and one.torsion > 0.0]
+    held = {*case.operation.fixed, *(name for pair in joined if CASING in pair for name in pair if name != CASING)}
+    torques: dict[str, float] = {}
+    for port, torque in load_case.torque.items():
+        torques[shaft_of[port]] = torques.get(shaft_of[port], 0.0) + torque
+    outputs = [shaft_of[port] for port in case.operation.output]
+    return {
+        "torques": {shaft: torque for shaft, torque in torques.items() if shaft not in outputs},
+        "held": sorted(held),
+        "outputs": outputs,
+        "joined": [pair for pair in joined if CASING not in pair],
+    }
 
 
 def _independent(case: GearboxCase, conditions, held, joined, load_case: LoadCaseSection) -> tuple[str, ...]:
     """Choose of the given speeds those from which the others follow."""
-    links = tuple(tuple(pair) for pair in joined if CASING not in pair)
+    links = tuple(map(tuple, joined))
     graph = ShaftGraph(tuple(shaft.name for shaft in case.shaft), tuple(conditions), tuple(held), links)
     found: list[str] = []
     for name in load_case.speed:

@@ -23,6 +23,7 @@ from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
+from femgear.trains.gearbox.losses import BOX_LOSSES, idle_loss_entries
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
 from femgear.trains.gearbox.resonance_table import describe_resonances
@@ -199,6 +200,7 @@ GEARBOX = Train(
             tables=lambda results: describe_deflection(results.deflection)[1:],
             warnings=deflection_warnings,
         ),
+        BOX_LOSSES,
         Stage(
             name="modes",
             decided_by=partial(box_entries, "modes"),
@@ -257,7 +259,7 @@ GEARBOX = Train(
         ),
     ),
     describe=describe_gearbox,
-    warnings=gearbox_warnings,
+    warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case)),
     figures=FiguresOf("femgear.trains.gearbox.figures:FIGURES"),
     recorded=GEARBOX_RECORDED,
     verdict=gearbox_verdict,

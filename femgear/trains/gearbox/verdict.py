@@ -14,6 +14,7 @@ import numpy as np
 from femgear.report.tables import Block, Marks, doubtful_excitation
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.life_results import life_rows
+from femgear.stages.losses_results import efficiency_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
 from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
@@ -37,6 +38,7 @@ def gearbox_verdict(results: Any) -> Iterator[Block]:
         response = results.dynamics if "dynamics" in results.stages else None
         rows += smallest_safeties(results.deflection, response, marks)
         rows += life_rows(results.deflection, marks, of=("deflection",))
+        rows += efficiency_rows(results, marks)
     modes = results.modes if "modes" in results.stages else None
     if modes is not None:
         rows += _nearest_mode(modes)

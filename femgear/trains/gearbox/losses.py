@@ -1,0 +1,180 @@
+"""Stage "losses" of a gearbox: teeth and bearings of all load cases, torques with losses, efficiency.
+
+The teeth lose by the loads of their contact, with the misalignment that the gearbox gives them, bearings by Palmgren's
+formula. Stages whose teeth are not computed, and bearings of given stiffness, lose nothing here, as a finding says.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.case.dependencies import Steps, loss_entries
+from femgear.case.lubrication import losses_wanted, oil_at
+from femgear.errors import CaseError
+from femgear.findings import Finding
+from femgear.gears.power_losses import FrictionTorque, lossy_flow
+from femgear.stages.losses import NO_LOSSES, check_loss_entries, losses_of_meshes, mesh_friction
+from femgear.stages.losses_results import LossesResult, LossPoint, MeshFriction, describe_losses, loss_tables
+from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
+from femgear.system.bearing_friction import (
+    OIL_BATH,
+    friction_kind,
+    friction_load,
+    load_factor,
+    lubricant_torque,
+)
+from femgear.trains.gearbox.case_file import CASING, GearboxCase, LoadCaseSection
+from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.key_figures import stage_meshes
+from femgear.trains.gearbox.life import turning_speed
+from femgear.trains.gearbox.power import flow_entries, stage_conditions
+
+if TYPE_CHECKING:
+    from femgear.trains.gearbox.results import DeflectionResult
+
+
+def bearing_torque(state: Deflection, number: int, speed_share: float = 1.0) -> float:
+    """Compute the friction torque of a bearing [N m] at a share of the speeds; NaN where nothing tells its friction."""
+    case = state.model.case
+    section = case.bearing[number]
+    if section.kind is None or section.pitch_diameter is None:
+        return math.nan
+    force = state.bearing_force[number]
+    radial, axial = math.hypot(force[0], force[1]), float(force[2])
+    try:
+        factor = section.load_friction
+        if factor is None:
+            factor = load_factor(section.kind, section.contact_angle, radial, axial, section.static_rating)
+    except CaseError:
+        return math.nan
+    load = friction_load(section.kind, section.contact_angle, radial, axial)
+    torque = factor * load * section.pitch_diameter
+    if (viscosity := _kinematic(case)) is None:
+        return torque
+    turns = 2.0 * math.pi * turning_speed(state, number) * speed_share
+    bath = section.lubricant_friction
+    bath = OIL_BATH[friction_kind(section.kind, section.contact_angle)] if bath is None else bath
+    return torque + lubricant_torque(bath, section.pitch_diameter, turns, viscosity)
+
+
+def _kinematic(case: GearboxCase) -> float | None:
+    """Kinematic viscosity of the oil in operation [m^2/s]; None where the case has none."""
+    if case.lubricant is None:
+        return None
+    return oil_at(case) / case.lubricant.density
+
+
+def loss_point(state: Deflection, load_case: LoadCaseSection, speed_share: float = 1.0) -> LossPoint:
+    """Compute the losses of a loaded state at a share of the speeds of its load case."""
+    model, case = state.model, state.model.case
+    speed = {shaft: speed_share * value for shaft, value in model.flow.speed.items()}
+    friction: dict[str, MeshFriction] = {}
+    for name, contact in state.contacts.items():
+        frequency = abs(model.flow.mesh_frequency[name]) * speed_share
+        helix = contact.case.helix_angle or 0.0
+        friction[name] = mesh_friction(contact.case, contact.result, frequency, helix_angle=helix, rules=case)
+    torques = {}
+    if case.losses is not None and case.losses.bearings:
+        torques = {name: bearing_torque(state, number, speed_share) for number, name in enumerate(model.bearing_names)}
+    rings = {
+        name: (section.shaft, section.outer_shaft if section.outer_shaft != CASING else None)
+        for name, section in zip(model.bearing_names, case.bearing, strict=True)
+    }
+    flow = lossy_flow(
+        [shaft.name for shaft in case.shaft],
+        stage_conditions(case),
+        speeds=speed,
+        efficiencies={name: of_stage.passed for name, of_stage in friction.items()},
+        friction=[
+            FrictionTorque(name, rings[name], torque) for name, torque in torques.items() if math.isfinite(torque)
+        ],
+        **flow_entries(case, load_case),
+    )
+    sets = {name: contact.result.planetary_set for name, contact in state.contacts.items()}
+    return LossPoint(
+        flow,
+        friction,
+        {name: losses_of_meshes(flow, name, friction[name], sets[name]) for name in friction},
+        {name: flow.friction_loss.get(name, math.nan) for name in torques},
+    )
+
+
+@one_blas_thread()
+def solve_box_losses(
+    case: GearboxCase, deflection: DeflectionResult, *, progress: Progress = silent, steps: Steps | None = None
+) -> LossesResult:
+    """Compute losses and efficiency of all load cases, and the map over torque and speed of the chosen one.
+
+    The gearbox is solved again for every torque of the map.
+    """
+    loaded, cases, losses = deflection.of(case), case.operation.load_case, case.losses
+    assert losses is not None
+    points = tuple(loss_point(state, load_case) for state, load_case in zip(loaded.states, cases, strict=True))
+    chosen = cases[loaded.chosen]
+    efficiency = np.zeros((len(losses.torque_shares), len(losses.speed_shares)))
+    for row, share in enumerate(losses.torque_shares):
+        progress("losses", row, len(efficiency))
+        torque = {port: share * value for port, value in chosen.torque.items()}
+        with_torque = chosen.model_copy(update={"torque": torque})
+        state = loaded.state if share == 1.0 else solve_deflection(case, with_torque, steps=steps)
+        efficiency[row] = [loss_point(state, with_torque, each).flow.efficiency for each in losses.speed_shares]
+    named = {stage.name: stage_meshes(stage) for stage in (*case.pair, *case.planetary)}
+    meshes = {name: named[name] for name in points[0].stages}
+    missing = tuple(_left_out(case, points[0]))
+    return LossesResult(points, meshes, "load_case", [each.name for each in cases], losses, efficiency, missing)
+
+
+def _left_out(case: GearboxCase, point: LossPoint) -> Iterator[str]:
+    """Say which losses are left out, and what would give them."""
+    stages = [stage.name for stage in (*case.pair, *case.planetary) if stage.name not in point.friction]
+    if stages:
+        yield f"stages without computed teeth lose nothing here: {', '.join(stages)}"
+    if case.losses is None or not case.losses.bearings:
+        return
+    silent_bearings = [name for name, loss in point.bearing_loss.items() if not math.isfinite(loss)]
+    if silent_bearings:
+        yield (
+            f"bearings lose nothing here without kind, pitch_diameter and, of balls, static_rating: "
+            f"{', '.join(silent_bearings)}"
+        )
+    if case.planetary:
+        yield "bearings of planets lose nothing here: their stiffness alone is given"
+    if point.bearing_loss and case.lubricant is None:
+        yield "bearings lose nothing by their lubricant: give the section lubricant"
+
+
+def idle_loss_entries(case: GearboxCase) -> Iterator[Finding]:
+    """Tell tables of losses and oil in the teeth of stages, which have no effect there (W-UNUSED)."""
+    for kind in ("pair", "planetary"):
+        for number, stage in enumerate(getattr(case, kind)):
+            for name in ("losses", "lubricant"):
+                if name in (stage.teeth or {}):
+                    key = f"{kind}[{number}].teeth.{name}"
+                    remedy = f"give [{name}] of the gearbox"
+                    yield Finding("W-UNUSED", key, "losses are those of the gearbox", remedy=remedy)
+
+
+def no_box_losses(case: GearboxCase) -> str:
+    """Tell why a gearbox has no losses; empty where it has."""
+    return "" if losses_wanted(case) else NO_LOSSES
+
+
+BOX_LOSSES = Stage(
+    name="losses",
+    decided_by=loss_entries,
+    title="Losses",
+    solve=solve_box_losses,
+    takes=("deflection",),
+    options=("progress", "steps"),
+    wanted=losses_wanted,
+    unavailable=no_box_losses,
+    check=check_loss_entries,
+    verdict=lambda result: {"points": len(result.points)},
+    describe=lambda results: describe_losses(results.losses),
+    tables=lambda results: loss_tables(results.losses),
+    warnings=LossesResult.warnings,
+)

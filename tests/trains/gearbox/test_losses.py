@@ -1,0 +1,110 @@
+"""Losses of a gearbox: teeth, bearings, balance of powers, what is left out."""
+
+import math
+
+import numpy as np
+import pytest
+from small_gearbox import pair_tables, set_on_shafts
+
+from femgear.gears.power_losses import planetary_efficiency
+from femgear.stages.key_figures import figure_of
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.key_figures import gearbox_key_figures
+from femgear.trains.gearbox.losses import bearing_torque, idle_loss_entries, loss_point, solve_box_losses
+from femgear.trains.gearbox.results import DeflectionResult
+from femgear.trains.reading import read_case
+
+BALLS = {
+    "kind": "ball",
+    "rolling_elements": 9,
+    "element_diameter": "9.5 mm",
+    "pitch_diameter": "46 mm",
+    "static_rating": "11.2 kN",
+}
+LOSSES = {"friction": "constant", "coefficient": 0.05}
+OIL = {"viscosity": "20 mm^2/s"}
+
+
+def geared(losses=LOSSES, oil=OIL, **bearing):
+    """Gearbox of a pair with teeth, whose bearings A and C have balls."""
+    tables = pair_tables(teeth=True) | {"losses": losses, "deflection": {"slices": 3, "passes": 3}}
+    tables |= {"lubricant": oil} if oil else {}
+    for number in (0, 2):
+        section = tables["bearing"][number]
+        tables["bearing"][number] = {name: section[name] for name in ("name", "shaft", "position")}
+        tables["bearing"][number] |= {name: value for name, value in (BALLS | bearing).items() if value is not None}
+    return read_case(tables)
+
+
+def solved(case):
+    states = tuple(solve_deflection(case, load_case) for load_case in case.operation.load_case)
+    return DeflectionResult(case, states, case.operation.first - 1)
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return solved(geared())
+
+
+@pytest.fixture(scope="module")
+def result(loaded):
+    return solve_box_losses(loaded.case, loaded)
+
+
+def test_powers_balance_and_losses_are_those_of_teeth_and_bearings(result):
+    data = result.dataset()
+    flow = result.points[0].flow
+    assert abs(float(data["power_imbalance"][0])) < 1e-9
+    assert float(data["loss"][0]) == pytest.approx(float(data["mesh_loss"].sum() + data["bearing_loss"].sum()))
+    assert float(data["input_power"][0]) == pytest.approx(100.0 * 1000.0 * math.pi / 30.0)
+    assert 148.0 < flow.torque["output"] < 150.0
+    passed = 1.0 - 0.05 * float(data["loss_factor"][0, 0])
+    assert float(data["stage_efficiency"][0, 0]) == pytest.approx(passed)
+
+
+def test_bearings_without_a_kind_are_left_out_and_that_is_said(result):
+    lost = dict(zip(result.dataset()["bearing"].values, result.dataset()["bearing_loss"].values[0], strict=True))
+    assert math.isnan(lost["B"]) and math.isnan(lost["D"]) and lost["A"] > lost["C"] > 0.0
+    assert [finding.code for finding in result.findings] == ["W-LOSSES"] and "B, D" in result.findings[0].text
+
+
+def test_entries_of_a_bearing_go_before_the_factors_of_its_kind(loaded):
+    state = loaded.state
+    force = state.bearing_force[0]
+    own = solved(geared(load_friction=2e-3, lubricant_friction=0.0)).state
+    assert bearing_torque(own, 0) == pytest.approx(2e-3 * math.hypot(force[0], force[1]) * 46e-3, rel=1e-6)
+    assert bearing_torque(state, 0, 0.5) < bearing_torque(state, 0)
+    assert math.isnan(bearing_torque(solved(geared(static_rating=None)).state, 0))
+
+
+def test_without_oil_bearings_lose_by_their_load_alone(loaded, result):
+    dry = geared(oil=None)
+    point = loss_point(loaded.of(dry).state, dry.load_case)
+    assert 0.0 < point.bearing_loss["A"] < result.points[0].bearing_loss["A"]
+    none = geared(losses=LOSSES | {"bearings": False})
+    alone = loss_point(loaded.of(none).state, none.load_case)
+    assert alone.bearing_loss == {} and alone.flow.efficiency == pytest.approx(alone.friction["stage"].passed[0])
+
+
+def test_key_figures_are_those_of_the_file(loaded, result):
+    figures, data = gearbox_key_figures(loaded.case), result.contents()
+    for name, variable in (("efficiency", "efficiency"), ("losses", "loss"), ("efficiency stage", "stage_efficiency")):
+        figure = figure_of(figures, name)
+        assert figure is not None and figure.stage == "losses"
+        assert figure.read(data) == pytest.approx(float(np.asarray(data[variable].values).ravel()[0]))
+
+
+def test_tables_of_losses_in_teeth_have_no_effect_and_that_is_said():
+    tables = pair_tables(teeth=True)
+    tables["pair"][0]["teeth"]["losses"] = LOSSES
+    assert [finding.key for finding in idle_loss_entries(read_case(tables))] == ["pair[0].teeth.losses"]
+
+
+@pytest.mark.slow
+def test_a_planetary_stage_has_the_efficiency_of_its_closed_form():
+    case = read_case(set_on_shafts(slices=7) | {"losses": LOSSES})
+    loaded = solved(case)
+    point = loss_point(loaded.state, case.load_case)
+    (friction,) = point.friction.values()
+    basic = friction.passed[0] * friction.passed[1]
+    assert point.flow.efficiency == pytest.approx(planetary_efficiency(basic, 73 / 23), rel=1e-9)
