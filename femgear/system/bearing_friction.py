@@ -9,6 +9,7 @@ on, below it ``160e-7 f_0 d_m^3``, in N mm, with the viscosity nu [mm^2/s], the 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -95,3 +96,32 @@ def load_factor(kind: Kind, contact_angle: float, radial: float, axial: float, s
     share, thrust = (0.6, 0.5) if name == "ball" else (0.5, 0.3)
     equivalent = max(radial, share * radial + thrust * abs(axial))
     return scale * float(np.power(equivalent / static_rating, power))
+
+
+@dataclass(frozen=True)
+class FrictionFactors:
+    """f_1 and f_0 of a bearing.
+
+    Parameters
+    ----------
+    load, lubricant : float
+        f_1 and f_0.
+    """
+
+    load: float
+    lubricant: float
+
+    def torque(self, load: float, pitch_diameter: float, speed: float, viscosity: float | None) -> float:
+        """Compute M_0 + M_1 [N m], M_1 alone without a viscosity.
+
+        Parameters
+        ----------
+        load : float
+            P_1 [N].
+        pitch_diameter, speed, viscosity
+            As for `lubricant_torque`.
+        """
+        torque = self.load * load * pitch_diameter
+        if viscosity is None:
+            return torque
+        return torque + lubricant_torque(self.lubricant, pitch_diameter, speed, viscosity)

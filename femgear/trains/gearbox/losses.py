@@ -22,10 +22,10 @@ from femgear.stages.losses_results import LossesResult, LossPoint, MeshFriction,
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.system.bearing_friction import (
     OIL_BATH,
+    FrictionFactors,
     friction_kind,
     friction_load,
     load_factor,
-    lubricant_torque,
 )
 from femgear.trains.gearbox.case_file import CASING, GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
@@ -51,14 +51,11 @@ def bearing_torque(state: Deflection, number: int, speed_share: float = 1.0) -> 
             factor = load_factor(section.kind, section.contact_angle, radial, axial, section.static_rating)
     except CaseError:
         return math.nan
-    load = friction_load(section.kind, section.contact_angle, radial, axial)
-    torque = factor * load * section.pitch_diameter
-    if (viscosity := _kinematic(case)) is None:
-        return torque
-    turns = 2.0 * math.pi * turning_speed(state, number) * speed_share
     bath = section.lubricant_friction
     bath = OIL_BATH[friction_kind(section.kind, section.contact_angle)] if bath is None else bath
-    return torque + lubricant_torque(bath, section.pitch_diameter, turns, viscosity)
+    load = friction_load(section.kind, section.contact_angle, radial, axial)
+    turns = 2.0 * math.pi * turning_speed(state, number) * speed_share
+    return FrictionFactors(factor, bath).torque(load, section.pitch_diameter, turns, _kinematic(case))
 
 
 def _kinematic(case: GearboxCase) -> float | None:
