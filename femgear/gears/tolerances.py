@@ -9,8 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
 
 from femgear.errors import GeometryError
+from femgear.gears.iso6336 import helix_of
+
+if TYPE_CHECKING:
+    from femgear.gears.gear import Gear
 
 CLASSES = (1, 11)
 """Finest and coarsest flank tolerance class."""
@@ -96,6 +101,16 @@ def flank_tolerances(
         runout=0.9 * cumulative,
     )
     return FlankTolerances(**{entry.name: 1e-6 * _rounded(getattr(exact, entry.name)) for entry in fields(exact)})
+
+
+def tolerances_of_gear(gear: Gear, tolerance_class: int) -> FlankTolerances:
+    """Compute the flank tolerances of a gear of the transverse section [m], see `flank_tolerances`."""
+    return flank_tolerances(
+        tolerance_class,
+        diameter=2.0 * gear.reference_radius,
+        normal_module=gear.module * math.cos(helix_of(gear)[0]),
+        face_width=gear.face_width,
+    )
 
 
 def _checked(

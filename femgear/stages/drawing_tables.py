@@ -34,6 +34,7 @@ from femgear.gears.drawing import (
     usual_span_teeth,
 )
 from femgear.gears.gear import Gear
+from femgear.gears.tolerances import FlankTolerances, tolerances_of_gear
 from femgear.remembered import remembered
 from femgear.report.tables import Block
 
@@ -42,6 +43,18 @@ if TYPE_CHECKING:
     from femgear.gears.pair import GearPair
 
 _NOTHING = "-"
+_TOLERANCES = {
+    "f_pT": "pitch",
+    "F_pT": "cumulative_pitch",
+    "F_alphaT": "profile",
+    "f_falphaT": "profile_form",
+    "f_HalphaT": "profile_slope",
+    "F_betaT": "helix",
+    "f_fbetaT": "helix_form",
+    "f_HbetaT": "helix_slope",
+    "F_rT": "runout",
+}
+"""Symbols of the flank tolerances by their names."""
 _NONE = math.nan, math.nan, math.nan
 
 
@@ -168,8 +181,11 @@ def drawing_attributes(case: GearCase) -> dict[str, Any]:
     }
 
 
-def describe_drawing(case: GearCase) -> Iterator[Block]:
-    """Tabulate thickness, chord, span and dimension over balls of all gears, and the play of their meshes."""
+def describe_drawing(case: Any) -> Iterator[Block]:
+    """Tabulate thickness, chord, span and dimension over balls of all gears, and the play of their meshes.
+
+    With ``strength.quality`` the flank tolerances of this class come beside them.
+    """
     drawn, helix = drawn_gears(case), case.helix_angle or 0.0
     rows: dict[str, Callable[[DrawnGear], str]] = {
         "tooth thickness s_n [mm]": lambda d: _length(d.thickness),
@@ -192,6 +208,25 @@ def describe_drawing(case: GearCase) -> Iterator[Block]:
     names = (d.gear.name.replace("_", " ") for d in drawn)
     yield Block("Drawing", ("", *names), tuple((name, *map(text, drawn)) for name, text in rows.items()), tuple(notes))
     yield _play_block(case)
+    if (tolerance_class := case.strength.quality) is not None:
+        yield _class_block(drawn, tolerance_class)
+
+
+def _class_block(drawn: tuple[DrawnGear, ...], tolerance_class: int) -> Block:
+    """Tabulate the flank tolerances of all gears in a class; what the standard does not cover is a note."""
+    tolerances, notes = list[FlankTolerances | None](), list[str]()
+    for gear in (d.gear for d in drawn):
+        try:
+            tolerances.append(tolerances_of_gear(gear, tolerance_class))
+        except GeometryError as error:
+            tolerances.append(None)
+            notes.append(f"{gear.name.replace('_', ' ')}: {error.message}")
+    rows = tuple(
+        (f"{symbol} [um]", *(_NOTHING if t is None else f"{1e6 * getattr(t, name):.6g}" for t in tolerances))
+        for symbol, name in _TOLERANCES.items()
+    )
+    names = (d.gear.name.replace("_", " ") for d in drawn)
+    return Block(f"Flank tolerances, ISO 1328-1, class {tolerance_class}", ("", *names), rows, tuple(notes))
 
 
 def _play_block(case: GearCase) -> Block:

@@ -26,7 +26,6 @@ from femgear.gears.iso6336 import (
     Edition,
     contact_ratio_factor,
     contact_safety,
-    helix_of,
     nominal_contact_stress,
     overlap_of,
     root_safety,
@@ -47,7 +46,7 @@ from femgear.gears.iso6336_root import NominalRootStress, nominal_root_stress
 from femgear.gears.iso6336_stiffness import line_load_factor, material_factor, pair_mesh_stiffness
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import BRANCH, GearSet
-from femgear.gears.tolerances import flank_tolerances
+from femgear.gears.tolerances import tolerances_of_gear
 
 if TYPE_CHECKING:
     from femgear.case.sections import StrengthSection
@@ -357,15 +356,7 @@ def _effective_deviations(
     case: Any, pair: GearPair, numbers: tuple[int, int], quality: int, speed: float
 ) -> tuple[float, float]:
     """Larger f_pb and f_falpha of both gears [m], less what runs in at a pitch line velocity [m/s]."""
-    tolerances = [
-        flank_tolerances(
-            quality,
-            diameter=2.0 * gear.reference_radius,
-            normal_module=gear.module * math.cos(helix_of(gear)[0]),
-            face_width=gear.face_width,
-        )
-        for gear in pair.gears
-    ]
+    tolerances = [tolerances_of_gear(gear, quality) for gear in pair.gears]
     pitch = max(of_gear.base_pitch(pair.gear_1.pressure_angle) for of_gear in tolerances)
     profile = max(of_gear.profile_form for of_gear in tolerances)
     limits = [gear_material(case, case.gear_names[number]).contact_stress_limit for number in numbers]

@@ -17,9 +17,11 @@ from pydantic import BeforeValidator, ValidationError, model_validator
 
 from femgear.case import text as case_text
 from femgear.case.messages import combine, translate
-from femgear.case.quantities import Section
+from femgear.case.quantities import Count, Section
 from femgear.errors import CaseError
+from femgear.gears.tolerances import CLASSES
 from femgear.study.problem import Variable, current_value, split
+from femgear.study.quality import limit_of_entry
 from femgear.study.samples import share_quantiles
 from femgear.trains.reading import with_values
 
@@ -46,17 +48,27 @@ Amount = Annotated[str | float, BeforeValidator(_amount)]
 class EntryTolerance(Section):
     """Law of an entry, or of several that share one draw.
 
-    ``mean``, ``sigma`` and ``limit`` are in a unit of the entry, or shares of its value as ``"10 %"``.
+    ``mean``, ``sigma`` and ``limit`` are in a unit of the entry, or shares of its value as ``"10 %"``. A ``quality``,
+    the flank tolerance class of ISO 1328-1, stands for sigma and limit of a normal law.
     """
 
     key: Annotated[tuple[str, ...], BeforeValidator(_keys)]
-    distribution: Literal["normal", "uniform"]
+    distribution: Literal["normal", "uniform"] | None = None
     mean: str | float = 0.0
     sigma: Amount | None = None
     limit: Amount | None = None
+    quality: Annotated[int, Count(*CLASSES)] | None = None
 
     @model_validator(mode="after")
     def _possible(self):
+        if self.quality is not None:
+            if given := self.given("distribution", "sigma", "limit"):
+                message = f"quality stands for {' and '.join(given)}"
+                raise CaseError(message, code="E-CHOICE", remedy=f"leave {' and '.join(given)} out, or quality")
+            return self
+        if self.distribution is None:
+            message, remedy = "a tolerance needs its distribution", 'add distribution = "normal", or quality = 6'
+            raise CaseError(message, code="E-KEY-MISSING", limit="'normal' or 'uniform'", remedy=remedy)
         needed, other = ("sigma", None) if self.distribution == "normal" else ("limit", "sigma")
         if getattr(self, needed) is None:
             message = f"a {self.distribution} distribution needs its {needed}"
@@ -104,7 +116,7 @@ class DrawnEntry:
         each = [
             share_quantiles(
                 share,
-                distribution=law.distribution,
+                distribution=law.distribution or "normal",
                 mean=self._number(law.mean, value),
                 sigma=None if law.sigma is None else self._number(law.sigma, value),
                 limit=None if law.limit is None else self._number(law.limit, value),
@@ -157,6 +169,10 @@ def read_entry_tolerances(path: str | os.PathLike, case: Any) -> tuple[tuple[Dra
 def _drawn_entry(case: Any, law: EntryTolerance) -> DrawnEntry:
     """The entries of a law with their values."""
     variable, values = None, list[float]()
+    if law.quality is not None:
+        limit = min(limit_of_entry(case, key, law.quality) for key in law.key)
+        amounts = {"sigma": f"{1e6 * limit / 3.0!r} um", "limit": f"{1e6 * limit!r} um"}
+        law = law.model_copy(update={"distribution": "normal", **amounts})
     for key in law.key:
         raw = current_value(case, key)
         if raw is None:

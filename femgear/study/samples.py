@@ -29,10 +29,10 @@ from scipy.sparse import csr_array
 
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
-from femgear.case.gear_set import need_set
+from femgear.case.gear_set import need_set, planetary_set
 from femgear.case.messages import combine, translate
 from femgear.case.planetary import Case
-from femgear.case.quantities import ANGLE, Quantity, Section
+from femgear.case.quantities import ANGLE, Count, Quantity, Section
 from femgear.case.sections import LARGEST_DEVIATION, LARGEST_SLOPE, Amplitude, Deviation, Slope
 from femgear.contact.assembly import (
     MOST_ENLARGEMENTS,
@@ -69,8 +69,10 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope, ProfileSlope
+from femgear.gears.tolerances import CLASSES
 from femgear.stages.protocol import one_blas_thread
 from femgear.stages.static_results import SLICES
+from femgear.study.quality import laws_of_class
 from femgear.study.relief import DesignBasis, design_basis, sun_torque
 from femgear.trains.reading import with_value, with_values
 
@@ -213,11 +215,17 @@ class CarrierTolerances(RunoutTolerances):
     misalignment: AxisTolerances = AxisTolerances()
 
 
+Quality = Annotated[int, Count(*CLASSES)]
+
+
 class GearTolerances(RunoutTolerances):
     """Of a gear, as the case file has its errors; every tooth and every planet has a draw of its own.
 
-    Slopes and crowning are one draw for all teeth of sun or ring, and one for each flank of all planets.
+    Slopes and crowning are one draw for all teeth of sun or ring, and one for each flank of all planets. Errors that
+    have no law of their own follow from a flank tolerance class of ISO 1328-1, the ``quality``.
     """
+
+    quality: Quality | None = None
 
     pitch: Law | None = None
     cumulative_pitch: Law | None = None
@@ -253,7 +261,9 @@ class PinTolerances(Section):
 
 
 class Tolerances(Section):
-    """Distributions of manufacturing errors, some of them given."""
+    """Distributions of manufacturing errors, some of them given; ``quality`` is that of gears without their own."""
+
+    quality: Quality | None = None
 
     sun: SunTolerances = SunTolerances()
     planet: PlanetTolerances = PlanetTolerances()
@@ -263,13 +273,17 @@ class Tolerances(Section):
 
     @model_validator(mode="after")
     def _some(self):
-        if not any(True for _ in self.laws()):
+        if not any(True for _ in self.laws()) and not any(self.classes().values()):
             raise CaseError(
                 "no error has a tolerance",
                 code="E-KEY-MISSING",
-                remedy="give some, such as sun.pitch, pin_errors.tangential",
+                remedy="give some, such as sun.pitch, pin_errors.tangential, or quality = 6",
             )
         return self
+
+    def classes(self) -> dict[str, int | None]:
+        """Find the flank tolerance class of every gear, None of one that has none."""
+        return {name: getattr(self, name).quality or self.quality for name in _FLANKS}
 
     def laws(self) -> Iterator[tuple[str, Law]]:
         """Give the keys of the errors that are drawn, and their laws."""
@@ -282,7 +296,26 @@ class Tolerances(Section):
                     yield from of(f"{name}.{key}", value)
 
         for name, section in self:
-            yield from of(name, section)
+            if isinstance(section, Section):
+                yield from of(name, section)
+
+
+def with_classes(tolerances: Tolerances, case: Case) -> Tolerances:
+    """Give the gears of a case the laws that their flank tolerance classes make of the errors without a law.
+
+    CaseError: a class or a size that ISO 1328-1 does not cover (E-ISO1328).
+    """
+    sections = dict[str, Section]()
+    for gear in planetary_set(case).gears:
+        section, tolerance_class = getattr(tolerances, gear.name), tolerances.classes()[gear.name]
+        if tolerance_class is None:
+            continue
+        laws = laws_of_class(gear, tolerance_class, over_width=case.static.slices > 0)
+        if section.cumulative_pitch is not None:
+            laws.pop("pitch")
+        made = {key: Law.model_validate(law) for key, law in laws.items() if getattr(section, key) is None}
+        sections[gear.name] = section.model_copy(update=made)
+    return tolerances.model_copy(update=sections)
 
 
 def read_tolerances(path: str | os.PathLike, module: float) -> tuple[Tolerances, str]:
@@ -993,6 +1026,7 @@ def prepared(
     """
     need_set(case)
     law, text = read_tolerances(tolerances, case.sun.module)
+    law = with_classes(law, case)
     checked(positions, "--positions", 8, 4096)
     # of helical teeth more than those asked for, so that slices are met alike
     basis = design_basis(with_value(case, "static.positions", positions), cache=cache, steps=steps)

@@ -8,6 +8,7 @@ import pytest
 from femgear.case.gear_set import planetary_set
 from femgear.errors import GeometryError
 from femgear.gears.drawing import normal_thickness, over_balls, span
+from femgear.gears.tolerances import tolerances_of_gear
 from femgear.stages.drawing_tables import describe_drawing, drawing_attributes, drawn_gears, mesh_plays
 from femgear.trains.reading import read_case, with_values
 
@@ -58,3 +59,13 @@ def test_teeth_and_balls_of_the_case_are_those_of_the_table():
     with pytest.raises(GeometryError, match="E-RANGE") as refusal:
         drawn_gears(with_values(case, {"planet.ball_diameter": "1 mm"}))
     assert (refusal.value.key, refusal.value.value) == ("planet.ball_diameter", "1 mm")
+
+
+def test_a_class_of_the_section_strength_adds_its_flank_tolerances(case):
+    *_, table = describe_drawing(with_values(case, {"strength.quality": 6}))
+    cells = {name: texts for name, *texts in table.rows}
+    assert table.title == "Flank tolerances, ISO 1328-1, class 6"
+    assert cells["f_pT [um]"][0] == f"{1e6 * tolerances_of_gear(planetary_set(case).sun, 6).pitch:.6g}"
+    narrow = with_values(case, {"strength.quality": 6, "set.face_width": "3 mm"})
+    *_, table = describe_drawing(narrow)
+    assert {texts for _, *row in table.rows for texts in row} == {"-"} and len(table.notes) == 3
