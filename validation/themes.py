@@ -39,6 +39,7 @@ from validation import (
     impacts,
     integration,
     levels,
+    life,
     losses,
     members,
     modulation,
@@ -295,6 +296,22 @@ THEMES = (
             strength.life_factors,
             strength.materials,
         ),
+    ),
+    Theme(
+        "life",
+        "Life over load cases (ISO 6336-6)",
+        "Damage sums of roots and flanks, load cycles against the carrier, safeties of spectra. Gears are of case "
+        "hardened steel where no other is named; contacts of load cases are solved. Compared with: figures and sums by "
+        "hand, KISSsoft report, single runs; gates: printed digits; 1e-12; 1e-9 of safeties that are iterated.",
+        (
+            life.three_torques,
+            life.cycles_of_a_set,
+            life.damage_of_halves,
+            life.lives_in_hours,
+            life.single_runs,
+            life.reversed_set,
+        ),
+        (life.spectrum_of_a_file,),
     ),
     Theme(
         "rims",
