@@ -108,7 +108,9 @@ def damage_of_halves() -> tuple[Row, ...]:
             rows.append(within(treatment, "lines by hand", f"{kind}: damage", by_hand, whole, ROUNDED))
             safety = spectrum_safety(stress, cycles, line)
             left = damage_by_hand(safety * stress, cycles, line) - 1.0
-            rows.append(at_most(treatment, "", f"{kind}: damage less 1 under S times the stresses", 1e-9, left))
+            rows.append(
+                at_most(treatment, "lines by hand", f"{kind}: damage less 1 under S times the stresses", 1e-9, left)
+            )
     return tuple(rows)
 
 
