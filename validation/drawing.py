@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import root, root_scalar
 
 from femgear.gears.allowances import thickness_allowances
+from femgear.gears.checks import tip_clearances
 from femgear.gears.drawing import (
     chord,
     gear_at_allowance,
@@ -23,13 +25,16 @@ from femgear.gears.drawing import (
     usual_span_teeth,
 )
 from femgear.gears.gear import Gear, flank_points
-from femgear.gears.profile import BasicRack, transverse_rack, transverse_tool
+from femgear.gears.pair import close_pair
+from femgear.gears.profile import BasicRack, roll, transverse_rack, transverse_tool
+from femgear.gears.tips import settled_tips
 from validation.rows import Row, at_most, printed, within
 
 ALPHA = math.radians(20.0)
 HAND = "closed form of textbooks (Niemann and Winter, vol. 2; DIN 3960), evaluated by hand"
 PROFILE = "points of the flanks that femgear generates, on a helix of their lead"
 BACK = "from the measure back to the profile shift"
+TIPS = "DIN 3960, by hand; a clearance of 0.25 modules"
 FITS = "DIN 3967:1978, example of section 3.1 and rows of both tables as two public programs have them"
 ROUNDING = 1e-12
 TOUCHING = 1e-9
@@ -148,11 +153,37 @@ def on_the_profile() -> tuple[Row, ...]:
         if (k := usual_span_teeth(gear, helix)) is not None:
             reference, _ = planes_on_the_profile(gear, k, helix)
             rows.append(within(case, PROFILE, f"W_{k} [mm]", 1e3 * reference, 1e3 * span(gear, k, helix), TOUCHING))
+        if not helix:
+            points = flank_points(gear, [roll(gear.reference_radius, gear.base_radius)])
+            reference, ours = 2.0 * points[0, 1], chord(gear)[0]
+            rows.append(within(case, PROFILE, "chord [mm]", 1e3 * reference, 1e3 * ours, TOUCHING))
+            reference, ours = abs(gear.tip_radius - points[0, 0]), chord(gear)[1]
+            rows.append(within(case, PROFILE, "height of the chord [mm]", 1e3 * reference, 1e3 * ours, TOUCHING))
         ball = usual_ball(gear, helix) or 0.0
         reference, _ = ball_between_flanks(gear, ball, helix)
         ours, quantity = over_balls(gear, ball, helix), f"M_dK, ball {1e3 * ball:g} mm [mm]"
         rows.append(within(case, PROFILE, quantity, 1e3 * reference, 1e3 * ours, TOUCHING))
     return tuple(rows)
+
+
+def shortened_tips() -> tuple[Row, ...]:
+    """Tips of a shifted pair that keep the clearance of the rack, ``k = a/m - (z1 + z2)/2 - x1 - x2`` (DIN 3960)."""
+    gears = [Gear(z, 3e-3, ALPHA, 0.0, 0.02, 0.008, name=n, tip_open=True) for z, n in ((12, "pinion"), (24, "wheel"))]
+    closed = close_pair(replace(gears[0], profile_shift=0.6), gears[1], centre_distance=56.5e-3, find=("wheel",))
+    pair = settled_tips(closed)
+    case = "12/24, x_1 0.6, a 56.5"
+    rows = [
+        printed(case, TIPS, f"tip diameter of the {gear.name} [mm]", reference, 2e3 * gear.tip_radius)
+        for gear, reference in zip(pair.gears, ("44.84", "79.40"), strict=True)
+    ]
+    k = 56.5 / 3.0 - 18.0 - sum(gear.profile_shift for gear in pair.gears)
+    rows += [
+        within(case, TIPS, f"shortening of the {gear.name} [mm]", -3.0 * k, 1e3 * gear.tip_shortening, ROUNDING)
+        for gear in pair.gears
+    ]
+    clearance = tip_clearances(pair)
+    rows += [within(case, TIPS, f"{name} [mm]", 0.75, 1e3 * value, ROUNDING) for name, value in clearance.items()]
+    return (*rows, printed(case, TIPS, "contact ratio", "1.202", pair.contact_ratio))
 
 
 def there_and_back() -> tuple[Row, ...]:

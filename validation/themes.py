@@ -100,6 +100,7 @@ THEMES = (
             drawing.textbook,
             drawing.helical_by_section,
             drawing.on_the_profile,
+            drawing.shortened_tips,
             drawing.there_and_back,
             drawing.fits,
         ),

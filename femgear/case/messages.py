@@ -239,7 +239,9 @@ def _shift_left_out(error: GeometryError, case: Case) -> None:
         measures = section.given(*MEASURES)
         if measures and (section.profile_shift is None or entry not in section.model_fields_set):
             error.message += f" (the {gear}'s {measures[0]} makes its profile shift {error.value})"
-            error.key, error.value = f"{gear}.{measures[0]}", LENGTH.show(getattr(section, measures[0]))
+            given = getattr(section, measures[0])
+            shown = ", ".join(map(LENGTH.show, given if isinstance(given, tuple) else (given,)))
+            error.key, error.value = f"{gear}.{measures[0]}", shown
             return
     if gear not in sections or entry != "profile_shift" or sections[gear].profile_shift is not None:
         return

@@ -58,14 +58,14 @@ def fit_series(name: str) -> tuple[str, int]:
     Raises
     ------
     GeometryError
-        No such series (E-ALLOWANCE).
+        No such series (E-CHOICE).
     """
     match = _NAME.fullmatch(name)
     allowance, tolerance = (match[2] or match[3], int(match[1] or match[4])) if match else ("", 0)
     if allowance not in ALLOWANCE_SERIES or tolerance not in TOLERANCE_SERIES:
         raise GeometryError(
             "no allowances of DIN 3967",
-            code="E-ALLOWANCE",
+            code="E-CHOICE",
             value=name,
             limit=f"series {', '.join(ALLOWANCE_SERIES)} with {TOLERANCE_SERIES[0]} to {TOLERANCE_SERIES[-1]}",
             remedy='write "cd 25", or both allowances as ["-70 um", "-110 um"]',
@@ -86,14 +86,14 @@ def thickness_allowances(name: str, reference_diameter: float) -> tuple[float, f
     Raises
     ------
     GeometryError
-        No such series, or a diameter beyond the tables (E-ALLOWANCE).
+        No such series (E-CHOICE), or a diameter beyond the tables (E-RANGE).
     """
     allowance, tolerance = fit_series(name)
     row = bisect_left(LARGEST_DIAMETERS, round(1e3 * reference_diameter, 9))
     if row == len(LARGEST_DIAMETERS):
         raise GeometryError(
             f"DIN 3967 has no allowances for a reference diameter of {1e3 * reference_diameter:.6g} mm",
-            code="E-ALLOWANCE",
+            code="E-RANGE",
             value=name,
             limit=f"up to {LARGEST_DIAMETERS[-1]:g} mm",
             remedy='give both allowances as ["-2000 um", "-2600 um"]',

@@ -15,7 +15,7 @@ import numpy as np
 
 from femgear.case.gear_set import planetary_set
 from femgear.case.messages import in_terms_of_the_case
-from femgear.case.tooth_measures import gear_allowances
+from femgear.case.tooth_measures import gear_limits
 from femgear.errors import GeometryError
 from femgear.gears.drawing import (
     MeshPlay,
@@ -130,7 +130,7 @@ def drawn_gears(case: Any) -> tuple[DrawnGear, ...]:
 
 
 def _drawn(case: Any, gear: Gear, helix: float) -> DrawnGear:
-    section, allowances = getattr(case, gear.name), gear_allowances(case, gear.name)
+    section, allowances = getattr(case, gear.name), gear_limits(case, gear)
     teeth, ball = section.span_teeth, section.ball_diameter
     if teeth is not None:
         check_span(gear, teeth, helix)

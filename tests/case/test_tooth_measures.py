@@ -10,6 +10,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.tooth_measures import gear_allowances, shift_open
 from femgear.errors import FemgearError
 from femgear.gears.drawing import normal_thickness, over_balls, span
+from femgear.stages.drawing_tables import drawn_gears
 from femgear.trains.reading import parse_case
 
 PAIR = """
@@ -99,7 +100,10 @@ def test_a_measure_beside_a_shift_thins_the_teeth():
     assert pair.backlash == pytest.approx(30e-6, rel=1e-6), "the span is along the line of action, as the play"
     with pytest.raises(FemgearError, match="E-DUPLICATE") as refusal:
         made(f'{SHIFTED}\nspan = "{1e3 * span(thick, 4) + 0.02!r} mm"\nspan_teeth = 4')
-    assert (refusal.value.value, refusal.value.limit) == ("32.6414 mm", "32.6214 mm")
+    assert refusal.value.value == "32.6414 mm"
+    assert refusal.value.limit is not None and refusal.value.limit.endswith(" to 32.6214 mm")
+    with pytest.raises(FemgearError, match="E-DUPLICATE"):  # no play: another profile shift
+        made(f'{SHIFTED}\nspan = "{1e3 * span(thick, 4) - 0.7!r} mm"\nspan_teeth = 4')
 
 
 def test_a_measure_within_allowances_is_taken_and_one_beyond_is_refused():
@@ -133,7 +137,8 @@ def test_allowances_thin_the_teeth_of_the_normal_section_by_their_mean(helix, na
         (f'{SHIFTED}\ntooth_thickness_allowance = ["-0.11 mm", "-0.07 mm"]', "E-RANGE", None, None),
         (f'{SHIFTED}\ntooth_thickness_allowance = ["10 um", "-70 um"]', "E-RANGE", None, "-10 mm to 0 mm"),
         (f'{SHIFTED}\ntooth_thickness_allowance = ["10 um"]', "E-TYPE", None, None),
-        (f'{SHIFTED}\ntooth_thickness_allowance = "cq 25"', "E-ALLOWANCE", None, None),
+        ('tooth_thickness = ["5.3 mm"]', "E-COUNT", None, None),
+        (f'{SHIFTED}\ntooth_thickness_allowance = "cq 25"', "E-CHOICE", None, None),
     ],
 )
 def test_what_no_drawing_gives_is_refused_by_its_key(entries, code, key, limit):
@@ -150,6 +155,34 @@ def test_backlash_and_allowances_are_refused_together_with_both_values():
     with pytest.raises(FemgearError, match="E-DUPLICATE") as refusal:
         pair_case(allowance, of_set='backlash = "0.1 mm"')
     assert refusal.value.value == "c 25; set.backlash = 100 um"
+
+
+@pytest.mark.parametrize("measure", ["span", "over_balls", "tooth_thickness"])
+@pytest.mark.parametrize("given", [SHIFTED, ""])
+def test_limits_of_a_measure_are_those_of_its_allowances(measure, given):
+    """The limits that `check` prints of "cd 25" give the same gears back, with and without the profile shift."""
+    drawn = drawn_gears(pair_case(f'{SHIFTED}\ntooth_thickness_allowance = "cd 25"'))[0]
+    of = {"span": drawn.span, "over_balls": drawn.over_balls, "tooth_thickness": drawn.thickness}
+    with_it = {"span": "span_teeth = 4", "over_balls": 'ball_diameter = "5.5 mm"', "tooth_thickness": ""}[measure]
+    _, low, high = of[measure]
+    entry = f'{given}\n{measure} = ["{1e3 * high!r} mm", "{1e3 * low!r} mm"]\n{with_it}'
+    (again, _) = drawn_gears(pair_case(entry))
+    assert normal_thickness(again.gear) == pytest.approx(normal_thickness(drawn.gear), rel=1e-12)
+    assert again.thickness == pytest.approx(drawn.thickness, rel=1e-12)
+    # without a shift the thickest tooth has no allowance
+    upper = -70e-6 if given else 0.0
+    assert again.allowances == pytest.approx((upper, upper - 40e-6), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("entries", "of_set"),
+    [('tooth_thickness_allowance = "c 25"', ""), ("", 'backlash = "0.1 mm"')],
+)
+def test_limits_and_allowances_or_backlash_are_refused_together(entries, of_set):
+    limits = 'tooth_thickness = ["5.30 mm", "5.34 mm"]'
+    with pytest.raises(FemgearError, match="E-DUPLICATE") as refusal:
+        pair_case(f"{SHIFTED}\n{limits}\n{entries}", of_set=of_set)
+    assert "5.3 mm, 5.34 mm" in str(refusal.value.value)
 
 
 def test_rings_have_no_span_and_are_measured_between_balls():

@@ -43,11 +43,11 @@ def test_both_tables_rise_with_the_diameter_and_along_their_series():
 
 @pytest.mark.parametrize("name", ["x 25", "cd 20", "cd 31", "ha 25", "25", "cd", "", "25cd25"])
 def test_other_names_are_refused(name):
-    with pytest.raises(GeometryError, match="E-ALLOWANCE"):
+    with pytest.raises(GeometryError, match="E-CHOICE"):
         fit_series(name)
 
 
 def test_a_diameter_beyond_the_tables_is_refused():
-    with pytest.raises(GeometryError, match="E-ALLOWANCE") as refusal:
+    with pytest.raises(GeometryError, match="E-RANGE") as refusal:
         thickness_allowances("c 25", 10.001)
     assert refusal.value.limit == "up to 10000 mm"

@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 
@@ -15,9 +16,11 @@ from femgear.gears.pair import GearPair, close_pair
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles, feasible_angles
 from femgear.gears.profile import PinionCutter
 from femgear.gears.tips import active_limits, clearance_shortening, fillet_overlap, settled_tips, tip_margin
-from femgear.trains.reading import read_case
+from femgear.trains.gearbox.case_file import teeth_of
+from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import train_of
 
+CASES = Path(__file__).resolve().parents[2] / "cases"
 ALPHA = math.radians(20.0)
 TEXTBOOK = [(sun, planet, sun + 2 * planet) for sun in range(17, 41, 3) for planet in range(17, 46, 2)]
 """Unshifted sets, sun 17 to 40 and odd planets of 17 to 45 teeth."""
@@ -205,3 +208,29 @@ def test_a_ring_shift_with_the_sign_of_iso_21771_is_recognised(distance):
 def test_passing_tips_are_shortened():
     pair = settled_tips(close_pair(open_gear(40), open_gear(46, internal=True)))
     assert tip_margin(*pair.gears, pair.centre_distance) >= 0.0 and pair.gear_2.tip_shortening > 0.0
+
+
+@pytest.mark.parametrize(
+    ("name", "stage", "gears"),
+    [
+        ("planetary_27_40_108.toml", None, ("sun", "planet", "ring")),
+        ("nrel_pgb.toml", None, ("sun", "planet", "ring")),
+        ("helical_30_20_70.toml", None, ("sun", "planet", "ring")),
+        ("spur_pair.toml", None, ("gear_1", "gear_2")),
+        ("e_axle.toml", "pair[0].teeth", ("gear_1", "gear_2")),
+        ("e_axle.toml", "planetary[0].teeth", ("sun", "planet", "ring")),
+    ],
+)
+def test_tips_run_free_in_every_train_that_has_teeth(name, stage, gears):
+    """No tip reaches below the involute of a mate, or only where undercut has removed it."""
+    prefix = f"{stage}." if stage else ""
+    case = with_values(read_case(CASES / name), {f"{prefix}{gear}.tip_diameter": "free" for gear in gears})
+    if stage:
+        sections = case.pair if stage.startswith("pair") else case.planetary
+        case = teeth_of(sections[0])
+    made = planetary_set(case)
+    assert all(gear.tip_diameter is None for gear in made.gears)
+    for pair in made.kinds:
+        for gear, partner, reach in active_limits(pair):
+            below = reach - gear.form_roll if gear.internal else gear.form_roll - reach
+            assert below <= 0.0 or gear.undercut or fillet_overlap(gear, partner, pair.centre_distance) <= 1e-9
