@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.findings import Finding
 from femgear.gears.iso6336_life import PITTING
 
 SHARES_SUM = 1e-3
@@ -85,7 +86,7 @@ def _shares_of_the_whole(load_cases: Sequence[Any]) -> Iterator[CaseError]:
 
 
 def check_load_spectrum(case: Any) -> Iterator[CaseError]:
-    """Refuse load cases of a set or a pair that are none, or whose materials have no line of life."""
+    """Refuse load cases of a set or a pair that do not go together, and pitting that materials have no line of."""
     yield from check_running_shares(case.operation)
     seen: dict[str, int] = {}
     for number, name in enumerate(load_case_names(case.operation.load_case)):
@@ -98,22 +99,28 @@ def check_load_spectrum(case: Any) -> Iterator[CaseError]:
                 remedy="give every load case a name of its own",
             )
         seen.setdefault(name, number)
-    if case.operation.load_case:
-        yield from _without_treatment(case)
     yield from check_pitting(case)
 
 
-def _without_treatment(case: Any) -> Iterator[CaseError]:
-    """Gears without a treatment, which has the line of life."""
-    lacking = [name for name in case.gear_names if _treatment(case, name) is None]
-    for name in lacking[:1] if len(lacking) == len(case.gear_names) else lacking:
-        every = len(lacking) == len(case.gear_names)
-        yield CaseError(
-            "lives over load cases follow from the treatment of the material, which is missing",
-            code="E-KEY-MISSING",
-            key="material.treatment" if every else f"{name}.material.treatment",
-            limit="a treatment of ISO 6336-5",
-            remedy='give treatment = "case hardened steel" with its hardness, or leave operation.load_case out',
+def without_line(case: Any) -> list[str]:
+    """List the gears of a case that have no treatment, and with it no line of life."""
+    return [name for name in case.gear_names if _treatment(case, name) is None]
+
+
+def spectrum_notices(case: Any) -> Iterator[Finding]:
+    """List gears whose lives load cases do not give for want of a treatment (W-UNUSED)."""
+    if not case.operation.load_case:
+        return
+    lacking = without_line(case)
+    every = len(lacking) == len(case.gear_names)
+    if lacking:
+        gears = ", ".join(name.replace("_", " ") for name in lacking)
+        text = (
+            "have no effect: no material has a treatment, whose line lives follow" if every else f"give {gears} no life"
+        )
+        keys = "material.treatment" if every else ", ".join(f"{name}.material.treatment" for name in lacking)
+        yield Finding(
+            "W-UNUSED", "operation.load_case", text, remedy=f'give {keys} = "case hardened steel" or the like'
         )
 
 

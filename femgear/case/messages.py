@@ -17,6 +17,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from femgear.case import text as case_text
+from femgear.case.load_spectrum import spectrum_notices
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, wrong_length
 from femgear.case.sections import RackSection
@@ -290,6 +291,7 @@ def notices(data: dict, case: Case) -> Iterator[Finding]:
             f"ring.teeth = {teeth} is read as an internal gear with {-teeth} teeth; ring.profile_shift keeps "
             "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
         )
+    yield from spectrum_notices(case)
     if not case.rigid and "bearing_clearance" in data["planet"] and case.static.members == "fixed":
         text = 'has no effect while static.members is "fixed"'
         remedy = 'write static.members = "elastic"'

@@ -23,6 +23,7 @@ from femgear.exchange.planetary_stage import (
     with_unit,
 )
 from femgear.exchange.rexs import Component, Model
+from femgear.exchange.unit_spectrum import load_case_shares, spectrum_tables
 
 _NAMES = {"sun": "gear_1", "planet": "gear_2", "ring": "gear_2"}
 
@@ -102,4 +103,5 @@ def _operation(
     taken = speeds_of_cases(model, number, torques, speeds, alone=wanted is not None)
     remarks |= {} if taken else {"operation.speeds": "assumed"}
     texts = dict.fromkeys(with_unit(taken_speed, SPEED) for taken_speed in taken or [1000.0 * SPEED.scale])
-    return {"torque": with_unit(torque, TORQUE), "speeds": [*texts]}
+    spectrum = spectrum_tables(model, torques[1:], speeds[1:], load_case_shares(model.load_cases))
+    return {"torque": with_unit(torque, TORQUE), "speeds": [*texts]} | ({"load_case": spectrum} if spectrum else {})

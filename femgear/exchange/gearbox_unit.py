@@ -644,12 +644,13 @@ class _Unit:
         return table | {"teeth": self._teeth(stage)}
 
     def _teeth(self, stage: Component) -> dict[str, Any]:
-        """Tables of the teeth of a stage, without its supports, which the gearbox has."""
+        """Tables of the teeth of a stage, without its supports and load cases, which the gearbox has."""
         tables = {key: value for key, value in self.teeth[stage.id].items() if key not in ("dynamics", "runup")}
         for name in ("gear_1", "gear_2", "sun", "carrier", "ring"):
             if name in tables:
                 tables[name] = {key: value for key, value in tables[name].items() if key not in _SUPPORTS}
-        return {key: value for key, value in tables.items() if value != {}}
+        operation = {key: value for key, value in tables["operation"].items() if key != "load_case"}
+        return {key: value for key, value in (tables | {"operation": operation}).items() if value != {}}
 
     def planetary(self, stage: Component) -> dict[str, Any]:
         """Table of a planetary stage."""

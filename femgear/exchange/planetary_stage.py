@@ -37,6 +37,7 @@ from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
 from femgear.exchange.gear_unit import gears_of, loads_on, stage_components, unit_flow, with_load_case
 from femgear.exchange.rexs import Component, Model, Relation
+from femgear.exchange.unit_spectrum import load_case_shares, spectrum_tables
 from femgear.findings import NOTE
 from femgear.gears.iso6336_stiffness import STEEL
 from femgear.gears.kinematics import MEMBERS, torque_ratios
@@ -667,7 +668,7 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wante
     usual = "carrier" if fixed == "sun" else "sun"
     member = next(iter([*(name for name in turning if name in loaded), *turning, *loaded]), usual)
     ratios = torque_ratios(tables["sun"]["teeth"], tables["ring"]["teeth"])
-    torques, speeds = zip(*(_of_member(member, ratios, *state) for state in states), strict=True)
+    torques, speeds_of_all = zip(*(_of_member(member, ratios, *state) for state in states), strict=True)
     torque = torques[0]
     if torque is None:
         width, module = to_si(tables["set"]["face_width"], LENGTH), to_si(tables["sun"]["module"], LENGTH)
@@ -675,11 +676,13 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wante
         on_sun = usual_torque(*teeth, module, width, tables["set"]["planets"])
         torque = float(f"{on_sun * abs(ratios[member]):.3g}")
         remarks["operation.torque"] = f"assumed: K factor of 1 N/mm^2{'; that of the file is 0' * idle}"
-    speeds = speeds_of_cases(s.model, number, torques, speeds, alone=wanted is not None)
+    speeds = speeds_of_cases(s.model, number, torques, speeds_of_all, alone=wanted is not None)
     remarks |= {} if turning or loaded else {"operation.input": "assumed"}
     remarks |= {} if speeds else {"operation.speeds": f"assumed{'; that of the file is 0' * stands}"}
     texts = dict.fromkeys(with_unit(speed, SPEED) for speed in speeds or [1000.0 * SPEED.scale])
-    return {"input": member, "fixed": fixed, "torque": with_unit(torque, TORQUE), "speeds": [*texts]}
+    operation = {"input": member, "fixed": fixed, "torque": with_unit(torque, TORQUE), "speeds": [*texts]}
+    spectrum = spectrum_tables(s.model, torques[1:], speeds_of_all[1:], load_case_shares(s.model.load_cases))
+    return operation | ({"load_case": spectrum} if spectrum else {})
 
 
 def speeds_of_cases(

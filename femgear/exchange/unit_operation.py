@@ -15,12 +15,9 @@ from femgear.exchange.planetary_stage import with_unit
 from femgear.exchange.rexs import Component, Model
 from femgear.exchange.unit_bearings import FORCE
 from femgear.exchange.unit_shafts import NoGearbox
+from femgear.exchange.unit_spectrum import load_case_shares, share_time
 
-LoadCase = Mapping[str, Mapping[str, tuple[str, str | None]]]
-"""Attributes, with their units, of the components of a load case by their ids."""
 _USUAL_SPEED = 1000.0 * SPEED.scale
-_FRACTIONS: Mapping[str | None, float] = {"%": 0.01}
-_HOURS: Mapping[str | None, float] = {"h": 1.0, "min": 1.0 / 60.0, "s": 1.0 / 3600.0, "d": 24.0}
 
 
 @dataclass(frozen=True)
@@ -130,7 +127,7 @@ class OperationReader:
             tables.append(table)
         if not tables:
             raise NoGearbox("no load gives a torque")
-        _share_time(tables, self.model)
+        share_time(tables, self.model)
         first = places.get(number)
         if first is None:
             raise NoGearbox(f"load case {number} has no torque")
@@ -226,36 +223,3 @@ class OperationReader:
             if any(moments):
                 moment[name] = [with_unit(newton_metres, TORQUE) for newton_metres in moments]
         return {key: value for key, value in (("force", force), ("tilting_moment", moment)) if value}
-
-
-def _share_time(load_cases: list[dict[str, Any]], model: Model) -> None:
-    """Give load cases without shares equal ones, and bring shares of more than the whole time to it."""
-    given = [load_case["share"] for load_case in load_cases if "share" in load_case]
-    if len(load_cases) > 1 and len(given) < len(load_cases):
-        left = max(1.0 - sum(given), 0.0) / (len(load_cases) - len(given))
-        for load_case in load_cases:
-            load_case.setdefault("share", float(f"{left or 1.0 / len(load_cases):.12g}"))
-        model.remark("operation", "the file does not tell the shares of all load cases: equal ones are assumed")
-    if len(load_cases) > 1 and (total := sum(load_case["share"] for load_case in load_cases)) > 1.0 + 1e-6:
-        for load_case in load_cases:
-            load_case["share"] = float(f"{load_case['share'] / total:.12g}")
-        model.remark("operation", f"the shares of the load cases are {total:.4g} in all: they are divided by it")
-
-
-def load_case_shares(cases: Sequence[LoadCase]) -> list[float | None]:
-    """Find the shares of the time of load cases: their fractions, else their durations where all have one.
-
-    None of a load case that says neither.
-    """
-    shares = [_first(given, "load_duration_fraction", _FRACTIONS) for given in cases]
-    if any(share is not None for share in shares):
-        return shares
-    hours = [_first(given, "load_duration", _HOURS) for given in cases]
-    given = [value for value in hours if value]
-    return [value / sum(given) for value in given] if len(given) == len(cases) else shares
-
-
-def _first(given: LoadCase, name: str, units: Mapping[str | None, float]) -> float | None:
-    """First value of an attribute in a load case, by the size of its unit."""
-    values = (attributes.get(name) for attributes in given.values())
-    return next((float(value) * units.get(unit, 1.0) for value, unit in filter(None, values)), None)

@@ -17,7 +17,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.gear_set import planetary_set
-from femgear.case.load_spectrum import load_case_names, required_life, running_shares
+from femgear.case.load_spectrum import load_case_names, required_life, running_shares, without_line
 from femgear.errors import FemgearError
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import BRANCH
@@ -210,7 +210,9 @@ def mesh_frequency_at(case: Any, speed: float) -> float:
 
 def no_load_cases(case: Any) -> str:
     """Say why a case has no stage of lives; empty where it has."""
-    return "" if case.operation.load_case else "operation gives no load cases"
+    if not case.operation.load_case:
+        return "operation gives no load cases"
+    return "" if len(without_line(case)) < len(case.gear_names) else "no material has a treatment"
 
 
 LIFE = Stage(

@@ -6,8 +6,15 @@ from pathlib import Path
 
 import pytest
 
-from femgear.case.load_spectrum import load_case_names, required_life, running_shares
+from femgear.case.load_spectrum import (
+    load_case_names,
+    required_life,
+    running_shares,
+    spectrum_notices,
+    without_line,
+)
 from femgear.errors import CaseError
+from femgear.stages.life import no_load_cases
 from femgear.trains.reading import read_case
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -59,11 +66,11 @@ def test_load_cases_that_are_none_are_refused_by_their_entries(load_cases, entry
 
 
 def test_what_lives_need_is_refused_together():
-    """Shares, treatments of some gears, a life of nothing, grades that there are not."""
+    """Shares and pitting, a life of nothing, grades that there are not."""
     changed = tables(FIRST | {"share": 0.6}, FIRST | {"share": 0.6}, steel={})
-    changed["gear_1"]["material"] = STEEL
-    assert problems(changed).keys() == {"operation.load_case[0].share", "gear_2.material.treatment"}
-    assert problems(tables(FIRST, steel={})).keys() == {"material.treatment"}
+    changed["strength"] = {"pitting": "limited"}
+    changed["material"] |= {"treatment": "grey iron", "hardness": 200}
+    assert problems(changed).keys() == {"operation.load_case[0].share", "strength.pitting"}
     assert problems(tables(required_hours=20)).keys() == {"operation.required_hours"}
     assert problems(tables(FIRST, required_hours=0)).keys() == {"operation.required_hours"}
     assert problems(tables(FIRST, steel=STEEL | {"grade": "MX"})).keys() == {"material.grade"}
@@ -76,3 +83,13 @@ def test_pitting_is_that_of_materials_that_have_its_line():
     assert problems(changed).keys() == {"strength.pitting"}
     changed["material"] |= STEEL
     assert read_case(changed).strength.pitting == "limited"
+
+
+def test_gears_without_a_treatment_are_told():
+    plain = tables(FIRST, steel={})
+    (told,) = spectrum_notices(read_case(plain))
+    assert told.code == "W-UNUSED" and "material.treatment" in told.remedy and no_load_cases(read_case(plain))
+    plain["gear_1"]["material"] = STEEL
+    (told,) = spectrum_notices(read_case(plain))
+    assert "gear_2.material.treatment" in told.remedy and without_line(read_case(plain)) == ["gear_2"]
+    assert not no_load_cases(read_case(plain)) and not list(spectrum_notices(read_case(tables(FIRST))))

@@ -109,6 +109,9 @@ def test_each_load_case_has_its_own_torque(tmp_path):
         operation = case_tables(model, load_case=number)[0]["operation"]
         assert operation["torque"] == f"{torque:g} N m"
         assert operation["speeds"] == [f"{one} rpm" for one in speeds]
+        # all are load cases of the life, each with its own speed
+        loads = [(one["torque"], one["speed"], one["share"]) for one in operation["load_case"]]
+        assert loads == [("30 N m", "543 rpm", 0.2), ("90 N m", "3456 rpm", 0.7), ("30 N m", "800 rpm", 0.1)]
         (told,) = [one for one in model.findings if one.key == "operation"]
         assert told.severity == DOUBT and model.findings[0] == told  # doubts come first
         assert ("2: 3456 rpm, 90 N m, 70 %" in str(told)) == (number != 2)

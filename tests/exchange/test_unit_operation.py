@@ -7,7 +7,7 @@ from rexs_stage import NONE, ParallelUnit
 from rexs_units import IndustrialUnit
 from trains.test_imports import drafts_of
 
-from femgear.exchange.unit_operation import load_case_shares, shaft_groups
+from femgear.exchange.unit_operation import shaft_groups
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.reading import parse_case
 
@@ -66,21 +66,6 @@ def test_loads_that_transmit_nothing_take_no_power(tmp_path):
     box.relate("assembly", assembly=30, part=6)
     case = parse_case(drafts_of(box, tmp_path)[0][""].text)
     assert case.operation.output == ("output",) and case.load_case.force["load 6"] == (50.0, 0.0, 0.0)
-
-
-def test_shares_are_fractions_or_durations():
-    def cases(name, *values, unit="h"):
-        return [{"1": {name: (str(value), unit)}, "10": {"rotational_speed": ("500", "1 / min")}} for value in values]
-
-    assert load_case_shares(cases("load_duration_fraction", 20, 80, unit="%")) == pytest.approx([0.2, 0.8])
-    assert load_case_shares(cases("load_duration", 500, 1500)) == pytest.approx([0.25, 0.75])
-    mixed = [*cases("load_duration", 1), *cases("load_duration", 180, unit="min")]
-    assert load_case_shares(mixed) == pytest.approx([0.25, 0.75])
-    # fractions come first; durations of some load cases say no share
-    both = cases("load_duration", 500, 1500)
-    both[0]["1"]["load_duration_fraction"] = ("10", "%")
-    assert load_case_shares(both) == [pytest.approx(0.1), None]
-    assert load_case_shares([*cases("load_duration", 5), {}]) == [None, None]
 
 
 def test_durations_of_a_unit_are_shares_of_its_load_cases(tmp_path):

@@ -12,11 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case.load_spectrum import required_life, without_line
 from femgear.case.quantities import ACCELERATION, RPM, SPEED, Dimension
 from femgear.gears.planetary import mesh_names
 from femgear.stages.key_figures import DECIBEL, NUMBER, KeyFigure, Stored
 from femgear.stages.losses_results import LOSS_FIGURES
-from femgear.trains.gearbox.case_file import FORCE, BoxPlanetarySection, GearboxCase, PairSection
+from femgear.trains.gearbox.case_file import FORCE, BoxPlanetarySection, GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.casing import bearing_name
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.mode_words import mode_distance
@@ -81,6 +82,7 @@ def _of_deflection(case: GearboxCase) -> Iterator[KeyFigure]:
         sets = [(stage.name, (stage.name,)) for stage in case.planetary]
         sharing = Stored("planet_load_factor")
         yield from _family("K_gamma", NUMBER, "deflection", sharing, sets, "stage")
+    yield from _of_lives(case)
     names = [bearing_name(section, number) for number, section in enumerate(case.bearing)]
     bearings = [(name, (name,)) for name in names]
     if bearings:
@@ -96,6 +98,19 @@ def _of_deflection(case: GearboxCase) -> Iterator[KeyFigure]:
         ]
         if rated:
             yield from _family("bearing life", HOURS, "deflection", lives, rated, "bearing")
+
+
+def _of_lives(case: GearboxCase) -> Iterator[KeyFigure]:
+    """Lives and safeties over the load cases of roots and flanks that have a line of life."""
+    stages = [stage for stage in (*case.pair, *case.planetary) if stage.teeth and case.deflection.contact]
+    teeth = [teeth_of(stage) for stage in stages]
+    if all(len(without_line(gears)) == len(gears.gear_names) for gears in teeth):
+        return
+    for kind, symbol in (("root", "S_F"), ("flank", "S_H")):
+        yield KeyFigure(f"{kind} life", HOURS, "deflection", Stored(f"{kind}_life", pick="smallest"), whole=True)
+        if required_life(case.operation) is not None:
+            safety = Stored(f"{kind}_spectrum_safety", pick="smallest")
+            yield KeyFigure(f"{symbol} over life", NUMBER, "deflection", safety, whole=True)
 
 
 def _bearing_force(labels: tuple[str, ...], data: Any) -> float:

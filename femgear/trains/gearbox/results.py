@@ -592,7 +592,12 @@ def _given_planets(case: GearboxCase) -> Iterator[Finding]:
 
 
 _HOLDS = ("support_stiffness", "bearing_stiffness", "tilt_stiffness", "foundation_radial", "foundation_tangential")
-_WITHOUT_EFFECT = (("static", "members"), ("planet", "bearing_clearance"))
+_WITHOUT_EFFECT = (
+    ("static", "members"),
+    ("planet", "bearing_clearance"),
+    ("operation", "load_case"),
+    ("operation", "required_hours"),
+)
 
 
 def _without_effect(tables: dict) -> list[str]:

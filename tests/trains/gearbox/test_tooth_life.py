@@ -7,6 +7,7 @@ import pytest
 from small_gearbox import pair_tables
 
 from femgear.stages.strength import rate_case
+from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.life import bearing_life_findings
 from femgear.trains.gearbox.stages import solve_deflections
 from femgear.trains.gearbox.tooth_life import pitting_problems, stage_spectra, tooth_life_contents
@@ -61,6 +62,17 @@ def test_the_file_has_lives_and_the_life_that_is_asked_for(result):
     data["spectrum_reference_life"][:] = [1e6, 3e3, 5e3, 1e7]
     (finding,) = bearing_life_findings(data)
     assert finding.code == "W-LIFE" and "B 3000 h, C 5000 h" in finding.text
+
+
+def test_lives_are_key_figures_of_the_gearbox(result):
+    figures = {figure.name: figure for figure in gearbox_key_figures(result.case)}
+    data = result.contents()
+    assert figures["root life"].read(data) == data["root_life"].values.min()
+    assert figures["S_H over life"].read(data) == data["flank_spectrum_safety"].values.min()
+    tables = tables_of(("run", "100 N m", "1000 rpm", 1.0))
+    assert "S_F over life" not in {figure.name for figure in gearbox_key_figures(read_case(tables))}
+    del tables["pair"][0]["teeth"]["material"]["treatment"]
+    assert "flank life" not in {figure.name for figure in gearbox_key_figures(read_case(tables))}
 
 
 @pytest.mark.slow
