@@ -96,7 +96,7 @@ def test_check_of_many_speeds_shows_some(check):
     ends = {"from": "1 rpm", "to": "1000 rpm"}
     code, out, _ = check(edited(("operation.speeds", ends | {"count": 1000})))
     _, of_two, _ = check(edited(("operation.speeds", ends | {"count": 2})))
-    assert code == 0 and "1000 speeds" in out and len(out.splitlines()) <= len(of_two.splitlines()) + 1
+    assert code == 0 and "1000 speeds" in out and len(out.splitlines()) < len(of_two.splitlines()) + 10
 
 
 def test_check_finds_the_shifts_that_are_left_out(check):
