@@ -54,6 +54,7 @@ _SOLUTION = {f"static.{name}" for name in ("positions", "contact", "back_flanks"
 """How the contact is solved, whatever the grids."""
 _BESIDE = {
     "deflection": {"modes", "dynamics", "runup", "balance"},
+    "stress": {"modes", "dynamics", "runup", "balance"},
     "modes": {"dynamics", "runup", "balance"},
     "dynamics": {"modes", "runup", "balance"},
     "runup": {"modes", "balance"},

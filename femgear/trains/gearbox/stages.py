@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 
 import numpy as np
 
@@ -48,6 +49,12 @@ from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_spee
 from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors
 from femgear.trains.gearbox.signals import GEARBOX_RECORDED
 from femgear.trains.gearbox.silence import why_silent
+from femgear.trains.gearbox.stress import (
+    box_stress_warnings,
+    describe_box_stress,
+    solve_box_stress,
+    why_no_stress,
+)
 from femgear.trains.gearbox.verdict import gearbox_verdict
 
 
@@ -201,6 +208,20 @@ GEARBOX = Train(
             warnings=deflection_warnings,
         ),
         BOX_LOSSES,
+        Stage(
+            name="stress",
+            decided_by=partial(box_entries, "stress"),
+            title="Stresses",
+            solve=solve_box_stress,
+            takes=("deflection",),
+            options=("progress", "steps"),
+            wanted=lambda case: not why_no_stress(case),
+            unavailable=why_no_stress,
+            verdict=lambda result: {"stages": [stage.name for stage in result.stages]},
+            describe=lambda results: next(describe_box_stress(results.stress, results.findings)),
+            tables=lambda results: islice(describe_box_stress(results.stress, results.findings), 1, None),
+            warnings=box_stress_warnings,
+        ),
         Stage(
             name="modes",
             decided_by=partial(box_entries, "modes"),
