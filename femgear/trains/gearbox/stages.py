@@ -12,6 +12,7 @@ import numpy as np
 from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
 from femgear.report.tables import Block, tabulate
+from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
@@ -20,7 +21,7 @@ from femgear.trains.gearbox.balance import (
     describe_balance,
     solve_balance,
 )
-from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection
+from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection, teeth_of
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
@@ -150,10 +151,13 @@ def check_before_run(case: GearboxCase) -> None:
 
 
 def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
-    """Tabulate the power flow of all load cases: speeds, torques, stages."""
+    """Tabulate the power flow of all load cases, and what drawings carry of the gears of stages that have teeth."""
     blocks = []
     for load_case in case.operation.load_case[:12]:
         blocks += list(_flow_blocks(case, load_case))
+    for stage in (*case.pair, *case.planetary):
+        if (teeth := teeth_of(stage)) is not None:
+            blocks += [replace(block, title=f"{block.title}, {stage.name}") for block in describe_drawing(teeth)]
     return (*blocks, *describe_casing(case))
 
 

@@ -57,6 +57,8 @@ def test_tables_tell_meshes_bearings_and_modes(results):
         "Stages, full",
         "Power flow, back",
         "Stages, back",
+        "Drawing, stage",
+        "Play of the meshes, stage",
     ]
 
 
