@@ -46,6 +46,7 @@ CATALOGUE = {
     "W-FORMER": (NOTE, "A file of a former model is read as one of today."),
     "W-FREE": (DOUBT, "More modes have no stiffness than a gearbox has ways to turn."),
     "W-GROWTH": (DOUBT, "The free motion grows: a parametric resonance."),
+    "W-HEAT": (DOUBT, "Teeth are hotter, or their oil film thinner, than the oil is good for."),
     "W-HELIX": (DOUBT, "The helix angle lies outside what is validated."),
     "W-JOURNAL": (NOTE, "Lines of a journal were damaged and are left out."),
     "W-KINK": (DOUBT, "A stress stands at a kink, or at an end of what was searched."),

@@ -328,6 +328,11 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-KINK": lambda: of_stage("elastic", "stress", corner()),
     "W-LIFE": lambda: of_stage("pair", "life", short_life()),
     "W-LIFTED": lambda: of_stage("elastic", "static", over_width(lifted=True)),
+    "W-HEAT": lambda: of_stage(
+        "pair",
+        "heat",
+        xr.Dataset({name: (("speed", "mesh_kind"), [[0.9]]) for name in ("scuffing_safety", "film_safety")}),
+    ),
     "W-LOSSES": lambda: of_stage(
         "pair", "losses", xr.Dataset({"efficiency": ("speed", [0.0])}, {"speed": [250.0]}, {"missing": ""})
     ),

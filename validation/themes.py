@@ -32,6 +32,7 @@ from validation import (
     gearbox_rings,
     gearbox_statics,
     geometry,
+    heat,
     helical,
     helical_pair,
     helical_teeth,
@@ -128,6 +129,14 @@ THEMES = (
         "of finite elements and those of a formula; 1e-9 for balances of powers.",
         (losses.fzg_gears, losses.sets, losses.computed_loads),
         (losses.gearbox,),
+    ),
+    Theme(
+        "heat",
+        "Contact temperatures and oil film",
+        "Flash temperature, scuffing and film of the FZG test gear C14. Compared with: Duhamel's integral, the closed "
+        "form of ISO/TS 6336-20, reports of GEARpie; gates: 0.5 %; printed digits; 30 % between the bulk temperatures "
+        "of both standards.",
+        (heat.closed_forms, heat.whole_run),
     ),
     Theme(
         "ISO 6336",

@@ -17,6 +17,7 @@ from femgear.case.quantities import (
     LINE_LOAD,
     VELOCITY,
     VISCOSITY,
+    Count,
     Number,
     Quantity,
     Section,
@@ -33,6 +34,7 @@ _Share = Annotated[float, Number(0.0, 10.0, open_low=True)]
 _Coefficient = Annotated[float, Number(0.0, 0.5, open_low=True)]
 _Load = Annotated[float, Quantity(LINE_LOAD, 0.0, 1e8)]
 _Velocity = Annotated[float, Quantity(VELOCITY, 0.0, 1e3)]
+_COOL = 289.0  # K, of the density that ISO/TS 6336-22 begins with
 _Grid = Values(min_length=1, max_length=100)
 
 
@@ -40,7 +42,8 @@ class LubricantSection(Section):
     """The oil: its viscosity at 40 and 100 degrees Celsius, or at the temperature that it has in operation.
 
     ``temperature`` is that of the oil in operation, ``density`` the one it has there. ``friction_factor`` is X_L, by
-    default that of the ``kind``.
+    default that of the ``kind``. ``supply`` is how the oil comes to the teeth, ``fzg_stage`` the load stage of the FZG
+    test A/8.3/90 at which it fails, ``permissible_film`` the least film over roughness, lambda_GFP.
     """
 
     kind: Literal["mineral", "PAO", "polyglycol", "water-soluble polyglycol"] = "mineral"
@@ -50,6 +53,9 @@ class LubricantSection(Section):
     temperature: OilTemperature | None = None
     density: Annotated[float, Quantity(DENSITY, 500.0, 2000.0)] = 870.0
     friction_factor: Annotated[float, Number(0.1, 3.0)] | None = None
+    supply: Literal["splash", "spray", "submerged"] = "splash"
+    fzg_stage: Annotated[int, Count(1, 14)] | None = None
+    permissible_film: Annotated[float, Number(0.0, 10.0, open_low=True)] | None = None
 
     @model_validator(mode="after")
     def _thinner_when_hot(self):
@@ -69,6 +75,11 @@ class LubricantSection(Section):
     def factor(self) -> float:
         """X_L: as given, or that of the kind."""
         return LUBRICANT_FACTORS[self.kind] if self.friction_factor is None else self.friction_factor
+
+    @property
+    def density_at_15(self) -> float:
+        """Density at 15 degrees Celsius [kg/m^3], 0.7 kg/m^3 more for every kelvin that the oil is hotter."""
+        return self.density + 0.7 * ((self.temperature or _COOL) - _COOL)
 
 
 class FrictionTableSection(Section):
@@ -149,6 +160,40 @@ def check_losses(case: Any) -> None:
         raise _missing(case, f'friction = "{losses.friction}" needs its {name}', f"losses.{name}", remedy)
     if losses.friction not in needs:
         oil_at(case)
+
+
+def heat_missing(case: Any) -> str:
+    """Tell what a case with losses lacks for temperatures and oil film of its teeth; empty where it has all."""
+    lacks = _heat_lacks(case)
+    return "" if lacks is None else f"{lacks[0]} is missing: {lacks[1]}"
+
+
+def _heat_lacks(case: Any) -> tuple[str, str] | None:
+    """Key that temperatures lack, and what would give it."""
+    if case.losses is None:
+        return "losses", "no section [losses] asks for them"
+    oil: LubricantSection = case.lubricant or LubricantSection()
+    if oil.temperature is None:
+        return "lubricant.temperature", 'give lubricant.temperature = "70 degC"'
+    if case.losses.roughness is None:
+        return "losses.roughness", 'give losses.roughness = "0.4 um", the mean R_a of flanks'
+    if oil.viscosity is None and (oil.viscosity_40 is None or oil.viscosity_100 is None):
+        return "lubricant.viscosity_40", 'give lubricant.viscosity_40 = "100 mm^2/s" and viscosity_100'
+    return None
+
+
+def check_film(case: Any) -> None:
+    """Refuse limits of scuffing or film thickness without what they are compared with (CaseError, E-KEY-MISSING)."""
+    oil: LubricantSection | None = case.lubricant
+    if oil is None or not oil.given("fzg_stage", "permissible_film"):
+        return
+    if (lacks := _heat_lacks(case)) is not None:
+        limit = oil.given("fzg_stage", "permissible_film")[0]
+        raise _missing(case, f"lubricant.{limit} gives no safety without {lacks[0]}", *lacks)
+    if oil.permissible_film is not None and (oil.viscosity_40 is None or oil.viscosity_100 is None):
+        key = "lubricant.viscosity_40"
+        message = "the film goes by the viscosity at the temperature of the contact, which is missing"
+        raise _missing(case, message, key, 'give lubricant.viscosity_40 = "100 mm^2/s" and viscosity_100')
 
 
 def _missing(case: Any, message: str, key: str, remedy: str) -> CaseError:

@@ -15,10 +15,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import loss_entries
-from femgear.case.lubrication import LubricantSection, check_losses, losses_wanted, oil_at
+from femgear.case.lubrication import LubricantSection, check_film, check_losses, losses_wanted, oil_at
 from femgear.errors import CaseError
 from femgear.gears.friction import (
     FRICTION_LAWS,
+    PathSpeeds,
     closed_loss_factor,
     loss_factor,
     path_speeds,
@@ -175,14 +176,27 @@ def friction_coefficient(
         )
     if not mesh_frequency:
         return np.zeros(len(force))
+    return law_friction(case, losses.friction, pair, line_load, at_pitch)
+
+
+def law_friction(case: Any, name: str, pair: GearPair, line_load: np.ndarray, at_pitch: PathSpeeds) -> np.ndarray:
+    """Compute the coefficient of friction of a formula of `FRICTION_LAWS` with the oil and roughness of a case.
+
+    Parameters
+    ----------
+    line_load : array
+        Force at the base circle over face width [N/m]; ISO/TS 6336-20 has that at the pitch circle.
+    at_pitch : PathSpeeds
+        At the pitch point.
+    """
     oil: LubricantSection = case.lubricant
-    law = FRICTION_LAWS[losses.friction]
-    return law(
-        line_load,
+    load = line_load * math.cos(pair.working_pressure_angle) if name == "iso" else line_load
+    return FRICTION_LAWS[name](
+        load,
         float(at_pitch.sum_speed),
         float(at_pitch.radius),
         viscosity=oil_at(case),
-        roughness=losses.roughness,
+        roughness=case.losses.roughness,
         lubricant=oil.factor,
     )
 
@@ -211,8 +225,8 @@ def _operation(case: Any, gears: GearSet) -> _Operation:
     return _Operation(shafts, condition, (), given, next(name for name in shafts if name != given))
 
 
-def _speeds(case: Any, gears: Any, speed: float) -> tuple[dict[str, float], float]:
-    """Speeds of all shafts [rad/s], and the mesh frequency [Hz], at a speed of the input [rad/s]."""
+def shaft_turning(case: Any, gears: Any, speed: float) -> tuple[dict[str, float], float]:
+    """Compute speeds of all shafts [rad/s], and the mesh frequency [Hz], at a speed of the input [rad/s]."""
     if gears.members:
         of_set = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
         return {"sun": of_set.sun, "carrier": of_set.carrier, "ring": of_set.ring}, of_set.mesh_frequency
@@ -224,7 +238,7 @@ def _speeds(case: Any, gears: Any, speed: float) -> tuple[dict[str, float], floa
 def _point(case: Any, static: StaticResult, torque: float, speed: float) -> LossPoint:
     """Losses at a torque [N m] and a speed [rad/s] of the input."""
     gears, helix = static.planetary_set, case.helix_angle or 0.0
-    turning, frequency = _speeds(case, gears, speed)
+    turning, frequency = shaft_turning(case, gears, speed)
     friction, operation = mesh_friction(case, static, frequency, helix_angle=helix), _operation(case, gears)
     name = operation.condition.name
     flow = lossy_flow(
@@ -292,6 +306,7 @@ def no_losses(case: Any) -> str:
 def check_loss_entries(case: Any) -> None:
     """Refuse sections of losses that lack something, or that a set cannot have (CaseError)."""
     check_losses(case)
+    check_film(case)
     losses = case.losses
     if losses is not None and bool(losses.torque_shares) != bool(losses.speed_shares):
         key = f"losses.{'speed' if losses.torque_shares else 'torque'}_shares"

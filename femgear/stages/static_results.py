@@ -29,6 +29,7 @@ from femgear.contact.slices import PARTS as SLICES
 from femgear.findings import Finding, findings_in
 from femgear.gears.checks import check_set, tip_clearances
 from femgear.gears.deviations import check_deviations
+from femgear.gears.friction import path_speeds
 from femgear.gears.gear import Gear, tooth_thickness
 from femgear.gears.iso6336 import bending_face_factor, contact_helix_factor, helix_of, relative_curvature
 from femgear.gears.kinematics import speeds, torques
@@ -1299,11 +1300,20 @@ def describe_meshes(s: GearSet, helix_angle: float | None = None) -> Block:
         ("tip clearances [mm]", *(f"{next(clearance)}, {next(clearance)}" for _ in s.kinds)),
         ("single contact, first gear [mm]", *(first for first, _ in alone)),
         ("single contact, second gear [mm]", *(second for _, second in alone)),
+        *_sliding_rows(s),
         *[("mesh phases [periods]", *of_kinds)] * (len(phases) > 1),
     )
     pair = "pair of the transverse section" if transverse else "pair"
     note = f"single contact: diameters between which one tooth {pair} carries, from root to tip of a gear"
     return Block("Meshes", ("", *names), rows, (note,))
+
+
+def _sliding_rows(s: GearSet) -> Iterator[tuple[str, ...]]:
+    """Rows of the specific sliding of both gears of every kind of mesh, at the first and the last contact."""
+    sliding = [path_speeds(pair, pair.path).specific_sliding for pair in s.kinds]
+    for place, gear in enumerate(("first", "second")):
+        ends = (of_kind[place] for of_kind in sliding)
+        yield f"specific sliding, {gear} gear", *(f"{low:.3f} to {high:.3f}" for low, high in ends)
 
 
 def _operation(case: Case, s: PlanetarySet) -> Block:

@@ -15,6 +15,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.report.response import stored_harmonics
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, tabulate
+from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.strength import MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
@@ -47,7 +48,7 @@ def strength_verdict(results: Results) -> Iterator[Block]:
     """
     marks, stages = Marks(results.findings), results.stages
     reasons = list(reason_row(results.stress)) if "stress" in stages else []
-    rows = [*reasons, *efficiency_rows(results, marks)]
+    rows = [*reasons, *efficiency_rows(results, marks), *heat_rows(results, marks)]
     if not rating_wanted(results.case):
         if rows:
             yield Block("Verdict", rows=tuple(rows), notes=marks.notes)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.errors import CaseError
+from femgear.gears.micropitting import kinematic_viscosity
 from femgear.system.rolling_bearings import THRUST_ANGLE, BallBearing, Bearing, BearingState
 
 LARGEST_LIFE_FACTOR = 50.0
@@ -305,10 +306,7 @@ def oil_viscosity(at_40: float, at_100: float, temperature: float) -> float:
     if not (at_40 > at_100 > 0.3e-6 and temperature > -273.0):
         message = f"{1e6 * at_40:g} mm^2/s at 40, {1e6 * at_100:g} at 100, asked at {temperature:g} degrees"
         raise CaseError(message, code="E-RANGE", limit="an oil that is thinner when it is hot, above 0.3 mm^2/s")
-    low, high = (math.log10(math.log10(1e6 * value + 0.7)) for value in (at_40, at_100))
-    cold, hot = math.log10(313.15), math.log10(373.15)
-    place = low + (high - low) * (math.log10(temperature + 273.15) - cold) / (hot - cold)
-    return 1e-6 * (10.0 ** (10.0**place) - 0.7)
+    return float(kinematic_viscosity(at_40, at_100, temperature + 273.15))
 
 
 def _ball_factors(bearing: BallBearing, axial: float) -> LoadFactors:

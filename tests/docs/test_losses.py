@@ -13,7 +13,7 @@ PAGE, EXAMPLES, PRINTED = read_page("losses.md")
 
 
 def test_examples_print_what_the_page_says():
-    assert run_examples("losses.md", EXAMPLES) == PRINTED and len(PRINTED) == 2
+    assert run_examples("losses.md", EXAMPLES) == PRINTED and len(PRINTED) == 3
 
 
 @pytest.mark.slow

@@ -61,6 +61,9 @@ CHANGES: tuple[dict[str, object], ...] = (
             "temperature": "80 degC",
             "density": "840 kg/m^3",
             "friction_factor": 0.75,
+            "supply": "spray",
+            "fzg_stage": 11,
+            "permissible_film": 0.2,
         },
         "losses": {
             "friction": "table",

@@ -61,6 +61,7 @@ from femgear.report.tables import (
 )
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.solvers.stability.parametric import stability
+from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.protocol import StageResult, one_blas_thread
@@ -625,6 +626,7 @@ def verdict(results: Results) -> Iterator[Block]:
         rows.append(("largest dynamic factor K_v of the run-up", largest_factors(results.runup, marks)))
         rows.append(("largest level of the run-up", loudest(results.runup, marks)))
     rows += efficiency_rows(results, marks)
+    rows += heat_rows(results, marks)
     if rows:
         yield Block("Verdict", rows=tuple(rows), notes=(*notes, *marks.notes))
     if "stress" in stages and rating_wanted(results.case):

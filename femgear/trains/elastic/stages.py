@@ -57,6 +57,7 @@ from femgear.solvers.linear.resonances import (
 )
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics
+from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE
 from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import member_speeds, parts_of_speeds
@@ -759,6 +760,7 @@ ELASTIC = Train(
         STATIC,
         STRESS,
         LOSSES,
+        HEAT,
         LIFE,
         Stage(
             name="modes",

@@ -13,10 +13,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.dependencies import Steps, loss_entries
-from femgear.case.lubrication import losses_wanted, oil_at
+from femgear.case.lubrication import heat_missing, losses_wanted, oil_at
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.power_losses import FrictionTorque, lossy_flow
+from femgear.stages.heat import heat_result, mesh_heat
+from femgear.stages.heat_results import HeatResult, describe_heat, heat_tables
 from femgear.stages.losses import NO_LOSSES, check_loss_entries, losses_of_meshes, mesh_friction
 from femgear.stages.losses_results import LossesResult, LossPoint, MeshFriction, describe_losses, loss_tables
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
@@ -125,6 +127,31 @@ def solve_box_losses(
     return LossesResult(points, meshes, "load_case", [each.name for each in cases], losses, efficiency, missing)
 
 
+@one_blas_thread()
+def solve_box_heat(case: GearboxCase, deflection: DeflectionResult, losses: LossesResult) -> HeatResult:
+    """Compute temperatures and oil film of all stages with teeth, in all load cases."""
+    loaded, points, kinds = deflection.of(case), [], []
+    for state, point in zip(loaded.states, losses.points, strict=True):
+        of_point, kinds = [], []
+        for name, contact in state.contacts.items():
+            gears, frequency = contact.result.planetary_set, abs(state.model.flow.mesh_frequency[name])
+            for kind, pair in enumerate(gears.kinds):
+                loss = float(point.mesh_loss[name][gears.kind_rows[kind]].max())
+                of_kind = mesh_heat(contact.case, contact.result, kind, mesh_frequency=frequency, loss=loss, rules=case)
+                of_point.append(of_kind)
+                mesh = f" {pair.gear_1.name}-{pair.gear_2.name}" if len(gears.kinds) > 1 else ""
+                kinds.append(f"{name}{mesh}")
+        points.append(tuple(of_point))
+    names = [load_case.name for load_case in case.operation.load_case]
+    return heat_result(case, tuple(points), tuple(kinds), "load_case", names)
+
+
+def _no_box_heat(case: GearboxCase) -> str:
+    """Tell why a gearbox has no temperatures; empty where it has."""
+    teeth = any(stage.teeth for stage in (*case.pair, *case.planetary)) and case.deflection.contact
+    return heat_missing(case) or ("" if teeth else "no stage has teeth whose contact is computed")
+
+
 def _left_out(case: GearboxCase, point: LossPoint) -> Iterator[str]:
     """Say which losses are left out, and what would give them."""
     stages = [stage.name for stage in (*case.pair, *case.planetary) if stage.name not in point.friction]
@@ -160,6 +187,19 @@ def no_box_losses(case: GearboxCase) -> str:
     return "" if losses_wanted(case) else NO_LOSSES
 
 
+BOX_HEAT = Stage(
+    name="heat",
+    decided_by=loss_entries,
+    title="Temperatures",
+    solve=solve_box_heat,
+    takes=("deflection", "losses"),
+    wanted=lambda case: losses_wanted(case) and not _no_box_heat(case),
+    unavailable=_no_box_heat,
+    verdict=lambda result: {"points": len(result.points)},
+    describe=lambda results: describe_heat(results.heat),
+    tables=lambda results: heat_tables(results.heat),
+    warnings=HeatResult.warnings,
+)
 BOX_LOSSES = Stage(
     name="losses",
     decided_by=loss_entries,

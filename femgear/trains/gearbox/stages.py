@@ -25,7 +25,7 @@ from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection, teeth
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
-from femgear.trains.gearbox.losses import BOX_LOSSES, idle_loss_entries
+from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
 from femgear.trains.gearbox.resonance_table import describe_resonances
@@ -212,6 +212,7 @@ GEARBOX = Train(
             warnings=deflection_warnings,
         ),
         BOX_LOSSES,
+        BOX_HEAT,
         Stage(
             name="stress",
             decided_by=partial(box_entries, "stress"),

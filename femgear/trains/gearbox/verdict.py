@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from femgear.report.tables import Block, Marks, doubtful_excitation
+from femgear.stages.heat_results import heat_rows
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
@@ -39,6 +40,7 @@ def gearbox_verdict(results: Any) -> Iterator[Block]:
         rows += smallest_safeties(results.deflection, response, marks)
         rows += life_rows(results.deflection, marks, of=("deflection",))
         rows += efficiency_rows(results, marks)
+        rows += heat_rows(results, marks)
     modes = results.modes if "modes" in results.stages else None
     if modes is not None:
         rows += _nearest_mode(modes)

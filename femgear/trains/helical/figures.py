@@ -377,6 +377,7 @@ FIGURES = {
         draw=lambda drawn: {} if "modes" in drawn.data else STATIC["static"].draw(drawn),
     ),
     "stress": STATIC["stress"],
+    "heat": STATIC["heat"],
     "modes": Figures(
         {
             "spatial_mode_shapes": "Mode shapes of the helical set with mean mesh stiffness, from the front "

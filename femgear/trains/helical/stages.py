@@ -20,6 +20,7 @@ from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
+from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE, LifeResult, solve_life
 from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import (
@@ -262,6 +263,7 @@ HELICAL = Train(
             unavailable=lambda case: _NO_TEETH if _given(case) else STRESS.unavailable(case),
         ),
         replace(LOSSES, unavailable=lambda case: _NO_TEETH if _given(case) else LOSSES.unavailable(case)),
+        replace(HEAT, unavailable=lambda case: _NO_TEETH if _given(case) else HEAT.unavailable(case)),
         replace(
             LIFE,
             solve=solve_helical_life,

@@ -45,6 +45,7 @@ from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.stages.drawing_tables import describe_drawing
+from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE
 from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import parts_of_speeds
@@ -419,6 +420,7 @@ PAIR = Train(
         replace(STATIC, describe=_describe_static),
         STRESS,
         LOSSES,
+        HEAT,
         LIFE,
         Stage(
             name="modes",

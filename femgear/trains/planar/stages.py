@@ -20,6 +20,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.stages.heat import HEAT
 from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
 from femgear.stages.protocol import (
@@ -393,6 +394,7 @@ PLANAR = Train(
         replace(STATIC, wanted=lambda case: bool(_needs_static(case)) or losses_wanted(case)),
         replace(STRESS, wanted=lambda case: bool(_needs_static(case)) and case.static.stresses),
         LOSSES,
+        HEAT,
         Stage(
             name="modes",
             title="Modes",
