@@ -10,7 +10,13 @@ from femgear.gears.power_losses import planetary_efficiency
 from femgear.stages.key_figures import figure_of
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
-from femgear.trains.gearbox.losses import bearing_torque, idle_loss_entries, loss_point, solve_box_losses
+from femgear.trains.gearbox.losses import (
+    bearing_torque,
+    idle_loss_entries,
+    loss_point,
+    solve_box_heat,
+    solve_box_losses,
+)
 from femgear.trains.gearbox.results import DeflectionResult
 from femgear.trains.reading import read_case
 
@@ -92,6 +98,16 @@ def test_key_figures_are_those_of_the_file(loaded, result):
         figure = figure_of(figures, name)
         assert figure is not None and figure.stage == "losses"
         assert figure.read(data) == pytest.approx(float(np.asarray(data[variable].values).ravel()[0]))
+
+
+def test_temperatures_are_those_of_the_teeth_of_every_stage(loaded):
+    oil = {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s", "temperature": "80 degC", "fzg_stage": 10}
+    case = geared(losses=LOSSES | {"roughness": "0.4 um"}, oil=oil)
+    state = loaded.of(case)
+    heat = solve_box_heat(case, state, solve_box_losses(case, state)).dataset()
+    assert list(heat["mesh_kind"].values) == ["stage"] and heat["flash_temperature"].shape == (1, 1, 101)
+    assert 80.0 < float(heat["bulk_temperature"].min()) < float(heat["highest_temperature"].max()) < 200.0
+    assert float(heat["scuffing_safety"].min()) > 1.0
 
 
 def test_tables_of_losses_in_teeth_have_no_effect_and_that_is_said():
