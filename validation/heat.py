@@ -11,7 +11,7 @@ from femgear.gears.contact_temperature import (
     contact_half_width,
     flash_temperature,
     hertz_pressure,
-    load_sharing,
+    path_load_sharing,
     reduced_modulus,
 )
 from femgear.gears.friction import path_speeds
@@ -117,7 +117,7 @@ def whole_run() -> tuple[Row, ...]:
     partner = np.interp(path[beyond] - pair.base_pitch, path, carried)
     shared = float(heat["shared_flash_temperature"].max())
     bulk = heat["bulk_temperature"].values[0, 0]
-    limits = load_sharing(pair, np.array([pair.path[0], 0.0, pair.path[1]]))
+    limits = path_load_sharing(pair, np.array([pair.path[0], 0.0, pair.path[1]]))
     return (
         within("C14", "one pair carries all", "load over width at the pitch point [N/m]", mean,
                float(carried[middle].min()), 1e-6),

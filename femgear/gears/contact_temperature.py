@@ -79,7 +79,7 @@ def flash_temperature(
     return np.divide(np.broadcast_to(heat, shape), bottom, out=np.zeros(shape), where=bottom > 0.0)
 
 
-def load_sharing(pair: GearPair, path: Any, overlap: float = 0.0, base_helix: float = 0.0) -> np.ndarray:
+def path_load_sharing(pair: GearPair, path: Any, overlap: float = 0.0, base_helix: float = 0.0) -> np.ndarray:
     """Compute the load sharing factor X_Gamma over the path [1] (ISO/TS 6336-20, unmodified profiles).
 
     Spur teeth: from 1/3 at the first contact up to 2/3, 1 in single contact, from 2/3 down to 1/3 at the last one. Wide

@@ -24,8 +24,8 @@ from femgear.gears.contact_temperature import (
     contact_half_width,
     flash_temperature,
     hertz_pressure,
-    load_sharing,
     mean_over_path,
+    path_load_sharing,
     reduced_modulus,
     scuffing_safety,
     scuffing_temperature,
@@ -141,7 +141,7 @@ def mesh_heat(
         return flash_temperature(coefficient, load, half, speeds.rolling_1, speeds.rolling_2)
 
     rise, other_rise = flash(friction[0], line_load), flash(friction[1], line_load)
-    shared = flash(friction[0], mean * load_sharing(pair, path, abs(static.overlap_ratio), base))
+    shared = flash(friction[0], mean * path_load_sharing(pair, path, abs(static.overlap_ratio), base))
     meshes = max(_meshes_of(gears, kind))
     bulk = float(bulk_temperature_of_flash(hot, mean_over_path(path, rise), supply=supply, meshes=meshes))
     of_losses = float(

@@ -10,8 +10,8 @@ from femgear.gears.contact_temperature import (
     contact_half_width,
     flash_temperature,
     hertz_pressure,
-    load_sharing,
     mean_over_path,
+    path_load_sharing,
     reduced_modulus,
     scuffing_safety,
     scuffing_temperature,
@@ -49,13 +49,13 @@ def test_flash_temperature_is_zero_at_the_pitch_point_and_without_load():
 def test_load_sharing_adds_up_to_the_whole_load():
     start, end = PAIR.path
     path = np.linspace(start + 1e-9, start + PAIR.base_pitch - 1e-9, 50)
-    both = load_sharing(PAIR, path) + load_sharing(PAIR, path + PAIR.base_pitch)
+    both = path_load_sharing(PAIR, path) + path_load_sharing(PAIR, path + PAIR.base_pitch)
     double = path + PAIR.base_pitch < end
     assert both[double] == pytest.approx(1.0, abs=1e-6)
-    assert load_sharing(PAIR, np.array([start - 1e-4, end + 1e-4])).tolist() == [0.0, 0.0]
-    wide = load_sharing(PAIR, np.array([start, 0.0, end]), 1.2, 0.3)
+    assert path_load_sharing(PAIR, np.array([start - 1e-4, end + 1e-4])).tolist() == [0.0, 0.0]
+    wide = path_load_sharing(PAIR, np.array([start, 0.0, end]), 1.2, 0.3)
     assert wide * PAIR.contact_ratio == pytest.approx([1.3, 1.0, 1.3])
-    assert load_sharing(PAIR, np.array([start]), 0.9, 0.3)[0] * PAIR.contact_ratio == pytest.approx(1.27)
+    assert path_load_sharing(PAIR, np.array([start]), 0.9, 0.3)[0] * PAIR.contact_ratio == pytest.approx(1.27)
 
 
 def test_bulk_temperatures_rise_with_flash_and_losses():

@@ -4,10 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.report.tables import Marks
 from femgear.stages.heat import load_over_path, solve_heat
-from femgear.stages.heat_figures import draw_contact_path
-from femgear.stages.heat_results import describe_heat, heat_rows, heat_tables
 from femgear.stages.losses import check_loss_entries, solve_losses
 from femgear.stages.static import solve_static
 from femgear.trains.reading import read_case, with_values
@@ -71,19 +68,6 @@ def test_a_set_has_both_kinds_of_mesh_and_tables_of_its_file():
     data = result.contents()
     assert list(data["mesh_kind"].values) == ["sun-planet", "planet-ring"]
     assert data["heat_friction"].values == pytest.approx(0.05)
-    block = describe_heat(data)
-    assert len(block.rows) == 4 and "S_B" in block.header
-    (table,) = heat_tables(data)
-    assert len(table.rows) == 2
-    figure = draw_contact_path(result.dataset())
-    assert len(figure.axes) == 4 and len(figure.axes[0].lines) == 3
-
-    class Results:
-        stages = ("heat",)
-        heat = data
-
-    names = [name for name, _ in heat_rows(Results(), Marks(()))]
-    assert names == ["hottest contact, ISO/TS 6336-20", "thinnest film lambda_GF,min, ISO/TS 6336-22"]
     assert [stage.name for stage in stages_of(case) if stage.name in ("losses", "heat")] == ["losses", "heat"]
 
 
