@@ -107,11 +107,18 @@ def without_line(case: Any) -> list[str]:
     return [name for name in case.gear_names if _treatment(case, name) is None]
 
 
+def has_rated_bearings(case: Any) -> bool:
+    """Tell whether the bearings of the planets of a case have a rating."""
+    return getattr(getattr(case, "planet", None), "dynamic_rating", None) is not None
+
+
 def spectrum_notices(case: Any) -> Iterator[Finding]:
     """List gears whose lives load cases do not give for want of a treatment (W-UNUSED)."""
     if not case.operation.load_case:
         return
     lacking = without_line(case)
+    if len(lacking) == len(case.gear_names) and has_rated_bearings(case):
+        return
     every = len(lacking) == len(case.gear_names)
     if lacking:
         gears = ", ".join(name.replace("_", " ") for name in lacking)

@@ -96,6 +96,7 @@ SMALLEST = 1e-100
 RPM = SPEED.scale
 """One revolution a minute [rad/s]."""
 TORQUE = Dimension("a torque", "N m", "N m", 1.0)
+FORCE = Dimension("a force", "N", "N", 1.0)
 MASS = Dimension("a mass", "kg", "kg", 1.0)
 INERTIA = Dimension("a moment of inertia", "kg m^2", "kg m^2", 1.0)
 DENSITY = Dimension("a density", "kg/m^3", "kg/m^3", 1.0)

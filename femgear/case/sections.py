@@ -15,6 +15,7 @@ from pydantic import BeforeValidator, Field, StrictBool, model_validator
 from femgear.case.quantities import (
     ANGLE,
     DENSITY,
+    FORCE,
     FOUNDATION,
     FREQUENCY,
     INERTIA,
@@ -398,7 +399,7 @@ class SunSection(ToothMeasures):
 
 
 class PlanetSection(ToothMeasures):
-    """One of the equal planets."""
+    """One of the equal planets; a dynamic rating of its bearing gives that a life over load cases."""
 
     teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
     profile_shift: Shift = 0.0
@@ -409,6 +410,8 @@ class PlanetSection(ToothMeasures):
     inertia: Inertia = LEFT_OUT
     bearing_stiffness: Stiffness = LEFT_OUT
     bearing_clearance: Annotated[float, Quantity(LENGTH, 0.0, 0.002)] = 0.0
+    dynamic_rating: Annotated[float, Quantity(FORCE, 1.0, 1e9)] | None = None
+    bearing_kind: Literal["ball", "roller"] = "roller"
     tilt_stiffness: Turning | None = None
     misalignment: Annotated[tuple[PlanetMisalignment, ...], Field(max_length=1000)] = ()
     tip_diameter: TipDiameter | None = None

@@ -17,12 +17,26 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, check_entries, compliance_entries, static_entries
 from femgear.case.gear_set import planetary_set
-from femgear.case.load_spectrum import load_case_names, required_life, running_shares, without_line
+from femgear.case.load_spectrum import (
+    has_rated_bearings,
+    load_case_names,
+    required_life,
+    running_shares,
+    without_line,
+)
+from femgear.contact.cycle import MeshCycle
 from femgear.errors import FemgearError
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import BRANCH
 from femgear.report.tables import Block
 from femgear.stages.life_results import describe_damage, describe_life, life_findings
+from femgear.stages.planet_bearings import (
+    PlanetBearings,
+    describe_planet_bearings,
+    planet_bearing_findings,
+    planet_bearing_variables,
+    planet_bearings,
+)
 from femgear.stages.protocol import Progress, Stage, StageResult, one_blas_thread, silent
 from femgear.stages.static import solve_static
 from femgear.stages.static_results import StaticResult
@@ -60,6 +74,8 @@ class LifeResult(StageResult):
         Life that the case asks for [h].
     residuals : (c,) array
         Largest violation of contact conditions and equilibrium, relative, NaN without load.
+    bearings : PlanetBearings or None
+        Those of the planets, where they have a rating.
     """
 
     names: tuple[str, ...]
@@ -68,6 +84,7 @@ class LifeResult(StageResult):
     spectra: tuple[RatedSpectrum, ...]
     required: float | None
     residuals: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    bearings: PlanetBearings | None = None
 
     @property
     def residual(self) -> float:
@@ -82,7 +99,7 @@ class LifeResult(StageResult):
     @staticmethod
     def warnings(data: Any) -> Iterable[Finding]:
         """List what life.nc says against itself."""
-        return life_findings(data)
+        return (*life_findings(data), *planet_bearing_findings(data))
 
     def contents(self) -> Contents:
         """Collect the contents of life.nc."""
@@ -109,7 +126,8 @@ class LifeResult(StageResult):
         coords["kind"] = (("kind",), np.arange(1, kinds + 1), "1", "number of the kind of mesh")
         attrs: dict[str, Any] = {"title": "life of the teeth over load cases"}
         attrs |= {} if self.required is None else {"required_hours": self.required}
-        return Contents(variables, coords | tooth_life_coordinates(self.spectra), attrs)
+        lives, planets = planet_bearing_variables([self.bearings] if self.bearings else [])
+        return Contents(variables | lives, coords | tooth_life_coordinates(self.spectra) | planets, attrs)
 
 
 def static_load_factors(static: StaticResult) -> dict[str, np.ndarray | None]:
@@ -159,24 +177,33 @@ def solve_life(
     steps, load_cases = steps or Steps(), case.operation.load_case
     steps.keep("flank compliances", compliance_entries(case), (static.sectors, static.bodies))
     names, shares = load_case_names(load_cases), running_shares(load_cases)
-    loads, residuals = list[RatedLoad](), list[float]()
+    loads, residuals, cycles = list[RatedLoad](), list[float](), list[MeshCycle | None]()
     for number, (load_case, share) in enumerate(zip(load_cases, shares.tolist(), strict=True)):
         progress("life", float(number), float(len(load_cases)))
         loaded = with_torque(case, load_case.torque)
         torque, frequency = float(loaded.torque_on_first_gear()), mesh_frequency_at(case, load_case.speed)
-        rating, residual = None, math.nan
+        rating, residual, cycle = None, math.nan, None
         if load_case.torque != 0.0:
             same = load_case.torque == case.operation.torque
             state = static if same else _state(loaded, number, names[number], contact, cache, steps)
             computed: dict[str, Any] = static_load_factors(state)
             rating = rate_case(loaded, torque=torque, frequencies=(frequency,), **computed)
-            residual = state.residual
+            residual, cycle = state.residual, state.cycle
+        cycles.append(cycle)
         loads.append(RatedLoad(rating, torque, frequency, share))
         residuals.append(residual)
     spectra = rated_spectra(case, loads)
     speed = np.array([load_case.speed for load_case in load_cases])
     required = required_life(case.operation)
-    return LifeResult(tuple(names), tuple(loads), speed, spectra, required, np.array(residuals))
+    bearings = planet_bearings(
+        case,
+        planetary_set(case),
+        cycles,
+        carrier_speed=[carrier_speed_at(case, load_case.speed) for load_case in load_cases],
+        mesh_frequency=[load.mesh_frequency for load in loads],
+        shares=shares,
+    )
+    return LifeResult(tuple(names), tuple(loads), speed, spectra, required, np.array(residuals), bearings)
 
 
 def with_torque(case: Any, torque: float) -> Any:
@@ -208,11 +235,21 @@ def mesh_frequency_at(case: Any, speed: float) -> float:
     return abs(speeds(gears, input=operation.input, fixed=operation.fixed, speed=speed).mesh_frequency)
 
 
+def carrier_speed_at(case: Any, speed: float) -> float:
+    """Compute the speed of the carrier of a case at a speed of its input [rad/s]; zero of a pair."""
+    gears, operation = planetary_set(case), case.operation
+    if not gears.repeated[BRANCH]:
+        return 0.0
+    return speeds(gears, input=operation.input, fixed=operation.fixed, speed=speed).carrier
+
+
 def no_load_cases(case: Any) -> str:
     """Say why a case has no stage of lives; empty where it has."""
     if not case.operation.load_case:
         return "operation gives no load cases"
-    return "" if len(without_line(case)) < len(case.gear_names) else "no material has a treatment"
+    if len(without_line(case)) < len(case.gear_names) or has_rated_bearings(case):
+        return ""
+    return "no material has a treatment"
 
 
 LIFE = Stage(
@@ -223,7 +260,7 @@ LIFE = Stage(
     options=("cache", "progress", "steps"),
     verdict=lambda result: {"load_cases": len(result.loads), "roots_and_flanks": len(result.spectra)},
     describe=lambda results: next(describe_life(results.life), Block("Life of the teeth", notes=(_NO_LIVES,))),
-    tables=lambda results: describe_damage(results.life),
+    tables=lambda results: (*describe_damage(results.life), *describe_planet_bearings(results.life)),
     warnings=LifeResult.warnings,
     unavailable=no_load_cases,
 )

@@ -59,7 +59,8 @@ def entries_without_effect(data: dict, others: Sequence[str] = (), *, lives: boo
     machines = [name for name in ("motor", "brake", "housing", "runup") if name in data]
     keys = ("foundation_radial", "foundation_tangential")
     foundation = (f"ring.{key}" for key in keys if key in data["ring"])
-    spectrum = (f"operation.{key}" for key in ("load_case", "required_hours") if key in data["operation"])
+    spectrum = [f"operation.{key}" for key in ("load_case", "required_hours") if key in data["operation"]]
+    spectrum += [f"planet.{key}" for key in ("dynamic_rating", "bearing_kind") if key in data["planet"]]
     return [*machines, *others, *foundation, *(() if lives else spectrum)]
 
 

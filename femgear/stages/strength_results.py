@@ -18,6 +18,7 @@ from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
+from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.stages.strength import MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
 from femgear.stages.stress_reasons import reason_row
 from femgear.system.fourier import sample
@@ -48,7 +49,7 @@ def strength_verdict(results: Results) -> Iterator[Block]:
     """
     marks, stages = Marks(results.findings), results.stages
     reasons = list(reason_row(results.stress)) if "stress" in stages else []
-    rows = [*reasons, *efficiency_rows(results, marks), *heat_rows(results, marks)]
+    rows = [*reasons, *_lives(results, marks), *efficiency_rows(results, marks), *heat_rows(results, marks)]
     if not rating_wanted(results.case):
         if rows:
             yield Block("Verdict", rows=tuple(rows), notes=marks.notes)
@@ -61,8 +62,7 @@ def strength_verdict(results: Results) -> Iterator[Block]:
         dynamic = factor_of_two_frequencies(results.response, len(kinds))
     rating = rate_case(results.case, sharing=sharing, dynamic=dynamic, face=face)
     doubts = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
-    lives = life_rows(results.life, marks) if "life" in results.stages else ()
-    rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *lives, *rows]
+    rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *rows]
     yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
     yield strength_block(rating, kinds)
 
@@ -93,6 +93,13 @@ def factor_of_two_frequencies(response: xr.Dataset, kinds: int) -> np.ndarray:
         peak = np.real(force @ np.exp(1j * turned)).max(axis=1)
         factors.append((peak / np.real(force[:, mean].sum(axis=1))).reshape(kinds, -1).max(axis=1))
     return np.max(factors, axis=0)
+
+
+def _lives(results: Results, marks: Marks) -> Iterator[tuple[str, str]]:
+    """Rows of the lives of teeth and planets' bearings over the load cases, where they were computed."""
+    if "life" in results.stages:
+        yield from life_rows(results.life, marks)
+        yield from planet_bearing_rows(results.life, marks)
 
 
 def computed_dynamic_factor(dynamics: xr.Dataset, kinds: int) -> np.ndarray:

@@ -64,6 +64,7 @@ from femgear.solvers.stability.parametric import stability
 from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
+from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.stages.protocol import StageResult, one_blas_thread
 from femgear.stages.static_results import (
     HELD,
@@ -621,7 +622,7 @@ def verdict(results: Results) -> Iterator[Block]:
             rows.append(("face load factor K_Hβ", text))
         rows += _strength(results, computed, notes, marks, _all_of(doubts))
     if "life" in stages:
-        rows += life_rows(results.life, marks)
+        rows += (*life_rows(results.life, marks), *planet_bearing_rows(results.life, marks))
     if "runup" in stages:
         rows.append(("largest dynamic factor K_v of the run-up", largest_factors(results.runup, marks)))
         rows.append(("largest level of the run-up", loudest(results.runup, marks)))

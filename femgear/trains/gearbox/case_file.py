@@ -23,6 +23,7 @@ from femgear.case.quantities import (
     ACCELERATION,
     ANGLE,
     DENSITY,
+    FORCE,
     FREQUENCY,
     INERTIA,
     LENGTH,
@@ -61,7 +62,6 @@ from femgear.errors import CaseError
 from femgear.trains.gearbox.materials import with_materials
 from femgear.trains.reading import parse_case
 
-FORCE = Dimension("a force", "N", "N", 1.0)
 RISE = Dimension("a temperature difference", "K", "K", 1.0)
 EXPANSION = Dimension("a thermal expansion", "1/K", "1/K", 1.0)
 CASING = "casing"

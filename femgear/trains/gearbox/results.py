@@ -16,6 +16,7 @@ from femgear.findings import DOUBT, FAULT, Finding
 from femgear.gears.planetary import assembly_positions
 from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.stages.life_results import describe_damage, describe_life, life_findings
+from femgear.stages.planet_bearings import describe_planet_bearings, planet_bearing_findings
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
@@ -431,6 +432,7 @@ def describe_deflection(data: xr.Dataset) -> tuple[Block, ...]:
         *describe_load_cases(data),
         *describe_life(data),
         *describe_damage(data),
+        *describe_planet_bearings(data),
     )
 
 
@@ -458,6 +460,7 @@ def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:
         yield from _idle_planets(data)
     yield from life_findings(data)
     yield from bearing_life_findings(data)
+    yield from planet_bearing_findings(data)
     if "estimate_face_load_factor" in data:
         spread = np.ptp(data["estimate_face_load_factor"].values, axis=0)
         worst = int(np.nan_to_num(spread).argmax()) if len(spread) else 0

@@ -10,8 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
+from femgear.case.gear_set import planetary_set
 from femgear.case.load_spectrum import check_pitting, required_life, running_shares
 from femgear.errors import CaseError
+from femgear.stages.planet_bearings import PlanetBearings, planet_bearing_variables, planet_bearings
 from femgear.stages.tooth_spectra import (
     RatedLoad,
     RatedSpectrum,
@@ -55,7 +57,27 @@ def tooth_life_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple],
     """
     spectra, required = stage_spectra(states), required_life(states[0].model.case.operation)
     attrs = {} if required is None else {"required_hours": required}
-    return tooth_life_variables(spectra, required), tooth_life_coordinates(spectra), attrs
+    variables, planets = planet_bearing_variables(stage_planet_bearings(states))
+    return variables | tooth_life_variables(spectra, required), planets | tooth_life_coordinates(spectra), attrs
+
+
+def stage_planet_bearings(states: Sequence[Deflection]) -> list[PlanetBearings]:
+    """Collect the bearings of the planets of all sets whose teeth give them a rating, by the contact of their teeth."""
+    case, sets = states[0].model.case, list[PlanetBearings]()
+    for stage in case.planetary:
+        contacts = [state.contacts.get(stage.name) for state in states]
+        teeth = next((contact.case for contact in contacts if contact is not None), None)
+        bearings = teeth and planet_bearings(
+            teeth,
+            planetary_set(teeth),
+            [None if contact is None else contact.result.cycle for contact in contacts],
+            carrier_speed=[state.model.flow.speed[stage.carrier] for state in states],
+            mesh_frequency=[state.model.flow.mesh_frequency[stage.name] for state in states],
+            shares=running_shares(case.operation.load_case),
+        )
+        if bearings:
+            sets.append(replace(bearings, names=tuple(f"{stage.name} {name}" for name in bearings.names)))
+    return sets
 
 
 def pitting_problems(case: GearboxCase, stages: Sequence[PairSection | BoxPlanetarySection]) -> Iterator[CaseError]:

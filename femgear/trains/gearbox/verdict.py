@@ -16,6 +16,7 @@ from femgear.stages.heat_results import heat_rows
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
+from femgear.stages.planet_bearings import planet_bearing_rows
 from femgear.trains.gearbox.casing_results import largest_foot_force
 from femgear.trains.gearbox.life import shortest_life
 from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
@@ -39,6 +40,7 @@ def gearbox_verdict(results: Any) -> Iterator[Block]:
         response = results.dynamics if "dynamics" in results.stages else None
         rows += smallest_safeties(results.deflection, response, marks)
         rows += life_rows(results.deflection, marks, of=("deflection",))
+        rows += planet_bearing_rows(results.deflection, marks, of=("deflection",))
         rows += efficiency_rows(results, marks)
         rows += heat_rows(results, marks)
     modes = results.modes if "modes" in results.stages else None
