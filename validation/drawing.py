@@ -12,6 +12,7 @@ from scipy.optimize import root, root_scalar
 from femgear.gears.allowances import thickness_allowances
 from femgear.gears.checks import tip_clearances
 from femgear.gears.drawing import (
+    ball_contact_radius,
     chord,
     gear_at_allowance,
     half_angle_of_balls,
@@ -21,6 +22,7 @@ from femgear.gears.drawing import (
     over_balls,
     shift_of_half_angle,
     span,
+    span_radius,
     usual_ball,
     usual_span_teeth,
 )
@@ -34,6 +36,7 @@ ALPHA = math.radians(20.0)
 HAND = "closed form of textbooks (Niemann and Winter, vol. 2; DIN 3960), evaluated by hand"
 PROFILE = "points of the flanks that femgear generates, on a helix of their lead"
 BACK = "from the measure back to the profile shift"
+PROGRAM = "STplus report of a pair 51/52, as tests of a public program of gear geometry print it"
 TIPS = "DIN 3960, by hand; a clearance of 0.25 modules"
 FITS = "DIN 3967:1978, example of section 3.1 and rows of both tables as two public programs have them"
 ROUNDING = 1e-12
@@ -127,6 +130,32 @@ def textbook() -> tuple[Row, ...]:
         rows.append(within(case, HAND, "s [mm]", thickness, 1e3 * normal_thickness(gear), ROUNDING))
         chordal = 3.0 * teeth * math.sin(thickness / (3.0 * teeth))
         rows.append(within(case, HAND, "chord [mm]", chordal, 1e3 * chord(gear)[0], ROUNDING))
+    return tuple(rows)
+
+
+def another_program() -> tuple[Row, ...]:
+    """Two gears of module 1 mm by a program of gear designers; their shifts follow from its printed spans."""
+    rows = []
+    for teeth, length, thickness, balls, allowance, of_span, of_balls in (
+        (51, 17.090, "1.719", "53.846", -0.296, "50.788", "50.779"),
+        (52, 17.180, "1.800", "55.064", -0.220, "51.728", "52.146"),
+    ):
+        plain = Gear(teeth, 1e-3, ALPHA, 0.0, 0.01, 0.01)
+        gear = replace(plain, profile_shift=shift_of_half_angle(plain, half_angle_of_span(plain, 6, 1e-3 * length)))
+        thin = gear_at_allowance(gear, 1e-3 * allowance)
+        # three decimals of the span leave the thickness open by 0.5 um over cos(alpha), M_dK by 2.5 times 0.5 um
+        for quantity, reference, value, digits in (
+            ("s_n from W_6 [mm]", thickness, normal_thickness(gear), 2.1),
+            ("M_dK from W_6, ball 1.75 mm [mm]", balls, over_balls(gear, 1.75e-3), 3.5),
+            (f"diameter where W_6 touches, A_sn {1e3 * allowance:g} um [mm]", of_span, 2.0 * span_radius(thin, 6), 2.1),
+            (
+                f"diameter where the ball touches, A_sn {1e3 * allowance:g} um [mm]",
+                of_balls,
+                2.0 * ball_contact_radius(thin, 1.75e-3),
+                3.5,
+            ),
+        ):
+            rows.append(printed(f"{teeth}, m 1", PROGRAM, quantity, reference, 1e3 * value, digits=digits))
     return tuple(rows)
 
 

@@ -99,6 +99,7 @@ THEMES = (
         "1e-12; 1e-9; printed digits.",
         (
             drawing.textbook,
+            drawing.another_program,
             drawing.helical_by_section,
             drawing.on_the_profile,
             drawing.shortened_tips,

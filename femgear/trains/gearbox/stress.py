@@ -21,6 +21,7 @@ from femgear.report.tables import Block
 from femgear.stages.protocol import Progress, StageResult, silent
 from femgear.stages.static import solve_static, solve_stress
 from femgear.stages.static_results import describe_stress, stress_warnings
+from femgear.stages.stress_reasons import reason_row
 from femgear.storage.contents import Contents
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
 from femgear.trains.gearbox.deflection import Deflection
@@ -28,7 +29,7 @@ from femgear.trains.gearbox.deflection import Deflection
 if TYPE_CHECKING:
     import xarray as xr
 
-_ATTRIBUTES = "module", "repeats", "nominal_load", "iso_contact_helix_factor", "iso", "iso_edition"
+_ATTRIBUTES = "module", "sun_torque", "repeats", "nominal_load", "iso_contact_helix_factor", "iso", "iso_edition"
 """Of stress.nc of a set or a pair, which its table and its findings need."""
 
 
@@ -218,3 +219,11 @@ def describe_box_stress(data: xr.Dataset, findings: Sequence[Finding] = ()) -> I
         ]
         block = describe_stress(part, of_stage)
         yield replace(block, title=f"Stresses, {name}") if len(parts) > 1 else block
+
+
+def box_reason_rows(data: xr.Dataset) -> Iterator[tuple[str, str]]:
+    """Write the rows of a verdict that say which stresses differ from those of ISO 6336, and why, stage by stage."""
+    parts = list(stage_parts(data))
+    for name, _, part in parts:
+        for title, text in reason_row(part):
+            yield (f"{title}, {name}" if len(parts) > 1 else title), text

@@ -22,6 +22,7 @@ from femgear.trains.gearbox.life import shortest_life
 from femgear.trains.gearbox.mode_words import mesh_lines_and_modes, nearest_mode
 from femgear.trains.gearbox.response_results import line_origin
 from femgear.trains.gearbox.strength import smallest_safeties
+from femgear.trains.gearbox.stress import box_reason_rows
 
 SENSORS_JUDGED = 3
 """Sensors in the verdict, at most: the loudest ones."""
@@ -39,6 +40,7 @@ def gearbox_verdict(results: Any) -> Iterator[Block]:
         rows += _worst_of_deflection(results.deflection, marks)
         response = results.dynamics if "dynamics" in results.stages else None
         rows += smallest_safeties(results.deflection, response, marks)
+        rows += box_reason_rows(results.stress) if "stress" in results.stages else ()
         rows += life_rows(results.deflection, marks, of=("deflection",))
         rows += planet_bearing_rows(results.deflection, marks, of=("deflection",))
         rows += efficiency_rows(results, marks)

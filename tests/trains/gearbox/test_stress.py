@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from femgear.run import solve
-from femgear.trains.gearbox.stress import box_stress_warnings, describe_box_stress, stage_parts, why_no_stress
+from femgear.stages.stress_reasons import reason_row
+from femgear.trains.gearbox.stress import (
+    box_reason_rows,
+    box_stress_warnings,
+    describe_box_stress,
+    stage_parts,
+    why_no_stress,
+)
 from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case, with_values
 
@@ -46,3 +53,14 @@ def test_a_gearbox_without_teeth_or_contact_says_why_it_has_none(pair):
     assert why_no_stress(pair[1]) == ""
     assert "deflection.contact" in why_no_stress(with_values(pair[1], {"deflection.contact": False}))
     assert "no stage has teeth" in why_no_stress(read_case("cases/four_stage_reducer.toml"))
+
+
+def test_the_verdict_says_which_stresses_differ_from_nominal_ones(stresses):
+    alone, box = (data.copy() for data in stresses)
+    for data in (alone, box):
+        data["iso_root_stress"] = 0.5 * data["root_worst"]
+    ((title, text),) = box_reason_rows(box)
+    assert title.startswith("FE over ISO 6336") and "root gear 1 2.00 (see Stresses)" in text
+    roots = [part for part in text.split("), ") if part.startswith("root")]
+    ((_, same),) = reason_row(alone)
+    assert roots == [part for part in same.split("), ") if part.startswith("root")]
