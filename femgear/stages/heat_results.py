@@ -12,6 +12,7 @@ import numpy as np
 from femgear.case.quantities import CELSIUS, RPM
 from femgear.findings import Finding
 from femgear.report.tables import Block, Marks, tabulate
+from femgear.stages.key_figures import NUMBER, KeyFigure, Stored
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import as_written, declared
@@ -19,6 +20,11 @@ from femgear.storage.results import as_written, declared
 if TYPE_CHECKING:
     import xarray as xr
 
+HEAT_KEY_FIGURES = (
+    KeyFigure("scuffing safety", NUMBER, "heat", Stored("scuffing_safety", pick="smallest"), ("W-HEAT",), whole=True),
+    KeyFigure("film ratio", NUMBER, "heat", Stored("smallest_film_ratio", pick="smallest"), whole=True),
+)
+"""Key figures of all trains with temperatures: the worst of all operating points and kinds of mesh."""
 _SHOWN = 12
 """Operating points in a table, at most."""
 _CURVE = "{} mesh_kind point"

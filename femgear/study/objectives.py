@@ -24,6 +24,7 @@ from femgear.errors import CaseError
 from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness
 from femgear.moved import former_names
+from femgear.stages.heat_results import HEAT_KEY_FIGURES
 from femgear.stages.key_figures import NUMBER, KeyFigure, figure_of
 from femgear.stages.losses_results import LOSS_FIGURES
 from femgear.stages.static_results import LARGE
@@ -50,7 +51,7 @@ _SPEEDS = 51
 _MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 _FORCE = Dimension("a force", "N", "N", 1.0)
 _STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
-STAGES = ("gears", "static", "deflection", "stress", "losses", "modes", "dynamics", "runup", "housing")
+STAGES = ("gears", "static", "deflection", "stress", "losses", "heat", "modes", "dynamics", "runup", "housing")
 """In the order of their effort."""
 
 
@@ -384,7 +385,7 @@ _WORDS: dict[str, Callable[..., StudyQuantity]] = {
     **{f"tip thickness {gear}": partial(tip_thickness, gear) for gear in get_args(_GearName)},
     "contact pressure": contact_pressure,
     **{f"root stress {gear}": partial(root_stress, gear) for gear in get_args(_GearName)},
-    **{figure.name: partial(quantity_of_figure, figure) for figure in LOSS_FIGURES},
+    **{figure.name: partial(quantity_of_figure, figure) for figure in (*LOSS_FIGURES, *HEAT_KEY_FIGURES)},
 }
 _OVER_SPEEDS = ("mesh force", "peak mesh force", "housing")
 """Quantities that take the first and the last speed."""

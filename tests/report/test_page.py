@@ -194,7 +194,7 @@ def test_verdict_stands_before_the_stages_and_trust_is_folded_away_at_the_end(tm
         # what is folded away is on paper, and where no script opens it
         assert text.count("<details") == 2 and text.count(" open>") == 2 * static
     titles = [stage.title for stage in ELASTIC.stages]
-    assert titles == ["Static", "Stresses", "Losses", "Life", "Modes", "Run-up", "Dynamics", "Housing"]
+    assert titles == ["Static", "Stresses", "Losses", "Temperatures", "Life", "Modes", "Run-up", "Dynamics", "Housing"]
 
 
 def test_static_results_alone_make_a_page(tmp_path):

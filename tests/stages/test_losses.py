@@ -3,13 +3,15 @@
 import numpy as np
 import pytest
 
-from femgear.case.dependencies import loss_entries, modal_entries, static_entries
+from femgear.case.dependencies import Steps, loss_entries, modal_entries, static_entries
 from femgear.errors import CaseError
 from femgear.gears.power_losses import planetary_efficiency
 from femgear.run import run_case
 from femgear.stages.losses import check_loss_entries, computed_loss_factor, solve_losses
 from femgear.stages.static import solve_static
 from femgear.storage.results import run_folder
+from femgear.study.objectives import named_quantity
+from femgear.trains.live import Answer
 from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import stages_of, train_of
 from validation.losses import computed_case, computed_loads
@@ -104,3 +106,14 @@ def test_a_run_has_its_file_table_and_row_of_the_verdict(tmp_path):
     blocks = train_of(case).describe_results(results)
     rows = {name: text for block in blocks if block.title == "Verdict" for name, text in block.rows}
     assert rows["efficiency"].startswith(f"{100.0 * float(data['efficiency'][0]):.3f} %")
+
+
+def test_studies_ask_for_efficiency_by_name():
+    losses = CONSTANT["losses"] | {"roughness": "0.4 um"}
+    oil = {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s", "temperature": "80 degC", "fzg_stage": 12}
+    case = with_values(read_case("cases/planetary_27_40_108.toml"), COARSE | {"losses": losses, "lubricant": oil})
+    answer = Answer(case, Steps())
+    values = {name: named_quantity(name, case=case).compute(answer) for name in ("efficiency", "scuffing safety")}
+    assert values["efficiency"] == min(point.flow.efficiency for point in answer["losses"].points)
+    assert values["scuffing safety"] > 1.0
+    assert named_quantity("losses", case=case).show(250.0) == "250 W"

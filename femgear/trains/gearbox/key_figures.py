@@ -13,8 +13,10 @@ from typing import Any
 import numpy as np
 
 from femgear.case.load_spectrum import required_life, without_line
+from femgear.case.lubrication import heat_missing
 from femgear.case.quantities import ACCELERATION, RPM, SPEED, Dimension
 from femgear.gears.planetary import mesh_names
+from femgear.stages.heat_results import HEAT_KEY_FIGURES
 from femgear.stages.key_figures import DECIBEL, NUMBER, KeyFigure, Stored
 from femgear.stages.losses_results import LOSS_FIGURES
 from femgear.trains.gearbox.case_file import FORCE, BoxPlanetarySection, GearboxCase, PairSection, teeth_of
@@ -125,6 +127,8 @@ def _of_losses(case: GearboxCase) -> Iterator[KeyFigure]:
     if case.losses is None:
         return
     yield from LOSS_FIGURES
+    if not heat_missing(case):
+        yield from HEAT_KEY_FIGURES
     stages = [stage for stage in (*case.pair, *case.planetary) if stage.teeth and case.deflection.contact]
     for stage in stages:
         of_stage = Stored("stage_efficiency", "stage", (stage.name,), "smallest")
