@@ -128,7 +128,10 @@ def _teeth_tables(given: Mapping[str, Any], torque: str) -> dict[str, Any]:
     """Tables of a case that the teeth of a stage keep."""
     operation = {key: value for key, value in given["operation"].items() if key in ("input", "fixed")}
     speeds = {"speeds": given["operation"]["speeds"]} if "input" in operation else {}
-    return {key: given[key] for key in _TEETH if key in given} | {"operation": operation | {"torque": torque} | speeds}
+    tables = {key: given[key] for key in _TEETH if key in given}
+    if "planar" in tables:  # the rest of the section is of the set alone
+        tables["planar"] = {"ring": tables["planar"].get("ring", {})}
+    return tables | {"operation": operation | {"torque": torque} | speeds}
 
 
 def _pair(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> dict[str, Any]:

@@ -516,11 +516,11 @@ class _Builder:
         mass, inertia = getattr(section, "mass", math.nan), getattr(section, "inertia", math.nan)
         gears = {gear.name: gear for gear in planetary_set(teeth).gears}
         diametral = math.nan
+        rigid = getattr(teeth, "helical", None) or getattr(teeth, "planar", None)
+        if rigid is not None and key == "ring":
+            mass, inertia = rigid.ring.mass, rigid.ring.inertia
         if hasattr(teeth, "helical"):
-            space = getattr(teeth.helical, key)
-            diametral = space.diametral_inertia
-            mass = space.mass if key == "ring" else mass
-            inertia = space.inertia if key == "ring" else inertia
+            diametral = getattr(teeth.helical, key).diametral_inertia
         if key in gears:
             body = gear_cylinder(gears[key], gear_material(teeth, key).density)
             found = [value if math.isfinite(value) else guess for value, guess in zip((mass, inertia, diametral), body)]
