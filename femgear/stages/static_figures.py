@@ -47,6 +47,7 @@ from femgear.report.style import (
     position_words,
 )
 from femgear.stages.heat_figures import HEAT_FIGURES
+from femgear.stages.life_figures import LIFE_FIGURES
 from femgear.stages.protocol import Drawn, Figures
 from femgear.stages.static import over_width, static_supports
 from femgear.stages.static_results import SIDES, UNEQUAL, StaticResult, peak_to_peak, shares
@@ -822,4 +823,10 @@ _STRESSES = Figures(
 )
 
 
-FIGURES = {"static": _STATIC, "stress": _STRESSES, "heat": HEAT_FIGURES, "": Figures({}, draw=_deviation_figures)}
+FIGURES = {
+    "static": _STATIC,
+    "stress": _STRESSES,
+    "life": LIFE_FIGURES,
+    "heat": HEAT_FIGURES,
+    "": Figures({}, draw=_deviation_figures),
+}

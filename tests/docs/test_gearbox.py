@@ -11,9 +11,10 @@ from small_gearbox import pair_tables
 
 from femgear.exchange.casing_files import read_nodes
 from femgear.exchange.superelement import SUPERELEMENT_ROLES
-from femgear.trains.gearbox.case_file import BoxBearingSection, BoxCasingSection
+from femgear.trains.gearbox.case_file import BoxBearingSection, BoxCasingSection, embed_stages
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.sensors import sensor_rows
+from femgear.trains.gearbox.stages import solve_deflections
 from femgear.trains.reading import read_case
 from validation.tools import gearbox_keys
 
@@ -51,3 +52,19 @@ def test_the_table_of_keys_is_that_of_the_sections():
     rows = dict(re.findall(r"^\| `\[\[bearing\]\]` \| `(\w+)` \| .* \| (.*) \|$", PAGE, flags=re.M))
     assert rows.keys() == BoxBearingSection.model_fields.keys()
     assert rows["shaft"] == "needed" and rows["inner_osculation"] == "0.52" and rows["estimated"] == "`false`"
+
+
+@pytest.mark.slow
+def test_lives_of_the_axle_are_those_of_the_page():
+    tables = tomllib.loads((Path(__file__).parents[2] / "cases" / "e_axle.toml").read_text(encoding="utf-8"))
+    embed_stages(tables, "cases/e_axle.toml")
+    for stage in (*tables["pair"], *tables["planetary"]):
+        steel = {"treatment": "case hardened steel", "hardness": 720, "root_stress_limit": "461 MPa"}
+        stage["teeth"]["material"] |= steel
+    tables["strength"], tables["operation"]["required_hours"] = {"quality": 6}, 8000
+    data = solve_deflections(read_case(tables)).dataset()
+    safeties = [data[f"{kind}_spectrum_safety"].values.min() for kind in ("root", "flank")]
+    numbers = re.search(r"smallest S_F over them is ([\d.]+).*?smallest S_H ([\d.]+).*?L10r = (\d+) h", PAGE, re.S)
+    assert numbers and [f"{value:.2f}" for value in safeties] == [*numbers.groups()[:2]]
+    assert f"{data['spectrum_reference_life'].values.min():.0f}" == numbers[3]
+    assert not data["root_damage"].any() and not data["flank_damage"].any()

@@ -12,6 +12,7 @@ import numpy as np
 
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
 from femgear.stages.heat_figures import HEAT_FIGURES
+from femgear.stages.life_figures import LIFE_CAPTION, draw_damage
 from femgear.stages.protocol import Drawn, Figures
 from femgear.trains.gearbox.casing_results import seat_curve
 from femgear.trains.gearbox.response_figures import RESPONSE_FIGURES
@@ -255,6 +256,7 @@ def _excitation_line(ax, name: str, slope: float, fastest: float, top: float, na
 def _draw_deflection(drawn: Drawn) -> dict[str, Figure]:
     data = drawn.data["deflection"]
     pictures = {"deflected_shafts": deflected_shafts(data), "load_patterns": load_patterns(data)}
+    pictures["damage"] = draw_damage(data)
     return {name: picture for name, picture in pictures.items() if picture is not None}
 
 
@@ -273,6 +275,7 @@ FIGURES = {
             "deflected_shafts": "Deflection of the shafts in both planes along their axes; arrows are the forces of "
             "the bearings on the shafts.",
             "load_patterns": "Load per width of the meshes under the misalignment that shafts and bearings give them.",
+            "damage": LIFE_CAPTION,
         },
         _draw_deflection,
     ),

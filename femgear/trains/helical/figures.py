@@ -378,6 +378,7 @@ FIGURES = {
     ),
     "stress": STATIC["stress"],
     "heat": STATIC["heat"],
+    "life": STATIC["life"],
     "modes": Figures(
         {
             "spatial_mode_shapes": "Mode shapes of the helical set with mean mesh stiffness, from the front "
