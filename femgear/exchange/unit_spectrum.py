@@ -52,7 +52,7 @@ def share_time(load_cases: Sequence[dict[str, Any]], model: Model) -> None:
 def spectrum_tables(
     model: Model, torques: Sequence[float | None], speeds: Sequence[float], shares: Sequence[float | None]
 ) -> list[dict[str, Any]]:
-    """Make the load cases of the life of a stage; none of fewer than two in the file.
+    """Make the load cases of the life of a stage: none of fewer than two, nor of those that differ in the speed alone.
 
     Parameters
     ----------
@@ -65,7 +65,8 @@ def spectrum_tables(
     shares : sequence of float or None
         Of the time.
     """
-    if len(model.load_cases) < 2:
+    alike = not any(share is not None for share in shares) and len({*torques}) < 2
+    if len(model.load_cases) < 2 or alike:
         return []
     tables = []
     for number, (torque, speed, share) in enumerate(zip(torques, speeds, shares, strict=True), start=1):

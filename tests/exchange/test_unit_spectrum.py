@@ -49,4 +49,7 @@ def test_a_stage_has_the_load_cases_that_turn_and_load_it():
     assert first == {"name": "load case 1", "torque": "30 N m", "speed": "543 rpm", "share": 0.25}
     assert second["torque"] == "-90 N m" and second["share"] == 0.75 and len(model.texts) == 3
     assert spectrum_tables(unit(1), (30.0,), (RPM,), (1.0,)) == []
+    # speeds of one torque are those of operation.speeds
+    assert spectrum_tables(unit(2), (30.0, 30.0), (RPM, 2.0 * RPM), (None, None)) == []
+    assert len(spectrum_tables(unit(2), (30.0, 40.0), (RPM, RPM), (None, None))) == 2
     assert spectrum_tables(unit(2), (30.0, None), (RPM, RPM), (0.5, 0.5)) == []
