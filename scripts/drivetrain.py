@@ -27,7 +27,6 @@ def main(
     rate: str | None = None,
     balanced: bool = False,
     torsional: bool = True,
-    modes: int | None = None,
     sensitivity: bool = True,
 ) -> None:
     """Integrate a drivetrain with and without bending; tables, pictures, a CSV file.
@@ -35,7 +34,7 @@ def main(
     Parameters
     ----------
     case
-        TOML case file with model = "drivetrain"; the published wind turbine set when left out.
+        TOML case file of a gearbox with [transient]; the published wind turbine set when left out.
     output
         Folder of the results.
     duration
@@ -46,37 +45,34 @@ def main(
         The torque that is a share of the others takes all of it, so that the speed stays.
     torsional
         The same chain without bending beside it.
-    modes
-        Pictures of that many elastic modes. Default: as the case says.
     sensitivity
         Whether to vary the assumed inputs of the published set.
     """
-    from femgear.trains.drivetrain.checks import check_spectrum
-    from femgear.trains.drivetrain.model import case_model
-    from femgear.trains.drivetrain.results import describe_drivetrain, describe_spectrum, describe_transient
+    from femgear.trains.gearbox.stages import describe_gearbox
+    from femgear.trains.gearbox.transient_checks import check_spectrum, check_transient
+    from femgear.trains.gearbox.transient_results import describe_spectrum, describe_transient
     from femgear.trains.reading import read_case, with_value
 
     data, paper = read_case(case), read_case(PAPER)
-    if getattr(data, "model", "") != "drivetrain":
+    if getattr(data, "transient", None) is None:
         raise CaseError(
-            "this is no drivetrain",
+            "this is no gearbox that is integrated in time",
             code="E-MODEL",
             key="model",
-            limit='model = "drivetrain"',
-            remedy="name a case file of a drivetrain",
+            limit='model = "gearbox" with [transient]',
+            remedy="name a case file of such a gearbox",
             file=str(case),
         )
     if duration is not None:
-        data = with_value(with_value(data, "simulation.settle", None), "simulation.duration", duration)
+        data = with_value(with_value(data, "transient.settle", None), "transient.duration", duration)
     if rate is not None:
-        data = with_value(data, "simulation.rate", rate)
-    if modes is not None:
-        data = with_value(data, "simulation.modes", modes)
-    data = with_value(data, "simulation.torsional", torsional)
+        data = with_value(data, "transient.rate", rate)
+    data = with_value(data, "transient.torsional", torsional)
     data = with_balance(data) if balanced else data
-    blocks = describe_drivetrain(data)  # refuse before the folder is touched
-    if gears := bool(data.parallel or data.planetary):
-        check_spectrum(data, case_model(data))
+    check_transient(data)  # refuse before the folder is touched
+    blocks = describe_gearbox(data)
+    if gears := bool(data.pair or data.planetary):
+        check_spectrum(data)
     folder = ready_folder(output, _names())
     sets, names = _computed(data, folder, gears=gears)
     _write_forces(folder, sets["transient"])
@@ -88,7 +84,7 @@ def main(
             print(f"  {note}")
     if _is_paper(data, paper):
         _kinematics()
-    extras = {"contact loss": lambda: backlash_figure(data, case_model(data))} if gears else {}
+    extras = {"contact loss": lambda: backlash_figure(data)} if gears else {}
     if sensitivity and _is_paper(data, paper):
         extras["sensitivity"] = _sensitivity
     names += _draw_extras(folder, extras)
@@ -97,9 +93,10 @@ def main(
 
 def _names() -> list[str]:
     """Names of the files, of pictures of a run as patterns."""
-    from femgear.trains.drivetrain.figures import FIGURES
+    from femgear.trains.gearbox.figures import FIGURES
 
-    pictures = [f"{name}*.png" for figures in FIGURES.values() for name in figures.captions]
+    stages = ("modes", "transient", "spectrum")
+    pictures = [f"{name}*.png" for stage in stages for name in FIGURES[stage].captions]
     return ["forces.csv", *(f"{name}.png" for name in FILES.values()), *pictures]
 
 
@@ -107,19 +104,16 @@ def _computed(data, folder: Path, *, gears: bool):
     """Datasets of all stages, and the names of the pictures of a run."""
     from femgear.report.page import write_pictures
     from femgear.stages.protocol import Drawn
-    from femgear.trains.drivetrain.stages import (
-        DRIVETRAIN,
-        solve_drivetrain_modes,
-        solve_spectrum,
-        solve_transient_run,
-    )
+    from femgear.trains.gearbox.spectrum import solve_box_spectrum, solve_box_transient
+    from femgear.trains.gearbox.stages import GEARBOX, solve_box_modes, solve_deflections
 
     with Progress() as progress:
-        transient = solve_transient_run(data, progress=progress)
-        sets = {"modes": solve_drivetrain_modes(data).dataset(), "transient": transient.dataset()}
+        deflection = solve_deflections(data)
+        transient = solve_box_transient(data, deflection, progress=progress)
+        sets = {"modes": solve_box_modes(data, deflection).dataset(), "transient": transient.dataset()}
         if gears:
-            sets["spectrum"] = solve_spectrum(data, transient).dataset()
-        return sets, write_pictures(folder, DRIVETRAIN, Drawn(data, sets), progress=progress)
+            sets["spectrum"] = solve_box_spectrum(data, transient).dataset()
+        return sets, write_pictures(folder, GEARBOX, Drawn(data, sets), progress=progress)
 
 
 def _draw_extras(folder: Path, extras) -> list[str]:
@@ -149,7 +143,7 @@ def _is_paper(data, paper) -> bool:
     """Whether the chain is the published one, whatever is done with it."""
     return all(
         getattr(data, part) == getattr(paper, part)
-        for part in ("body", "shaft", "parallel", "planetary", "bearing", "gravity")
+        for part in ("shaft", "mass", "coupling", "pair", "planetary", "bearing", "gravity")
     )
 
 
@@ -168,10 +162,11 @@ def _kinematics() -> None:
 def _write_forces(folder: Path, transient) -> None:
     """Low-passed records with bending: time, speed of the first body, mesh forces."""
     meshes = [f"{mesh} [N]" for mesh in transient["mesh"].values]
-    header = ("time [s]", f"{transient['body'].values[0]} speed [rad/s]", *meshes)
+    shaft = str(transient.attrs["shaft_of_speed"])
+    header = ("time [s]", f"{shaft} speed [rad/s]", *meshes)
     columns = (
         transient["time"].values,
-        transient["speed"].values[0, :, 0],
+        transient["speed"].sel(shaft=shaft).values[0],
         *transient["mesh_force"].values[0].T,
     )
     write_csv(folder / "forces.csv", header, (tuple(map(float, row)) for row in zip(*columns)))

@@ -14,20 +14,18 @@ def with_balance(case):
     """The case with the share of a torque that balances all others; as it is where it has no share."""
     from femgear.trains.reading import with_value
 
-    for i, one in enumerate(case.operation.torque):
-        if one.share is not None:
-            return with_value(case, f"operation.torque[{i}].share", 1.0)
+    for i, torque in enumerate(case.transient.torque):
+        if torque.share is not None:
+            return with_value(case, f"transient.torque[{i}].share", 1.0)
     return case
 
 
-def backlash_figure(case, model, *, steps: int = 100_000):
+def backlash_figure(case, *, steps: int = 100_000):
     """The mesh that parts most at the start, around its first separation, and the same mesh made linear.
 
     Parameters
     ----------
-    case : DrivetrainCase
-    model : DrivetrainModel
-        Of the case.
+    case : GearboxCase
     steps : int
         Of the start that is searched, which ends where spectra begin.
 
@@ -38,53 +36,51 @@ def backlash_figure(case, model, *, steps: int = 100_000):
     str
         What was found.
     """
-    from femgear.trains.drivetrain.figures import over_time
+    from femgear.trains.gearbox.transient_figures import over_time
 
-    parted, linear = separating_start(case, model, steps=steps)
-    if not parted.lost.any():
-        return None, f"no teeth part in the first {parted.time[-1]:.4g} s: no picture of contact loss"
-    mesh = int(np.argmax(parted.lost))
-    shown, first = first_separation(parted, mesh, mesh_period(case, model, mesh))
-    gap, time = 1e3 * model.backlash[mesh], parted.time[shown]
-    text = f"backlash of {gap:g} mm" if np.isfinite(gap) else "no back flank"
-    curves = [(f"teeth that part, {text}", parted.force[shown, mesh])]
+    parted, linear = separating_start(case, steps=steps)
+    run, model = parted.run, parted.model
+    if not run.lost.any():
+        return None, f"no teeth part in the first {run.time[-1]:.4g} s: no picture of contact loss"
+    mesh = int(np.argmax(run.lost))
+    stage = next(stage for stage in model.stages if run.meshes[mesh] in stage.meshes)
+    shown, first = first_separation(run, mesh, 2.0 * np.pi / model.box.frequency[stage.mesh_base])
+    gap, time = 1e3 * stage.excitation.backlash[stage.meshes.index(run.meshes[mesh])], run.time[shown]
+    text = f"backlash of {gap:g} mm" if gap else "no back flank"
+    curves = [(f"teeth that part, {text}", run.force[shown, mesh])]
     if linear is not None:
-        curves.append(("linear mesh, which pulls", linear.force[shown, mesh]))
+        curves.append(("linear mesh, which pulls", linear.run.force[shown, mesh]))
     found = (
-        f"{model.meshes[mesh]} parts first at {parted.time[first]:.4g} s; apart for "
-        f"{parted.lost[mesh]:.2%} of the first {parted.time[-1]:.4g} s"
+        f"{run.meshes[mesh]} parts first at {run.time[first]:.4g} s; apart for "
+        f"{run.lost[mesh]:.2%} of the first {run.time[-1]:.4g} s"
     )
     return over_time(time, [(found, curves)], unit="mesh force [kN]", factor=1e-3), found
 
 
-def separating_start(case, model, *, steps: int):
+def separating_start(case, *, steps: int):
     """The start of a case, every step recorded, with meshes that part and with linear ones.
 
     The second is None where the linear motion outgrows the numbers.
     """
     from femgear.errors import ConvergenceError
-    from femgear.trains.drivetrain.case_file import settle_time, torque_histories
-    from femgear.trains.drivetrain.simulation import march_drivetrain
 
-    s, torques = case.simulation, torque_histories(case, model.ratio)
-    duration = min(max(settle_time(case), 10.0 / s.rate), s.duration, steps / s.rate)
-    options = {
-        "duration": duration,
-        "step": 1.0 / s.rate,
-        "speed": case.operation.speed,
-        "start": s.start,
-        "outputs": (),
-    }
-    parted = march_drivetrain(model, torques, contact_loss=True, **options)
+    s = case.transient
+    duration = min(max(s.settled, 10.0 / s.rate), s.duration, steps / s.rate)
+    parted = started(case, duration, contact_loss=True)
     try:
-        return parted, march_drivetrain(model, torques, contact_loss=False, **options)
+        return parted, started(case, duration, contact_loss=False)
     except ConvergenceError:
         return parted, None
 
 
-def mesh_period(case, model, mesh: int) -> float:
-    """[s] at the speed of the operation."""
-    return 2.0 * np.pi / model.frequencies(case.operation.speed)[model.mesh_base[mesh]]
+def started(case, duration: float, *, contact_loss: bool):
+    """Motion of a case over a duration [s], every step recorded."""
+    from femgear.trains.gearbox.deflection import solve_deflection
+    from femgear.trains.gearbox.transient import gearbox_in_time, integrate
+
+    transient = case.transient.model_copy(update={"duration": duration, "contact_loss": contact_loss})
+    case = case.model_copy(update={"transient": transient})
+    return integrate(gearbox_in_time(solve_deflection(case), transient), lowpass=False)
 
 
 def first_separation(run, mesh: int, period: float) -> tuple[slice, int]:
@@ -152,21 +148,25 @@ def input_ratios(names, quantities, *, title: str = ""):
 
 def line_amplitudes(assumed) -> np.ndarray:
     """Amplitudes [N] of four lines of the mesh forces at constant speed, 20 s behind 10 s of settling."""
-    from published.wind_turbine_drivetrain import PRINTED, paper_torques, wind_turbine_drivetrain
+    from published.wind_turbine_drivetrain import wind_turbine_drivetrain
 
-    from femgear.trains.drivetrain.model import drivetrain_model
-    from femgear.trains.drivetrain.parts import constant_torques
-    from femgear.trains.drivetrain.simulation import march_drivetrain
+    from femgear.trains.reading import read_case
 
-    model = drivetrain_model(wind_turbine_drivetrain(assumed))
-    torques = constant_torques(paper_torques(balanced=True))
-    run = march_drivetrain(model, torques, duration=30.0, step=1.0 / RATE, speed=PRINTED.speed, outputs=())
+    tables = wind_turbine_drivetrain(assumed)
+    tables["operation"]["torque"][1]["share"] = 1.0
+    tables["simulation"] |= {"duration": "30 s", "rate": f"{RATE} Hz", "start": "static", "torsional": False}
+    motion = started(read_case(tables), 30.0, contact_loss=False)
+    run, model = motion.run, motion.model
     kept = run.time >= 10.0
     times, force = run.time[kept], run.force[kept]
-    f = model.frequencies(PRINTED.speed)
     window = np.hanning(len(times))
+    omega = dict(zip(model.box.bases, model.box.frequency, strict=True))
+    mesh, turn = omega["carrier-sun mesh"], omega["carrier-sun carrier"]
 
-    def line(mesh, omega):
-        return 2.0 * abs((window * np.exp(-1j * omega * times)) @ force[:, mesh]) / window.sum()
+    def line(name, frequency):
+        column = run.meshes.index(name)
+        return 2.0 * abs((window * np.exp(-1j * frequency * times)) @ force[:, column]) / window.sum()
 
-    return np.array([line(0, f[1]), line(0, f[1] - f[0]), line(-2, f[2]), line(-1, f[3])])
+    sun, pairs = "carrier-sun sun-planet 1", ("gear 1-gear 2", "gear 2-gear 3")
+    lines = [(sun, mesh), (sun, mesh - turn), *((name, omega[f"{name} mesh"]) for name in pairs)]
+    return np.array([line(*entry) for entry in lines])

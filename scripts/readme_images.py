@@ -123,13 +123,19 @@ RUNS = {
     "nrel_pgb": _case("nrel_pgb", "Wind turbine set B, rigid bodies"),
     "nrel_pgb_static": _case("nrel_pgb_static", "Wind turbine set B with computed mesh stiffness"),
     "nrel_pga": _case("nrel_pga", "Wind turbine set A, rigid bodies"),
-    "wind_turbine_drivetrain": _case("wind_turbine_drivetrain", "Wind turbine drivetrain"),
+    "wind_turbine_drivetrain": _case(
+        "wind_turbine_drivetrain",
+        "Wind turbine drivetrain",
+        ("campbell", "mesh_force_spectrum", "side_bands", "transient"),
+    ),
     "grc_like_drivetrain": _case(
         "grc_like_drivetrain",
         "Drivetrain like that of the gearbox collaborative",
-        ("campbell", "drivetrain_mode", "mesh_force", "side_bands", "transient_forces", "transient_speeds"),
+        ("campbell", "mesh_force_spectrum", "side_bands", "transient_forces", "transient_speeds"),
     ),
-    "own_chain": _case("own_chain", "A drivetrain to start from", ("campbell", "mesh_force", "transient_forces")),
+    "own_chain": _case(
+        "own_chain", "A drivetrain to start from", ("campbell", "mesh_force_spectrum", "transient_forces")
+    ),
     "e_axle": _case("e_axle", "Electric axle: shafts, bearings and two stages"),
     "e_axle_on_feet": Run(
         "femgear run cases/e_axle.toml",

@@ -9,7 +9,6 @@ import numpy as np
 
 from femgear.case.gear_set import planetary_set
 from femgear.system.rigid_bodies import RigidSet
-from femgear.trains.drivetrain.case_file import DrivetrainCase, drivetrain_of
 from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import read_case
 
@@ -89,97 +88,6 @@ def set_tables(data: RigidSet, teeth) -> dict[str, Any]:
             "load_case": [{"torque": {"set sun": "100 N m"}, "speed": {"set sun": "1000 rpm", "set ring": "0 rpm"}}],
         },
     }
-
-
-def drivetrain_tables(case: DrivetrainCase) -> dict[str, Any]:
-    """Tables of a gearbox that is a drivetrain of bodies, joints and stages; nothing moves along z."""
-    train = drivetrain_of(case)
-    place = {train.bodies[0].name: np.zeros(3)}
-    ways = [(*s.between, np.array([0.0, 0.0, s.length])) for s in train.shafts]
-    for stage in train.parallel:
-        distance = sum(stage.pitch_radii)
-        ways.append((*stage.between, distance * np.array([math.cos(stage.direction), math.sin(stage.direction), 0.0])))
-    ways += [(stage.carrier, stage.sun, np.zeros(3)) for stage in train.planetary]
-    while len(place) < len(train.bodies):
-        for first, second, way in ways:
-            if first in place and second not in place:
-                place[second] = place[first] + way
-            elif second in place and first not in place:
-                place[first] = place[second] - way
-    tables: dict[str, Any] = {"model": "gearbox", "title": "drivetrain", "shaft": [], "mass": [], "bearing": []}
-    for body in train.bodies:
-        x, y, z = place[body.name]
-        tables["shaft"].append({"name": body.name, "axis": [_n(x, "m"), _n(y, "m")], "start": _n(z, "m")})
-        tables["mass"].append(
-            {
-                "shaft": body.name,
-                "mass": _n(body.mass, "kg"),
-                "inertia": _n(body.inertia, "kg m^2"),
-                "transverse_inertia": _n(body.transverse_inertia, "kg m^2"),
-            }
-        )
-        hold = {"shaft": body.name, "axial": "rigid"}
-        tables["bearing"].append(hold if body.tilts else hold | {"tilt": "rigid"})
-    for one in train.bearings:
-        springs = _spring_entries((one.radial, 0.0, one.tilt, 0.0))
-        tables["bearing"].append(
-            {"shaft": one.body, **springs} | ({"position": _n(one.offset, "m")} if one.offset else {})
-        )
-    tables["coupling"] = [
-        {
-            "between": list(one.between),
-            "torsion": _n(one.springs.torsion, "N m/rad"),
-            "bending": _n(one.springs.bending, "N m/rad"),
-            "radial": _n(one.springs.shear, "N/m"),
-        }
-        for one in train.shafts
-    ]
-    tables["pair"] = [
-        {
-            "name": one.name,
-            "shafts": list(one.between),
-            "gears": {
-                "teeth": list(one.teeth),
-                "radii": [_n(r, "m") for r in one.pitch_radii],
-                "pressure_angle": _n(one.pressure_angle, "rad"),
-            },
-            "mesh": {"stiffness": _n(one.mesh.stiffness, "N/m")},
-        }
-        for one in train.parallel
-    ]
-    tables["planetary"] = [
-        {
-            "name": one.name,
-            "sun": one.sun,
-            "carrier": one.carrier,
-            "gears": {
-                "teeth": [one.sun_teeth, round(one.planet_teeth_or_half), one.ring_teeth],
-                "planets": len(one.angles),
-                "base_radii": [_n(r, "m") for r in one.base_radii],
-                "centre_distance": _n(one.axis_distance, "m"),
-            },
-            "planet": {
-                "mass": _n(one.planet_mass, "kg"),
-                "inertia": _n(one.planet_inertia, "kg m^2"),
-                "transverse_inertia": _n(one.planet_transverse_inertia, "kg m^2"),
-                "bearing": {"radial": _n(one.planet_bearing, "N/m")},
-            },
-            "sun_mesh": {"stiffness": _n(one.sun_mesh.stiffness, "N/m")},
-            "ring_mesh": {"stiffness": _n(one.ring_mesh.stiffness, "N/m")},
-        }
-        for one in train.planetary
-    ]
-    first, last = case.operation.torque[0].body, case.operation.torque[-1].body
-    tables["operation"] = {
-        "output": [last],
-        "load_case": [
-            {
-                "torque": {first: _n(case.operation.torque[0].torque or 1.0, "N m")},
-                "speed": {train.bodies[0].name: _n(case.operation.speed, "rad/s")},
-            }
-        ],
-    }
-    return tables
 
 
 def elastic_set_tables(path: str) -> dict[str, Any]:

@@ -85,7 +85,7 @@ WORDS = {
         TEXT + "\n[bearing]\na = 1\n[bearing]\na = 2\n",
         ("E-TOML", "bearing", "[[bearing]]"),
     ),
-    "a model of another kind": ("model = 3\n", ("E-TYPE", "model", "gear_pair, pair, drivetrain")),
+    "a model of another kind": ("model = 3\n", ("E-TYPE", "model", "gear_pair, pair, gearbox")),
     "a number in place of a table in a list": (
         'model = "multistage"\ntitle = "x"\nstage = [1]\n',
         ("E-TYPE", "stage[0]", "write the section [[stage]]"),

@@ -34,10 +34,9 @@ QUICK = {
         "housing.published": None,
     },
     "own_chain": {
-        "simulation.settle": "0.05 s",
-        "simulation.duration": "0.2 s",
-        "simulation.rate": "20 kHz",
-        "simulation.modes": 1,
+        "transient.settle": "0.05 s",
+        "transient.duration": "0.2 s",
+        "transient.rate": "20 kHz",
     },
     "four_stage_reducer": {},
     "helical_30_20_70": {
@@ -89,7 +88,7 @@ def test_numbers_are_told_before_anything_is_drawn(tmp_path, monkeypatch):
     monkeypatch.setattr(report_page, "write_pictures", drawn)
     with run_folder(tmp_path, case=case.source) as place:
         run_case(case, place, computed=computed)
-    assert seen == [["modes", "transient", "spectrum"], ["report.html"]]
+    assert seen == [["deflection", "modes", "dynamics", "transient", "spectrum"], ["report.html"]]
 
 
 def contents(folder):
@@ -119,7 +118,7 @@ def test_an_interrupted_run_goes_on_from_its_stages_to_the_same_bits(name, tmp_p
 
 @pytest.fixture
 def interrupted(tmp_path):
-    """A folder with the modes of a run that was interrupted, and its case."""
+    """A folder with the first stages of a run that was interrupted, and its case."""
     case = quick("own_chain")
     with pytest.raises(KeyboardInterrupt):
         run(case, tmp_path / "out", stop="transient")
@@ -132,19 +131,19 @@ def test_another_case_is_kept_out_of_an_interrupted_run(interrupted):
     with pytest.raises(StorageError, match="interrupted run of another case") as info:
         run(other, folder)
     assert info.value.code == "E-OUTPUT" and "--force" in info.value.remedy
-    assert run(other, folder, force=True) == ["modes", "transient", "spectrum"]
+    assert run(other, folder, force=True) == ["deflection", "modes", "dynamics", "transient", "spectrum"]
     assert read_manifest(folder).complete
 
 
 def test_a_run_that_replaces_results_goes_on_too(interrupted):
     folder, case = interrupted
-    with pytest.warns(UserWarning, match="modes: as the run"):
+    with pytest.warns(UserWarning, match="deflection, modes, dynamics: as the run"):
         run(case, folder)
     before = contents(folder)
     with pytest.raises(KeyboardInterrupt):
         run(case, folder, stop="transient", force=True)
     assert read_manifest(folder).complete and contents(folder) == before
-    with pytest.warns(UserWarning, match="modes: as the run"):
+    with pytest.warns(UserWarning, match="deflection, modes, dynamics: as the run"):
         assert run(case, folder, force=True) == ["transient", "spectrum"]
     assert contents(folder) == before and not (folder / ".running").exists()
 
@@ -162,19 +161,22 @@ def test_stages_that_do_not_fit_are_computed_again(interrupted, damage):
             kept.write_bytes(kept.read_bytes()[:-40])
         listed = {**read_manifest(folder).files, ".stages/modes.npz": checksum(kept)}
         edit_manifest(folder, files=listed)
-    assert run(case, folder) == ["modes", "transient", "spectrum"]
+    assert run(case, folder) == ["modes", "dynamics", "transient", "spectrum"]
 
 
 def test_a_file_of_the_user_among_the_kept_stages_is_refused_and_stays(interrupted):
     folder, case = interrupted
     photo = folder / ".stages" / "photo.png"
     photo.write_text("mine")
-    with pytest.raises(StorageError) as info, pytest.warns(UserWarning, match="modes: as the run"):
+    with (
+        pytest.raises(StorageError) as info,
+        pytest.warns(UserWarning, match="deflection, modes, dynamics: as the run"),
+    ):
         run(case, folder)
     assert info.value.file == str(photo) and photo.read_text() == "mine"
     assert not read_manifest(folder).complete
     photo.rename(folder.parent / "photo.png")
-    with pytest.warns(UserWarning, match="modes: as the run"):
+    with pytest.warns(UserWarning, match="deflection, modes, dynamics: as the run"):
         assert run(case, folder) == ["transient", "spectrum"]
     assert not photo.parent.exists()
 

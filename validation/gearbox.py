@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from gearbox_equivalents import (
-    drivetrain_tables,
     elastic_set_tables,
     pair_of_rigid_gears_tables,
     set_tables,
@@ -20,7 +19,6 @@ from small_gearbox import pair_tables
 from femgear.run import solve
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.lumped_set import gear_set_modes
-from femgear.trains.drivetrain.stages import solve_drivetrain_modes
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.modes import linear_system, solve_gearbox_modes
 from femgear.trains.gearbox_of_case import gearbox_of_case
@@ -51,7 +49,7 @@ def _alike(name: str, source: str, tables: dict[str, Any], expected) -> list[Row
 
 
 def other_trains() -> tuple[Row, ...]:
-    """Sets, stages in series and a drivetrain written as gearboxes."""
+    """Sets and stages in series written as gearboxes."""
     helical, planar = kahraman_set(contact_points="pitch_point"), lin_parker_set()
     radii = np.array([planar.sun_radius, planar.planet_radius, planar.ring_radius])
     teeth = np.rint(1000 * radii / radii[0]).astype(int).tolist()
@@ -67,9 +65,6 @@ def other_trains() -> tuple[Row, ...]:
     for case, key in (("published_four_stages", "published"), ("four_stage_reducer", "modes")):
         tables = tomllib.loads(Path(f"cases/{case}.toml").read_text(encoding="utf-8"))
         rows += _alike(case, "femgear, multistage", tables, stored()[key]["frequency"])
-    drivetrain = read_case("cases/wind_turbine_drivetrain.toml")
-    modes = solve_drivetrain_modes(drivetrain).modes
-    rows += _alike("36 coordinates", "femgear, drivetrain", drivetrain_tables(drivetrain), modes.frequency)
     pair = with_values(read_case("cases/spur_pair.toml"), {"gear_1.bearing_stiffness": "1e8 N/m"})
     modes = solve(pair, only="modes")["modes"].modes
     tables = pair_of_rigid_gears_tables(pair, float(modes.mesh_stiffness[0]))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 from casings import casing_tables
-from gearbox_equivalents import drivetrain_tables, pair_of_rigid_gears_tables, set_tables
+from gearbox_equivalents import pair_of_rigid_gears_tables, set_tables
 from scipy.integrate import solve_ivp
 from small_gearbox import planetary_tables
 
@@ -24,7 +24,6 @@ from femgear.system.fourier import side_bands
 from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque
 from femgear.system.system import MechanicalSystem, MeshExcitation, NonlinearSystem
-from femgear.trains.drivetrain.model import DrivetrainModel, balanced_torque, case_model, drivetrain_problem
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, centrifugal_pull, nonlinear_gearbox, wave_generator
 from femgear.trains.gearbox.stage_structure import running_stage
@@ -296,85 +295,3 @@ def turning_in_time() -> tuple[Row, ...]:
         assert parted > 0.0 and behind > 0.0
         rows.append(at_most(name, IN_TIME, text, 1e-6, apart))
     return tuple(rows)
-
-
-def wind_turbine() -> tuple[Row, ...]:
-    """The wind turbine drivetrain as a gearbox: matrices, flanks at any angle, and time history with flanks that part.
-
-    Speeds of the former are those of its radii, which do not have the ratios of its teeth; gyroscopic and
-    Coriolis terms, which are in proportion to them, are left out of both.
-    """
-    case = read_case("cases/wind_turbine_drivetrain.toml")
-    former = case_model(case)
-    found = solve_deflection(read_case(drivetrain_tables(case) | {"gravity": {}}))
-    positions = np.exp(2j * np.pi * np.outer(np.arange(64) / 64, np.arange(former.stiffness.shape[1])))
-    names = {"sun-planet": "carrier-sun sun-planet", "planet": "carrier-sun planet"}
-    place = {f"{names.get(name.split()[0], name)} {name.split()[1]}": i for i, name in enumerate(former.meshes[:6])}
-    place = {name.replace(" of carrier", ""): i for name, i in place.items()}
-    place |= {name: i + 6 for i, name in enumerate(former.meshes[6:])}
-    drives = dict[str, MeshExcitation]()
-    for stage in found.model.stages:
-        at = [place[found.model.assembly.contacts[mesh].name] for mesh in stage.meshes]
-        k = (positions @ former.stiffness[at].T).real.T
-        drives[stage.name] = MeshExcitation(k, 0.0 * k, 0.0 * k, former.backlash[at])
-    ratio = former.train.damping_ratio
-    box = nonlinear_gearbox(found, drives, harmonics=15, damping_ratio=ratio, gyroscopic=False)
-    assembly = found.model.assembly
-    known = [name.removeprefix("carrier-sun ") if "rotation" in name else name for name in assembly.motion_names]
-    here = [(i, known.index(name)) for i, name in enumerate(former.place.names) if name in known]
-    ours, theirs = np.array(here).T[::-1]
-    shared = np.linalg.lstsq(former.free[theirs], box.motion[ours], rcond=None)[0]
-    assert np.abs(former.free[theirs] @ shared - box.motion[ours]).max() < 1e-12
-    system, apart = box.problem.system, dict[str, float]()
-    # without the Coriolis terms of the planets
-    system = replace(system, C=0.5 * (system.C + system.C.T))
-    box = replace(box, problem=replace(box.problem, system=system))
-    for name, matrix in (("mass", "M"), ("stiffness", "K"), ("damping", "C")):
-        wanted = shared.T @ getattr(former.system, matrix) @ shared
-        apart[name] = np.abs(getattr(system, matrix) - wanted).max() / np.abs(wanted).max()
-    order = [place[name] for stage in box.stages for name in stage.meshes]
-    apart["drive flanks at three angles"] = max(
-        float(
-            np.abs(
-                np.vstack([stage.drive.at(angle) for stage in box.stages])
-                - (former.geometry.basic @ former.geometry.selection(np.array([angle]))).T[order] @ shared
-            ).max()
-        )
-        for angle in (0.0, 1.1, -2.0)
-    )
-    source = "drivetrain, femgear.trains.drivetrain.model"
-    rows = [
-        at_most(
-            f"wind turbine drivetrain: {name}",
-            source,
-            "largest difference, relative or per m of base radius",
-            1e-9,
-            value,
-        )
-        for name, value in apart.items()
-    ]
-    return (*rows, _history(former, box, shared))
-
-
-def _history(former: DrivetrainModel, box: NonlinearGearbox, shared: np.ndarray) -> Row:
-    """Motion of both from rest under torque and weight, in coordinates of which ``shared`` (n, n) are the former."""
-    torques = balanced_torque(former, "rotor", 15e3, "generator")
-    wanted = drivetrain_problem(former, torques=torques, separates=True)
-    system = replace(box.problem.system, load=shared.T @ wanted.system.load)
-    speeds = former.frequencies(8.0)
-    times, known = np.linspace(0.0, 0.05, 51), {"method": "average acceleration", "step": 1e-4, "tolerance": 1e-12}
-    reference = solve_transient(wanted, speeds, times, **known)
-    # pairs come first in a gearbox
-    motion = solve_transient(replace(box.problem, system=system), speeds[[2, 3, 0, 1]], times, **known)
-    force = np.hstack(
-        [
-            element.evaluate(reference.deflection[:, element.columns], times[:, None] * speeds)[0].any(axis=-1)
-            for element in wanted.elements
-        ]
-    )
-    assert not force[:, :8].all() and np.isfinite(reference.displacement).all()
-    apart = np.abs(motion.displacement @ shared.T - reference.displacement).max() / np.abs(reference.displacement).max()
-    text = "0.05 s from rest with flanks that part, largest difference over the largest motion"
-    return at_most(
-        "wind turbine drivetrain: time history", "drivetrain, femgear.trains.drivetrain.model", text, 1e-9, apart
-    )

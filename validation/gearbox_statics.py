@@ -15,7 +15,6 @@ from typing import Any
 
 import numpy as np
 from gearbox_equivalents import (
-    drivetrain_tables,
     elastic_set_tables,
     pair_of_rigid_gears_tables,
     set_tables,
@@ -27,11 +26,11 @@ from femgear.stages.lumped_set import Gravity, gear_set_problem
 from femgear.system.assembly import MOTIONS
 from femgear.system.mesh_directions import free_motions, gear_set_system
 from femgear.system.rigid_bodies import CENTRAL, ROTATIONS, PlanarTorque, RigidSet
-from femgear.trains.drivetrain.model import case_model
 from femgear.trains.elastic.model import gears_alone
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.pair.model import pair_model
 from femgear.trains.reading import read_case, with_values
+from validation.reference import drivetrain_train
 from validation.reference.multistage_train import stored
 from validation.rows import Row, at_most, counted
 
@@ -195,29 +194,13 @@ def stages_state(name: str, found: Deflection) -> LoadedState:
     return LoadedState(motion, scale * force, springs)
 
 
-def chain_state(case, found: Deflection) -> LoadedState:
-    """The same of a chain of bodies, shafts and stages, under its weight."""
-    model = case_model(case)
-    load = model.system.load.copy()
-    for name, torque in found.model.flow.port_torque.items():
-        if torque:
-            load[model.index(f"{name}: rotation")] += torque
-    held = model.free[model.place.names.index(f"{model.train.bodies[0].name}: rotation")]
-    q = held_state(model.total_stiffness, load, held)
-    full, motion, springs = model.free @ q, {}, {}
-    for body in model.train.bodies:
-        first, values = model.place.body[body.name], np.zeros(6)
-        values[[0, 1, 3, 4, 5]] = full[first : first + 5]
-        motion[body.name] = values
-    for bearing in model.train.bearings:
-        values = motion[bearing.body]
-        moved = values[:2] + bearing.offset * np.array([values[4], -values[3]])
-        force = np.append(-bearing.radial * moved, np.zeros(4))
-        springs[bearing.body] = springs.get(bearing.body, 0.0) + force
-    # the planets of the first stage come before its meshes with the ring, as in a gearbox; pairs come first there
-    force = model.mean_stiffness * (model.system.W.T @ q)
-    pairs = len(model.train.parallel)
-    return LoadedState(motion, np.concatenate([force[-pairs:], force[:-pairs]]), springs)
+def chain_state() -> LoadedState:
+    """The same of the wind turbine drivetrain under its weight, as the former train had it."""
+    stored = drivetrain_train.numbers()["loaded"]
+    motion, held = (
+        {name: np.array(values) for name, values in stored[key].items()} for key in ("motion", "bearing_force")
+    )
+    return LoadedState(motion, np.array(stored["mesh_force"]), held)
 
 
 def rigid_sets(weight: bool = True) -> tuple[tuple[str, str, LoadedState, LoadedState], ...]:
@@ -243,9 +226,9 @@ def chains() -> tuple[tuple[str, str, LoadedState, LoadedState], ...]:
     for name in ("published_four_stages", "four_stage_reducer"):
         found = solve_deflection(with_values(read_case(f"cases/{name}.toml"), torque))
         states.append((name, "femgear, multistage", of_gearbox(found), stages_state(name, found)))
-    case = with_values(read_case("cases/wind_turbine_drivetrain.toml"), {"simulation.turning": False})
-    found = solve_deflection(read_case(drivetrain_tables(case) | {"gravity": DOWN}))
-    states.append(("36 coordinates", "femgear, drivetrain", of_gearbox(found), chain_state(case, found)))
+    torques = {"operation.load_case[0].torque": {"rotor": "15 kN m"}, "gravity": DOWN}
+    found = solve_deflection(with_values(read_case("cases/wind_turbine_drivetrain.toml"), torques))
+    states.append(("36 coordinates", "femgear, drivetrain", of_gearbox(found), chain_state()))
     return tuple(states)
 
 

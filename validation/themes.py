@@ -443,9 +443,9 @@ THEMES = (
         "Gearboxes whose teeth part",
         "Contact loss, back flanks that wedge, weight and turning planets on uneven supports, on one assembled system. "
         "Compared with: the trains of a pair and of a planar set, by harmonic balance; the linear response; the "
-        "drivetrain of a wind turbine, matrices and history; the same bodies in axes at rest, integrated by DOP853. "
+        "same bodies in axes at rest, integrated by DOP853. "
         "Gates: 1e-9; 1e-8 of the linear response; 1e-6 in time.",
-        (gearbox_nonlinear.pairs, gearbox_nonlinear.linear_meshes, gearbox_nonlinear.wind_turbine),
+        (gearbox_nonlinear.pairs, gearbox_nonlinear.linear_meshes),
         (gearbox_nonlinear.planar_sets, gearbox_nonlinear.turning_in_time),
     ),
     Theme(
@@ -513,20 +513,24 @@ THEMES = (
     Theme(
         "drivetrain",
         "Wind turbine drivetrain",
-        "Compared with: torsional and planar models, energy and momentum; gates: 0.1 %; 1e-9; 1e-6.",
+        "Gearboxes integrated in time. Compared with: the train of drivetrains that had these cases before, modes, "
+        "histories and spectra; the integrator of any nonlinear system; closed forms, energy and momentum; gates: "
+        "0.1 %; 1e-9, of lines 1e-8; 1e-6.",
         (
             drivetrain.shaft_joints,
             drivetrain.kinematics,
             drivetrain.shifted_planets,
             drivetrain.base_line,
             drivetrain.stiffness,
-            drivetrain.reductions,
+            drivetrain.former_modes,
+            drivetrain.former_histories,
+            drivetrain.general_integrator,
             drivetrain.balances,
             drivetrain.torques,
             drivetrain.growth,
             drivetrain.contact_loss,
         ),
-        (drivetrain.minute,),
+        (drivetrain.former_spectra, drivetrain.minute),
     ),
     Theme(
         "bearings",

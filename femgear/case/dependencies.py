@@ -54,12 +54,13 @@ _DYNAMIC = _WORDS | {"static.stresses", "static.members"}
 _SOLUTION = {f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")}
 """How the contact is solved, whatever the grids."""
 _BESIDE = {
-    "deflection": {"modes", "dynamics", "runup", "balance"},
-    "stress": {"modes", "dynamics", "runup", "balance"},
-    "modes": {"dynamics", "runup", "balance"},
-    "dynamics": {"modes", "runup", "balance"},
-    "runup": {"modes", "balance"},
-    "balance": {"modes", "dynamics", "runup"},
+    "deflection": {"modes", "dynamics", "runup", "balance", "transient"},
+    "stress": {"modes", "dynamics", "runup", "balance", "transient"},
+    "modes": {"dynamics", "runup", "balance", "transient"},
+    "dynamics": {"modes", "runup", "balance", "transient"},
+    "runup": {"modes", "balance", "transient"},
+    "balance": {"modes", "dynamics", "runup", "transient"},
+    "transient": {"modes", "dynamics", "runup", "balance"},
 }
 """Tables of a gearbox that are those of other stages, by stage."""
 _HELIX = {"helical.helix_angle"}
@@ -131,7 +132,7 @@ def runup_entries(case: Case) -> Entries:
 
 def box_entries(stage: str, case: ReadCase) -> Entries:
     """List the entries of a gearbox that decide a stage, which goes on from the deflection alone."""
-    kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup", "balance") else frozenset()
+    kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup", "balance", "transient") else frozenset()
     return _entries(case, {"format", "title"} | _OIL | _BESIDE[stage], kept=kept)
 
 

@@ -16,7 +16,6 @@ from femgear.case import text as case_text
 from femgear.case.estimates import (
     Estimate,
     cylinder,
-    estimated_mesh_stiffness,
     estimates,
     usual_rim,
     usual_torque,
@@ -28,8 +27,6 @@ from femgear.case.quantities import (
     INERTIA,
     LENGTH,
     MASS,
-    STIFFNESS,
-    TORSION,
     Quantity,
 )
 from femgear.case.sections import LARGEST_HELIX, FaceWidth, Module
@@ -217,7 +214,7 @@ def new_case(
     taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": count}
     taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{speed}"'}
     left = [f"--{key} {value}" for key, value in taken.items() if not given[key] and (of_set or key != "planets")]
-    shape = {"drivetrain": _chain, "gearbox": pair_in_gearbox}.get(kind)
+    shape = {"drivetrain": _in_time, "gearbox": pair_in_gearbox}.get(kind)
     tables = tables if shape is None else shape(tables, notes)
     return draft_text(tables, notes, word="estimated", head=_head(kind, left, lacks, form))
 
@@ -244,7 +241,7 @@ def _has_normal_section(tables: dict[str, object], beta: float) -> bool:
 
 def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm) -> list[str]:
     """Paragraphs before the first entry: what is assumed, and what teeth lack whatever their shifts."""
-    head = [_HEAD.format(kind) + {"drivetrain": "", "gearbox": _STANDS}.get(kind, _LEAVE)]
+    head = [_HEAD.format(kind) + {"drivetrain": _STANDS, "gearbox": _STANDS}.get(kind, _LEAVE)]
     head += [f"Assumed: {' '.join(left)}"] if left else []
     if lacks:
         place = "" if form.centre_distance is None else " at this centre distance"
@@ -258,7 +255,7 @@ def _head(kind: str, left: list[str], lacks: tuple[str, ...], form: ToothForm) -
 def _usual_notes(given: Mapping[str, object]) -> dict[str, str]:
     """Remarks on entries that every new case has, and on those whose option is not given."""
     notes = {f"material.{key}": "estimated: steel" for key in _STEEL}
-    notes |= {f"{key}.pressure_angle": "estimated: ISO 53" for key in ("sun", "set", "parallel[0]")}
+    notes |= {f"{key}.pressure_angle": "estimated: ISO 53" for key in ("sun", "set")}
     notes |= {"set.planets": "estimated: as equal spacing allows"} if given["planets"] is None else {}
     notes |= {} if given["face-width"] else {"set.face_width": "estimated: 12 modules"}
     notes |= {} if given["torque"] else {"operation.torque": "estimated: K factor of 1 N/mm^2"}
@@ -277,7 +274,7 @@ def _check_options(kind: str, teeth: tuple[int, ...], planets: int | None, form:
         raise _no_such(kind, "--planets", "no planets")
     if planets and planets > 0 and sum(teeth[::2]) % planets:
         raise _unequal(teeth, planets)
-    if form.helix is not None and kind in ("planar", "drivetrain"):
+    if form.helix is not None and kind == "planar":
         raise _no_such(kind, "--helix", "spur teeth, or a helix_angle of its own tables")
 
 
@@ -523,7 +520,7 @@ def _read(kind: object, text: str, key: str) -> float:
 
 
 def _follows(tables: dict[str, object]) -> bool:
-    """Whether the steps of a drivetrain follow its motion, so that no rate is refused or warned of."""
+    """Whether the steps of an integration follow the meshes, so that no rate is refused or warned of."""
     case = parse_case(case_text.write(tables))
     try:
         codes = [finding.code for finding in train_of(case).case_warnings(case)]
@@ -532,48 +529,29 @@ def _follows(tables: dict[str, object]) -> bool:
     return not {"E-RATE", "W-RATE"} & set(codes)
 
 
-def _chain(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
-    """Tables of a drivetrain: motor, shaft, the pair, shaft and load."""
+def _in_time(pair: dict[str, Any], notes: dict[str, str]) -> dict[str, Any]:
+    """Tables of a gearbox that is integrated in time: the pair on shafts, with rotors at motor and load."""
     case = parse_case(case_text.write(pair))
     gears: Any = planetary_set(case)
-    estimated, width = estimates(case), planetary_set(case).mesh_widths[0]
-    bearing, ratio = estimated["gear_1.bearing_stiffness"], gears.gear_2.teeth / gears.gear_1.teeth
-    tilt = Estimate(0.75 * bearing.value * width**2, TORSION, "the bearing's stiffness over three face widths")
-    how = "cylinder of the wheel's radius and four face widths"
+    width = gears.mesh_widths[0]
     rotor = cylinder(0.0, gears.gear_2.reference_radius, 4.0 * width, case.material.density)
-    rotors = [Estimate(value, dimension, how) for value, dimension in zip(rotor, (MASS, INERTIA, INERTIA), strict=True)]
-    modulus = case.material.youngs_modulus
-    mesh = estimated_mesh_stiffness(modulus, modulus, width)
-    stiffness = Estimate(mesh, STIFFNESS, "20 N/(mm um) times the face width")
-    tables: dict[str, Any] = {"format": 1, "model": "drivetrain", "title": pair["title"]}
-    tables |= {"body": [], "shaft": [], "parallel": [], "bearing": []}
-
-    def add(table: str, given: dict[str, Any], **estimated: Estimate) -> None:
-        for key, value in estimated.items():
-            notes[f"{table}[{len(tables[table])}].{key}"] = f"estimated: {value.how}"
-        tables[table].append(given | {key: str(value) for key, value in estimated.items()})
-
-    for name, gear in (("motor", ""), ("pinion", "gear_1"), ("wheel", "gear_2"), ("load", "")):
-        keys = f"{gear}.mass", f"{gear}.inertia", f"helical.{gear}.diametral_inertia"
-        mass, inertia, transverse = [estimated[key] for key in keys] if gear else rotors
-        add("body", {"name": name}, mass=mass, inertia=inertia, transverse_inertia=transverse)
-        add("bearing", {"body": name}, radial=bearing, tilt=tilt)
-    for ends, torque in ((["motor", "pinion"], 1.0), (["wheel", "load"], ratio)):
-        diameter = (16.0 * abs(torque * case.operation.torque) / (math.pi * 25e6)) ** (1.0 / 3.0)
-        outer = Estimate(diameter, LENGTH, "25 N/mm^2 of torsional stress")
-        length = Estimate(5.0 * diameter, LENGTH, "five diameters")
-        add("shaft", {"between": ends}, length=length, outer_diameter=outer)
-    mesh = {"stiffness": str(stiffness), "contact_ratio": round(gears.contact_ratio, 4)}
-    stage = {"between": ["pinion", "wheel"], "teeth": [gears.gear_1.teeth, gears.gear_2.teeth]}
-    add("parallel", stage | {key: pair["set"][key] for key in ("module", "pressure_angle")} | {"mesh": mesh})
-    notes["parallel[0].mesh.stiffness"] = f"estimated: {stiffness.how}"
-    notes["operation.torque[0].torque"] = notes.pop("operation.torque", "")
-    torques = [{"body": "motor", "torque": pair["operation"]["torque"]}, {"body": "load", "share": 1.0}]
-    tables["operation"] = {"speed": pair["operation"]["speeds"][0], "torque": torques}
-    tables["simulation"] = {"duration": "1 s", "damping_ratio": 0.03}
+    tables = pair_in_gearbox(pair, notes)
+    tables["mass"] = [
+        {"name": f"rotor of {load['name']}", "shaft": load["shaft"], "position": load["position"]}
+        | {
+            name: str(Estimate(value, dimension, ""))
+            for name, value, dimension in zip(("mass", "inertia"), rotor, (MASS, INERTIA), strict=False)
+        }
+        for load in tables["load"]
+    ]
+    for number in range(2):
+        for name in ("mass", "inertia"):
+            how = "cylinder of the wheel's radius and four face widths"
+            notes[f"mass[{number}].{name}"] = f"estimated: {how}"
+    tables["transient"] = {"duration": "1 s"}
     for rate in ("50 kHz", "100 kHz", "200 kHz", "500 kHz", "1 MHz", "2 MHz", "5 MHz", "10 MHz"):
         if _follows(tables):
             break
-        tables["simulation"]["rate"] = rate
-        notes["simulation.rate"] = "estimated: steps that follow the meshes and the modes that they drive"
+        tables["transient"]["rate"] = rate
+        notes["transient.rate"] = "estimated: steps that follow the meshes"
     return tables

@@ -50,7 +50,7 @@ def case_drafts(model: Model, name: str, *, stage: str | None = None, load_case:
     Parameters
     ----------
     name : str
-        Of the file, such as "case.toml", for the drivetrain to name those of its stages.
+        Of the file, such as "case.toml", for the gearbox to name those of its stages.
     stage : str, optional
         Id of the only stage to take.
     load_case : int, optional

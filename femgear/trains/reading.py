@@ -42,7 +42,7 @@ _REXS = (".rexs", ".rexsj", ".rexsz")
 
 
 def read_case(source: str | os.PathLike | Mapping[str, Any]) -> Any:
-    """Read the case of a TOML file: a planetary set, or what its ``model`` names, as ``"drivetrain"``.
+    """Read the case of a TOML file: a planetary set, or what its ``model`` names, as ``"gearbox"``.
 
     Parameters
     ----------
@@ -122,7 +122,11 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
 
 def _of_former_train(data: dict, model: str, lines: str, name: str) -> tuple[dict, tuple[Finding, ...]]:
     """Tables of today that say what those of a train do that is no more, and what is to be said of it."""
-    section, tables_of = (resolve_name(place) for place in registry.FORMER[model])
+    section, tables_of, *embed = (resolve_name(place) for place in registry.FORMER[model])
+    for put_in in embed:
+        _, unread = _embedded_files(put_in, data, name)
+        if unread:
+            raise combine(unread, lines, name)
     case_text.check_tree(data, name)
     try:
         tables, unlike = tables_of(section.model_validate(data))

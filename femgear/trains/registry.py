@@ -38,10 +38,15 @@ FORMER = {
     "multistage": (
         "femgear.trains.gearbox.multistage_cases:MultistageFile",
         "femgear.trains.gearbox.multistage_cases:gearbox_of_multistage",
-    )
+    ),
+    "drivetrain": (
+        "femgear.trains.gearbox.drivetrain_cases:DrivetrainFile",
+        "femgear.trains.gearbox.drivetrain_cases:gearbox_of_drivetrain",
+        "femgear.trains.gearbox.drivetrain_cases:embed_drivetrain",
+    ),
 }
-"""Models of files whose train is no more, each with the section that reads its tables, and what makes those of today
-and the findings on what these have not of it."""
+"""Models of files whose train is no more, each with the section that reads its tables, what makes those of today and
+the findings on what these have not of it, and what puts tables in the place of files that it names."""
 GROUP = "femgear.trains"
 """Entry points of other packages; the name is that of the train, the value a module with FILE and TRAIN."""
 
@@ -50,7 +55,6 @@ TRAINS = tuple(
     for name, key, folder, reads in (
         ("gear_pair", "model", "impacts", "trains.impacts.case_file"),
         ("pair", "model", "pair", "trains.pair.case_file"),
-        ("drivetrain", "model", "drivetrain", "trains.drivetrain.case_file"),
         ("gearbox", "model", "gearbox", "trains.gearbox.checks"),
         ("helical", "helical", "helical", "trains.helical.section"),
         ("planar", "planar", "planar", "trains.planar.section"),

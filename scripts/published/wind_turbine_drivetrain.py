@@ -10,18 +10,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
-
-from femgear.trains.drivetrain.parts import (
-    BearingSection,
-    BodySection,
-    Drivetrain,
-    MeshSection,
-    ParallelSection,
-    PlanetarySection,
-    ShaftSection,
-)
 
 RPM = math.pi / 30.0
 
@@ -121,9 +112,10 @@ class Assumed:
 PRINTED, ASSUMED = Printed(), Assumed()
 
 
-def wind_turbine_drivetrain(assumed: Assumed = ASSUMED, *, gravity: float = 9.80665) -> Drivetrain:
-    """The chain of the paper: rotor 5, carrier 5, planets 3, sun 5, gear 1 5, gear 2 3, gear 3 5, generator
-    5.
+def wind_turbine_drivetrain(assumed: Assumed = ASSUMED, *, gravity: float = 9.80665) -> dict[str, Any]:
+    """The chain of the paper: rotor 5, carrier 5, planets 3, sun 5, gear 1 5, gear 2 3, gear 3 5, generator 5.
+
+    The tables are those of a file with model = "drivetrain", as `femgear.read_case` reads it.
 
     Parameters
     ----------
@@ -134,119 +126,108 @@ def wind_turbine_drivetrain(assumed: Assumed = ASSUMED, *, gravity: float = 9.80
     p, a = PRINTED, assumed
     length = dict(zip(("low", "intermediate", "high"), a.shaft_lengths))
 
-    def wheel(name, inertia, radius, *, tilts=True):
+    def body(name, inertia, mass, transverse, **others):
+        return {
+            "name": name,
+            "inertia": f"{inertia!r} kg m^2",
+            "mass": f"{mass!r} kg",
+            "transverse_inertia": f"{transverse!r} kg m^2",
+            **others,
+        }
+
+    def wheel(name, inertia, radius, **others):
         # a flat disc: mass 2 I / r^2, half the polar inertia about a diameter
-        return BodySection.in_si(
-            name=name,
-            mass=2.0 * inertia / radius**2,
-            inertia=inertia,
-            transverse_inertia=0.5 * inertia,
-            tilts=tilts,
-        )
+        return body(name, inertia, 2.0 * inertia / radius**2, 0.5 * inertia, **others)
 
     def mesh(stiffness, ratio, phase=0.0):
-        return MeshSection.in_si(stiffness=stiffness, contact_ratio=ratio, phase=phase, backlash=a.backlash)
+        given = {"stiffness": f"{stiffness!r} N/m", "contact_ratio": ratio, "phase": phase}
+        return given | ({"backlash": f"{a.backlash!r} m"} if math.isfinite(a.backlash) else {})
 
     def shaft(first, second, name, springs):
-        bending, torsion = springs
-        return ShaftSection.in_si(
-            between=(first, second),
-            length=length[name],
-            bending=bending,
-            torsion=torsion,
-            shear_ratio=a.shear_ratio,
-        )
+        bending, torsion = (f"{spring!r} N m/rad" for spring in springs)
+        springs = {"bending": bending, "torsion": torsion, "shear_ratio": a.shear_ratio}
+        return {"between": [first, second], "length": f"{length[name]!r} m", **springs}
 
     def stage(first, second, radii, teeth, wave, direction):
         # the second gear has the whole number of teeth nearest to the ratio of the radii
-        return ParallelSection.in_si(
-            between=(first, second),
-            teeth=(teeth, round(teeth * radii[1] / radii[0])),
-            radii=radii,
-            mesh=wave,
-            pressure_angle=p.pressure_angle,
-            direction=direction,
-        )
+        return {
+            "between": [first, second],
+            "teeth": [teeth, round(teeth * radii[1] / radii[0])],
+            "radii": [f"{radius!r} m" for radius in radii],
+            "mesh": wave,
+            "pressure_angle": f"{p.pressure_angle!r} rad",
+            "direction": f"{direction!r} rad",
+        }
 
-    bodies = (
-        # a rotor of three blades or more has half its polar inertia about a diameter
-        BodySection.in_si(name="rotor", mass=a.rotor_mass, inertia=p.rotor, transverse_inertia=0.5 * p.rotor),
-        wheel("carrier", p.carrier, p.carrier_radius),
-        wheel("sun", p.sun, p.sun_radius),
-        wheel("gear 1", p.gear_1, p.gear_1_radius),
-        wheel("gear 2", p.gear_2, p.gear_2_radii[1], tilts=False),
-        wheel("gear 3", p.gear_3, p.gear_3_radius),
-        BodySection.in_si(
-            name="generator",
-            mass=a.generator_mass,
-            inertia=p.generator,
-            transverse_inertia=a.generator_transverse,
-        ),
-    )
-    planets = PlanetarySection.in_si(
-        carrier="carrier",
-        sun="sun",
-        sun_radius=p.sun_radius,
-        planet_radius=p.planet_radius,
-        ring_teeth=a.ring_teeth,
-        sun_teeth=a.sun_teeth,
-        planet_mass=2.0 * p.planet / p.planet_radius**2,
-        planet_inertia=p.planet,
-        planet_transverse_inertia=0.5 * p.planet,
-        sun_mesh=mesh(p.planetary_mesh, a.planetary_contact_ratio),
-        ring_mesh=mesh(p.planetary_mesh, a.ring_contact_ratio, a.ring_phase),
-        pressure_angle=p.pressure_angle,
-    )
+    def bearing(body, radial, tilt=0.0):
+        return {"body": body, "radial": f"{radial!r} N/m"} | ({"tilt": f"{tilt!r} N m/rad"} if tilt else {})
+
+    planets = {
+        "carrier": "carrier",
+        "sun": "sun",
+        "sun_radius": f"{p.sun_radius!r} m",
+        "planet_radius": f"{p.planet_radius!r} m",
+        "ring_teeth": a.ring_teeth,
+        "sun_teeth": a.sun_teeth,
+        "planet_mass": f"{2.0 * p.planet / p.planet_radius**2!r} kg",
+        "planet_inertia": f"{p.planet!r} kg m^2",
+        "planet_transverse_inertia": f"{0.5 * p.planet!r} kg m^2",
+        "sun_mesh": mesh(p.planetary_mesh, a.planetary_contact_ratio),
+        "ring_mesh": mesh(p.planetary_mesh, a.ring_contact_ratio, a.ring_phase),
+        "pressure_angle": f"{p.pressure_angle!r} rad",
+    }
     small, large = p.gear_2_radii
-    return Drivetrain(
-        bodies,
-        (
+    first = mesh(p.mesh_12, a.contact_ratio_12)
+    second = mesh(p.mesh_23, a.contact_ratio_23)
+    return {
+        "model": "drivetrain",
+        "title": "Wind turbine drivetrain with shaft bending, 36 dof",
+        "body": [
+            # a rotor of three blades or more has half its polar inertia about a diameter
+            body("rotor", p.rotor, a.rotor_mass, 0.5 * p.rotor),
+            wheel("carrier", p.carrier, p.carrier_radius),
+            wheel("sun", p.sun, p.sun_radius),
+            wheel("gear 1", p.gear_1, p.gear_1_radius),
+            wheel("gear 2", p.gear_2, p.gear_2_radii[1], tilts=False),
+            wheel("gear 3", p.gear_3, p.gear_3_radius),
+            body("generator", p.generator, a.generator_mass, a.generator_transverse),
+        ],
+        "shaft": [
             shaft("rotor", "carrier", "low", p.low_speed),
             shaft("sun", "gear 1", "intermediate", p.intermediate),
             shaft("gear 3", "generator", "high", p.high_speed),
-        ),
-        (
-            stage(
-                "gear 1",
-                "gear 2",
-                (p.gear_1_radius, small),
-                a.gear_1_teeth,
-                mesh(p.mesh_12, a.contact_ratio_12),
-                a.direction_12,
-            ),
-            stage(
-                "gear 2",
-                "gear 3",
-                (large, p.gear_3_radius),
-                a.gear_2_teeth,
-                mesh(p.mesh_23, a.contact_ratio_23),
-                a.direction_23,
-            ),
-        ),
-        (planets,),
-        (
-            BearingSection.in_si(body="rotor", radial=a.rotor_bearing, tilt=a.rotor_tilt),
-            BearingSection.in_si(body="carrier", radial=a.carrier_bearing, tilt=a.tilt_bearing),
-            BearingSection.in_si(body="sun", radial=a.sun_bearing),
-            BearingSection.in_si(body="gear 1", radial=a.gear_bearing, tilt=a.tilt_bearing),
-            BearingSection.in_si(body="gear 2", radial=a.gear_bearing),
-            BearingSection.in_si(body="gear 3", radial=a.gear_bearing, tilt=a.tilt_bearing),
-            BearingSection.in_si(body="generator", radial=a.generator_bearing, tilt=a.tilt_bearing),
-        ),
-        gravity,
-        a.damping_ratio,
-    )
-
-
-def paper_torques(*, balanced: bool = False) -> dict[str, float]:
-    """Torques on rotor and generator [N m].
-
-    The paper's generator torque is 30 % of the aerodynamic one; read as of that torque seen through the
-    ratio, so
-    that the rest accelerates the chain. ``balanced`` takes all of it. Both wheels turn in the same sense.
-    """
-    share = 1.0 if balanced else PRINTED.generator_share
-    return {"rotor": PRINTED.torque, "generator": -share * PRINTED.torque / ratio_of_radii()}
+        ],
+        "planetary": [planets],
+        "parallel": [
+            stage("gear 1", "gear 2", (p.gear_1_radius, small), a.gear_1_teeth, first, a.direction_12),
+            stage("gear 2", "gear 3", (large, p.gear_3_radius), a.gear_2_teeth, second, a.direction_23),
+        ],
+        "bearing": [
+            bearing("rotor", a.rotor_bearing, a.rotor_tilt),
+            bearing("carrier", a.carrier_bearing, a.tilt_bearing),
+            bearing("sun", a.sun_bearing),
+            bearing("gear 1", a.gear_bearing, a.tilt_bearing),
+            bearing("gear 2", a.gear_bearing),
+            bearing("gear 3", a.gear_bearing, a.tilt_bearing),
+            bearing("generator", a.generator_bearing, a.tilt_bearing),
+        ],
+        "gravity": {"acceleration": f"{gravity!r} m/s^2"},
+        "operation": {
+            "speed": f"{p.speed!r} rad/s",
+            "torque": [
+                {"body": "rotor", "torque": f"{p.torque!r} N m"},
+                {"body": "generator", "share": p.generator_share},
+            ],
+        },
+        "simulation": {
+            "duration": "60 s",
+            "rate": "20 kHz",
+            "start": "zero",
+            "harmonics": 15,
+            "damping_ratio": a.damping_ratio,
+            "torsional": True,
+        },
+    }
 
 
 def ratio_of_radii() -> float:

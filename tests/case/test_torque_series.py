@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from femgear.errors import CaseError
-from femgear.trains.drivetrain.case_file import read_torques
+from femgear.trains.gearbox.transient_case import read_torques
 from femgear.trains.reading import parse_case, read_case
 
 OWN = Path(__file__).parents[2] / "cases" / "own_chain.toml"

@@ -443,7 +443,7 @@ def test_multistage_lists_the_readings_of_the_published_table(tmp_path):
 
 @pytest.mark.slow
 def test_drivetrain_writes_spectra_and_pictures(tmp_path):
-    settings = ["--duration", "3 s", "--rate", "4 kHz", "--modes", "0", "--balanced", "--no-sensitivity"]
+    settings = ["--duration", "3 s", "--rate", "4 kHz", "--balanced", "--no-sensitivity"]
     done = run("drivetrain.py", *settings, "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     names = {path.name for path in tmp_path.iterdir()}
@@ -456,7 +456,7 @@ def test_drivetrain_writes_spectra_and_pictures(tmp_path):
 @pytest.mark.slow
 def test_drivetrain_takes_a_case_of_its_own(tmp_path):
     own = ROOT / "cases" / "own_chain.toml"
-    done = run("drivetrain.py", own, "--duration", "0.2 s", "--modes", "0", "-o", tmp_path, folder=tmp_path)
+    done = run("drivetrain.py", own, "--duration", "0.2 s", "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "pinion-wheel" in done.stdout and "ratio of the radii" not in done.stdout
     assert "contact loss: pinion-wheel parts first" in done.stdout and (tmp_path / "backlash.png").exists()

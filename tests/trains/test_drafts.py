@@ -16,7 +16,7 @@ from femgear.trains.drafts import KINDS, ToothForm, new_case
 from femgear.trains.reading import parse_case, read_case, with_values
 from femgear.trains.registry import check_case, train_of
 
-TRAINS = {"planetary": "elastic"}
+TRAINS = {"planetary": "elastic", "drivetrain": "gearbox"}
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -34,7 +34,7 @@ _SLOW = tuple("femgear. h5netcdf h5py matplotlib numpy pandas rich scipy xarray 
 """Packages that this process imports for those that it starts."""
 # what any run imports: without it the first command would run twice
 _RUN_IMPORTS = (
-    *("femgear.report.page", "femgear.run", "femgear.trains.drivetrain.stages", "h5py", "rich.progress"),
+    *("femgear.report.page", "femgear.run", "femgear.trains.gearbox.stages", "h5py", "rich.progress"),
     *("scipy.integrate", "scipy.optimize", "scipy.signal", "xarray.backends.h5netcdf_"),
 )
 _FEW = 30
@@ -238,11 +238,11 @@ def case_texts() -> dict[str, str]:
     small |= {"operation.speeds": ["1000 rpm", "2000 rpm"], "housing.published": None}
     quick = with_values(reference, small)
     free = re.sub(r"(?m)^profile_shift = .*\n", "", quick.source)
-    short = {"simulation.duration": "0.05 s", "simulation.settle": "0.01 s", "simulation.rate": "10 kHz"}
+    short = {"transient.duration": "0.05 s", "transient.settle": "0.01 s", "transient.rate": "10 kHz"}
     chain = with_values(read_case(cases / "own_chain.toml"), short)
     return {
         "chain": chain.source,
-        "other chain": with_values(chain, {"simulation.damping_ratio": 0.05}).source,
+        "other chain": with_values(chain, {"modes.damping_ratio": 0.05}).source,
         "set": quick.source,
         "grids": with_values(quick, {"static.flank_elements": 6}).source,
         "shifts": free,

@@ -56,7 +56,7 @@ SCRIPTS = {
     "readme_images.py": (("docs", "--only", "published_four_stages"),),
 }
 OTHERS = {
-    "schema": ((*CLI, "schema"), (*CLI, "schema", "--model", "drivetrain")),
+    "schema": ((*CLI, "schema"), (*CLI, "schema", "--model", "gearbox")),
     "optimise": (
         (*CLI, "optimise", REFERENCE, *COARSE, "--of", "ste overall", "-o", "results_1"),
         (

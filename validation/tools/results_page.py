@@ -51,14 +51,9 @@ RUNS = {
             "operation.speeds": ["3000 rpm"],
         },
     ),
-    "drivetrain": (
+    "in_time": (
         "own_chain",
-        {
-            "simulation.settle": "0.01 s",
-            "simulation.duration": "0.05 s",
-            "simulation.rate": "20 kHz",
-            "simulation.modes": 1,
-        },
+        {"transient.settle": "0.01 s", "transient.duration": "0.05 s", "transient.rate": "20 kHz"},
     ),
     "pair": (
         "spur_pair",
@@ -102,6 +97,8 @@ RUNS = {
         },
     ),
 }
+SHOWN = {"in_time": ("transient", "spectrum")}
+"""Stages of runs of which the others are shown elsewhere."""
 TABLE = re.compile(r"(?s)(<!-- table (\w+) (\w+) -->\n).*?(<!-- end -->\n)")
 ROW = "| {} | {} | {} | {} | {} |\n"
 HEAD = ROW.format("variable", "dimensions", "unit", "meaning", "remark") + "|---|---|---|---|---|\n"
@@ -119,7 +116,7 @@ def variables() -> dict[tuple[str, str], Variables]:
     for train, (name, changes) in RUNS.items():
         case = with_values(femgear.read_case(ROOT / "cases" / f"{name}.toml"), changes)
         for stage, result in femgear.solve(case).items():
-            if stage not in declared:
+            if stage not in declared and stage in SHOWN.get(train, (stage,)):
                 found[train, stage] = {
                     name: (
                         " ".join(one.dims),

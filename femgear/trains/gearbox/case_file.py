@@ -60,6 +60,7 @@ from femgear.case.sections import (
 from femgear.case.text import ReadCase, described
 from femgear.errors import CaseError
 from femgear.trains.gearbox.materials import with_materials
+from femgear.trains.gearbox.transient_case import TransientSection, embed_torques
 from femgear.trains.reading import parse_case
 
 RISE = Dimension("a temperature difference", "K", "K", 1.0)
@@ -175,6 +176,8 @@ class BoxShaftSection(Section):
     part: Annotated[tuple[BoxShaftPartSection, ...], Field(max_length=MOST_PARTS)] = ()
     material: ShaftMaterialSection | None = None
     temperature_rise: Rise = 0.0
+    longest_element: Length | None = None
+    """Of finite elements; by default a sixteenth of the shaft."""
 
     @property
     def length(self) -> float:
@@ -291,13 +294,15 @@ class BoxCouplingSection(Section):
 class BoxMeshSection(Section):
     """Stiffness of a mesh along its normal where no teeth are given, and its tooth pairs in contact.
 
-    With a transverse ``contact_ratio`` the stiffness is in proportion to the number of tooth pairs. ``phase`` is the
-    share of the mesh period by which a pair of teeth passes the middle of its path before the pitch point. ``backlash``
-    is along the line of action in the transverse section.
+    With a transverse ``contact_ratio`` the stiffness is in proportion to the number of tooth pairs, unless a
+    ``low_share`` gives that with the smaller number of pairs over that with the larger. ``phase`` is the share of the
+    mesh period by which a pair of teeth passes the middle of its path before the pitch point. ``backlash`` is along the
+    line of action in the transverse section.
     """
 
     stiffness: MeshStiffness
     contact_ratio: Annotated[float, Number(1.0, 20.0)] | None = None
+    low_share: Annotated[float, Number(0.0, 1.0, open_low=True)] | None = None
     phase: Annotated[float, Number(-1.0, 1.0)] = 0.0
     backlash: Annotated[float, Quantity(LENGTH, 0.0, 0.05)] | None = None
 
@@ -655,6 +660,7 @@ class GearboxCase(Section, ReadCase):
     dynamics: BoxDynamicsSection = BoxDynamicsSection()
     runup: RunupSection = RunupSection(count=0)
     balance: BoxBalanceSection = BoxBalanceSection()
+    transient: TransientSection | None = None
     strength: StrengthSection = StrengthSection()
     lubricant: LubricantSection | None = None
     losses: LossesSection | None = None
@@ -704,14 +710,14 @@ def teeth_of(stage: PairSection | BoxPlanetarySection) -> Any:
 
 
 def embed_stages(data: dict, name: str) -> dict[str, str]:
-    """Put the tables of stages in the place of the files that they name, and the SHA-256 of the files of a casing."""
-    found = add_checksum(data, "casing", name, "casing")
+    """Put tables of stages and torques in the place of their files, and the SHA-256 of the files of a casing."""
+    found = add_checksum(data, "casing", name, "casing") | embed_torques(data, name)
     for kind in ("pair", "planetary"):
         stages = data.get(kind)
         for i, table in enumerate(stages if isinstance(stages, list) else ()):
             if isinstance(table, dict) and isinstance(table.get("teeth"), str):
                 key, file = f"{kind}[{i}].teeth", table.pop("teeth")
-                table["teeth"] = embedded(file, name, key, _stage_tables)
+                table["teeth"] = embedded(file, name, key, stage_tables)
                 found[key] = case_text.printable(file)
             body = table.get("carrier_body") if isinstance(table, dict) else None
             if isinstance(body, dict) and isinstance(body.get("file"), str):
@@ -744,7 +750,7 @@ def _superelement_tables(body: dict, name: str, key: str) -> dict:
     return others | {"superelement": lists | triangles}
 
 
-def _stage_tables(path: str) -> dict:
+def stage_tables(path: str) -> dict:
     """Read the tables of the case file of a stage, with the points of its measured profiles."""
     data = case_text.parse(case_text.read_text(path), path)
     embed_profiles(data, path)

@@ -34,6 +34,7 @@ from femgear.trains.gearbox.holding import floating_shafts, loose_fits, tilting_
 from femgear.trains.gearbox.materials import material_notices
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.tooth_life import pitting_problems
+from femgear.trains.gearbox.transient_case import transient_problems
 
 # Entries that speeds and torques hang on.
 _OF_THE_FLOW = ("pair", "planetary", "coupling", "operation", "load")
@@ -51,6 +52,7 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     stages, loads = [*_stages(case)], [*_loads(case)]
     problems = [*named, *_seats(case), *_bearings(case), *_shaft_parts(case), *stages, *loads, *_weight(case)]
     problems += [*coupling_problems(case), *run_up_problems(case)]
+    problems += transient_problems(case.transient, port_names(case))
     problems += [] if named else check_casing(case)
     problems += [] if stages else pitting_problems(case, (*case.pair, *case.planetary))
     # what has no mass turns and is held as what has

@@ -1,6 +1,6 @@
 """What a stage excites a gearbox with: its contact, or the number of tooth pairs where no contact is computed.
 
-Meshes of a given stiffness and contact ratio have the wave of `femgear.system.stiffness_waves` under the constant
+Meshes of a given stiffness and contact ratio have the wave of `pair_count_wave` under the constant
 force F that the power flow gives them: ``f = k(t) (approach - mean approach) + F k(t) / k_0``. The pitch point is the
 middle of the path of contact unless a phase is given, and teeth are as thick as their spaces at the pitch circle.
 """
@@ -13,8 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from femgear.case.dependencies import Steps
+from femgear.errors import CaseError
 from femgear.system.fourier import sample, tooth_lines
-from femgear.system.stiffness_waves import pair_count_wave
 from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.case_file import BoxMeshSection, PairSection
 from femgear.trains.gearbox.deflection import Deflection
@@ -86,7 +86,16 @@ def _wave(mesh: BoxMeshSection, sizes: StageSizes, flank: int, harmonics: int) -
     width = min(sizes.face_widths, default=0.0)
     pitch = 2.0 * math.pi * sizes.base_radii[0] / sizes.teeth[0]
     overlap = width * abs(math.tan(sizes.base_helix)) / pitch
-    return pair_count_wave(middle - half, middle + half, harmonics, overlap=overlap)
+    return _step_share(mesh) * pair_count_wave(middle - half, middle + half, harmonics, overlap=overlap)
+
+
+def _step_share(mesh: BoxMeshSection) -> float:
+    """Step of the stiffness by one pair more over that of pairs that are as stiff as one another."""
+    if mesh.low_share is None or mesh.contact_ratio is None:
+        return 1.0
+    # with n pairs for 1 - s and n + 1 for s = e - n of the time the mean is (r + (1 - r) s) of the larger stiffness
+    share = mesh.contact_ratio - math.floor(mesh.contact_ratio)
+    return (1.0 - mesh.low_share) * mesh.contact_ratio / (mesh.low_share + (1.0 - mesh.low_share) * share)
 
 
 def mesh_phases(sizes: StageSizes) -> np.ndarray:
@@ -99,3 +108,34 @@ def mesh_phases(sizes: StageSizes) -> np.ndarray:
     psi = np.asarray(sizes.planet_angles)
     of_sun = -(psi - psi[0]) * sun / (2.0 * math.pi)
     return np.concatenate([of_sun, of_sun - 0.5 * (planet - 1)]) % 1.0
+
+
+def pair_count_wave(start: float, end: float, harmonics: int, *, overlap: float = 0.0) -> np.ndarray:
+    """Compute the harmonics of a mesh stiffness in proportion to the length of contact of its tooth pairs.
+
+    A pair touches from ``start`` s to ``end`` e of its path, so that at ``Re sum k_h exp(2 pi i h tau)``
+    ``k_h / k_0 = (exp(-2 pi i h s) - exp(-2 pi i h e)) / (pi i h (e - s)) sinc(h overlap)`` with ``sinc(x) = sin(pi
+    x) / (pi x)``: a rectangular wave of spur gears (Parker and Lin, J. Mech. Des. 126, 2004, 68-76), the sum of the
+    contact lines of helical ones (Maatar and Velex, J. Mech. Des. 118, 1996, 586-589).
+
+    CaseError: a path that ends before it starts (E-RANGE).
+
+    Parameters
+    ----------
+    start, end : float
+        In transverse base pitches from the pitch point, which a pair passes at tau = 0, in the middle of the width.
+    harmonics : int
+        Number H of harmonics of the mesh frequency.
+    overlap : float
+        Overlap ratio of helical teeth [1].
+
+    Returns
+    -------
+    (H,) complex array
+        Harmonics 1 to H over the mean stiffness [1].
+    """
+    if not start < end:
+        raise CaseError("the path of contact ends before it starts", code="E-RANGE", limit=f"end above {start:g}")
+    h = np.arange(1, harmonics + 1)
+    wave = (np.exp(-2j * np.pi * h * start) - np.exp(-2j * np.pi * h * end)) / (1j * np.pi * h * (end - start))
+    return wave * np.sinc(h * overlap)

@@ -17,6 +17,7 @@ from femgear.stages.protocol import Drawn, Figures
 from femgear.trains.gearbox.casing_results import seat_curve
 from femgear.trains.gearbox.response_figures import RESPONSE_FIGURES
 from femgear.trains.gearbox.stage_figures import draw_stage_energy
+from femgear.trains.gearbox.transient_figures import TRANSIENT_FIGURES
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -288,4 +289,6 @@ FIGURES = {
         },
         _draw_modes,
     ),
-} | RESPONSE_FIGURES
+    **RESPONSE_FIGURES,
+    **TRANSIENT_FIGURES,
+}

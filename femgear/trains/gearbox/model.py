@@ -335,7 +335,9 @@ class _Builder:
             )
             for part in shaft.part
         ]
-        beam = self.beams[shaft.name] = beam_shaft(parts, sorted(seats_on(self.case, shaft.name)))
+        beam = self.beams[shaft.name] = beam_shaft(
+            parts, sorted(seats_on(self.case, shaft.name)), longest_element=shaft.longest_element
+        )
         stations = tuple(
             self._station(f"{shaft.name} {i + 1}", (x, y, shaft.start + float(z))) for i, z in enumerate(beam.stations)
         )

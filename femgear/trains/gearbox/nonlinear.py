@@ -137,6 +137,7 @@ def nonlinear_gearbox(
     separates: bool = True,
     back_flanks: bool = True,
     gyroscopic: bool = True,
+    turning: bool = True,
     damping_ratio: float | None = None,
 ) -> NonlinearGearbox:
     """Assemble a gearbox with the meshes of some stages as elements.
@@ -156,6 +157,8 @@ def nonlinear_gearbox(
         Teeth that part touch their back flanks beyond the backlash.
     gyroscopic : bool
         With the gyroscopic moments of shafts and planets.
+    turning : bool
+        Directions of meshes go round with the carriers; without it they are those at the angle where these stand.
     damping_ratio : float, optional
         Of all modes with the planets where they stand, viscous; by default that of the case.
 
@@ -170,7 +173,7 @@ def nonlinear_gearbox(
     T = assembly.motions
     bases, frequency, staged = list[str](), list[float](), list[NonlinearStage]()
     for stage in chosen:
-        turn = _carrier_speed(model, stage)
+        turn = _carrier_speed(model, stage) if turning else 0.0
         if turn:
             bases.append(f"{stage.name} carrier")
             frequency.append(abs(turn))
@@ -178,7 +181,7 @@ def nonlinear_gearbox(
         bases.append(f"{stage.name} mesh")
         frequency.append(2.0 * math.pi * model.flow.mesh_frequency[stage.name] / made.excitation.periods)
         staged.append(made)
-    coriolis, centrifugal = _turning_terms(model, chosen, assembly, gyroscopic=gyroscopic)
+    coriolis, centrifugal = _turning_terms(model, chosen if turning else (), assembly, gyroscopic=gyroscopic)
     system = assemble(
         assembly.mass, stiffness + centrifugal, np.zeros((len(T), 0)), load, motions=T, dofs=assembly.free_names
     )
@@ -479,7 +482,8 @@ def _elements(
         flanks.append((made[0], made[1]))
         columns.append(basic)
         count += len(at)
-    return np.hstack(columns), tuple(elements), tuple(flanks)
+    # without any stage a column that nothing acts on
+    return np.hstack(columns) if stages else np.zeros((len(mass), 1)), tuple(elements), tuple(flanks)
 
 
 def _parts(directions: TurningDirections) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

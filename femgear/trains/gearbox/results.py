@@ -45,6 +45,7 @@ from femgear.trains.gearbox.sensors import (
 from femgear.trains.gearbox.silence import idle_entries
 from femgear.trains.gearbox.strength import describe_strength, strength_contents
 from femgear.trains.gearbox.tooth_life import tooth_life_contents
+from femgear.trains.gearbox.transient_checks import transient_notices
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -558,6 +559,7 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     yield from sensor_notices(case)
     yield from idle_entries(case)
     yield from overlaps(case)
+    yield from transient_notices(case)
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):
             given = _without_effect(stage.teeth or {})

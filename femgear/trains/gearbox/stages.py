@@ -50,12 +50,21 @@ from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_spee
 from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors
 from femgear.trains.gearbox.signals import GEARBOX_RECORDED
 from femgear.trains.gearbox.silence import why_silent
+from femgear.trains.gearbox.spectrum import (
+    sign_of_forces,
+    solve_box_spectrum,
+    solve_box_transient,
+    spectrum_verdict,
+    transient_verdict,
+)
 from femgear.trains.gearbox.stress import (
     box_stress_warnings,
     describe_box_stress,
     solve_box_stress,
     why_no_stress,
 )
+from femgear.trains.gearbox.transient_checks import check_spectrum, check_transient, why_no_motion
+from femgear.trains.gearbox.transient_results import TransientResult, describe_spectrum, describe_transient
 from femgear.trains.gearbox.verdict import gearbox_verdict
 
 
@@ -136,6 +145,10 @@ def solve_box_balance(
 
 def _no_balance(case: GearboxCase) -> str:
     return why_silent(case) or ("" if case.balance.harmonics else "[balance] gives no harmonics")
+
+
+def _no_spectrum(case: GearboxCase) -> str:
+    return why_no_motion(case) or ("" if case.pair or case.planetary else "the gearbox has no gears")
 
 
 def _no_runup(case: GearboxCase) -> str:
@@ -283,6 +296,32 @@ GEARBOX = Train(
             describe=lambda results: describe_balance(results.balance),
             warnings=balance_warnings,
         ),
+        Stage(
+            name="transient",
+            decided_by=partial(box_entries, "transient"),
+            title="Motion in time",
+            solve=solve_box_transient,
+            takes=("deflection",),
+            options=("progress", "steps"),
+            wanted=lambda case: not why_no_motion(case),
+            unavailable=why_no_motion,
+            verdict=transient_verdict,
+            describe=lambda results: describe_transient(results.transient),
+            check=check_transient,
+            warnings=TransientResult.warnings,
+        ),
+        Stage(
+            name="spectrum",
+            decided_by=partial(box_entries, "transient"),
+            title="Spectrum",
+            solve=solve_box_spectrum,
+            takes=("transient",),
+            wanted=lambda case: not _no_spectrum(case),
+            unavailable=_no_spectrum,
+            verdict=spectrum_verdict,
+            describe=lambda results: describe_spectrum(results.spectrum),
+            check=check_spectrum,
+        ),
     ),
     describe=describe_gearbox,
     warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case)),
@@ -290,4 +329,5 @@ GEARBOX = Train(
     recorded=GEARBOX_RECORDED,
     verdict=gearbox_verdict,
     key_figures=gearbox_key_figures,
+    remarks=sign_of_forces,
 )

@@ -7,12 +7,12 @@ import pytest
 from casings import RPM
 from small_gearbox import pair_tables, planetary_tables
 
+from femgear.errors import CaseError
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import close_set
 from femgear.system.fourier import harmonics_of
-from femgear.system.stiffness_waves import pair_count_wave
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
-from femgear.trains.gearbox.excitation import excitation_of, exciting_stages, mesh_phases
+from femgear.trains.gearbox.excitation import excitation_of, exciting_stages, mesh_phases, pair_count_wave
 from femgear.trains.gearbox.response import solve_gearbox_response
 from femgear.trains.reading import read_case
 
@@ -94,3 +94,33 @@ def test_meshes_without_contact_ratio_or_torque_excite_nothing():
     found = solve_deflection(read_case(tables))
     assert exciting_stages(found) == []
     assert exciting_stages(loaded_pair("0 N m")) == []
+
+
+POSITIONS = 20_000
+
+
+def counted(start: float, end: float, overlap: float = 0.0) -> np.ndarray:
+    """Length of contact at equal steps of the period, pairs at all transverse sections counted one by one."""
+    tau = (np.arange(POSITIONS) + 0.5) / POSITIONS
+    sections = overlap * (np.arange(50) - 24.5) / 50.0
+    pairs = np.arange(-25, 26)
+    place = tau[:, None, None] + sections[:, None] + pairs
+    return ((place > start) & (place < end)).sum(axis=2).mean(axis=1)
+
+
+@pytest.mark.parametrize(("start", "end", "overlap"), [(-0.9, 0.7, 0.0), (-1.3, 1.9, 0.0), (-0.9, 0.7, 1.37)])
+def test_harmonics_are_those_of_pairs_that_are_counted(start, end, overlap):
+    length = counted(start, end, overlap)
+    assert length.mean() == pytest.approx(end - start, rel=1e-3)
+    wanted = harmonics_of(length / length.mean(), 8)[1:] * np.exp(-1j * np.pi * np.arange(1, 9) / POSITIONS)
+    assert pair_count_wave(start, end, 8, overlap=overlap) == pytest.approx(wanted, abs=2e-3)
+
+
+def test_whole_contact_or_overlap_ratios_keep_the_stiffness_constant():
+    assert np.abs(pair_count_wave(-0.8, 1.2, 9)).max() < 1e-14
+    assert np.abs(pair_count_wave(-0.9, 0.7, 9, overlap=1.0)).max() < 1e-14
+
+
+def test_a_path_has_a_length():
+    with pytest.raises(CaseError, match="ends before"):
+        pair_count_wave(0.5, 0.5, 3)

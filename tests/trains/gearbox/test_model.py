@@ -4,14 +4,13 @@ import math
 
 import numpy as np
 import pytest
-from gearbox_equivalents import drivetrain_tables, pair_of_rigid_gears_tables, set_tables
+from gearbox_equivalents import pair_of_rigid_gears_tables, set_tables
 from published.planetary_sets import kahraman_set, lin_parker_set
 from small_gearbox import pair_tables
 
 from femgear.run import solve
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.lumped_set import gear_set_modes
-from femgear.trains.drivetrain.stages import solve_drivetrain_modes
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.reading import read_case, with_values
@@ -41,13 +40,6 @@ def test_the_set_of_lin_and_parker():
     radii = np.array([data.sun_radius, data.planet_radius, data.ring_radius])
     teeth = np.rint(1000 * radii / radii[0]).astype(int).tolist()
     agree(frequencies(set_tables(data, teeth)), gear_set_modes(data).frequency)
-
-
-def test_the_drivetrain_of_36_coordinates():
-    case = read_case("cases/wind_turbine_drivetrain.toml")
-    found = frequencies(drivetrain_tables(case))
-    assert len(found) == 36
-    agree(found, solve_drivetrain_modes(case).modes.frequency)
 
 
 @pytest.mark.parametrize("torque", ["200 N m", "-200 N m"])

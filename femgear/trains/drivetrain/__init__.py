@@ -1,1 +1,0 @@
-"""Drivetrain: bodies, bending shafts, gear stages and bearings, integrated in time."""
