@@ -90,6 +90,8 @@ def gearbox_tables(
     tables["operation"] = operation
     if (weight := _gravity(model)) is not None:
         tables["gravity"] = weight
+    if oil := unit.lubrication.table():
+        tables["lubricant"] = oil
     casings = (part for part in model.components.values() if part.type == "gear_casing")
     if rise := next((rise_of_part for part in casings if (rise_of_part := temperature_rise(model, part))), None):
         tables["thermal"] = {"casing_rise": f"{rise:.6g} K"}

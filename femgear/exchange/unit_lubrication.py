@@ -19,6 +19,7 @@ from femgear.system.bearing_life import VISCOSITY_RATIOS, oil_viscosity, referen
 
 _CONTAMINATION = ("contamination_factor_according_to_iso_281_2007", "contamination_factor_according_to_din_26281")
 _OIL_TEMPERATURE, _MEAN, _REFERENCE = "temperature_lubricant", "mean_operating_temperature", "reference_temperature"
+_THINNEST, _THICKEST = 0.5e-6, 0.1  # kinematic viscosities of oils [m^2/s]
 # The same in degrees of either scale.
 _PER_KELVIN = {"1e-6 / C": 1e-6, "1e-6 / K": 1e-6, "1 / K": 1.0, "1 / C": 1.0}
 
@@ -64,6 +65,20 @@ class Lubrication:
                 self.model.remark("bearing", text, remedy="a thicker or a colder oil")
                 del entries_["viscosity_ratio"]
         return entries_
+
+    def table(self) -> dict[str, Any]:
+        """Make the section ``lubricant`` of a gearbox: viscosities, and the highest temperature of all load cases.
+
+        Empty where the file has them not, or other ones than an oil can have.
+        """
+        if not self.viscosities or not _THICKEST > self.viscosities[0] > self.viscosities[1] > _THINNEST:
+            return {}
+        entries = {
+            f"viscosity_{at}": f"{value / VISCOSITY.scale:.6g} {VISCOSITY.shown}"
+            for at, value in zip((40, 100), self.viscosities, strict=True)
+        }
+        temperatures = [value for value in self.temperatures if value is not None and -50.0 <= value <= 250.0]
+        return entries | ({"temperature": f"{max(temperatures):.6g} degC"} if temperatures else {})
 
     def least_ratio(self, pitch: float, shafts: Sequence[str]) -> float | None:
         """Least viscosity ratio kappa over the load cases in which rings turn; None where the file has no oil."""

@@ -79,6 +79,7 @@ _ATTRIBUTES = {
     name: unit
     for unit, names in (
         ("Hz", "bandwidth compared_to excitation_reach natural_frequency resolution"),
+        ("degC", "oil_temperature"),
         ("kg/m^3", "air_density"),
         ("m", "centre_distance face_width half_backlash microphone_distance module outer_radius"),
         ("m/s", "sound_speed"),

@@ -7,6 +7,7 @@ from rexs_stage import MM, NONE
 from rexs_units import IndustrialUnit, ThreeStageUnit
 from trains.test_imports import drafts_of
 
+from femgear.case.lubrication import oil_at
 from femgear.exchange.rexs import read_model
 from femgear.exchange.unit_lubrication import temperature_rise, thermal_expansion, unit_lubrication
 from femgear.system.bearing_life import oil_viscosity, reference_viscosity
@@ -50,6 +51,13 @@ def test_the_ratio_is_the_least_of_all_load_cases(tmp_path):
     assert known["bearing 33"].contamination == 0.5
     assert "least of all load cases" in text
     assert known["bearing 34"].viscosity_ratio is None
+
+
+def test_the_oil_is_that_of_the_gearbox(tmp_path):
+    case = parse_case(bearings(oiled(), tmp_path)[2])
+    assert case.lubricant is not None and case.lubricant.temperature == pytest.approx(343.15)
+    assert oil_at(case) == pytest.approx(870.0 * oil_viscosity(100e-6, 11e-6, 70.0))
+    assert parse_case(bearings(IndustrialUnit(), tmp_path)[2]).lubricant is None
 
 
 def test_temperatures_in_kelvin_are_the_same(tmp_path):
