@@ -75,6 +75,7 @@ _COORDINATES = {
     "speed": ("rpm", "speed of the input"),
 }
 """Unit and description of what the variables of planetary sets stand over."""
+_MEASURES = "tooth_thickness", "span", "over_balls"
 _ATTRIBUTES = {
     name: unit
     for unit, names in (
@@ -82,6 +83,8 @@ _ATTRIBUTES = {
         ("degC", "oil_temperature"),
         ("kg/m^3", "air_density"),
         ("m", "centre_distance face_width half_backlash microphone_distance module outer_radius"),
+        ("m", "ball_diameter tip_diameter normal_play_gear_1_gear_2 normal_play_planet_ring normal_play_sun_planet"),
+        ("m", " ".join(f"{name}{limit}" for name in _MEASURES for limit in ("", "_least", "_largest"))),
         ("m/s", "sound_speed"),
         ("m/s^2", "reference_acceleration"),
         ("N", "unit_force"),

@@ -111,7 +111,7 @@ def test_results_page_names_every_variable_and_attribute(datasets, stage):
 @pytest.mark.parametrize("stage", PLACES)
 def test_exported_attributes_have_units(datasets, stage):
     ratios = {"contact_ratio_sun_planet", "contact_ratio_planet_ring", "overlap_ratio"}
-    pure = ratios | {"mesh_phases", "free_ends", "peak_doubt", "peaks_cut_off"}
+    pure = ratios | {"mesh_phases", "free_ends", "peak_doubt", "peaks_cut_off", "profile_shift"}
     for name, value in datasets[stage].attrs.items():
         if np.asarray(value).dtype.kind == "f" and name not in pure:
             assert _attribute(name, value)[2] not in ("", "1"), name
