@@ -208,6 +208,7 @@ def in_terms_of_the_case(error: GeometryError, case: Case) -> None:
             error.key = f"{error.gear}.rack.root_radius"
         error.value = rack_at(case, error.key).root_radius
     _shift_left_out(error, case)
+    _allowance(error, case)
     _in_transverse_section(error, case)
     dimension = _DIMENSIONS.get((error.key or "").rpartition(".")[2])
     if dimension is not None and isinstance(error.value, float):
@@ -258,6 +259,21 @@ def _shift_left_out(error: GeometryError, case: Case) -> None:
     if error.code == "E-SHIFT":
         error.limit = f"such that the {gear}'s shift is {error.limit}"
     error.value, error.remedy = given, remedy
+
+
+def _allowance(error: GeometryError, case: Case) -> None:
+    """A thickness allowance is no entry: name the allowances of the drawing, or the backlash that it is half of."""
+    gear, _, entry = (error.key or "").partition(".")
+    if entry != "thickness_allowance" or gear not in case.gear_names:
+        return
+    given, most = getattr(case, gear).tooth_thickness_allowance, LENGTH.show(case.module)
+    if given is None:
+        error.key, error.value = "set.backlash", LENGTH.show(case.set.backlash)
+        error.limit, error.remedy = f"below twice the module, {most}", "check its unit"
+        return
+    error.key = f"{gear}.tooth_thickness_allowance"
+    error.value = given if isinstance(given, str) else ", ".join(f"{1e6 * value:.6g} um" for value in given)
+    error.limit, error.remedy = f"less than a module, {most}, in their middle", "check their unit"
 
 
 def _in_transverse_section(error: GeometryError, case: Case) -> None:

@@ -264,18 +264,23 @@ def measured_gear(case: Any, section: Any, gear: Gear) -> Gear:
         if first.has_limits:
             made = replace(made, thickness_allowance=_allowance(made, first))
     else:
-        if section.span is not None:
-            check_span(gear, section.span_teeth, helix)
+        # what cannot be measured at all is no contradiction
+        _check_tools(section, gear, helix)
         made = _thinned_to(case, section, gear, first)
     for other in measures[1:]:
         value = other.of(made)
         if not other.ends[0] - AGREED <= value <= other.ends[1] + AGREED:
             raise _contradiction(gear, other, f"{gear.name}.{first.key} = {first.text}", value)
-    if section.span is not None:
-        check_span(made, section.span_teeth, helix)
-    if section.over_balls is not None:
-        check_ball(made, section.ball_diameter, helix)
+    _check_tools(section, made, helix)
     return made
+
+
+def _check_tools(section: Any, gear: Gear, helix: float) -> None:
+    """Refuse spans and balls of measures that the flanks of a gear do not have."""
+    if section.span is not None:
+        check_span(gear, section.span_teeth, helix)
+    if section.over_balls is not None:
+        check_ball(gear, section.ball_diameter, helix)
 
 
 def _allowance(gear: Gear, measure: _Measured) -> float:

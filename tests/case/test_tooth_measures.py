@@ -138,6 +138,13 @@ def test_allowances_thin_the_teeth_of_the_normal_section_by_their_mean(helix, na
         (f'{SHIFTED}\ntooth_thickness_allowance = ["10 um", "-70 um"]', "E-RANGE", None, "-10 mm to 0 mm"),
         (f'{SHIFTED}\ntooth_thickness_allowance = ["10 um"]', "E-TYPE", None, None),
         ('tooth_thickness = ["5.3 mm"]', "E-COUNT", None, None),
+        (f'{SHIFTED}\nover_balls = "81.6 mm"\nball_diameter = "20 mm"', "E-RANGE", "gear_1.ball_diameter", None),
+        (
+            f'{SHIFTED}\ntooth_thickness_allowance = ["-5 mm", "-6 mm"]',
+            "E-ALLOWANCE",
+            "gear_1.tooth_thickness_allowance",
+            "less than a module, 3 mm, in their middle",
+        ),
         (f'{SHIFTED}\ntooth_thickness_allowance = "cq 25"', "E-CHOICE", None, None),
     ],
 )
