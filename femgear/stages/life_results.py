@@ -53,7 +53,8 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
     if math.isinf(lives[at]):
         yield "shortest life of the teeth, ISO 6336-6", _NO_DAMAGE
     else:
-        hours = marks(f"{hours_text(lives[at])} h", "W-LIFE", of=of)
+        hours = f"{hours_text(lives[at])} h"
+        hours = marks(hours, "W-LIFE", of=of) if data[f"{shortest}_damage"].values[at] > 1.0 else hours
         what = f"{shortest} of {data[shortest].values[at]}"
         yield "shortest life of the teeth, ISO 6336-6", f"{hours}, {what}: {_most_damage(data, shortest, at)}"
     for kind in kinds:
@@ -63,7 +64,8 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
         at = int(np.nanargmin(safety))
         cause = f", {_most_damage(data, kind, at)}" if math.isfinite(data[f"{kind}_life"].values[at]) else ""
         damage = float(data[f"{kind}_damage"].values[at])
-        text = marks(f"{safety[at]:.2f}", "W-LIFE", of=of)
+        text = f"{safety[at]:.2f}"
+        text = marks(text, "W-LIFE", of=of) if damage > 1.0 else text
         name = f"smallest {SYMBOLS[kind]} over the life asked for"
         yield name, f"{text}, {kind} of {data[kind].values[at]}: damage {_number(damage)}{cause}"
 

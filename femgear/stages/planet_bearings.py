@@ -155,7 +155,8 @@ def planet_bearing_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)
     if math.isfinite(life[at]):
         share = data["planet_bearing_damage_share"].values[:, at]
         most = int(share.argmax())
-        text = f"{marks(f'{life[at]:.4g} h', 'W-LIFE', of=of)}, {data['planet_bearing'].values[at]}"
+        hours, short = f"{life[at]:.4g} h", life[at] < float(data.attrs.get("required_hours", 0.0))
+        text = f"{marks(hours, 'W-LIFE', of=of) if short else hours}, {data['planet_bearing'].values[at]}"
         case = data["load_case"].values[most]
         yield "shortest L10 of the planets' bearings", f"{text}: {share[most]:.0%} of the damage in {case}"
 

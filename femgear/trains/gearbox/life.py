@@ -142,7 +142,8 @@ def shortest_life(data: xr.Dataset, marks: Marks | None = None) -> Iterator[tupl
             continue
         at = int(np.nanargmin(life))
         hours = f"{life_text(life[at])} h"
-        hours = hours if marks is None else marks(hours, "W-LIFE", of=("deflection",))
+        short = life[at] < float(data.attrs.get("required_hours", 0.0))
+        hours = marks(hours, "W-LIFE", of=("deflection",)) if marks is not None and short else hours
         text = f"{hours}, {data['bearing'].values[at]}"
         if len(cases) > 1:
             damage = np.nan_to_num(data["damage_share"].values[:, at])
