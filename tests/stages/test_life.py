@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from femgear.errors import ContactError
+from femgear.run import solve
 from femgear.stages.life import LIFE, mesh_frequency_at, no_load_cases, solve_life, static_load_factors, with_torque
 from femgear.stages.static import solve_static
 from femgear.stages.strength import mesh_frequencies, rate_case
 from femgear.trains.reading import read_case, with_values
+from femgear.trains.registry import stages_of, train_of
 
 CASES = Path(__file__).parents[2] / "cases"
 NOMINAL = {"torque": "200 N m", "speed": "1500 rpm"}
@@ -111,3 +113,12 @@ def test_a_case_without_load_cases_has_no_lives():
     idle = life_of(case_of({"torque": "0 N m", "speed": "10 rpm"}))
     assert not idle.spectra and idle.residual == 0.0 and list(idle.findings) == []
     assert with_values(plain, {"operation.torque": "1 N m"}).operation.load_case == ()
+
+
+def test_planar_sets_have_lives_beside_a_given_mesh_stiffness():
+    load = {"torque": "10 kN m", "speed": "20 rpm"}
+    case = case_of(load, name="nrel_pgb")
+    assert {"static", "life"} <= {stage.name for stage in stages_of(case)}
+    result = solve(case, only="life")["life"]
+    assert {rated.name for rated in result.spectra} >= {"sun", "planet, ring side"}
+    assert not any("load_case" in finding.text for finding in train_of(case).case_warnings(case))

@@ -159,9 +159,10 @@ def planar_notices(data: dict) -> Iterator[Finding]:
     if "response" not in planar:
         keys += ["mesh_harmonics", "response_harmonics"]
     dynamics = [f"dynamics.{key}" for key in keys if key in data.get("dynamics", {})]
-    if unused := entries_without_effect(data, dynamics):
+    if unused := entries_without_effect(data, dynamics, lives=True):
         yield Finding("W-UNUSED", "", f"{entries_with_verb(unused)} no effect in this planar case")
-    if "mesh_stiffness" in planar and (unused := _without_static(data)):
+    solved = "load_case" in data["operation"]  # the contact of lives
+    if "mesh_stiffness" in planar and not solved and (unused := _without_static(data)):
         yield Finding("W-UNUSED", "", f"{entries_with_verb(unused)} no effect while planar.mesh_stiffness is given")
     if "response" in planar and "mesh_stiffness" in planar:
         still = "no weight acts" if "gravity" not in planar else ""

@@ -21,6 +21,7 @@ from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.stages.heat import HEAT
+from femgear.stages.life import LIFE, no_load_cases
 from femgear.stages.losses import LOSSES
 from femgear.stages.lumped_set import check_one_period, gear_set_modes, member_speeds, mode_ratios, needed
 from femgear.stages.protocol import (
@@ -391,8 +392,11 @@ PLANAR = Train(
     name="planar",
     words="a planar case",
     stages=(
-        replace(STATIC, wanted=lambda case: bool(_needs_static(case)) or losses_wanted(case)),
+        replace(
+            STATIC, wanted=lambda case: bool(_needs_static(case)) or losses_wanted(case) or not no_load_cases(case)
+        ),
         replace(STRESS, wanted=lambda case: bool(_needs_static(case)) and case.static.stresses),
+        LIFE,
         LOSSES,
         HEAT,
         Stage(
