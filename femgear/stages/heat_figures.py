@@ -1,4 +1,4 @@
-"""Curves over the path of contact: load, contact temperature, oil film and sliding of every kind of mesh (heat.nc)."""
+"""Pictures of losses and temperatures: efficiency over torque and speed, curves over the path of contact."""
 
 from __future__ import annotations
 
@@ -65,4 +65,28 @@ HEAT_FIGURES = Figures(
         ),
     },
     draw=_heat_figures,
+)
+
+
+def draw_efficiency_map(losses: xr.Dataset) -> Figure:
+    """Draw the efficiency over the share of the speed, a curve for every share of the torque, from losses.nc."""
+    figure, (axes,) = new_figure(height=3.8)
+    for number, share in enumerate(losses["torque_share"].values):
+        values = 100.0 * losses["efficiency_map"].values[number]
+        axes.plot(
+            losses["speed_share"].values, values, marker="o", label=f"torque {float(share):g}", **line_style(number)
+        )
+    label(axes, "share of the speed of operation", "efficiency [%]")
+    legend_below(figure)
+    return figure
+
+
+def _loss_figures(drawn: Drawn) -> dict[str, Figure]:
+    losses = drawn.data["losses"]
+    return {"efficiency_map": draw_efficiency_map(losses)} if "efficiency_map" in losses else {}
+
+
+LOSSES_FIGURES = Figures(
+    {"efficiency_map": "Efficiency over shares of torque and speed of operation, the contact solved at every torque."},
+    draw=_loss_figures,
 )

@@ -8,7 +8,7 @@ from femgear.stages.heat import load_over_path, solve_heat
 from femgear.stages.losses import check_loss_entries, solve_losses
 from femgear.stages.static import solve_static
 from femgear.trains.reading import read_case, with_values
-from femgear.trains.registry import stages_of
+from femgear.trains.registry import stages_of, train_of
 from validation.heat import whole_run
 
 OIL = {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s", "temperature": "80 degC"}
@@ -95,3 +95,11 @@ def test_without_a_temperature_of_the_oil_there_is_no_stage_and_a_reason():
     assert "heat" not in [stage.name for stage in stages_of(case)]
     with pytest.raises(CaseError, match=r"lubricant\.temperature"):
         stages_of(case, "heat")
+
+
+def test_check_has_the_specific_sliding_of_both_gears(pair):
+    (block,) = (block for block in train_of(pair[0]).describe_case(pair[0]) if block.title == "Meshes")
+    rows = {row[0]: row[1] for row in block.rows}
+    sliding = pair[2].points[0][0].specific_sliding
+    for gear, values in zip(("first", "second"), sliding, strict=True):
+        assert rows[f"specific sliding, {gear} gear"] == f"{values[0]:.3f} to {values[-1]:.3f}"
