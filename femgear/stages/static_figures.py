@@ -46,7 +46,7 @@ from femgear.report.style import (
     periodic,
     position_words,
 )
-from femgear.stages.heat_figures import HEAT_FIGURES
+from femgear.stages.heat_figures import HEAT_FIGURES, LOSSES_FIGURES
 from femgear.stages.life_figures import LIFE_FIGURES
 from femgear.stages.protocol import Drawn, Figures
 from femgear.stages.static import over_width, static_supports
@@ -828,5 +828,6 @@ FIGURES = {
     "stress": _STRESSES,
     "life": LIFE_FIGURES,
     "heat": HEAT_FIGURES,
+    "losses": LOSSES_FIGURES,
     "": Figures({}, draw=_deviation_figures),
 }

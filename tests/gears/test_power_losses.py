@@ -36,6 +36,17 @@ def test_with_a_held_carrier_both_ways_have_one_efficiency():
         assert flow.efficiency == pytest.approx(0.99 * 0.995, rel=1e-12)
 
 
+@pytest.mark.parametrize("torque", [400.0, -400.0])
+def test_a_set_with_the_sun_held_lets_less_power_roll(torque):
+    """With i_0 = 4 the ring drives with (eta_0 + 4)/5, the carrier with 5/(1/eta_0 + 4)."""
+    condition = planetary_condition("set", None, "carrier", "ring", 27, 108)
+    _, flow = flows(condition, ["carrier", "ring"], {"ring": 300.0}, {"ring": torque}, ["carrier"])
+    basic = basic_efficiency(ETA)
+    expected = (basic + 4.0) / 5.0 if torque > 0.0 else 5.0 / (1.0 / basic + 4.0)
+    assert flow.efficiency == pytest.approx(expected, rel=1e-12)
+    assert flow.rolling_power["set"] == pytest.approx(0.2 * flow.input_power, rel=0.02)
+
+
 def test_losses_add_up_meshes_and_bearings_in_a_train_of_stages():
     conditions = [
         pair_condition("first", "a", "b", 20, 61),

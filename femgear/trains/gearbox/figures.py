@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.report.style import BLACK, COLOURS, GREY, SIZE, label, legend_below, new_figure
-from femgear.stages.heat_figures import HEAT_FIGURES
+from femgear.stages.heat_figures import HEAT_FIGURES, LOSSES_FIGURES
 from femgear.stages.life_figures import LIFE_CAPTION, draw_damage
 from femgear.stages.protocol import Drawn, Figures
 from femgear.trains.gearbox.casing_results import seat_curve
@@ -271,6 +271,7 @@ def _draw_modes(drawn: Drawn) -> dict[str, Figure]:
 
 FIGURES = {
     "heat": HEAT_FIGURES,
+    "losses": LOSSES_FIGURES,
     "deflection": Figures(
         {
             "deflected_shafts": "Deflection of the shafts in both planes along their axes; arrows are the forces of "

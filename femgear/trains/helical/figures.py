@@ -378,6 +378,7 @@ FIGURES = {
     ),
     "stress": STATIC["stress"],
     "heat": STATIC["heat"],
+    "losses": STATIC["losses"],
     "life": STATIC["life"],
     "modes": Figures(
         {
