@@ -90,6 +90,7 @@ def test_a_class_gives_the_laws_that_a_file_leaves_out(case):
     assert with_classes(placed, case).sun.pitch is None and with_classes(placed, case).planet.runout_amplitude is None
 
 
+@pytest.mark.slow
 def test_samples_are_drawn_by_class(case, tmp_path):
     path = tmp_path / "class.toml"
     path.write_text("quality = 6\n", encoding="utf-8")
