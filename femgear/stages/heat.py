@@ -163,6 +163,7 @@ def mesh_heat(
         (bulk, of_losses),
         scuffing,
         float(scuffing_safety(scuffing, highest, hot)) if math.isfinite(scuffing) else math.nan,
+        hot,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -75,6 +75,8 @@ class MeshHeat:
         Scuffing temperature [K]; NaN without a load stage.
     safety : float
         S_B.
+    oil : float
+        Temperature of the oil [K].
     """
 
     path: np.ndarray
@@ -89,11 +91,27 @@ class MeshHeat:
     bulk: tuple[float, float]
     scuffing: float
     safety: float
+    oil: float
 
     @property
     def highest(self) -> float:
         """Largest contact temperature [K]."""
         return self.bulk[0] + float(self.flash.max())
+
+    @property
+    def idle(self) -> MeshHeat:
+        """The same mesh without load: teeth as hot as the oil, whose film then matters nowhere."""
+        nothing, oil = 0.0 * self.flash, self.oil
+        return replace(
+            self,
+            line_load=nothing,
+            pressure=nothing,
+            flash=nothing,
+            shared_flash=nothing,
+            film=nothing + math.nan,
+            bulk=(oil, oil),
+            safety=math.nan,
+        )
 
     @property
     def smallest_film(self) -> float:

@@ -7,7 +7,8 @@ formula. Stages whose teeth are not computed, and bearings of given stiffness, l
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,7 +19,7 @@ from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.power_losses import FrictionTorque, lossy_flow
 from femgear.stages.heat import heat_result, mesh_heat
-from femgear.stages.heat_results import HeatResult, describe_heat, heat_tables
+from femgear.stages.heat_results import HeatResult, MeshHeat, describe_heat, heat_tables
 from femgear.stages.losses import NO_LOSSES, check_loss_entries, losses_of_meshes, mesh_friction
 from femgear.stages.losses_results import LossesResult, LossPoint, MeshFriction, describe_losses, loss_tables
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
@@ -112,7 +113,10 @@ def solve_box_losses(
     """
     loaded, cases, losses = deflection.of(case), case.operation.load_case, case.losses
     assert losses is not None
-    points = tuple(loss_point(state, load_case) for state, load_case in zip(loaded.states, cases, strict=True))
+    points = _with_idle_stages(
+        [loss_point(state, load_case) for state, load_case in zip(loaded.states, cases, strict=True)],
+        [stage.name for stage in (*case.pair, *case.planetary)],
+    )
     chosen = cases[loaded.chosen]
     efficiency = np.zeros((len(losses.torque_shares), len(losses.speed_shares)))
     for row, share in enumerate(losses.torque_shares):
@@ -127,23 +131,50 @@ def solve_box_losses(
     return LossesResult(points, meshes, "load_case", [each.name for each in cases], losses, efficiency, missing)
 
 
+def _with_idle_stages(points: Sequence[LossPoint], names: Sequence[str]) -> tuple[LossPoint, ...]:
+    """Give points in which a stage carries nothing the zeros of its meshes, where another point has the stage."""
+    carrying = {name: point.friction[name] for point in points for name in point.friction}
+    idle = {
+        name: replace(
+            friction,
+            coefficient=0.0 * friction.coefficient,
+            factor=0.0 * friction.factor,
+            force=0.0 * friction.force,
+            passed=(1.0,) * len(friction.passed),
+        )
+        for name, friction in carrying.items()
+    }
+    stages = [name for name in names if name in carrying]
+    return tuple(
+        replace(
+            point,
+            friction={name: point.friction.get(name, idle[name]) for name in stages},
+            mesh_loss={name: point.mesh_loss.get(name, idle[name].force) for name in stages},
+        )
+        for point in points
+    )
+
+
 @one_blas_thread()
 def solve_box_heat(case: GearboxCase, deflection: DeflectionResult, losses: LossesResult) -> HeatResult:
     """Compute temperatures and oil film of all stages with teeth, in all load cases."""
-    loaded, points, kinds = deflection.of(case), [], []
+    loaded = deflection.of(case)
+    points: list[dict[str, MeshHeat]] = []
     for state, point in zip(loaded.states, losses.points, strict=True):
-        of_point, kinds = [], []
+        of_point: dict[str, MeshHeat] = {}
         for name, contact in state.contacts.items():
             gears, frequency = contact.result.planetary_set, abs(state.model.flow.mesh_frequency[name])
             for kind, pair in enumerate(gears.kinds):
                 loss = float(point.mesh_loss[name][gears.kind_rows[kind]].max())
-                of_kind = mesh_heat(contact.case, contact.result, kind, mesh_frequency=frequency, loss=loss, rules=case)
-                of_point.append(of_kind)
                 mesh = f" {pair.gear_1.name}-{pair.gear_2.name}" if len(gears.kinds) > 1 else ""
-                kinds.append(f"{name}{mesh}")
-        points.append(tuple(of_point))
+                of_point[f"{name}{mesh}"] = mesh_heat(
+                    contact.case, contact.result, kind, mesh_frequency=frequency, loss=loss, rules=case
+                )
+        points.append(of_point)
     names = [load_case.name for load_case in case.operation.load_case]
-    return heat_result(case, tuple(points), tuple(kinds), "load_case", names)
+    kinds = {name: mesh for point in points for name, mesh in point.items()}
+    every = (tuple(point.get(name) or mesh.idle for name, mesh in kinds.items()) for point in points)
+    return heat_result(case, tuple(every), tuple(kinds), "load_case", names)
 
 
 def _no_box_heat(case: GearboxCase) -> str:

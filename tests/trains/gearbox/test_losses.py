@@ -110,6 +110,22 @@ def test_temperatures_are_those_of_the_teeth_of_every_stage(loaded):
     assert float(heat["scuffing_safety"].min()) > 1.0
 
 
+def test_a_load_case_without_torque_has_zeros_in_place_of_its_stages():
+    oil = {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s", "temperature": "80 degC"}
+    tables = pair_tables(teeth=True) | {"losses": LOSSES | {"roughness": "0.4 um"}, "lubricant": oil}
+    tables["deflection"] = {"slices": 3, "passes": 3}
+    load_case = tables["operation"]["load_case"][0]
+    idle = {"name": "idle", "torque": {"motor": "0 N m"}, "share": 0.5}
+    tables["operation"]["load_case"] = [load_case | idle, load_case | {"share": 0.5}]
+    state = solved(read_case(tables))
+    losses = solve_box_losses(state.case, state)
+    data = losses.dataset()
+    assert data["mesh_loss"].values[0] == 0.0 and data["mesh_loss"].values[1] > 0.0
+    heat = solve_box_heat(state.case, state, losses).dataset()
+    assert heat["highest_temperature"].values[0] == pytest.approx(80.0) and not heat["path_load"].values[0].any()
+    assert heat["highest_temperature"].values[1] > 80.0
+
+
 def test_tables_of_losses_in_teeth_have_no_effect_and_that_is_said():
     tables = pair_tables(teeth=True)
     tables["pair"][0]["teeth"]["losses"] = LOSSES
