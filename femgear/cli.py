@@ -334,7 +334,7 @@ def run(
     only
         Compute this stage and what it needs, no further: "static", "stress" (whatever static.stresses says),
         "modes", "dynamics" or "housing"; "branch" or "response" of planar cases, "transient" or "spectrum" of
-        drivetrains; "balance" of stages in series; "sweep" or "chaos" of gear pairs.
+        gearboxes in time; "balance" of gearboxes; "sweep" or "chaos" of gear pairs.
     pictures
         Draw figures, fields and report.
     force

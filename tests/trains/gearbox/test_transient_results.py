@@ -30,7 +30,9 @@ def results(tmp_path_factory, own):
     return open_results(folder)
 
 
-@pytest.mark.parametrize("name", ["wind_turbine_drivetrain", "grc_like_drivetrain"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("wind_turbine_drivetrain", marks=pytest.mark.slow), "grc_like_drivetrain"]
+)
 def test_shipped_cases_run(name, tmp_path):
     entries = {"settle": "0.02 s", "duration": "0.12 s", "rate": "10 kHz", "record": "2 kHz"}
     case = read_case(CASES / f"{name}.toml")
