@@ -45,12 +45,20 @@ CHANGES: tuple[dict[str, object], ...] = (
     {"material.poisson_ratio": 0.29},
     {"material.density": "7700 kg/m^3"},
     {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"},
+    {"planet.dynamic_rating": "20 kN", "planet.bearing_kind": "ball"},
+    {"operation.load_case": [{"name": "run", "torque": "30 N m", "speed": "500 rpm", "share": 1.0}]},
+    {
+        "operation.load_case": [{"torque": "30 N m", "speed": "500 rpm", "hours": 100}],
+        "operation.required_hours": 200,
+    },
     {"material.treatment": "case hardened steel", "material.grade": "ME", "material.hardness": 720},
     {
         "strength.edition": 2006,
         "strength.application_factor": 1.25,
         "strength.quality": 6,
         "strength.modification": "proven",
+        "strength.pitting": "limited",
+        "strength.reversal_factor": 0.8,
     },
     {
         "lubricant": {
