@@ -132,6 +132,20 @@ CHANGES: tuple[dict[str, object], ...] = (
     {"operation.input": "carrier", "operation.torque": "480 N m"},
     {"operation.torque": "110 N m"},
     {"operation.torque": "-110 N m"},
+    {
+        "operation.load_case": [
+            {"name": "often", "torque": "60 N m", "speed": "900 rpm", "share": 0.9},
+            {"name": "seldom", "torque": "120 N m", "speed": "600 rpm", "share": 0.1},
+        ],
+        "operation.required_hours": 20000.0,
+        "planet.dynamic_rating": "20 kN",
+        "planet.bearing_kind": "ball",
+    },
+    {
+        "operation.load_case": [{"name": "always", "torque": "60 N m", "speed": "900 rpm", "hours": 3000.0}],
+        "strength.pitting": "limited",
+        "strength.reversal_factor": 0.8,
+    },
     {"operation.speeds": ["900 rpm", "2000 rpm"]},
     {"operation.speeds": ["900 rpm", "9000 rpm"], "dynamics.up_to": "40 kHz"},
     {"static.positions": 9, "static.longest_record": 50},
@@ -158,6 +172,10 @@ CHANGES: tuple[dict[str, object], ...] = (
 )
 # entries of files, of slices, or without which no set is: others of their tables decide the same
 ELSEWHERE = (
+    ".span",
+    ".over_balls",
+    ".ball_diameter",
+    ".tooth_thickness",
     "format",
     "set.helix_angle",
     "teeth",

@@ -27,9 +27,11 @@ from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.resonance_table import loudest_resonance
 from femgear.trains.gearbox.sensors import gearbox_sensors
 from femgear.trains.gearbox.silence import exciting_sections
+from femgear.trains.gearbox.stress import stresses_wanted, why_no_stress
 
 MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 HOURS = Dimension("a life", "h", "h", 1.0)
+STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
 _RESPONSES = (("", "dynamics"), ("run-up ", "runup"))
 """Words before the figures of a response, and its stage."""
 _OF_FORCES = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS"
@@ -46,7 +48,7 @@ def stage_meshes(stage: PairSection | BoxPlanetarySection) -> tuple[str, ...]:
 
 def gearbox_key_figures(case: GearboxCase) -> tuple[KeyFigure, ...]:
     """List the key figures of a case by name, those of the whole gearbox before those of its parts."""
-    return (*_of_deflection(case), *_of_losses(case), *_of_modes(), *_of_responses(case))
+    return (*_of_deflection(case), *_of_stresses(case), *_of_losses(case), *_of_modes(), *_of_responses(case))
 
 
 def _family(
@@ -100,6 +102,16 @@ def _of_deflection(case: GearboxCase) -> Iterator[KeyFigure]:
         ]
         if rated:
             yield from _family("bearing life", HOURS, "deflection", lives, rated, "bearing")
+
+
+def _of_stresses(case: GearboxCase) -> Iterator[KeyFigure]:
+    """Largest root stresses and contact pressures of the stages that have them."""
+    if why_no_stress(case):
+        return
+    stages = [stage for stage in (*case.pair, *case.planetary) if stresses_wanted(stage)]
+    parts = [(stage.name, stage_meshes(stage)) for stage in stages]
+    for name, variable in (("root stress", "root_worst"), ("contact pressure", "largest_pressure")):
+        yield from _family(name, STRESS, "stress", Stored(variable), parts, "mesh")
 
 
 def _of_lives(case: GearboxCase) -> Iterator[KeyFigure]:
