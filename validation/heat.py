@@ -128,5 +128,6 @@ def whole_run() -> tuple[Row, ...]:
                     float(heat["flash_temperature"].max())),
         within("C14", "ISO/TS 6336-20", "rise of the teeth over the oil by their losses, part 22 [K]",
                bulk[0] - 90.0, bulk[1] - 90.0, 0.3, note="two models of one thing"),
-        at_most("C14", "ISO/TS 6336-20", "scuffing safety below one", 0.0, max(0.0, 1.0 - float(heat["scuffing_safety"].min()))),
+        at_most("C14", "ISO/TS 6336-20", "scuffing safety below one", 0.0,
+                max(0.0, 1.0 - float(heat["scuffing_safety"].min()))),
     )  # fmt: skip
