@@ -333,8 +333,8 @@ def run(
         Folder of the results. Default: CASE_results, beside the case.
     only
         Compute this stage and what it needs, no further: "static", "stress" (whatever static.stresses says),
-        "modes", "dynamics" or "housing"; "branch" or "response" of planar cases, "transient" or "spectrum" of
-        gearboxes in time; "balance" of gearboxes; "sweep" or "chaos" of gear pairs.
+        "life", "losses" or "heat" of teeth, "modes", "dynamics" or "housing"; "branch" or "response" of planar
+        cases; "deflection", "balance", "transient" or "spectrum" of gearboxes; "sweep" or "chaos" of gear pairs.
     pictures
         Draw figures, fields and report.
     force

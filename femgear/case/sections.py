@@ -712,7 +712,8 @@ def gear_material(case: Any, gear: str) -> MaterialSection:
 def _limit_of_treatment(case: Any, gear: str, material: MaterialSection, kind: Literal["contact", "root"]) -> float:
     """Limit of a treatment [Pa], refused in terms of the case."""
     section = getattr(case, gear).material
-    key = f"{gear}.material.hardness" if section is not None and section.hardness is not None else "material.hardness"
+    of_gear = section is not None and (section.treatment is not None or section.hardness is not None)
+    key = f"{gear}.material.hardness" if of_gear else "material.hardness"
     if material.treatment is None or material.hardness is None:
         raise CaseError(
             f"{material.treatment} has limits by its hardness, which is missing",

@@ -188,7 +188,7 @@ def tooth_life_variables(spectra: Sequence[RatedSpectrum], required: float | Non
         over = math.nan if required is None else required
         values = {
             "life": hours,
-            "damage": over / hours,
+            "damage": np.divide(over, hours, out=np.full(len(hours), over * math.inf), where=hours > 0.0),
             "spectrum_safety": [rated.spectrum.safety(over) if required else math.nan for rated in of_kind],
             "equivalent_torque": [rated.equivalent_torque for rated in of_kind],
             "damage_share": _over_load_cases(of_kind, "damage_share"),
