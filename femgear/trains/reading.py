@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 
 _MOST_UNREAD = 20
 """Files of a case that are refused at once."""
+_MOST_JUDGED = 100
+"""Entries that are refused beside which the others are judged, too."""
 _MOST_LEVELS = 4
 """Tables around a refused entry that are left out to judge the others."""
 _REXS = (".rexs", ".rexsj", ".rexsz")
@@ -97,7 +99,8 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         # tables whose files cannot be read have no points
         tables = {(problem.key or "").rpartition(".")[0] for problem in unread}
         problems = [problem for problem in translate(error, keys) if problem.key not in tables]
-        problems += [] if unread else _beside_refused(file, data, error)
+        many = error.error_count() > _MOST_JUDGED
+        problems += [] if unread or many else _beside_refused(file, data, error)
         raise combine([*unread, *problems], lines, name, error.error_count()) from None
     if unread:
         raise combine(unread, lines, name)
