@@ -52,7 +52,10 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
     problems = []
     details: Any = error.errors(include_url=False)
     # a list whose entries are refused has too few left
-    inside = {detail["loc"][:length] for detail in details for length in range(len(detail["loc"]))}
+    short = [item["loc"] for item in details[:_MOST] if item["type"] == "too_short"]
+    inside = {
+        loc for loc in short if any(len(one["loc"]) > len(loc) and one["loc"][: len(loc)] == loc for one in details)
+    }
     for item in details[:_MOST]:
         if item["type"] == "too_short" and item["loc"] in inside:
             continue
