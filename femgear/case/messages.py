@@ -54,7 +54,9 @@ def translate(error: ValidationError, model: type[BaseModel], prefix: str = "") 
     # a list whose entries are refused has too few left
     short = [item["loc"] for item in details[:_MOST] if item["type"] == "too_short"]
     inside = {
-        loc for loc in short if any(len(one["loc"]) > len(loc) and one["loc"][: len(loc)] == loc for one in details)
+        loc
+        for loc in short
+        if any(len(other["loc"]) > len(loc) and other["loc"][: len(loc)] == loc for other in details)
     }
     for item in details[:_MOST]:
         if item["type"] == "too_short" and item["loc"] in inside:
