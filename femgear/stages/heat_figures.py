@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from femgear.report.style import label, legend_below, line_style, new_figure
+from femgear.report.style import GREY, label, legend_below, line_style, new_figure
+from femgear.stages.heat_results import hottest_point
 from femgear.stages.protocol import Drawn, Figures
 
 if TYPE_CHECKING:
@@ -18,21 +19,24 @@ _DRAWN = 6
 
 
 def draw_contact_path(heat: xr.Dataset) -> Figure:
-    """Draw load, temperature, film and specific sliding over the path, at the last operating point of heat.nc."""
+    """Draw load, temperature, film and specific sliding over the path, at the hottest operating point of heat.nc."""
+    point, where = hottest_point(heat)
     figure, ((load, hot), (film, sliding)) = _axes()
     for kind, name in enumerate(heat["mesh_kind"].values[:_DRAWN]):
         place, style = 1e3 * heat["path_place"].values[kind], line_style(kind)
-        bulk = float(heat["bulk_temperature"].values[-1, kind, 0])
-        carried = np.where(heat["path_load"].values[-1, kind] > 0.0, 1.0, np.nan)
-        load.plot(place, 1e-3 * heat["path_load"].values[-1, kind], label=str(name), **style)
-        hot.plot(place, carried * (bulk + heat["flash_temperature"].values[-1, kind]), **style)
-        shared = bulk + heat["shared_flash_temperature"].values[-1, kind]
+        bulk = float(heat["bulk_temperature"].values[point, kind, 0])
+        carried = np.where(heat["path_load"].values[point, kind] > 0.0, 1.0, np.nan)
+        load.plot(place, 1e-3 * heat["path_load"].values[point, kind], label=str(name), **style)
+        hot.plot(place, carried * (bulk + heat["flash_temperature"].values[point, kind]), **style)
+        shared = bulk + heat["shared_flash_temperature"].values[point, kind]
         hot.plot(place, shared, color=style["color"], linewidth=0.8, linestyle=":")
-        film.plot(place, heat["film_ratio"].values[-1, kind], **style)
+        film.plot(place, heat["film_ratio"].values[point, kind], **style)
         for gear in (0, 1):
             values = heat["specific_sliding"].values[kind, gear]
             sliding.plot(place, np.where(values > -5.0, values, np.nan), linewidth=1.6 - 0.8 * gear, **style)
-    label(load, y="largest load over width [N/mm]")
+    hot.plot([], [], color=GREY, linewidth=0.8, linestyle=":", label="load shared by X_Γ")
+    sliding.plot([], [], color=GREY, linewidth=0.8, label="second gear")
+    label(load, y="line load [N/mm]", title=where)
     label(hot, y="contact temperature [°C]")
     label(film, "path from the pitch point [mm]", "film over roughness")
     label(sliding, "path from the pitch point [mm]", "specific sliding")
@@ -40,8 +44,7 @@ def draw_contact_path(heat: xr.Dataset) -> Figure:
         axes.axvline(0.0, color="0.6", linewidth=0.8)
     film.set_ylim(bottom=0.0)
     load.set_ylim(bottom=0.0)
-    if heat.sizes["mesh_kind"] > 1:
-        legend_below(figure, load)
+    legend_below(figure)
     return figure
 
 
@@ -58,10 +61,10 @@ def _heat_figures(drawn: Drawn) -> dict[str, Figure]:
 HEAT_FIGURES = Figures(
     {
         "contact_path": (
-            "Along the path of contact at the last operating point: the largest load over width that a tooth pair "
-            "has there, the contact temperature with that load and, dotted, with the load sharing factor X_Γ of ISO/TS "
-            "6336-20, the oil film over the roughness (ISO/TS 6336-22), and the specific sliding of the first (thick) "
-            "and the second gear (thin)."
+            "Along the path of contact at the operating point with the hottest contact: the largest load over width "
+            "that a tooth pair has there, the contact temperature with that load and, dotted, with the load sharing "
+            "factor X_Γ of ISO/TS 6336-20, the oil film over the roughness (ISO/TS 6336-22), and the specific sliding "
+            "of the first (thick) and the second gear (thin)."
         ),
     },
     draw=_heat_figures,

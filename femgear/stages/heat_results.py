@@ -13,6 +13,7 @@ from femgear.case.quantities import CELSIUS, RPM
 from femgear.findings import Finding
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.key_figures import NUMBER, KeyFigure, Stored
+from femgear.stages.losses_results import point_label
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import as_written, declared
@@ -212,6 +213,13 @@ def heat_warnings(data: Any) -> Iterator[Finding]:
             yield Finding("W-HEAT", key, f"{words} is {least:.2f}", limit="1 and more")
 
 
+def hottest_point(data: Any) -> tuple[int, str]:
+    """Find the operating point of heat.nc with the hottest contact: its number, and its speed or load case."""
+    highest = data["highest_temperature"]
+    number = int(np.nanmax(np.asarray(highest.values, float), axis=1).argmax())
+    return number, point_label(data, highest.dims[0], number)
+
+
 def describe_heat(data: Any) -> Block:
     """Tabulate temperatures, films and safeties of the operating points of heat.nc."""
     dim = data["highest_temperature"].dims[0]
@@ -225,11 +233,8 @@ def describe_heat(data: Any) -> Block:
 
         return text
 
-    def label(place: tuple[int, int]) -> str:
-        return f"{float(labels[place[0]]):.6g} rpm" if dim == "speed" else str(labels[place[0]])
-
     columns = {
-        "speed" if dim == "speed" else "load case": label,
+        "speed" if dim == "speed" else "load case": lambda place: point_label(data, dim, place[0]),
         "mesh": lambda place: kinds[place[1]],
         "flash, largest [K]": lambda place: f"{float(data['flash_temperature'].values[place].max()):.1f}",
         "teeth [°C]": figure("bulk_temperature", ".1f", 0),
@@ -248,21 +253,22 @@ def describe_heat(data: Any) -> Block:
 
 
 def heat_tables(data: Any) -> Iterator[Block]:
-    """Tabulate where on the path the contact is hottest and the film thinnest, at the last operating point."""
+    """Tabulate where on the path the contact is hottest and the film thinnest, where that is largest."""
+    number, where = hottest_point(data)
     kinds = [str(kind) for kind in data["mesh_kind"].values]
 
     def row(kind: int) -> tuple[str, ...]:
         place = 1e3 * data["path_place"].values[kind]
-        flash, film = data["flash_temperature"].values[-1, kind], data["film_ratio"].values[-1, kind]
+        flash, film = data["flash_temperature"].values[number, kind], data["film_ratio"].values[number, kind]
         hottest = int(flash.argmax())
         thin = f"{place[int(np.nanargmin(film))]:+.3f}" if np.isfinite(film).any() else "-"
         sliding = data["specific_sliding"].values[kind]
         worst = ", ".join(f"{min(values[0], values[-1]):.3f}" for values in sliding)
-        shared = float(data["shared_flash_temperature"].values[-1, kind].max())
+        shared = float(data["shared_flash_temperature"].values[number, kind].max())
         return kinds[kind], f"{place[hottest]:+.3f}", thin, f"{shared:.1f}", worst
 
     header = ("mesh", "hottest [mm]", "thinnest film [mm]", "flash with X_Gamma [K]", "specific sliding, smallest")
-    note = "places from the pitch point towards the tip of the first gear"
+    note = f"at {where}; places from the pitch point towards the tip of the first gear"
     yield Block("Over the path of contact", header, tuple(row(kind) for kind in range(len(kinds))), (note,))
 
 
@@ -285,4 +291,7 @@ def heat_rows(results: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         at = np.unravel_index(int(pick(values)), values.shape)
         text = form.format(values[at])
         below = name.endswith("_safety") and values[at] < 1.0
-        yield words, f"{marks(text, 'W-HEAT', of=('heat',)) if below else text}, {kinds[at[1]]}"
+        marked = marks(text, "W-HEAT", of=("heat",)) if below else text
+        dim = data[name].dims[0]
+        several = f", {point_label(data, dim, int(at[0]))}" if len(values) > 1 else ""
+        yield words, f"{marked}, {kinds[at[1]]}{several}"

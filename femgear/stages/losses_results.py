@@ -150,8 +150,10 @@ class LossesResult(StageResult):
     def contents(self) -> Contents:
         """Collect the contents of losses.nc."""
         points, first, stages = self.points, self.points[0], self.points[0].stages
-        each = {name: [_joined(getattr(point.friction[stage], name) for stage in stages) for point in points]
-                for name in ("coefficient", "factor", "rigid", "closed")}  # fmt: skip
+        each = {
+            name: [_joined(getattr(point.friction[stage], name) for stage in stages) for point in points]
+            for name in ("coefficient", "factor", "rigid", "closed")
+        }
         shafts = [*first.flow.torque]
         flows = [point.flow for point in points]
         values: dict[str, Any] = {
@@ -215,11 +217,14 @@ def point_dim(data: Any) -> str:
     return data["efficiency"].dims[0]
 
 
-def _label(data: Any, number: int) -> str:
-    """Write an operating point."""
-    dim = point_dim(data)
+def point_label(data: Any, dim: str, number: int) -> str:
+    """Write an operating point, a speed or a load case, by its number along its dimension."""
     value = data[dim].values[number]
     return f"{float(value):.6g} rpm" if dim == "speed" else str(value)
+
+
+def _label(data: Any, number: int) -> str:
+    return point_label(data, point_dim(data), number)
 
 
 def describe_losses(data: Any) -> Block:
@@ -265,8 +270,8 @@ def _friction_words(data: Any) -> Iterator[str]:
 
 
 def mesh_loss_block(data: Any) -> Block:
-    """Tabulate loss factors and losses of all meshes at the last operating point of losses.nc."""
-    number = len(data["efficiency"].values) - 1
+    """Tabulate loss factors and losses of all meshes at the operating point of losses.nc with the largest losses."""
+    number = int(np.argmax(data["loss"].values))
 
     def figure(name: str, form: str, mesh: int) -> str:
         values = np.asarray(data[name].values)

@@ -11,8 +11,8 @@ from femgear.stages.protocol import Drawn
 def test_the_picture_has_the_curves_of_every_kind_of_mesh():
     heat = result(mesh(), mesh(film=0.1)).dataset()
     load, hot, film, sliding = draw_contact_path(heat).axes
-    # curves of both kinds, those of X_Gamma beside them, both gears, and the pitch point in each
-    assert [len(axes.lines) for axes in (load, hot, film, sliding)] == [3, 5, 3, 5]
+    # curves of both kinds, those of X_Gamma beside them, both gears, the pitch point in each, two for the legend
+    assert [len(axes.lines) for axes in (load, hot, film, sliding)] == [3, 6, 3, 6]
     place, values = film.lines[1].get_data()
     assert np.allclose(place, 1e3 * heat["path_place"].values[1]) and np.allclose(
         values, heat["film_ratio"].values[0, 1]

@@ -1,10 +1,12 @@
 """Tables and rows of temperatures, whatever they come from."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from femgear.report.tables import Marks
-from femgear.stages.heat_results import HeatResult, MeshHeat, describe_heat, heat_rows, heat_tables
+from femgear.stages.heat_results import HeatResult, MeshHeat, describe_heat, heat_rows, heat_tables, hottest_point
 
 
 def mesh(safety=2.0, film=0.4):
@@ -54,6 +56,16 @@ def test_tables_show_the_numbers_of_the_file():
     (table,) = heat_tables(data)
     row = dict(zip(table.header, table.rows[0], strict=True))
     assert row["hottest [mm]"] == "+10.000" and row["thinnest film [mm]"] == "-10.000"
+
+
+def test_where_on_the_path_is_told_of_the_hottest_operating_point():
+    cool = replace(mesh(), flash=0.5 * mesh().flash, bulk=(350.0, 355.0))
+    both = HeatResult(((mesh(),), (cool,)), ("pair",), "load_case", ["full", "coasting"], 353.15, 0.3).contents()
+    assert hottest_point(both) == (0, "full")
+    (table,) = heat_tables(both)
+    assert table.notes[0].startswith("at full;") and float(table.rows[0][3]) == pytest.approx(0.9 * 120.0)
+    found = type("Results", (), {"stages": ("heat",), "heat": both})()
+    assert dict(heat_rows(found, Marks(())))["hottest contact, ISO/TS 6336-20"].endswith("pair, full")
 
 
 def test_rows_of_the_verdict_are_the_worst_kinds_and_marked_below_one():

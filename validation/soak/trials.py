@@ -132,7 +132,6 @@ def metered(limit: float) -> Iterator[Meter]:
     def stop(*_):
         raise TooSlow
 
-    gc.collect()
     gc.freeze()
     meter, before = Meter(), signal.signal(signal.SIGPROF, stop)
     signal.setitimer(signal.ITIMER_PROF, limit)

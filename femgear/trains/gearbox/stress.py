@@ -14,16 +14,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from femgear.case import text as case_text
-from femgear.case.dependencies import Steps
 from femgear.findings import Finding
 from femgear.report.tables import Block
 from femgear.stages.protocol import Progress, StageResult, silent
-from femgear.stages.static import solve_static, solve_stress
+from femgear.stages.static import solve_stress
 from femgear.stages.static_results import describe_stress, stress_warnings
 from femgear.stages.stress_reasons import reason_row
 from femgear.storage.contents import Contents
-from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
+from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection
 from femgear.trains.gearbox.deflection import Deflection
 
 if TYPE_CHECKING:
@@ -105,9 +103,7 @@ class GearboxStressResult(StageResult):
         return Contents(variables, coords, attributes)
 
 
-def solve_box_stress(
-    case: GearboxCase, deflection: Any, *, steps: Steps | None = None, progress: Progress = silent
-) -> GearboxStressResult:
+def solve_box_stress(case: GearboxCase, deflection: Any, *, progress: Progress = silent) -> GearboxStressResult:
     """Find root stresses and contact pressures of the teeth of all stages in the load case that pictures are of.
 
     Parameters
@@ -115,8 +111,6 @@ def solve_box_stress(
     case : GearboxCase
     deflection : DeflectionResult
         Loaded states.
-    steps : Steps, optional
-        Compliances that the contact of the stages has left.
     progress : callable
         Called with ("stress", done, total).
     """
@@ -129,7 +123,7 @@ def solve_box_stress(
         kind = "planetary" if stage.planets else "pair"
         key = f"{kind}[{getattr(case, kind).index(stage.section)}].teeth"
         meshes = tuple(names[mesh].name for mesh in stage.meshes)
-        solved.append(_stage_stress(found, stage.name, key, meshes, steps or Steps()))
+        solved.append(_stage_stress(found, stage.name, key, meshes))
     return GearboxStressResult(tuple(solved))
 
 
@@ -147,14 +141,10 @@ def why_no_stress(case: GearboxCase) -> str:
     return ""
 
 
-def _stage_stress(found: Deflection, name: str, key: str, meshes: tuple[str, ...], steps: Steps) -> StageStress:
-    """Solve the contact of a stage once more with its pressures, and the stresses of its teeth."""
+def _stage_stress(found: Deflection, name: str, key: str, meshes: tuple[str, ...]) -> StageStress:
+    """Find the stresses of the teeth of a stage under the contact of the loaded state."""
     contact = found.contacts[name]
-    tables = case_text.parse(contact.case.source, "")
-    tables["static"]["stresses"] = True
-    teeth = stage_case_of(case_text.write(tables))
-    static = solve_static(teeth, steps=steps, deviations=contact.deviations)
-    data = solve_stress(teeth, static).dataset()
+    data = solve_stress(contact.case, contact.result).dataset()
     data["largest_pressure"] = _largest_pressure(data)
     if "slice" in data.sizes:  # slices have the pressure of Hertz, kinks or not
         data["relief_kink"] = 0 * data["relief_kink"]
