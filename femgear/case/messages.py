@@ -17,7 +17,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from femgear.case import text as case_text
-from femgear.case.load_spectrum import spectrum_notices
+from femgear.case.load_spectrum import spectrum_notices, without_line
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, wrong_length
 from femgear.case.sections import RackSection
@@ -305,6 +305,27 @@ def added_material(case: Any) -> Iterator[Finding]:
                 )
 
 
+def idle_materials_and_oil(case: Any) -> Iterator[Finding]:
+    """List grades and hardnesses without a treatment, and an oil whose losses nobody asks for (W-UNUSED)."""
+    sections = {f"{gear}.material": getattr(case, gear).material for gear in without_line(case)}
+    if len(sections) == len(case.gear_names):
+        sections = {"material": case.material} | sections
+    for key, section in sections.items():
+        for name in ("grade", "hardness"):
+            if section is not None and name in section.model_fields_set:
+                text = "has no effect: limits follow from it where the material has a treatment"
+                remedy = f'give {key}.treatment = "case hardened steel" or the like'
+                yield Finding("W-UNUSED", f"{key}.{name}", text, remedy=remedy)
+    yield from idle_oil(case)
+
+
+def idle_oil(case: Any) -> Iterator[Finding]:
+    """Tell an oil of a case without losses, which nothing asks for (W-UNUSED)."""
+    if case.lubricant is not None and case.losses is None:
+        remedy = 'give [losses] with friction = "schlenk" or the like'
+        yield Finding("W-UNUSED", "lubricant", "has no effect: losses are not asked for", remedy=remedy)
+
+
 def notices(data: dict, case: Case) -> Iterator[Finding]:
     """Remark on what a case file, its tables checked, gives in a way that deserves to be said."""
     if (teeth := data["ring"]["teeth"]) < 0:
@@ -313,6 +334,7 @@ def notices(data: dict, case: Case) -> Iterator[Finding]:
             "femgear's sign (positive moves the flank outwards, the opposite of ISO 21771)"
         )
     yield from spectrum_notices(case)
+    yield from idle_materials_and_oil(case)
     if not case.rigid and "bearing_clearance" in data["planet"] and case.static.members == "fixed":
         text = 'has no effect while static.members is "fixed"'
         remedy = 'write static.members = "elastic"'

@@ -1,12 +1,14 @@
 """Messages of a case file in the words of its author: near keys, places, units, all mistakes at once."""
 
 import re
+import tomllib
+from pathlib import Path
 
 import pytest
 from trains.test_reading import CASE, TEXT, _root_radius_code, refused, replaced
 
 from femgear.case.gear_set import planetary_set
-from femgear.case.messages import no_such
+from femgear.case.messages import idle_materials_and_oil, no_such
 from femgear.errors import CaseError, GeometryError
 from femgear.trains.reading import read_case, with_value, with_values
 
@@ -118,3 +120,20 @@ def test_a_name_that_nothing_has_is_refused_with_the_nearest():
     assert no_such("part", "load[0].shaft", "wheel", names, "name a [[shaft]]", limit="a shaft").remedy == (
         "name a [[shaft]]"
     )
+
+
+def test_entries_of_strength_and_oil_without_effect_are_told():
+    tables = tomllib.loads(Path("cases/spur_pair.toml").read_text(encoding="utf-8"))
+    assert not list(idle_materials_and_oil(read_case(tables)))
+    tables["material"]["hardness"] = 700
+    tables["lubricant"] = {"viscosity": "30 mm^2/s"}
+    tables["gear_2"]["material"] = {"grade": "ME"}
+    assert [told.key for told in idle_materials_and_oil(read_case(tables))] == [
+        "material.hardness",
+        "gear_2.material.grade",
+        "lubricant",
+    ]
+    # a gear with a treatment takes the hardness of the others
+    tables["gear_1"]["material"] = {"treatment": "case hardened steel"}
+    tables["losses"] = {"friction": "constant", "coefficient": 0.05}
+    assert [told.key for told in idle_materials_and_oil(read_case(tables))] == ["gear_2.material.grade"]
