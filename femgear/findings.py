@@ -56,6 +56,7 @@ CATALOGUE = {
     "W-LOSSES": (NOTE, "Losses of a part are left out, or rest on a simpler model."),
     "W-MOTION": (DOUBT, "A member moves far enough to change contact points and arms."),
     "W-NEIGHBOURS": (NOTE, "Neighbouring planets come close to one another."),
+    "W-OIL": (DOUBT, "The viscosity of the oil is extrapolated beyond the temperatures at which its law holds."),
     "W-ONE-WAY": (NOTE, "Supports or a casing change the level that load factors are computed without."),
     "W-OPEN": (NOTE, "A planet carries nothing at some positions."),
     "W-OVERLAP": (DOUBT, "Shafts and gears take up the same space."),
@@ -86,6 +87,7 @@ CATALOGUE = {
     "W-SPEED": (NOTE, "Torques change the speed within the record."),
     "W-STEPS": (DOUBT, "Peaks of resonances are too narrow for the speeds of a run-up."),
     "W-STIFFNESS": (DOUBT, "Results rest on estimated stiffnesses, of bearings or of meshes."),
+    "W-STRENGTH": (FAULT, "A tooth fails at once: a stress exceeds its static strength."),
     "W-SWEEP": (NOTE, "A sweep takes long."),
     "W-TAIL": (DOUBT, "The highest harmonics of a response are not small."),
     "W-TEETH": (

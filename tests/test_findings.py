@@ -97,10 +97,14 @@ def of_stage(train: str, stage: str, data: xr.Dataset) -> tuple[Finding, ...]:
     return known.stage(stage).findings(data)
 
 
-def short_life() -> xr.Dataset:
-    """A root that fails before its time."""
+def short_life(*lives: float) -> xr.Dataset:
+    """A root that fails before its time, or at once."""
     return xr.Dataset(
-        {"root_damage": ("root", [0.5, 2.0]), "root_damage_share": (("load_case", "root"), [[0.4, 0.7], [0.6, 0.3]])},
+        {
+            "root_life": ("root", [*lives]),
+            "root_damage": ("root", [0.5, 2.0]),
+            "root_damage_share": (("load_case", "root"), [[0.4, 0.7], [0.6, 0.3]]),
+        },
         coords={"load_case": ["start", "run"], "root": ["gear 1", "gear 2"]},
     )
 
@@ -326,7 +330,7 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-FACE-LOAD": lambda: of_stage("elastic", "static", over_width()),
     "W-GROWTH": lambda: of_stage("gearbox", "transient", transient(growth=2.0)),
     "W-KINK": lambda: of_stage("elastic", "stress", corner()),
-    "W-LIFE": lambda: of_stage("pair", "life", short_life()),
+    "W-LIFE": lambda: of_stage("pair", "life", short_life(200.0, 50.0)),
     "W-LIFTED": lambda: of_stage("elastic", "static", over_width(lifted=True)),
     "W-HEAT": lambda: of_stage(
         "pair",
@@ -351,6 +355,7 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
             drive_contact=("speed", [1.0, 0.9]), back_contact=("speed", [0.0, 0.0]), backlash=("x", [1e-5])
         ),
     ),
+    "W-STRENGTH": lambda: of_stage("pair", "life", short_life(200.0, 0.0)),
     "W-STIFFNESS": lambda: of_stage(
         "gearbox",
         "deflection",
@@ -456,6 +461,7 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
             "transient.rate": "100 kHz",
         },
     ),
+    "W-OIL": lambda: of_case("e_axle", {"lubricant.temperature": "-40 degC"}),
     "W-TEETH": lambda: read_case(CASES / "wind_turbine_drivetrain.toml").notices,
     "W-TIP": lambda: of_case(PLANETARY, {"sun.tip_diameter": None}),
     "W-TIP-THIN": lambda: of_case(PLANETARY, {"set.backlash": "1 mm"}),

@@ -113,9 +113,12 @@ def has_rated_bearings(case: Any) -> bool:
 
 
 def spectrum_notices(case: Any) -> Iterator[Finding]:
-    """List gears whose lives load cases do not give for want of a treatment (W-UNUSED)."""
+    """List gears whose lives load cases do not give for want of a treatment or a torque (W-UNUSED)."""
     if not case.operation.load_case:
         return
+    if not any(load_case.torque for load_case in case.operation.load_case):
+        remedy = 'give one of them a torque, as in torque = "300 N m"'
+        yield Finding("W-UNUSED", "operation.load_case", "have no effect on teeth: none has a torque", remedy=remedy)
     lacking = without_line(case)
     if len(lacking) == len(case.gear_names) and has_rated_bearings(case):
         return

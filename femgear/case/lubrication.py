@@ -6,6 +6,7 @@ with the entry that would give it.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
 from pydantic import StrictBool, model_validator
@@ -25,6 +26,7 @@ from femgear.case.quantities import (
     Values,
 )
 from femgear.errors import CaseError
+from femgear.findings import Finding
 from femgear.gears.friction import LUBRICANT_FACTORS
 from femgear.system.bearing_life import oil_viscosity
 
@@ -34,6 +36,16 @@ _Share = Annotated[float, Number(0.0, 10.0, open_low=True)]
 _Coefficient = Annotated[float, Number(0.0, 0.5, open_low=True)]
 _Load = Annotated[float, Quantity(LINE_LOAD, 0.0, 1e8)]
 _Velocity = Annotated[float, Quantity(VELOCITY, 0.0, 1e3)]
+OIL_RANGE = {"mineral": (-10.0, 150.0)}
+"""Temperatures [degC] between which the viscosity of an oil is taken from those at 40 and 100 by kind.
+
+ASTM D341 holds while the oil is one liquid, above its cloud point: ISO 12925-1 lets mineral gear oils of VG 220 to 460
+pour from -9 degC on, synthetic ones (CKE, CKS, CKT) from below -30. 150 degC is the highest temperature at which
+SAE J300 has viscosities measured.
+"""
+_SYNTHETIC = (-40.0, 150.0)
+LEAST_VISCOSITY = 2e-6
+"""Down to which ``lg lg (nu + 0.7)`` is straight [m^2/s]; ASTM D341 corrects it below."""
 _COOL = 289.0  # K, of the density that ISO/TS 6336-22 begins with
 _Grid = Values(min_length=1, max_length=100)
 
@@ -58,8 +70,15 @@ class LubricantSection(Section):
     permissible_film: Annotated[float, Number(0.0, 10.0, open_low=True)] | None = None
 
     @model_validator(mode="after")
-    def _thinner_when_hot(self):
+    def _one_viscosity(self):
         cold, hot = self.viscosity_40, self.viscosity_100
+        if self.viscosity is not None and (others := self.given("viscosity_40", "viscosity_100")):
+            raise CaseError(
+                f"viscosity beside {', '.join(others)}: two viscosities in operation",
+                code="E-DUPLICATE",
+                value=f"{1e6 * self.viscosity:g} mm^2/s",
+                remedy="keep viscosity_40 and viscosity_100, or the viscosity in operation alone",
+            )
         if cold is not None and hot is not None and not cold > hot:
             raise CaseError(
                 "the oil is not thinner at 100 degC than at 40 degC",
@@ -95,9 +114,15 @@ class FrictionTableSection(Section):
         if len(self.coefficients) != rows or any(len(row) != columns for row in self.coefficients):
             message = "the coefficients of friction do not fit their loads and speeds"
             raise CaseError(message, code="E-COUNT", limit=f"{rows} rows of {columns} numbers")
-        if any(list(grid) != sorted({*grid}) for grid in (self.line_loads, self.speeds)):
-            message = "loads and speeds of a table of friction ascend"
-            raise CaseError(message, code="E-RANGE", remedy="sort rows and columns, and keep one of each")
+        for name, grid, dimension in (("line_loads", self.line_loads, LINE_LOAD), ("speeds", self.speeds, VELOCITY)):
+            if list(grid) != sorted({*grid}):
+                raise CaseError(
+                    f"{name} of a table of friction ascend",
+                    code="E-RANGE",
+                    value=", ".join(map(dimension.show, grid)),
+                    limit="each larger than the one before",
+                    remedy="sort rows and columns, and keep one of each",
+                )
         return self
 
 
@@ -180,6 +205,25 @@ def _heat_lacks(case: Any) -> tuple[str, str] | None:
     if oil.viscosity is None and (oil.viscosity_40 is None or oil.viscosity_100 is None):
         return "lubricant.viscosity_40", 'give lubricant.viscosity_40 = "100 mm^2/s" and viscosity_100'
     return None
+
+
+def oil_doubts(case: Any) -> Iterator[Finding]:
+    """List an oil whose viscosity is extrapolated too far from those at 40 and 100 degrees (W-OIL)."""
+    oil: LubricantSection | None = case.lubricant
+    if oil is None or oil.temperature is None or oil.viscosity_40 is None or oil.viscosity_100 is None:
+        return
+    celsius, (low, high) = oil.temperature - CELSIUS, OIL_RANGE.get(oil.kind, _SYNTHETIC)
+    viscosity = oil_viscosity(oil.viscosity_40, oil.viscosity_100, celsius)
+    if low <= celsius <= high and viscosity >= LEAST_VISCOSITY:
+        return
+    yield Finding(
+        "W-OIL",
+        "lubricant.temperature",
+        f"{1e6 * viscosity:.3g} mm^2/s at {celsius:g} degC is extrapolated from 40 and 100 degC beyond where ASTM D341 "
+        "holds",
+        remedy="give lubricant.viscosity, that at the temperature of operation, alone",
+        limit=f"{low:g} to {high:g} degC of {oil.kind} oil, and {1e6 * LEAST_VISCOSITY:g} mm^2/s or more",
+    )
 
 
 def check_film(case: Any) -> None:

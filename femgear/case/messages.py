@@ -18,6 +18,7 @@ from pydantic import BaseModel, ValidationError
 
 from femgear.case import text as case_text
 from femgear.case.load_spectrum import spectrum_notices, without_line
+from femgear.case.lubrication import oil_doubts
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, wrong_length
 from femgear.case.sections import RackSection
@@ -316,14 +317,16 @@ def idle_materials_and_oil(case: Any) -> Iterator[Finding]:
                 text = "has no effect: limits follow from it where the material has a treatment"
                 remedy = f'give {key}.treatment = "case hardened steel" or the like'
                 yield Finding("W-UNUSED", f"{key}.{name}", text, remedy=remedy)
-    yield from idle_oil(case)
+    yield from oil_notices(case)
 
 
-def idle_oil(case: Any) -> Iterator[Finding]:
-    """Tell an oil of a case without losses, which nothing asks for (W-UNUSED)."""
+def oil_notices(case: Any) -> Iterator[Finding]:
+    """Tell an oil of a case without losses, which nothing asks for (W-UNUSED), and one extrapolated (W-OIL)."""
     if case.lubricant is not None and case.losses is None:
         remedy = 'give [losses] with friction = "schlenk" or the like'
         yield Finding("W-UNUSED", "lubricant", "has no effect: losses are not asked for", remedy=remedy)
+    else:
+        yield from oil_doubts(case)
 
 
 def notices(data: dict, case: Case) -> Iterator[Finding]:

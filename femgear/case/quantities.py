@@ -486,13 +486,13 @@ def Count(low: int, high: int, *, note: str = "", signed: bool = False, remedy: 
     return _Reader(convert, schema)
 
 
-def printable_line(value: object, *, name: str = "title", most: int = 200) -> str:
-    """Check that a text is printable and has at most so many characters."""
+def printable_line(value: object, *, name: str = "title", least: int = 0, most: int = 200) -> str:
+    """Check that a text is printable and has so many characters."""
     if not isinstance(value, str):
         message = f"a text is needed, not {described(value)}"
         raise CaseError(message, code="E-TYPE", value=value, remedy="write it in quotation marks")
-    if len(value) > most or not value.isprintable():
-        limit = f"{most} printable characters"
+    if len(value) > most or not value.isprintable() or len(value.strip()) < least:
+        limit = f"{f'{least} to ' * bool(least)}{most} printable characters"
         raise CaseError(f"the {name} must be one printable line", code="E-RANGE", value=value, limit=limit)
     return value
 

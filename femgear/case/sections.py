@@ -7,6 +7,7 @@ alone is in `femgear.case.checks`.
 from __future__ import annotations
 
 import math
+from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
@@ -36,6 +37,7 @@ from femgear.case.quantities import (
     Title,
     Values,
     at_most,
+    printable_line,
 )
 from femgear.case.text import described
 from femgear.case.tooth_measures import ToothMeasures
@@ -500,7 +502,7 @@ class SpectrumLoadSection(Section):
     A negative torque loads the other flanks. Parts are shares of the running time, or hours, in all load cases.
     """
 
-    name: Annotated[str, Field(min_length=1, max_length=60)] | None = None
+    name: Annotated[str, BeforeValidator(partial(printable_line, name="name", least=1, most=60))] | None = None
     torque: Annotated[float, Quantity(TORQUE, -LARGEST_TORQUE, LARGEST_TORQUE)]
     speed: Speed
     share: Share = 1.0

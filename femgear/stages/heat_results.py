@@ -291,7 +291,7 @@ def heat_rows(results: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         at = np.unravel_index(int(pick(values)), values.shape)
         text = form.format(values[at])
         below = name.endswith("_safety") and values[at] < 1.0
-        marked = marks(text, "W-HEAT", of=("heat",)) if below else text
+        marked = marks(text, *(("W-HEAT",) if below else ()), "W-OIL", of=("heat",))
         dim = data[name].dims[0]
         several = f", {point_label(data, dim, int(at[0]))}" if len(values) > 1 else ""
         yield words, f"{marked}, {kinds[at[1]]}{several}"

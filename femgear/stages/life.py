@@ -25,7 +25,7 @@ from femgear.case.load_spectrum import (
     without_line,
 )
 from femgear.contact.cycle import MeshCycle
-from femgear.errors import FemgearError
+from femgear.errors import LESS_TORQUE, FemgearError
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import BRANCH
 from femgear.report.tables import Block
@@ -220,9 +220,11 @@ def _state(
     try:
         return contact(loaded, cache=cache, steps=steps)
     except FemgearError as error:
+        entry = f"operation.load_case[{number}].torque"
         if error.key == "operation.torque":
-            error.key = f"operation.load_case[{number}].torque"
+            error.key = entry
             error.file = loaded.location(error.key)
+        error.remedies = tuple(f"reduce {entry}" if text == LESS_TORQUE else text for text in error.remedies)
         error.message = f"{name} with {loaded.operation.torque:.6g} N m: {error.message}"
         raise
 

@@ -57,7 +57,7 @@ def draw_damage(data: xr.Dataset) -> Figure | None:
     if len(shares) > len(coloured):
         ax.barh(rows, 100.0 - left, left=left, height=0.7, color=GREY, label=OTHERS)
     for row, life in zip(rows, lives, strict=True):
-        ax.text(101.0, row, f"{hours_text(life)} h", va="center", fontsize=SMALL)
+        ax.text(101.0, row, f"{hours_text(life)} h" if life else "at once", va="center", fontsize=SMALL)
     ax.set_yticks(rows, names)
     ax.set_xlim(0.0, 118.0)
     ax.set_xticks(np.arange(0, 101, 20))

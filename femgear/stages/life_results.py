@@ -18,11 +18,19 @@ _MOST = 40  # rows of load cases in a table
 
 
 def life_findings(data: Any) -> Iterator[Finding]:
-    """List roots and flanks whose life ends before the one that the case asks for (W-LIFE)."""
+    """List teeth that fail at once (W-STRENGTH), and whose life ends before the one that the case asks for (W-LIFE)."""
     for kind in SYMBOLS:
         if f"{kind}_damage" not in data:
             continue
         damage, names = data[f"{kind}_damage"].values, data[kind].values
+        lives = data[f"{kind}_life"].values
+        if broken := [number for number in range(len(names)) if lives[number] == 0.0]:
+            others = f"; so do: {', '.join(str(names[number]) for number in broken[1:5])}" if len(broken) > 1 else ""
+            text = f"the {kind} of {names[broken[0]]} {_most_damage(data, kind, broken[0])}{others}"
+            remedy = "less torque in that load case, a wider face, a larger module, or another treatment"
+            yield Finding("W-STRENGTH", "operation.load_case", text, remedy=remedy)
+        # beyond the static strength no life is what fails
+        damage = np.where(lives == 0.0, np.nan, damage)
         failing = [str(names[number]) for number in np.argsort(-damage) if damage[number] > 1.0]
         if failing:
             most, load_case = float(np.nanmax(damage)), _most_damage(data, kind, int(np.nanargmax(damage)))
@@ -54,7 +62,10 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
         yield "shortest life of the teeth, ISO 6336-6", _NO_DAMAGE
     else:
         hours = f"{hours_text(lives[at])} h"
-        hours = marks(hours, "W-LIFE", of=of) if data[f"{shortest}_damage"].values[at] > 1.0 else hours
+        if lives[at] == 0.0:
+            hours = marks(hours, "W-STRENGTH", of=of)
+        elif data[f"{shortest}_damage"].values[at] > 1.0:
+            hours = marks(hours, "W-LIFE", of=of)
         what = f"{shortest} of {data[shortest].values[at]}"
         yield "shortest life of the teeth, ISO 6336-6", f"{hours}, {what}: {_most_damage(data, shortest, at)}"
     for kind in kinds:
@@ -62,12 +73,20 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
         if np.isnan(safety).all():
             continue
         at = int(np.nanargmin(safety))
-        cause = f", {_most_damage(data, kind, at)}" if math.isfinite(data[f"{kind}_life"].values[at]) else ""
-        damage = float(data[f"{kind}_damage"].values[at])
+        life, damage = float(data[f"{kind}_life"].values[at]), float(data[f"{kind}_damage"].values[at])
         text = f"{safety[at]:.2f}"
-        text = marks(text, "W-LIFE", of=of) if damage > 1.0 else text
-        name = f"smallest {SYMBOLS[kind]} over the life asked for"
-        yield name, f"{text}, {kind} of {data[kind].values[at]}: damage {_number(damage)}{cause}"
+        text = marks(text, "W-STRENGTH" if life == 0.0 else "W-LIFE", of=of) if damage > 1.0 else text
+        cause = _most_damage(data, kind, at)
+        if life > 0.0:
+            cause = f"damage {_number(damage)}{f', {cause}' if math.isfinite(life) else ''}"
+        yield f"smallest {SYMBOLS[kind]} over the life asked for", f"{text}, {kind} of {data[kind].values[at]}: {cause}"
+
+
+def _share_text(share: float, life: float) -> str:
+    """Write the share of a load case in a damage; of what fails at once, whether it does in this load case."""
+    if life > 0.0:
+        return f"{share:.2%}"
+    return "fails at once" if share > 0.0 else "-"
 
 
 def _first_to_fail(data: Any, kind: str) -> int:
@@ -77,9 +96,13 @@ def _first_to_fail(data: Any, kind: str) -> int:
 
 
 def _most_damage(data: Any, kind: str, number: int) -> str:
-    """Say which load case makes most of the damage of a root or flank."""
+    """Say which load case makes most of the damage of a root or flank, or in which ones it fails at once."""
     share = data[f"{kind}_damage_share"].values[:, number]
     at = int(share.argmax())
+    if data[f"{kind}_life"].values[number] == 0.0:
+        beyond = [str(name) for name, part in zip(data["load_case"].values, share, strict=True) if part > 0.0]
+        more = f" and {len(beyond) - 3} more" if len(beyond) > 3 else ""
+        return f"fails at once in {', '.join(beyond[:3])}{more}: beyond the static strength"
     return f"{share[at]:.0%} of the damage in {data['load_case'].values[at]}"
 
 
@@ -135,7 +158,7 @@ def describe_damage(data: Any) -> Iterator[Block]:
             f"{data[f'{kind}_stress_ratio'].values[i].max():.3f}"
         )
         columns[f"damage of the {kind} of {data[kind].values[at]}"] = lambda i, kind=kind, at=at: (
-            f"{data[f'{kind}_damage_share'].values[i, at]:.2%}"
+            _share_text(float(data[f"{kind}_damage_share"].values[i, at]), float(data[f"{kind}_life"].values[at]))
         )
     left = (f"the first {_MOST} of {count}",) if count > _MOST else ()
     yield tabulate("Damage by load case", range(min(count, _MOST)), columns, left)

@@ -313,7 +313,7 @@ def efficiency_rows(results: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         return
     at = int(np.nanargmin(values))
     loss = float(data["loss"].values[at])
-    text = marks(f"{100.0 * values[at]:.3f} %", "W-LOSSES", of=("losses",))
+    text = marks(f"{100.0 * values[at]:.3f} %", "W-LOSSES", "W-OIL", of=("losses",))
     where = f" at {_label(data, at)}" if point_dim(data) == "speed" else f", {_label(data, at)}"
     least = "smallest " if len(values) > 1 else ""
     yield f"{least}efficiency", f"{text}{where}: {loss:.4g} W of losses"

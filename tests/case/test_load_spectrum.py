@@ -57,6 +57,8 @@ def test_shares_count_by_their_sum_and_hours_ask_for_all_of_them():
         ([{"hours": 0}], "[0].hours"),
         ([{"speed": "0 rpm"}], "[0].speed"),
         ([{"torque": "1e-9 N m"}], "[0].torque"),
+        ([{"name": ""}], "[0].name"),
+        ([{"name": "a" * 61}], "[0].name"),
         ([{"share": 0.5, "name": "a"}, {"share": 0.5, "name": "a"}], "[1].name"),
         ([{"share": 0.5}, {"share": 0.5, "torqe": "1 N m"}], "[1].torqe"),
     ],
@@ -93,3 +95,10 @@ def test_gears_without_a_treatment_are_told():
     (told,) = spectrum_notices(read_case(plain))
     assert "gear_2.material.treatment" in told.remedy and without_line(read_case(plain)) == ["gear_2"]
     assert not no_load_cases(read_case(plain)) and not list(spectrum_notices(read_case(tables(FIRST))))
+
+
+def test_load_cases_of_which_none_has_a_torque_are_told():
+    idle = FIRST | {"torque": "0 N m", "share": 0.5}
+    (finding,) = spectrum_notices(read_case(tables(idle, idle | {"name": "b"})))
+    assert (finding.code, finding.key) == ("W-UNUSED", "operation.load_case") and "torque" in finding.text
+    assert not list(spectrum_notices(read_case(tables(idle, FIRST | {"share": 0.5, "name": "b"}))))

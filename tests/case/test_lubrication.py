@@ -2,7 +2,7 @@
 
 import pytest
 
-from femgear.case.lubrication import check_losses, oil_at
+from femgear.case.lubrication import check_losses, oil_at, oil_doubts
 from femgear.errors import CaseError
 from femgear.trains.reading import read_case, with_values
 
@@ -46,6 +46,7 @@ def test_what_is_missing_for_the_friction_is_named(losses, oil, key):
         ({"lubricant": OIL | {"temperature": "700 degC"}}, "E-RANGE"),
         ({"lubricant": OIL | {"temperature": "70"}}, "E-UNIT"),
         ({"lubricant": OIL | {"viscosity_40": "100 mPa s"}}, "E-UNIT"),
+        ({"lubricant": OIL | {"viscosity": "15 mm^2/s"}}, "E-DUPLICATE"),
         ({"losses": {"friction": "constant", "coefficient": 0.0}}, "E-RANGE"),
         ({"losses": {"friction": "wimmer"}}, "E-CHOICE"),
         (
@@ -62,3 +63,33 @@ def test_values_that_cannot_be_are_refused(changes, code):
     with pytest.raises(CaseError) as refused:
         with_values(read_case(PAIR), changes)
     assert refused.value.code == code
+
+
+def test_loads_of_a_table_that_descend_are_refused_with_what_they_are():
+    table = {"line_loads": ["10 N/mm", "1 N/mm"], "speeds": ["1 m/s"], "coefficients": [[0.05], [0.04]]}
+    with pytest.raises(CaseError) as refused:
+        with_values(read_case(PAIR), {"losses": {"friction": "table", "table": table}})
+    assert refused.value.message.startswith("line_loads") and refused.value.value == "10 N/mm, 1 N/mm"
+
+
+@pytest.mark.parametrize(
+    "kind, temperature, doubtful",
+    [
+        ("mineral", "-50 degC", True),
+        ("mineral", "-9 degC", False),
+        ("mineral", "150 degC", False),
+        ("mineral", "250 degC", True),
+        ("PAO", "-30 degC", False),
+        ("PAO", "-50 degC", True),
+    ],
+)
+def test_an_oil_beyond_the_range_of_the_law_is_a_doubt(kind, temperature, doubtful):
+    findings = list(oil_doubts(pair(oil=OIL | {"kind": kind, "temperature": temperature})))
+    assert [finding.code for finding in findings] == ["W-OIL"] * doubtful
+
+
+def test_a_thin_oil_is_a_doubt_and_a_given_viscosity_none():
+    thin = OIL | {"viscosity_40": "5 mm^2/s", "viscosity_100": "1.7 mm^2/s", "temperature": "120 degC"}
+    (finding,) = oil_doubts(pair(oil=thin))
+    assert "1.38 mm^2/s" in finding.text or "1.3" in finding.text
+    assert not list(oil_doubts(pair(oil={"viscosity": "1 mm^2/s", "temperature": "250 degC"})))

@@ -44,6 +44,22 @@ def test_the_verdict_names_what_fails_first_and_by_which_load_case(data):
     assert root.startswith("0.90†, root of gear 2: damage 2.5") and flank.startswith("1.60, flank of gear 1: damage 0")
 
 
+def test_what_fails_at_once_is_told_by_its_code_and_has_no_share_of_a_damage(data):
+    data["root_life"].values[1], data["root_damage"].values[1] = 0.0, math.inf
+    data["root_damage_share"].values[:, 1] = 0.5, 0.5
+    (finding,) = life_findings(data)
+    assert (finding.code, finding.severity) == ("W-STRENGTH", "fault")
+    assert "gear 2 fails at once in start, run" in finding.text
+    (_, life), (_, root), _ = life_rows(data, Marks([finding]))
+    assert life.startswith("0 h†, root of gear 2: fails at once in start, run") and "%" not in life
+    assert root.startswith("0.90†, root of gear 2: fails at once")
+    (damage,) = describe_damage(data)
+    assert [row[3] for row in damage.rows] == ["fails at once", "fails at once"]
+    # without a life asked for there is no damage, but what breaks is told all the same
+    data["root_damage"] = ("root", [math.nan, math.nan])
+    assert [finding.code for finding in life_findings(data)] == ["W-STRENGTH"]
+
+
 def test_without_damage_or_a_life_asked_for_the_verdict_says_less(data):
     data = data[[name for name in data if str(name).startswith(("share", "flank"))]]
     data["flank_spectrum_safety"] = ("flank", [math.nan])

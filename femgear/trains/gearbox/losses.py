@@ -15,7 +15,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, loss_entries
 from femgear.case.lubrication import heat_missing, losses_wanted, oil_at
-from femgear.case.messages import idle_oil
+from femgear.case.messages import oil_notices
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.power_losses import FrictionTorque, lossy_flow
@@ -205,7 +205,7 @@ def _left_out(case: GearboxCase, point: LossPoint) -> Iterator[str]:
 
 def idle_loss_entries(case: GearboxCase) -> Iterator[Finding]:
     """Tell oil without losses, and tables of both in the teeth of stages, which have no effect there (W-UNUSED)."""
-    yield from idle_oil(case)
+    yield from oil_notices(case)
     for kind in ("pair", "planetary"):
         for number, stage in enumerate(getattr(case, kind)):
             for name in ("losses", "lubricant"):

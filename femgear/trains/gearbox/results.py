@@ -551,6 +551,9 @@ def describe_gearbox_modes(data: xr.Dataset) -> Block:
 def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     """List what of a gearbox case deserves a look: how it was read, entries without effect, bodies that overlap."""
     yield from case.notices
+    if not any(any(load_case.torque.values()) for load_case in case.operation.load_case):
+        text, remedy = "no load case has a torque: no teeth carry any", 'give one, as in torque = {motor = "35 N m"}'
+        yield Finding("W-LOAD", "operation.load_case", text, remedy=remedy)
     if not case.deflection.contact and any(stage.teeth is not None for stage in (*case.pair, *case.planetary)):
         text = "without contact meshes have the stiffness of ISO 6336-1, and no K_Hbeta"
         yield Finding("W-STIFFNESS", "deflection.contact", text, remedy="leave it out")

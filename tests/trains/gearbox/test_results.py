@@ -104,6 +104,13 @@ def test_estimated_bearings_show_the_range_that_they_make():
     assert describe_deflection(data)[0].rows[0][2].endswith(")")
 
 
+def test_load_cases_of_which_none_has_a_torque_are_told():
+    tables = pair_tables(teeth=True)
+    for load_case in tables["operation"]["load_case"]:
+        load_case["torque"] = {}
+    assert codes(gearbox_warnings(read_case(tables))) == ["W-LOAD"]
+
+
 def test_motions_that_are_not_small_are_told():
     tables = pair_tables()
     tables["operation"]["load_case"][0]["torque"]["motor"] = "1e8 N m"
