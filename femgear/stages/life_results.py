@@ -157,8 +157,8 @@ def describe_damage(data: Any) -> Iterator[Block]:
         columns[f"largest stress over long life, {kind}s"] = lambda i, kind=kind: (
             f"{data[f'{kind}_stress_ratio'].values[i].max():.3f}"
         )
-        columns[f"damage of the {kind} of {data[kind].values[at]}"] = lambda i, kind=kind, at=at: (
-            _share_text(float(data[f"{kind}_damage_share"].values[i, at]), float(data[f"{kind}_life"].values[at]))
+        columns[f"damage of the {kind} of {data[kind].values[at]}"] = lambda i, kind=kind, at=at: _share_text(
+            float(data[f"{kind}_damage_share"].values[i, at]), float(data[f"{kind}_life"].values[at])
         )
     left = (f"the first {_MOST} of {count}",) if count > _MOST else ()
     yield tabulate("Damage by load case", range(min(count, _MOST)), columns, left)

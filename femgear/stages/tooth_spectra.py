@@ -34,7 +34,11 @@ _WORDS = {
     "damage": ("", "1", "damage of the {} over the life that the case asks for; NaN without"),
     "spectrum_safety": ("", "1", "factor on all stresses of the {} with which that damage is 1; NaN without a life"),
     "equivalent_torque": ("", "N m", "constant torque on the sun or gear 1 with the same damage of the {}"),
-    "damage_share": ("load_case ", "1", "share of the load case in the damage of the {}, equal of those it fails in at once"),
+    "damage_share": (
+        "load_case ",
+        "1",
+        "share of the load case in the damage of the {}, equal of those it fails in at once",
+    ),
     "stress_ratio": ("load_case ", "1", "stress of the {} over its strength for long life; 0 where it has no load"),
     "load_cycles": ("load_case ", "1/h", "load cycles of the {} in an hour of all load cases"),
 }
