@@ -50,21 +50,33 @@ def strength_verdict(results: Results) -> Iterator[Block]:
     marks, stages = Marks(results.findings), results.stages
     reasons = list(reason_row(results.stress)) if "stress" in stages else []
     rows = [*reasons, *_lives(results, marks), *efficiency_rows(results, marks), *heat_rows(results, marks)]
-    if not rating_wanted(results.case):
+    rated = rate_results(results)
+    if rated is None:
         if rows:
             yield Block("Verdict", rows=tuple(rows), notes=marks.notes)
         return
+    rating, kinds = rated
+    doubts = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
+    rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *rows]
+    yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
+    yield strength_block(rating, kinds)
+
+
+def rate_results(results: Results) -> tuple[Rating, list[str]] | None:
+    """Rate the teeth of a run with the load factors that it has; None where the case asks for no safeties.
+
+    Beside the rating stand the names of its kinds of mesh.
+    """
+    if not rating_wanted(results.case):
+        return None
+    stages = results.stages
     kinds, dynamic = kind_names(planetary_set(results.case).mesh_names), None
     sharing, face = computed_load_factors(results.static, kinds) if "static" in stages else (None, None)
     if "dynamics" in stages:
         dynamic = computed_dynamic_factor(results.dynamics, len(kinds))
     elif "response" in stages:
         dynamic = factor_of_two_frequencies(results.response, len(kinds))
-    rating = rate_case(results.case, sharing=sharing, dynamic=dynamic, face=face)
-    doubts = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
-    rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *rows]
-    yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
-    yield strength_block(rating, kinds)
+    return rate_case(results.case, sharing=sharing, dynamic=dynamic, face=face), kinds
 
 
 def computed_load_factors(static: xr.Dataset, kinds: Sequence[str]) -> tuple[np.ndarray | None, np.ndarray | None]:
