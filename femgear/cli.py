@@ -795,8 +795,8 @@ def compute_sweep(
         Folder of sweep.csv, sweep.png and the journal sweep.jsonl.
     of
         Quantities as in docs/optimise.md: ste, ste overall, mesh force, housing, ...; of gearboxes K_Hbeta, STE,
-        bearing life, level, ... of the whole or of one part. May be repeated. Default: transmission errors; of
-        gearboxes all that stand for the whole.
+        bearing life, level, ... of the whole or of one part; of pairs STE, root life, losses, .... May be repeated.
+        Default: transmission errors; of gearboxes and pairs all that stand for the whole.
     speeds
         First and last speed of the input, for mesh forces and the housing; of gearboxes those of the run-up.
     """
@@ -828,7 +828,7 @@ class DrawnSamples:
     Parameters
     ----------
     number
-        Number of samples. Default: 1000; 100 of gearboxes, each of which is solved as a run solves it.
+        Number of samples. Default: 1000; 100 of gearboxes and pairs, each of which is solved as a run solves it.
     seed
         Sample i of a seed is the same whatever the number of samples.
     index
@@ -935,7 +935,7 @@ def _samples_of_entries(
     from femgear.study.entry_samples import ENTRY_SAMPLES, EntryRequest, entry_samples_into
     from femgear.study.runner import open_runner
 
-    _refuse_options(others, "planetary sets", "leave it out: samples of gearboxes are solved as femgear run does")
+    _refuse_options(others, "planetary sets", "leave it out: samples of others are solved as femgear run does")
     with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
         count = ENTRY_SAMPLES if drawn.number is None else drawn.number
         request = EntryRequest(drawn.of, drawn.speeds, count, drawn.seed, drawn.index)

@@ -63,7 +63,8 @@ def _key_figures(train: Train, first: Results, second: Results) -> Iterator[Bloc
         unit = f" [{figure.dimension.shown}]".replace(" [1]", "")
         rows.append((f"{name}{unit}", figure.show(x), figure.show(y), "" if alike else figure.change(x, y)))
     notes = (f"{same} figures of parts change by less than {_LEAST_CHANGE:.1%}",) if same else ()
-    yield Block("Key figures", ("figure", "first", "second", "change"), tuple(rows), notes)
+    if rows or same:
+        yield Block("Key figures", ("figure", "first", "second", "change"), tuple(rows), notes)
 
 
 def _findings(first: Results, second: Results) -> Block:

@@ -19,6 +19,9 @@ from femgear.findings import NOTE, Finding
 NUMBER = Dimension("a number", "1", "1", 1.0)
 DECIBEL = Dimension("a level", "dB", "dB", 1.0)
 """Of accelerations, re 1e-6 m/s^2 (ISO 1683)."""
+MICROMETRES = Dimension("a length", "m", "um", 1e-6)
+HOURS = Dimension("a life", "h", "h", 1.0)
+STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
 REFERENCE_ACCELERATION = 1e-6
 """Of levels in dB [m/s^2]."""
 Pick = Literal["largest", "smallest", "size"]

@@ -10,9 +10,25 @@ import numpy as np
 
 from femgear.findings import Finding
 from femgear.report.tables import Block, Marks, tabulate
+from femgear.stages.key_figures import HOURS, NUMBER, KeyFigure, Stored
 
 SYMBOLS = {"root": "S_F", "flank": "S_H"}
 """Safeties by what they are of."""
+_OF_LIFE = "W-LIFE", "W-STRENGTH"
+LIFE_FIGURES = tuple(
+    KeyFigure(f"{kind} life", HOURS, "life", Stored(f"{kind}_life", pick="smallest"), _OF_LIFE, whole=True)
+    for kind in SYMBOLS
+)
+SPECTRUM_FIGURES = tuple(
+    KeyFigure(
+        f"{symbol} over life", NUMBER, "life", Stored(f"{kind}_spectrum_safety", pick="smallest"), _OF_LIFE, whole=True
+    )
+    for kind, symbol in SYMBOLS.items()
+)
+"""Of cases that ask for a life."""
+PLANET_BEARING_FIGURE = KeyFigure(
+    "planet bearing life", HOURS, "life", Stored("planet_bearing_life", pick="smallest"), ("W-LIFE",), whole=True
+)
 _NO_DAMAGE = "none fails: all stresses lie below those of 1e10 load cycles"
 _MOST = 40  # rows of load cases in a table
 

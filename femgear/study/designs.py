@@ -31,6 +31,7 @@ from femgear.case.dependencies import Steps
 from femgear.case.planetary import Case
 from femgear.errors import ContactError, FemgearError, StorageError
 from femgear.findings import NOTE, Finding, once, tell
+from femgear.stages.key_figures import HOURS
 from femgear.stages.protocol import Progress
 from femgear.storage.files import exclusive_lock, storage_errors
 from femgear.study.objectives import STAGES, StudyQuantity, has_figures
@@ -226,7 +227,7 @@ def _is_design(count: int, key: str, record: dict) -> bool:
     texts += tuple(code for codes in record.get("doubts", {}).values() for code in codes)
     return (
         len(point) in (0, count)
-        and all(type(value) is float and math.isfinite(value) for value in values)
+        and all(value is None or (type(value) is float and math.isfinite(value)) for value in values)
         and all(isinstance(text, str) for text in texts)
     )
 
@@ -376,10 +377,13 @@ class Designs:
                 raise
             record["error"] = _told(error)
         record |= {"doubts": doubts} if self.telling else {}
+        # a life without end is null: JSON has no infinity
+        record["values"] = {name: None if math.isinf(value) else value for name, value in numbers.items()}
         return record | {"seconds": round(time.perf_counter() - start, 3)}
 
     def _known(self, key: str) -> dict[str, float]:
-        return self.journal.get(key, {}).get("values", {})
+        values = self.journal.get(key, {}).get("values", {})
+        return {name: math.inf if value is None else value for name, value in values.items()}
 
     def _lacks(self, key: str, ask: Callable[[_Values], None]) -> bool:
         """Tell whether a point that has not failed lacks what is asked."""
@@ -436,8 +440,8 @@ def _violation(limits: Sequence[Limit], values: _Values) -> float:
 
 
 def _finite(quantity: StudyQuantity, value: float) -> float:
-    """The value, refused where it is no number."""
-    if not math.isfinite(value):
+    """The value, refused where it is no number; a life has no end where nothing does damage."""
+    if math.isnan(value) or (math.isinf(value) and quantity.dimension is not HOURS):
         message = f"{quantity.name} is not finite"
         raise ContactError(message, code="E-FINITE", value=value, limit="finite numbers")
     return value

@@ -105,7 +105,7 @@ class EntrySamples:
     @property
     def whole(self) -> np.ndarray:
         """Numbers of the samples that can be computed."""
-        return np.flatnonzero(np.isfinite(self.values).all(axis=1))
+        return np.flatnonzero(~np.isnan(self.values).any(axis=1))
 
     @property
     def worst(self) -> int:
@@ -115,7 +115,9 @@ class EntrySamples:
     def correlation(self) -> np.ndarray:
         """Compute Spearman's rank correlation of quantities and laws (quantities, laws); 0 where nothing changes."""
         values = self.values[self.whole]
-        alike = np.ptp(values, axis=0) <= _ROUNDING * np.abs(values).max(axis=0)
+        same = (values == values[:1]).all(axis=0)  # endless lives among them
+        with np.errstate(invalid="ignore"):
+            alike = same | (np.ptp(values, axis=0) <= _ROUNDING * np.abs(values).max(axis=0))
         ranks = [_ranks(part) for part in (np.where(alike, 0.0, values), self.drawn[self.whole])]
         centred = [rank - rank.mean(axis=0) for rank in ranks]
         sizes = [np.sqrt((part**2).sum(axis=0)) for part in centred]
@@ -183,7 +185,7 @@ def sample_entries(
             doubts = {} if errors[-1] else designs.doubts(point, quantities)
             codes.append(" ".join(dict.fromkeys(code for part in doubts.values() for code in part)))
         computed = designs.computed
-    if not np.isfinite(values).all(axis=1).any():
+    if np.isnan(values).any(axis=1).all():
         raise CaseError("no sample can be computed", code="E-INFEASIBLE", value=errors[0], remedy="smaller tolerances")
     shares = entry_shares(entries, seed, 0, count)
     before = np.array([nominal[quantity.name] for quantity in quantities])
@@ -250,8 +252,10 @@ def _records(drawn: EntrySamples) -> Iterator[tuple[object, ...]]:
 def _statistics(drawn: EntrySamples) -> Iterator[tuple[str, str, list[float]]]:
     """Rows of name, unit, value of the case, mean, standard deviation and percentiles [SI]."""
     values = drawn.values[drawn.whole]
-    spread = values.std(axis=0, ddof=1) if len(values) > 1 else np.zeros(len(drawn.quantities))
-    at = np.percentile(values, PERCENTILES, axis=0)
+    with np.errstate(invalid="ignore"):  # of lives without end
+        spread = values.std(axis=0, ddof=1) if len(values) > 1 else np.zeros(len(drawn.quantities))
+        between = np.percentile(values, PERCENTILES, axis=0)
+    at = np.where(np.isnan(between), np.percentile(values, PERCENTILES, axis=0, method="inverted_cdf"), between)
     for number, quantity in enumerate(drawn.quantities):
         numbers = drawn.nominal[number], values[:, number].mean(), spread[number], *at[:, number]
         yield quantity.name, quantity.dimension.si, [float(number) for number in numbers]
@@ -292,7 +296,8 @@ def _draw(drawn: EntrySamples, path: Path) -> None:
     for number, (quantity, ax) in enumerate(zip(shown, axes, strict=False)):
         scale = quantity.dimension.scale
         ax.plot(np.sort(values[:, number]) / scale, 100.0 * share, color=BLUE, linewidth=1.8, label="samples")
-        ax.axvline(drawn.nominal[number] / scale, color=VERMILION, linewidth=1.4, linestyle="--", label="case")
+        if np.isfinite(drawn.nominal[number]):
+            ax.axvline(drawn.nominal[number] / scale, color=VERMILION, linewidth=1.4, linestyle="--", label="case")
         title = f"{quantity.name} [{quantity.dimension.shown}]".replace("[um]", "[µm]")
         label(ax, fill(title, 36), "samples below [%]" if number % columns == 0 else "")
     for ax in axes[len(shown) :]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -24,10 +24,10 @@ from femgear.errors import CaseError
 from femgear.findings import NOTE, Finding
 from femgear.gears.gear import tooth_thickness
 from femgear.moved import former_names
-from femgear.stages.heat_results import HEAT_KEY_FIGURES
-from femgear.stages.key_figures import NUMBER, KeyFigure, figure_of
-from femgear.stages.losses_results import LOSS_FIGURES
+from femgear.remembered import remembered
+from femgear.stages.key_figures import MICROMETRES, NUMBER, STRESS, KeyFigure, figure_of
 from femgear.stages.static_results import LARGE
+from femgear.stages.tooth_figures import TOOTH_FIGURES, missing_entry
 from femgear.system.fourier import sample
 from femgear.trains.elastic import stages as elastic_stages
 from femgear.trains.elastic.checks import case_warnings, response_findings
@@ -48,10 +48,8 @@ Speeds = tuple[str, str]
 """First and last speed of the input, with their units."""
 _SPEEDS = 51
 """Of a range, by default."""
-_MICROMETRES = Dimension("a length", "m", "um", 1e-6)
 _FORCE = Dimension("a force", "N", "N", 1.0)
-_STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
-STAGES = ("gears", "static", "deflection", "stress", "losses", "heat", "modes", "dynamics", "runup", "housing")
+STAGES = ("gears", "static", "deflection", "stress", "life", "losses", "heat", "modes", "dynamics", "runup", "housing")
 """In the order of their effort."""
 
 
@@ -192,7 +190,7 @@ def transmission_error(mesh: Mesh = "largest", *, torque: str | None = None) -> 
     where = "" if value is None else f" at {TORQUE.show(value)}"
     findings = partial(_of_static, (*LARGE, "W-POSITIONS"), value)
     name = f"STE peak to peak, {mesh}{where}"
-    return StudyQuantity(name, _MICROMETRES, "static", compute, signal, value, findings)
+    return StudyQuantity(name, MICROMETRES, "static", compute, signal, value, findings)
 
 
 def _signal(mesh: Mesh, arc: np.ndarray, deflection: np.ndarray, n: int) -> np.ndarray:
@@ -314,7 +312,7 @@ def _tip_thickness(name: str, answer: Answer) -> float:
 def contact_pressure() -> StudyQuantity:
     """Define the largest contact pressure away from the ends of the flanks [Pa]."""
     findings = partial(_of_static, ("W-PRESSURE", "W-EDGE", "W-KINK"), None)
-    return StudyQuantity("contact pressure", _STRESS, "static", _largest_pressure, findings=findings)
+    return StudyQuantity("contact pressure", STRESS, "static", _largest_pressure, findings=findings)
 
 
 def _largest_pressure(answer: Answer) -> float:
@@ -329,7 +327,7 @@ def root_stress(gear: _GearName) -> StudyQuantity:
     places = {"sun": ((0, 0),), "planet": ((0, 1), (1, 0)), "ring": ((1, 1),)}
     wanted = _chosen(gear, places, "gear")
     compute = partial(_largest_stress, wanted)
-    return StudyQuantity(f"root stress, {gear}", _STRESS, "stress", compute, findings=_of_stresses)
+    return StudyQuantity(f"root stress, {gear}", STRESS, "stress", compute, findings=_of_stresses)
 
 
 def _largest_stress(wanted: tuple[tuple[int, int], ...], answer: Answer) -> float:
@@ -385,7 +383,7 @@ _WORDS: dict[str, Callable[..., StudyQuantity]] = {
     **{f"tip thickness {gear}": partial(tip_thickness, gear) for gear in get_args(_GearName)},
     "contact pressure": contact_pressure,
     **{f"root stress {gear}": partial(root_stress, gear) for gear in get_args(_GearName)},
-    **{figure.name: partial(quantity_of_figure, figure) for figure in (*LOSS_FIGURES, *HEAT_KEY_FIGURES)},
+    **{figure.name: partial(quantity_of_figure, figure) for figure in TOOTH_FIGURES},
 }
 _OVER_SPEEDS = ("mesh force", "peak mesh force", "housing")
 """Quantities that take the first and the last speed."""
@@ -401,15 +399,15 @@ def _of_figure(figure: KeyFigure, answer: Answer) -> Iterable[Finding]:
     return figure.concerned(answer[figure.stage].findings)
 
 
-@lru_cache(maxsize=4)
+@remembered(4)
 def _contents(result: StageResult) -> Any:
     """Contents of the file of a result, which many figures are read from."""
     return result.contents()
 
 
 def has_figures(case: Any) -> bool:
-    """Tell whether the quantities of a case are the key figures of its train."""
-    return bool(train_of(case).key_figures(case))
+    """Tell whether the quantities of a case are the key figures of its train alone; those of sets are more."""
+    return not isinstance(case, Case) and bool(train_of(case).key_figures(case))
 
 
 def need_quantities(case: Any) -> None:
@@ -431,9 +429,9 @@ def with_run_up(case: Any, speeds: Speeds | None) -> Any:
 
 def default_quantities(case: Any) -> tuple[str, ...]:
     """Name the quantities of a sweep that names none: transmission errors, or the figures of the whole."""
-    figures = train_of(case).key_figures(case)
-    if not figures:
+    if not has_figures(case):
         return "ste", "ste sun-planet", "ste planet-ring"
+    figures = train_of(case).key_figures(case)
     stages = {stage.name: stage for stage in train_of(case).stages}
     return tuple(figure.name for figure in figures if figure.whole and not stages[figure.stage].unavailable(case))
 
@@ -442,7 +440,12 @@ def _figure_quantity(words: str, case: Any) -> StudyQuantity:
     """Find the quantity of a key figure of the train of a case, or a natural frequency."""
     figures = train_of(case).key_figures(case)
     if (figure := figure_of(figures, words)) is None:
-        names = [figure.name for figure in figures]
+        names = list(dict.fromkeys((*(figure.name for figure in figures), *(() if has_figures(case) else NAMES))))
+        known = figure_of(TOOTH_FIGURES, words) if hasattr(case, "gear_names") else None
+        if known is not None:
+            entry = missing_entry(case, known)
+            message, remedy = f"{known.name} needs {entry}", f"give {entry}"
+            raise CaseError(message, code="E-STAGE", key="objective", value=words, remedy=remedy)
         what, limit = "take one of these names", ", ".join((*names, "natural frequency N"))
         error = no_such("quantity", "objective", words, names, what, limit=limit)
         error.code = "E-OBJECTIVE"
@@ -465,7 +468,7 @@ def named_quantity(words: str, *, speeds: Speeds | None = None, case: Any = None
     name = " ".join(words.split()).lower()
     if (mode := name.removeprefix("natural frequency ")) != name and mode.isdecimal():
         return natural_frequency(int(mode))
-    if case is not None and has_figures(case):
+    if case is not None and (has_figures(case) or figure_of(TOOTH_FIGURES, words) is not None):
         return _figure_quantity(words, case)
     if name not in _WORDS:
         raise CaseError(

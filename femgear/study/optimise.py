@@ -291,10 +291,14 @@ def _figure_problem(case: Any, request: SearchRequest) -> tuple[Problem, StudyQu
                     code="E-VARIABLE",
                     key="--vary",
                     limit="entries of the case with their bounds",
-                    remedy='--vary "bearing[0].position=5 mm..12 mm"',
+                    remedy='--vary "gear_1.profile_shift=0.0..0.4"'
+                    if hasattr(case, "gear_names")
+                    else '--vary "bearing[0].position=5 mm..12 mm"',
                 )
-        with part():
-            if request.torque is not None:
+        with part("--torque"):
+            if request.torque is not None and hasattr(case.operation, "torque"):
+                case = with_value(case, "operation.torque", request.torque)
+            elif request.torque is not None:
                 message, remedy = "a gearbox has the torques of its load cases", "vary operation.load_case[0].torque"
                 raise CaseError(message, code="E-CHOICE", key="--torque", value=request.torque, remedy=remedy)
     first, *others = quantities

@@ -9,12 +9,14 @@ from femgear.case.dependencies import Steps, compliance_entries, fingerprint, ri
 from femgear.case.quantities import SPEED
 from femgear.errors import CaseError
 from femgear.stages.static import solve_static
+from femgear.study.designs import open_designs
 from femgear.study.objectives import (
     at_speeds,
     contact_pressure,
     forces_over_time,
     housing_level,
     mesh_force,
+    named_quantity,
     natural_frequency,
     response_at,
     root_stress,
@@ -178,3 +180,16 @@ def test_the_optimum_of_the_page_is_one():
     assert ste.compute(after) < ste.compute(before)
     forces = [forces_over_time(response_at(one, RANGE).force, dynamic=True).max(axis=1) for one in (before, after)]
     assert np.all(forces[1] < forces[0]) and forces[1].max() < 0.5 * forces[0].max()
+
+
+def test_a_life_without_end_goes_through_the_journal(tmp_path):
+    """JSON has no infinity: the journal holds null, and the design is known again."""
+    strong = {"material.treatment": "case hardened steel", "material.hardness": 720}
+    loads = [{"torque": "10 N m", "speed": "1500 rpm"}]
+    quick = {"static.positions": 14, "static.flank_elements": 4, "operation.load_case": loads}
+    case = with_values(read_case(CASE.with_name("spur_pair.toml")), strong | quick)
+    quantity = named_quantity("root life", case=case)
+    for computed in (1, 0):
+        with open_designs(case, [("gear_1.profile_shift",)], journal=tmp_path / "journal.jsonl") as designs:
+            assert designs.values((0.3,), [quantity])["root life"] == np.inf and designs.computed == computed
+    assert '"root life": null' in (tmp_path / "journal.jsonl").read_text()

@@ -614,13 +614,15 @@ def verdict(results: Results) -> Iterator[Block]:
         text = _kinds("{:.3f}", factors.max(axis=0), lambda text: marks(text, *codes, of=_OF_LEVEL))
         rows.append(("largest dynamic factor K_v, at operating speeds", text))
         computed = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
+    rated = rating_wanted(results.case)
+    if "static" in stages and "face_load_factor" in (static := results.static):
+        computed["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+        text = _kinds("{:.3f}", computed["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
+        rows.append(("face load factor K_Hβ", text))
     if "stress" in stages:
-        static = results.static
-        if "face_load_factor" in static:
-            computed["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
-            text = _kinds("{:.3f}", computed["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
-            rows.append(("face load factor K_Hβ", text))
-        rows += _strength(results, computed, notes, marks, _all_of(doubts))
+        rows += _stresses(results, marks)
+    if rated or "stress" in stages:
+        rows += _safeties(results.case, computed, notes, marks, _all_of(doubts))
     if "life" in stages:
         rows += (*life_rows(results.life, marks), *planet_bearing_rows(results.life, marks))
     if "runup" in stages:
@@ -630,7 +632,7 @@ def verdict(results: Results) -> Iterator[Block]:
     rows += heat_rows(results, marks)
     if rows:
         yield Block("Verdict", rows=tuple(rows), notes=(*notes, *marks.notes))
-    if "stress" in stages and rating_wanted(results.case):
+    if rated:
         yield strength_block(_rated(results.case, computed), KINDS)
     if "dynamics" in stages:
         yield _operating_points(results, factors, doubts)
@@ -716,13 +718,8 @@ def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
     return np.array(factors), sharing
 
 
-def _strength(
-    results: Results, computed: Mapping[str, Any], notes: list[str], marks: Marks, doubts: tuple[str, ...]
-) -> Iterator[tuple[str, str]]:
-    """Rows of the largest stresses, and of the safeties of ISO 6336 with known load factors (2,).
-
-    ``doubts`` are codes of the findings that concern the dynamic factors.
-    """
+def _stresses(results: Results, marks: Marks) -> Iterator[tuple[str, str]]:
+    """Rows of the largest stresses, and of why they differ from those of ISO 6336."""
     stress = results.stress
 
     def largest(name: str) -> np.ndarray:
@@ -740,14 +737,18 @@ def _strength(
     ]
     yield f"largest contact pressure{where}", ", ".join(pressures)
     yield from reason_row(stress)
-    for name, text in _safeties(results.case, computed, notes):
-        yield name, marks(text, *doubts, "W-FACE-LOAD", "W-THRUST", of=("static", *_OF_LEVEL))
 
 
-def _safeties(case: Case, computed: Mapping[str, np.ndarray], notes: list[str]) -> Iterator[tuple[str, str]]:
-    """Rows of S_F and S_H of ISO 6336 with the load factors (2,) that were computed, by their symbols."""
+def _safeties(
+    case: Case, computed: Mapping[str, np.ndarray], notes: list[str], marks: Marks, doubts: tuple[str, ...]
+) -> Iterator[tuple[str, str]]:
+    """Rows of S_F and S_H of ISO 6336 with the load factors (2,) that were computed, by their symbols.
+
+    ``doubts`` are codes of the findings that concern the dynamic factors.
+    """
     rating = _rated(case, computed)
-    yield from safety_rows(rating, KINDS)
+    for name, text in safety_rows(rating, KINDS):
+        yield name, marks(text, *doubts, "W-FACE-LOAD", "W-THRUST", of=("static", *_OF_LEVEL))
     notes += safety_notes(rating)
 
 

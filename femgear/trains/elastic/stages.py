@@ -83,6 +83,7 @@ from femgear.stages.static import (
     ring_foundation,
 )
 from femgear.stages.static_results import StaticResult, describe_set
+from femgear.stages.tooth_figures import tooth_key_figures
 from femgear.system.mode_kinds import mode_kinds
 from femgear.system.system import Response
 from femgear.trains.elastic.checks import (
@@ -818,6 +819,7 @@ ELASTIC = Train(
     describe=describe_set,
     warnings=_warnings,
     verdict=verdict,
+    key_figures=tooth_key_figures,
     figures=FiguresOf("femgear.trains.elastic.figures:FIGURES"),
     recorded=Recorded(
         sensor_signals, signal_extent, _FORMATS, lambda results: 2, sensor_spectra, ring_shapes, order_cuts

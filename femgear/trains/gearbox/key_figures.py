@@ -7,6 +7,7 @@ the worst of all of them; those of the response are at the speed of the chosen o
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -17,7 +18,8 @@ from femgear.case.lubrication import heat_missing
 from femgear.case.quantities import ACCELERATION, RPM, SPEED, Dimension
 from femgear.gears.planetary import mesh_names
 from femgear.stages.heat_results import HEAT_KEY_FIGURES
-from femgear.stages.key_figures import DECIBEL, NUMBER, KeyFigure, Stored
+from femgear.stages.key_figures import DECIBEL, HOURS, MICROMETRES, NUMBER, STRESS, KeyFigure, Stored
+from femgear.stages.life_results import LIFE_FIGURES, SPECTRUM_FIGURES
 from femgear.stages.losses_results import LOSS_FIGURES
 from femgear.trains.gearbox.case_file import FORCE, BoxPlanetarySection, GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.casing import bearing_name
@@ -29,9 +31,6 @@ from femgear.trains.gearbox.sensors import gearbox_sensors
 from femgear.trains.gearbox.silence import exciting_sections
 from femgear.trains.gearbox.stress import stresses_wanted, why_no_stress
 
-MICROMETRES = Dimension("a length", "m", "um", 1e-6)
-HOURS = Dimension("a life", "h", "h", 1.0)
-STRESS = Dimension("a stress", "Pa", "MPa", 1e6)
 _RESPONSES = (("", "dynamics"), ("run-up ", "runup"))
 """Words before the figures of a response, and its stage."""
 _OF_FORCES = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS"
@@ -120,11 +119,9 @@ def _of_lives(case: GearboxCase) -> Iterator[KeyFigure]:
     teeth = [teeth_of(stage) for stage in stages]
     if all(len(without_line(gears)) == len(gears.gear_names) for gears in teeth):
         return
-    for kind, symbol in (("root", "S_F"), ("flank", "S_H")):
-        yield KeyFigure(f"{kind} life", HOURS, "deflection", Stored(f"{kind}_life", pick="smallest"), whole=True)
-        if required_life(case.operation) is not None:
-            safety = Stored(f"{kind}_spectrum_safety", pick="smallest")
-            yield KeyFigure(f"{symbol} over life", NUMBER, "deflection", safety, whole=True)
+    required = required_life(case.operation) is not None
+    for figure in (*LIFE_FIGURES, *(SPECTRUM_FIGURES if required else ())):
+        yield replace(figure, stage="deflection")
 
 
 def _bearing_force(labels: tuple[str, ...], data: Any) -> float:

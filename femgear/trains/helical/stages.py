@@ -44,6 +44,7 @@ from femgear.stages.protocol import (
 from femgear.stages.static import STATIC, STRESS, mesh_backlash, solve_static, solve_stress
 from femgear.stages.static_results import StaticResult, StressResult, describe_set, set_warnings
 from femgear.stages.strength_results import strength_verdict
+from femgear.stages.tooth_figures import tooth_key_figures
 from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
@@ -298,4 +299,5 @@ HELICAL = Train(
     figures=FiguresOf("femgear.trains.helical.figures:FIGURES"),
     remarks=_remarks,
     verdict=strength_verdict,
+    key_figures=tooth_key_figures,
 )

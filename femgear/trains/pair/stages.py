@@ -71,6 +71,7 @@ from femgear.stages.static_results import (
     mean_over_period,
 )
 from femgear.stages.strength_results import strength_verdict
+from femgear.stages.tooth_figures import pair_key_figures
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import fluctuation, sample
 from femgear.system.system import Modes, NonlinearSystem, Response
@@ -464,4 +465,5 @@ PAIR = Train(
     | {"dynamics": DYNAMICS, "runup": RUNUP},
     recorded=Recorded(pair_signals, pair_signal_extent, {"wav": ("dynamics",)}, lambda results: 3),
     verdict=strength_verdict,
+    key_figures=pair_key_figures,
 )

@@ -37,6 +37,7 @@ from femgear.stages.protocol import (
 from femgear.stages.static import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
 from femgear.stages.static_results import StaticResult, describe_set
 from femgear.stages.strength_results import strength_verdict
+from femgear.stages.tooth_figures import tooth_key_figures
 from femgear.system.fourier import side_bands
 from femgear.trains.planar.model import (
     carrier_sense,
@@ -439,5 +440,6 @@ PLANAR = Train(
     warnings=planar_warnings,
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
     verdict=strength_verdict,
+    key_figures=tooth_key_figures,
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
 )

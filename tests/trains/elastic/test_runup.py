@@ -253,6 +253,15 @@ def test_safeties_of_static_runs_have_no_dynamic_factors(case, files):
     assert "K_v (a response, or operation.speeds with strength.quality)" in notes
 
 
+def test_safeties_need_no_stresses(case, files):
+    """A run that ends with the contact or the lives has safeties with the factors that it has."""
+    strong = with_values(case, LIMITS)
+    first, rated = verdict(results_of(strong, {"static": files["static"]}))
+    assert {"safety S_F, ISO 6336-3:2019", "safety S_H, ISO 6336-2:2019"} <= dict(first.rows).keys()
+    assert "taken as 1" in " ".join(first.notes) and rated.title == "Strength, ISO 6336:2019"
+    assert len([*verdict(results_of(case, {"static": files["static"]}))]) == 1
+
+
 def test_the_verdict_says_what_shares_belong_to(case, files):
     """Static results with fixed centres beside factors on supports, and shares of an instant beside means."""
     share = np.array([0.0, 0.5, 0.5])[:, None] + 0.0 * files["static"]["load_share"]
