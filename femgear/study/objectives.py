@@ -441,10 +441,10 @@ def _figure_quantity(words: str, case: Any) -> StudyQuantity:
     figures = train_of(case).key_figures(case)
     if (figure := figure_of(figures, words)) is None:
         names = list(dict.fromkeys((*(figure.name for figure in figures), *(() if has_figures(case) else NAMES))))
-        known = figure_of(TOOTH_FIGURES, words) if hasattr(case, "gear_names") else None
-        if known is not None:
-            entry = missing_entry(case, known)
-            message, remedy = f"{known.name} needs {entry}", f"give {entry}"
+        figure = figure_of(TOOTH_FIGURES, words) if hasattr(case, "gear_names") else None
+        if figure is not None:
+            entry = missing_entry(case, figure)
+            message, remedy = f"{figure.name} needs {entry}", f"give {entry}"
             raise CaseError(message, code="E-STAGE", key="objective", value=words, remedy=remedy)
         what, limit = "take one of these names", ", ".join((*names, "natural frequency N"))
         error = no_such("quantity", "objective", words, names, what, limit=limit)
