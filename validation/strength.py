@@ -11,16 +11,29 @@ from femgear.gears.iso6336 import (
     Edition,
     bending_face_factor,
     contact_ratio_factor,
+    helix_of,
     nominal_contact_stress,
     single_pair_factors,
     zone_factor,
 )
 from femgear.gears.iso6336_load import disc_inertia, dynamic_factor, reduced_mass, resonance_speed
-from femgear.gears.iso6336_root import NominalRootStress, load_distribution_factor, nominal_root_stress
+from femgear.gears.iso6336_root import (
+    NominalRootStress,
+    fillet_section,
+    load_distribution_factor,
+    nominal_root_stress,
+)
 from femgear.gears.iso6336_stiffness import BENDING_SHARE, gear_blank_factor, pair_mesh_stiffness
 from femgear.gears.pair import GearPair, close_pair
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles
-from femgear.gears.profile import BasicRack, PinionCutter, base_helix_angle, transverse_rack, transverse_tool
+from femgear.gears.profile import (
+    BasicRack,
+    PinionCutter,
+    RackTip,
+    base_helix_angle,
+    transverse_rack,
+    transverse_tool,
+)
 from femgear.gears.tolerances import flank_tolerances
 from validation.rows import Row, printed, within
 
@@ -29,7 +42,7 @@ STAGE_1 = "KISSsoft report, NREL 5 MW gearbox, planetary stage 1"
 STAGE_3 = "KISSsoft report, NREL 5 MW gearbox, stage 3 (24/95, 10 deg)"
 EXAMPLE = "ISO/TR 6336-30:2017, worked example 1 (17/103, m_n 8, 15.8 deg)"
 FZG_C = "FZG test gear C, 16/24, m 4.5, 200 N m, ISO 6336:2006 evaluated by hand"
-FZG_H = "FZG test gear H501, 20/30, m_n 3.5, 15 deg, 100 N m, ISO 6336:2006 evaluated by hand"
+FZG_H = "GEARpie, report of FZG gear H501, 20/30, m_n 3.5, 15 deg, 100 N m, DIN 3990"
 EDITION_2019 = "KISSsoft reports by ISO 6336:2019 of planetary stages, m_n 40, 15 deg"
 TOLERANCES = "ISO 1328-1:2013, eq. 5 to 12 with the rounding of 5.2.3, 40 teeth, m 3, b 30, class 6"
 STAGE_1_FORCE, STAGE_3_FORCE = 779454.877, 240064.4
@@ -101,18 +114,14 @@ def third_stage() -> GearPair:
 
 
 def helical_test_gear(rounding: float) -> GearPair:
-    """Make the FZG test gear H501 with a rounding of the rack [modules]; the wheel's shift is found."""
-    gears = helical_gears(
-        (20, 30),
-        (0.1809, 0.0891),
-        (80.672, 116.264),
-        (30.0, 30.0),
-        module=3.5,
-        degrees=15,
-        width=23,
-        rack=(1.0, 1.25, rounding),
-    )
-    return close_pair(*gears, centre_distance=91.5e-3, find=("wheel",))
+    """Make the FZG test gear H501 with a rounding of the rack [modules], its tips shortened by what the shifts need."""
+    rack = {"module": 3.5, "degrees": 15, "width": 23, "rack": (1.0, 1.25, rounding)}
+    shifts, bores = (0.1809, 0.0891), (30.0, 30.0)
+    open_tips = close_pair(*helical_gears((20, 30), shifts, (None, None), bores, **rack))
+    radii = [gear.reference_radius for gear in open_tips.gears]
+    shortened = sum(radii) + 3.5e-3 * sum(shifts) - open_tips.centre_distance
+    tips = [2e3 * (r + 3.5e-3 * (1.0 + x) - shortened) for r, x in zip(radii, shifts, strict=True)]
+    return close_pair(*helical_gears((20, 30), shifts, tips, bores, **rack))
 
 
 def contact_stress(pair: GearPair, force: float) -> float:
@@ -263,7 +272,7 @@ def technical_report() -> tuple[Row, ...]:
 
 
 def fzg_gears() -> tuple[Row, ...]:
-    """FZG gears C and H501 by the edition of 2006."""
+    """FZG gear C by the edition of 2006."""
     rack, rows = BasicRack(1.0, 1.25, 0.375), []
     shape = (4.5e-3, ALPHA)
     spur = GearPair(
@@ -271,20 +280,52 @@ def fzg_gears() -> tuple[Row, ...]:
         Gear(24, *shape, 0.1715, 0.014, 0.01, rack=rack, tip_diameter=118.544e-3),
         91.5e-3,
     )
-    note = (
-        "with a rounding of 0.30 modules, which its Y_F 1.479, 1.490 and Y_S 2.047, 2.036 have; 0.38 gives 90.7, 91.1"
-    )
-    for case, source, pair, torque, values, remark in (
-        ("C", FZG_C, spur, 200.0, (275.70, 267.54, 1239.07), ""),
-        ("H501", FZG_H, helical_test_gear(0.30), 100.0, (96.7, 96.9, 652.5), note),
-    ):
-        force = torque / pair.gears[0].reference_radius
-        for gear, value, root in zip(("pinion", "wheel"), values, root_stresses(pair, force), strict=False):
-            quantity = f"{gear}: nominal root stress sigma_F0 [MPa]"
-            rows.append(within(case, source, quantity, value, 1e-6 * root.stress, HALF_PERCENT, note=remark))
-        ours = contact_stress(pair, force)
-        rows.append(within(case, source, "nominal contact stress sigma_H0 [MPa]", values[2], ours, HALF_PERCENT))
+    force = 200.0 / spur.gears[0].reference_radius
+    for gear, value, root in zip(("pinion", "wheel"), (275.70, 267.54), root_stresses(spur, force), strict=True):
+        quantity = f"{gear}: nominal root stress sigma_F0 [MPa]"
+        rows.append(within("C", FZG_C, quantity, value, 1e-6 * root.stress, HALF_PERCENT))
+    contact = "nominal contact stress sigma_H0 [MPa]"
+    return (*rows, within("C", FZG_C, contact, 1239.07, contact_stress(spur, force), HALF_PERCENT))
+
+
+def helical_fzg_gear() -> tuple[Row, ...]:
+    """FZG gear H501: as GEARpie reports it, and the section of its own rack by the fillet that the tool generates.
+
+    The rounding of 0.38 modules stands in GEARpie's library of gears, but its strength has 0.30 of all helical gears
+    (``rfer`` of DIN3990.py). Its force is that of the pitch circle, its Z_beta the sqrt(cos beta) of DIN 3990.
+    """
+    pair, rows = helical_test_gear(0.30), []
+    force = 100.0 / (pair.centre_distance * 20.0 / 50.0)
+    note = "rounding 0.30 modules, as the report's program has it of all helical gears; its list of gears says 0.38"
+    reported = (("1.479", "2.047", "95.80"), ("1.490", "2.036", "96.01"))
+    for gear, values, root in zip(("pinion", "wheel"), reported, root_stresses(pair, force), strict=True):
+        ours = root.form, root.correction, 1e-6 * root.stress
+        for name, value, number in zip(("Y_F", "Y_S", "sigma_F0 [MPa]"), values, ours, strict=True):
+            rows.append(printed("H501", FZG_H, f"{gear}: {name}", value, number, note=note))
+    degrees = math.radians(15.0)
+    ours = contact_stress(pair, force) * math.cos(degrees)
+    note = "without 1/cos(beta) = Z_beta^2 of ISO over that of DIN 3990"
+    rows.append(printed("H501", FZG_H, "nominal contact stress sigma_H0 [MPa]", "627.27", ours, note=note))
+    own, generated = helical_test_gear(0.38), "fillet that the rack generates, point by point"
+    for gear, root in zip(own.gears, root_stresses(own, force), strict=True):
+        chord, radius, _ = generated_section(gear)
+        sizes = ("chord s_Fn", chord, root.chord), ("radius rho_F", radius, root.fillet_radius)
+        for name, reference, number in sizes:
+            words = f"{gear.name}: {name} [mm], rounding 0.38"
+            rows.append(within("H501", generated, words, 1e3 * reference, 1e3 * number, 1e-5))
     return tuple(rows)
+
+
+def generated_section(gear: Gear) -> tuple[float, float, float]:
+    """Find chord, radius and foot [m] of the critical section of a helical gear by the fillet of its virtual gear."""
+    z = gear.teeth * gear.rack.stretch / math.cos(helix_of(gear)[1]) ** 2
+    module, stretch = gear.module / gear.rack.stretch, gear.rack.stretch
+    rounding, dedendum = (size * stretch * module for size in (gear.rack.root_radius, gear.rack.dedendum))
+    half_width = 0.25 * math.pi * module - dedendum * math.tan(ALPHA)
+    half_width -= (1.0 - math.sin(ALPHA)) / math.cos(ALPHA) * rounding
+    depth = dedendum - rounding - gear.profile_shift * stretch * module
+    tool = RackTip(0.5 * module * z, depth, half_width, rounding, math.pi / z, 0.5 * math.pi - ALPHA)
+    return fillet_section(tool, math.radians(30.0))
 
 
 def edition_of_2019() -> tuple[Row, ...]:

@@ -302,6 +302,7 @@ THEMES = (
             strength.report_of_stage_3,
             strength.technical_report,
             strength.fzg_gears,
+            strength.helical_fzg_gear,
             strength.edition_of_2019,
             strength.tolerances,
             strength.life_factors,
