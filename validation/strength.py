@@ -114,7 +114,22 @@ def third_stage() -> GearPair:
 
 
 def helical_test_gear(rounding: float) -> GearPair:
-    """Make the FZG test gear H501 with a rounding of the rack [modules], its tips shortened by what the shifts need."""
+    """Make the FZG test gear H501 with a rounding of the rack [modules]; the wheel's shift is found."""
+    gears = helical_gears(
+        (20, 30),
+        (0.1809, 0.0891),
+        (80.672, 116.264),
+        (30.0, 30.0),
+        module=3.5,
+        degrees=15,
+        width=23,
+        rack=(1.0, 1.25, rounding),
+    )
+    return close_pair(*gears, centre_distance=91.5e-3, find=("wheel",))
+
+
+def reported_test_gear(rounding: float) -> GearPair:
+    """Make the FZG test gear H501 by its shifts alone, its tips shortened by what these need, as GEARpie does."""
     rack = {"module": 3.5, "degrees": 15, "width": 23, "rack": (1.0, 1.25, rounding)}
     shifts, bores = (0.1809, 0.0891), (30.0, 30.0)
     open_tips = close_pair(*helical_gears((20, 30), shifts, (None, None), bores, **rack))
@@ -294,7 +309,7 @@ def helical_fzg_gear() -> tuple[Row, ...]:
     The rounding of 0.38 modules stands in GEARpie's library of gears, but its strength has 0.30 of all helical gears
     (``rfer`` of DIN3990.py). Its force is that of the pitch circle, its Z_beta the sqrt(cos beta) of DIN 3990.
     """
-    pair, rows = helical_test_gear(0.30), []
+    pair, rows = reported_test_gear(0.30), []
     force = 100.0 / (pair.centre_distance * 20.0 / 50.0)
     note = "rounding 0.30 modules, as the report's program has it of all helical gears; its list of gears says 0.38"
     reported = (("1.479", "2.047", "95.80"), ("1.490", "2.036", "96.01"))
@@ -306,7 +321,7 @@ def helical_fzg_gear() -> tuple[Row, ...]:
     ours = contact_stress(pair, force) * math.cos(degrees)
     note = "without 1/cos(beta) = Z_beta^2 of ISO over that of DIN 3990"
     rows.append(printed("H501", FZG_H, "nominal contact stress sigma_H0 [MPa]", "627.27", ours, note=note))
-    own, generated = helical_test_gear(0.38), "fillet that the rack generates, point by point"
+    own, generated = reported_test_gear(0.38), "fillet that the rack generates, point by point"
     for gear, root in zip(own.gears, root_stresses(own, force), strict=True):
         chord, radius, _ = generated_section(gear)
         sizes = ("chord s_Fn", chord, root.chord), ("radius rho_F", radius, root.fillet_radius)
