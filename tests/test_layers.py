@@ -55,6 +55,12 @@ def tree(path: Path) -> ast.Module:
 
 
 @cache
+def walked(path: Path) -> tuple[ast.AST, ...]:
+    """All nodes of a file, the outer ones first."""
+    return tuple(ast.walk(tree(path)))
+
+
+@cache
 def nodes(path: Path, *, typed: bool) -> tuple[ast.Import | ast.ImportFrom, ...]:
     """Import statements of a file, wherever they stand; `typed` adds those that only type checkers see."""
     pending, found = [tree(path)], []
@@ -225,7 +231,7 @@ def test_no_function_is_longer_than_70_lines():
     functions = ast.FunctionDef, ast.AsyncFunctionDef
     long = {}
     for path in MODULES:
-        for node in ast.walk(tree(path)):
+        for node in walked(path):
             if isinstance(node, functions):
                 described = ast.get_docstring(node) is not None
                 first = node.body[0].end_lineno if described else node.lineno
@@ -241,12 +247,12 @@ FOREIGN = {
 """Modules that read messages of others, for want of anything else."""
 
 
-def read_texts(module: ast.Module) -> list[ast.expr]:
+def read_texts(path: Path) -> list[ast.expr]:
     """Expressions in which words are looked for, or which are cut or changed."""
     reading = {"startswith", "endswith", "removesuffix", "removeprefix", "replace", "partition", "rpartition"}
     reading |= {"split", "rsplit", "find", "index", "count"}
     texts = []
-    for node in ast.walk(module):
+    for node in walked(path):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in reading:
             if node.func.attr == "split" and not node.args:  # puts a text on one line
                 continue
@@ -273,11 +279,10 @@ def test_no_module_reads_prose():
     """Refusals and findings are data: no condition hangs on words of a message, a remedy or a limit."""
     wrong = defaultdict(list)
     for path in MODULES:
-        module = tree(path)
-        loops = (node for node in ast.walk(module) if isinstance(node, ast.For | ast.comprehension))
+        loops = (node for node in walked(path) if isinstance(node, ast.For | ast.comprehension))
         of_remedies = (loop.target for loop in loops if ast.unparse(loop.iter).endswith("remedies"))
         remedies = {target.id for target in of_remedies if isinstance(target, ast.Name)}
-        for text in read_texts(module):
+        for text in read_texts(path):
             if is_prose(text, remedies):
                 wrong[place(path)].append(f"{text.lineno}: {ast.unparse(text)}")
     assert {name: texts for name, texts in wrong.items() if name not in FOREIGN} == {}
@@ -312,10 +317,10 @@ def test_local_variables_say_what_they_hold():
     for path in MODULES:
         if place(path).startswith(STILL_SO):
             continue
-        functions = (ast.FunctionDef, ast.Lambda)
-        bodies = [node for node in ast.walk(tree(path)) if isinstance(node, functions)]
-        for node in {node for body in bodies for node in ast.walk(body)}:
-            held = isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+        classes = (node for node in walked(path) if isinstance(node, ast.ClassDef))
+        fields = {line.target for node in classes for line in node.body if isinstance(line, ast.AnnAssign)}
+        for node in walked(path):
+            held = isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node not in fields
             name = node.id if held else getattr(node, "arg", None) if isinstance(node, ast.arg) else None
             if name in SAYS_NOTHING - MEANT.get(place(path), set()):
                 wrong.append(f"{place(path)}:{node.lineno}: {name}")

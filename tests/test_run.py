@@ -38,7 +38,7 @@ QUICK = {
         "transient.duration": "0.2 s",
         "transient.rate": "20 kHz",
     },
-    "four_stage_reducer": {},
+    "four_stage_reducer": {"runup.count": 3},
     "helical_30_20_70": {
         "static.positions": 12,
         "static.flank_elements": 6,

@@ -1,6 +1,5 @@
 """Every error code of the package has a meaning, and docs/errors.md is what is written from the source."""
 
-import ast
 import importlib.util
 from pathlib import Path
 
@@ -40,12 +39,13 @@ def test_codes_on_the_other_pages_exist():
 
 def refusals(error_page, folder):
     """File, code, words and message of the refusals of a folder."""
-    for path in (PATH.parents[2] / "femgear" / folder).rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("Error"):
-                words = {word.arg: word.value for word in node.keywords}
+    for source in error_page.sources(error_page.ROOT / "femgear"):
+        calls = source.calls if (error_page.ROOT / "femgear" / folder) in source.path.parents else ()
+        for call in calls:
+            if error_page._name(call.func).endswith("Error"):
+                words = {word.arg: word.value for word in call.keywords}
                 for code in error_page._codes(words.get("code")):
-                    yield code, words.keys(), f"{path.name}:{node.lineno}: {error_page._text(node.args[0])}"
+                    yield code, words.keys(), f"{source.path.name}:{call.lineno}: {error_page._text(call.args[0])}"
 
 
 @pytest.mark.parametrize("folder", ["case", "gears", "trains", "study", "storage"])

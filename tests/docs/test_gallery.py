@@ -93,13 +93,15 @@ def test_what_two_runs_draw_alike_stands_once(gallery, tmp_path):
     assert (tmp_path / "gallery.md").read_text(encoding="utf-8").count("Its pictures stand above.") == 1
 
 
-def test_names_and_sizes_are_checked(gallery, tmp_path):
+def test_names_and_sizes_are_checked(gallery, tmp_path, monkeypatch):
     from PIL import Image
 
     with pytest.raises(CaseError, match="no run nothing") as found:
         gallery.main(tmp_path, only=("nothing",))
     assert found.value.code == "E-CHOICE" and not list(tmp_path.iterdir())
-    noise = np.random.default_rng(1).integers(0, 256, (400, 500, 3), dtype=np.uint8)
+    assert gallery.LARGEST == 110_000
+    monkeypatch.setattr(gallery, "LARGEST", 1_100)
+    noise = np.random.default_rng(1).integers(0, 256, (40, 50, 3), dtype=np.uint8)
     Image.fromarray(noise).save(tmp_path / "noise.png")
     with pytest.raises(StorageError, match=r"noise\.png takes"):
         gallery.small(tmp_path / "noise.png")

@@ -10,14 +10,17 @@ from __future__ import annotations
 
 import argparse
 import ast
+import gc
 import re
 from collections import defaultdict
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 from femgear.findings import CATALOGUE
 
 ROOT = Path(__file__).resolve().parents[2]
+NAMED = re.compile(r"\b[EW]-[A-Z]|Error\b")
 CODE = re.compile(r"E-[A-Z0-9]+(?:-[A-Z0-9]+)*")
 HEAD = """# Errors
 
@@ -45,18 +48,40 @@ ends no run: the exit code stays 0. Severities: `note`, worth knowing; `doubt`, 
 |---|---|---|---|"""
 
 
+class Source:
+    """A file of the package: its syntax tree with its functions and calls, the outer ones first."""
+
+    def __init__(self, path: Path):
+        text = path.read_text(encoding="utf-8")
+        self.path, self.tree = path, ast.parse(text)
+        self.functions, self.calls, self.texts = [], [], []
+        of = {ast.FunctionDef: self.functions, ast.Call: self.calls, ast.Constant: self.texts}
+        for node in ast.walk(self.tree):
+            if (nodes := of.get(type(node))) is not None:
+                nodes.append(node)
+
+    def calls_in(self, function: ast.FunctionDef) -> list[ast.Call]:
+        """Calls between the first and the last line of a function."""
+        return [call for call in self.calls if _holds(function, call)]
+
+
+@cache
+def sources(folder: Path) -> tuple[Source, ...]:
+    """Files of a folder that name an error or a warning, in the order of their names."""
+    named = (path for path in sorted(folder.rglob("*.py")) if NAMED.search(path.read_text(encoding="utf-8")))
+    return tuple(map(Source, named))
+
+
 def refusals(folder: Path = ROOT / "femgear") -> dict[str, list[tuple[str, str, str]]]:
     """Messages, limits and remedies of all refusals by their code, in the order of the source."""
     found = defaultdict(list)
-    for path in sorted(folder.rglob("*.py")):
-        tree = ast.parse(path.read_text(encoding="utf-8"))
-        functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
-        for call in (node for node in ast.walk(tree) if isinstance(node, ast.Call)):
+    for source in sources(folder):
+        for call in source.calls:
             words = {word.arg: word.value for word in call.keywords if word.arg}
             told = [call.args[0] if call.args else None, words.get("limit"), words.get("remedy")]
             for code in _codes(words.get("code")):
-                within = [f for f in functions if f.lineno <= call.lineno <= (f.end_lineno or 0)]
-                values = [_values(one, call, within[-1] if within else tree) for one in told]
+                within = [function for function in source.functions if _holds(function, call)]
+                values = [_values(one, call, within[-1] if within else source.tree) for one in told]
                 for cells in zip(*(one * (len(max(values, key=len)) // len(one)) for one in values)):
                     entry = tuple(_text(cell) for cell in cells)
                     if entry not in found[code]:
@@ -64,21 +89,31 @@ def refusals(folder: Path = ROOT / "femgear") -> dict[str, list[tuple[str, str, 
     return dict(found)
 
 
-def _values(node: ast.expr | None, use: ast.Call, scope: ast.AST) -> list[ast.expr | None]:
+def _holds(function: ast.FunctionDef, call: ast.Call) -> bool:
+    return function.lineno <= call.lineno <= (function.end_lineno or 0)
+
+
+def _values(node: ast.expr | None, use: ast.Call, scope: ast.AST) -> Sequence[ast.expr | None]:
     """Values that a name has from the statements last before its use, alone or as one of several names."""
     if not isinstance(node, ast.Name):
         return [node]
     for statement in _before(scope, use):
-        found = []
-        for one in ast.walk(statement):
-            if isinstance(one, ast.Assign):
-                target, value = one.targets[0], one.value
-                both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
-                pairs = zip(target.elts, value.elts) if both else [(target, value)]
-                found += [(one.lineno, v) for t, v in pairs if ast.unparse(t) == node.id]
-        if found:
-            return [value for _, value in sorted(found, key=lambda pair: pair[0])]
+        if values := [value for name, value in _assignments(statement) if name == node.id]:
+            return values
     return [node]
+
+
+@cache
+def _assignments(statement: ast.stmt) -> list[tuple[str, ast.expr]]:
+    """Names and values of all assignments within a statement, in the order of the source."""
+    found = []
+    for part in ast.walk(statement):
+        if isinstance(part, ast.Assign):
+            target, value = part.targets[0], part.value
+            both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
+            pairs = zip(target.elts, value.elts) if both else [(target, value)]
+            found += [(part.lineno, _name(t), v) for t, v in pairs]
+    return [(name, value) for _, name, value in sorted(found, key=lambda entry: entry[0])]
 
 
 def _before(scope: ast.AST, use: ast.Call) -> Iterator[ast.stmt]:
@@ -93,15 +128,13 @@ def _before(scope: ast.AST, use: ast.Call) -> Iterator[ast.stmt]:
 def warnings(folder: Path = ROOT / "femgear") -> list[tuple[str, str, str, str]]:
     """Codes, entries of the case, messages and remedies of all warnings, by code."""
     found = set()
-    for path in folder.rglob("*.py"):
-        for function in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(function, ast.FunctionDef):
-                calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
-                for call in calls:
-                    if call.args and ast.unparse(call.func) == "Finding" and _text(call.args[0])[:2] == "W-":
-                        remedy = next((word.value for word in call.keywords if word.arg == "remedy"), None)
-                        cells = [*call.args[:3], call.args[3] if len(call.args) > 3 else remedy]
-                        found.add(tuple(_text(_assigned(cell, call, function)) for cell in cells))
+    for source in sources(folder):
+        for function in source.functions:
+            for call in source.calls_in(function):
+                if call.args and _name(call.func) == "Finding" and _text(call.args[0])[:2] == "W-":
+                    remedy = next((word.value for word in call.keywords if word.arg == "remedy"), None)
+                    cells = [*call.args[:3], call.args[3] if len(call.args) > 3 else remedy]
+                    found.add(tuple(_text(_assigned(cell, call, function)) for cell in cells))
     return sorted(found)
 
 
@@ -119,13 +152,13 @@ def _assigned(node: ast.expr | None, use: ast.Call, function: ast.FunctionDef) -
 
 def named_codes(folder: Path = ROOT / "femgear") -> set[str]:
     """Codes that stand in the source as texts, docstrings left out."""
-    found = set()
-    for path in folder.rglob("*.py"):
-        if path.name != "errors.py":
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                if isinstance(node, ast.Constant) and CODE.fullmatch(str(node.value)):
-                    found.add(node.value)
-    return found
+    named = (source for source in sources(folder) if source.path.name != "errors.py")
+    values = {str(node.value) for source in named for node in source.texts}
+    return {value for value in values if CODE.fullmatch(value)}
+
+
+def _name(node: ast.expr) -> str:
+    return node.id if isinstance(node, ast.Name) else ""
 
 
 def _codes(node: ast.expr | None) -> set[str]:
@@ -174,6 +207,8 @@ def main() -> None:
     """Write the page."""
     from femgear.errors import CODES
 
+    # nothing of the trees goes before the end
+    gc.disable()
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("-o", "--output", type=Path, required=True)
     parser.parse_args().output.write_text(page(CODES), encoding="utf-8")
