@@ -353,7 +353,8 @@ class StrengthSection(Section):
     ``quality`` is the flank tolerance class of ISO 1328-1, from which K_v, K_Halpha and K_Falpha of part 1 follow;
     ``modification`` how helical teeth are modified: by experience, or as a calculation has proven (f_ZCa). Of lives
     over load cases ``pitting`` says whether flanks may pit to a limited extent, and ``reversal_factor`` is Y_M of
-    gears whose load cases load both flanks.
+    gears whose load cases load both flanks. ``required_root_safety`` and ``required_flank_safety`` are the S_F and
+    S_H that designer and customer agreed on, which ISO 6336-1 leaves to them.
     """
 
     edition: Literal[2006, 2019] = 2019
@@ -362,6 +363,8 @@ class StrengthSection(Section):
     modification: Literal["none", "experience", "proven"] | None = None
     pitting: Literal["none", "limited"] = "none"
     reversal_factor: Annotated[float, Number(0.1, 1.0)] = 0.7
+    required_root_safety: Annotated[float, Number(0.1, 100.0)] = 1.0
+    required_flank_safety: Annotated[float, Number(0.1, 100.0)] = 1.0
 
 
 class ShaftPartSection(Section):

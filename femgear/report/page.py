@@ -31,6 +31,7 @@ from femgear.second_process import shared
 from femgear.storage.files import checksum, storage_errors, write_bytes, write_text
 
 if TYPE_CHECKING:
+    from femgear.stages.judgements import Judgement
     from femgear.stages.protocol import Drawn, Figures, Progress, Train
     from femgear.storage.results import Results
 
@@ -152,19 +153,25 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     numbers = {block.title: block for block in train.describe_results(results)} | train.describe_stages(results)
     sections = [*(stage.title for stage in train.stages), _OTHER]
     notice = f'<p class="warn"><a href="#warnings">Warnings: {_counted(warnings)}</a></p>\n' if warnings else ""
+    unfolded = not data  # without scripts nothing opens what is folded away for paper
+    charts = data.get("charts", {})
+    gears, verdict = train.describe(case), tuple(train.verdict(results))
     head = "".join(
         (
             f"<h1>{escape(case.title)}</h1>\n",
             f'<p class="lead">{escape(_lead(results))}</p>\n',
             _contents(sections, numbers, pictures),
+            _front(train, results, charts, gears if "solid" in data else ()),
             notice,
-            _gears(train.describe(case), tuple(train.verdict(results)), "solid" in data, static),
+            _folded("verdict", "Verdict in numbers", "".join(map(table, verdict)), True) if verdict else "",
+            _folded("gears", "Gears and operation", "".join(map(table, gears)), unfolded),
         )
     )
-    charts = data.get("charts", {})
     parts = {stage.title: part_of(stage.name) for stage in train.stages if stage.name in {*data} & {*_PARTS}}
-    body = "".join(_section(name, numbers, pictures, charts, train, results, parts.get(name, "")) for name in sections)
-    main = f"{head}{body}{_trust(results, numbers, warnings, static)}"
+    body = "".join(
+        _section(name, numbers, pictures, charts, train, results, parts.get(name, ""), unfolded) for name in sections
+    )
+    main = f"{head}{body}{_trust(results, numbers, warnings, unfolded)}"
     return document(case.title, main, {"charts": charts} | data if data else None)
 
 
@@ -235,17 +242,55 @@ def _anchor(name: str) -> str:
     return name.lower().replace(" ", "-")
 
 
-def _gears(gears: Sequence[Block], verdict: Sequence[Block], drawn: bool, static: bool) -> str:
-    """Show the gears in space beside the verdict, and what they are, which a verdict folds away."""
-    tables = "".join(map(table, gears))
-    if not verdict:
-        place = part_of("solid").format("") if drawn else ""
-        return f'<h2 id="gears">Gears and operation</h2>\n{place}{tables}'
-    first, rest = ("".join(map(table, part)) for part in (verdict[:2], verdict[2:]))
-    if drawn:
-        place = part_of("solid").format(escape("; ".join(gears[0].notes[:2]) + "."))
-        first = f'<div class="top">\n{place}<div>\n{first}</div>\n</div>\n'
-    return f"{first}{rest}{_folded('gears', 'Gears and operation', tables, static)}"
+def _front(train: Train, results: Results, charts, gears: Sequence[Block]) -> str:
+    """Make page one: a sentence, a card for every question, the gears in space and two charts.
+
+    ``gears`` are drawn in space where there are any.
+    """
+    judgements = tuple(train.judgements(results))
+    sentences = [judgement.sentence for judgement in judgements if judgement.sentence]
+    sentence = ". ".join(text[0].upper() + text[1:] for text in sentences)
+    text = f'<p class="sentence">{escape(sentence)}.</p>\n' if sentence else ""
+    cards = "".join(map(_card, judgements))
+    shown = "".join(front_chart(*place) for place in _front_places(train, charts))
+    solid = part_of("solid").format(escape("; ".join(gears[0].notes[:2]) + ".")) if gears else ""
+    charts_beside = f'<div class="charts">\n{shown}</div>\n' if shown else ""
+    both = " both" * bool(solid and shown)
+    below = f'<div class="top{both}">\n{solid}{charts_beside}</div>\n' if solid or shown else ""
+    columns = 3 if len(judgements) == 6 else min(len(judgements), 5)
+    listed_cards = f'<ul class="cards" style="--columns: {columns}">\n{cards}</ul>\n' if cards else ""
+    return f'<section class="front" aria-label="Page one">\n{text}{listed_cards}{below}</section>\n'
+
+
+def _front_places(train: Train, charts) -> list[tuple[str, int]]:
+    """Choose the charts of page one: the first two that there are."""
+    places = []
+    for stem, panel in train.front:
+        name = next((name for name in charts if name == stem or name.startswith(stem + "_")), None)
+        if name in charts and panel < len(charts[name]["panels"]):
+            places.append((name, panel))
+    return places[:2]
+
+
+_SHAPES = {"good": "✓", "look": "▲", "bad": "✕", "open": "○"}
+"""Signs of the states of cards, for those who see no colours."""
+
+
+def _card(judgement: Judgement) -> str:
+    """Write the card of a question: its state in colour, sign and word, the answer, and what limits it."""
+    limit = f'<p class="limit">{escape(judgement.limit)}</p>' if judgement.limit else ""
+    return (
+        f'<li class="card {judgement.state}"><p class="question">{escape(judgement.question)} '
+        f"<b>{_SHAPES[judgement.state]} {escape(judgement.words)}</b></p>"
+        f'<p class="answer">{escape(judgement.answer)}</p>{limit}</li>\n'
+    )
+
+
+def front_chart(name: str, panel: int) -> str:
+    """Place of one panel of a chart on page one."""
+    words = escape(name.replace("_", " "))
+    place = f'data-chart="{escape(name)}" data-panel="{panel}"'
+    return f'<div class="chart" role="group" aria-label="{words}" {place}></div>\n'
 
 
 def _folded(key: str, title: str, content: str, shown: bool) -> str:
@@ -258,8 +303,10 @@ def part_of(name: str) -> str:
     return (_WEB / f"{name}.html").read_text("utf-8")
 
 
-def _section(name: str, numbers, pictures, charts, train: Train, results: Results, part: str = "") -> str:
-    """Show tables and pictures of a stage, nothing without any."""
+def _section(
+    name: str, numbers, pictures, charts, train: Train, results: Results, part: str = "", static: bool = False
+) -> str:
+    """Show tables and pictures of a stage, folded away under its title; nothing without any."""
     blocks = [numbers[name]] if name in numbers else []
     for stage in train.stages:
         if stage.title == name and stage.name in results.stages:
@@ -268,12 +315,8 @@ def _section(name: str, numbers, pictures, charts, train: Train, results: Result
     if not blocks and not figures:
         return ""
     tables = "".join(table(block, heading=i > 0) for i, block in enumerate(blocks))
-    return (
-        f'<h2 id="{_anchor(name)}">{escape(name)}</h2>\n'
-        + part
-        + tables
-        + "".join(_figure(figure, charts) for figure in figures)
-    )
+    content = part + tables + "".join(_figure(figure, charts) for figure in figures)
+    return _folded(_anchor(name), name, content, static)
 
 
 def table(block: Block, *, heading: bool = True) -> str:

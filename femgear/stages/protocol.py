@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from femgear.case.text import ReadCase
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
     from femgear.findings import Finding
+    from femgear.stages.judgements import Judgement
     from femgear.stages.key_figures import KeyFigure
     from femgear.storage.results import Results
 
@@ -318,6 +319,10 @@ class Train:
         ``(Results) -> blocks``: what decides, before everything else.
     key_figures : callable
         ``(case) -> figures`` by which cases are compared, none of trains whose studies have quantities of their own.
+    judgements : callable
+        ``(Results) -> judgements``: the questions that page one answers, in their order.
+    front : tuple of (str, int)
+        Charts of page one, the first two of which are there: name of the figure, and number of its panel.
     """
 
     name: str
@@ -330,6 +335,8 @@ class Train:
     recorded: Recorded | None = None
     verdict: Callable[[Results], Iterable[Block]] = lambda results: ()
     key_figures: Callable[[Any], tuple[KeyFigure, ...]] = lambda case: ()
+    judgements: Callable[[Results], Iterable[Judgement]] = lambda results: ()
+    front: tuple[tuple[str, int], ...] = ()
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""

@@ -32,6 +32,7 @@ CUT = """() => [...document.querySelectorAll('.chart, .pair > div')].flatMap((di
     const over = titles.filter((a, i) => titles.slice(0, i).some((b) => meet(a, b))).map(() => 'titles meet');
     return [...cut, ...over].map((text) => `${div.dataset.chart || div.dataset.part}: ${text}`); })"""
 """Words of charts that stand outside of their frames, and titles of axes that cover one another."""
+CUT_OF_FRONT = CUT.replace("'.chart, .pair > div'", "'.front .chart'")
 EMPTY = """() => Object.entries(page.data.charts || {}).flatMap(([name, { panels }]) => {
     const known = (y, i) => i && Number.isFinite(y[i]) && Number.isFinite(y[i - 1]);
     const traces = panels.flatMap((panel) => panel.traces);
@@ -73,7 +74,7 @@ def opened(chromium, report):
     """Open a report without a network; at the end nothing was said and nothing asked for."""
     contexts, messages = [], []
 
-    def show(name: str, width: int = 1400, scheme: str = "light"):
+    def show(name: str, width: int = 1400, scheme: str = "light", unfold: bool = True):
         context = chromium.new_context(viewport={"width": width, "height": 900}, color_scheme=scheme, offline=True)
         contexts.append(context)
         tab = context.new_page()
@@ -83,6 +84,8 @@ def opened(chromium, report):
         tab.on("request", lambda asked: messages.append(asked.url) if asked.url.startswith("http") else None)
         tab.goto(report(name).as_uri())
         tab.wait_for_selector("html[data-ready]")
+        if unfold:
+            tab.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
         return tab
 
     yield show
@@ -133,15 +136,20 @@ def test_paper_shows_every_chart_and_every_column(opened, name):
 
 @pytest.mark.parametrize("width", (1400, 1024, 768, 400))
 def test_nothing_of_the_first_screen_is_cut(opened, width):
-    tab = opened(DEMO, width)
-    cut = """() => [...document.querySelectorAll('.top, .top *, h1, nav a')].filter((one) => {
+    tab = opened(DEMO, width, unfold=False)
+    cut = """() => [...document.querySelectorAll('.front, .front p, .front li, .top *, h1, nav a')].filter((one) => {
         const { left, right } = one.getBoundingClientRect();
         return right > document.documentElement.clientWidth + 1 || left < -1
             || (one.matches('.wide') && one.scrollWidth > one.clientWidth + 1);
     }).map((one) => one.outerHTML.slice(0, 80))"""
     assert tab.evaluate(cut) == []
     box = tab.locator("#solid-place canvas").bounding_box()
-    assert box["y"] + box["height"] < 900 and box["width"] > 0.35 * min(width, 1152) and box["height"] > 230
+    # on a phone the answers come first
+    assert (
+        box["y"] + box["height"] < (900 if width > 500 else 1300)
+        and box["width"] > 0.35 * min(width, 1152)
+        and box["height"] > 230
+    )
 
 
 def test_modes_in_space_move_bodies_as_modes_nc_says(opened, report):
@@ -190,7 +198,7 @@ def test_set_in_space_is_drawn_turns_and_moves(opened):
         const pen = copy.getContext('2d'); pen.drawImage(canvas, 0, 0);
         const bytes = Array.from(pen.getImageData(0, 0, width, height).data);
         return bytes.filter((_, i) => i % 64 === 3 || i % 64 === 0); }"""
-    tab.wait_for_function("document.querySelector('#solid-place canvas').width > 300")
+    tab.wait_for_function("() => document.querySelector('#solid-place canvas').width > 300")
     first = tab.evaluate(pixels)
     covered = sum(alpha > 0 for alpha in first[1::2])
     assert 0.1 < covered / (len(first) // 2) < 0.9
@@ -220,13 +228,37 @@ def test_hover_tells_the_line(opened):
     assert "order" in text and "Hz" in text and "m/s²" in text
 
 
+@pytest.mark.parametrize("name", TRAINS)
+def test_page_one_fits_a_screen_and_the_rest_is_folded_away(opened, name):
+    tab = opened(name, unfold=False)
+    box = tab.locator(".front").bounding_box()
+    assert box["y"] + box["height"] <= 900 and tab.locator(".card").count() >= 2
+    assert tab.evaluate("document.documentElement.scrollHeight") <= 6 * 900
+    tab.wait_for_function("() => [...document.querySelectorAll('.front .chart')].every((one) => one.dataset.drawn)")
+    assert tab.locator(".front .chart").count() >= 1 and tab.evaluate(CUT_OF_FRONT) == []
+    link = tab.locator("nav a").nth(1)
+    section = tab.locator(link.get_attribute("href"))
+    assert section.get_attribute("open") is None
+    link.click()
+    tab.wait_for_function("(one) => one.open", arg=section.element_handle())
+
+
+@pytest.mark.parametrize("name", TRAINS)
+def test_page_one_is_one_sheet_of_paper(opened, name):
+    tab = opened(name, 794, unfold=False)
+    tab.emulate_media(media="print")
+    tab.evaluate("dispatchEvent(new Event('beforeprint'))")
+    box = tab.locator(".front").bounding_box()
+    assert box["y"] + box["height"] < (29.7 - 2 * 1.4) * 96 / 2.54
+
+
 def test_page_goes_from_the_gears_to_what_its_results_rest_on(opened):
-    tab = opened(DEMO)
+    tab = opened(DEMO, unfold=False)
     titles = tab.locator("main :is(h2, caption)").all_text_contents()
-    wanted = ("Verdict", "Gears and operation", "Static", "Stresses", "Modes", "Run-up", "Housing")
+    wanted = ("Verdict in numbers", "Gears and operation", "Static", "Stresses", "Modes", "Run-up", "Housing")
     places = [titles.index(one) for one in wanted]
     assert places == sorted(places) and titles[-1] == "Files"
-    boxes = [tab.locator(one).first.bounding_box() for one in ("#solid-place canvas", ".top caption")]
+    boxes = [tab.locator(one).first.bounding_box() for one in ("#solid-place canvas", ".card")]
     assert all(0 < box["y"] and box["y"] + box["height"] < 900 for box in boxes)
     assert not tab.locator("#trust pre").is_visible()
     tab.evaluate("dispatchEvent(new Event('beforeprint'))")
@@ -238,7 +270,7 @@ def test_page_goes_from_the_gears_to_what_its_results_rest_on(opened):
 def test_one_switch_changes_the_levels_of_the_whole_run_up(opened):
     """A line of amplitude 3 m/s^2 at 50 Hz; r.m.s. is 1/sqrt(2) of it, velocity 1/(2 pi f)."""
     tab = opened(DEMO)
-    tab.wait_for_function("document.querySelector('[data-part=cuts]').data")
+    tab.wait_for_function("() => document.querySelector('[data-part=cuts]').data")
     tab.select_option("[data-part=source]", "acceleration")
     tab.evaluate(DRAW)
     speed, power = 2 * math.pi * 50.0, 3.0 / math.sqrt(2)
@@ -276,7 +308,7 @@ def test_speed_moves_all_pictures_and_the_sound(opened):
     state = """(ids) => ids.map((id) => {
         const { data, layout } = document.querySelector(`[data-part=${id}]`);
         return JSON.stringify([data, layout.shapes, layout.title]); })"""
-    tab.wait_for_function("document.querySelector('[data-part=lobes]').data")
+    tab.wait_for_function("() => document.querySelector('[data-part=lobes]').data")
     first, label = tab.evaluate(state, ids), tab.inner_text("[data-part=value]")
     tab.locator("[data-part=speed]").fill("60")
     assert all(a != b for a, b in zip(first, tab.evaluate(state, ids)))
@@ -308,8 +340,8 @@ def test_two_runs_are_heard_one_after_the_other_on_one_scale(chromium, report, t
     tab.on("console", lambda message: messages.append(message.text))
     tab.on("pageerror", lambda error: messages.append(str(error)))
     tab.goto((tmp_path / "c" / "compare.html").as_uri())
-    tab.wait_for_function("document.querySelectorAll('.runup').length === 2")
-    tab.wait_for_function("[...document.querySelectorAll('.runup')].every((one) => one.explorer)")
+    tab.wait_for_function("() => document.querySelectorAll('.runup').length === 2")
+    tab.wait_for_function("() => [...document.querySelectorAll('.runup')].every((one) => one.explorer)")
     rendered = """async (root) => { const { turns, scaleOf } = root.explorer;
         const speed = Number(root.querySelector('[data-part=speed]').value);
         const name = root.querySelector('[data-part=source]').value, { samples } = turns(speed, 48000);

@@ -184,15 +184,17 @@ def test_verdict_stands_before_the_stages_and_trust_is_folded_away_at_the_end(tm
     for static in (False, True):
         text = html(ELASTIC, results, static=static)
         keys = (
+            '<section class="front"',
             "<caption>Verdict",
             '<details id="gears"',
             *(f'id="{one}"' for one in ("static", "modes", "dynamics", "housing", "trust", "warnings")),
         )
         places = [text.index(key) for key in (*keys, "did not converge at 3100 rpm", "Case as run")]
         assert places == sorted(places) and text.count("did not converge at 3100 rpm") == 1
-        assert 'href="#warnings">Warnings: ' in text[: places[0]]
-        # what is folded away is on paper, and where no script opens it
-        assert text.count("<details") == 2 and text.count(" open>") == 2 * static
+        assert 'href="#warnings">Warnings: ' in text[: places[1]]
+        folded = 7  # the verdict, the gears, four stages, and what the results rest on
+        # what is folded away is shown where no script opens it for paper
+        assert text.count("<details") == folded and text.count(" open>") == folded
     titles = [stage.title for stage in ELASTIC.stages]
     assert titles == ["Static", "Stresses", "Losses", "Temperatures", "Life", "Modes", "Run-up", "Dynamics", "Housing"]
 
@@ -221,3 +223,22 @@ def test_no_results_no_page(tmp_path):
     with pytest.raises(StorageError):
         html(ELASTIC, open_results(tmp_path))
     assert list(tmp_path.iterdir()) == []
+
+
+def test_page_one_answers_the_questions_of_a_set(tmp_path):
+    """Without limits of the material strength has none either; no convergence makes the numbers doubtful."""
+
+    def change(stage, data):
+        if stage == "dynamics":
+            data["converged"].values[1] = False
+
+    text = html(ELASTIC, open_results(make_run(tmp_path / "out", change=change)))
+    front = text[text.index('<section class="front"') : text.index("</section>")]
+    states = re.findall(r'<li class="card (\w+)"><p class="question">([^<?]*\?) <b>(.) ([^<]*)</b>', front)
+    questions = {question: state for state, question, _, _ in states}
+    assert questions["Is it strong enough?"] == "open" and questions["Can the numbers be relied on?"] == "look"
+    assert "give material.treatment and material.hardness" in front and "W-CONVERGENCE" in front
+    signs = {"good": ("✓", "holds"), "look": ("▲", "look"), "open": ("○", "no limit")}
+    assert [signs[state] for state, *_ in states] == [(sign, word) for _, _, sign, word in states]
+    sentence = re.search(r'<p class="sentence">(.*?)</p>', front)[1]
+    assert sentence.startswith("Its strength is not rated. At 3,100 rpm it has ")

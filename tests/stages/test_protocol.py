@@ -57,7 +57,7 @@ def test_run_writes_stages_figure_and_page(path, tmp_path, capsys):
     # 1 / (2 zeta k) at resonance
     assert float(results["receptance"]["receptance"].max()) == pytest.approx(1 / (0.04 * 8e5), rel=1e-3)
     page = (out / "report.html").read_text(encoding="utf-8")
-    assert '<h2 id="receptance">' in page and "Displacement of the mass for a unit force." in page
+    assert '<details id="receptance"' in page and "Displacement of the mass for a unit force." in page
     assert "receptance.png" in results.manifest.files
     assert cli.main(["run", str(path), "-o", str(tmp_path / "one"), "--only", "receptance"]) == 0
     assert cli.main(["run", str(path), "-o", str(tmp_path / "no"), "--only", "housing"]) == 2

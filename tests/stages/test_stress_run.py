@@ -158,8 +158,8 @@ def test_report_has_the_section_with_its_figures(tmp_path, case, library, result
 
     assert {caption_of(ELASTIC, name.removesuffix(".png"))[1] for name in figures} == {"Stresses"}
     text = page(ELASTIC, results)
-    assert '<h2 id="stress' in text and "FE/ISO" in text
-    assert text.index('<h2 id="static') < text.index('<h2 id="stress') < text.index('<h2 id="modes')
+    assert '<details id="stress' in text and "FE/ISO" in text
+    assert text.index('<details id="static') < text.index('<details id="stress') < text.index('<details id="modes')
 
 
 def test_documentation_names_every_variable(results):

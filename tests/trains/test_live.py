@@ -59,6 +59,8 @@ CHANGES: tuple[dict[str, object], ...] = (
         "strength.modification": "proven",
         "strength.pitting": "limited",
         "strength.reversal_factor": 0.8,
+        "strength.required_root_safety": 1.4,
+        "strength.required_flank_safety": 1.1,
     },
     {
         "lubricant": {
@@ -145,6 +147,8 @@ CHANGES: tuple[dict[str, object], ...] = (
         "operation.load_case": [{"name": "always", "torque": "60 N m", "speed": "900 rpm", "hours": 3000.0}],
         "strength.pitting": "limited",
         "strength.reversal_factor": 0.8,
+        "strength.required_root_safety": 1.4,
+        "strength.required_flank_safety": 1.1,
     },
     {"operation.speeds": ["900 rpm", "2000 rpm"]},
     {"operation.speeds": ["900 rpm", "9000 rpm"], "dynamics.up_to": "40 kHz"},

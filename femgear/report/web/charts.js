@@ -118,7 +118,7 @@ page.arrange = (chart, width) => {
   const foot = page.footroom(chart), above = 20 + 16 * lines + (title.lines && 10 + 20 * title.lines);
   const gaps = { x: across, y: hidden ? 14 + 16 * lines : (single ? 74 : 66) + 16 * lines + foot, left, right, top: Math.max(above, page.headroom(chart)), bottom: 62 + foot };
   const ratio = chart.size[1] / chart.size[0];
-  const cell = chart.panels[0].square ? Math.min((width - 40) / columns, 460) * 1.02 : single ? 250 : Math.min(Math.max((width * ratio) / rows, 210), 340);
+  const cell = chart.panels[0].square ? Math.min((width - 40) / columns, 460) * 1.02 : single ? 250 : Math.min(Math.max((width * ratio) / rows, chart.least || 210), 340);
   const height = rows * cell + gaps.top + gaps.bottom;
   const inner = { w: width - gaps.left - gaps.right, h: height - gaps.top - gaps.bottom };
   const places = chart.panels.map((panel, i) => {
@@ -130,8 +130,17 @@ page.arrange = (chart, width) => {
   return { height, places, gaps, inner, title: title.text };
 };
 
+// one panel alone, for page one, with the title of the axis that it shares
+page.chartOf = (div) => {
+  const chart = page.data.charts[div.dataset.chart];
+  if (div.dataset.panel === undefined) return chart;
+  const panel = chart.panels[Number(div.dataset.panel)], titles = chart.panels.map(({ x }) => x.title).filter(Boolean);
+  const x = { ...panel.x, title: panel.x.title || titles[titles.length - 1] };
+  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".both") ? 1.9 : 3.4], least: 120, title: "", panels: [{ ...panel, x, place: [0, 1, 0, 1], shared: 0 }] };
+};
+
 page.draw = (div) => {
-  const chart = page.data.charts[div.dataset.chart], width = Math.max(div.clientWidth, 280);
+  const chart = page.chartOf(div), width = Math.max(div.clientWidth, 280);
   const { height, places, gaps, inner, title } = page.arrange(chart, width);
   const seen = new Set(), traces = [], notes = [], narrow = width < 620;
   const layout = { height, width, margin: { l: gaps.left, r: gaps.right, t: gaps.top, b: gaps.bottom }, paper_bgcolor: "rgba(0,0,0,0)",
@@ -156,7 +165,13 @@ page.draw = (div) => {
       notes.push({ text: page.wrapped(panel.title, pixels).text, xref: "paper", yref: "paper", x: place.x[0], y: place.y[1],
         xanchor: "left", yanchor: "bottom", showarrow: false, align: "left", font: { size: narrow ? 11 : 12.5 } });
     }
+    const kept = []; // of upright words of a small chart those that leave room for one another
     panel.words.forEach((word) => {
+      if (chart.least && word.angle && !word.paper && panel.x.range) {
+        const [low, high] = panel.x.range, across = ((word.x - low) / (high - low)) * inner.w;
+        if (kept.some((other) => Math.abs(other - across) < 14)) return;
+        kept.push(across);
+      }
       const align = { center: "center", left: "left", right: "right" }, high = { bottom: "bottom", top: "top", center: "middle", baseline: "bottom" };
       const own = word.paper ? { xref: key.x + " domain", yref: key.y + " domain" } : { xref: key.x, yref: key.y };
       const at = (value, axis) => (axis.log && !word.paper ? Math.log10(value) : value);
@@ -189,10 +204,16 @@ page.start = async () => {
     if (target.dataset.drawn && Math.abs(target.clientWidth - Number(target.dataset.drawn)) > 4) page.draw(target);
   }));
   document.querySelectorAll(".chart").forEach((div) => {
-    div.style.minHeight = page.arrange(page.data.charts[div.dataset.chart], Math.max(div.clientWidth, 280)).height + "px";
+    div.style.minHeight = page.arrange(page.chartOf(div), Math.max(div.clientWidth, 280)).height + "px";
     watcher.observe(div);
     resized.observe(div);
   });
+  // what a link leads to is opened
+  const unfold = () => { const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+    for (let one = target; one; one = one.parentElement) if (one.tagName === "DETAILS") one.open = true;
+    if (target) target.scrollIntoView(); };
+  addEventListener("hashchange", unfold);
+  unfold();
   const redraw = () => document.querySelectorAll(".chart[data-drawn]").forEach(page.draw);
   dark.addEventListener("change", () => { page.dark = dark.matches; redraw(); });
   // paper is white, and shows all charts

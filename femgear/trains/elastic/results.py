@@ -752,6 +752,22 @@ def _safeties(
     notes += safety_notes(rating)
 
 
+def rate_set(results: Results) -> Rating | None:
+    """Rate the teeth of a run with the load factors that it has; None where the case asks for no safeties."""
+    if not rating_wanted(results.case):
+        return None
+    stages, computed = results.stages, dict[str, np.ndarray]()
+    if "dynamics" in stages:
+        factors, sharing = _load_factors(results.dynamics)
+        if "housing" in stages and "dynamic_factor" in results.housing:
+            factors = results.housing["dynamic_factor"].values[[*chosen(results.dynamics.sizes["speed"])]]
+        computed = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
+    if "static" in stages and "face_load_factor" in results.static:
+        static = results.static
+        computed["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+    return _rated(results.case, computed)
+
+
 def _rated(case: Case, computed: Mapping[str, np.ndarray]) -> Rating:
     """Rate the flanks of a planetary set with the load factors (2,) that were computed, by their symbols."""
     sharing, dynamic, face = (computed.get(symbol) for symbol in ("K_gamma", "K_v", "K_Hβ"))

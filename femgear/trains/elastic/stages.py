@@ -112,6 +112,7 @@ from femgear.trains.elastic.excitation_limit import (
     lines_on_foundation,
     lost_level,
 )
+from femgear.trains.elastic.judgements import set_with_ring_judgements
 from femgear.trains.elastic.model import (
     RADIAL,
     RECORD,
@@ -820,6 +821,8 @@ ELASTIC = Train(
     warnings=_warnings,
     verdict=verdict,
     key_figures=tooth_key_figures,
+    judgements=set_with_ring_judgements,
+    front=(("run_up_levels", 0), ("static_transmission_error", 0), ("load_sharing", 0)),
     figures=FiguresOf("femgear.trains.elastic.figures:FIGURES"),
     recorded=Recorded(
         sensor_signals, signal_extent, _FORMATS, lambda results: 2, sensor_spectra, ring_shapes, order_cuts

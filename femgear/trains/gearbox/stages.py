@@ -24,6 +24,7 @@ from femgear.trains.gearbox.balance import (
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection, teeth_of
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
+from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries
 from femgear.trains.gearbox.modes import solve_gearbox_modes
@@ -325,6 +326,15 @@ GEARBOX = Train(
     ),
     describe=describe_gearbox,
     warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case)),
+    judgements=gearbox_judgements,
+    front=(
+        ("run_up_levels", 0),
+        ("run_up_forces", 0),
+        ("sensor_spectra", 0),
+        ("transient_forces", 0),
+        ("load_patterns", 0),
+        ("campbell", 0),
+    ),
     figures=FiguresOf("femgear.trains.gearbox.figures:FIGURES"),
     recorded=GEARBOX_RECORDED,
     verdict=gearbox_verdict,

@@ -23,7 +23,7 @@ from femgear.trains.gearbox.contact import StageContact, loaded_tables
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.power import BoxFlow
 
-_OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
+OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
 _SAFETIES = {"iso_root_safety": "S_F", "iso_contact_safety": "S_H"}
 _STRESSES = {"S_F": "sigma_F0", "S_H": "Z sigma_H0"}
 _WORDS = {
@@ -194,25 +194,44 @@ def smallest_safeties(data: Any, response: Any, marks: Marks) -> Iterator[tuple[
     marks : Marks
         Of the findings of the run.
     """
+    for name, symbol in _SAFETIES.items():
+        least = least_safety(data, response, symbol)
+        if least is None:
+            continue
+        value, (case, mesh, gear) = least
+        cases = data["load_case"].values
+        stress = name.replace("_safety", "_stress")
+        cause = f"{_STRESSES[symbol]} {1e-6 * float(data[stress].values[case, mesh, gear]):.1f} MPa"
+        where = f", {cases[case]}" if len(cases) > 1 else ""
+        text = marks(f"{value:.2f}", *OF_TEETH, of=("deflection",))
+        edition, flank = data.attrs["iso_edition"], data["iso_flank"].values[mesh, gear]
+        yield f"smallest safety {symbol}, ISO 6336:{edition}", f"{text}, {flank}{where}: {cause}"
+
+
+def least_safety(data: Any, response: Any, symbol: str) -> tuple[float, tuple[int, int, int]] | None:
+    """Find the smallest S_F or S_H over all load cases, and its load case, mesh and gear; None without any.
+
+    Parameters
+    ----------
+    data : dataset
+        deflection.nc.
+    response : dataset or None
+        dynamics.nc, whose K_v stands for that of part 1 in its load case.
+    symbol : {"S_F", "S_H"}
+    """
     if "iso_flank" not in data:
-        return
+        return None
     ratio = np.ones(data["iso_dynamic_factor"].shape)
     if response is not None:
         chosen = int(data.attrs["load_case"])
         computed = _computed_factors(data, response)
         ratio[chosen] = np.where(np.isfinite(computed), data["iso_dynamic_factor"].values[chosen] / computed, 1.0)
-    cases, flanks = data["load_case"].values, data["iso_flank"].values
-    for name, symbol in _SAFETIES.items():
-        values = data[name].values * (ratio if symbol == "S_F" else np.sqrt(ratio))[..., None]
-        if not np.isfinite(values).any():
-            continue
-        case, mesh, gear = np.unravel_index(int(np.nanargmin(values)), values.shape)
-        stress = name.replace("_safety", "_stress")
-        cause = f"{_STRESSES[symbol]} {1e-6 * float(data[stress].values[case, mesh, gear]):.1f} MPa"
-        where = f", {cases[case]}" if len(cases) > 1 else ""
-        text = marks(f"{values[case, mesh, gear]:.2f}", *_OF_TEETH, of=("deflection",))
-        edition = data.attrs["iso_edition"]
-        yield f"smallest safety {symbol}, ISO 6336:{edition}", f"{text}, {flanks[mesh, gear]}{where}: {cause}"
+    name = next(name for name, of in _SAFETIES.items() if of == symbol)
+    values = data[name].values * (ratio if symbol == "S_F" else np.sqrt(ratio))[..., None]
+    if not np.isfinite(values).any():
+        return None
+    case, mesh, gear = map(int, np.unravel_index(int(np.nanargmin(values)), values.shape))
+    return float(values[case, mesh, gear]), (case, mesh, gear)
 
 
 def _computed_factors(data: Any, response: Any) -> np.ndarray:

@@ -45,6 +45,7 @@ from femgear.stages.static import STATIC, STRESS, mesh_backlash, solve_static, s
 from femgear.stages.static_results import StaticResult, StressResult, describe_set, set_warnings
 from femgear.stages.strength_results import strength_verdict
 from femgear.stages.tooth_figures import tooth_key_figures
+from femgear.stages.train_judgements import set_judgements
 from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_directions, pin_directions
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
@@ -296,6 +297,8 @@ HELICAL = Train(
     ),
     describe=lambda case: (*describe_set(case), *describe_helical(case, planetary_set(case))),
     warnings=set_warnings,
+    judgements=set_judgements,
+    front=(("speed_sweep", 0), ("helical_mesh_stiffness", 1), ("dynamic_transmission_error", 0)),
     figures=FiguresOf("femgear.trains.helical.figures:FIGURES"),
     remarks=_remarks,
     verdict=strength_verdict,

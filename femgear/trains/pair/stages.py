@@ -72,6 +72,7 @@ from femgear.stages.static_results import (
 )
 from femgear.stages.strength_results import strength_verdict
 from femgear.stages.tooth_figures import pair_key_figures
+from femgear.stages.train_judgements import set_judgements
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import fluctuation, sample
 from femgear.system.system import Modes, NonlinearSystem, Response
@@ -458,6 +459,8 @@ PAIR = Train(
     ),
     describe=_describe_case,
     warnings=_warnings,
+    judgements=set_judgements,
+    front=(("run_up_levels", 1), ("static_transmission_error", 0)),
     figures={
         name: Figures({**figures.captions, **_CAPTIONS}, figures.draw, figures.write) if name == "static" else figures
         for name, figures in FIGURES.items()

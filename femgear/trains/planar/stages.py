@@ -38,6 +38,7 @@ from femgear.stages.static import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRE
 from femgear.stages.static_results import StaticResult, describe_set
 from femgear.stages.strength_results import strength_verdict
 from femgear.stages.tooth_figures import tooth_key_figures
+from femgear.stages.train_judgements import set_judgements
 from femgear.system.fourier import side_bands
 from femgear.trains.planar.model import (
     carrier_sense,
@@ -438,6 +439,8 @@ PLANAR = Train(
     ),
     describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),
     warnings=planar_warnings,
+    judgements=set_judgements,
+    front=(("weight_response", 0), ("tooth_contact", 0), ("response_mesh_forces", 0)),
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
     verdict=strength_verdict,
     key_figures=tooth_key_figures,

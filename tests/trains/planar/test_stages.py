@@ -205,7 +205,7 @@ def test_report_shows_every_figure_with_its_comparison(results):
     for words in ("1 in contact all the time", "Published natural frequencies", "40.75", "Beside NREL"):
         assert words in page
     for section in ("response-to-the-weight", "weight-and-mesh-frequency"):
-        assert f'<h2 id="{section}">' in page
+        assert f'<details id="{section}"' in page
     before = page
     assert cli.main(["report", str(results.folder)]) == 0
     assert (results.folder / "report.html").read_text(encoding="utf-8") == before

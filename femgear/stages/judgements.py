@@ -1,0 +1,292 @@
+"""What page one answers about a gearbox: does it hold, how long, does it run smoothly, how loud, how sure is that.
+
+A `Judgement` is one question with its answer, a colour, and the limit that the colour rests on. Each train lists its
+own with the functions of this module; the page shows them as cards, and joins their sentences to one text.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from femgear.case.sections import StrengthSection
+from femgear.findings import DOUBT, FAULT, Finding
+from femgear.stages.life_results import hours_text
+from femgear.stages.strength import RatedFlank, Rating
+
+State = Literal["good", "look", "bad", "open"]
+_WORDS: dict[State, str] = {"good": "holds", "look": "look", "bad": "fails", "open": "no limit"}
+"""What the colour of a card says, for those who see no colours."""
+STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
+    "Is it strong enough?",
+    "How long does it live?",
+    "Does it stay cool?",
+    "Does it run smoothly?",
+    "How loud is it?",
+    "Can the numbers be relied on?",
+)
+"""The questions, in the order of the cards."""
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """One question about a gearbox with its answer.
+
+    Parameters
+    ----------
+    question : str
+    state : {"good", "look", "bad", "open"}
+        Holds; deserves a look; fails; nothing to judge by.
+    answer : str
+        In figures.
+    limit : str
+        What the state rests on, or which entry of the case would give a limit.
+    sentence : str
+        The answer as a part of a text, empty where it needs no words.
+    """
+
+    question: str
+    state: State
+    answer: str
+    limit: str = ""
+    sentence: str = ""
+
+    @property
+    def words(self) -> str:
+        """What the state means, in a word."""
+        return _WORDS[self.state]
+
+
+@dataclass(frozen=True)
+class Least:
+    """The smallest of some safeties.
+
+    Parameters
+    ----------
+    value : float
+        S_F or S_H.
+    where : str
+        Root or flank that it is of.
+    """
+
+    value: float
+    where: str
+
+
+def least_of(rating: Rating) -> tuple[Least | None, Least | None]:
+    """Find the smallest S_F and S_H of a rating; None where no material has the limit."""
+
+    def least(values: Sequence[float], part: str) -> Least | None:
+        flanks: list[tuple[float, RatedFlank]] = [
+            (value, flank) for value, flank in zip(values, rating.flanks, strict=True) if math.isfinite(value)
+        ]
+        if not flanks:
+            return None
+        value, flank = min(flanks, key=lambda pair: pair[0])
+        return Least(value, f"{part} of {flank.name if flank.name.startswith('gear') else f'the {flank.name}'}")
+
+    roots, contacts = ([flank.root_safety for flank in rating.flanks], [f.contact_safety for f in rating.flanks])
+    return least(roots, "root"), least(contacts, "flank")
+
+
+def judge_strength(
+    root: Least | None, flank: Least | None, asked: StrengthSection, stresses: str = "", doubtful: bool = False
+) -> Judgement:
+    """Judge safeties against those that the case asks for.
+
+    Parameters
+    ----------
+    root, flank : Least or None
+        Smallest S_F and S_H; None where no material has a limit.
+    asked : StrengthSection
+        With the safeties asked for.
+    stresses : str
+        Largest stresses in words, for the answer where there are no safeties.
+    doubtful : bool
+        Whether findings concern the safeties.
+    """
+    known = [
+        (symbol, least, required)
+        for symbol, least, required in (
+            ("S_F", root, asked.required_root_safety),
+            ("S_H", flank, asked.required_flank_safety),
+        )
+        if least is not None
+    ]
+    if not known:
+        how = "give material.treatment and material.hardness for safeties"
+        return Judgement(STRONG, "open", stresses or "not rated", how, "Its strength is not rated")
+    low = [(symbol, least, required) for symbol, least, required in known if not least.value >= required]
+    answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in known)
+    limit = (
+        f"{' and '.join(f'{symbol} at least {required:g}' for symbol, _, required in known)}, ISO 6336:{asked.edition}"
+    )
+    if low:
+        failing = " and ".join(f"{symbol} {least.value:.2f} of the {least.where}" for symbol, least, _ in low)
+        return Judgement(STRONG, "bad", answer, limit, f"Not strong enough: {failing}")
+    if len(known) == 1:
+        missing = "S_H is not rated" if known[0][0] == "S_F" else "S_F is not rated"
+        return Judgement(STRONG, "look", answer, f"{limit}; {missing}", f"Strong enough by {answer}; {missing}")
+    return Judgement(STRONG, "look" if doubtful else "good", answer, limit, f"Strong enough: {answer}")
+
+
+def judge_lives(parts: Iterable[tuple[str, float, str]], required: float | None) -> Iterator[Judgement]:
+    """Judge lives against the one that the case asks for; nothing where none was computed.
+
+    Parameters
+    ----------
+    parts : iterable of (str, float, str)
+        What lives, its shortest life [h], and where: ``("teeth", 31000.0, "root of the sun")``.
+    required : float, optional
+        Life asked for [h].
+    """
+    lives = [(name, hours, where) for name, hours, where in parts if not math.isnan(hours)]
+    if not lives:
+        return
+    answer = ", ".join(f"{name} {_hours(hours)}" for name, hours, _ in lives)
+    _, shortest, where = min(lives, key=lambda life: life[1])
+    words = f"{where} {'fails' if required is not None and shortest < required else 'lives'} first"
+    if math.isinf(shortest):
+        sentence = "No tooth and no bearing fails under these loads"
+    else:
+        sentence = f"It lives {_hours(shortest)} ({words})"
+    if required is None:
+        yield Judgement(LIFE, "open", answer, "operation.required_hours gives a limit", sentence)
+        return
+    state: State = "bad" if shortest < required else "good"
+    asked = "" if math.isinf(shortest) else f" of the {required:,.0f} h asked for"
+    yield Judgement(LIFE, state, answer, f"at least {required:,.0f} h", sentence.replace(" (", f"{asked} (", 1))
+
+
+def _hours(hours: float) -> str:
+    """Write a life with its unit: whole hours with separators of thousands."""
+    if math.isinf(hours):
+        return "without end"
+    return f"{hours:,.0f} h" if hours >= 100.0 else f"{hours_text(hours)} h"
+
+
+def lives_of_teeth(data: Any) -> Iterator[tuple[str, float, str]]:
+    """Name the shortest life of roots and flanks of a file with lives [h]."""
+    kinds = [kind for kind in ("root", "flank") if f"{kind}_life" in data]
+    if not kinds:
+        return
+    kind = min(kinds, key=lambda kind: float(data[f"{kind}_life"].values.min()))
+    lives = data[f"{kind}_life"].values
+    at = int(lives.argmin())
+    yield "teeth", float(lives[at]), f"the {kind} of {data[kind].values[at]}"
+
+
+def lives_of_bearings(data: Any) -> Iterator[tuple[str, float, str]]:
+    """Name the shortest lives of bearings of shafts and of planets in a file with lives [h]."""
+    if "spectrum_reference_life" in data:
+        modified, reference = data["spectrum_modified_life"].values, data["spectrum_reference_life"].values
+        life = np.where(np.isnan(modified), reference, modified)
+        if np.isfinite(life).any():
+            at = int(np.nanargmin(life))
+            yield "bearings", float(life[at]), f"bearing {data['bearing'].values[at]}"
+    if "planet_bearing_life" in data:
+        life = data["planet_bearing_life"].values
+        at = int(life.argmin())
+        yield "planets' bearings", float(life[at]), f"the bearing of {data['planet_bearing'].values[at]}"
+
+
+def judge_heat(results: Any) -> Iterator[Judgement]:
+    """Judge scuffing and film, with the efficiency; nothing where no losses were computed."""
+    if "losses" not in results.stages:
+        return
+    values = np.asarray(results.losses["efficiency"].values, float)
+    loss = np.asarray(results.losses["loss"].values, float)
+    if not np.isfinite(values).any():
+        return
+    efficiency = f"efficiency {100.0 * np.nanmin(values):.2f} %, losses {np.nanmax(loss):,.0f} W"
+    limits, below = list[str](), list[str]()
+    if "heat" in results.stages:
+        for name, words in (("scuffing_safety", "S_B"), ("film_safety", "S_lambda")):
+            safety = np.asarray(results.heat[name].values, float)
+            if np.isfinite(safety).any():
+                limits.append(f"{words} {np.nanmin(safety):.2f}")
+                if not np.nanmin(safety) >= 1.0:
+                    below.append(limits[-1])
+        hottest = float(np.nanmax(results.heat["highest_temperature"].values))
+        efficiency += f", contact {hottest:.0f} °C"
+    answer = ", ".join([efficiency, *limits])
+    sentence = f"It loses {np.nanmax(loss):,.0f} W"
+    if below:
+        yield Judgement(HEAT, "bad", answer, "at least 1", f"{sentence} and its oil fails ({', '.join(below)})")
+    elif limits:
+        yield Judgement(HEAT, "good", answer, "at least 1, ISO/TS 6336-20 and -22", sentence)
+    else:
+        yield Judgement(HEAT, "open", answer, "lubricant.fzg_stage gives a limit", sentence)
+
+
+def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgement:
+    """Judge the run by what speaks against it: teeth that part or press on both flanks, motions that are not stable.
+
+    Parameters
+    ----------
+    answer : str
+        Transmission error and dynamic factors, in figures.
+    results : Results
+    stages : sequence of str
+        Stages that the train has with motion; where a run has none of them nothing is judged.
+    """
+    present = [stage for stage in stages if stage in results.stages]
+    if not present:
+        return Judgement(SMOOTH, "open", answer, "no motion was computed")
+    against = list(dict.fromkeys(_against(results, present)))
+    if not against:
+        return Judgement(SMOOTH, "good", answer, "teeth stay in contact, motions are stable")
+    return Judgement(SMOOTH, "look", answer, ", ".join(against), f"At some speeds {' and '.join(against)}")
+
+
+def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
+    """List what speaks against a smooth run in findings and results."""
+    codes = {finding.code for finding in results.findings}
+    data = [results[stage] for stage in stages]
+    parted = any("drive_contact" in part and float(part["drive_contact"].min()) < 1.0 for part in data)
+    if parted or codes & {"W-PULL", "W-SEPARATION"}:
+        yield "teeth part"
+    if any("back_contact" in part and float(part["back_contact"].max()) > 0.0 for part in data):
+        yield "teeth press on their back flanks"
+    unstable = any("stable" in part and bool((part["stable"].values == 0).any()) for part in data)
+    if unstable or codes & {"W-UNSTABLE", "W-GROWTH"}:
+        yield "motions are not stable"
+
+
+_CLEAR = "no resonance makes the level at a speed of operation"
+
+
+def judge_noise(answer: str, sentence: str, resonance: str = "", open_words: str = _CLEAR) -> Judgement:
+    """Judge how loud it is: by resonances at speeds of operation, since a level has no limit of its own.
+
+    Parameters
+    ----------
+    answer : str
+        Levels, in figures.
+    sentence : str
+        Where it is loudest, and by what.
+    resonance : str
+        The resonance that makes the level at a speed of operation, empty where there is none.
+    open_words : str
+        What to say where there is none.
+    """
+    if resonance:
+        return Judgement(QUIET, "look", answer, resonance, sentence)
+    return Judgement(QUIET, "open", answer, open_words, sentence)
+
+
+def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
+    """Judge the numbers by the findings of the run: faults, doubts, and a run that did not end."""
+    faults, doubts = ([f for f in findings if f.severity == severity] for severity in (FAULT, DOUBT))
+    if not complete:
+        return Judgement(SURE, "bad", "the run did not come to its end", "", "The run did not come to its end")
+    if faults or doubts:
+        count = [f"{len(f)} {word}{'s' * (len(f) > 1)}" for f, word in ((faults, "fault"), (doubts, "doubt")) if f]
+        codes = list(dict.fromkeys(finding.code for finding in (*faults, *doubts) if finding.code))
+        shown = ", ".join(codes[:4]) + (f" and {len(codes) - 4} more" if len(codes) > 4 else "")
+        return Judgement(SURE, "bad" if faults else "look", " and ".join(count), shown)
+    return Judgement(SURE, "good", "no doubt was raised", "solutions converged, samples resolve them")

@@ -1,0 +1,89 @@
+"""What page one answers about pairs and planetary sets, from the files that their stages write."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from femgear.case.load_spectrum import required_life
+from femgear.findings import DOUBT, FAULT
+from femgear.report.tables import significant
+from femgear.stages.judgements import (
+    Judgement,
+    judge_heat,
+    judge_lives,
+    judge_noise,
+    judge_numbers,
+    judge_smoothness,
+    judge_strength,
+    least_of,
+    lives_of_bearings,
+    lives_of_teeth,
+)
+from femgear.stages.static_results import peak_to_peak
+from femgear.stages.strength import Rating
+from femgear.stages.strength_results import computed_dynamic_factor, kind_names, rate_results
+from femgear.stages.stress_reasons import largest_pressure
+
+_OF_SAFETIES = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION", "W-PRESSURE"
+_RESPONSES = "dynamics", "response", "runup", "branch"
+"""Stages with motion."""
+
+
+def set_judgements(results: Any) -> Iterator[Judgement]:
+    """Judge a pair or a set of rigid bodies, which has no housing."""
+    rated = rate_results(results)
+    yield from judge_teeth(results, None if rated is None else rated[0])
+    yield judge_noise("no housing in this kind of case", "", open_words="femgear gearbox CASE makes one with sensors")
+    yield judge_numbers(results.findings, results.manifest.complete)
+
+
+def judge_teeth(results: Any, rating: Rating | None) -> Iterator[Judgement]:
+    """Judge strength, lives, heat and smoothness of a pair or a set.
+
+    Parameters
+    ----------
+    results : Results
+    rating : Rating or None
+        Of its teeth; None where the case asks for no safeties.
+    """
+    case, stages, findings = results.case, results.stages, results.findings
+    root, flank = (None, None) if rating is None else least_of(rating)
+    doubtful = any(f.code in _OF_SAFETIES and f.severity in (DOUBT, FAULT) for f in findings)
+    yield judge_strength(root, flank, case.strength, _stresses(results), doubtful)
+    if "life" in stages:
+        parts = (*lives_of_teeth(results.life), *lives_of_bearings(results.life))
+        yield from judge_lives(parts, required_life(case.operation))
+    yield from judge_heat(results)
+    yield judge_smoothness(_motion(results), results, _RESPONSES)
+
+
+def _stresses(results: Any) -> str:
+    """Write the largest stresses of a run, empty where there are none."""
+    if "stress" not in results.stages:
+        return ""
+    root = float(np.nanmax(results.stress["root_worst"].values))
+    pressure = float(np.nanmax(largest_pressure(results.stress)))
+    return f"root {1e-6 * root:.0f} MPa, pressure {1e-6 * pressure:.0f} MPa"
+
+
+def _motion(results: Any) -> str:
+    """Write transmission errors and dynamic factors of a run by kind of mesh."""
+    parts = []
+    if "static" in results.stages:
+        static = results.static
+        kinds = kind_names(static["mesh"].values)
+        error = 1e6 * peak_to_peak(static, "ste").reshape(len(kinds), -1).max(axis=1)
+        parts.append(f"transmission error {_joined(error, 2)} µm")
+    if "dynamics" in results.stages:
+        kinds = kind_names(results.dynamics["mesh"].values)
+        parts.append(f"K_v {_joined(computed_dynamic_factor(results.dynamics, len(kinds)), 2)}")
+    return ", ".join(parts) or "-"
+
+
+def _joined(values: Sequence[float] | np.ndarray, places: int) -> str:
+    """Write the values of the kinds of mesh, one where all are equal."""
+    texts = [significant(float(value), places) for value in values]
+    return texts[0] if len(set(texts)) == 1 else " and ".join(texts)

@@ -1,0 +1,82 @@
+"""What page one answers about a set with an elastic ring: its teeth, and how loud it is by which line and mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from femgear.stages.judgements import Judgement, judge_noise, judge_numbers
+from femgear.stages.train_judgements import judge_teeth
+from femgear.trains.elastic.results import rate_set
+
+_MAKES = 0.5
+"""Share of the level from which on one resonance makes it."""
+_NEAR = 10.0
+"""Distance up to which a resonance counts at a speed of operation [%]."""
+
+
+def set_with_ring_judgements(results: Any) -> Iterator[Judgement]:
+    """Judge a planetary set with an elastic ring."""
+    yield from judge_teeth(results, rate_set(results))
+    if "housing" in results.stages:
+        yield _noise(results)
+    yield judge_numbers(results.findings, results.manifest.complete)
+
+
+def _noise(results: Any) -> Judgement:
+    """Judge the level at the loudest speed of operation, with its main line and the resonance that makes it.
+
+    Lines of housing.nc are displacements.
+    """
+    housing = results.housing
+    level, speeds = housing["level"].values, housing["speed"].values
+    at = int(level.argmax())
+    speed = float(speeds[at])
+    heard = (
+        f" ({float(housing['pressure_level'][at]):.1f} dB(A) at the microphone)" if "pressure_level" in housing else ""
+    )
+    answer = f"{level[at]:.3g} m/s²{heard} at {speed:,.4g} rpm"
+    carrier = abs(float(housing["carrier_speed"].values[at]))
+    orders = housing["order"].values
+    size = np.hypot(housing["lines_real"].values[at], housing["lines_imag"].values[at]) * (orders * carrier) ** 2
+    line = int(size.argmax())
+    order = float(orders[line])
+    hertz = order * carrier / (2.0 * np.pi)
+    share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
+    main = f"order {order:g} ({hertz:,.0f} Hz{_nearest_mode(results, hertz)}) makes {share:.0%} of the power"
+    sentence = f"At {speed:,.4g} rpm it has {level[at]:.3g} m/s²{heard}: {main}"
+    if "runup" not in results.stages:
+        return judge_noise(answer, sentence)
+    runup = results.runup
+    worst = int(runup["level"].values.argmax())
+    loudest = float(runup["level"].values[worst])
+    sentence += f". Loudest of the run-up: {loudest:.3g} m/s² at {float(runup['speed'].values[worst]):,.0f} rpm"
+    return judge_noise(answer, sentence, _resonance(runup))
+
+
+def _nearest_mode(results: Any, hertz: float) -> str:
+    """Write the mode nearest to a frequency, empty without modes or where none is within a fifth."""
+    if "modes" not in results.stages:
+        return ""
+    frequency = results.modes["frequency"].values
+    mode = int(np.abs(frequency - hertz).argmin())
+    if abs(frequency[mode] - hertz) > 0.2 * hertz:
+        return ""
+    return f", mode {mode + 1}: {results.modes['kind'].values[mode]}"
+
+
+def _resonance(runup: Any) -> str:
+    """Write the resonance that makes most of the level at a speed of operation; empty where none does."""
+    if "operating_alone" not in runup:
+        return ""
+    alone, distance = runup["operating_alone"].values, runup["distance"].values
+    level = np.interp(runup["operating_speed"].values, runup["speed"].values, runup["level"].values)
+    makes = np.where((np.abs(distance) <= _NEAR) & (alone >= _MAKES * level), alone / level, 0.0)
+    if not makes.any():
+        return ""
+    at = int(makes.argmax())
+    mode, harmonic = int(runup["mode"].values[at]), int(runup["mesh_harmonic"].values[at])
+    speed = float(runup["operating_speed"].values[at])
+    return f"mode {mode} meets mesh harmonic {harmonic} {distance[at]:+.1f} % from {speed:,.4g} rpm"

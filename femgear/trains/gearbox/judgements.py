@@ -1,0 +1,123 @@
+"""What page one answers about a gearbox: teeth and bearings over all load cases, its run, its loudest sensor."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from femgear.case.load_spectrum import required_life
+from femgear.case.sections import StrengthSection
+from femgear.findings import NOTE
+from femgear.stages.judgements import (
+    Judgement,
+    Least,
+    judge_heat,
+    judge_lives,
+    judge_noise,
+    judge_numbers,
+    judge_smoothness,
+    judge_strength,
+    lives_of_bearings,
+    lives_of_teeth,
+)
+from femgear.stages.key_figures import REFERENCE_ACCELERATION
+from femgear.trains.gearbox.mode_words import nearest_mode
+from femgear.trains.gearbox.response_results import line_origin
+from femgear.trains.gearbox.strength import OF_TEETH, least_safety
+
+_RESPONSES = "dynamics", "runup", "balance", "transient"
+"""Stages with motion."""
+
+
+def gearbox_judgements(results: Any) -> Iterator[Judgement]:
+    """Judge a gearbox."""
+    stages, case, findings = results.stages, results.case, results.findings
+    if "deflection" in stages:
+        data = results.deflection
+        response = results.dynamics if "dynamics" in stages else None
+        root, flank = (_least(least_safety(data, response, symbol), data) for symbol in ("S_F", "S_H"))
+        doubtful = any(f.code in OF_TEETH and f.severity != NOTE for f in findings)
+        asked = case.strength or StrengthSection()
+        yield judge_strength(root, flank, asked, _stresses(results), doubtful)
+        yield from judge_lives((*lives_of_teeth(data), *lives_of_bearings(data)), required_life(case.operation))
+    yield from judge_heat(results)
+    yield judge_smoothness(_motion(results), results, _RESPONSES)
+    if "dynamics" in stages and results.dynamics.sizes.get("sensor", 0):
+        yield _noise(results)
+    yield judge_numbers(findings, results.manifest.complete)
+
+
+def _least(found: tuple[float, tuple[int, int, int]] | None, data: Any) -> Least | None:
+    """Name the flank of the smallest safety, and its load case where there are several."""
+    if found is None:
+        return None
+    value, (case, mesh, gear) = found
+    where = str(data["iso_flank"].values[mesh, gear])
+    return Least(value, where if data.sizes["load_case"] == 1 else f"{where}, {data['load_case'].values[case]}")
+
+
+def _stresses(results: Any) -> str:
+    if "stress" not in results.stages:
+        return ""
+    root, pressure = (float(np.nanmax(results.stress[name].values)) for name in ("root_worst", "largest_pressure"))
+    return f"root {1e-6 * root:.0f} MPa, pressure {1e-6 * pressure:.0f} MPa"
+
+
+def _motion(results: Any) -> str:
+    """Write the largest transmission error and the largest mesh force over its mean."""
+    parts = []
+    if "deflection" in results.stages:
+        for name, words, factor, unit in (
+            ("transmission_error", "transmission error", 1e6, " µm"),
+            ("face_load_factor", "K_Hβ", 1.0, ""),
+        ):
+            values = results.deflection[name].values if name in results.deflection else np.array([np.nan])
+            if np.isfinite(values).any():
+                parts.append(f"{words} {factor * np.nanmax(values):.3g}{unit}")
+    if "dynamics" in results.stages:
+        factors = results.dynamics["dynamic_factor"].values
+        if np.isfinite(factors).any():
+            parts.append(f"K_v {np.nanmax(factors):.2f}")
+    return ", ".join(parts) or "-"
+
+
+def _noise(results: Any) -> Judgement:
+    """Judge the level at the loudest sensor, with its main line and the way most of it comes by."""
+    data, modes = results.dynamics, results.modes if "modes" in results.stages else None
+    level = data["level"].values[0]
+    sensor = int(level.argmax())
+    whole, name, speed = float(level[sensor]), data["sensor"].values[sensor], float(data["speed"].values[0])
+    answer = f"{_level(whole)} at {name}, {speed:,.4g} rpm"
+    if not whole > 0.0:
+        return judge_noise(answer, "", open_words="nothing excites it")
+    size = np.hypot(data["lines_real"].values[0, sensor], data["lines_imag"].values[0, sensor])
+    line = int(size.argmax())
+    hertz = float(data["order"].values[line]) * speed / 60.0
+    near = "" if modes is None else f", near {nearest_mode(modes, hertz)}"
+    main = (
+        f"{line_origin(data, line)} at {hertz:,.0f} Hz{near} makes {0.5 * (size[line] / whole) ** 2:.0%} of the power"
+    )
+    sentence = f"At {speed:,.4g} rpm {name} has {_level(whole)}: {main}"
+    if "path_share" in data:
+        share = data["path_share"].values[0, :, sensor]
+        way = int(share.argmax())
+        sentence += f"; {share[way]:.0%} comes by {data['path'].values[way]}"
+    if "runup" in results.stages and "level" in results.runup:
+        over = results.runup["level"].values.max(axis=1)
+        at = int(over.argmax())
+        sentence += (
+            f". Loudest of the run-up: {_level(float(over[at]))} at {results.runup['speed'].values[at]:,.0f} rpm"
+        )
+    return judge_noise(
+        answer, sentence, open_words="no limit is known: femgear compare sets two runs beside one another"
+    )
+
+
+def _level(level: float) -> str:
+    """Write a level with its decibels re 1 µm/s²."""
+    if not level > 0.0:
+        return "silence"
+    return f"{level:.3g} m/s² ({20.0 * math.log10(level / REFERENCE_ACCELERATION):.0f} dB)"

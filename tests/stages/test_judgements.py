@@ -1,0 +1,151 @@
+"""Judgements of page one: states follow from the numbers and the limits of the case."""
+
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from femgear.case.sections import StrengthSection
+from femgear.findings import DOUBT, FAULT, NOTE, Finding
+from femgear.stages.judgements import (
+    Least,
+    judge_heat,
+    judge_lives,
+    judge_noise,
+    judge_numbers,
+    judge_smoothness,
+    judge_strength,
+    least_of,
+    lives_of_bearings,
+    lives_of_teeth,
+)
+
+ROOT, FLANK = Least(1.92, "root of the planet"), Least(1.21, "flank of the sun")
+
+
+def test_safeties_are_judged_by_those_asked_for():
+    asked = StrengthSection(required_root_safety=1.4, required_flank_safety=1.0)
+    holds = judge_strength(ROOT, FLANK, asked)
+    assert holds.state == "good" and holds.limit == "S_F at least 1.4 and S_H at least 1, ISO 6336:2019"
+    assert holds.sentence == "Strong enough: S_F 1.92 (root of the planet), S_H 1.21 (flank of the sun)"
+    more = StrengthSection(required_root_safety=2.0, required_flank_safety=1.25, edition=2006)
+    fails = judge_strength(ROOT, FLANK, more)
+    assert fails.state == "bad" and fails.limit.endswith("ISO 6336:2006")
+    assert (
+        fails.sentence == "Not strong enough: S_F 1.92 of the root of the planet and S_H 1.21 of the flank of the sun"
+    )
+    # a safety that is exactly the one asked for holds, one without a number does not
+    assert judge_strength(Least(1.4, ""), Least(1.0, ""), asked).state == "good"
+    assert judge_strength(Least(math.nan, ""), FLANK, asked).state == "bad"
+
+
+def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
+    open_ = judge_strength(None, None, StrengthSection(), "root 130 MPa, pressure 736 MPa")
+    assert (open_.state, open_.answer) == ("open", "root 130 MPa, pressure 736 MPa")
+    assert "material.treatment" in open_.limit and open_.words == "no limit"
+    half = judge_strength(None, FLANK, StrengthSection())
+    assert half.state == "look" and half.limit.endswith("S_F is not rated")
+    assert judge_strength(ROOT, FLANK, StrengthSection(), doubtful=True).state == "look"
+
+
+def test_the_smallest_safety_is_that_of_its_flank():
+    flanks = [
+        SimpleNamespace(name="sun", root_safety=2.0, contact_safety=math.nan),
+        SimpleNamespace(name="gear 2", root_safety=1.5, contact_safety=math.nan),
+    ]
+    root, flank = least_of(SimpleNamespace(flanks=flanks))
+    assert root == Least(1.5, "root of gear 2") and flank is None
+
+
+@pytest.mark.parametrize(
+    ("required", "state", "words"),
+    (
+        (None, "open", "It lives 7,605 h (bearing C lives first)"),
+        (5000.0, "good", "It lives 7,605 h of the 5,000 h asked for (bearing C lives first)"),
+        (20000.0, "bad", "It lives 7,605 h of the 20,000 h asked for (bearing C fails first)"),
+    ),
+)
+def test_lives_are_judged_by_the_one_asked_for(required, state, words):
+    lives = [("teeth", math.inf, "the root of gear 1"), ("bearings", 7605.0, "bearing C")]
+    (judgement,) = judge_lives(lives, required)
+    assert (judgement.state, judgement.sentence) == (state, words)
+    assert judgement.answer == "teeth without end, bearings 7,605 h"
+
+
+def test_lives_without_end_hold_and_none_is_not_judged():
+    (judgement,) = judge_lives([("teeth", math.inf, "the root of gear 1")], 100.0)
+    assert judgement.state == "good" and judgement.sentence == "No tooth and no bearing fails under these loads"
+    assert not list(judge_lives([("bearings", math.nan, "")], 100.0))
+
+
+def test_lives_come_from_the_files():
+    teeth = {"root_life": ("root", [math.inf, 400.0]), "flank_life": ("flank", [900.0, math.inf])}
+    gears = {"root": ["sun", "ring"], "flank": ["sun", "ring"]}
+    assert list(lives_of_teeth(xr.Dataset(teeth, gears))) == [("teeth", 400.0, "the root of ring")]
+    # a_ISO L10r stands for L10r where there is one
+    bearings = {
+        "spectrum_reference_life": ("bearing", [800.0, 500.0, math.nan]),
+        "spectrum_modified_life": ("bearing", [300.0, math.nan, math.nan]),
+        "planet_bearing_life": ("planet_bearing", [70.0]),
+    }
+    data = xr.Dataset(bearings, {"bearing": ["A", "B", "C"], "planet_bearing": ["planet 1"]})
+    assert [(name, hours) for name, hours, _ in lives_of_bearings(data)] == [
+        ("bearings", 300.0),
+        ("planets' bearings", 70.0),
+    ]
+
+
+@pytest.mark.parametrize(("safety", "state"), ((math.nan, "open"), (2.0, "good"), (0.9, "bad")))
+def test_heat_is_judged_by_scuffing(safety, state):
+    losses = xr.Dataset({"efficiency": ("speed", [0.99, 0.985]), "loss": ("speed", [100.0, 250.0])})
+    kinds = "speed", "mesh_kind"
+    heat = xr.Dataset(
+        {name: (kinds, [[value]]) for name, value in (("scuffing_safety", safety), ("film_safety", math.nan))}
+        | {"highest_temperature": (kinds, [[113.0]])}
+    )
+    results = SimpleNamespace(stages=("losses", "heat"), losses=losses, heat=heat)
+    (judgement,) = judge_heat(results)
+    assert judgement.state == state and judgement.answer.startswith("efficiency 98.50 %, losses 250 W, contact 113 °C")
+    assert not list(judge_heat(SimpleNamespace(stages=())))
+
+
+class Files(dict):
+    """Results of some stages."""
+
+    stages = property(lambda self: tuple(self))
+    findings: tuple = ()
+
+
+def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
+    smooth = Files(dynamics=xr.Dataset({"drive_contact": ("speed", [1.0, 1.0]), "stable": ("speed", [1, 1])}))
+    assert judge_smoothness("-", smooth, ("dynamics",)).state == "good"
+    assert judge_smoothness("-", smooth, ("branch",)).state == "open"
+    parted = Files(branch=xr.Dataset({"drive_contact": ("point", [1.0, 0.9]), "stable": ("point", [1, 0])}))
+    judgement = judge_smoothness("-", parted, ("dynamics", "branch"))
+    assert judgement.state == "look" and judgement.limit == "teeth part, motions are not stable"
+    # what is not determined is not judged
+    assert judge_smoothness("-", Files(branch=xr.Dataset({"stable": ("point", [1, -1])})), ("branch",)).state == "good"
+    back = Files(branch=xr.Dataset({"back_contact": ("point", [0.0, 0.1])}))
+    assert judge_smoothness("-", back, ("branch",)).limit == "teeth press on their back flanks"
+    pulled = Files(dynamics=xr.Dataset({"level": ("speed", np.ones(2))}))
+    pulled.findings = (Finding("W-PULL", "", "it pulls"),)
+    assert judge_smoothness("-", pulled, ("dynamics",)).limit == "teeth part"
+
+
+def test_a_level_is_judged_by_resonances_alone():
+    assert judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2").state == "look"
+    assert judge_noise("1 m/s²", "so").state == "open"
+
+
+def test_numbers_are_judged_by_the_findings():
+    note, doubt, fault = (
+        Finding(code, "", "text", severity=severity)
+        for code, severity in (("W-TIP", NOTE), ("W-TAIL", DOUBT), ("W-LIFE", FAULT))
+    )
+    assert judge_numbers([note], complete=True).state == "good"
+    assert judge_numbers([note, doubt], complete=True).state == "look"
+    judged = judge_numbers([doubt, fault, fault], complete=True)
+    assert (judged.state, judged.answer, judged.limit) == ("bad", "2 faults and 1 doubt", "W-LIFE, W-TAIL")
+    assert judge_numbers([], complete=False).state == "bad"

@@ -1,0 +1,50 @@
+"""Judgements of pairs and sets, from the files of a run."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from femgear.stages.judgements import HEAT, QUIET, SMOOTH, STRONG, SURE
+from femgear.stages.train_judgements import judge_teeth, set_judgements
+from femgear.trains.reading import read_case, with_values
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+class Files(dict):
+    """A run of a case with the files of some stages."""
+
+    def __init__(self, case, **data):
+        super().__init__(data)
+        self.case, self.findings, self.stages = case, (), tuple(data)
+        self.manifest = SimpleNamespace(complete=True)
+        self.__dict__.update(data)
+
+
+@pytest.fixture(scope="module")
+def static():
+    meshes = ["sun-planet 1", "sun-planet 2", "planet 1-ring", "planet 2-ring"]
+    error = 1e-6 * np.array([1.0, 1.5, 0.25, 0.25])
+    return xr.Dataset({"ste_peak_to_peak": ("mesh", error)}, {"mesh": meshes, "planet": [1, 2]})
+
+
+def test_the_error_of_either_kind_of_mesh_is_the_largest(static):
+    case = read_case(CASES / "planetary_27_40_108.toml")
+    strength, smooth = judge_teeth(Files(case, static=static), None)
+    assert (strength.question, strength.state) == (STRONG, "open")
+    assert (smooth.question, smooth.answer) == (SMOOTH, "transmission error 1.50 and 0.25 µm")
+    assert smooth.state == "open"  # without motion
+
+
+def test_a_pair_with_limits_is_rated_and_has_no_level():
+    limits = {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"}
+    case = with_values(read_case(CASES / "spur_pair.toml"), {**limits, "strength.required_flank_safety": 3.0})
+    judged = {judgement.question: judgement for judgement in set_judgements(Files(case))}
+    assert list(judged) == [STRONG, SMOOTH, QUIET, SURE] and HEAT not in judged
+    assert judged[STRONG].state == "bad" and "S_H at least 3" in judged[STRONG].limit
+    assert judged[QUIET].state == "open" and "femgear gearbox" in judged[QUIET].limit
+    enough = with_values(case, {"strength.required_flank_safety": 0.1})
+    assert next(set_judgements(Files(enough))).state == "good"

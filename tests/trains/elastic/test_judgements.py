@@ -1,0 +1,76 @@
+"""Judgements of a set with an elastic ring: its level, main line and resonance."""
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from femgear.stages.judgements import QUIET
+from femgear.trains.elastic.judgements import set_with_ring_judgements
+from femgear.trains.reading import read_case
+
+CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
+CARRIER = 2.0 * np.pi * 10.0
+
+
+@pytest.fixture
+def results():
+    """Two lines at 600 rpm of the carrier: order 108 has the larger displacement, order 216 the larger acceleration."""
+    order = np.array([0.0, 108.0, 216.0])
+    moved = np.array([[0.0, 2.0, 1.0]]) / (108.0 * CARRIER) ** 2
+    level = np.sqrt(0.5 * (2.0**2 + 4.0**2))
+    housing = xr.Dataset(
+        {
+            "lines_real": (("speed", "order"), moved),
+            "lines_imag": (("speed", "order"), 0.0 * moved),
+            "level": ("speed", [level]),
+            "carrier_speed": ("speed", [CARRIER]),
+        },
+        {"speed": [3000.0], "order": order},
+    )
+    runup = xr.Dataset(
+        {
+            "level": ("speed", [1.0, level, 9.0]),
+            "operating_alone": ("resonance", [0.4 * level, 0.8 * level]),
+            "distance": ("resonance", [0.1, -1.6]),
+            "operating_speed": ("resonance", [3000.0, 3000.0]),
+            "mode": ("resonance", [2, 7]),
+            "mesh_harmonic": ("resonance", [1, 2]),
+        },
+        {"speed": [1000.0, 3000.0, 4000.0]},
+    )
+    modes = xr.Dataset({"frequency": ("mode", [500.0, 2200.0]), "kind": ("mode", ["rotational", "ring"])})
+    return SimpleNamespace(
+        case=read_case(CASE),
+        findings=(),
+        stages=("housing", "runup", "modes"),
+        manifest=SimpleNamespace(complete=True),
+        housing=housing,
+        runup=runup,
+        modes=modes,
+    )
+
+
+def judged(results):
+    class Files(SimpleNamespace):
+        def __getitem__(self, name):
+            return getattr(self, name)
+
+    found = {judgement.question: judgement for judgement in set_with_ring_judgements(Files(**vars(results)))}
+    return found[QUIET]
+
+
+def test_the_main_line_is_that_of_the_acceleration_with_its_mode(results):
+    noise = judged(results)
+    assert "order 216 (2,160 Hz, mode 2: ring) makes 80% of the power" in noise.sentence
+    assert noise.sentence.endswith("Loudest of the run-up: 9 m/s² at 4,000 rpm")
+    assert noise.answer == "3.16 m/s² at 3,000 rpm"
+
+
+def test_a_resonance_that_makes_the_level_deserves_a_look(results):
+    assert judged(results).state == "look"
+    assert judged(results).limit == "mode 7 meets mesh harmonic 2 -1.6 % from 3,000 rpm"
+    results.runup["distance"].values[1] = 12.0
+    assert judged(results).state == "open"
