@@ -94,7 +94,7 @@ def least_of(rating: Rating) -> tuple[Least | None, Least | None]:
 
 
 def judge_strength(
-    root: Least | None, flank: Least | None, asked: StrengthSection, stresses: str = "", doubtful: bool = False
+    root: Least | None, flank: Least | None, limits: StrengthSection, stresses: str = "", doubtful: bool = False
 ) -> Judgement:
     """Judge safeties against those that the case asks for.
 
@@ -102,34 +102,34 @@ def judge_strength(
     ----------
     root, flank : Least or None
         Smallest S_F and S_H; None where no material has a limit.
-    asked : StrengthSection
+    limits : StrengthSection
         With the safeties asked for.
     stresses : str
         Largest stresses in words, for the answer where there are no safeties.
     doubtful : bool
         Whether findings concern the safeties.
     """
-    known = [
+    rated = [
         (symbol, least, required)
         for symbol, least, required in (
-            ("S_F", root, asked.required_root_safety),
-            ("S_H", flank, asked.required_flank_safety),
+            ("S_F", root, limits.required_root_safety),
+            ("S_H", flank, limits.required_flank_safety),
         )
         if least is not None
     ]
-    if not known:
+    if not rated:
         how = "give material.treatment and material.hardness for safeties"
         return Judgement(STRONG, "open", stresses or "not rated", how, "Its strength is not rated")
-    low = [(symbol, least, required) for symbol, least, required in known if not least.value >= required]
-    answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in known)
+    low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
+    answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated)
     limit = (
-        f"{' and '.join(f'{symbol} at least {required:g}' for symbol, _, required in known)}, ISO 6336:{asked.edition}"
+        f"{' and '.join(f'{symbol} at least {required:g}' for symbol, _, required in rated)}, ISO 6336:{limits.edition}"
     )
     if low:
         failing = " and ".join(f"{symbol} {least.value:.2f} of the {least.where}" for symbol, least, _ in low)
         return Judgement(STRONG, "bad", answer, limit, f"Not strong enough: {failing}")
-    if len(known) == 1:
-        missing = "S_H is not rated" if known[0][0] == "S_F" else "S_F is not rated"
+    if len(rated) == 1:
+        missing = "S_H is not rated" if rated[0][0] == "S_F" else "S_F is not rated"
         return Judgement(STRONG, "look", answer, f"{limit}; {missing}", f"Strong enough by {answer}; {missing}")
     return Judgement(STRONG, "look" if doubtful else "good", answer, limit, f"Strong enough: {answer}")
 
@@ -158,8 +158,8 @@ def judge_lives(parts: Iterable[tuple[str, float, str]], required: float | None)
         yield Judgement(LIFE, "open", answer, "operation.required_hours gives a limit", sentence)
         return
     state: State = "bad" if shortest < required else "good"
-    asked = "" if math.isinf(shortest) else f" of the {required:,.0f} h asked for"
-    yield Judgement(LIFE, state, answer, f"at least {required:,.0f} h", sentence.replace(" (", f"{asked} (", 1))
+    wanted = "" if math.isinf(shortest) else f" of the {required:,.0f} h asked for"
+    yield Judgement(LIFE, state, answer, f"at least {required:,.0f} h", sentence.replace(" (", f"{wanted} (", 1))
 
 
 def _hours(hours: float) -> str:

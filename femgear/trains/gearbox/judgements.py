@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from femgear.case.load_spectrum import required_life
-from femgear.case.sections import StrengthSection
 from femgear.findings import NOTE
 from femgear.stages.judgements import (
     Judgement,
@@ -40,8 +39,7 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
         response = results.dynamics if "dynamics" in stages else None
         root, flank = (_least(least_safety(data, response, symbol), data) for symbol in ("S_F", "S_H"))
         doubtful = any(f.code in OF_TEETH and f.severity != NOTE for f in findings)
-        asked = case.strength or StrengthSection()
-        yield judge_strength(root, flank, asked, _stresses(results), doubtful)
+        yield judge_strength(root, flank, case.strength, _stresses(results), doubtful)
         yield from judge_lives((*lives_of_teeth(data), *lives_of_bearings(data)), required_life(case.operation))
     yield from judge_heat(results)
     yield judge_smoothness(_motion(results), results, _RESPONSES)
@@ -50,11 +48,11 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
     yield judge_numbers(findings, results.manifest.complete)
 
 
-def _least(found: tuple[float, tuple[int, int, int]] | None, data: Any) -> Least | None:
+def _least(safety: tuple[float, tuple[int, int, int]] | None, data: Any) -> Least | None:
     """Name the flank of the smallest safety, and its load case where there are several."""
-    if found is None:
+    if safety is None:
         return None
-    value, (case, mesh, gear) = found
+    value, (case, mesh, gear) = safety
     where = str(data["iso_flank"].values[mesh, gear])
     return Least(value, where if data.sizes["load_case"] == 1 else f"{where}, {data['load_case'].values[case]}")
 
