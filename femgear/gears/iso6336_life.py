@@ -38,10 +38,10 @@ class ToothSpectrum:
 
     Parameters
     ----------
-    ratio : (c,) array
+    ratio : (c,) or (c, m) array
         Stress over the strength for long life, the inverse of the safety S_F or S_H of the load case; 0 where the load
-        case does not load it.
-    cycles : (c,) array
+        case does not load it. Of a gear with m mates the stresses by all of them.
+    cycles : (c,) or (c, m) array
         Load cycles an hour of the spectrum: those an hour of the load case, times its share.
     line : LifeLine
         Y_NT or Z_NT of the material.
@@ -54,7 +54,17 @@ class ToothSpectrum:
     @property
     def damage(self) -> np.ndarray:
         """Damage (c,) of the load cases in an hour of the spectrum; infinite beyond the static strength."""
-        return miner_damage(self.ratio, self.cycles, self.line)
+        return miner_damage(self.ratio, self.cycles, self.line).reshape(len(self.ratio), -1).sum(axis=1)
+
+    @property
+    def largest_ratio(self) -> np.ndarray:
+        """Largest stress (c,) of the load cases over the strength for long life."""
+        return self.ratio.reshape(len(self.ratio), -1).max(axis=1)
+
+    @property
+    def all_cycles(self) -> np.ndarray:
+        """Load cycles (c,) an hour of the spectrum by all mates."""
+        return self.cycles.reshape(len(self.cycles), -1).sum(axis=1)
 
     @property
     def hours(self) -> float:

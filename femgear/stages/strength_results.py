@@ -194,7 +194,7 @@ def safety_notes(rating: Rating) -> Iterator[str]:
         wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "face" in factors.sources else ""
         transverse = "; roots have K_Fα in the place of K_Hα" if "transverse" in factors.sources else ""
         yield f"long life, every other factor of ISO 6336-2 and -3 is 1{wide}{transverse}"
-        yield from _missing_factors(factors, planets=any(flank.reversed_bending for flank in flanks))
+        yield from _missing_factors(factors, planets=any(flank.gear == "planet" for flank in flanks))
     if factors.message:
         yield f"no load factors of part 1: {factors.message}"
 

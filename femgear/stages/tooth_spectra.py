@@ -70,7 +70,7 @@ class RatedSpectrum:
     def equivalent_torque(self) -> float:
         """Constant torque on the sun or gear 1 with the same damage over its load cycles [N m] (ISO 6336-6)."""
         exponent = self.spectrum.line.slope * (1.0 if self.kind == "root" else 0.5)
-        return equivalent_torque(self.torque, self.spectrum.cycles, exponent)
+        return equivalent_torque(self.torque, self.spectrum.all_cycles, exponent)
 
 
 @dataclass(frozen=True)
@@ -196,8 +196,8 @@ def tooth_life_variables(spectra: Sequence[RatedSpectrum], required: float | Non
             "spectrum_safety": [rated.spectrum.safety(over) if required else math.nan for rated in of_kind],
             "equivalent_torque": [rated.equivalent_torque for rated in of_kind],
             "damage_share": _over_load_cases(of_kind, "damage_share"),
-            "stress_ratio": _over_load_cases(of_kind, "ratio"),
-            "load_cycles": _over_load_cases(of_kind, "cycles"),
+            "stress_ratio": _over_load_cases(of_kind, "largest_ratio"),
+            "load_cycles": _over_load_cases(of_kind, "all_cycles"),
         }
         if of_kind:
             for name, (before, unit, text) in _WORDS.items():

@@ -22,6 +22,7 @@ from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, P
 from femgear.trains.gearbox.contact import StageContact, loaded_tables
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.power import BoxFlow
+from femgear.trains.gearbox.shared_gears import bent_both_ways, shared_gears
 
 OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
 _SAFETIES = {"iso_root_safety": "S_F", "iso_contact_safety": "S_H"}
@@ -97,7 +98,8 @@ def rated_stages(state: Deflection) -> dict[str, Rating]:
     for stage in state.model.stages:
         if stage.name not in ratings and flow.touches(stage.section):
             ratings[stage.name] = _rated_teeth(case, stage.section, flow)
-    return {name: rating for name, rating in ratings.items() if rating is not None}
+    rated = {name: rating for name, rating in ratings.items() if rating is not None}
+    return bent_both_ways(rated, shared_gears(case), flow)
 
 
 def strength_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], dict[str, tuple], dict[str, Any]]:
@@ -132,6 +134,9 @@ def strength_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], d
     }
     first = next(filter(None, ratings))
     notes = [f"{name}: {note}" for name, rating in first.items() for note in _notes(rating)]
+    for gear in shared_gears(model.case):
+        if any({*gear.pushes(state.model.flow)} >= {1, -1} for state in states):
+            notes.append(f"Y_M = 0.7 of {gear.name}, whose mates bend its teeth both ways")
     editions = ", ".join(dict.fromkeys(str(rating.nominal.edition) for rating in first.values()))
     return variables, coords, {"iso_edition": editions, "iso_notes": " | ".join(notes)}
 

@@ -1,19 +1,23 @@
 """Lives of the teeth of all stages of a gearbox over its load cases, ISO 6336-6.
 
 Ratings are those of the loaded states: torques of the power flow, K_gamma and K_Hbeta of the contact with the
-misalignment of each load case. Torques of a stage are those on its sun or gear 1. Gears of different stages are
-different gears: where one gear meets two mates, as an idler does, a crack of its root by both is not added.
+misalignment of each load case. Torques of a stage are those on its sun or gear 1. A gear with several mates, as an
+idler, is one gear, see `femgear.trains.gearbox.shared_gears`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from femgear.case.gear_set import planetary_set
 from femgear.case.load_spectrum import check_pitting, required_life, running_shares
+from femgear.case.sections import gear_material
 from femgear.errors import CaseError
 from femgear.stages.planet_bearings import PlanetBearings, planet_bearing_variables, planet_bearings
+from femgear.stages.strength import Rating
 from femgear.stages.tooth_spectra import (
     RatedLoad,
     RatedSpectrum,
@@ -23,6 +27,7 @@ from femgear.stages.tooth_spectra import (
 )
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.deflection import Deflection
+from femgear.trains.gearbox.shared_gears import SharedGear, gear_loads, shared_gears, shared_spectra
 from femgear.trains.gearbox.strength import rated_stages, strength_of_stage
 
 
@@ -30,6 +35,8 @@ def stage_spectra(states: Sequence[Deflection]) -> tuple[RatedSpectrum, ...]:
     """Collect the spectra of all roots and flanks that have a limit and a treatment, stage by stage."""
     case = states[0].model.case
     shares, ratings = running_shares(case.operation.load_case), [rated_stages(state) for state in states]
+    shared = shared_gears(case)
+    left_out = {(stage, f"gear {number + 1}") for gear in shared for stage, number in gear.places}
     spectra = list[RatedSpectrum]()
     for stage in states[0].model.stages:
         contacts = [state.contacts.get(stage.name) for state in states]
@@ -46,8 +53,25 @@ def stage_spectra(states: Sequence[Deflection]) -> tuple[RatedSpectrum, ...]:
             for state, rating, contact, share in zip(states, ratings, contacts, shares.tolist(), strict=True)
         ]
         for rated in rated_spectra(teeth, loads, strength_of_stage(case, teeth)):
-            spectra.append(replace(rated, name=f"{stage.name} {rated.name}"))
+            if (stage.name, rated.name.partition(",")[0]) not in left_out:
+                spectra.append(replace(rated, name=f"{stage.name} {rated.name}"))
+    for gear in shared:
+        spectra += _of_shared_gear(gear, states, ratings, shares)
     return tuple(spectra)
+
+
+def _of_shared_gear(
+    gear: SharedGear, states: Sequence[Deflection], ratings: Sequence[Mapping[str, Rating]], shares: np.ndarray
+) -> list[RatedSpectrum]:
+    """Spectra of a gear with several mates, with material and rules of its first stage."""
+    (name, number), case = gear.places[0], states[0].model.case
+    contacts = [state.contacts.get(name) for state in states]
+    teeth = next((contact.case for contact in contacts if contact is not None), None)
+    if teeth is None or (treatment := gear_material(teeth, teeth.gear_names[number]).treatment) is None:
+        return []
+    torque = np.array([0.0 if contact is None else contact.result.sun_torque for contact in contacts])
+    loads = gear_loads(gear, [state.model.flow for state in states], ratings, shares, torque)
+    return shared_spectra(loads, treatment, strength_of_stage(case, teeth))
 
 
 def tooth_life_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], dict[str, tuple], dict[str, float]]:

@@ -47,7 +47,9 @@ def contact_of(case, torque, force, face=None):
 
 def box(**given):
     """A gearbox with or without a section strength."""
-    return SimpleNamespace(strength=StrengthSection(**given), model_fields_set={"strength"} if given else set())
+    return SimpleNamespace(
+        pair=(), strength=StrengthSection(**given), model_fields_set={"strength"} if given else set()
+    )
 
 
 def state_of(case, contacts):
