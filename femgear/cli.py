@@ -322,8 +322,11 @@ def run(
     only: str | None = None,
     pictures: bool = True,
     force: bool = False,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Compute a case and write results, pictures and report.
+
+    It prints what page one of the report answers and the verdict; of --only STAGE the table of that stage.
 
     Parameters
     ----------
@@ -339,6 +342,8 @@ def run(
         Draw figures, fields and report.
     force
         Replace the results that the folder holds, once the new ones are complete.
+    verbose
+        Print the tables of all stages.
     """
     from femgear.run import run_case
     from femgear.storage.files import resumable
@@ -368,7 +373,7 @@ def run(
             def tell_numbers(results) -> None:
                 """Print what was found, before anything is drawn."""
                 with progress.aside():
-                    _print(train.describe_results(results))
+                    _print(train.describe_results(results) if verbose else train.describe_briefly(results, only))
                     _warn(train.result_warnings(results))
                     sys.stdout.flush()
                 if pictures:
@@ -378,6 +383,48 @@ def run(
         _say(f"results: {output}")
         if pictures:
             _say(f"report:  {output / 'report.html'}")
+        if not verbose:
+            _say(f"tables:  femgear report {shlex.quote(str(output))} --verbose")
+    return 0
+
+
+@app.command
+def explain(code: str, /) -> int:
+    """Say what the code of a refusal or a warning means, as in "femgear explain W-PULL".
+
+    Parameters
+    ----------
+    code
+        The code, as messages have it in square brackets.
+    """
+    from difflib import get_close_matches
+
+    from femgear.errors import CODES
+    from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE
+
+    severities = {
+        NOTE: "worth knowing",
+        DOUBT: "a number may be wrong, and is marked where it stands",
+        FAULT: "nothing real carries that",
+    }
+    name = code.strip().strip("[]").upper()
+    if name in CATALOGUE:
+        severity, meaning = CATALOGUE[name]
+        _say(f"{name}: {meaning}")
+        _say(f"A warning, which ends nothing. Severity: {severity}, {severities[severity]}.")
+    elif name in CODES:
+        _say(f"{name}: {CODES[name]}")
+        _say("A refusal: nothing was computed. Its message has entry, value, limit and remedy.")
+    else:
+        near = get_close_matches(name, [*CODES, *CATALOGUE], n=3)
+        raise CaseError(
+            "there is no such code",
+            code="E-ARGUMENTS",
+            key="code",
+            value=code,
+            limit="the codes of docs/errors.md",
+            remedy=f"meant is perhaps {' or '.join(near)}" if near else "take it from the message, as W-PULL",
+        )
     return 0
 
 
@@ -402,7 +449,13 @@ def _only_case() -> Path:
 
 
 @app.command
-def report(folder: Path, /, *, static: Annotated[bool, Parameter(negative="")] = False) -> int:
+def report(
+    folder: Path,
+    /,
+    *,
+    static: Annotated[bool, Parameter(negative="")] = False,
+    verbose: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
     """Write report.html from the results in a folder.
 
     Parameters
@@ -411,10 +464,17 @@ def report(folder: Path, /, *, static: Annotated[bool, Parameter(negative="")] =
         Folder that femgear run wrote.
     static
         Pictures and no scripts: for paper, and where scripts are not allowed.
+    verbose
+        Print the tables of all stages.
     """
     from femgear.run import report_again
+    from femgear.trains.reading import open_results
+    from femgear.trains.registry import train_of
 
     report_again(folder, static=static)
+    if verbose:
+        results = open_results(folder)
+        _print(train_of(results.case).describe_results(results))
     _say(f"report:  {folder / 'report.html'}")
     return 0
 

@@ -318,13 +318,42 @@ def pipeline(monkeypatch):
 
 def test_run_writes_and_sums_up(tmp_path, capsys, pipeline):
     out = tmp_path / "out"
-    assert cli.main(["run", str(CASE), "-o", str(out)]) == 0
+    assert cli.main(["run", str(CASE), "-o", str(out), "--verbose"]) == 0
     printed = capsys.readouterr()
     for title in ("Static", "Stresses", "Modes", "Dynamics", "Housing", "Time", "load share"):
         assert title in printed.out
     assert "static" in printed.err
     assert open_results(out).stages == STAGES
     assert (out / "case.toml").read_text(encoding="utf-8") == TEXT
+
+
+def test_run_prints_answers_and_verdict_in_45_lines_and_the_report_all_tables(tmp_path, capsys, monkeypatch, pipeline):
+    monkeypatch.setenv("COLUMNS", "80")
+    out = tmp_path / "out"
+    assert cli.main(["run", str(CASE), "-o", str(out)]) == 0
+    printed = capsys.readouterr().out
+    assert len(printed.splitlines()) <= 40 and "Is it strong enough?" in printed and "Verdict" in printed
+    assert "Its strength is not rated." in printed and "Dynamics" not in printed
+    assert f"tables:  femgear report {out} --verbose" in printed
+    assert cli.main(["report", str(out), "--verbose"]) == 0
+    assert "Dynamics" in capsys.readouterr().out
+    assert cli.main(["run", str(CASE), "-o", str(tmp_path / "only"), "--only", "static"]) == 0
+    assert "STE mean" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    (("W-PULL", "Severity: doubt"), ("[e-mass]", "A refusal"), ("W-LIFE", "Severity: fault")),
+)
+def test_a_code_is_explained(capsys, code, words):
+    assert cli.main(["explain", code]) == 0
+    printed = capsys.readouterr().out
+    assert printed.startswith(code.strip("[]").upper() + ": ") and words in printed
+
+
+def test_a_code_that_is_none_is_refused_with_those_that_are_near(capsys):
+    assert cli.main(["explain", "W-PUL"]) == 2
+    assert "W-PULL" in capsys.readouterr().err
 
 
 def test_run_prints_its_warnings_before_it_computes(tmp_path, capsys, pipeline):

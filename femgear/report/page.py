@@ -247,10 +247,8 @@ def _front(train: Train, results: Results, charts, gears: Sequence[Block]) -> st
 
     ``gears`` are drawn in space where there are any.
     """
-    judgements = tuple(train.judgements(results))
-    sentences = [judgement.sentence for judgement in judgements if judgement.sentence]
-    sentence = ". ".join(text[0].upper() + text[1:] for text in sentences)
-    text = f'<p class="sentence">{escape(sentence)}.</p>\n' if sentence else ""
+    sentence, judgements = train.summary(results)
+    text = f'<p class="sentence">{escape(sentence)}</p>\n' if sentence else ""
     cards = "".join(map(_card, judgements))
     shown = "".join(front_chart(*place) for place in _front_places(train, charts))
     solid = part_of("solid").format(escape("; ".join(gears[0].notes[:2]) + ".")) if gears else ""
@@ -272,16 +270,12 @@ def _front_places(train: Train, charts) -> list[tuple[str, int]]:
     return places[:2]
 
 
-_SHAPES = {"good": "✓", "look": "▲", "bad": "✕", "open": "○"}
-"""Signs of the states of cards, for those who see no colours."""
-
-
 def _card(judgement: Judgement) -> str:
     """Write the card of a question: its state in colour, sign and word, the answer, and what limits it."""
     limit = f'<p class="limit">{escape(judgement.limit)}</p>' if judgement.limit else ""
     return (
         f'<li class="card {judgement.state}"><p class="question">{escape(judgement.question)} '
-        f"<b>{_SHAPES[judgement.state]} {escape(judgement.words)}</b></p>"
+        f"<b>{escape(judgement.words)}</b></p>"
         f'<p class="answer">{escape(judgement.answer)}</p>{limit}</li>\n'
     )
 

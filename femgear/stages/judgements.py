@@ -15,11 +15,12 @@ import numpy as np
 
 from femgear.case.sections import StrengthSection
 from femgear.findings import DOUBT, FAULT, Finding
+from femgear.report.tables import Block
 from femgear.stages.life_results import hours_text
 from femgear.stages.strength import RatedFlank, Rating
 
 State = Literal["good", "look", "bad", "open"]
-_WORDS: dict[State, str] = {"good": "holds", "look": "look", "bad": "fails", "open": "no limit"}
+_WORDS: dict[State, str] = {"good": "✓ holds", "look": "▲ look", "bad": "✕ fails", "open": "○ no limit"}
 """What the colour of a card says, for those who see no colours."""
 STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
     "Is it strong enough?",
@@ -57,7 +58,7 @@ class Judgement:
 
     @property
     def words(self) -> str:
-        """What the state means, in a word."""
+        """What the state means: a sign and a word."""
         return _WORDS[self.state]
 
 
@@ -75,6 +76,23 @@ class Least:
 
     value: float
     where: str
+
+
+def joined_sentence(judgements: Iterable[Judgement]) -> str:
+    """Join the sentences of judgements to one text; empty where none has a sentence."""
+    sentences = [judgement.sentence for judgement in judgements if judgement.sentence]
+    return "".join(f"{text[0].upper()}{text[1:]}. " for text in sentences).rstrip()
+
+
+def describe_judgements(judgements: Sequence[Judgement]) -> tuple[Block, ...]:
+    """Tabulate judgements for the terminal under the sentence of page one; nothing without any."""
+    if not judgements:
+        return ()
+    rows = tuple(
+        (judgement.question, judgement.words, ": ".join(filter(None, (judgement.answer, judgement.limit))))
+        for judgement in judgements
+    )
+    return (Block(joined_sentence(judgements) or "Summary", rows=rows),)
 
 
 def least_of(rating: Rating) -> tuple[Least | None, Least | None]:

@@ -19,6 +19,7 @@ from femgear.case.dependencies import Entries, every_entry
 from femgear.errors import FemgearError
 from femgear.findings import by_severity, once
 from femgear.report.tables import Block, listed
+from femgear.stages.judgements import Judgement, describe_judgements, joined_sentence
 from femgear.storage.contents import Contents, as_dataset
 
 if TYPE_CHECKING:
@@ -29,7 +30,6 @@ if TYPE_CHECKING:
     from femgear.case.text import ReadCase
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
     from femgear.findings import Finding
-    from femgear.stages.judgements import Judgement
     from femgear.stages.key_figures import KeyFigure
     from femgear.storage.results import Results
 
@@ -353,6 +353,25 @@ class Train:
         timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
         time = Block("Time", ("stage", "[s]"), tuple(timings))
         return (*self.verdict(results), *blocks, *listed(results.findings), time)
+
+    def summary(self, results: Results) -> tuple[str, tuple[Judgement, ...]]:
+        """Answer the questions of page one, and join the answers to one text."""
+        judgements = tuple(self.judgements(results))
+        return joined_sentence(judgements), judgements
+
+    def describe_briefly(self, results: Results, only: str | None = None) -> tuple[Block, ...]:
+        """Tabulate what page one answers, the verdict and the findings of a run, and one stage if that was asked for.
+
+        Trains without judgements have all their tables.
+        """
+        judgements = tuple(self.judgements(results))
+        if not judgements:
+            return self.describe_results(results)
+        stage = None if only is None else self.stage(only)
+        numbers = () if stage is None or stage.name not in results.stages else (stage.describe(results),)
+        verdict = next(iter(self.verdict(results)), None)
+        decided = () if verdict is None else (verdict,)
+        return (*describe_judgements(judgements), *(numbers or decided), *listed(results.findings))
 
     def describe_stages(self, results: Results) -> dict[str, Block]:
         """Tabulate the numbers of the stages of a run, by the titles of the stages."""
