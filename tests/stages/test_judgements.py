@@ -44,7 +44,7 @@ def test_safeties_are_judged_by_those_asked_for():
 def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
     open_ = judge_strength(None, None, StrengthSection(), "root 130 MPa, pressure 736 MPa")
     assert (open_.state, open_.answer) == ("open", "root 130 MPa, pressure 736 MPa")
-    assert "material.treatment" in open_.limit and open_.words == "no limit"
+    assert "material.treatment" in open_.limit and open_.words == "○ no limit"
     half = judge_strength(None, FLANK, StrengthSection())
     assert half.state == "look" and half.limit.endswith("S_F is not rated")
     assert judge_strength(ROOT, FLANK, StrengthSection(), doubtful=True).state == "look"
