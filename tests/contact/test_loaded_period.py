@@ -215,7 +215,7 @@ MOUNTED = _mounted()
             1,
             marks=pytest.mark.slow,
         ),
-        (TORQUE, 4, {"planet_pitch": MOUNTED}, 19, 4),
+        pytest.param(TORQUE, 4, {"planet_pitch": MOUNTED}, 19, 4, marks=pytest.mark.slow),
         pytest.param(-TORQUE, 4, {"planet_ring_side_pitch": MOUNTED}, 19, 4, marks=pytest.mark.slow),
     ],
 )

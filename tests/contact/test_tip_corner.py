@@ -175,7 +175,7 @@ def test_corner_contact_does_not_depend_on_cells(bodies):
         pytest.param({"depth": 0.33e-3}, marks=pytest.mark.slow),
         pytest.param({"depth": 3e-3}, marks=pytest.mark.slow),
         {"flank_elements": 12},
-        {"flank_elements": 48},
+        pytest.param({"flank_elements": 48}, marks=pytest.mark.slow),
     ],
 )
 def test_corner_contact_does_not_depend_on_depth_and_elements(bodies, options):

@@ -59,6 +59,7 @@ def test_every_image_has_a_name_and_a_sentence():
         assert Path(link).stem.replace("_", " ") in name, link
 
 
+@pytest.mark.slow
 def test_the_page_and_its_images_are_made_anew(gallery, tmp_path, capsys):
     docs, only = tmp_path / "docs", ("published_four_stages",)
     stale = docs / "images" / only[0] / "stage_forces.png"

@@ -46,6 +46,7 @@ def test_run_prints_warnings_of_the_case_once(name, tmp_path, capsys):
     assert "warning:" not in printed.out and printed.err.index("warning:") < printed.err.index("modes")
 
 
+@pytest.mark.slow
 def test_run_and_report_say_what_results_say_against_themselves(tmp_path, capsys):
     """The rigid hammering of an undamped chain: its mesh pulls, and the step is coarse."""
     case = with_value(read_case(CASES / "own_chain.toml"), "modes.damping_ratio", 0.0)

@@ -260,6 +260,7 @@ def test_long_records_keep_the_history_of_the_worst_tooth(pitch_error):
     assert_kept_is_the_worst_of_all(static, result, reverse=False)
 
 
+@pytest.mark.slow
 def test_long_records_of_negative_torque_keep_it_too(monkeypatch):
     _, static, result = with_pitch_error("-8 um", monkeypatch, **{"operation.torque": "-100 N m"})
     assert_kept_is_the_worst_of_all(static, result, reverse=True)

@@ -117,6 +117,7 @@ def test_only_static_has_none(tmp_path):
     assert run(tmp_path / "out", case, only="static").stages == ("static",)
 
 
+@pytest.mark.slow
 def test_only_stress_of_no_torque_is_a_valid_run(tmp_path, recwarn):
     """Asked for by name it is computed whatever the key says; without torque all is zero."""
     case = coarse(**{"operation.torque": "0 N m", "set.planets": 1, "static.stresses": False})

@@ -1,5 +1,6 @@
 """Serial, processes and Dask: the same bits, a bounded window, and what kills workers and programs."""
 
+import contextlib
 import json
 import os
 import signal
@@ -28,14 +29,14 @@ CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml
 RATIO = "dynamics.damping_ratio"
 
 
-@pytest.fixture(scope="module")
-def cluster():
+@contextlib.contextmanager
+def dask_cluster(**options):
     """A scheduler with two workers of this machine, and with Dask's own count of allowed failures."""
     from distributed import LocalCluster
 
-    options = {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": ":0"}
-    with LocalCluster(**options, silence_logs=50) as found:
-        yield found
+    options |= {"n_workers": 2, "threads_per_worker": 1, "host": "127.0.0.1", "dashboard_address": ":0"}
+    with LocalCluster(**options, silence_logs=50) as cluster, Dask(cluster.scheduler_address) as runner:
+        yield runner
 
 
 @pytest.fixture(scope="module")
@@ -45,24 +46,33 @@ def processes():
 
 
 @pytest.fixture(scope="module")
-def dask_runner(cluster):
-    with Dask(cluster.scheduler_address) as runner:
+def dask_runner():
+    """Workers are threads here: to start processes takes ten seconds."""
+    with dask_cluster(processes=False, protocol="tcp://") as runner:
         yield runner
 
 
-@pytest.fixture(params=["serial", "processes", "dask_runner"])
+@pytest.fixture(scope="module")
+def dask_processes():
+    with dask_cluster() as runner:
+        yield runner
+
+
+@pytest.fixture(
+    params=["serial", "processes", "dask_runner", pytest.param("dask_processes", marks=pytest.mark.slow)]
+)
 def runner(request):
     return Runner() if request.param == "serial" else request.getfixturevalue(request.param)
 
 
-@pytest.fixture(params=["processes", "dask_runner"])
+@pytest.fixture(params=["processes", "dask_runner", pytest.param("dask_processes", marks=pytest.mark.slow)])
 def remote(request):
     return request.getfixturevalue(request.param)
 
 
 # Dask begins its workers anew, which takes seconds
 kills = pytest.mark.parametrize(
-    "remote", ["processes", pytest.param("dask_runner", marks=pytest.mark.slow)], indirect=True
+    "remote", ["processes", pytest.param("dask_processes", marks=pytest.mark.slow)], indirect=True
 )
 
 
@@ -216,6 +226,7 @@ def test_a_search_has_the_same_bits_whoever_computes(case, processes, dask_runne
     np.testing.assert_equal(runs[2], runs[0])
 
 
+@pytest.mark.slow
 @kills
 def test_a_design_that_kills_workers_is_a_failure_of_the_sweep(case, remote, tmp_path):
     values = {RATIO: [0.1, 0.2, small_tasks.POISON, 0.7, 0.8]}

@@ -230,7 +230,7 @@ def assert_equal(found, expected, rtol):
         slow(RIGID, -TORQUE),
         slow(SPRUNG, TORQUE),
         (SPRUNG, -TORQUE),
-        (Supports(sun=0.0), TORQUE),
+        slow(Supports(sun=0.0), TORQUE),
         slow(Supports(sun=0.0), -TORQUE),
     ],
     ids=["fixed", "fixed, reversed", "sprung", "sprung, reversed", "floating sun", "floating sun, reversed"],
@@ -270,6 +270,7 @@ def test_planets_out_of_phase(case, planets):
     assert_equal(springs, exact, 1e-2)
 
 
+@pytest.mark.slow
 def test_all_kinds_of_errors_at_a_negative_torque(basis):
     """Slopes tilt the windows where they are: the walk, which moves them, cuts them into other cells."""
     model = sample_model(basis, ALL, sun_torque=-TORQUE)
@@ -293,6 +294,7 @@ def test_a_planet_that_is_hardly_pressed_is_not_taken_for_open():
         np.testing.assert_allclose(springs[name], exact[name], rtol=2e-3, atol=1e-4 * exact[name].max())
 
 
+@pytest.mark.slow
 def test_no_errors_give_the_set_of_the_case(basis):
     nothing = tolerances(sun={"cumulative_pitch": law("0 um")}, pin_errors={"radial": law("0 um")})
     own = replace(no_deviations(basis.gears), pin_errors=[[0, 2e-6], [1e-6, 0], [0, 0]])
@@ -417,6 +419,7 @@ def test_samples_drawn_at_random_are_solved_exactly(case, tmp_path, monkeypatch)
     assert (tmp_path / "samples.png").read_bytes()[:4] == b"\x89PNG"
 
 
+@pytest.mark.slow
 def test_errors_below_rounding_are_computed_and_drawn(case, tmp_path):
     path, out, laws = tmp_path / "case.toml", tmp_path / "out", tmp_path / "laws.toml"
     path.write_text(case.source, encoding="utf-8")
@@ -556,7 +559,8 @@ def test_refusals(basis, case, tmp_path, capsys):
     assert not (tmp_path / "out").exists()
 
 
-@pytest.mark.parametrize("torque", [TORQUE, slow(-TORQUE)])
+@pytest.mark.slow
+@pytest.mark.parametrize("torque", [TORQUE, -TORQUE])
 def test_samples_have_the_errors_of_runs_with_many_positions(basis, torque):
     """Where pitch errors keep the record open, equidistant positions lacked up to two thirds at its end."""
     places = sample_positions(basis, torque, 16)

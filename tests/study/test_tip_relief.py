@@ -106,6 +106,7 @@ def test_the_optimum_of_a_coarse_map_has_no_way_down(quick_case, tmp_path):
     assert after / before == pytest.approx(0.142, rel=0.016)
 
 
+@pytest.mark.slow
 def test_a_relief_at_the_end_of_its_range_is_no_minimum(quick_case, tmp_path):
     arguments = ("--points", "3", "--largest", "1 um", "--also", "100 N m")
     done = relief(quick_case, *arguments, "-o", "out", folder=tmp_path)
