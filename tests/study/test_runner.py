@@ -58,9 +58,7 @@ def dask_processes():
         yield runner
 
 
-@pytest.fixture(
-    params=["serial", "processes", "dask_runner", pytest.param("dask_processes", marks=pytest.mark.slow)]
-)
+@pytest.fixture(params=["serial", "processes", "dask_runner", pytest.param("dask_processes", marks=pytest.mark.slow)])
 def runner(request):
     return Runner() if request.param == "serial" else request.getfixturevalue(request.param)
 
