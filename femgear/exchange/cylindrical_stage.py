@@ -100,8 +100,9 @@ def _operation(
         torque = float(f"{usual_torque(teeth[0], teeth[1], module, width):.3g}")
         remarks["operation.torque"] = "assumed: K factor of 1 N/mm^2"
         model.remark("operation.torque", "the file does not determine the torque: that of a K factor is taken")
-    taken = speeds_of_cases(model, number, torques, speeds, alone=wanted is not None)
+    shares = load_case_shares(model.load_cases)
+    taken = speeds_of_cases(model, number, torques, speeds, shares, alone=wanted is not None)
     remarks |= {} if taken else {"operation.speeds": "assumed"}
     texts = dict.fromkeys(with_unit(taken_speed, SPEED) for taken_speed in taken or [1000.0 * SPEED.scale])
-    spectrum = spectrum_tables(model, torques[1:], speeds[1:], load_case_shares(model.load_cases))
+    spectrum = spectrum_tables(model, torques[1:], speeds[1:], shares)
     return {"torque": with_unit(torque, TORQUE), "speeds": [*texts]} | ({"load_case": spectrum} if spectrum else {})

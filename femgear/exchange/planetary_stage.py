@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from femgear.case.estimates import USUAL_STIFFNESS, estimates, usual_rim, usual_torque
 from femgear.case.gear_set import planetary_set, support_stiffness
+from femgear.case.load_spectrum import running_shares
 from femgear.case.planetary import Case
 from femgear.case.quantities import (
     ANGLE,
@@ -37,7 +38,7 @@ from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
 from femgear.exchange.gear_unit import gears_of, loads_on, stage_components, unit_flow, with_load_case
 from femgear.exchange.rexs import Component, Model, Relation
-from femgear.exchange.unit_spectrum import load_case_shares, spectrum_tables
+from femgear.exchange.unit_spectrum import load_case_shares, load_duration, spectrum_tables, tell_life_left_out
 from femgear.findings import NOTE
 from femgear.gears.iso6336_stiffness import STEEL
 from femgear.gears.kinematics import MEMBERS, torque_ratios
@@ -676,24 +677,35 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wante
         on_sun = usual_torque(*teeth, module, width, tables["set"]["planets"])
         torque = float(f"{on_sun * abs(ratios[member]):.3g}")
         remarks["operation.torque"] = f"assumed: K factor of 1 N/mm^2{'; that of the file is 0' * idle}"
-    speeds = speeds_of_cases(s.model, number, torques, speeds_of_all, alone=wanted is not None)
+    shares = load_case_shares(s.model.load_cases)
+    speeds = speeds_of_cases(s.model, number, torques, speeds_of_all, shares, alone=wanted is not None)
     remarks |= {} if turning or loaded else {"operation.input": "assumed"}
     remarks |= {} if speeds else {"operation.speeds": f"assumed{'; that of the file is 0' * stands}"}
     texts = dict.fromkeys(with_unit(speed, SPEED) for speed in speeds or [1000.0 * SPEED.scale])
     operation = {"input": member, "fixed": fixed, "torque": with_unit(torque, TORQUE), "speeds": [*texts]}
-    spectrum = spectrum_tables(s.model, torques[1:], speeds_of_all[1:], load_case_shares(s.model.load_cases))
+    spectrum = spectrum_tables(s.model, torques[1:], speeds_of_all[1:], shares)
     return operation | ({"load_case": spectrum} if spectrum else {})
 
 
 def speeds_of_cases(
-    model: Model, number: int, torques: Sequence[float | None], speeds: Sequence[float], *, alone: bool
+    model: Model,
+    number: int,
+    torques: Sequence[float | None],
+    speeds: Sequence[float],
+    shares: Sequence[float | None],
+    *,
+    alone: bool,
 ) -> list[float]:
     """List the speeds of the load case of a number [rad/s], and of those with its torque unless ``alone``.
 
-    Torques [N m] and speeds are those of this load case, then of all. A finding lists the cases left out.
+    Torques [N m] and speeds are those of this load case, then of all, with their shares. A finding lists the cases left
+    out; beside one of no duration those of the life are none of them.
     """
     taken, others, first = [speeds[0]], [], torques[0]
+    of_life = bool(shares) and shares[number - 1] == 0.0
     for i, (torque, speed) in enumerate(zip(torques[1:], speeds[1:], strict=True), start=1):
+        if of_life and shares[i - 1] != 0.0:
+            continue
         alike = torque == first or (torque and first and abs(torque - first) <= 1e-6 * abs(first))
         if i != number and alike and not alone:
             taken.append(speed)
@@ -776,6 +788,7 @@ _UNITS = {
     "mum": 1e-6,
     "m / s^2": 1.0,
     "%": 1e-2,
+    "h": 3600.0,
     "none": 1.0,
 }
 """SI values of units as REXS spells them."""
@@ -807,7 +820,8 @@ def stage_model(case: Case, name: str) -> Model:
         w.relate("central_shaft", planetary_stage=stage, shaft=shaft)
     bearing = {"radial_stiffness": _stiffness(case, "planet", "bearing_stiffness")}
     add_planets(w, case, model, stage, (sun, ring), gears.planet_angles, bearing)
-    load_cases = _add_operation(w, case, shafts, casing)
+    load_cases = _add_operation(w, case, shafts, casing, unit)
+    tell_life_left_out(case.operation, model.remark)
     return replace(model, relations=tuple(w.relations), load_cases=load_cases)
 
 
@@ -939,8 +953,11 @@ def _stiffness(case: Case, member: str, key: str) -> tuple[str, str] | None:
     return None if f"{value or 0.0:.4g}" == f"{estimate:.4g}" else rexs_attribute(value, "N / m")
 
 
-def _add_operation(w: ModelWriter, case: Case, shafts: dict[str, str], casing: str) -> tuple[dict, ...]:
-    """Add load, coupling of the fixed member, bearings of sun and carrier; load cases of several speeds."""
+def _add_operation(w: ModelWriter, case: Case, shafts: dict[str, str], casing: str, unit: str) -> tuple[dict, ...]:
+    """Add load, coupling of the fixed member, bearings of sun and carrier; load cases of several speeds or of a life.
+
+    Speeds of operation beside load cases of the life have no duration.
+    """
     operation, a = case.operation, rexs_attribute
     joints = {operation.fixed: [w.add("coupling", f"{operation.fixed} held")]}
     for member in ("sun", "carrier"):
@@ -955,4 +972,13 @@ def _add_operation(w: ModelWriter, case: Case, shafts: dict[str, str], casing: s
     speeds = [{"rotational_speed": (repr(speed / SPEED.scale), "1 / min")} for speed in operation.speeds]
     turning = speeds[0] | {"defines_speed": ("true", "none")}
     w.components[shaft] = replace(w.components[shaft], attributes=turning)
-    return tuple({shaft: speed} for speed in speeds) if len(speeds) > 1 else ()
+    if not operation.load_case:
+        return tuple({shaft: speed} for speed in speeds) if len(speeds) > 1 else ()
+    by_hours = operation.load_case[0].hours is not None
+    none = {"load_duration": ("0", "h")} if by_hours else {"load_duration_fraction": ("0", "%")}
+    points = [{unit: none, shaft: speed, load: {"torque_around_u_axis": torque}} for speed in speeds]
+    for load_case, share in zip(operation.load_case, running_shares(operation.load_case).tolist(), strict=True):
+        duration = {name: a(*value) for name, value in load_duration(load_case, share).items()}
+        speed = {"rotational_speed": (repr(load_case.speed / SPEED.scale), "1 / min")}
+        points.append({unit: duration, shaft: speed, load: {"torque_around_u_axis": a(load_case.torque, "N m")}})
+    return tuple(points)

@@ -11,10 +11,12 @@ from dataclasses import replace
 from typing import Any
 
 from femgear.case.gear_set import planetary_set
+from femgear.case.load_spectrum import running_shares
 from femgear.case.quantities import SPEED
 from femgear.errors import CaseError
 from femgear.exchange.planetary_stage import ModelWriter, add_gear, add_planets, rexs_attribute
 from femgear.exchange.rexs import Model
+from femgear.exchange.unit_spectrum import load_duration, tell_life_left_out
 from femgear.findings import NOTE
 
 _CASING = "casing"
@@ -72,7 +74,11 @@ def unit_model(case: Any, teeth: Mapping[str, Any], name: str) -> Model:
         joint = writer.w.add("coupling", f"{shaft} held")
         writer.w.relate("side", assembly=joint, inner_part=writer.shafts[shaft], outer_part=writer.casing)
     writer.left_out()
-    cases = tuple(writer.load_case(load_case, loads) for load_case in case.operation.load_case)
+    shares = running_shares(case.operation.load_case).tolist()
+    cases = tuple(
+        writer.load_case(load_case, loads, share)
+        for load_case, share in zip(case.operation.load_case, shares, strict=True)
+    )
     return replace(writer.model, relations=tuple(writer.w.relations), load_cases=cases)
 
 
@@ -355,9 +361,9 @@ class _UnitWriter:
             load.shaft, "external_load", load.name, load.position, transmits_torque=_YES if turns else _NO
         )
 
-    def load_case(self, given: Any, loads: Mapping[str, str]) -> dict[str, Attributes]:
-        """Write torques, forces, speeds and share of a load case."""
-        values_of: dict[str, Attributes] = {self.unit: self._put(load_duration_fraction=(given.share, "%"))}
+    def load_case(self, given: Any, loads: Mapping[str, str], share: float) -> dict[str, Attributes]:
+        """Write torques, forces, speeds and share of the running time, or hours, of a load case."""
+        values_of: dict[str, Attributes] = {self.unit: self._put(**load_duration(given, share))}
         for shaft, speed in given.speed.items():
             values_of[self.shafts[shaft]] = {"rotational_speed": (f"{speed / SPEED.scale:.15g}", "1 / min")}
         fixed = {load.name: load for load in self.case.load}
@@ -387,6 +393,7 @@ class _UnitWriter:
     def left_out(self) -> None:
         """Tell what of the case REXS has no form for."""
         case, tell = self.case, self.model.remark
+        tell_life_left_out(case.operation, tell)
         for number, section in enumerate(case.mass):
             text = f"REXS has no mass such as {section.name or section.shaft}: left out, modes change"
             tell(f"mass[{number}]", text, remedy="give it again after import")

@@ -11,8 +11,8 @@ from scipy.optimize import brentq
 from femgear.case.gear_set import planetary_set
 from femgear.case.sections import gear_material
 from femgear.errors import CaseError, GeometryError
-from femgear.exchange.planetary_stage import RIGID, case_tables
-from femgear.exchange.rexs import read_model
+from femgear.exchange.planetary_stage import RIGID, case_tables, stage_model
+from femgear.exchange.rexs import model_text, read_model
 from femgear.findings import DOUBT
 from femgear.stages.static import solve_static
 from femgear.trains.reading import read_case, with_values
@@ -198,3 +198,32 @@ def test_a_gear_without_a_material_has_that_of_its_shaft(tmp_path):
     case = read_case(case_tables(model)[0])
     assert [1e-9 * gear_material(case, name).youngs_modulus for name in ("sun", "planet", "ring")] == [170, 210, 210]
     assert any("that of its shaft" in one.text for one in model.findings)
+
+
+@pytest.mark.parametrize("by_hours", [False, True])
+def test_load_cases_of_a_life_come_back(by_hours, tmp_path):
+    """Torques, speeds and shares of all load cases, beside torque and speeds of operation."""
+    parts = [{"hours": 30.0}, {"hours": 90.0}] if by_hours else [{"share": 0.25}, {"share": 0.75}]
+    loads = [{"torque": "-40 N m", "speed": "1500 rpm"}, {"torque": "100 N m", "speed": "900 rpm"}]
+    spectrum = [load | part for load, part in zip(loads, parts, strict=True)]
+    case = with_values(read_case("cases/planetary_27_40_108.toml"), {"operation.load_case": spectrum})
+    model, path = stage_model(case, "set.rexs"), tmp_path / "set.rexs"
+    assert [finding.key for finding in model.findings] == ["operation.load_case"] * by_hours
+    path.write_text(model_text(model, "femgear", "0"), encoding="utf-8")
+    back = imported(path)[1].operation
+    assert (back.torque, back.speeds) == (pytest.approx(100.0), pytest.approx(case.operation.speeds))
+    for load_case, same, share in zip(case.operation.load_case, back.load_case, (0.25, 0.75), strict=True):
+        assert same.torque == pytest.approx(load_case.torque, rel=1e-12)
+        assert same.speed == pytest.approx(load_case.speed, rel=1e-12)
+        assert same.share == pytest.approx(share, rel=1e-12)
+
+
+def test_one_load_case_and_the_life_asked_for(tmp_path):
+    values = {"operation.load_case": [{"torque": "60 N m", "speed": "1500 rpm"}], "operation.required_hours": 500.0}
+    model = stage_model(with_values(read_case("cases/planetary_27_40_108.toml"), values), "set.rexs")
+    (finding,) = model.findings
+    assert (finding.code, finding.key) == ("W-REXS", "operation.required_hours")
+    path = tmp_path / "set.rexs"
+    path.write_text(model_text(model, "femgear", "0"), encoding="utf-8")
+    (load_case,) = imported(path)[1].operation.load_case
+    assert (load_case.torque, load_case.share) == (60.0, 1.0)

@@ -209,3 +209,13 @@ def test_what_is_written_is_read_again(unit, tmp_path):
         for gear, other in zip(first.gears, second.gears, strict=True):
             for key in ("teeth", "module", "profile_shift", "tip_radius", "root_radius", "rim_radius", "face_width"):
                 assert getattr(gear, key) == pytest.approx(getattr(other, key), rel=1e-9, abs=1e-12), key
+
+
+def test_hours_of_load_cases_are_durations(unit, tmp_path):
+    """They come back as shares of the time, not as the whole time for each."""
+    changes = {"operation.load_case[0].hours": 30.0, "operation.load_case[1].hours": 10.0}
+    shares = {f"operation.load_case[{number}].share": None for number in (0, 1)}
+    model, findings = written(with_values(unit, changes | shares), tmp_path)
+    assert [finding.key for finding in findings] == ["operation.load_case"]
+    back = parse_case(case_drafts(model, "unit.toml")[0].text)
+    assert [load_case.share for load_case in back.operation.load_case] == pytest.approx([0.75, 0.25])

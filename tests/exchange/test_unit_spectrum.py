@@ -29,6 +29,7 @@ def test_shares_are_fractions_or_durations():
     both[0]["1"]["load_duration_fraction"] = ("10", "%")
     assert load_case_shares(both) == [pytest.approx(0.1), None]
     assert load_case_shares([*cases("load_duration", 5), {}]) == [None, None]
+    assert load_case_shares(cases("load_duration", 0, 30, 10)) == [0.0, 0.75, 0.25]
 
 
 @pytest.mark.parametrize(
