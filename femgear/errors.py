@@ -91,6 +91,7 @@ CODES = {
     "E-SHAFT": "The parts make no shaft.",
     "E-SHAPE": "Arrays do not have the shapes that belong together.",
     "E-SHIFT": "A profile shift is not possible, or cannot be found.",
+    "E-FRICTION": "Friction of the teeth cannot act in this model, or not with another entry.",
     "E-SLICES": "Slices over the face width are missing, or do not go with something else.",
     "E-SOLVE": "A system of linear equations has no trustworthy solution.",
     "E-SPECTRUM": "No spectrum can be made of this record.",

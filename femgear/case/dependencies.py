@@ -67,6 +67,16 @@ _HELIX = {"helical.helix_angle"}
 """All that the transverse section of helical gears depends on."""
 
 
+def friction_entries(case: Any) -> Entries:
+    """List the entries that decide the friction that acts on the gears; none where none does."""
+    if getattr(case, "losses", None) is None or not case.losses.excites:
+        return {}
+    of_friction = {key: value for key, value in every_entry(case).items() if key.split(".")[0] in _OIL}
+    for name in ("bearings", "torque_shares", "speed_shares"):
+        of_friction.pop(f"losses.{name}", None)
+    return {**of_friction, "operation.speeds": f"{case.operation.speeds[0]:.9g} rad/s of the input"}
+
+
 def static_entries(case: Any) -> Entries:
     """List the entries that decide the static solution; supports only where members move."""
     left_out, parts = _WORDS | _MACHINES | {"static.stresses", "helical"}, {"mass", "inertia", "density"}
@@ -75,7 +85,8 @@ def static_entries(case: Any) -> Entries:
     # whatever member the torque is given for: the flanks see that of the sun
     sun = case.torque_on_first_gear()
     kept = _HELIX | ({"helical.hand"} if case.static.slices > 1 else set())
-    return {"operation.torque": f"{sun:.9g} N m on the sun", **_entries(case, left_out, parts, kept=kept)}
+    torque = {"operation.torque": f"{sun:.9g} N m on the sun", **friction_entries(case)}
+    return {**torque, **_entries(case, left_out, parts, kept=kept)}
 
 
 def solution_entries(case: Any) -> Entries:
@@ -99,20 +110,21 @@ def loss_entries(case: ReadCase) -> Entries:
 def state_entries(case: Case) -> Entries:
     """List the entries that decide the loaded state on the supports: neither masses nor what turns fast."""
     left_out = _DYNAMIC | {"operation.speeds", "dynamics", "motor", "brake"}
-    return _entries(case, left_out, {"mass", "inertia", "density"})
+    return {**_entries(case, left_out, {"mass", "inertia", "density"}), **friction_entries(case)}
 
 
 def modal_entries(case: Any) -> Entries:
     """List the entries that decide the modal basis: all but speeds, harmonics, tolerance and sensor."""
     kept = {"dynamics.damping_ratio", "dynamics.up_to"}
-    return _entries(case, _DYNAMIC | {"operation.speeds", "dynamics"}, kept=kept)
+    return {**_entries(case, _DYNAMIC | {"operation.speeds", "dynamics"}, kept=kept), **friction_entries(case)}
 
 
 def dynamic_entries(case: Case) -> Entries:
     """List the entries that decide the periodic response: all but the sensor of the level and microphone."""
     # a casing is known by the checksum of its files
     heard = ("form", "points", "sensor_angle", "microphone", "published", "structure.file", "structure.nodes")
-    return _entries(case, (_DYNAMIC - {"housing"}) | {f"housing.{name}" for name in heard})
+    left_out = (_DYNAMIC - {"housing"}) | {f"housing.{name}" for name in heard}
+    return {**friction_entries(case), **_entries(case, left_out)}
 
 
 def response_entries(case: Case) -> Entries:
@@ -122,12 +134,12 @@ def response_entries(case: Case) -> Entries:
 
 def heard_entries(case: Case) -> Entries:
     """List the entries that decide what the housing's sensors and microphone hear: not what is published."""
-    return _entries(case, (_DYNAMIC - {"housing"}) | {"housing.published"})
+    return {**friction_entries(case), **_entries(case, (_DYNAMIC - {"housing"}) | {"housing.published"})}
 
 
 def runup_entries(case: Case) -> Entries:
     """List the entries that decide the run-up: those of what is heard, and its own."""
-    return _entries(case, (_DYNAMIC - {"housing", "runup"}) | {"housing.published"})
+    return {**friction_entries(case), **_entries(case, (_DYNAMIC - {"housing", "runup"}) | {"housing.published"})}
 
 
 def box_entries(stage: str, case: ReadCase) -> Entries:

@@ -131,6 +131,7 @@ class LossesSection(Section):
 
     ``friction`` names the formula, or says that it is the ``coefficient`` or the ``table``. ``roughness`` is the mean
     R_a of both flanks. The map has the ``torque_shares`` and ``speed_shares`` of the torque and the speed of operation.
+    With ``excites`` the friction of the teeth acts on the gears, at rest and in motion.
     """
 
     friction: Literal["constant", "schlenk", "niemann", "iso", "table"] = "schlenk"
@@ -138,6 +139,7 @@ class LossesSection(Section):
     table: FrictionTableSection | None = None
     roughness: Annotated[float, Quantity(LENGTH, 1e-9, 2e-5)] | None = None
     bearings: StrictBool = True
+    excites: StrictBool = False
     torque_shares: Annotated[tuple[_Share, ...], Values(max_length=50)] = ()
     speed_shares: Annotated[tuple[_Share, ...], Values(max_length=200)] = ()
 

@@ -15,6 +15,7 @@ from typing import TypeVar
 import numpy as np
 
 from femgear.contact.bodies import Bodies, FlankCompliance, station_weights
+from femgear.contact.flank_friction import WindowFriction, window_friction
 from femgear.contact.flank_pairs import (
     BACK_SIDE,
     DRIVE_SIDE,
@@ -274,6 +275,8 @@ class Candidates:
     approach, supports : (meshes, m) and (meshes, meshes) arrays
         Approach of the flanks of every mesh per unit motion, and compliance of sprung members between the
         meshes [m/N].
+    friction : WindowFriction, optional
+        Of the flanks, in the equilibrium.
     """
 
     setup: MeshWindows
@@ -288,6 +291,7 @@ class Candidates:
     images: np.ndarray
     approach: np.ndarray
     supports: np.ndarray
+    friction: WindowFriction | None = None
 
     @cached_property
     def smooth(self) -> np.ndarray:
@@ -582,7 +586,11 @@ def equal_cells(cells: int) -> np.ndarray:
 
 
 def contact_candidates(
-    setup: MeshWindows, bodies: Bodies, positions, members: MovingMembers | None = None
+    setup: MeshWindows,
+    bodies: Bodies,
+    positions,
+    members: MovingMembers | None = None,
+    friction: tuple[float, ...] | None = None,
 ) -> Candidates:
     """Assemble separations and compliance of all candidates at some positions.
 
@@ -595,6 +603,8 @@ def contact_candidates(
         Indices of the positions in `setup`.
     members : MovingMembers, optional
         Without them all axes are fixed.
+    friction : tuple of float, optional
+        Coefficient of every kind of mesh, see `femgear.contact.flank_friction.window_friction`; with members alone.
     """
     positions = np.asarray(positions)
     near = np.moveaxis(setup.near[:, positions], 1, 0)
@@ -621,6 +631,10 @@ def contact_candidates(
     if setup.images > 1 and members is not None:
         image = setup.places[1]
         supports = np.sum([supports[image == 0][:, image == i] for i in range(setup.images)], axis=0)
+    rubbing = None
+    if friction is not None and members is not None:
+        image = setup.places[1] if setup.images > 1 else None
+        rubbing = window_friction(setup.gears, setup.zeta[place], mesh, friction, members, images=image)
     return Candidates(
         setup=setup,
         bodies=bodies,
@@ -634,6 +648,7 @@ def contact_candidates(
         images=body_compliance(setup, bodies, positions, mesh, pair),
         approach=approach,
         supports=supports,
+        friction=rubbing,
     )
 
 

@@ -7,7 +7,8 @@ up to one, so that a motion q approaches the cells of all windows by ``Pi e G q`
 
     (I + Q S) z - Q e G q = -Pi^T y,    (e G)^T z = load,    Q = Pi^T Y,    p = -y - Y (S z - e G q)
 
-has three unknowns a window instead of its cells. All cells that pull or penetrate change sides at once, until
+has three unknowns a window instead of its cells. With friction (`femgear.contact.flank_friction`) the equilibrium alone
+has other levers, ``(e (G + mu sigma R))^T z = load``. All cells that pull or penetrate change sides at once, until
 there are none. Positions where that does not end, and loads that may be rounding, are left to
 `femgear.contact.solve.solve_contact`.
 """
@@ -22,7 +23,8 @@ import numpy as np
 
 from femgear.contact.active_set import NULL, RIGID, ROUNDING, factor, settle
 from femgear.contact.assembly import ROUGH_STIFFNESS, Candidates
-from femgear.contact.solve import solve_contact
+from femgear.contact.flank_friction import WindowFriction
+from femgear.contact.solve import ContactState, solve_contact
 from femgear.contact.supports import BearingSprings
 from femgear.errors import ContactError
 
@@ -38,6 +40,8 @@ _ROUNDED = 1e-14
 """Violation that is rounding alone."""
 _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
+_ROUNDS, _SETTLED = 60, 1e-14
+"""Solutions of a position by itself that friction may ask for, each with that of the one before; change of the last."""
 
 
 @dataclass(frozen=True)
@@ -248,7 +252,7 @@ class _ActiveSets:
         P, W, C = candidates.gap.shape
         self.found, self.bearings, self.given = candidates, springs, load
         # problems at one position, which differ in their separations alone
-        self.alike = P > 1 and candidates.local.strides[0] == 0
+        self.alike = P > 1 and candidates.local.strides[0] == 0 and candidates.friction is None
         G, arms = candidates.approach[candidates.mesh], np.zeros((0, len(load)))
         if springs is not None:
             arms = np.pad(springs.arms, ((0, 0), (len(load) - springs.arms.shape[1], 0)))
@@ -257,6 +261,10 @@ class _ActiveSets:
         self.clearance, self.softness = (springs.clearance, springs.compliance) if springs else (0.0, 1.0)
         smooth = candidates.smooth[:1] if self.alike else candidates.smooth
         self.S = smooth + candidates.supports[np.ix_(candidates.mesh, candidates.mesh)][:, None, :, None]
+        self.levers: np.ndarray | None = None
+        if candidates.friction is not None:
+            self.S = self.S + candidates.friction.supports[:, :, None, :, None]
+            self.levers = self.G + candidates.friction.arms / self.arm
         # L^-1 of the separations and of the polynomials
         self.offset, self.columns = np.zeros((P, W, C)), np.zeros((P, W, C, 3))
         self.loads, self.gaps = np.zeros((2, P, W, C))
@@ -369,16 +377,28 @@ class _ActiveSets:
             solved[alike, windows] = np.linalg.solve(matrix, moments).reshape(len(alike), most, 3, -1)
         solved = solved.reshape(T, n, -1)
         springs = self.springs[todo] / self.softness
-        stiffness = G.T @ solved[..., :-1] + np.swapaxes(self.arms * springs[..., None], -1, -2) @ self.arms
+        by_springs = np.swapaxes(self.arms * springs[..., None], -1, -2) @ self.arms
+        stiffness = G.T @ solved[..., :-1] + by_springs
         balance = load + solved[..., -1] @ G + clearance * (springs @ self.arms)
         held, vectors = np.linalg.eigh(0.5 * (stiffness + stiffness.swapaxes(-1, -2)))
         free = held <= NULL * held[:, -1:]
-        along = vectors.swapaxes(-1, -2) @ balance[..., None]
-        motions = vectors @ np.where(free[..., None], 0.0, along / np.where(free, 1.0, held)[..., None])
+        if self.levers is None:
+            along = vectors.swapaxes(-1, -2) @ balance[..., None]
+            motions = vectors @ np.where(free[..., None], 0.0, along / np.where(free, 1.0, held)[..., None])
+        else:
+            levers = np.repeat(self.levers[todo], 3, axis=1).swapaxes(-1, -2)
+            balance = load + (levers @ solved[..., -1:])[..., 0] + clearance * (springs @ self.arms)
+            motions = _held_motions(levers @ solved[..., :-1] + by_springs, balance, vectors, free)
         moved = S.reshape(-1, n, n) @ (solved[..., :-1] @ motions - solved[..., -1:]) - G @ motions
         loads = -offset - (columns @ moved.reshape(T, -1, 3, 1))[..., 0]
         null = {at: vectors[at][:, free[at]] for at in np.flatnonzero(free.any(axis=1))}
         return loads, motions[..., 0], null
+
+    def _carried(self, todo: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Loads on the motions (t, m) that forces of the windows (t, W) of some problems balance [N]."""
+        if self.levers is None:
+            return force @ self.G
+        return (force[:, None] @ self.levers[todo])[:, 0]
 
     def _rows(self, values: np.ndarray, todo: np.ndarray) -> np.ndarray:
         """Values of some problems, (1, ...) where they are alike."""
@@ -416,7 +436,7 @@ class _ActiveSets:
         largest = np.maximum(largest, np.abs(carried).max(axis=1, initial=0.0))[:, None, None]
         rounding = ROUNDING * (np.abs(gap) + (moved + 10 * turned)[:, None, None] + np.abs(approach))
         flips = np.where(active, loads < -10 * ROUNDING * largest, gaps < -rounding)
-        imbalance = self.load - loads.sum(axis=-1) @ self.G - carried @ self.arms
+        imbalance = self.load - self._carried(todo, loads.sum(axis=-1)) - carried @ self.arms
         length = np.maximum(moved, RIGID * np.abs(gap).max(axis=(1, 2)))
         apart = np.where(active, np.abs(gaps), -gaps).max(axis=(1, 2)) / np.where(length > 0, length, 1.0)
         pull = np.maximum(-loads.min(axis=(1, 2)), np.abs(imbalance).max(axis=1))
@@ -487,6 +507,8 @@ class _ActiveSets:
             arrays = self.bearings.joined(*arrays)
         start = np.concatenate([self.active[before][candidate], self.springs[before]])
         state = solve_contact(*arrays, self.given, start=start)
+        if self.found.friction is not None:
+            state = self._alone_with_friction(at, arrays, state)
         self.springs[at] = state.active[len(problem.gap) :]
         for name in ("loads", "gaps", "active"):
             values = getattr(self, name)
@@ -494,6 +516,40 @@ class _ActiveSets:
             values[at][candidate] = getattr(state, name)[: len(problem.gap)]
         self.motions[at], self.residual[at] = state.motions, state.residual
         self.iterations[at] += state.iterations
+
+    def _alone_with_friction(self, at: int, arrays, state: ContactState) -> ContactState:
+        """Solve one position with the friction of the solution before, until it is its own.
+
+        The map contracts by about the coefficient of friction times roll length over base radius.
+        """
+        H, gap, G = arrays
+        window, friction = np.nonzero(self.found.candidate[at])[0], self.found.friction
+        assert friction is not None
+        for _ in range(_ROUNDS):
+            before = np.bincount(window, state.loads[: len(window)], minlength=len(self.found.mesh))
+            parted = np.append((friction.supports[at] @ before)[window], np.zeros(len(gap) - len(window)))
+            state = solve_contact(H, gap + parted, G, self.given - before @ friction.arms[at], start=state.active)
+            after = np.bincount(window, state.loads[: len(window)], minlength=len(before))
+            if np.abs(after - before).max() <= _SETTLED * np.abs(after).max():
+                return state
+        raise ContactError(
+            f"the contact with friction does not settle at position {self.found.position[at]}",
+            code="E-CONTACT",
+            key="losses.excites",
+            limit=f"{_ROUNDS} solutions",
+            remedy="give a smaller coefficient of friction, or leave losses.excites out",
+        )
+
+
+def _held_motions(stiffness: np.ndarray, balance: np.ndarray, vectors: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Solve unsymmetric stiffnesses (t, m, m) for the motions (t, m, 1) without those that nothing restrains.
+
+    ``vectors`` (t, m, m) are columns, of which ``free`` (t, m) are such motions.
+    """
+    onto = vectors.swapaxes(-1, -2)
+    held = np.where(free[:, :, None] | free[:, None], np.eye(free.shape[1]), onto @ stiffness @ vectors)
+    along = np.where(free[..., None], 0.0, onto @ balance[..., None])
+    return vectors @ np.linalg.solve(held, along)
 
 
 def _local_solution(local, place, active, right) -> np.ndarray:
@@ -547,6 +603,8 @@ class PairLaws:
         Moments of the loads [N], and motions [m], at the given state.
     pressure : (P, W, K) array
         Largest of all cells over the root of the force, which Hertz's law has constant [Pa/N^(1/2)].
+    friction : WindowFriction, optional
+        As of `Candidates`.
     """
 
     force: np.ndarray
@@ -561,6 +619,7 @@ class PairLaws:
     loads: np.ndarray
     motions: np.ndarray
     pressure: np.ndarray
+    friction: WindowFriction | None = None
 
     @property
     def step(self) -> float:
@@ -620,6 +679,8 @@ def pair_laws(candidates: Candidates, state: BatchState, force: np.ndarray) -> P
     loads = (onto @ state.loads[..., None])[..., 0]
     field = (smooth.reshape(P, 3 * W, 3 * W) @ loads.reshape(P, -1, 1)).reshape(P, W, 3, 1)
     field += (loads.sum(axis=-1) @ supports)[..., None, None]
+    if candidates.friction is not None:
+        field += (candidates.friction.supports @ loads.sum(axis=-1)[..., None])[..., None]
     gap = np.where(candidates.candidate, candidates.gap + (Pi @ field)[..., 0], np.inf)
     separation = gap.min(axis=-1)
     rows = np.nonzero(np.isfinite(separation))
@@ -647,6 +708,7 @@ def pair_laws(candidates: Candidates, state: BatchState, force: np.ndarray) -> P
         loads=loads,
         motions=state.motions,
         pressure=np.moveaxis(pressure, 0, -1),
+        friction=candidates.friction,
     )
 
 

@@ -448,6 +448,27 @@ def active_flank_load(grid: Grid, planetary_set: PlanetarySet, side: float) -> n
     return load if side > 0 else mirrored_columns(load, mirror_nodes(grid))
 
 
+def active_flank_friction(grid: Grid, planetary_set: PlanetarySet, side: float) -> np.ndarray:
+    """Spread a unit friction force along the active flank of the ring tooth, and a unit turning of it, (2n, 2) forces.
+
+    The force acts along the tangent as flank 1 moves while the planet drives, the couple of normal forces as the
+    planet turns then. ``grid`` and ``side`` as in `active_flank_load`.
+    """
+    stations = flank_stations(grid, planetary_set.ring)
+    weights, normal = active_flank_weights(stations, planetary_set), stations.normals
+    # planets turn clockwise while the left flank of the ring carries
+    tangent = np.column_stack([normal[:, 1], -normal[:, 0]])
+    arm = stations.points - weights @ stations.points
+    along = weights * (arm * tangent).sum(axis=1)
+    turned = along * (arm[:, 0] * normal[:, 1] - arm[:, 1] * normal[:, 0])
+    couple = -along / turned.sum()
+    loads = np.zeros((2 * len(grid.points), 2))
+    for axis in (0, 1):
+        loads[2 * stations.nodes + axis, 0] = weights * tangent[:, axis]
+        loads[2 * stations.nodes + axis, 1] = couple * normal[:, axis]
+    return loads if side > 0 else mirrored_columns(loads, mirror_nodes(grid))
+
+
 def root_functionals(grid: Grid, gear: Gear, material: Material, *, state: str) -> BoundaryStress:
     """Tangential stress along fillet and root arc of the left flank, in the direction of the boundary."""
     names = tuple(name for name in ("fillet_left", "root_left") if name in grid.boundaries)

@@ -37,6 +37,7 @@ from femgear.contact.batch import (
 )
 from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
+from femgear.contact.flank_friction import friction_of_record
 from femgear.contact.omitted_pairs import needed_nearest
 from femgear.contact.peaks import (
     FEWEST,
@@ -44,6 +45,7 @@ from femgear.contact.peaks import (
     MOST_ROUNDS,
     mean_weights,
     open_places,
+    pitch_passages,
     tooth_pair_codes,
 )
 from femgear.contact.slices import largest_mean
@@ -66,6 +68,8 @@ from femgear.gears.planetary import mirrored_set
 
 _TOGETHER, _ROWS, _SAME_PLACE = 64, 50, 1e-6
 """Positions that are solved at once, and slices of helical teeth; distance of two that count as one [mesh periods]."""
+_PASSAGE = np.int64(1 << 40)
+"""What passages of the pitch point add to the numbers of tooth pairs that carry."""
 _MANY_PARTS = 3
 """Parts of a walk above which two processes share them."""
 
@@ -100,6 +104,9 @@ class CycleOptions:
     peaks : bool
         Solve further positions where the extremes between equidistant ones lie (`MeshCycle.between`), see
         `femgear.contact.peaks`; not of helical teeth.
+    friction : tuple of float, optional
+        Coefficient of friction of every kind of mesh, over the force in the transverse section; negative where gear
+        2 drives. See `femgear.contact.flank_friction`; none of back flanks, nor of members that tilt.
     progress : callable, optional
         Called with (positions done, positions).
     """
@@ -115,6 +122,7 @@ class CycleOptions:
     ahead: np.ndarray | None = None
     width_supports: WidthSupports = UPRIGHT
     peaks: bool = False
+    friction: tuple[float, ...] | None = None
     progress: Callable[[int, int], None] | None = None
 
     def mirrored(self, order: np.ndarray) -> CycleOptions:
@@ -253,6 +261,9 @@ class MeshCycle:
         States at further positions, between which and the others no extremes are left.
     alike : int
         Rotations that map the planets onto one another: they go through the same states.
+    friction_force, friction_moment : (M, P) arrays, optional
+        Force of gear 1 on gear 2 along the tangent, positive as flank 1 moves there while gear 1 drives [N], and the
+        sum of the same times the path coordinates of the tooth pairs, as the flanks that are loaded drive [N m].
     """
 
     position: np.ndarray
@@ -295,6 +306,8 @@ class MeshCycle:
     helical: bool = False
     between: Between | None = None
     alike: int = 1
+    friction_force: np.ndarray | None = None
+    friction_moment: np.ndarray | None = None
 
     def extremes(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Smallest and largest values over the record and the positions between.
@@ -403,9 +416,11 @@ class MeshCycle:
 _PRESSURES = ("pressure", "pressure_offset", "pressure_centre")
 _OVER_MESHES = ("deflection", "force", "back_force", "stiffness", "max_pressure", "edge_contact")
 _PRESSED = ("pressed_path", "pressed_load")
+FRICTION = ("friction_force", "friction_moment")
+"""What there is of meshes whose flanks rub."""
 _SLICED = ("slice_load", "slice_pressure", "mesh_misalignment", "lead_offset")
 _AXES = {
-    "mt": (*_OVER_MESHES, *_PRESSED, "held_stiffness", "mesh_misalignment", "lead_offset"),
+    "mt": (*_OVER_MESHES, *_PRESSED, "held_stiffness", "mesh_misalignment", "lead_offset", *FRICTION),
     "mst": ("tooth_load", "path", "back_tooth_load", "back_path", "pressure_centre"),
     "gms": ("tooth", "back_tooth"),
     "t": ("sun_arc", "residual", "iterations"),
@@ -497,7 +512,7 @@ def walk_mesh_cycle(
         record = loaded if loaded.force.any() else record
     if options.ahead is not None and not np.ndim(positions):
         record = replace(record, **over_slices(record, options.ahead, periods=periods))
-        pins = pin_forces(solved, record.force, record.back_force)
+        pins = pin_forces(solved, record.force, record.back_force, record.friction_force)
         record = replace(record, bearing_force=pins)
     return _seen_from_front(record, planetary_set, order) if mirrored else record
 
@@ -565,6 +580,7 @@ def cycle_without_load(
         for axes, names in _AXES.items()
         for name in names
         if not name.startswith("held")
+        and (options.friction is not None or name not in FRICTION)
         and (options.pressures or name not in _PRESSURES)
         and (options.waves is not None or name not in _SLICED)
     }
@@ -759,7 +775,7 @@ class _Walk:
         """Solve the contact at positions from ``first`` to ``end`` of the windows, each of so many slices."""
         options, positions = self.options, len(self.empty.position) // self.repeats
         rows = (np.arange(first, end)[:, None] * each + np.arange(each)).ravel()
-        candidates = contact_candidates(setup, self.bodies, rows, self.members)
+        candidates = contact_candidates(setup, self.bodies, rows, self.members, options.friction)
         if first == 0:
             # bodies that are no elastic bodies are refused before anything rests on them
             check_definite(candidates)
@@ -859,6 +875,8 @@ class _Walk:
             curves[name] = tooth_pair_codes(place[0], record.tooth_load, place[1], pitch)
             if record.slice_load is not None:
                 curves[f"slice_{name}"] = tooth_pair_codes(place[0], record.slice_load, place[1], pitch)
+        if record.friction_force is not None:
+            curves["passages"] = pitch_passages(record.path, record.position, pitch)
         return curves
 
     def _open_places(self, known_curves: dict[str, np.ndarray]) -> tuple[np.ndarray, float]:
@@ -884,6 +902,12 @@ class _Walk:
         codes, later = np.concatenate([codes, same]), np.append(later[:, 0], later_same)
         position, curves, codes = known_curves["position"][order], curves[:, order], codes[:, order]
         jumps = np.arange(len(curves)) > len(first)
+        if "passages" in known_curves:
+            # friction turns round where a pair passes the pitch point: deflections and loads jump
+            passed = known_curves["passages"].sum(axis=0)[order]
+            at_end = passed[0] + len(known_curves["passages"]) * self.empty.periods
+            jumps = jumps[:, None] | (np.diff(passed, append=at_end) != 0)
+            codes, later = codes + _PASSAGE * passed, later + _PASSAGE * at_end
         return open_places(position, curves, codes, least, self.empty.periods, later, jumps)
 
     def _at_positions(self, candidates: Candidates, state: BatchState) -> dict[str, Any]:
@@ -899,6 +923,9 @@ class _Walk:
         motion[members.free] = state.motions.T[rotations:] if self.images == 1 else 0.0
         whole = force if self.images == 1 else force[setup.places[0]]
         pulled = members.approach[:, sprung].T @ whole[: len(members.approach)]
+        if candidates.friction is not None:
+            rubbing = candidates.by_pairs(candidates.friction.factor * state.loads.sum(axis=-1)).sum(axis=1)
+            pulled = pulled + members.sliding[:, sprung].T @ rubbing[setup.places[0]]
         motion[sprung] = -pulled / members.stiffness[sprung, None]
         at_edge = candidates.at_flank_end(state.active)
         pressure = candidates.equal_cell_pressure(state.loads)
@@ -976,9 +1003,11 @@ class _Walk:
             message += "; some teeth are wedged between both flanks"
         if (record.back_force[~record.wedged] > 0).any():
             message += "; some meshes carry on their back flanks alone"
+        if (friction := self.options.friction) is not None:
+            record = replace(record, **friction_of_record(self.planetary_set, friction, record, self.options.ahead))
         return replace(
             record,
-            bearing_force=pin_forces(self.planetary_set, record.force, record.back_force),
+            bearing_force=pin_forces(self.planetary_set, record.force, record.back_force, record.friction_force),
             open_planets=unloaded,
             unknowns=unknowns,
             member_names=self.members.names,

@@ -6,7 +6,7 @@ tooth pairs of the plane solution become the springs of `femgear.contact.slices`
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -23,7 +23,10 @@ from femgear.gears.modifications import FlankTwist
 
 _FORCES, _LEAST, _MOST = 32, 1e-4, 4.0
 """Of the curves of tooth pairs: their number, and the shares of the torque at which they begin and end."""
-_EVEN = ("deflection", "sun_arc", "force", "stiffness", "member_motion", "held_stiffness")
+_EVEN = (
+    *("deflection", "sun_arc", "force", "stiffness", "member_motion", "held_stiffness"),
+    *("friction_force", "friction_moment"),
+)
 """What all slices of helical teeth have in common, and forces and stiffnesses that are sums over them."""
 _OF_PAIRS = ("tooth_load", "slice_load")
 """Loads of tooth pairs, whose sum is the force of their mesh."""
@@ -92,6 +95,10 @@ def contact_over_width(
     motion[members.free] = sliced.motions.T[driver + 1 : len(load)] if candidates.setup.images == 1 else 0.0
     angles, turned, twisted = _by_tilts(over.tilting, sliced, sliced.motions.T[len(load) :])
     pulled = members.approach[:, sprung].T @ force[places[0]]
+    if candidates.friction is not None:
+        rubbing = np.repeat(candidates.friction.factor.reshape(P, -1, W), S // (rows // P), axis=1) * sliced.force
+        of_meshes = replace(sliced, force=rubbing).of_meshes().mean(axis=1).T
+        pulled = pulled + members.sliding[:, sprung].T @ of_meshes[places[0]]
     motion[sprung] = -pulled / members.stiffness[sprung, None]
     base = turns @ sliced.motions.T[: driver + 1] + members.approach[places[1] == 0] @ motion
     # of the least-squares lines through the slices, from one end of the width to the other

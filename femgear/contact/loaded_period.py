@@ -20,6 +20,7 @@ import numpy as np
 
 from femgear.contact.bodies import Bodies
 from femgear.contact.cycle import (
+    FRICTION,
     CycleOptions,
     MeshCycle,
     loaded_image,
@@ -27,6 +28,7 @@ from femgear.contact.cycle import (
     walk_mesh_cycle,
 )
 from femgear.contact.face_width import over_slices
+from femgear.contact.flank_friction import path_sense
 from femgear.contact.supports import RIGID, Supports
 from femgear.curves import parabolas
 from femgear.gears.deviations import SetDeviations, common_period, planet_shift, without_turning
@@ -61,6 +63,8 @@ class LoadedPeriod:
         ring held, supports left out [m/N].
     periods : int
         Mesh periods in the record.
+    friction_force, friction_moment : (meshes, P) arrays, optional
+        As in `MeshCycle` [N], [N m].
     """
 
     position: np.ndarray
@@ -70,6 +74,8 @@ class LoadedPeriod:
     held_stiffness: np.ndarray
     held_compliance: np.ndarray
     periods: int = 1
+    friction_force: np.ndarray | None = None
+    friction_moment: np.ndarray | None = None
 
     def resampled(self, name: str, count: int) -> np.ndarray:
         """Values (meshes, count) of one of the arrays (meshes, P) at equidistant positions, made once.
@@ -215,11 +221,15 @@ def _record(cycle: MeshCycle, base_pitch: float) -> dict[str, np.ndarray]:
     A tooth pair is known by its place on the path at position zero.
     """
     place = np.rint((cycle.path / base_pitch - cycle.position) * 1e6)
+    rubbing = {name: values for name in FRICTION if (values := getattr(cycle, name)) is not None}
+    if rubbing:
+        # a pair that has passed the pitch point is another one
+        place = 4.0 * place + path_sense(cycle.path, base_pitch)
     loaded = np.empty(len(cycle.position), object)
     for p in range(len(cycle.position)):
         mesh, pair = np.nonzero(cycle.tooth_load[..., p] > 0)
         loaded[p] = frozenset(zip(mesh.tolist(), place[mesh, pair, p].tolist(), strict=True))
-    return {name: np.asarray(getattr(cycle, name)) for name in _OVER_POSITIONS} | {"loaded": loaded}
+    return {name: np.asarray(getattr(cycle, name)) for name in _OVER_POSITIONS} | rubbing | {"loaded": loaded}
 
 
 def _unresolved(record: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -257,7 +267,8 @@ def _whole_period(planetary_set: GearSet, record: dict, symmetry: int, shift: Fr
     # the mean of what is linear between the positions
     weights = (gap + np.roll(gap, 1)) / (2 * (periods / parts))
     compliance = record["held_compliance"][..., shown] @ weights
-    names, mean = ("deflection", "force", "stiffness", "held_stiffness"), np.zeros(compliance.shape[:2])
+    names, mean = ["deflection", "force", "stiffness", "held_stiffness"], np.zeros(compliance.shape[:2])
+    names += [name for name in FRICTION if name in record]
     values: dict[str, list[np.ndarray]] = {name: [] for name in names}
     for part in range(parts):
         moved = (np.arange(N) - ahead * (step * part % parts)) % N

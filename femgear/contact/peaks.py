@@ -70,9 +70,9 @@ def open_places(
         Peak to peak below which a curve counts as constant.
     later : (K,) array, optional
         Numbers of the first position after all ``periods``: those of other teeth. Default: as at first.
-    jumps : (K,) bool array, optional
-        Curves that jump where their codes change, and go on at either side of the jump as before. Default:
-        none; they bend there.
+    jumps : (K,) or (K, P) bool array, optional
+        Curves that jump where their codes change, or intervals in which they do, and go on at either side of the
+        jump as before. Default: none; they bend there.
 
     Returns
     -------
@@ -82,7 +82,8 @@ def open_places(
         Largest share of a peak to peak that intervals which are not halved any more may add.
     """
     other = codes != np.column_stack([codes[:, 1:], codes[:, 0] if later is None else later])
-    jump = other & (np.zeros(len(values), bool) if jumps is None else jumps)[:, None]
+    jumping = np.zeros(len(values), bool) if jumps is None else jumps
+    jump = other & (jumping if jumping.ndim == 2 else jumping[:, None])
     beyond, length = _beyond(position, values, other, jump, least, periods)
     wanted = (beyond > 0.5 * TOLERANCE) | (other & (length > (1.0 + 1e-9) * ENCLOSED))
     halved = wanted.any(axis=0) & (length > SHORTEST)
@@ -93,6 +94,12 @@ def open_places(
         # a record that ends at zero has no position beyond it
         places = np.where(places > 0.0, places - periods, places)
     return np.sort(places), float(left.max(initial=0.0)) if len(position) > 2 else 1.0
+
+
+def pitch_passages(path: np.ndarray, position: np.ndarray, base_pitch: float) -> np.ndarray:
+    """Count the tooth pairs of every mesh (M, P) that have passed the pitch point, from paths (M, T, P) [m]."""
+    place = np.floor(np.rint((path[:, 0] / base_pitch - position) * 1e6) * 1e-6)
+    return np.floor(path[:, 0] / base_pitch - place).astype(np.int64)
 
 
 def peak_doubt(position: np.ndarray, values: np.ndarray, least: np.ndarray, periods: int) -> float:

@@ -206,6 +206,12 @@ class _SliceNewton:
         plane = laws.loads[rows]
         field = (self.S @ plane.swapaxes(2, 3).reshape(P, L, 1, -1, 1))[..., 0]
         self.field = field + (plane.sum(axis=-1) @ laws.supports)[..., None]
+        # friction on sprung members, and in the equilibrium, of every slice
+        self.rubbing = self.levers = None
+        if laws.friction is not None:
+            of_rows = (laws.friction.supports[rows] / self.unit, laws.friction.arms[rows])
+            self.rubbing, self.levers = (np.repeat(values, self.each, axis=1) for values in of_rows)
+            self.field = self.field + (laws.friction.supports[rows] @ plane.sum(axis=-1)[..., None])
         self.plane, motions = plane.sum(axis=-1), laws.motions[rows] / self.unit
         self.motions = np.hstack([motions.mean(axis=1), np.zeros((P, k))])
         # of springs on the motions, over the unit
@@ -222,6 +228,8 @@ class _SliceNewton:
         # at the given state the curves miss their own points by their interpolation
         self.refresh()
         missed = self.by_laws(self.force)[0] + self.force @ laws.supports / self.unit
+        if self.rubbing is not None:
+            missed += (self.rubbing @ self.force[..., None])[..., 0]
         missed -= np.repeat(motions @ laws.approach.T, self.each, axis=1)
         self.apart = self.apart - np.where(self.force > 0.0, missed, 0.0) * self.unit + separations
         self.refresh()
@@ -257,6 +265,8 @@ class _SliceNewton:
         gap += (self.across.reshape(P, self.size, -1) @ force.reshape(P, -1, 1)).reshape(self.shape)
         # members on springs move as a whole
         gap += (force.mean(axis=1) @ self.laws.supports / self.unit)[:, None]
+        if self.rubbing is not None:
+            gap += (self.rubbing @ force[..., None])[..., 0].mean(axis=1)[:, None]
         shared = self.laws.approach.shape[1]
         gap = gap - (self.motions[:, :shared] @ self.laws.approach.T)[:, None]
         return gap - np.einsum("nwk,pk->pnw", self.tilts, self.motions[:, shared:]), slope
@@ -273,7 +283,10 @@ class _SliceNewton:
         load = images * np.abs(self.load).max()
         # with members on springs, which move as a whole
         N, n = self.shape[1], self.size
-        self.joined = (self.across + self.laws.supports[:, None] / (N * self.unit)).reshape(P, n, n)
+        joined = self.across + self.laws.supports[:, None] / (N * self.unit)
+        if self.rubbing is not None:
+            joined = joined + self.rubbing.swapaxes(1, 2)[:, None] / N
+        self.joined = joined.reshape(P, n, n)
         # separations that are large against the load leave their rounding in it
         limit = max(_SETTLED * load, _ROUNDED * self.widest / self.unit)
         todo = np.ones(P, bool)
@@ -394,8 +407,13 @@ class _SliceNewton:
         between[..., range(W), range(W)] += slope
         self._gather(block, self.joined, between, self.carrying)
         G = np.hstack([np.tile(self.laws.approach, (N, 1)), self.tilts.reshape(n, -1)])[at]
-        tilted = np.einsum("nwk,pnw->pk", self.tilts, self.force)
+        tilted, levers = np.einsum("nwk,pnw->pk", self.tilts, self.force), None
         carried = np.hstack([self.force.sum(axis=1) @ self.laws.approach, tilted]) / N
+        if self.levers is not None:
+            shared = self.levers.shape[-1]
+            carried[:, :shared] += (self.force.reshape(P, 1, n) @ self.levers.reshape(P, n, shared))[:, 0] / N
+            levers = G.copy()
+            levers[..., :shared] += np.take_along_axis(self.levers.reshape(P, n, shared), at[..., None], axis=1)
         balance = self.load - carried - self.springs * self.motions
         gap, change = np.take_along_axis(gap.reshape(P, n), at, axis=1), np.zeros((P, n + m))
         for place in np.flatnonzero(todo | changed):
@@ -408,6 +426,7 @@ class _SliceNewton:
                 -gap[place, carrying],
                 balance[place],
                 N,
+                None if levers is None else levers[place, carrying],
             )
             change[place, at[place, carrying]], change[place, n:] = solution
         # pulls stay until the next step: motions belong to them
@@ -424,16 +443,20 @@ def _bordered_solution(
     right: np.ndarray,
     balance: np.ndarray,
     slices: int,
+    levers: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve ``A f - G q = right, G^T f / N + S q = balance`` for forces (c,) and motions (m,).
 
-    The compliance A (c, c) is symmetric and mostly definite; S are springs (m,), N slices.
+    The compliance A (c, c) is symmetric and mostly definite; S are springs (m,), N slices. With friction the
+    equilibrium has ``levers`` (c, m) in place of G, and A need not be symmetric.
     """
-    _, solved, failed = _POSV[float](compliance.T, np.column_stack([G, right]))
+    failed = levers is not None
+    if not failed:
+        _, solved, failed = _POSV[float](compliance.T, np.column_stack([G, right]))
     if failed:
         solved = np.linalg.solve(compliance, np.column_stack([G, right]))
     by_motions, alone = solved[:, :-1], solved[:, -1]
-    below = G.T / slices
+    below = (G if levers is None else levers).T / slices
     moved = np.linalg.solve(np.diag(springs) + below @ by_motions, balance - below @ alone)
     return alone + by_motions @ moved, moved
 

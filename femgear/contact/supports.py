@@ -21,7 +21,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.errors import ContactError
-from femgear.gears.kinematics import across, member_approach, mesh_normals, unheld_members, unit_vectors
+from femgear.gears.kinematics import (
+    across,
+    member_approach,
+    member_sliding,
+    mesh_normals,
+    sliding_directions,
+    unheld_members,
+    unit_vectors,
+)
 from femgear.gears.pair import BRANCH, GearSet
 
 SPRINGS = 120
@@ -69,11 +77,15 @@ class MovingMembers:
         Approach of the flanks of every mesh per unit motion [1].
     stiffness : (m,) array
         [N/m], 0 for free motions.
+    sliding : (2N, m) array
+        Sliding of flank 1 on flank 2 of every mesh per unit motion [1], see
+        `femgear.gears.kinematics.member_sliding`.
     """
 
     names: tuple[str, ...]
     approach: np.ndarray
     stiffness: np.ndarray
+    sliding: np.ndarray
 
     @property
     def free(self) -> np.ndarray:
@@ -222,8 +234,8 @@ def moving_members(planetary_set: GearSet, supports: Supports, *, both_flanks: b
     ContactError: E-MECHANISM: members float that the planets cannot hold.
     """
     if supports == RIGID:
-        sides = 1 + both_flanks
-        return MovingMembers((), np.zeros((sides * len(planetary_set.mesh_names), 0)), np.zeros(0))
+        count, sides = len(planetary_set.mesh_names), 1 + both_flanks
+        return MovingMembers((), np.zeros((sides * count, 0)), np.zeros(0), np.zeros((count, 0)))
     floating = [name for name in planetary_set.members if getattr(supports, name) == 0.0]
     loose = unheld_members(planetary_set, floating, both_flanks=both_flanks)
     if loose:
@@ -258,19 +270,23 @@ def bearing_springs(planetary_set: GearSet, supports: Supports, members: MovingM
     return BearingSprings(supports.planet_clearance, compliance, arms.reshape(N * n, -1))
 
 
-def pin_forces(planetary_set: GearSet, force, back_force) -> np.ndarray:
+def pin_forces(planetary_set: GearSet, force, back_force, friction_force=None) -> np.ndarray:
     """Compute the force of every pin on its planet [N], shape (N, 2, P), in the frame of the carrier.
 
     What balances the mesh forces on the planet, whatever holds it: ``-(n_sp F_sp - n_pr F_pr)`` with the
     normals of `femgear.gears.kinematics.mesh_normals` on either side of the teeth. Of a pair it is the force
     of its bearing on gear 2.
 
-    ``force`` and ``back_force`` (meshes, P) [N] are those on drive and back flanks.
+    ``force`` and ``back_force`` (meshes, P) [N] are those on drive and back flanks, ``friction_force`` that along
+    `femgear.gears.kinematics.sliding_directions`, none where left out.
     """
     s = planetary_set
     result = np.zeros((s.n_planets, 2, np.shape(force)[1]))
-    for back, carried in ((False, force), (True, back_force)):
-        along, pins = mesh_normals(s, back=back)[:, :, None] * np.asarray(carried)[:, None, :], np.zeros(result.shape)
+    acting = [(mesh_normals(s), force), (mesh_normals(s, back=True), back_force)]
+    if friction_force is not None:
+        acting.append((sliding_directions(s), friction_force))
+    for directions, carried in acting:
+        along, pins = directions[:, :, None] * np.asarray(carried)[:, None, :], np.zeros(result.shape)
         for mesh, on_gears in zip(s.meshes, along, strict=True):
             for body, push in zip(mesh.bodies, (1.0, -1.0), strict=True):
                 if s.bodies[body].gear == BRANCH:
@@ -281,15 +297,22 @@ def pin_forces(planetary_set: GearSet, force, back_force) -> np.ndarray:
 
 def _one_side(planetary_set: GearSet, supports: Supports, back: bool) -> MovingMembers:
     """Motions and their approach (2N, m) on one side of the teeth."""
-    s, motions = planetary_set, member_approach(planetary_set, back=back)
-    moved = [(name, getattr(supports, name), effect) for name, effect in motions.items()]
+    s, motions, slides = planetary_set, member_approach(planetary_set, back=back), member_sliding(planetary_set)
+    moved = [(name, getattr(supports, name), (effect, slides[name])) for name, effect in motions.items()]
     # with clearance the springs of the bearing are candidates of the contact problem instead
     bearing = 0.0 if supports.planet_clearance else supports.planet
-    branch = np.array([mesh.copy for mesh in s.meshes])[:, None]
-    moved += [(f"planet {n + 1}", bearing, np.where(branch == n, motions["carrier"], 0.0)) for n in range(s.n_planets)]
-    yielding = [(name, value, effect) for name, value, effect in moved if value is not None]
+    branch, pins = np.array([mesh.copy for mesh in s.meshes])[:, None], (motions["carrier"], slides["carrier"])
+    moved += [
+        (f"planet {n + 1}", bearing, tuple(np.where(branch == n, effect, 0.0) for effect in pins))
+        for n in range(s.n_planets)
+    ]
+    yielding = [(name, value, effects) for name, value, effects in moved if value is not None]
+    approach, sliding = (
+        np.hstack([np.zeros((len(s.meshes), 0)), *(effects[kind] for _, _, effects in yielding)]) for kind in (0, 1)
+    )
     return MovingMembers(
         names=tuple(f"{name}: {axis}" for name, _, _ in yielding for axis in "xy"),
-        approach=np.hstack([np.zeros((len(s.meshes), 0)), *(effect for _, _, effect in yielding)]),
+        approach=approach,
         stiffness=np.array([value for _, value, _ in yielding for _ in "xy"], float),
+        sliding=sliding,
     )

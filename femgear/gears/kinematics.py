@@ -206,6 +206,25 @@ def member_approach(planetary_set: GearSet, *, back: bool = False) -> dict[str, 
     return {name: effect[:, np.isin(number, gears)].sum(axis=1) for name, gears in s.members.items()}
 
 
+def sliding_directions(gears: GearSet) -> np.ndarray:
+    """Compute the unit vectors (M, 2) along which flank 1 of every mesh moves over the tangent while gear 1 drives."""
+    sense = np.array([gears.senses[gears.bodies[mesh.bodies[0]].gear] for mesh in gears.meshes])
+    return sense[:, None] * across(mesh_normals(gears))
+
+
+def member_sliding(planetary_set: GearSet) -> dict[str, np.ndarray]:
+    """Compute the sliding (M, 2) of flank 1 on flank 2 per unit motion of the members along x and y, by their names.
+
+    Along `sliding_directions`, as `member_approach` has it along the normals.
+    """
+    s, effect = planetary_set, np.zeros((len(planetary_set.meshes), len(planetary_set.bodies), 2))
+    for mesh, direction, row in zip(s.meshes, sliding_directions(s), effect, strict=True):
+        for body, push in zip(mesh.bodies, (1.0, -1.0), strict=True):
+            row[body] = push * direction
+    number = np.array([body.gear for body in s.bodies])
+    return {name: effect[:, np.isin(number, gears)].sum(axis=1) for name, gears in s.members.items()}
+
+
 def unheld_members(planetary_set: GearSet, floating: Sequence[str], *, both_flanks: bool = False) -> tuple[str, ...]:
     """Find the members that float without being held by the planets.
 

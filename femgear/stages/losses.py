@@ -15,18 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import loss_entries
-from femgear.case.lubrication import LubricantSection, check_film, check_losses, losses_wanted, oil_at
+from femgear.case.lubrication import check_film, check_losses, losses_wanted
+from femgear.case.tooth_friction import friction_coefficient, shaft_turning
 from femgear.errors import CaseError
-from femgear.gears.friction import (
-    FRICTION_LAWS,
-    PathSpeeds,
-    closed_loss_factor,
-    loss_factor,
-    path_speeds,
-    sliding_per_path,
-    table_friction,
-)
-from femgear.gears.kinematics import speeds
+from femgear.gears.friction import closed_loss_factor, loss_factor, sliding_per_path
 from femgear.gears.power_flow import pair_condition, planetary_condition
 from femgear.gears.power_losses import LossyFlow, lossy_flow
 from femgear.gears.profile import base_helix_angle
@@ -43,7 +35,7 @@ from femgear.stages.static import slices_ahead, solve_static
 if TYPE_CHECKING:
     from femgear.case.dependencies import Steps
     from femgear.contact.cycle import MeshCycle
-    from femgear.gears.pair import GearPair, GearSet
+    from femgear.gears.pair import GearSet
     from femgear.gears.shaft_graph import SpeedCondition
     from femgear.stages.static_results import StaticResult
 
@@ -146,61 +138,6 @@ def mesh_friction(
     return MeshFriction(friction, factor, gears.of_kinds(rigid), gears.of_kinds(closed), force, tuple(passed))
 
 
-def friction_coefficient(
-    case: Any, pair: GearPair, force: np.ndarray, mesh_frequency: float, base_helix: float
-) -> np.ndarray:
-    """Compute the coefficient of friction of meshes of one kind by the section ``losses`` of a case.
-
-    Parameters
-    ----------
-    force : (m,) array
-        Mean force along the line of action of every mesh [N].
-    mesh_frequency : float
-        [Hz]
-    base_helix : float
-        [rad]
-    """
-    losses, line_load = case.losses, np.abs(force) / pair.face_width
-    if losses.friction == "constant":
-        return np.full(len(force), losses.coefficient)
-    at_pitch = path_speeds(pair, 0.0, mesh_frequency, base_helix)
-    if losses.friction == "table":
-        pitch_speed = 2.0 * math.pi * mesh_frequency / pair.gear_1.teeth * pair.gear_1.base_radius
-        grid = losses.table
-        return table_friction(
-            line_load,
-            pitch_speed / math.cos(pair.working_pressure_angle),
-            loads=grid.line_loads,
-            speeds=grid.speeds,
-            coefficients=grid.coefficients,
-        )
-    if not mesh_frequency:
-        return np.zeros(len(force))
-    return law_friction(case, losses.friction, pair, line_load, at_pitch)
-
-
-def law_friction(case: Any, name: str, pair: GearPair, line_load: np.ndarray, at_pitch: PathSpeeds) -> np.ndarray:
-    """Compute the coefficient of friction of a formula of `FRICTION_LAWS` with the oil and roughness of a case.
-
-    Parameters
-    ----------
-    line_load : array
-        Force at the base circle over face width [N/m]; ISO/TS 6336-20 has that at the pitch circle.
-    at_pitch : PathSpeeds
-        At the pitch point.
-    """
-    oil: LubricantSection = case.lubricant
-    load = line_load * math.cos(pair.working_pressure_angle) if name == "iso" else line_load
-    return FRICTION_LAWS[name](
-        load,
-        float(at_pitch.sum_speed),
-        float(at_pitch.radius),
-        viscosity=oil_at(case),
-        roughness=case.losses.roughness,
-        lubricant=oil.factor,
-    )
-
-
 def losses_of_meshes(flow: LossyFlow, stage: str, friction: MeshFriction, gears: GearSet) -> np.ndarray:
     """Share the losses of the kinds of mesh of a stage among its meshes (M,) [W]."""
     losses = np.zeros(len(friction.force))
@@ -223,16 +160,6 @@ def _operation(case: Any, gears: GearSet) -> _Operation:
     on = {name: name if name != held else None for name in members}
     condition = planetary_condition("set", on["sun"], on["carrier"], on["ring"], case.sun.teeth, abs(case.ring.teeth))
     return _Operation(shafts, condition, (), given, next(name for name in shafts if name != given))
-
-
-def shaft_turning(case: Any, gears: Any, speed: float) -> tuple[dict[str, float], float]:
-    """Compute speeds of all shafts [rad/s], and the mesh frequency [Hz], at a speed of the input [rad/s]."""
-    if gears.members:
-        of_set = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
-        return {"sun": of_set.sun, "carrier": of_set.carrier, "ring": of_set.ring}, of_set.mesh_frequency
-    first, second = (gear.name.replace("_", " ") for gear in gears.gears)
-    ratio = gears.senses[1] * gears.gears[0].teeth / gears.gears[1].teeth
-    return {first: speed, second: ratio * speed}, abs(speed) * gears.gears[0].teeth / (2.0 * math.pi)
 
 
 def _point(case: Any, static: StaticResult, torque: float, speed: float) -> LossPoint:

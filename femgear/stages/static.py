@@ -36,6 +36,7 @@ from femgear.case.gear_set import (
 from femgear.case.planetary import Case
 from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES
 from femgear.case.teeth import case_overlap
+from femgear.case.tooth_friction import acting_friction
 from femgear.contact.bodies import (
     Bodies,
     Sector,
@@ -158,6 +159,7 @@ def solve_static(
             # pressures of the plane contact are not those of slices
             pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
             peaks=True,
+            friction=acting_friction(case, gears),
             progress=partial(progress, "contact"),
             **width,
         ),

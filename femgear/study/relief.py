@@ -20,6 +20,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.case.tooth_friction import no_acting_friction
 from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.supports import RIGID, Supports
@@ -137,6 +138,7 @@ def design_basis(case: Case, *, cache: Path | None = None, steps: Steps | None =
 
     CaseError: as `femgear.stages.static.check_slices`.
     """
+    no_acting_friction(case, "designs, derivatives and samples know no friction of the teeth")
     gears, deviations, steps = planetary_set(case), set_deviations(case), steps or Steps()
     over = over_width(case, gears, cache=cache, steps=steps)
     return DesignBasis(

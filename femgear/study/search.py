@@ -27,6 +27,7 @@ import numpy as np
 from femgear.case.dependencies import FLANK_ENTRIES
 from femgear.case.gear_set import set_deviations
 from femgear.case.planetary import Case
+from femgear.case.tooth_friction import no_acting_friction
 from femgear.errors import CaseError, ContactError, ConvergenceError, FemgearError, StorageError
 from femgear.findings import Finding, tell
 from femgear.stages.key_figures import DECIBEL
@@ -544,6 +545,7 @@ def _linearised(evaluations: Evaluations, x) -> tuple[np.ndarray, np.ndarray]:
     objective = problem.objective
     answer = under_torque(evaluations.designs.answer(problem.point(x)), objective.torque)
     case, static = answer.case, answer.static
+    no_acting_friction(case, "derivatives know no friction of the teeth")
     basis = DesignBasis(
         static.planetary_set,
         static.bodies,

@@ -133,6 +133,22 @@ class Contact:
         )
         return np.stack([first, -second])
 
+    @property
+    def sliding(self) -> np.ndarray:
+        """Sliding of flank 1 on flank 2 along the tangent and its turning against it, (2, 2, S, 6).
+
+        Per unit of the motions of either station, second axis [1, m] and [1]: along the tangent of the transverse
+        section, at the pitch point, positive as gear 1 moves while it drives; see
+        `femgear.contact.cycle.MeshCycle.friction_force`.
+        """
+        effect, drives = np.zeros((2, 2, len(self.heights), 6)), np.sign(self.approach[0, 0, 5])
+        for station, (normal, points) in enumerate(zip(self.normals, self.points, strict=True)):
+            tangent = drives * np.array([-normal[1], normal[0], 0.0]) / math.hypot(normal[0], normal[1])
+            effect[0, station] = point_approach(tangent, points)
+            effect[1, station, :, 5] = drives
+        effect[:, 1] *= -1.0
+        return effect
+
 
 @dataclass(frozen=True)
 class Assembly:
@@ -200,6 +216,17 @@ class Assembly:
                     columns[6 * station : 6 * station + 6] += approach.T
             blocks.append(columns)
         return np.hstack(blocks)
+
+    @cached_property
+    def sliding_columns(self) -> np.ndarray:
+        """Sliding (6n, g) of all slices of all meshes, and their turning (6n, g), as `Contact.sliding`, (6n, 2g)."""
+        columns = np.zeros((2, self.count, self.columns.shape[1]))
+        for contact, place in zip(self.contacts, self.slices, strict=True):
+            for kind, of_stations in zip(columns, contact.sliding, strict=True):
+                for station, sliding in zip(contact.stations, of_stations, strict=True):
+                    if station != GROUND:
+                        kind[6 * station : 6 * station + 6, place] += sliding.T
+        return np.hstack([*columns])
 
     @cached_property
     def slices(self) -> tuple[slice, ...]:

@@ -58,6 +58,8 @@ class MechanicalSystem:
     flexibility : (n_meshes, n_meshes) array, optional
         Static compliance of bodies that are rigid in the coordinates, from the force of every mesh to the
         deflection of every other [m/N]: the spring deflections are then ``W^T q - flexibility f``.
+    sources : (n, c) array, optional
+        Directions of external loads that vary with the mesh, ``MeshExcitation.source``.
     """
 
     M: np.ndarray
@@ -68,6 +70,7 @@ class MechanicalSystem:
     dofs: tuple[str, ...]
     gyroscopic: np.ndarray | None = None
     flexibility: np.ndarray | None = None
+    sources: np.ndarray | None = None
 
     def __post_init__(self):
         freeze(self)
@@ -92,6 +95,8 @@ class MeshExcitation:
         Total play along the line of action [m].
     periods : int
         Number of mesh periods that the record spans.
+    source : (c, n_positions) array, optional
+        Loads along ``MechanicalSystem.sources``, such as the friction of the flanks [N, N m].
     """
 
     stiffness: np.ndarray
@@ -99,6 +104,7 @@ class MeshExcitation:
     force: np.ndarray
     backlash: np.ndarray
     periods: int = 1
+    source: np.ndarray | None = None
 
     def __post_init__(self):
         freeze(self)
@@ -154,6 +160,10 @@ class Modes:
         Names of the degrees of freedom, as in `MechanicalSystem`; empty where they have none.
     modal_load : (n_modes,) array, optional
         ``shape^T load`` [N kg^-1/2]: what the constant external load does on each mode; ``None`` means no load.
+    source_load : (n_modes, c) array, optional
+        ``shape^T sources`` of `MechanicalSystem.sources` [kg^-1/2], of rigid modes too.
+    source_residual : (n_meshes, c) array, optional
+        Static mesh deflection per source that the modes leave out [m/N].
     """
 
     frequency: np.ndarray
@@ -167,6 +177,8 @@ class Modes:
     nodal_diameter: np.ndarray
     dofs: tuple[str, ...] = field(default=())
     modal_load: np.ndarray | None = None
+    source_load: np.ndarray | None = None
+    source_residual: np.ndarray | None = None
 
     def __post_init__(self):
         freeze(self)
@@ -207,6 +219,8 @@ class Response:
     periods : int
         Mesh periods in one period of the excitation record: harmonic ``h`` has the frequency
         ``h mesh_frequency / periods``.
+    source : (n_speeds, c, H + 1) complex array, optional
+        Loads of `MeshExcitation.source` that were kept at every speed [N, N m].
     """
 
     mesh_frequency: np.ndarray
@@ -222,6 +236,7 @@ class Response:
     method: tuple[str, ...]
     message: str
     periods: int = 1
+    source: np.ndarray | None = None
 
     def __post_init__(self):
         freeze(self)
@@ -229,7 +244,7 @@ class Response:
     def without_lines(self) -> Response:
         """Give what is known of every speed, without the harmonics, which take the memory."""
         none = np.empty((len(self.mesh_frequency), 0, 0), complex)
-        return replace(self, deflection=none, force=none, modal=none)
+        return replace(self, deflection=none, force=none, modal=none, source=None)
 
 
 def gear_meshes(
@@ -295,6 +310,11 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
         lines_of_series[:, : lines + 1].copy() for lines_of_series in excitation.every_harmonic
     )
     return stiffness, deflection, force
+
+
+def source_harmonics(excitation: MeshExcitation, count: int) -> np.ndarray | None:
+    """Compute ``count`` mesh harmonics of the loads along the sources, as `mesh_harmonics`; None without any."""
+    return None if excitation.source is None else harmonics_of(excitation.source, count * excitation.periods)
 
 
 @dataclass(frozen=True)

@@ -85,6 +85,7 @@ CHANGES: tuple[dict[str, object], ...] = (
             "speed_shares": [0.5],
         },
     },
+    {"losses": {"friction": "constant", "coefficient": 0.05, "excites": True}},
     {"sun.pressure_angle": "20.1 deg", "sun.profile_shift": None},
     {"sun.bore_radius": "9.5 mm"},
     {"sun.face_width": "26 mm"},

@@ -148,7 +148,9 @@ def undamped_modes(
     _check_rigid(system, shape[:, rigid])
     rows[:, rigid] = modal_load[rigid] = 0.0
     omega = np.sqrt(np.where(rigid, 0.0, values))
-    loads = np.column_stack([springs, system.load])
+    sources = np.zeros((len(shape), 0)) if system.sources is None else system.sources
+    count, source_load = len(springs.T), shape.T @ sources
+    loads = np.column_stack([springs, system.load, sources])
     static = springs.T @ pseudo_solve(system.M, stiffness, shape[:, rigid], loads)
     return Modes(
         frequency=omega / (2.0 * np.pi),
@@ -156,12 +158,16 @@ def undamped_modes(
         shape=shape,
         mesh_stiffness=np.asarray(mesh_stiffness, dtype=float),
         mesh_deflection=rows,
-        residual=_residual_flexibility(system, mesh_stiffness, static[:, :-1], rows, omega),
-        load_deflection=static[:, -1],
+        residual=_residual_flexibility(system, mesh_stiffness, static[:, :count], rows, omega),
+        load_deflection=static[:, count],
         kind=tuple("rigid" if flag else "elastic" for flag in rigid),
         nodal_diameter=np.full(len(omega), -1),
         dofs=system.dofs,
         modal_load=modal_load,
+        source_load=None if system.sources is None else source_load,
+        source_residual=None
+        if system.sources is None
+        else static[:, count + 1 :] - _modal_flexibility(rows, source_load.T, omega),
     )
 
 
@@ -195,7 +201,19 @@ def output_load(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray:
     return outputs @ pseudo_solve(*rigid_basis(system, modes), system.load[:, None])[:, 0]
 
 
-def output_response(modes: Modes, response: Response, rows, *, residual, load) -> np.ndarray:
+def source_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarray | None:
+    """Compute static outputs ``L q`` (n_outputs, c) per source that the modes leave out, as `residual_output`.
+
+    None of a system without sources.
+    """
+    if system.sources is None or modes.source_load is None:
+        return None
+    outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
+    static = outputs @ pseudo_solve(*rigid_basis(system, modes), system.sources)
+    return static - _modal_flexibility(outputs @ modes.shape, modes.source_load.T, 2.0 * np.pi * modes.frequency)
+
+
+def output_response(modes: Modes, response: Response, rows, *, residual, load, source=None) -> np.ndarray:
     """Compute the harmonics of the outputs ``L q`` [m per unit of L] of a periodic response.
 
     They are complex (n_speeds, n_outputs, H + 1); the response was computed with the modes.
@@ -208,10 +226,14 @@ def output_response(modes: Modes, response: Response, rows, *, residual, load) -
         From :func:`residual_output` [m/N].
     load : (n_outputs,) array
         From :func:`output_load` [m].
+    source : (n_outputs, c) array, optional
+        From :func:`source_output` [m/N], of a response with sources.
     """
     omega = 2.0 * np.pi * modes.frequency
     forcing = response.force - modes.mesh_stiffness[:, None] * response.deflection
     out = np.matmul(rows, response.modal) - np.matmul(residual, forcing)
+    if source is not None and response.source is not None:
+        out += np.matmul(source, response.source)
     modal_load = np.zeros(len(omega)) if modes.modal_load is None else modes.modal_load
     out[..., 0] += load - _modal_flexibility(rows, modal_load[None, :], omega)[:, 0]
     return out

@@ -14,7 +14,7 @@ import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.system.fourier import Product, pad, sample
-from femgear.system.system import MeshExcitation, Modes, Response, mesh_harmonics
+from femgear.system.system import MeshExcitation, Modes, Response, mesh_harmonics, source_harmonics
 
 # Two signals or receptances closer than this (relative) are equal: identical planets. And what natural
 # frequencies of theirs differ by from rounding, which damping shows as a 1/(2 zeta)th at resonances.
@@ -102,8 +102,9 @@ def solve_spectral(
     _check_harmonics(*kept)
     excited, answered = (kept := kept * excitation.periods).max(axis=1)
     data = _Data.build(modes, excitation, excited, answered, frequency.max() / excitation.periods)
-    n, speeds = len(data.stiffness), len(frequency)
-    lines: Any = [np.zeros((speeds, size, answered + 1), complex) for size in (n, n, len(modes.frequency))]
+    n, speeds, sources = len(data.stiffness), len(frequency), 0 if data.source is None else len(data.source)
+    sizes = n, n, len(modes.frequency), sources
+    lines: Any = [np.zeros((speeds, size, answered + 1), complex) for size in sizes]
     numbers: Any = [np.zeros(speeds, kind) for kind in (float, float, float, float, int, bool)]
     solved = _Solved(*lines, *numbers)
     for part in _batches(frequency, kept[1]):
@@ -395,6 +396,8 @@ class _Solved:
         Harmonics of the meshes [m], [N].
     modal : (n_speeds, n_modes, H + 1) complex array
         Harmonics of the modal coordinates [m kg^1/2].
+    source : (n_speeds, c, H + 1) complex array
+        Harmonics of the loads along the sources [N, N m].
     residual, radius, tail, lowest : (n_speeds,) arrays
         ``residual``, ``spectral_radius``, ``tail`` and ``lowest_force`` of `Response`.
     iterations : (n_speeds,) int array
@@ -406,6 +409,7 @@ class _Solved:
     deflection: np.ndarray
     force: np.ndarray
     modal: np.ndarray
+    source: np.ndarray
     residual: np.ndarray
     radius: np.ndarray
     tail: np.ndarray
@@ -443,6 +447,7 @@ def _response(frequency, solved: _Solved, method: str, tolerance: float, periods
         lowest_force=solved.lowest,
         message="",
         periods=periods,
+        source=solved.source if solved.source.shape[1] else None,
     )
     return replace(response, message=joint_message([response]))
 
@@ -507,6 +512,8 @@ class _Data:
         Which meshes repeat which.
     classes : list of _Class
         Harmonics at which all twins have one shift.
+    source : (c, H + 1) complex array, optional
+        Harmonics of the loads along the sources [N, N m].
     """
 
     stiffness: np.ndarray
@@ -514,16 +521,37 @@ class _Data:
     force: np.ndarray
     twins: Twins
     classes: list[_Class]
+    source: np.ndarray | None = None
 
     @classmethod
     def build(cls, modes: Modes, excitation: MeshExcitation, excited: int, count: int, fastest: float) -> _Data:
         excited //= excitation.periods
         stiffness, deflection, force = (pad(harmonics_, count) for harmonics_ in mesh_harmonics(excitation, excited))
         load = pad(modes.load_deflection[:, None], count)
-        twins = find_twins((stiffness, deflection, force, load))
+        source, signals = source_harmonics(excitation, excited), [stiffness, deflection, force, load]
+        if source is not None:
+            if modes.source_load is None or modes.source_load.shape[1] != len(source):
+                raise CaseError("the modes do not know the sources of the excitation", code="E-SHAPE")
+            source = pad(source, count)
+            signals.append(_by_sources(modes, source, 2.0 * np.pi * fastest * np.arange(count + 1)[None])[:, 0])
+        twins = find_twins(tuple(signals))
         if twins.period > len(twins.group) or not _alike(modes, twins, 2.0 * np.pi * fastest):
             twins = _alone(len(twins.group), count)
-        return cls(stiffness, deflection, force, twins, _classes(modes, twins))
+        return cls(stiffness, deflection, force, twins, _classes(modes, twins), source)
+
+
+def _by_sources(modes: Modes, source: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """Mesh deflections (n, n_speeds, H + 1) by loads along the sources (c, H + 1), at (n_speeds, H + 1) [rad/s]."""
+    assert modes.source_load is not None
+    assert modes.source_residual is not None
+    moved = _moved_by_sources(modes, source, omega)
+    return np.moveaxis(moved @ modes.mesh_deflection.T, -1, 0) + (modes.source_residual @ source)[:, None]
+
+
+def _moved_by_sources(modes: Modes, source: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """Modal coordinates (n_speeds, H + 1, n_modes) by loads along the sources; rigid modes, which strain nothing, 0."""
+    assert modes.source_load is not None
+    return compliance(modes, omega) * (modes.source_load @ source).T
 
 
 def _alone(n: int, count: int) -> Twins:
@@ -563,8 +591,16 @@ def _solve_batch(modes, data: _Data, part, fundamental, kept, solved: _Solved, h
         between = np.moveaxis(modal[-1] @ class_.pairs + class_.residual, -1, 0)
         receptance[..., class_.h] = between.reshape(groups, groups, len(part), -1)
     receptance *= heard
-    source = -transfer(receptance, forcing)
+    source, driven, moved_by = -transfer(receptance, forcing), None, None
     source[..., 0] += modes.load_deflection[leaders, None]
+    if data.source is not None:
+        # of lines beyond the last one that is excited there is nothing
+        kept_lines = lines <= excited[:, None]
+        omega = 2.0 * np.pi * fundamental[part, None] * lines
+        driven = _by_sources(modes, data.source[:, :size], omega) * kept_lines
+        moved_by = _moved_by_sources(modes, data.source[:, :size], omega) * kept_lines[..., None]
+        source += driven[leaders]
+        solved.source[part, :, :size] = data.source[None, :, :size] * kept_lines[:, None]
     problem = HarmonicProblem(receptance, Product(stiffness), source)
     solved.radius[part] = spectral_radius(problem) if how.radius else np.nan
     solution, solved.iterations[part], solved.direct[part] = _solve(problem, how)
@@ -578,6 +614,9 @@ def _solve_batch(modes, data: _Data, part, fundamental, kept, solved: _Solved, h
         predicted[:, :, class_.h] += np.moveaxis(moved @ modes.mesh_deflection[:, class_.used].T, -1, 0)
         solved.modal[..., :size][part[:, None], class_.used, class_.h] = moved.transpose(0, 2, 1)
     predicted[..., 0] += modes.load_deflection[:, None]
+    if driven is not None and moved_by is not None:
+        predicted += driven
+        solved.modal[part, :, :size] += moved_by.swapaxes(1, 2)
     if modes.modal_load is not None:
         solved.modal[part, :, 0] += modes.modal_load * compliance(modes, np.zeros(()))
     solved.residual[part] = _norm(deflection - predicted) / _moving(deflection)

@@ -20,6 +20,7 @@ from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.planetary import Case, check_floating, output_member
 from femgear.case.quantities import RPM
 from femgear.case.sections import SupportSection
+from femgear.case.tooth_friction import no_acting_friction
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.deviations import common_period
@@ -81,6 +82,8 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
         takes, remedy = 'housing.form = "linear" takes', 'take the form "exact"'
         check_one_period(case, gears, takes, key="housing.form", remedy=remedy)
     record_periods(case, gears)
+    if case.housing.stands_still:
+        no_acting_friction(case, "a housing that stands still has no place for friction along the flanks")
     _check_housing_supports(case)
     if case.housing.structure:
         imported_casing(case, gears)

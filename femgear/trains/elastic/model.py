@@ -18,7 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.gear_set import support_stiffness
-from femgear.contact.bodies import active_flank_load, active_flank_weights, flank_stations
+from femgear.contact.bodies import (
+    active_flank_friction,
+    active_flank_load,
+    active_flank_weights,
+    flank_stations,
+)
 from femgear.errors import ContactError
 from femgear.fe.beam import body_matrices
 from femgear.fe.compliance import rim_compliance, sector_harmonics, static_cut_shapes
@@ -26,6 +31,7 @@ from femgear.fe.reduction import CyclicModes, cyclic_modes, sector_basis, smooth
 from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import torques, unit_vectors
 from femgear.housing.two_way.structure import circumferential
+from femgear.stages.friction_source import friction_source
 from femgear.stages.static import mesh_backlash
 from femgear.system.assembly import (
     GROUND,
@@ -108,10 +114,11 @@ def elastic_set(
     machines = _machines(case)
     gears = rigid_gears(case, planetary_set, machines, sun_torque=sun_torque)
     load = np.zeros((len(gears.names), 6))
-    acting = torques(planetary_set, member="sun", torque=sun_torque)
+    acting, end = torques(planetary_set, member="sun", torque=sun_torque), {}
     for member in ("sun", "carrier"):
         ends = [name for name, joined, _ in machines if joined == member]
-        load[gears.names.index(ends[0] if ends else member), ROTATION] += getattr(acting, member)
+        end[member] = gears.names.index(ends[0] if ends else member)
+        load[end[member], ROTATION] += getattr(acting, member)
     rigid = gears.system(load.ravel())
     angles = np.asarray(planetary_set.planet_angles) + ring.load_angle
     columns = np.zeros((len(ring_mode), 2 * planetary_set.n_planets))
@@ -121,6 +128,15 @@ def elastic_set(
     )
     system = with_modal_body(rigid, (2 * np.pi * modes.frequency[ring_mode]) ** 2, columns, ring_names)
     system, n_rigid, n = replace(system, flexibility=flexibility), len(rigid.dofs), len(system.dofs)
+    if modes.load.shape[1] > 1:
+        # friction along the flanks, and its turning, on the ring as on the gears; the carrier takes what is lost
+        rubbed = np.zeros((2, len(ring_mode), 2 * planetary_set.n_planets))
+        for kind, on_ring in enumerate(rubbed):
+            shown = ring_displacement(modes, ring_mode, ring_phase, angles, load=kind + 1)
+            on_ring[:, planetary_set.n_planets :] = -shown
+        taken = gears.motions[6 * end["carrier"] + ROTATION]
+        directions = np.vstack([gears.motions.T @ gears.sliding_columns, np.hstack([*rubbed])])
+        system = replace(system, sources=np.column_stack([directions, np.append(taken, np.zeros(len(ring_mode)))]))
     return ElasticSet(
         system=system,
         rigid_directions=np.vstack([rigid.W, np.zeros_like(columns)]),
@@ -140,6 +156,7 @@ def gears_alone(model: ElasticSet, flexibility) -> MechanicalSystem:
     system, rigid = model.system, slice(model.ring_slice.start)
     return replace(
         system,
+        sources=None,
         M=system.M[rigid, rigid],
         C=system.C[rigid, rigid],
         K=system.K[rigid, rigid],
@@ -150,12 +167,13 @@ def gears_alone(model: ElasticSet, flexibility) -> MechanicalSystem:
     )
 
 
-def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles) -> np.ndarray:
+def ring_displacement(ring: CyclicModes, ring_mode, ring_phase, angles, *, load: int = 0) -> np.ndarray:
     """Compute the displacement (n_ring, N) into the ring at its loaded flanks per unit ring coordinate.
 
-    Mode and kind (0 cosine, 1 sine) of every coordinate (n_ring,), angles (N,) of the loaded teeth [rad].
+    Mode and kind (0 cosine, 1 sine) of every coordinate (n_ring,), angles (N,) of the loaded teeth [rad]; of another
+    ``load`` of the ring where that is not 0.
     """
-    factor = ring.load[ring_mode, :1] * np.exp(1j * ring.nodal_diameter[ring_mode, None] * angles)
+    factor = ring.load[ring_mode, load : load + 1] * np.exp(1j * ring.nodal_diameter[ring_mode, None] * angles)
     sine = ring_phase[:, None] == 1
     return ring.norm[ring_mode, None] * np.where(sine, factor.imag, factor.real)
 
@@ -358,8 +376,9 @@ class RingModel:
     Parameters
     ----------
     modes : CyclicModes
-        One load (displacement into the ring at the loaded flank), outputs radial and tangential
-        displacement of the outer surface above a tooth.
+        One load (displacement into the ring at the loaded flank), with friction those of
+        `femgear.contact.bodies.active_flank_friction` too; outputs radial and tangential displacement of the outer
+        surface above a tooth.
     load_angle : float
         Angle from a planet to the centre of the ring tooth that it loads [rad].
     compliance : (n_max + 1,) array
@@ -399,6 +418,7 @@ def ring_model(
     max_diameter: int,
     max_frequency: float,
     side: float = 1.0,
+    friction: bool = False,
 ) -> RingModel:
     """Compute ring modes for nodal diameters 0..max_diameter under a unit load on the active flank.
 
@@ -417,12 +437,16 @@ def ring_model(
         Modes beyond are represented by their static part [Hz].
     side : float
         Sign of the sun's torque: which flanks carry.
+    friction : bool
+        Whether flanks rub.
     """
     ring, grid = planetary_set.ring, sector.grid
     diameters = np.arange(max_diameter + 1)
     weights = active_flank_weights(flank_stations(grid, ring), planetary_set)
     schurs = [body.surface.at_distribution(weights, side) for body in flanks]  # type: ignore[union-attr]
     load = active_flank_load(grid, planetary_set, side)
+    if friction:
+        load = np.hstack([load, active_flank_friction(grid, planetary_set, side)])
     basis = sector_basis(
         grid,
         sector.stiffness + foundation,
@@ -488,4 +512,4 @@ def mesh_springs(gears: PlanetarySet, ring: RingModel, state: LoadedPeriod) -> t
         backlash=mesh_backlash(gears),
         periods=state.periods,
     )
-    return excitation, flexibility
+    return replace(excitation, source=friction_source(state, record)), flexibility

@@ -9,7 +9,7 @@ import numpy as np
 from scipy import linalg
 
 from femgear.housing.sensor import SensorLines, component_lines
-from femgear.solvers.linear.modal import output_load, output_response, residual_output
+from femgear.solvers.linear.modal import output_load, output_response, residual_output, source_output
 from femgear.trains.elastic.model import RADIAL, ring_field
 
 if TYPE_CHECKING:
@@ -52,6 +52,7 @@ def mesh_and_ring_outputs(
         rows @ (outputs @ basis.shape),
         residual=rows @ residual_output(model.system, basis, outputs),
         load=rows @ output_load(model.system, basis, outputs),
+        source=None if (source := source_output(model.system, basis, outputs)) is None else rows @ source,
     )
     ring = np.zeros((len(values), values.shape[-1], len(heard)), complex)
     ring[..., heard] = np.swapaxes(values[:, n_meshes:], 1, 2)

@@ -61,6 +61,7 @@ from femgear.report.tables import (
 )
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.solvers.stability.parametric import stability
+from femgear.stages.friction_source import friction_rows
 from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
@@ -110,6 +111,7 @@ _ROUNDED, _MANY = 1e-5, 40
 # speeds, and bands at each of them, that are listed
 _FEW, _CUTS = 4, 24
 _FIRST, _STRONGEST = 6, 4
+FRICTION_CHANGE = "what the friction of the teeth adds to the level of the housing"
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
 _PARTS = ("sun", "planet, sun side", "planet, ring side", "ring")
@@ -169,6 +171,8 @@ class ModesResult(StageResult):
     bearing_share : (2N, 2) array, optional
         Mean force of a mesh over that of all of its kind, with `BEARING_FACTORS` of the planets' bearing
         stiffness; None where planets share equally.
+    frictionless : MeshExcitation, optional
+        The excitation of the same set without friction, where friction acts.
     """
 
     ring: RingModel
@@ -181,6 +185,7 @@ class ModesResult(StageResult):
     symmetry: int
     entries: Entries
     bearing_share: np.ndarray | None = None
+    frictionless: MeshExcitation | None = None
 
     @property
     def max_diameter(self) -> int:
@@ -375,6 +380,8 @@ class DynamicsResult(StageResult):
         Entries of the case that the result depends on.
     fixed : FixedHousing, optional
         The housing that stands still; all else is of the ring on its foundation.
+    friction_change : (speeds,) array, optional
+        What the friction of the teeth adds to the level of the housing, where it acts [dB].
     """
 
     input_speed: np.ndarray
@@ -392,6 +399,7 @@ class DynamicsResult(StageResult):
     compared_to: float
     entries: Entries
     fixed: FixedHousing | None = None
+    friction_change: np.ndarray | None = None
 
     @cached_property
     @one_blas_thread()
@@ -437,6 +445,8 @@ class DynamicsResult(StageResult):
             "excitation_limit": ("speed", self.excitation_limit, "Hz", _HIGHEST),
             "level_change": ("speed", self.level_change, "dB", LEVEL_CHANGE),
         }
+        if self.friction_change is not None:
+            reach["friction_change"] = ("speed", self.friction_change, "dB", FRICTION_CHANGE)
         harmonic, periods = np.arange(response.force.shape[-1]), response.periods
         return Contents(
             response_variables(self) | reach | complex_entries(entries, single=True),
@@ -614,6 +624,7 @@ def verdict(results: Results) -> Iterator[Block]:
         text = _kinds("{:.3f}", factors.max(axis=0), lambda text: marks(text, *codes, of=_OF_LEVEL))
         rows.append(("largest dynamic factor K_v, at operating speeds", text))
         computed = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
+        rows += friction_rows(results.dynamics, "level of the housing")
     rated = rating_wanted(results.case)
     if "static" in stages and "face_load_factor" in (static := results.static):
         computed["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)

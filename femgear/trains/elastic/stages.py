@@ -32,6 +32,7 @@ from femgear.case.dependencies import (
 )
 from femgear.case.gear_set import material_of, planetary_set, set_deviations
 from femgear.case.planetary import Case
+from femgear.case.tooth_friction import acting_friction, friction_acts
 from femgear.contact.bodies import Bodies, with_ring
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.loaded_period import LoadedPeriod, loaded_period
@@ -57,6 +58,7 @@ from femgear.solvers.linear.resonances import (
 )
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics
+from femgear.stages.friction_source import balanced_source
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE
 from femgear.stages.losses import LOSSES
@@ -178,7 +180,7 @@ _SHARING_POSITIONS = 8
 """Positions of a mesh period from which mean shares at other bearing stiffnesses are taken."""
 _EQUAL = 0.005
 """Mean shares that differ less from one another than this are equal."""
-_LINES = ("deflection", "force", "modal")
+_LINES = ("deflection", "force", "modal", "source")
 """What a response has of every harmonic."""
 
 
@@ -216,29 +218,19 @@ def solve_modes(
     check_entries(static, StaticResult, static_entries(case), "static solution")
     check_dynamic_case(case, static.planetary_set)
     steps, gears, torque = steps or Steps(), static.planetary_set, static.sun_torque
-    bodies, deviations, entries = _ring_bodies(case, static, steps), set_deviations(case), state_entries(case)
-    state = steps.kept("loaded state", entries) or steps.keep(
-        "loaded state",
-        entries,
-        loaded_period(
-            gears,
-            *bodies,
-            sun_torque=torque,
-            positions=record_positions(case, gears),
-            contact=case.static.contact,
-            deviations=None if deviations.ideal else deviations,
-            supports=linear_supports(case),
-            options=CycleOptions(
-                progress=partial(progress, "modes"), **loaded_over_width(case, gears, static.waves, steps)
-            ),
-        ),
-    )
+    bodies, deviations = _ring_bodies(case, static, steps), set_deviations(case)
+    friction, entries = acting_friction(case, gears), state_entries(case)
+    state = _loaded_state(case, static, bodies, steps, friction, partial(progress, "modes"))
     stiffness = state.resampled("held_stiffness", RECORD * state.periods).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
     reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
     ring, entries = _ring_of_case(case, static, bodies, steps, reach), {**entries, "reach": reach}
     springs = steps.kept("mesh springs", entries)
     excitation, flexibility = springs or steps.keep("mesh springs", entries, mesh_springs(gears, ring, state))
+    frictionless = None
+    if friction is not None:
+        without = _loaded_state(case, static, bodies, steps, None, partial(progress, "modes"))
+        frictionless = mesh_springs(gears, ring, without)[0]
     model = elastic_set(case, gears, ring, sun_torque=torque, flexibility=flexibility)
     modes = undamped_modes(
         model.system,
@@ -258,7 +250,32 @@ def solve_modes(
     modes = replace(modes, kind=kinds, nodal_diameter=diameters)
     symmetry = rotational_symmetry(deviations, gears)
     sharing = _sharing_over_bearings(case, gears, bodies[0], state, steps)
-    return ModesResult(ring, model, excitation, modes, bodies, state, reach, symmetry, modal_entries(case), sharing)
+    made = model, balanced_source(excitation, modes), modes, bodies, state, reach, symmetry, modal_entries(case)
+    return ModesResult(ring, *made, sharing, frictionless)
+
+
+def _loaded_state(
+    case: Case, static: StaticResult, bodies: tuple[Bodies, Bodies], steps: Steps, friction, progress
+) -> LoadedPeriod:
+    """Loaded state of the set on its supports, with friction of every kind of mesh or without."""
+    gears, deviations, entries = static.planetary_set, set_deviations(case), state_entries(case)
+    name = "loaded state" if friction is not None or not friction_acts(case) else "loaded state without friction"
+    return steps.kept(name, entries) or steps.keep(
+        name,
+        entries,
+        loaded_period(
+            gears,
+            *bodies,
+            sun_torque=static.sun_torque,
+            positions=record_positions(case, gears),
+            contact=case.static.contact,
+            deviations=None if deviations.ideal else deviations,
+            supports=linear_supports(case),
+            options=CycleOptions(
+                friction=friction, progress=progress, **loaded_over_width(case, gears, static.waves, steps)
+            ),
+        ),
+    )
 
 
 def _sharing_over_bearings(
@@ -287,6 +304,7 @@ def _sharing_over_bearings(
                 deviations=None if deviations.ideal else deviations,
                 supports=replace(supports, planet=factor * supports.planet),
                 periods=state.periods,
+                options=CycleOptions(friction=acting_friction(case, gears)),
             ).force
         )
         for factor in BEARING_FACTORS
@@ -323,7 +341,7 @@ def _ring_of_case(
 ) -> RingModel:
     """Cyclic modes of the ring on its foundation for excitation up to a frequency [Hz]."""
     gears, sector, side = static.planetary_set, static.sectors.ring, 1.0 if static.sun_torque >= 0 else -1.0
-    entries = {**ring_entries(case), "reach": reach, "side": side}
+    entries = {**ring_entries(case), "reach": reach, "side": side, "friction": friction_acts(case)}
     return steps.kept("ring model", entries) or steps.keep(
         "ring model",
         entries,
@@ -336,6 +354,7 @@ def _ring_of_case(
             max_diameter=max_nodal_diameter(case),
             max_frequency=MODES_ABOVE * reach,
             side=side,
+            friction=friction_acts(case),
         ),
     )
 
@@ -417,9 +436,11 @@ def dynamics_parts(
         else:
             response, dte, radial = early
         responses.append(response.without_lines())
+        rubbing = _friction_change(case, modes, radial, carrier[numbers], frequency[numbers], limit.at(numbers))
         if numbers[-1] + 1 == len(speeds) and part is not case:
             response = replace(response, message=joint_message(responses))
-        last = replace(response, **{name: getattr(response, name)[-1:] for name in _LINES})
+        kept = {name: lines[-1:] for name in _LINES if (lines := getattr(response, name)) is not None}
+        last = replace(response, **kept)
         heard = response if any(math.sin(sensor.direction) for sensor in case.housing.sensor) else last
         yield (
             part,
@@ -437,11 +458,24 @@ def dynamics_parts(
                 excitation_limit=limit.frequency[numbers],
                 level_change=level_change[numbers],
                 compared_to=beyond,
+                friction_change=rubbing,
                 entries=dynamic_entries(part),
                 fixed=_fixed_part(case, modes, carrier, limit, numbers) if case.housing.stands_still else None,
             ),
         )
         progress("dynamics", float(numbers[-1] + 1), float(len(speeds)))
+
+
+def _friction_change(
+    case: Case, modes: ModesResult, field: np.ndarray, carrier: np.ndarray, frequency: np.ndarray, limit: FrequencyLimit
+) -> np.ndarray | None:
+    """Compute by how much friction changes the levels (n_speeds,) [dB]; None without friction."""
+    if modes.frictionless is None:
+        return None
+    without = solve_spectral(modes.modes, modes.frictionless, frequency, **limit.options(case), radius=False)
+    fields = field, mesh_and_ring_outputs(modes, without)[1]
+    level, level_without = (order_level(lines_of_field(case, modes, radial, carrier)) for radial in fields)
+    return 20.0 * np.log10(level / level_without)
 
 
 @one_blas_thread()

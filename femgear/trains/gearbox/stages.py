@@ -11,6 +11,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
+from femgear.case.tooth_friction import no_acting_friction
 from femgear.report.tables import Block, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
@@ -158,6 +159,8 @@ def _no_runup(case: GearboxCase) -> str:
 
 def check_before_run(case: GearboxCase) -> None:
     """Refuse files of a casing that are none of this case, shafts that the model leaves loose, and idle sensors."""
+    for teeth in (case, *(teeth for stage in (*case.pair, *case.planetary) if (teeth := teeth_of(stage)) is not None)):
+        no_acting_friction(teeth, "gearboxes have no place for friction along the flanks")
     check_casing_file(case)
     check_held(case)
     check_sensors(case)

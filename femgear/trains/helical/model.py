@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 import numpy as np
 
 from femgear.case.gear_set import materials_of, support_stiffness
+from femgear.case.tooth_friction import no_acting_friction
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.errors import CaseError, ConvergenceError, GeometryError
@@ -412,6 +413,7 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
     far apart, a torque that no teeth carry. E-PERIODS: a static record of several mesh periods. E-GEOMETRY:
     virtual gears that cannot be made.
     """
+    no_acting_friction(case, "helical sets in space have no place for friction along the flanks")
     _check_supports(case, gears)
     if case.helical.mesh_stiffness is not None:
         return

@@ -18,16 +18,26 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from femgear.case.gear_set import line_play, set_deviations
+from femgear.case.tooth_friction import friction_acts
 from femgear.contact.cycle import CycleOptions
 from femgear.contact.loaded_period import loaded_period
 from femgear.fe.beam import body_matrices
 from femgear.gears.kinematics import unit_vectors
 from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
+from femgear.stages.friction_source import friction_source
 from femgear.stages.static import over_width, record_positions
 from femgear.stages.static_results import StaticResult
 from femgear.system.assembly import GROUND, IN_PLANE, ROTATION, Assembly, Inertia, gear_contact, held_motions, joint
-from femgear.system.system import MechanicalSystem, MeshExcitation, Modes, NonlinearSystem, gear_meshes
+from femgear.system.system import (
+    HarmonicForce,
+    MechanicalSystem,
+    MeshExcitation,
+    Modes,
+    NonlinearSystem,
+    gear_meshes,
+    source_harmonics,
+)
 from femgear.trains.pair.case_file import PairCase
 
 _RECORD = 2**13
@@ -50,8 +60,8 @@ class PairModel:
         Rows of x and y of gear 1 and gear 2; zero of held axes.
     bearing_stiffness : (4,) array
         Of these rows [N/m], infinite of held axes.
-    normal : (2,) array
-        Direction of the force of gear 1 on gear 2.
+    normal, tangent : (2,) arrays
+        Directions of the force and of the friction force of gear 1 on gear 2.
     """
 
     system: MechanicalSystem
@@ -59,17 +69,25 @@ class PairModel:
     supported: np.ndarray
     bearing_stiffness: np.ndarray
     normal: np.ndarray
+    tangent: np.ndarray
 
-    def measured(self, motion: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def measured(
+        self, motion: np.ndarray, force: np.ndarray, source: np.ndarray | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Give transmission error [m] and forces of gears on bearings [N] of lines of all rows.
 
-        Of lines (..., 5, L) of ``rotation`` and ``supported`` [m], and of the mesh force (..., L) [N], the
-        lines (..., 1, L) and (..., 2, 2, L); a held axis carries what the mesh exerts on its gear.
+        Of lines (..., 5, L) of ``rotation`` and ``supported`` [m], of the mesh force (..., L) [N] and of the sources
+        (..., 3, L) of friction, the lines (..., 1, L) and (..., 2, 2, L); a held axis carries what the mesh exerts on
+        its gear.
         """
         held = np.isinf(self.bearing_stiffness)
         stiffness = np.where(held, 0.0, self.bearing_stiffness)[:, None]
         reaction = held[:, None] * np.concatenate([-self.normal, self.normal])[:, None]
         bearing = stiffness * motion[..., 1:, :] + reaction * force[..., None, :]
+        if source is not None:
+            # the friction force of gear 1 on gear 2 is the first source, reversed
+            along = held[:, None] * np.concatenate([self.tangent, -self.tangent])[:, None]
+            bearing = bearing + along * source[..., :1, :]
         return motion[..., :1, :], bearing.reshape(*bearing.shape[:-2], 2, 2, -1)
 
     @property
@@ -118,11 +136,18 @@ def pair_model(case: PairCase, gears: GearPair) -> PairModel:
     assembly = Assembly(names, places, held, tuple(inertias), (), tuple(springs), (contact,))
     system, motions = assembly.system(load.ravel()), assembly.motions.reshape(len(names), 6, -1)
     rotation = np.einsum("s,sm->m", assembly.columns[[ROTATION, 6 + ROTATION], 0], motions[:2, ROTATION])
-    return PairModel(system, rotation, motions[:2, :2].reshape(4, -1), bearing, contact.normals[0, :2])
+    if friction_acts(case):
+        directions = assembly.motions.T @ assembly.sliding_columns
+        system = replace(system, sources=np.column_stack([directions, motions[ends[1], ROTATION]]))
+    tangent = contact.sliding[0, 0, 0, :2]
+    return PairModel(system, rotation, motions[:2, :2].reshape(4, -1), bearing, contact.normals[0, :2], tangent)
 
 
-def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
-    """Compute mesh stiffness, transmission error and force of the loaded pair over one mesh period."""
+def pair_excitation(case: PairCase, static: StaticResult, friction: tuple[float, ...] | None) -> MeshExcitation:
+    """Compute mesh stiffness, transmission error and force of the loaded pair over one mesh period.
+
+    With a coefficient of friction, see `femgear.case.tooth_friction.acting_friction`, its forces too.
+    """
     gears: GearPair = static.planetary_set
     deviations, slices = set_deviations(case), over_width(case, gears, waves=static.waves)
     if slices:
@@ -135,21 +160,28 @@ def pair_excitation(case: PairCase, static: StaticResult) -> MeshExcitation:
         positions=record_positions(case, gears),
         contact=case.static.contact,
         deviations=None if deviations.ideal else deviations,
-        options=CycleOptions(**slices),
+        options=CycleOptions(friction=friction, **slices),
     )
     record = (state.resampled(name, _RECORD) for name in ("stiffness", "deflection", "force"))
-    return MeshExcitation(*record, backlash=np.array([line_play(case)]))
+    return MeshExcitation(*record, backlash=np.array([line_play(case)]), source=friction_source(state, _RECORD))
 
 
 def separating_pair(model: PairModel, modes: Modes, excitation: MeshExcitation, harmonics: int) -> NonlinearSystem:
     """Make the pair whose flanks part and meet their back sides, with so many harmonics of the excitation.
 
+    Friction that acts does so as with flanks in contact.
+
     The modes give the viscous damping, which flanks that are apart have too, as in A. Kahraman and R. Singh,
     J. Sound Vib. 142, 1990, 49-75.
     """
     damping = modal_damping(model.system, modes.mesh_stiffness, modes.damping_ratio)
-    meshes = gear_meshes(excitation, harmonics=harmonics)
-    return NonlinearSystem(replace(model.system, C=damping), (meshes,))
+    meshes, system, forces = gear_meshes(excitation, harmonics=harmonics), replace(model.system, C=damping), ()
+    lines = source_harmonics(excitation, harmonics)
+    if lines is not None and system.sources is not None:
+        acting = system.sources @ lines
+        system = replace(system, load=system.load + np.real(acting[:, 0]))
+        forces = tuple(HarmonicForce(acting[:, h], (h,)) for h in range(1, harmonics + 1))
+    return NonlinearSystem(system, (meshes,), forces)
 
 
 def pair_kinds(modes: Modes, mass: np.ndarray) -> tuple[str, ...]:

@@ -15,6 +15,7 @@ from femgear.findings import Finding, tell
 from femgear.gears.pair import GearPair
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
 from femgear.report.tables import Block, chosen, first_speeds, response_warnings, tabulate
+from femgear.stages.friction_source import friction_rows
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
@@ -79,6 +80,8 @@ class PairModesResult(StageResult):
         With the mean mesh stiffness.
     entries : Entries
         Entries of the case that the result depends on.
+    frictionless : MeshExcitation, optional
+        The excitation without friction, where friction acts.
     """
 
     gears: GearPair
@@ -86,6 +89,7 @@ class PairModesResult(StageResult):
     excitation: MeshExcitation
     modes: Modes
     entries: Entries
+    frictionless: MeshExcitation | None = None
 
     def contents(self) -> Contents:
         """Collect the contents of modes.nc."""
@@ -122,11 +126,15 @@ class PairMotion:
     drive: np.ndarray
     back: np.ndarray
 
+    @property
+    def bearing_rms(self) -> np.ndarray:
+        """Root mean square (s, 2) of the force of either gear on its bearing about its mean [N]."""
+        return np.sqrt(0.5 * (np.abs(self.bearing[..., 1:]) ** 2).sum(axis=(-2, -1)))
+
     def levels(self, along: str, prefix: str = "") -> dict[str, tuple]:
         """Make the entries of a dataset that tell the motion at every speed, over a dimension."""
-        power = (np.abs(self.bearing[..., 1:]) ** 2).sum(axis=(-2, -1))
         factor = self.peak / np.real(self.force[:, 0, 0])
-        values = fluctuation(self.dte)[:, 0], factor, self.lowest, np.sqrt(0.5 * power), self.drive, self.back
+        values = fluctuation(self.dte)[:, 0], factor, self.lowest, self.bearing_rms, self.drive, self.back
         return {
             f"{prefix}{name}": (f"{along} gear" if value.ndim > 1 else along, value, *_LEVELS[name])
             for name, value in zip(_LEVELS, values, strict=True)
@@ -155,6 +163,8 @@ class PairDynamicsResult(StageResult):
         Frequency at which the excitation ends [Hz].
     backlash : (1,) array
         Play along the line of action [m].
+    friction_change : (s, 2) array, optional
+        What friction adds to the fluctuation of the force on either bearing with flanks in contact, where it acts [dB].
     """
 
     gears: GearPair
@@ -164,6 +174,7 @@ class PairDynamicsResult(StageResult):
     stability: Stability
     excitation_limit: np.ndarray
     backlash: np.ndarray
+    friction_change: np.ndarray | None = None
 
     @property
     def converged(self) -> bool:
@@ -197,6 +208,9 @@ class PairDynamicsResult(StageResult):
         reach = ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation")
         variables = response_variables(self) | {"excitation_limit": reach} | motion.levels("speed")
         variables["backlash"] = ("mesh", self.backlash, *_PLAY)
+        if self.friction_change is not None:
+            words = "what the friction of the teeth adds to the fluctuation of the bearing force"
+            variables["friction_change"] = ("speed gear", self.friction_change, "dB", words)
         title = {"title": "periodic response of the pair", "message": self.response.message}
         return Contents(
             variables | complex_entries(entries),
@@ -367,10 +381,11 @@ def describe_dynamics(data: xr.Dataset) -> Block:
         "method": lambda row: str(row.method.values),
         "Floquet": lambda row: f"{float(row.floquet_multiplier):.4f}",
     }
-    notes = (
+    notes = [
         "K_v: largest over mean mesh force; contact: share of the time with drive flanks closed; Floquet: "
-        "largest multiplier, stable up to 1",
-    )
+        "largest multiplier, stable up to 1"
+    ]
+    notes += [f"{words}: {text}" for words, text in friction_rows(data, "bearing forces")]
     return tabulate("Dynamics", (data.isel(speed=i) for i in chosen(data.sizes["speed"])), columns, notes)
 
 

@@ -22,6 +22,7 @@ from femgear.case.dependencies import check_entries, modal_entries, static_entri
 from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.quantities import RPM
 from femgear.case.teeth import case_overlap
+from femgear.case.tooth_friction import acting_friction
 from femgear.errors import ConvergenceError, GeometryError
 from femgear.findings import Finding
 from femgear.gears.checks import check_meshes
@@ -31,7 +32,7 @@ from femgear.gears.pair import GearPair
 from femgear.report.tables import Block, chosen, describe_modes, tabulate
 from femgear.solvers.continuation.branches import frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
-from femgear.solvers.linear.modal import output_load, output_response, residual_output, undamped_modes
+from femgear.solvers.linear.modal import output_load, output_response, residual_output, source_output, undamped_modes
 from femgear.solvers.linear.resonances import (
     crossings,
     merged_speeds,
@@ -45,6 +46,7 @@ from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.stages.drawing_tables import describe_drawing
+from femgear.stages.friction_source import balanced_source
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE
 from femgear.stages.losses import LOSSES
@@ -75,7 +77,7 @@ from femgear.stages.tooth_figures import pair_key_figures
 from femgear.stages.train_judgements import set_judgements
 from femgear.system.force_laws import GearMeshes
 from femgear.system.fourier import fluctuation, sample
-from femgear.system.system import Modes, NonlinearSystem, Response
+from femgear.system.system import Modes, NonlinearSystem, Response, source_harmonics
 from femgear.trains.pair.case_file import PairCase
 from femgear.trains.pair.figures import DYNAMICS, RUNUP
 from femgear.trains.pair.model import (
@@ -206,11 +208,14 @@ def solve_pair_modes(case: PairCase, static: StaticResult) -> PairModesResult:
     """
     check_entries(static, StaticResult, static_entries(case), "static solution")
     gears: GearPair = static.planetary_set
-    model, excitation = pair_model(case, gears), pair_excitation(case, static)
+    model, friction = pair_model(case, gears), acting_friction(case, gears)
+    excitation = pair_excitation(case, static, friction)
     mean, ratio = excitation.stiffness.mean(axis=1), case.dynamics.damping_ratio
     modes = undamped_modes(model.system, mean, damping_ratio=ratio)
     modes = replace(modes, kind=pair_kinds(modes, model.system.M))
-    return PairModesResult(gears, model, excitation, modes, modal_entries(case))
+    frictionless = None if friction is None else pair_excitation(case, static, None)
+    made = gears, model, balanced_source(excitation, modes), modes, modal_entries(case)
+    return PairModesResult(*made, frictionless)
 
 
 def _harmonics(case: PairCase, modes: Modes, mesh_frequency: np.ndarray) -> np.ndarray:
@@ -225,13 +230,13 @@ def _harmonics(case: PairCase, modes: Modes, mesh_frequency: np.ndarray) -> np.n
 
 
 def _linear(
-    case: PairCase, modes: PairModesResult, frequency: np.ndarray, harmonics: np.ndarray
+    case: PairCase, modes: PairModesResult, frequency: np.ndarray, harmonics: np.ndarray, *, friction: bool = True
 ) -> tuple[Response, PairMotion]:
-    """Solve for the response with flanks held together at mesh frequencies (s,) [Hz]."""
+    """Solve for the response with flanks held together at mesh frequencies (s,) [Hz], friction left out or not."""
     basis, model = modes.modes, modes.model
     response = solve_spectral(
         basis,
-        modes.excitation,
+        modes.excitation if friction or modes.frictionless is None else modes.frictionless,
         frequency,
         excitation_harmonics=harmonics[0],
         response_harmonics=harmonics[1],
@@ -243,16 +248,23 @@ def _linear(
         model.rows @ basis.shape,
         load=output_load(model.system, basis, model.rows),
         residual=residual_output(model.system, basis, model.rows),
+        source=source_output(model.system, basis, model.rows),
     )
     force = sample(response.force[:, 0], 4 * response.force.shape[-1])
-    measured = model.measured(motion, response.force[:, 0])
+    measured = model.measured(motion, response.force[:, 0], response.source)
     extremes, closed = (force.max(axis=1), force.min(axis=1)), np.ones(len(force))
     lines = np.array(response.deflection), np.array(response.force)
     return response, PairMotion(*lines, *measured, *extremes, closed, np.zeros(len(force)))
 
 
-def _parted(model: PairModel, problem: NonlinearSystem, solutions: Sequence[PeriodicSolution], size: int) -> PairMotion:
-    """Collect the motion of solutions with play, their lines filled with zeros up to a harmonic."""
+def _parted(
+    model: PairModel,
+    problem: NonlinearSystem,
+    solutions: Sequence[PeriodicSolution],
+    size: int,
+    source: np.ndarray | None,
+) -> PairMotion:
+    """Collect the motion of solutions with play, their lines filled with zeros up to a harmonic, as sources (3, .)."""
     lines, reduction, mesh = np.zeros((len(solutions), 7, size + 1), complex), reduced(problem), problem.elements[0]
     assert isinstance(mesh, GearMeshes)
     for row, solution in zip(lines, solutions, strict=True):
@@ -263,7 +275,8 @@ def _parted(model: PairModel, problem: NonlinearSystem, solutions: Sequence[Peri
     _, drive, back, has_back = mesh.flank_forces(x, phase)
     force, closed = mesh.evaluate(x, phase)[0][..., 0, 0], (drive > 0.0, has_back & (back < 0.0))
     measures = force.max(axis=1), force.min(axis=1), *(closed_there.mean(axis=(1, 2)) for closed_there in closed)
-    return PairMotion(lines[:, :1], lines[:, 1:2], *model.measured(lines[:, 2:], lines[:, 1]), *measures)
+    measured = model.measured(lines[:, 2:], lines[:, 1], source)
+    return PairMotion(lines[:, :1], lines[:, 1:2], *measured, *measures)
 
 
 def _with_play(problem: NonlinearSystem, frequency: float, start: np.ndarray, case: PairCase) -> PeriodicSolution:
@@ -306,6 +319,10 @@ def pair_dynamics_parts(
         frequency = speeds * case.gear_1.teeth / (2.0 * np.pi)
         harmonics = _harmonics(case, basis, frequency)
         response, motion = _linear(case, modes, frequency, harmonics)
+        change = None
+        if modes.frictionless is not None:
+            without = _linear(case, modes, frequency, harmonics, friction=False)[1]
+            change = 20.0 * np.log10(motion.bearing_rms / without.bearing_rms)
         decisive = decisive_harmonics(basis, excitation, int(harmonics[0].max()))
         judged = stability(basis, excitation, frequency, excitation_harmonics=decisive)
         multiplier, method = judged.multiplier.copy(), list(response.method)
@@ -314,7 +331,8 @@ def pair_dynamics_parts(
             problem = separating_pair(modes.model, basis, excitation, int(harmonics[0, s]))
             start = response.deflection[s, :, : harmonics[1, s] + 1]
             solution = _with_play(problem, frequency[s], start, case)
-            part_motion = _parted(modes.model, problem, [solution], motion.dte.shape[-1] - 1)
+            rubbing = None if response.source is None else response.source[s]
+            part_motion = _parted(modes.model, problem, [solution], motion.dte.shape[-1] - 1, rubbing)
             for name, values in vars(part_motion).items():
                 getattr(motion, name)[s] = values[0]
             for name in _TOLD:
@@ -324,7 +342,7 @@ def pair_dynamics_parts(
         response = replace(response, **lines, **verdicts, method=tuple(method))
         judged, reach = replace(judged, multiplier=multiplier), harmonics[0] * frequency
         play = modes.excitation.backlash
-        yield part, PairDynamicsResult(modes.gears, speeds, motion, response, judged, reach, play)
+        yield part, PairDynamicsResult(modes.gears, speeds, motion, response, judged, reach, play, change)
         progress("dynamics", float(numbers[-1] + 1), float(count))
 
 
@@ -387,7 +405,9 @@ def _branch(case: PairCase, modes: PairModesResult, speeds: np.ndarray, lowest: 
     curve = frequency_response_curve(problem, (float(high * teeth), float(low * teeth)), **options)
     far = np.abs(curve.lines[:, 0]).sum(axis=1) > LARGEST_APPROACH * case.module
     kept = max(int(far.argmax()), 1) if far.any() else len(far)
-    motion = _parted(modes.model, problem, curve.solutions[:kept], size)
+    rubbing = source_harmonics(modes.excitation, count)
+    rubbing = None if rubbing is None else np.pad(rubbing, ((0, 0), (0, size - count)))
+    motion = _parted(modes.model, problem, curve.solutions[:kept], size, rubbing)
     along = curve.parameter[:kept] / teeth
     parts, folds = along[motion.drive < 1.0] / RPM, np.sort(along[curve.folds[curve.folds < kept]]) / RPM
     span = f"from {parts.min():.6g} to {parts.max():.6g} rpm" if len(parts) else "nowhere"

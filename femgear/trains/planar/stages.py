@@ -16,6 +16,7 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.case.lubrication import losses_wanted
 from femgear.case.quantities import RPM
+from femgear.case.tooth_friction import no_acting_friction
 from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import undamped_modes
@@ -82,6 +83,7 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
 
     CaseError: E-BACKLASH: back flanks without play. E-PERIODS: a static record of several mesh periods.
     """
+    no_acting_friction(case, "rigid planar sets have no place for friction along the flanks")
     planar, play = case.planar, _least_play(case, gears)
     if planar.back_flanks and planar.line_backlash is None and not play > _NO_PLAY:
         raise CaseError(

@@ -1,0 +1,54 @@
+"""Friction of the teeth as a load that excites: from the loaded state to the sources of the mechanical system.
+
+The loaded state holds friction forces and their moments about the pitch points, with the mean loads
+(`femgear.contact.flank_friction`). They act on the bodies along `femgear.system.assembly.Assembly.sliding_columns`,
+whatever the bodies do: friction does not follow the forces of the motion. Forces of the meshes are those of the same
+state, so that a set at rest under both is in equilibrium.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from femgear.contact.cycle import FRICTION
+from femgear.report.tables import chosen
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.contact.loaded_period import LoadedPeriod
+    from femgear.system.system import MeshExcitation, Modes
+
+
+def friction_source(state: LoadedPeriod, count: int) -> np.ndarray | None:
+    """Loads (2M + 1, count) of the friction of all meshes on the motions, and zeros for what takes its mean.
+
+    Along the columns of `femgear.system.assembly.Assembly.sliding_columns` [N, N m]; None without friction.
+    """
+    if state.friction_force is None:
+        return None
+    force, moment = (state.resampled(name, count) for name in FRICTION)
+    return np.concatenate([-force, -moment, np.zeros((1, count))])
+
+
+def balanced_source(excitation: MeshExcitation, modes: Modes) -> MeshExcitation:
+    """Let the last source take what friction loses of the mean power, which moves the set as a rigid body else."""
+    if excitation.source is None or modes.source_load is None:
+        return excitation
+    rigid, source = modes.source_load[modes.frequency == 0.0], np.array(excitation.source)
+    if len(rigid):
+        source[-1] = -np.linalg.lstsq(rigid[:, -1:], rigid[:, :-1] @ source[:-1].mean(axis=1), rcond=None)[0]
+    return replace(excitation, source=source)
+
+
+def friction_rows(dynamics: xr.Dataset, words: str) -> list[tuple[str, str]]:
+    """Write what friction adds to a level at some speeds of dynamics.nc, for the verdict; none without."""
+    if "friction_change" not in dynamics:
+        return []
+    change = dynamics["friction_change"]
+    change = change.max(dim=[dim for dim in change.dims if dim != "speed"])
+    shown = [f"{float(change[i]):+.1f} dB at {float(dynamics.speed[i]):g} rpm" for i in chosen(len(change))]
+    return [(f"friction of the teeth adds to the {words}", ", ".join(shown))]

@@ -1,0 +1,192 @@
+"""Friction as a load that excites: equilibrium at rest, time integration, orders of equal planets, efficiency."""
+
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from femgear.housing.orders import order_level
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.stages.losses import solve_losses
+from femgear.stages.static import solve_static
+from femgear.system.fourier import harmonics_of, sample
+from femgear.system.system import mesh_harmonics, source_harmonics
+from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes
+from femgear.trains.reading import read_case, with_values
+
+CASES = Path(__file__).parents[2] / "cases"
+ACTS = {"losses": {"friction": "constant", "coefficient": 0.06, "excites": True}, "static.stresses": False}
+COARSE = {"static.flank_elements": 8, "static.positions": 16, "dynamics.up_to": "8 kHz"}
+
+
+UNEVEN = (0.0, 122.66666666666667, 240.0)
+
+
+@cache
+def pair(**more):
+    held = {"gear_1.bearing_stiffness": "2e8 N/m", "gear_2.bearing_stiffness": "3e8 N/m"}
+    case = with_values(read_case(CASES / "spur_pair.toml"), ACTS | COARSE | held | more)
+    static = solve_static(case)
+    return case, static, solve_pair_modes(case, static)
+
+
+@cache
+def planetary(angles=None, **more):
+    changed = ACTS | COARSE | {"operation.speeds": ["250 rpm"]} | more
+    if angles is not None:
+        changed |= {"set.planet_angles": [f"{angle} deg" for angle in angles]}
+    case = with_values(read_case(CASES / "planetary_27_40_108.toml"), changed)
+    static = solve_static(case)
+    modes = solve_modes(case, static)
+    return case, static, modes
+
+
+def test_a_pair_is_as_direct_integration_has_it():
+    """The linear equations over one period from all unit states, whose periodic solution needs no settling."""
+    _, _, modes = pair()
+    basis, excitation, count = modes.modes, modes.excitation, 6
+    frequency = 1.9e3
+    stiffness, deflection, force = mesh_harmonics(excitation, count)
+    source, omega = source_harmonics(excitation, count), 2.0 * np.pi * frequency
+    elastic = basis.frequency > 0.0
+    natural, shape = 2.0 * np.pi * basis.frequency[elastic], basis.shape[:, elastic]
+    damping, m = 2.0 * basis.damping_ratio[elastic] * natural, int(elastic.sum())
+    row, acting = modes.model.system.W[:, 0] @ shape, shape.T @ modes.model.system.sources
+    constant, mean = shape.T @ modes.model.system.load, basis.mesh_stiffness[0]
+
+    def at(lines, t):
+        return np.real(lines @ np.exp(1j * omega * t * np.arange(count + 1)))
+
+    def rates(t, y, forced):
+        states = y.reshape(2 * m, -1)
+        x, v = states[:m], states[m:]
+        k = at(stiffness[0], t)
+        pushed = (k - mean) * (row @ x)
+        load = -(natural**2)[:, None] * x - damping[:, None] * v - np.outer(row, pushed)
+        if forced:
+            alone = at(force[0], t) - k * at(deflection[0], t)
+            load += (constant + acting @ at(source, t) - row * alone)[:, None]
+        return np.concatenate([v, load]).ravel()
+
+    period, options = 1.0 / frequency, {"rtol": 1e-11, "atol": 1e-16, "method": "DOP853"}
+    through = solve_ivp(rates, (0.0, period), np.eye(2 * m).ravel(), args=(False,), **options).y[:, -1]
+    once = solve_ivp(rates, (0.0, period), np.zeros(2 * m), args=(True,), **options).y[:, -1]
+    start = np.linalg.solve(np.eye(2 * m) - through.reshape(2 * m, 2 * m), once)
+    instants = np.arange(256) / 256 * period
+    integrated = solve_ivp(rates, (0.0, period), start, args=(True,), t_eval=instants, **options).y
+    response = solve_spectral(
+        basis, excitation, frequency, excitation_harmonics=count, response_harmonics=40, tolerance=1e-11
+    )
+    approach = sample(response.deflection[0], 256)[0]
+    assert np.abs(approach - row @ integrated[:m]).max() < 1e-6 * np.ptp(approach)
+    without = solve_spectral(
+        basis, replace(excitation, source=0.0 * excitation.source), frequency, excitation_harmonics=count
+    )
+    assert np.abs(without.deflection[0, 0, 1]) != pytest.approx(np.abs(response.deflection[0, 0, 1]), rel=0.01)
+
+
+def test_a_pair_at_rest_is_in_the_equilibrium_of_its_statics():
+    case, _, modes = pair(**{"brake.inertia": "1e4 kg m^2", "brake.coupling_stiffness": "1e6 N m/rad"})
+    response = solve_spectral(
+        modes.modes, modes.excitation, 0.05, excitation_harmonics=30, response_harmonics=120, tolerance=1e-10
+    )
+    static = modes.excitation.every_harmonic[2][:, :20]
+    assert np.abs(response.force[0, :, :20] - static).max() < 1e-3 * np.abs(static[:, 1]).max()
+    assert np.abs(static[:, 1]).max() > 0.001 * static[0, 0].real
+    assert case.losses.excites
+
+
+def test_forces_on_rigid_bearings_are_those_of_teeth_and_friction():
+    case, _, modes = pair(**{"gear_1.bearing_stiffness": None, "gear_2.bearing_stiffness": None})
+    dynamics = solve_pair_dynamics(case, modes)
+    force, source = dynamics.response.force[:, 0], dynamics.response.source
+    normal, tangent = modes.model.normal, modes.model.tangent
+    assert normal @ tangent == pytest.approx(0.0, abs=1e-12)
+    on_first = dynamics.motion.bearing[:, 0]
+    assert np.einsum("sah,a->sh", on_first, normal) == pytest.approx(-force, rel=1e-9, abs=1e-9)
+    assert np.einsum("sah,a->sh", on_first, tangent) == pytest.approx(source[:, 0], rel=1e-9, abs=1e-9)
+    assert on_first == pytest.approx(-dynamics.motion.bearing[:, 1])
+    friction = modes.excitation.source[0]
+    assert np.abs(friction).max() < 1.01 * 0.06 * modes.excitation.force.max()
+    assert dynamics.friction_change.shape == (len(case.operation.speeds), 2)
+
+
+def test_the_mean_of_what_is_lost_is_taken_at_the_other_end():
+    _, _, modes = pair()
+    rigid = modes.modes.frequency == 0.0
+    assert rigid.sum() == 1
+    work = modes.modes.source_load[rigid] @ modes.excitation.source
+    assert abs(work.mean()) < 1e-9 * np.abs(work).max()
+
+
+@pytest.mark.parametrize(
+    ("angles", "foundation", "allowed"),
+    [
+        (None, "1e10 N/m^3", 2e-3),
+        pytest.param(UNEVEN, "1e12 N/m^3", 4e-3, marks=pytest.mark.slow),
+        pytest.param(UNEVEN, "1e10 N/m^3", 4e-2, marks=pytest.mark.slow),
+    ],
+)
+def test_a_set_at_rest_is_in_the_equilibrium_of_its_statics(angles, foundation, allowed):
+    """A heavy brake stands still, as the carrier does in the statics.
+
+    These leave out what friction bends along the tangent: how a soft ring then shares the load of uneven planets.
+    """
+    soft = {f"ring.foundation_{way}": foundation for way in ("radial", "tangential")}
+    _, _, modes = planetary(angles, **{"brake.inertia": "1e6 kg m^2"}, **soft)
+    response = solve_spectral(
+        modes.modes, modes.excitation, 0.1, excitation_harmonics=20, response_harmonics=60, tolerance=1e-9
+    )
+    static = modes.excitation.every_harmonic[2][:, :10]
+    apart = np.abs(response.force[0, :, :10] - static)
+    assert apart.max() < allowed * np.abs(static[:, 1]).max()
+
+
+@pytest.mark.slow
+def test_without_friction_all_is_as_before():
+    case, _, modes = planetary()
+    plain = with_values(case, {"losses": None})
+    before = solve_modes(plain, solve_static(plain))
+    for name in ("stiffness", "deflection", "force"):
+        assert np.array_equal(getattr(modes.frictionless, name), getattr(before.excitation, name))
+    assert before.frictionless is None
+    assert before.excitation.source is None
+    dynamics, other = solve_dynamics(case, *planetary()[1:]), solve_dynamics(plain, solve_static(plain), before)
+    levels = [order_level(solve_housing(c, d).exact) for c, d in ((case, dynamics), (plain, other))]
+    assert dynamics.friction_change == pytest.approx(20.0 * np.log10(levels[0] / levels[1]), abs=0.05)
+
+
+def test_equal_planets_make_multiples_of_their_number_alone():
+    """Carrier orders at the sensor: friction is the same at every planet, at other times."""
+    case, static, modes = planetary()
+    lines = solve_housing(case, solve_dynamics(case, static, modes)).exact
+    strength = np.abs(lines.displacement[0])
+    multiple = np.isclose(np.mod(lines.order, 3), 0.0)
+    assert strength[~multiple].max(initial=0.0) < 1e-9 * strength.max()
+    assert strength[np.isclose(lines.order, 108)] > 1e-3 * strength[lines.order > 50].max()
+
+
+def test_the_statics_lose_what_the_losses_say_to_first_order():
+    case, static, _ = pair()
+    plain = with_values(case, {"losses.excites": False})
+    cycle, gears, (kind,) = static.cycle, static.planetary_set, static.planetary_set.kinds
+    levers = np.tan(kind.working_pressure_angle), gears.gears[1].base_radius
+    arc = cycle.force + cycle.friction_force * levers[0] - cycle.friction_moment / levers[1]
+    passed = arc.mean() * gears.gears[0].base_radius / abs(static.sun_torque)
+    loss = 1.0 - solve_losses(plain, solve_static(plain)).points[0].flow.efficiency
+    # of 0.9 % a few per cent are of the second order, or of the places between positions
+    assert 1.0 - passed == pytest.approx(loss, rel=0.05)
+
+
+def test_sources_are_those_of_the_loaded_state():
+    _, _, modes = planetary()
+    state, source = modes.state, modes.excitation.source
+    count = source.shape[1]
+    assert np.array_equal(source[:6], -state.resampled("friction_force", count))
+    assert np.array_equal(source[6:12], -state.resampled("friction_moment", count))
+    assert np.ptp(source[12]) == 0.0
+    assert harmonics_of(source[:6], 3)[:, 1] == pytest.approx(source_harmonics(modes.excitation, 1)[:6, 1])
