@@ -110,6 +110,7 @@ def test_pressures_of_helical_teeth_are_those_of_the_normal_section(helix):
     assert cycle.slice_pressure[..., 7, :][pitch] == pytest.approx(hertz, rel=3e-3)
 
 
+@pytest.mark.slow
 def test_a_contact_of_one_slice_is_warned_of():
     """Its stiffness is that of the slice: twice as many of them are half as stiff."""
     found = solve_static(misaligned(0.1, 10))

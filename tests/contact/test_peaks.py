@@ -206,6 +206,7 @@ def test_errors_over_torque_have_no_steps(reference):
     assert np.diff(errors, axis=0).min() > 0.0
 
 
+@pytest.mark.slow
 def test_maps_have_the_numbers_of_a_run(tmp_path):
     """Harris map, objective and static.nc of one design: the same peaks to peaks, whatever the positions."""
     case = with_values(random_set(4).case, {"static.positions": 12})
@@ -220,7 +221,8 @@ def test_maps_have_the_numbers_of_a_run(tmp_path):
     assert (stored > np.ptp(data["ste"].values, axis=1).reshape(2, -1).max(axis=1)).all()
 
 
-@pytest.mark.parametrize("seed", [pytest.param(4, marks=pytest.mark.slow), 13])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [4, 13])
 def test_root_stresses_and_pressures_of_few_positions(seed, tmp_path):
     """At 9 positions root stresses were up to 6 % low; all planets that are alike have the largest."""
     case = random_set(seed).case

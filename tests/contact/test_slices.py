@@ -92,6 +92,7 @@ def test_energy_of_a_wave_is_that_of_its_strains(sectors):
     assert energy == pytest.approx(2 * total, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_sector_answers_waves_as_the_whole_gear(sectors):
     sector, teeth = sectors.sun, sectors.sun.gear.teeth
     stations = flank_stations(sector.grid, sector.gear)

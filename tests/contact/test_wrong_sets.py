@@ -89,6 +89,7 @@ def test_planet_pushed_into_the_sun_is_wedged(solved):
     assert any("W-WEDGED" in str(warning) for warning in result.findings)
 
 
+@pytest.mark.slow
 def test_pitch_error_that_separates_one_planet(solved):
     """Three teeth of planet 2 stand 80 um back: while they mesh with the sun, it carries nothing."""
     pitch = ["0 um"] * 40

@@ -317,6 +317,7 @@ def other_kind(value, random):
     return random.choice([one for one in others if type(one) is not type(value)])
 
 
+@pytest.mark.slow
 def test_no_mutant_of_a_journal_gives_a_wrong_number(problem, whole, tmp_path):
     """Of 250; with MUTANTS and SEED in the environment of more, and of others."""
     right, text = whole

@@ -86,6 +86,7 @@ def test_nafems_fv33_exact():
     assert strain[0, 0] == pytest.approx(129.222705, rel=5e-9)
 
 
+@pytest.mark.slow
 def test_nafems_fv33_by_elements():
     """The finite-element ring from copies of one sector: three zero modes, then the exact pairs."""
     grid = annulus_grid(1.8, 6.0, 36, across=12, along=2)

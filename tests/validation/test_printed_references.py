@@ -236,6 +236,7 @@ def test_tapered_membrane():
     np.testing.assert_allclose(np.sqrt(np.sort(values)) / (2 * math.pi), printed, rtol=2e-5)
 
 
+@pytest.mark.slow
 def test_elliptic_membrane():
     """NAFEMS LE1: quarter between ellipses (2, 1) and (3.25, 2.75) m, 10 MPa outwards on the outer one."""
     from skfem import FacetBasis, LinearForm, condense, solve

@@ -16,6 +16,7 @@ def motion():
     return system, motion_over_a_turn(system, SAMPLES)
 
 
+@pytest.mark.slow
 def test_the_motion_satisfies_its_equations(motion):
     system, values = motion
     n = len(values)
@@ -28,6 +29,7 @@ def test_the_motion_satisfies_its_equations(motion):
         assert acceleration[:, at] == pytest.approx(wanted, abs=1e-6 * np.abs(acceleration).max())
 
 
+@pytest.mark.slow
 def test_another_turn_changes_nothing(motion):
     system, values = motion
     n = len(values)

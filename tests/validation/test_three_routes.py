@@ -37,6 +37,7 @@ def mesh_force(omega, depth, backlash):
     return force
 
 
+@pytest.mark.slow
 def test_duffing_against_an_integration_without_femgear():
     found, run = routes.duffing_motion()
     line = nonlinear.one_harmonic(2.5091975811, 1.2)
@@ -52,7 +53,8 @@ def test_duffing_against_an_integration_without_femgear():
         assert difference(lines, other) < GATE
 
 
-@pytest.mark.parametrize("back", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("back", [False, True])
 def test_gear_pair_against_an_integration_without_femgear(back):
     omega, depth, backlash = PAIR[back]
     found, run = routes.pair_motion(back)
@@ -95,6 +97,7 @@ def test_planetary_train_against_an_integration_without_femgear():
     assert found.verdict.stable is True and routes.open_share(found)[0] > 0.5
 
 
+@pytest.mark.slow
 def test_multipliers_of_shooting_are_those_of_the_verdict():
     for found in (routes.duffing_motion()[0], routes.pair_motion(False)[0], routes.train_motion()):
         sizes = np.sort(np.abs(found.verdict.multipliers))[::-1]
@@ -115,6 +118,7 @@ def test_a_motion_without_contact_loss_is_told_apart():
     assert difference(found.shooting.solution.deflection, linear.deflection) > 1e3 * GATE
 
 
+@pytest.mark.slow
 def test_planetary_train_that_strikes_its_back_flanks():
     found = routes.train_motion(backlash=1e-6)
     assert found.balance.converged and found.shooting.solution.converged

@@ -46,6 +46,7 @@ def test_grid_has_the_area_of_all_sectors(static, grid):
     assert len(grid.regions) == sector.gear.teeth + 2
 
 
+@pytest.mark.slow
 def test_whole_ring_and_sector_agree_and_see_another_fillet(static, grid):
     gear = static.planetary_set.ring
     found, number = free_modes(grid, reference_material(), PLANE, count=14)

@@ -225,6 +225,7 @@ def test_a_ring_on_a_support_is_excited_as_far_as_on_its_foundation(case, static
     assert dynamics.fixed.two_way.harmonics[0] == dynamics.response.force.shape[-1] - 1
 
 
+@pytest.mark.slow
 def test_what_a_ring_on_a_support_loses_is_warned_of(case, static, modes):
     """What the comparison found is what the case without the limit has."""
     few = held(case, **{"operation.speeds": ["1500 rpm"], "dynamics.mesh_harmonics": 12})

@@ -81,7 +81,7 @@ def test_levels_are_as_exact_as_the_tolerance_says(before):
     np.testing.assert_allclose(*levels, rtol=1e-6)
 
 
-@pytest.mark.parametrize("ratio", [1e-4, 0.05])
+@pytest.mark.parametrize("ratio", [1e-4, pytest.param(0.05, marks=pytest.mark.slow)])
 def test_next_to_no_support_is_the_ring_on_its_foundation(before, ratio):
     present = reference(**{"dynamics.damping_ratio": ratio, "operation.speeds": ["400 rpm"]})
     case = with_values(present, {"housing.support": WEAK})
@@ -183,6 +183,7 @@ def test_named_sensors(before, held):
         np.testing.assert_allclose(force[:, 1], 2e8 * moved[:, 4], rtol=0, atol=1e-9 * np.abs(force).max())
 
 
+@pytest.mark.slow
 def test_sensors_of_both_routes(before):
     """Next to no support at low speed: radial and tangential lines by two ways."""
     entries = {"dynamics.damping_ratio": 1e-4, "operation.speeds": ["400 rpm"], "housing.sensor": SENSORS}

@@ -269,6 +269,7 @@ def test_back_flanks_have_the_same_frequencies(ring, back_ring):
     assert other.load_deflection == pytest.approx(one.load_deflection, rel=1e-8)
 
 
+@pytest.mark.slow
 def test_ring_on_its_foundation_is_the_whole_ring_of_finite_elements():
     """Static deflection under unit mesh forces, all nodal diameters, against a sparse solve of all teeth."""
     common = dict(module=2e-3, pressure_angle=np.deg2rad(20), face_width=0.02)

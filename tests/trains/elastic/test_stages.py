@@ -128,6 +128,7 @@ def test_planets_in_phase_leave_only_multiples_of_three(case, modes, dynamics):
             assert levels[1] == pytest.approx(levels[0], rel=1e-9)
 
 
+@pytest.mark.slow
 def test_planets_out_of_phase_are_equal_and_leave_only_multiples_of_three(case):
     """28/41/110 at the default 64 positions, which three planets would meet unequally: 66 are taken."""
     data = case_text.parse(case.source, "")
@@ -320,6 +321,7 @@ def test_motions_beyond_small_displacements_are_refused(case, steps):
     assert "W-MOTION" in [one.code for one in loose.findings]
 
 
+@pytest.mark.slow
 def test_thick_teeth_wedge_without_any_other_error(case, steps):
     """Teeth thicker than the play allow load both flanks: errors of thickness alone reach the contact."""
     coarse = with_value(with_value(case, "static.positions", 16), "static.back_flanks", True)

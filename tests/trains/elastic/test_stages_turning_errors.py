@@ -66,6 +66,7 @@ def three(solved):
     )
 
 
+@pytest.mark.slow
 def test_every_line_is_that_of_time_integration_over_the_whole_record(three):
     """As a record of one long period, by an integrator of its own; multipliers of that period too."""
     modes = three[1]
