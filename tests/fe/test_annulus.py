@@ -72,6 +72,7 @@ def test_impossible_counts():
         annulus_frequencies(1.0, 2.0, STEEL, nodal_diameters=[2], count=0)
 
 
+@pytest.mark.slow
 def test_small_hole_approaches_the_solid_disc():
     """Fundamental n = 2 of a solid disc, plane stress, from the 2 x 2 Bessel determinant without Y."""
 

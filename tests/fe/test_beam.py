@@ -43,6 +43,7 @@ ROWS = (
 BOTH = (ShaftPart(0.1, 0.03), ShaftPart(0.2, 0.05, 0.01, 0.03, 0.0))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rows", ROWS, ids=lambda rows: rows.__name__)
 def test_rows_of_the_validation_pass(rows):
     assert {row.quantity: row.verdict for row in rows() if row.verdict != "passes"} == {}

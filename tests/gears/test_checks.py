@@ -146,7 +146,10 @@ def test_negative_play_names_the_gear_whose_shift_is_wrong():
     assert refusal(replace(REFERENCE, ring=replace(REFERENCE.ring, profile_shift=-0.1))).key == "ring.profile_shift"
 
 
-@pytest.mark.parametrize(("rho", "refused"), [(0.25, False), (0.26, False), (0.38, False), (0.30, True), (0.38, True)])
+@pytest.mark.parametrize(
+    ("rho", "refused"),
+    [(0.25, False), (0.26, False), (0.38, False), (0.30, True), pytest.param(0.38, True, marks=pytest.mark.slow)],
+)
 def test_ring_tip_on_planet_fillet(rho, refused, mesh_gaps):
     """Against placed outlines: the largest overlap over one mesh period is the one that is told.
 

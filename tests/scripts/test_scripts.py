@@ -420,6 +420,7 @@ def test_planet_phasing(tmp_path):
     assert hertz[force.argmax(axis=0)] == pytest.approx([9840, 9840], abs=100)
 
 
+@pytest.mark.slow
 def test_planet_phasing_of_unequal_planets(tmp_path):
     angles = [word for value in (0, 75.6, 180, 255.6) for word in ("--angle", str(value))]
     teeth = ("--sun", "29", "--planet", "21", "--ring", "71", "--points", "20", "--harmonics", "2")
@@ -432,6 +433,7 @@ def test_planet_phasing_of_unequal_planets(tmp_path):
     assert float(first["lateral force, tilting"]) > 0.5 and float(second["torque, thrust"]) > 0.01
 
 
+@pytest.mark.slow
 def test_multistage_lists_the_readings_of_the_published_table(tmp_path):
     done = run("multistage.py", "-o", tmp_path, folder=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -370,7 +370,7 @@ CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
     [
         ("fixed", {}),
         pytest.param("elastic", {}, marks=pytest.mark.slow),
-        ("fixed", SLICED),
+        pytest.param("fixed", SLICED, marks=pytest.mark.slow),
         pytest.param("fixed", {**SLICED, **HELICAL}, marks=pytest.mark.slow),
     ],
     ids=["fixed", "elastic", "slices", "helical"],

@@ -148,6 +148,7 @@ def test_table_of_the_summary(results):
     assert low < -0.5 * high < 0 and [row[-1] for row in block.rows[2:]] == ["3", "1", "1", "3"]
 
 
+@pytest.mark.slow
 def test_report_has_the_section_with_its_figures(tmp_path, case, library, results):
     _, result = library
     figures = write_figures(tmp_path, ELASTIC, Drawn(case, {"stress": result.dataset()}))

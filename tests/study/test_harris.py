@@ -65,7 +65,10 @@ def test_one_negative_torque(quick_case, tmp_path):
     [
         {"static.members": "elastic", "planet.bearing_clearance": "2 um"},
         pytest.param({"set.helix_angle": "10 deg", "static.slices": 9}, marks=pytest.mark.slow),
-        {"static.back_flanks": True, "sun.errors": {"runout_amplitude": "3 um"}, "static.longest_record": 2},
+        pytest.param(
+            {"static.back_flanks": True, "sun.errors": {"runout_amplitude": "3 um"}, "static.longest_record": 2},
+            marks=pytest.mark.slow,
+        ),
         pytest.param({"static.slices": 9, "static.members": "elastic"}, marks=pytest.mark.slow),
     ],
     ids=["bearing clearance", "helical", "back flanks and runout", "slices"],

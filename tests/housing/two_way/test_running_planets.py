@@ -97,7 +97,10 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("name", CASES)
+LONG = ("five planets", "opposed pairs of planets")
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in CASES])
 def test_lines_are_those_of_one_linear_system(name):
     count, teeth, sense, options = CASES[name]
     system = twin(count, teeth, sense, **options)

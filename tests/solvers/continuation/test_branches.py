@@ -172,6 +172,7 @@ def on_the_loop(frequency, amplitude):
     raise AssertionError("no subharmonic motion found")
 
 
+@pytest.mark.slow
 def test_subharmonic_motions_of_order_three_form_an_isola():
     """Nayfeh and Mook, Nonlinear Oscillations (1979), section 4.2.2: none grows out of the forced motion."""
     options = {"harmonics": 9, "scale": 1.0, "options": StepOptions(largest=0.2)}
@@ -262,6 +263,7 @@ def stops():
     return frequency_response_curve(two_masses(1e-6), TWO_HZ, harmonics=9, options=StepOptions(largest=0.2))
 
 
+@pytest.mark.slow
 def test_two_masses_with_stops_are_followed_over_both_symmetry_losses(stops):
     """Where the motion loses its symmetry the equations are singular: the branch goes on behind it."""
     assert stops.complete and stops.parameter[-1] == TWO_HZ[1]
@@ -281,7 +283,8 @@ def test_two_masses_with_stops_are_followed_over_both_symmetry_losses(stops):
     assert stops.lines[0, 0, 1] == pytest.approx(linear, rel=1e-3)
 
 
-@pytest.mark.parametrize(("hertz", "leg"), [pytest.param(105.0, "one", marks=pytest.mark.slow), (200.0, "top")])
+@pytest.mark.slow
+@pytest.mark.parametrize(("hertz", "leg"), [(105.0, "one"), (200.0, "top")])
 def test_two_masses_with_stops_against_integration_in_time(stops, hertz, leg):
     """SciPy's integrator settles on the motions of the branch from starts that are 1 % off."""
     problem, (one, other), (top, _) = stops.equations.balance.problem, stops.branch_points, stops.folds

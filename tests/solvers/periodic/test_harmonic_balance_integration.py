@@ -121,6 +121,7 @@ def test_gear_pair_from_rest_settles_on_the_solution():
     assert difference(found, harmonics_of(run.y[:1], 16)) < 1e-5
 
 
+@pytest.mark.slow
 def test_planetary_set_with_backlash():
     """18 degrees of freedom, six meshes that part, free rotation."""
     data = lin_parker_set(3)
@@ -147,7 +148,10 @@ def test_planetary_set_with_backlash():
 
 @pytest.mark.parametrize(
     "bearing",
-    [RadialBearings([[0, 1]], 1.0, clearance=0.3), BearingSprings([[0, 1]], 1.0, clearance=0.3, springs=8)],
+    [
+        RadialBearings([[0, 1]], 1.0, clearance=0.3),
+        pytest.param(BearingSprings([[0, 1]], 1.0, clearance=0.3, springs=8), marks=pytest.mark.slow),
+    ],
 )
 def test_rotor_in_a_bearing_with_clearance(bearing):
     """Weight that turns in the rotating frame, against the sense of rotation, and a constant load."""

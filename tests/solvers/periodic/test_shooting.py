@@ -119,6 +119,7 @@ def test_multipliers_of_rectangular_stiffness_are_matrix_exponentials():
     np.testing.assert_allclose(np.sort_complex(found.multipliers), np.sort_complex(exact), atol=1e-9)
 
 
+@pytest.mark.slow
 def test_planet_set_with_backlash_against_harmonic_balance(planet_set, planet_excitation):
     """Six meshes, some of which part in every period."""
     excitation = planet_excitation([0, 1 / 3, 2 / 3, 0.2, 0.2 + 1 / 3, 0.2 + 2 / 3], depth=0.5)
@@ -134,6 +135,7 @@ def test_planet_set_with_backlash_against_harmonic_balance(planet_set, planet_ex
     np.testing.assert_allclose(found.solution.deflection[:, :9], balance.deflection[:, :9], atol=1e-5 * largest)
 
 
+@pytest.mark.slow
 def test_a_limit_cycle_finds_its_own_amplitude_and_period():
     """A whirling rotor, x'' + c x' + k x + kc y + S(r) x = 0: omega = kc / c and S(r) = omega^2 - k."""
     c, circulatory, ring = 0.1, 0.12, RadialBearings([[0, 1]], 1.0, 0.5)

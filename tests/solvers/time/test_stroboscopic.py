@@ -42,6 +42,7 @@ def test_jump_down_of_the_sweep_up(duffing):
     assert up.amplitude[jump, 0] > 2.7 and up.amplitude[jump + 1, 0] < 0.4
 
 
+@pytest.mark.slow
 def test_jump_up_of_the_sweep_down(duffing):
     down = sweep_response(duffing, np.arange(1.135, 1.105, -0.005), start=start_on(0.8, 1.135), **OPTIONS)
     (jump,) = down.jumps()
@@ -100,7 +101,7 @@ def two_wells(force):
 @pytest.mark.parametrize(
     "force, period",
     [
-        (0.20, 1),
+        pytest.param(0.20, 1, marks=pytest.mark.slow),
         pytest.param(0.28, 2, marks=pytest.mark.slow),
         (0.29, 4),
         pytest.param(0.37, 5, marks=pytest.mark.slow),

@@ -100,6 +100,7 @@ def test_weight_hangs_in_the_bearings():
     assert up == pytest.approx(9.80665 * np.array(mass), rel=1e-6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("torque", ["100 N m", pytest.param("-100 N m", marks=pytest.mark.slow)])
 def test_contact_and_system_settle_whatever_they_start_from(torque):
     tables = pair_tables(teeth=True)
@@ -307,6 +308,7 @@ def test_a_shaft_that_may_slide_grows_without_force():
     assert along[0] - along[1] == pytest.approx(1.15e-5 * 40.0 * 0.085, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_teeth_without_a_torque_touch_nowhere_and_hold_nothing_up():
     """A shaft that turns along, and a load case at rest beside a loaded one."""
     tables = pair_tables(teeth=True)

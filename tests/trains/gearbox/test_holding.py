@@ -272,6 +272,7 @@ def test_planets_that_nothing_holds_are_named():
     assert {one.key for one in caught.value.problems} == {"planetary[0].planet.bearing"}
 
 
+@pytest.mark.slow
 def test_weight_along_the_axis_that_nothing_takes_is_told_at_the_terminal(tmp_path, capsys):
     tables = pair_tables(helix="15 deg")
     tables["bearing"][0]["axial_sense"], tables["bearing"][2]["axial_sense"] = "positive", "negative"
