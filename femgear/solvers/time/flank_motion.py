@@ -12,13 +12,13 @@ the largest Floquet exponent, at any load.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.solvers.time.flank_steps import FlankScheme, MeshBlock, Separating, march_pairs, solve_overlaps
+from femgear.solvers.time.flank_steps import FlankScheme, MeshBlock, Separating, Yielding, march_pairs, solve_overlaps
 from femgear.solvers.time.free_turn import FreeTurn, StepBlock, TorqueHistory
 from femgear.solvers.time.low_pass import Decimator
 from femgear.solvers.time.spun_system import SPRING, SpunSystem
@@ -39,6 +39,10 @@ _START = 1.0 / 3.0
 _SLIGHT = 1e-12
 # Force that this stiffness may carry, over those of the loads.
 _CARRIED = 1e-6
+
+# Newton steps for laws in the first state, the shortest one, their accuracy, and springs over those of the laws that
+# hold what floats.
+_STATIC_STEPS, _SHORTEST, _SETTLED, _SOFT = 200, 1e-3, 1e-11, 1e-9
 
 # Steps whose loads and meshes are made at once.
 _BLOCK = 4096
@@ -203,7 +207,9 @@ class _Motion:
         self.free = FreeMotion(spun, scheme)
         self.free_row = self.free.start()
         self.march, self.whole = march_pairs, self.piece % 2 == 0
-        if contact_loss and spun.meshes:
+        if spun.laws:
+            self.march, self.whole = Yielding(spun, self.state[: scheme.n] @ scheme.basic, parts=contact_loss).march, False
+        elif contact_loss and spun.meshes:
             self.march, self.whole = Separating(spun.side).march, False
 
     def block(self, first: int, number: int):
@@ -232,13 +238,50 @@ def _start_state(spun: SpunSystem, scheme: FlankScheme, turn: FreeTurn, start, *
         q, v = np.zeros((2, n))
         if start == "static":
             load = spun.without_drive(turn.directions @ block.loads[0])
-            q = _static_deviations(spun, U @ S, k, gap, load, contact_loss=contact_loss)
+            q = _static_state(spun, U @ S, k, gap, load, contact_loss=contact_loss)
     else:
         q, v = (np.asarray(array, float) for array in start)
     overlap = (U @ S).T @ q - gap
     pulls = (spun.side == SPRING) | (not contact_loss)
     force = k * np.where(pulls, overlap, np.maximum(overlap, 0.0))
-    return np.concatenate([q, v, S @ force])
+    return np.concatenate([q, v, S @ force + spun.law_forces(U.T @ q)[0]])
+
+
+def _static_state(spun: SpunSystem, W, k, gap, load, *, contact_loss: bool) -> np.ndarray:
+    """Deviations (n,) as `_static_deviations`, with the forces of laws: Newton's method, shortened where it overshoots.
+
+    ConvergenceError: no balance (E-CONVERGENCE).
+    """
+    if not spun.laws:
+        return _static_deviations(spun, W, k, gap, load, contact_loss=contact_loss)
+    U, system, springs = spun.basic, spun.system, np.diag(spun.law_springs)
+    q, offset, tangent = np.zeros(len(load)), np.zeros(len(springs)), springs
+    # forces that are out of balance, none known at first
+    rest, left = np.zeros(len(springs)), np.inf
+    for _ in range(_STATIC_STEPS):
+        softened = replace(system, K=system.K + U @ tangent @ U.T)
+        straight = replace(spun, laws=(), system=softened)
+        goal = _static_deviations(straight, W, k, gap, load - U @ offset, contact_loss=contact_loss)
+        share = 1.0
+        while True:
+            trial = q + share * (goal - q)
+            force, slope = spun.law_forces(U.T @ trial)
+            missed = force - (offset + tangent @ (U.T @ trial)) + (1.0 - share) * rest
+            if np.abs(missed).max() < left or share < _SHORTEST:
+                break
+            share *= 0.5
+        if share == 1.0 and np.abs(missed).max() <= _SETTLED * max(np.abs(force).max(), np.abs(load).max()):
+            return goal
+        q, rest, left = trial, missed, float(np.abs(missed).max())
+        # what floats in its play is held softly on the way
+        tangent = slope + _SOFT * springs
+        offset = force - tangent @ (U.T @ q)
+    raise ConvergenceError(
+        "the first loads find no balance in the bearings with play",
+        code="E-CONVERGENCE",
+        limit="loads, weight among them, that bearings and meshes carry",
+        remedy='a smaller clearance, or start = "zero"',
+    )
 
 
 def _static_deviations(spun: SpunSystem, W, k, gap, load, *, contact_loss: bool) -> np.ndarray:

@@ -11,6 +11,9 @@ force ``k max(u, 0)`` of their overlap u, the approach less the gap. With the co
 at the end of a step obey a small linear system. The forces do not fall with the overlap and the flexibility takes no
 energy back, so that there is one solution. Changing the wrong contacts and solving again mostly ends after one round;
 where it does not, only the first wrong one changes, which always ends (K. G. Murty, Opsearch 11, 1974, 123-130).
+
+Laws of the motion, as of bearings with play, are solved by Newton's method around that search: with their forces b and
+tangents B at the last iterate, the approaches are those of a system of the flexibility ``(1 + F B)^-1 F``.
 """
 
 from __future__ import annotations
@@ -30,6 +33,8 @@ from femgear.solvers.time.steps import AVERAGE_ACCELERATION
 _OVERLAP_ROUNDING = 1e-12
 # Rounds of changing all wrong contacts, and of changing one.
 _ROUNDS, _SINGLE = 12, 10_000
+# Newton steps for laws, their accuracy over the largest force, and what rounding leaves of it.
+_LAWS, _LAW_ACCURACY, _LAW_ROUNDING = 50, 1e-12, 1e-9
 # Instants whose matrices are made side by side, so that they stay in a cache.
 _SIDE_BY_SIDE = 256
 # Steps that go two at a time, whose maps are made together.
@@ -330,11 +335,11 @@ class Separating:
         np.dot(rows[i], scheme.advance, out=after)
         after[0] += loads[i]
         drawn = after[:, 2 * scheme.n :]
-        drawn[:] = self._forces(scheme, meshes, i, drawn)
+        drawn[:] = self._forces(scheme.flexibility, meshes, i, drawn)
 
-    def _forces(self, scheme, meshes, i, x):
+    def _forces(self, flexibility, meshes, i, x):
         """Forces and their tangents (2, m) on the simple motions from these motions (2, m) without them."""
-        forces, u = self._solved(scheme, meshes, i, x)
+        forces, u = self._solved(flexibility, meshes, i, x)
         if ((u >= self.least) & (u <= self.most)).all():
             return forces
         if not np.isfinite(x).all():
@@ -344,16 +349,16 @@ class Separating:
         closed_now = _changed(u, self.closed, _OVERLAP_ROUNDING * np.abs(free).max()) | self.spring
         if np.array_equal(closed_now, self.closed):
             return forces
-        flexibility = np.dot(S.T, np.dot(scheme.flexibility, S))
-        self._take(solve_overlaps(flexibility, free, closed_now, meshes.stiffness[i], always=self.spring)[1])
-        return self._solved(scheme, meshes, i, x)[0]
+        between = np.dot(S.T, np.dot(flexibility, S))
+        self._take(solve_overlaps(between, free, closed_now, meshes.stiffness[i], always=self.spring)[1])
+        return self._solved(flexibility, meshes, i, x)[0]
 
-    def _solved(self, scheme, meshes, i, x):
+    def _solved(self, flexibility, meshes, i, x):
         """Forces and tangents with the present contacts, and the overlaps (c,) that they lead to."""
         S, k = meshes.selection[i], meshes.stiffness[i][self.touching]
         if not len(k):
             return np.zeros_like(x), np.dot(x[0], S) - meshes.gap[i]
-        columns_touching, flexible = S.take(self.touching, axis=1), scheme.flexibility.T
+        columns_touching, flexible = S.take(self.touching, axis=1), flexibility.T
         inner = np.dot(np.dot(columns_touching.T, flexible), columns_touching) * k
         inner.ravel()[:: len(k) + 1] += 1.0
         right = np.dot(x, columns_touching)
@@ -362,3 +367,49 @@ class Separating:
         # rows in C order are columns in that of Fortran: nothing is copied
         forces = np.dot(self.dgesv(inner.T, right.T, overwrite_a=True, overwrite_b=True)[2].T, columns_touching.T)
         return forces, np.dot(x[0] - np.dot(forces[0], flexible), S) - meshes.gap[i]
+
+
+class Yielding(Separating):
+    """Steps with ``laws`` beside the contacts of a system, from motions (m,) of ``basic`` on.
+
+    Where flanks do not part all of them are springs.
+    """
+
+    def __init__(self, spun: SpunSystem, motion: np.ndarray, *, parts: bool):
+        super().__init__(spun.side if parts else np.full(len(spun.side), SPRING))
+        self.spun, self.motion = spun, motion
+
+    def march(self, scheme: FlankScheme, meshes: MeshBlock, loads, rows, steps: range) -> None:
+        """Fill rows as `march_closed`, with the contacts that touch and the forces of the laws."""
+        for i in steps:
+            self._step(scheme, i, meshes, loads, rows)
+
+    def _forces(self, flexibility, meshes, i, x):
+        if not np.isfinite(x).all():
+            return np.full_like(x, np.nan)
+        force, tangent = self.spun.law_forces(self.motion)
+        identity, settled = np.eye(len(force)), np.inf
+        for _ in range(_LAWS):
+            # rows: the motion, and the free motion with the tangents alone
+            yielded = np.linalg.inv(identity + flexibility @ tangent)
+            offset = force - tangent @ self.motion
+            pulled = np.dot(np.stack([x[0] - flexibility @ offset, x[1]]), yielded.T)
+            softened = yielded @ flexibility
+            contact = super()._forces(softened, meshes, i, pulled)
+            moved = pulled - np.dot(contact, softened.T)
+            total = contact + np.dot(moved, tangent)
+            total[0] += offset
+            new, slopes = self.spun.law_forces(moved[0])
+            missed = np.abs(new - (offset + tangent @ moved[0])).max(initial=0.0)
+            self.motion = moved[0]
+            # the forces of the last iterate are in balance with its motion
+            if missed <= _LAW_ACCURACY * max(np.abs(total[0]).max(initial=0.0), np.abs(new).max(initial=0.0)):
+                return total
+            if missed >= settled and missed <= _LAW_ROUNDING * np.abs(new).max(initial=0.0):
+                return total
+            force, tangent, settled = new, slopes, missed
+        raise ConvergenceError(
+            "no forces of the bearings with play fit the end of a step",
+            code="E-CONTACT",
+            remedy="take shorter steps",
+        )

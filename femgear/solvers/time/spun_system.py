@@ -2,7 +2,8 @@
 
 Its coordinates are deviations from a large common rotation, the rigid-body rotation, which torques change. Flanks of
 meshes and the springs beside them are contacts: their forces are ``k (x - gap)`` along their approach x, of those that
-part ``max(., 0)``. Stiffness and gap follow the phase of the mesh, the directions the angles of the carriers.
+part ``max(., 0)``. Stiffness and gap follow the phase of the mesh, the directions the angles of the carriers. Laws are
+elements beside them whose forces depend on the motion alone, as those of bearings with play.
 """
 
 from __future__ import annotations
@@ -17,13 +18,14 @@ from scipy import linalg
 
 from femgear.errors import CaseError
 from femgear.solvers.linear.modal import undamped_modes
-from femgear.system.force_laws import GearMeshes
+from femgear.system.force_laws import Element, GearMeshes
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import MechanicalSystem
 from femgear.system.turning_meshes import TurningMeshes
 
 DRIVE, BACK, SPRING = 1, -1, 0
 """What a contact is: drive flank, back flank, or a spring that never parts."""
+_NO_PHASE = np.zeros(0)
 _TABLE = 8192
 """Points of the tables of a mesh period, between which stiffness and gap are linear."""
 
@@ -67,6 +69,8 @@ class SpunSystem:
         `DRIVE`, `BACK` or `SPRING`, and number of the mesh.
     meshes : tuple of str
         Names of the M meshes.
+    laws : tuple of Element
+        On columns of ``basic``; forces do not depend on phases.
     """
 
     system: MechanicalSystem
@@ -82,6 +86,7 @@ class SpunSystem:
     side: np.ndarray
     mesh: np.ndarray
     meshes: tuple[str, ...]
+    laws: tuple[Element, ...] = ()
 
     @cached_property
     def carried(self) -> np.ndarray:
@@ -111,6 +116,24 @@ class SpunSystem:
         contacts = {name: getattr(self, name)[:n] for name in ("phase_ratio", "side", "mesh")}
         contacts |= {name: getattr(self, name)[..., :n] for name in ("fixed", "even", "odd", "stiffness", "gap")}
         return replace(self, **contacts)
+
+    @property
+    def law_springs(self) -> np.ndarray:
+        """Springs (m,) of the laws on their columns, near which they work [N/m]."""
+        springs = np.zeros(self.basic.shape[1])
+        for law in self.laws:
+            np.add.at(springs, law.columns, law.reference)
+        return springs
+
+    def law_forces(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Compute forces (m,) of the laws at motions x (m,) of ``basic`` and tangents (m, m) [N], [N/m]."""
+        force, tangent = np.zeros(len(x)), np.zeros((len(x), len(x)))
+        for law in self.laws:
+            parts, slopes = law.evaluate(x[law.columns], _NO_PHASE)
+            for columns, part, slope in zip(law.columns, parts, slopes, strict=True):
+                force[columns] += part
+                tangent[columns[:, None], columns] += slope
+        return force, tangent
 
     def share(self, direction: np.ndarray) -> float:
         """Part of a load along a direction (n,) that drives the rotation: its power at unit speed."""
@@ -160,8 +183,11 @@ class SpunSystem:
         return touched
 
     def static_flexibility(self, W: np.ndarray, k: np.ndarray) -> np.ndarray:
-        """Compute deviations (n, n) by loads that do not drive the rotation [m/N], contacts W (n, c), k (c,) closed."""
-        total = self.system.K + (W * k) @ W.T
+        """Compute deviations (n, n) by loads that do not drive the rotation [m/N], contacts W (n, c), k (c,) closed.
+
+        Laws are springs.
+        """
+        total = self.system.K + (W * k) @ W.T + (self.basic * self.law_springs) @ self.basic.T
         largest = np.abs(self.carried).max(initial=0.0)
         size = (np.abs(total).max() or 1.0) / largest**2 if largest else 0.0
         return np.linalg.inv(total + size * np.outer(self.carried, self.carried))
@@ -174,6 +200,7 @@ def spun_system(
     *,
     base_ratio: Sequence[float] | np.ndarray,
     shaft: np.ndarray,
+    laws: Sequence[Element] = (),
 ) -> SpunSystem:
     """Make a system that goes on with one rotation from meshes as elements on the columns of its ``W``.
 
@@ -189,6 +216,8 @@ def spun_system(
         Speeds of the base frequencies of the elements over that of the shaft that gives the speed [1].
     shaft : (n,) array
         Rotation of this shaft per unit of the coordinates.
+    laws : sequence of Element
+        On columns of ``W``, whose forces do not depend on phases.
 
     Raises
     ------
@@ -227,6 +256,7 @@ def spun_system(
         side=side,
         mesh=np.concatenate([group.mesh for group in groups]).astype(int),
         meshes=tuple(meshes),
+        laws=tuple(laws),
     )
     return replace(made, spin=free_rotation(made, shaft))
 
@@ -272,6 +302,7 @@ def free_rotation(made: SpunSystem, shaft: np.ndarray) -> np.ndarray:
     still, k = made.kept_together, made.stiffness[:-1].mean(axis=0) if len(made.stiffness) > 1 else made.stiffness[0]
     W, k = still.basic @ still.selection(np.zeros(1))[0], k[: made.closed]
     plain = replace(made.system, W=W, C=0.0 * made.system.C, load=0.0 * made.system.load, gyroscopic=None)
+    plain = replace(plain, K=plain.K + (made.basic * made.law_springs) @ made.basic.T)
     modes = undamped_modes(plain, k)
     free = modes.shape[:, modes.frequency == 0.0]
     if not free.shape[1]:

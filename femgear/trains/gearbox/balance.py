@@ -131,7 +131,10 @@ def held_together(box: NonlinearGearbox) -> NonlinearSystem:
     """Take a gearbox with drive flanks that may pull and no back flanks, in the same columns."""
     behind = [id(back) for _, back in box.flanks if back is not None]
     kept = (element for element in box.problem.elements if id(element) not in behind)
-    linear = (replace(element, separates=False) for element in kept if isinstance(element, GearMeshes | TurningMeshes))
+    linear = (
+        replace(element, separates=False) if isinstance(element, GearMeshes | TurningMeshes) else element
+        for element in kept
+    )
     return replace(box.problem, elements=tuple(linear))
 
 

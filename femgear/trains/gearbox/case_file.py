@@ -223,8 +223,10 @@ class BoxBearingSection(SeatSection):
     Stiffnesses may be ``"rigid"``; those left out are zero. A bearing of a ``kind`` has rolling elements, whose
     stiffness follows the load; ``contact_angle`` above zero takes thrust on the shaft towards +z, below zero
     towards -z. With an ``axial_sense`` it takes thrust on the shaft that way alone, with "none" of it nothing: a ring
-    slides in its seat. ``clearance`` is the radial play, ``preload`` the axial approach of the rings. The ratings are
-    those of the catalogue. ``load_friction`` and ``lubricant_friction`` are f_1 and f_0 of Palmgren's friction torque.
+    slides in its seat. ``clearance`` is the radial play, the whole way between the rings; beyond it a bearing without
+    ``kind`` is a ring of one-sided springs, together of its radial stiffness. ``preload`` is the axial approach of the
+    rings. The ratings are those of the catalogue. ``load_friction`` and ``lubricant_friction`` are f_1 and f_0 of
+    Palmgren's friction torque.
     """
 
     name: Name | None = None
@@ -258,16 +260,22 @@ class BoxBearingSection(SeatSection):
 
     @property
     def nonlinear(self) -> bool:
-        """Whether its force is no linear function of its motion: of a kind, or of one axial sense."""
-        return self.kind is not None or self.axial_sense is not None
+        """Whether its force is no linear function of its motion: of a kind, of one axial sense, or with play."""
+        return self.kind is not None or self.axial_sense is not None or self.gapped
+
+    @property
+    def gapped(self) -> bool:
+        """Whether it is given by its stiffness and has play."""
+        return self.kind is None and self.clearance > 0.0
 
     @property
     def stiffness(self) -> tuple[float, ...]:
         """Given stiffnesses along x, y, z [N/m], against both tilts and rotation [N m/rad].
 
-        Zero where left out, and along z where the axial one has one sense alone.
+        Zero where left out, along z where the axial one has one sense alone, and across the axis with play.
         """
-        given = self.radial, None if self.axial_sense else self.axial, self.tilt, self.torsional
+        across, along = None if self.gapped else self.radial, None if self.axial_sense else self.axial
+        given = across, along, self.tilt, self.torsional
         radial, axial, tilt, turn = (value or 0.0 for value in given)
         return radial, radial, axial, tilt, tilt, turn
 

@@ -242,7 +242,7 @@ def _bearings(case: GearboxCase) -> Iterator[CaseError]:
     for i, bearing in enumerate(case.bearing):
         key = f"bearing[{i}]"
         springs = bearing.given(*_SPRINGS)
-        if bearing.kind is None and not any(bearing.stiffness) and not bearing.axial:
+        if bearing.kind is None and not any(bearing.stiffness) and not bearing.axial and not bearing.gapped:
             yield CaseError(
                 "the bearing holds nothing",
                 code="E-KEY-MISSING",
@@ -270,8 +270,32 @@ def _bearings(case: GearboxCase) -> Iterator[CaseError]:
                 limit="positive or negative, of a kind also none",
                 remedy="leave axial and axial_sense out",
             )
+        if bearing.kind is None and bearing.clearance:
+            yield from _play(bearing, key)
         if bearing.outer_shaft is not None and _known(case, bearing.shaft, bearing.outer_shaft):
             yield from _ring_places(case, bearing, key)
+
+
+def _play(bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:
+    """Refuse play that no ring of springs can have."""
+    if bearing.clearance < 0.0:
+        yield CaseError(
+            "springs have no tight fit",
+            code="E-BEARING",
+            key=f"{key}.clearance",
+            value=LENGTH.show(bearing.clearance),
+            limit="0 or more of a bearing that is given by its stiffness",
+            remedy="leave it out, or give a kind with its geometry",
+        )
+    elif not bearing.radial or math.isinf(bearing.radial):
+        yield CaseError(
+            "play needs a radial stiffness beyond it",
+            code="E-BEARING",
+            key=f"{key}.radial",
+            value="rigid" if bearing.radial else "none",
+            limit="above 0 N/m and not rigid, of a bearing with clearance",
+            remedy='give radial = "2e8 N/m", or leave the clearance out',
+        )
 
 
 def _geometry(bearing: BoxBearingSection, key: str) -> Iterator[CaseError]:

@@ -15,6 +15,7 @@ import numpy as np
 
 from femgear.errors import FemgearError, several
 from femgear.system.assembly import GROUND, Assembly, StationSprings
+from femgear.system.force_laws import RadialBearings
 from femgear.system.rolling_bearings import BearingState, bearing_state, sliding_state
 from femgear.trains.gearbox.case_file import CASING, BoxBearingSection, GearboxCase, LoadCaseSection
 from femgear.trains.gearbox.casing import check_casing_held, elastic_foot_forces, rigid_foot_rows
@@ -110,7 +111,7 @@ class BearingLaw:
     Parameters
     ----------
     section : BoxBearingSection
-        With a kind, or with an axial stiffness of one sense.
+        With a kind, with an axial stiffness of one sense, or with play.
     factor : float
         On its stiffness: the same force at so many times smaller motions.
     """
@@ -131,12 +132,26 @@ class BearingLaw:
         """Force (6,) that holds a motion, and its derivative (6, 6) [N, N m]."""
         if (state := self.state(motion)) is not None:
             return state.force, self.factor * state.stiffness
-        sense = 1.0 if self.section.axial_sense == "positive" else -1.0
-        k = min(self.section.axial or 0.0, _STIFFEST) * self.factor
         force, stiffness = np.zeros(6), np.zeros((6, 6))
-        if sense * motion[2] > 0.0:
-            force[2], stiffness[2, 2] = k * motion[2], k
+        if self.section.axial_sense is not None:
+            sense = 1.0 if self.section.axial_sense == "positive" else -1.0
+            k = min(self.section.axial or 0.0, _STIFFEST) * self.factor
+            if sense * motion[2] > 0.0:
+                force[2], stiffness[2, 2] = k * motion[2], k
+        if self.section.gapped:
+            across, tangent = self.ring(np.array([[0, 1]])).evaluate(motion[None, :2], None)
+            force[:2], stiffness[:2, :2] = across[0], tangent[0]
         return force, stiffness
+
+    def ring(self, columns: np.ndarray) -> RadialBearings:
+        """Make the ring of springs of a bearing with play, on columns (1, 2) of its motion along x and y."""
+        assert self.section.radial is not None
+        return RadialBearings(columns, self.section.radial * self.factor, 0.5 * self.section.clearance)
+
+    def share(self, stiffness: np.ndarray) -> np.ndarray:
+        """Take from the stiffness (6, 6) of a bearing that of this law: of springs, which hold other motions too."""
+        own = self.held > 0.0
+        return stiffness if self.section.kind is not None else np.where(own[:, None] & own, stiffness, 0.0)
 
     def pressing(self, motion: np.ndarray) -> float:
         """Largest load of its elements, or its thrust, at a motion (6,) [N]."""
@@ -148,7 +163,9 @@ class BearingLaw:
     def held(self) -> np.ndarray:
         """Stiffness (6,) of a linear bearing that holds the same motions [N/m, N m/rad]."""
         if self.section.kind is None:
-            return np.array([0.0, 0.0, _GUESS, 0.0, 0.0, 0.0])
+            across = self.section.radial * self.factor if self.section.gapped and self.section.radial else 0.0
+            along = 0.0 if self.section.axial_sense is None else _GUESS
+            return np.array([across, across, along, 0.0, 0.0, 0.0])
         lever = 0.25 * (self.section.pitch_diameter or 0.0)
         thrust = self.section.kind in ("ball", "tapered", "spherical") and self.section.axial_sense != "none"
         tilt = 0.0 if self.section.kind == "spherical" else lever**2

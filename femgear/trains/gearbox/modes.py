@@ -123,9 +123,7 @@ def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.nda
     model = found.model
     bearings = []
     for number, law, springs in laws_of(model, model.estimate):
-        # of one axial sense: the rest of the bearing is among the springs
-        tangent = found.bearing_stiffness[number]
-        tangent = tangent if law.section.kind is not None else np.diag([0.0, 0.0, tangent[2, 2], 0, 0, 0])
+        tangent = law.share(found.bearing_stiffness[number])
         bearings.append(Beam(springs.stations, springs.rows.T @ tangent @ springs.rows))
     assembly = replace(model.assembly, beams=(*model.assembly.beams, *bearings))
     return assembly, assembly.system(), _pressed_stiffness(found)

@@ -6,7 +6,9 @@ which everything but the directions of the meshes stands still. Meshes of the ch
 normals: ``max(F + k(t) (approach - deflection), 0)`` of the drive flank with k, F and deflection of its contact, and
 the same on the back flank, whose normal has the tangential and the axial part reversed, beyond the backlash (Y. Guo
 and R. G. Parker, Eur. J. Mech. A 29, 2010, 1022-1033). Slopes along the width are held by a constant spring, apart or
-not. Meshes of other stages are springs of their mean stiffness.
+not. Meshes of other stages are springs of their mean stiffness. Bearings with play that are given by their stiffness
+are elements too: rings of one-sided springs, whose columns are the motions of the inner ring along x and y against the
+outer one (`femgear.system.force_laws.RadialBearings`).
 
 Motions are those from the unloaded gearbox, loads are torques, forces and weight: a mesh carries what all of them give
 it at every angle. Of a turning planet the Coriolis terms count, and the centrifugal ones with the pull of its pin,
@@ -28,7 +30,7 @@ from femgear.gears.profile import base_helix_angle
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.static import mesh_backlash
 from femgear.system.assembly import GROUND, Assembly, Contact, assemble, point_approach
-from femgear.system.force_laws import Element, GearMeshes, turning_wave
+from femgear.system.force_laws import Element, GearMeshes, RadialBearings, turning_wave
 from femgear.system.fourier import FourierSeries, harmonics_of, orders_of
 from femgear.system.system import MechanicalSystem, MeshExcitation, NonlinearSystem
 from femgear.system.turning_meshes import (
@@ -118,6 +120,8 @@ class NonlinearGearbox:
         Whose flanks part.
     flanks : tuple of two-tuples of Element
         By stage the elements of drive flanks and back flanks; None without these.
+    bearings : mapping of str to RadialBearings
+        By name the bearings that are elements, the last ones of the problem.
     """
 
     deflection: Deflection
@@ -127,6 +131,7 @@ class NonlinearGearbox:
     frequency: np.ndarray
     stages: tuple[NonlinearStage, ...]
     flanks: tuple[tuple[Element, Element | None], ...]
+    bearings: Mapping[str, RadialBearings]
 
 
 def nonlinear_gearbox(
@@ -171,6 +176,7 @@ def nonlinear_gearbox(
     chosen = [stage for stage in model.stages if stage.name in excitations]
     assembly, stiffness, load = _structure(found, chosen)
     T = assembly.motions
+    rings = _rings(found, assembly)
     bases, frequency, staged = list[str](), list[float](), list[NonlinearStage]()
     for stage in chosen:
         turn = _carrier_speed(model, stage) if turning else 0.0
@@ -186,13 +192,28 @@ def nonlinear_gearbox(
         assembly.mass, stiffness + centrifugal, np.zeros((len(T), 0)), load, motions=T, dofs=assembly.free_names
     )
     ratio = model.case.modes.damping_ratio if damping_ratio is None else damping_ratio
-    damping, free = _damping(replace(system, K=T.T @ stiffness @ T), staged, ratio)
+    closed = sum(ring.stiffness * across @ across.T for ring, across in rings.values())
+    damping, free = _damping(replace(system, K=T.T @ stiffness @ T + closed), staged, ratio)
     # torques that radii beside their tooth numbers leave out of balance speed the gearbox up as a whole
     balanced = system.load - system.M @ (free @ (free.T @ system.load))
     columns, elements, flanks = _elements(system.M, staged, harmonics, len(bases), separates=separates)
+    bearings = dict[str, RadialBearings]()
+    for name, (ring, across) in rings.items():
+        place = columns.shape[1] + np.array([[0, 1]])
+        columns, bearings[name] = np.hstack([columns, across]), replace(ring, columns=place)
     system = replace(system, C=damping + T.T @ coriolis @ T, W=columns, load=balanced)
-    problem = NonlinearSystem(system, elements)
-    return NonlinearGearbox(found, problem, T, tuple(bases), np.array(frequency), tuple(staged), flanks)
+    problem = NonlinearSystem(system, (*elements, *bearings.values()))
+    return NonlinearGearbox(found, problem, T, tuple(bases), np.array(frequency), tuple(staged), flanks, bearings)
+
+
+def _rings(found: Deflection, assembly: Assembly) -> dict[str, tuple[RadialBearings, np.ndarray]]:
+    """Bearings with play by name, with their motions across the axis (n, 2) per unit of the coordinates."""
+    rings = {}
+    for _, law, springs in laws_of(found.model, found.model.estimate):
+        across = (spread_rows(springs, assembly) @ assembly.motions)[:2].T
+        if law.section.gapped and across.any():
+            rings[springs.name] = law.ring(np.array([[0, 1]])), across
+    return rings
 
 
 def _carrier_speed(model: GearboxModel, stage: StageModel) -> float:
@@ -207,20 +228,18 @@ def _structure(found: Deflection, chosen: Sequence[StageModel]) -> tuple[Assembl
     """Gearbox with its stiffness (6s, 6s) and load (6s,), the meshes of the chosen stages left out.
 
     The load has what nonlinear bearings and meshes carry at the loaded state beyond what their tangents would.
+    Bearings with play are left out; what else a law of them holds stays.
     """
     model = found.model
     assembly, _, tangents = linear_system(found)
     stiffness, load, motion = assembly.stiffness, model.load.copy(), found.motion
-    bearings = assembly.beams[len(model.assembly.beams) :]
-    for beam, (_, law, springs) in zip(bearings, laws_of(model, model.estimate), strict=True):
-        rows = spread_rows(springs, assembly)
-        load -= rows.T @ law.force(rows @ motion)[0]
-        moved = np.zeros(6 * len(beam.stations))
-        parts = [(6 * at, 6 * station) for at, station in enumerate(beam.stations) if station != GROUND]
-        for at, place in parts:
-            moved[at : at + 6] = motion[place : place + 6]
-        for at, place in parts:
-            load[place : place + 6] += (beam.stiffness @ moved)[at : at + 6]
+    for number, law, springs in laws_of(model, model.estimate):
+        rows, tangent = spread_rows(springs, assembly), law.share(found.bearing_stiffness[number])
+        force = law.force(rows @ motion)[0]
+        if law.section.gapped:
+            stiffness = stiffness - rows[:2].T @ tangent[:2, :2] @ rows[:2]
+            force[:2], tangent[:2, :2] = 0.0, 0.0
+        load += rows.T @ (tangent @ (rows @ motion) - force)
     gone = {mesh for stage in chosen for mesh in stage.meshes}
     for mesh, part in enumerate(assembly.slices):
         if mesh not in gone:

@@ -67,11 +67,7 @@ def unheld_motions(found: Deflection) -> np.ndarray:
     tangent = assembly.stiffness + (assembly.columns * assembly.slice_stiffness) @ assembly.columns.T
     for number, law, springs in laws_of(model, model.estimate):
         rows = spread_rows(springs, assembly)
-        stiffness = found.bearing_stiffness[number]
-        if law.section.kind is None:
-            # of one axial sense: the rest of the bearing is among the springs
-            stiffness = np.diag([0.0, 0.0, stiffness[2, 2], 0.0, 0.0, 0.0])
-        tangent = tangent + rows.T @ stiffness @ rows
+        tangent = tangent + rows.T @ law.share(found.bearing_stiffness[number]) @ rows
     reduced = T.T @ tangent @ T
     size = np.sqrt(np.abs(np.diag(reduced)))
     size[size == 0.0] = size.max(initial=1.0)

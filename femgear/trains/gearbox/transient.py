@@ -124,7 +124,8 @@ def gearbox_in_time(found: Deflection, transient: TransientSection, *, steps: St
     if not meshes:
         plain = replace(made.spun, system=system)
         return replace(made, spun=replace(plain, spin=free_rotation(plain, turn)))
-    spun = spun_system(system, _groups(box), meshes, base_ratio=made.base_ratio, shaft=turn)
+    laws = tuple(box.bearings.values())
+    spun = spun_system(system, _groups(box), meshes, base_ratio=made.base_ratio, shaft=turn, laws=laws)
     return replace(made, spun=spun)
 
 
@@ -152,7 +153,7 @@ def _groups(box: NonlinearGearbox) -> list[ContactGroup]:
         flanks[id(drive)] = DRIVE, first + np.arange(len(stage.meshes))
         flanks[id(back)] = BACK, first + stage.back_flanks
         first += len(stage.meshes)
-    for element in box.problem.elements:
+    for element in box.problem.elements[: len(box.problem.elements) - len(box.bearings)]:
         assert isinstance(element, GearMeshes | TurningMeshes)
         side, mesh = flanks.get(id(element), (SPRING, np.zeros(len(element.columns), int)))
         groups.append(ContactGroup(element, side, mesh))
@@ -161,11 +162,12 @@ def _groups(box: NonlinearGearbox) -> list[ContactGroup]:
 
 def _without_contacts(box: NonlinearGearbox) -> SpunSystem:
     """System without meshes, which does not turn freely."""
-    system, nothing = box.problem.system, np.zeros((0, 0))
-    n = len(system.M)
-    turns, tables, none = np.zeros((0, 0, 0)), np.zeros((1, 0)), np.zeros(0)
-    ways = np.zeros((n, 0)), nothing, turns, turns, none
-    return SpunSystem(system, np.zeros(n), *ways, tables, tables, none, none.astype(int), none.astype(int), ())
+    system = box.problem.system
+    m = system.W.shape[1]
+    turns, tables, none = np.zeros((0, m, 0)), np.zeros((1, 0)), np.zeros(0)
+    ways, numbers = (system.W, np.zeros((m, 0)), turns, turns, none), (none, none.astype(int), none.astype(int))
+    laws = tuple(box.bearings.values())
+    return SpunSystem(system, np.zeros(len(system.M)), *ways, tables, tables, *numbers, (), laws)
 
 
 @dataclass(frozen=True)
