@@ -63,6 +63,25 @@ def pair_tables(*, teeth: bool = False, helix: str = "0 deg") -> dict[str, Any]:
     return tables
 
 
+def loose_pair_tables(play: str, *, weight: str = "50 kg") -> dict[str, Any]:
+    """Tables of a pair of two rigid bodies in the plane under weight, the second one in a bearing with play."""
+    tables = pair_tables() | {"motions": "plane", "gravity": {}}
+    tables["shaft"] = [{"name": "input"}, {"name": "output", "axis": ["90 mm", "0 mm"]}]
+    tables["pair"][0]["mesh"] |= {"contact_ratio": 1.6}
+    del tables["pair"][0]["positions"]
+    tables["mass"] = [
+        {"shaft": "input", "mass": "30 kg", "inertia": "2e-3 kg m^2"},
+        {"shaft": "output", "mass": weight, "inertia": "5e-3 kg m^2"},
+    ]
+    tables["bearing"] = [
+        {"name": "A", "shaft": "input", "radial": "2e8 N/m", "torsional": "1e4 N m/rad"},
+        {"name": "C", "shaft": "output", "radial": "2e8 N/m", "clearance": play},
+    ]
+    tables["load"] = [{"name": "motor", "shaft": "input"}, {"name": "brake", "shaft": "output"}]
+    tables["operation"]["load_case"][0]["torque"] = {"motor": "10 N m"}
+    return tables
+
+
 def set_on_shafts(*, slices: int = 9) -> dict[str, Any]:
     """Tables of a helical planetary set with teeth: two shafts of two bearings each, the ring in the casing."""
     teeth = read_case("cases/e_axle.toml").planetary[0].teeth

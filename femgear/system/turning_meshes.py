@@ -150,6 +150,19 @@ class TurningMeshes:
         force, closed = positive_part(line)
         return _on_columns(S, force, k * closed)
 
+    def evaluate_together(self, x, theta) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the sums over all flanks: forces (..., d) [N] and tangents (..., d, d) [N/m], at x (..., d) [m].
+
+        All flanks have the same columns.
+        """
+        S, k, line = self._lines(x[..., None, :], theta)
+        force, slope = line, np.broadcast_to(k, line.shape)
+        if self.separates:
+            force, closed = positive_part(line)
+            slope = k * closed
+        turned = np.swapaxes(S, -1, -2)
+        return (turned @ force[..., None])[..., 0], turned @ (slope[..., None] * S)
+
 
 def _on_columns(S: np.ndarray, force: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Forces (..., g, d) and tangents (..., g, d, d) on the columns of flanks along S (..., g, d)."""

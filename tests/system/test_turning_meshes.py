@@ -43,6 +43,9 @@ def test_forces_and_tangents_are_those_of_springs_along_the_turned_directions(se
         closed = element.switches(x[row], theta) > 0.0
         np.testing.assert_allclose(element.frozen(x[row], theta, closed)[0], force[row], rtol=1e-13, atol=1e-14)
     assert (force == 0.0).any() == separates
+    together = element.evaluate_together(x[:, 0], THETA)
+    for whole, parts in zip(together, element.evaluate(np.repeat(x[:, :1], 2, axis=1), THETA), strict=True):
+        np.testing.assert_allclose(whole, parts.sum(axis=1), rtol=1e-13, atol=1e-13)
     # no column is stiffer than it is said to be
     assert np.all(element.steepest(THETA) >= np.diagonal(tangent, axis1=2, axis2=3).max(axis=0) - 1e-12)
 

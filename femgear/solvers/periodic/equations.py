@@ -8,7 +8,8 @@ alternating between frequency and time, and the loads S.
 For many lines the derivative is an operator without a matrix of its size (`LineTangent`). One product costs a
 transform forth and back and the receptance of every line. GMRES (Saad and Schultz, SIAM J. Sci. Stat. Comput.
 7 (1986) 856) needs few of them, because the operator is the unit matrix plus the fixed point of the iteration
-with reference springs, whose eigenvalues are small or few.
+with reference springs, whose eigenvalues are small or few. Directions that turn with a carrier couple lines however
+constant stiffnesses are: such lines are solved together first (`femgear.solvers.periodic.line_groups`).
 
 A periodic motion needs a mean acceleration of zero, so on motions that supports leave free the mean forces of
 the elements balance the constant load (Krack and Gross, section 2.3: line zero of the harmonic equations). A
@@ -20,6 +21,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -35,6 +37,7 @@ from femgear.solvers.linear.receptance import (
     reduce_problem,
     source_columns,
 )
+from femgear.solvers.periodic.line_groups import line_groups
 from femgear.solvers.periodic.phase_grid import (
     PhaseGrid,
     coupled_pairs,
@@ -102,6 +105,12 @@ class HarmonicBalance:
     scale: float
     longest: float
 
+    @cached_property
+    def turning_bases(self) -> list[int]:
+        """Bases by which directions of elements turn."""
+        waves = [np.array(element.wave.orders) for element in self.elements if hasattr(element, "wave")]
+        return sorted({int(base) for orders in waves for base in np.flatnonzero(orders)})
+
     @property
     def size(self) -> int:
         """Number of real unknowns, ``n_columns (2 L - 1)``."""
@@ -131,6 +140,10 @@ class HarmonicBalance:
         both = self.grid.transform(np.hstack(self.beyond_reference(lines)))
         n = len(self.reduction.reference)
         return self.grid.amplitudes(both[:n]), self.grid.products(both[n:])
+
+    def forces_beyond(self, lines) -> np.ndarray:
+        """Compute the element forces beyond the reference springs (n_columns, L) [N] at lines of that shape."""
+        return self.grid.amplitudes(self.grid.transform(self.beyond_reference(lines)[0]))
 
     def beyond_reference(self, lines) -> tuple[np.ndarray, np.ndarray]:
         """Compute forces (N, n_columns) [N] and tangents (N, n_pairs) [N/m] less the reference springs."""
@@ -228,7 +241,7 @@ class HarmonicBalance:
         """
         frequency = np.atleast_1d(np.asarray(frequency, float))
         lines = self.lines(y)
-        beyond, products = self.forces(lines) if forces is None else forces
+        beyond, products = (self.forces_beyond(lines), None) if forces is None else forces
 
         def residual() -> np.ndarray:
             return self.residual(lines, beyond, self.receptance_at(frequency))
@@ -380,9 +393,19 @@ class LineTangent:
 
     def solve(self, error) -> np.ndarray | None:
         """Solve for ``dR/dX^-1 error`` (n_y,) [m] to three digits; None where GMRES does not get there."""
-        operator = _operator(len(error), lambda y: y + self.fixed_point(y))
-        step, state = gmres(operator, error, rtol=_ACCURACY, restart=_PRODUCTS, maxiter=1)
-        return None if state else step
+        balance, near = self.balance, lambda y: y
+        if balance.turning_bases:
+            n = len(balance.reduction.reference)
+            parts = balance.turning_bases, balance.pairs, self.receptance[:, :, :n], self.stiffness
+            groups = line_groups(balance.grid, *parts)
+            near = lambda y: balance.unknowns(groups.solve(balance.lines(y)))  # noqa: E731
+
+        def product(y) -> np.ndarray:
+            solved = near(y)
+            return solved + self.fixed_point(solved)
+
+        step, state = gmres(_operator(len(error), product), error, rtol=_ACCURACY, restart=_PRODUCTS, maxiter=1)
+        return None if state else near(step)
 
 
 def linearised(balance: HarmonicBalance, receptance, y) -> tuple[np.ndarray, LineTangent]:

@@ -190,6 +190,12 @@ def forces_on_grid(elements, pairs, x, theta) -> tuple[np.ndarray, np.ndarray]:
     place = {tuple(pair): number for number, pair in enumerate(pairs.tolist())}
     for element in elements:
         columns = element.columns
+        if hasattr(element, "evaluate_together"):
+            shared = columns[0].tolist()
+            part, slope = element.evaluate_together(x[:, shared], theta)
+            force[:, shared] += part
+            tangent[:, [place[a, b] for a in shared for b in shared]] += slope.reshape(len(x), -1)
+            continue
         part, slope = element.evaluate(x[:, columns], theta)
         width = columns.shape[1]
         for i in range(width):

@@ -208,7 +208,10 @@ class _Motion:
         self.free_row = self.free.start()
         self.march, self.whole = march_pairs, self.piece % 2 == 0
         if spun.laws:
-            self.march, self.whole = Yielding(spun, self.state[: scheme.n] @ scheme.basic, parts=contact_loss).march, False
+            self.march, self.whole = (
+                Yielding(spun, self.state[: scheme.n] @ scheme.basic, parts=contact_loss).march,
+                False,
+            )
         elif contact_loss and spun.meshes:
             self.march, self.whole = Separating(spun.side).march, False
 

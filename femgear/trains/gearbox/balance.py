@@ -2,14 +2,15 @@
 
 Stage by stage, as the response is solved: flanks of one stage part, and touch their back flanks, while meshes of all
 others are springs about the loaded state (`femgear.trains.gearbox.nonlinear`). A pair has the mesh frequency alone, a
-set whose carrier turns that of the carrier too, by which weight and uneven supports act on its planets.
+set whose carrier turns that of the carrier too, by which weight and uneven supports act on its planets. Bearings with
+play that are given by their stiffness keep it.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -58,6 +59,10 @@ class StageBalance:
     drive, back : (T, I, M) arrays
         Forces of drive flanks and back flanks [N] at I instants of the mesh period, or of the period of the
         excitation, at T angles of the carrier.
+    bearings : tuple of str
+        Names of the b bearings with play.
+    bearing_force : (T, I, b) array
+        Sizes of their forces [N].
     """
 
     name: str
@@ -65,6 +70,15 @@ class StageBalance:
     solution: PeriodicSolution
     drive: np.ndarray
     back: np.ndarray
+    bearings: tuple[str, ...] = ()
+    bearing_force: np.ndarray = field(default_factory=lambda: np.zeros((1, _INSTANTS, 0)))
+
+    @property
+    def uneven(self) -> np.ndarray:
+        """Largest force (M,) of every mesh over its mean, both over a mesh period: at the worst angle of the carrier."""
+        mean = (self.drive - self.back).mean(axis=1)
+        whole = mean.mean(axis=0)
+        return np.divide(mean.max(axis=0), whole, out=np.full(len(whole), np.nan), where=whole != 0.0)
 
     def share(self, force: np.ndarray) -> np.ndarray:
         """Share (M,) of the time in which flanks with a force (T, I, M) [N] touch."""
@@ -98,12 +112,23 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
         if len(box.frequency) > 1:
             orders = side_bands(wanted.side_bands, lines, wanted.side_bands)
         options = {"orders": orders, "stability": False, "radius": False}
-        held = solve_harmonic_balance(held_together(box), box.frequency, **options)
+        loaded = loaded_lines(box, len(orders)) if box.bearings else None
+        held = solve_harmonic_balance(held_together(box), box.frequency, start=loaded, **options)
         solution = solve_harmonic_balance(box.problem, box.frequency, start=held, **options)
         if not solution.converged:
             solution = solve_harmonic_balance(box.problem, box.frequency, **options)
-        solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *forces_of_flanks(box, solution)))
+        forces = *forces_of_flanks(box, solution), tuple(box.bearings), forces_of_bearings(box, solution)
+        solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *forces))
     return solved
+
+
+def loaded_lines(box: NonlinearGearbox, count: int) -> np.ndarray:
+    """Take the loaded state as so many lines (n_columns, L) to start from, all but the mean zero [m]."""
+    coordinates = np.linalg.lstsq(box.motion, box.deflection.motion, rcond=None)[0]
+    columns = box.problem.system.W.T
+    lines = np.zeros((len(columns), count), complex)
+    lines[:, 0] = columns @ coordinates
+    return lines
 
 
 def check_balance(case: GearboxCase) -> None:
@@ -144,16 +169,29 @@ def forces_of_flanks(box: NonlinearGearbox, solution: PeriodicSolution) -> tuple
     At equal instants of the mesh period and equal angles of the carrier, see `StageBalance`.
     """
     (stage,), ((front, behind),) = box.stages, box.flanks
-    phases = [2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS]
-    if stage.turns:
-        phases = [2.0 * np.pi * np.arange(_TURNS) / _TURNS, *phases]
-    theta = np.stack(np.meshgrid(*phases, indexing="ij"), axis=-1).reshape(-1, len(phases))
-    x = np.real(np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T)
+    x, theta = _deflections(box, solution)
     shape = (-1, _INSTANTS, len(stage.meshes))
     back = np.zeros((len(theta), len(stage.meshes)))
     if behind is not None:
         back[:, stage.back_flanks] = _forces(behind, x, theta)
     return _forces(front, x, theta).reshape(shape), back.reshape(shape)
+
+
+def forces_of_bearings(box: NonlinearGearbox, solution: PeriodicSolution) -> np.ndarray:
+    """Compute the sizes (T, I, b) of the forces of bearings with play, at the instants of `forces_of_flanks` [N]."""
+    x, theta = _deflections(box, solution)
+    sizes = [np.hypot(*element.evaluate(x[:, element.columns], theta)[0][:, 0].T) for element in box.bearings.values()]
+    table = np.stack(sizes, axis=-1) if sizes else np.zeros((len(x), 0))
+    return table.reshape(len(x) // _INSTANTS, _INSTANTS, len(sizes))
+
+
+def _deflections(box: NonlinearGearbox, solution: PeriodicSolution) -> tuple[np.ndarray, np.ndarray]:
+    """Deflections (T I, n_columns) [m] and phases (T I, n_bases) [rad] of one stage, see `forces_of_flanks`."""
+    phases = [2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS]
+    if box.stages[0].turns:
+        phases = [2.0 * np.pi * np.arange(_TURNS) / _TURNS, *phases]
+    theta = np.stack(np.meshgrid(*phases, indexing="ij"), axis=-1).reshape(-1, len(phases))
+    return np.real(np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T), theta
 
 
 def _forces(element: Element, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
@@ -211,6 +249,12 @@ class GearboxBalanceResult(StageResult):
         variables = {
             "stage_of_mesh": ("mesh", [stage.name for stage in stages for _ in stage.meshes], "1", "stage of the mesh"),
             "mean_force": ("mesh", joined(lambda s: (s.drive - s.back).mean(axis=(0, 1))), "N", "mean mesh force"),
+            "uneven": (
+                "mesh",
+                joined(lambda s: s.uneven),
+                "1",
+                "largest over mean, of forces meant over a mesh period",
+            ),
             "largest_force": ("mesh", joined(lambda s: s.drive.max(axis=(0, 1))), "N", "largest force of drive flanks"),
             "lowest_force": ("mesh", joined(lambda s: s.drive.min(axis=(0, 1))), "N", "smallest force of drive flanks"),
             "largest_back_force": (
@@ -248,8 +292,23 @@ class GearboxBalanceResult(StageResult):
             "stage": (("stage",), [stage.name for stage in stages], "1", "stage whose flanks part"),
             "instant": (("instant",), np.arange(_INSTANTS) / _INSTANTS, "1", "share of the period of the excitation"),
         }
+        if stages and stages[0].bearings:
+            variables |= _of_bearings(stages)
+            coords["bearing"] = (("bearing",), list(stages[0].bearings), "1", "bearing with play")
         attrs = {"title": "teeth that part, by harmonic balance", "rigid": ", ".join(self.rigid)}
         return Contents(variables, coords, attrs)
+
+
+def _of_bearings(stages: tuple[StageBalance, ...]) -> dict[str, Any]:
+    """Variables of the bearings with play, while each of the stages excites."""
+    force = [stage.bearing_force.reshape(-1, len(stage.bearings)) for stage in stages]
+    values = {
+        "bearing_mean": ("N", "mean size of the force", [one.mean(axis=0) for one in force]),
+        "bearing_largest": ("N", "largest size of the force", [one.max(axis=0) for one in force]),
+        "bearing_lowest": ("N", "smallest size of the force", [one.min(axis=0) for one in force]),
+        "bearing_loose": ("1", "share of the time in its play", [(one == 0.0).mean(axis=0) for one in force]),
+    }
+    return {name: ("stage bearing", np.array(table), unit, words) for name, (unit, words, table) in values.items()}
 
 
 def balance_warnings(data: xr.Dataset) -> Iterator[Finding]:
@@ -283,11 +342,23 @@ def describe_balance(data: xr.Dataset) -> Block:
     columns = {
         "mesh": lambda i: str(data["mesh"].values[i]),
         "mean force [N]": lambda i: f"{float(data['mean_force'].values[i]):.5g}",
+        "uneven": lambda i: f"{float(data['uneven'].values[i]):.4f}",
         "largest [N]": lambda i: f"{float(data['largest_force'].values[i]):.5g}",
         "smallest [N]": lambda i: f"{float(data['lowest_force'].values[i]):.5g}",
         "back flank [N]": lambda i: f"{float(data['largest_back_force'].values[i]):.5g}",
         "apart": lambda i: f"{float(data['parted_share'].values[i]):.1%}",
         "on the back": lambda i: f"{float(data['back_share'].values[i]):.1%}",
     }
-    note = "each stage with the meshes of the others as springs"
-    return tabulate("Teeth that part, harmonic balance", range(data.sizes["mesh"]), columns, (note,))
+    note = "each stage with the meshes of the others as springs; uneven: largest over mean of the mean mesh force"
+    notes = (note, *_loose_bearings(data)) if "bearing" in data.sizes else (note,)
+    return tabulate("Teeth that part, harmonic balance", range(data.sizes["mesh"]), columns, notes)
+
+
+def _loose_bearings(data: xr.Dataset) -> Iterator[str]:
+    """Say of bearings with play what they carry, over all stages."""
+    largest, lowest = data["bearing_largest"].values.max(axis=0), data["bearing_lowest"].values.min(axis=0)
+    for name, high, low, loose in zip(
+        data["bearing"].values, largest, lowest, data["bearing_loose"].values.max(axis=0), strict=True
+    ):
+        force = f"{low:.5g} N to {high:.5g} N" if high else "nothing"
+        yield f"bearing {name} carries {force}" + (f", {loose:.1%} of the time nothing" if 0.0 < loose < 1.0 else "")

@@ -4,19 +4,23 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_gearbox import pair_tables, planetary_tables
+from small_gearbox import loose_pair_tables, pair_tables, planetary_tables
 
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
+    StageBalance,
     check_balance,
     describe_balance,
+    forces_of_bearings,
     forces_of_flanks,
     held_together,
+    loaded_lines,
     solve_balance,
 )
+from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import excitation_of
 from femgear.trains.gearbox.nonlinear import nonlinear_gearbox
@@ -32,6 +36,15 @@ def heavy_set(torque: str, **balance) -> Deflection:
     tables["operation"]["load_case"][0]["torque"] = {"sun": torque}
     tables |= {"motions": "plane", "gravity": {}, "balance": {"harmonics": 3, "side_bands": 3} | balance}
     return solve_deflection(read_case(tables))
+
+
+def shaken(found: Deflection, amplitude: float) -> MeshExcitation:
+    """Excitation of the stage at few positions, with a transmission error of one line [m]."""
+    drive = excitation_of(found, found.model.stages[0])
+    few = {name: getattr(drive, name)[:, ::64] for name in ("stiffness", "deflection", "force")}
+    count = few["deflection"].shape[1]
+    few["deflection"] = few["deflection"] + amplitude * np.cos(2.0 * np.pi * np.arange(count) / count)
+    return replace(drive, **few)
 
 
 def test_mesh_forces_of_planets_under_load_are_those_of_the_torque():
@@ -100,3 +113,26 @@ def test_a_pair_that_parts_is_met_in_time():
     motion = solve_transient(box.problem, omega, times, start=start, method="DOP853", tolerance=1e-10, events=True)
     wanted = solution.at(times)[:, 0]
     assert np.abs(motion.deflection[:, 0] - wanted).max() < 1e-6 * np.ptp(wanted)
+
+
+def test_a_bearing_that_loses_its_load_is_met_in_time():
+    found = solve_deflection(read_case(loose_pair_tables("20 um", weight="28 kg")))
+    # weight and mesh nearly balance: little is left for the bearing
+    assert np.hypot(*found.bearing_force[1, :2]) < 0.4 * 28.0 * 9.81
+    drive, omega, harmonics = shaken(found, 5e-6), 2.0 * np.pi * 250.0, 48
+    box = nonlinear_gearbox(found, {"stage": drive}, harmonics=2, damping_ratio=0.05, separates=False)
+    options = {"harmonics": harmonics, "samples": 4096, "stability": False, "radius": False}
+    solution = solve_harmonic_balance(box.problem, omega, **options)
+    force, loose = forces_of_flanks(box, solution)[0], forces_of_bearings(box, solution)
+    assert solution.converged and force.min() > 0.0 and 0.4 < (loose == 0.0).mean() < 0.6
+    lines, order = displacements(box.problem, solution), np.arange(harmonics + 1)
+    start = lines.sum(axis=1).real, (1j * omega * order * lines).sum(axis=1).real
+    times = np.linspace(0.0, 4.0 * np.pi / omega, 65)
+    motion = solve_transient(box.problem, omega, times, start=start, method="DOP853", tolerance=1e-10)
+    wanted = solution.at(times)
+    assert (np.abs(motion.deflection - wanted).max(axis=0) < 1e-6 * np.ptp(wanted, axis=0)).all()
+    stage = StageBalance("stage", box.stages[0].meshes, solution, force, 0.0 * force, tuple(box.bearings), loose)
+    data = GearboxBalanceResult((stage,)).dataset()
+    assert data["bearing"].values.tolist() == ["C"] and data["bearing_lowest"].item() == 0.0
+    assert data["bearing_loose"].item() == pytest.approx((loose == 0.0).mean())
+    assert any("bearing C carries 0 N to" in note for note in describe_balance(data).notes)

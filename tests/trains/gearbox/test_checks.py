@@ -243,3 +243,18 @@ def test_a_name_is_judged_beside_a_shaft_without_length():
     # its places are not
     CHANGES["bearing[1].position"][0](tables)
     assert problems(tables).keys() == {"shaft[1].part[0].length", "bearing[0].shaft"}
+
+
+@pytest.mark.parametrize(
+    ("entries", "key", "value"),
+    [
+        ({"clearance": "-5 um", "radial": "2e8 N/m"}, "bearing[1].clearance", "-0.005 mm"),
+        ({"clearance": "5 um", "radial": "rigid"}, "bearing[1].radial", "rigid"),
+        ({"clearance": "5 um", "tilt": "1e5 N m/rad"}, "bearing[1].radial", "none"),
+    ],
+)
+def test_play_of_springs_needs_springs(entries, key, value):
+    tables = pair_tables()
+    _replaced(1, **entries)(tables)
+    error = problems(tables)[key]
+    assert (error.code, error.value) == ("E-BEARING", value) and error.remedy

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from gearbox_equivalents import elastic_set_tables
-from small_gearbox import pair_tables, set_on_shafts
+from scipy.optimize import brentq
+from small_gearbox import loose_pair_tables, pair_tables, set_on_shafts
 
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, FemgearError
@@ -88,6 +89,29 @@ def test_rolling_bearings_balance_at_their_own_motion():
         assert -again.force[:3] == pytest.approx(force[:3], rel=1e-9, abs=1e-9)
     # both balls of a shaft share the thrust
     assert abs(total[2]) == pytest.approx(100.0 / 0.036 * math.tan(math.radians(15.0)), rel=1e-6)
+
+
+def test_a_shaft_lies_in_the_play_of_springs():
+    """A rigid body under its weight alone: ``F = (2 k / pi) [r (p + sin p cos p) - 2 c sin p]``, ``cos p = c / r``."""
+    tables = loose_pair_tables("20 um")
+    tables["operation"]["load_case"][0]["torque"]["motor"] = "1e-9 N m"
+    found = solve_deflection(read_case(tables))
+    force, clearance = 50.0 * 9.80665, 10e-6
+    assert found.bearing_force[1] == pytest.approx([0.0, force, 0.0, 0.0, 0.0, 0.0], abs=1e-6)
+
+    def missing(r):
+        p = math.acos(clearance / r)
+        return 4e8 / math.pi * (r * (p + math.sin(p) * math.cos(p)) - 2.0 * clearance * math.sin(p)) - force
+
+    sunk = brentq(missing, clearance, 10 * clearance, xtol=1e-18)
+    assert found.motion[7] == pytest.approx(-sunk, rel=1e-9)
+    # the tangent across the load is that of the force over the way
+    across = found.bearing_stiffness[1, 0, 0]
+    assert across == pytest.approx(force / sunk, rel=1e-6) and found.bearing_stiffness[1, 1, 1] > across
+    # in no play it is the spring
+    tight = solve_deflection(read_case(loose_pair_tables("0 um")))
+    free = tight.bearing_force[1, :2] + 2e8 * tight.motion[6:8]
+    assert free == pytest.approx([0.0, 0.0], abs=1e-6)
 
 
 def test_weight_hangs_in_the_bearings():

@@ -5,10 +5,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from small_gearbox import pair_tables, planetary_tables, set_on_shafts
+from small_gearbox import loose_pair_tables, pair_tables, planetary_tables, set_on_shafts
 
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.time import flank_motion
+from femgear.solvers.time.flank_steps import FlankScheme
+from femgear.solvers.time.free_turn import FreeTurn
+from femgear.solvers.time.transient import solve_transient
 from femgear.trains.gearbox.balance import forces_of_flanks
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.excitation import excitation_of
@@ -145,3 +149,47 @@ def test_two_planets_turn_with_no_carrier_but_stand_at_an_angle():
 def test_the_general_integrator_and_balances_are_met(rows):
     for row in getattr(drivetrain, rows)():
         assert row.ours <= row.gate, row
+
+
+def loose_in_time(**entries):
+    """Model and motion of a pair of rigid bodies, one of them in a bearing with play, that starts without deflection."""
+    known = {"duration": "20 ms", "rate": "50 kHz", "harmonics": 4, "start": "zero"}
+    return in_time(loose_pair_tables("20 um"), **known | entries)
+
+
+@pytest.mark.parametrize("parts", [False, True])
+def test_a_bearing_with_play_is_met_by_the_integrator_of_any_system(parts):
+    """Weight sets in at once: the shaft falls through its play, and bounces."""
+    _, model, motion = loose_in_time(contact_loss=parts, back_flanks=False)
+    problem, run = model.box.problem, motion.run
+    known = {"method": "average acceleration", "step": run.step, "tolerance": 1e-12}
+    other = solve_transient(problem, model.box.frequency, run.time, **known)
+    across = other.deflection[:, model.box.bearings["C"].columns[0]]
+    assert 0.05 < (np.hypot(*across.T) < 10e-6).mean() < 0.95
+    rows = np.array([model.rotation(shaft) for shaft in motion.shafts])
+    wanted = other.displacement @ rows.T
+    # deviations have no part of the common rotation
+    turned = other.displacement @ model.spun.carried / model.spun.inertia
+    wanted -= turned[:, None] * (rows @ model.spun.spin)
+    np.testing.assert_allclose(run.motion, wanted, rtol=0.0, atol=1e-6 * np.abs(wanted).max())
+    assert run.energy_balance.error < 1e-12 and run.momentum < 1e-12
+    assert (run.lost.max() > 0.0) == parts
+
+
+def test_a_static_start_rests_in_the_play_of_its_bearings():
+    tables = loose_pair_tables("20 um")
+    del tables["pair"][0]["mesh"]["contact_ratio"]
+    found, model, motion = in_time(tables, duration="5 ms")
+    state = flank_motion._start_state(model.spun, *_first_scheme(model), "static", contact_loss=False)
+    bearing = model.box.bearings["C"]
+    at_rest = state[: len(model.spun.spin)] @ model.spun.basic
+    force = bearing.evaluate(at_rest[bearing.columns], None)[0][0]
+    assert force == pytest.approx(-found.bearing_force[1, :2], rel=1e-9)
+    assert np.abs(motion.run.velocity).max() < 1e-6 * motion.run.speed[0]
+    assert motion.run.force == pytest.approx(found.mesh_force[0], rel=1e-9)
+
+
+def _first_scheme(model):
+    torques = [(torque, model.rotation(torque.body)) for torque in model.torques]
+    turn = FreeTurn(model.spun, torques, 1e-5, model.speed)
+    return FlankScheme.of(model.spun, 1e-5, turn.directions), turn
