@@ -39,8 +39,8 @@ class Element(Protocol):
     theta (..., n_bases) [rad], forces (..., g, d) [N] and tangents (..., g, d, d) [N/m].
 
     Optional: ``degree`` of the law in x, None where it has corners. ``steepest(theta)`` (g, d): largest
-    stiffness over phases (n, n_bases), where that is not the reference. ``evaluate_together(x, theta)``, of one set of d
-    columns for all groups: the sums over the groups, from x (..., d).
+    stiffness over phases (n, n_bases), where that is not the reference. ``evaluate_together(x, theta)``, where all
+    groups have one set of d columns: the sums over the groups, from x (..., d).
     """
 
     @property

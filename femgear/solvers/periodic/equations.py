@@ -108,7 +108,7 @@ class HarmonicBalance:
     @cached_property
     def turning_bases(self) -> list[int]:
         """Bases by which directions of elements turn."""
-        waves = [np.array(element.wave.orders) for element in self.elements if hasattr(element, "wave")]
+        waves = [np.array(wave.orders) for element in self.elements if (wave := getattr(element, "wave", None))]
         return sorted({int(base) for orders in waves for base in np.flatnonzero(orders)})
 
     @property

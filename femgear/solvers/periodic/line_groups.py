@@ -40,7 +40,7 @@ class LineGroups:
             if np.iscomplexobj(factor[0]):
                 found = linalg.lu_solve(factor, right)
             else:
-                found = linalg.lu_solve(factor, np.concatenate([right.real, right.imag]))
+                found = linalg.lu_solve(factor, np.concatenate([np.real(right), np.imag(right)]))
                 found = found[: len(right)] + 1j * found[len(right) :]
             solved[:, members] = found.reshape(len(members), -1).T
         return solved

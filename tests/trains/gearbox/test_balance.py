@@ -9,6 +9,7 @@ from small_gearbox import loose_pair_tables, pair_tables, planetary_tables
 from femgear.errors import CaseError
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.time.transient import solve_transient
+from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
     StageBalance,
@@ -17,10 +18,8 @@ from femgear.trains.gearbox.balance import (
     forces_of_bearings,
     forces_of_flanks,
     held_together,
-    loaded_lines,
     solve_balance,
 )
-from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import excitation_of
 from femgear.trains.gearbox.nonlinear import nonlinear_gearbox

@@ -152,7 +152,7 @@ def test_the_general_integrator_and_balances_are_met(rows):
 
 
 def loose_in_time(**entries):
-    """Model and motion of a pair of rigid bodies, one of them in a bearing with play, that starts without deflection."""
+    """Model and motion of two rigid gears, one of them in a bearing with play, that start without deflection."""
     known = {"duration": "20 ms", "rate": "50 kHz", "harmonics": 4, "start": "zero"}
     return in_time(loose_pair_tables("20 um"), **known | entries)
 
