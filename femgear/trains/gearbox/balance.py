@@ -75,7 +75,7 @@ class StageBalance:
 
     @property
     def uneven(self) -> np.ndarray:
-        """Largest force (M,) of every mesh over its mean, of means over a mesh period: at the worst angle of a carrier."""
+        """Force (M,) of every mesh at the worst angle of the carrier over its mean, both over a mesh period."""
         mean = (self.drive - self.back).mean(axis=1)
         whole = mean.mean(axis=0)
         return np.divide(mean.max(axis=0), whole, out=np.full(len(whole), np.nan), where=whole != 0.0)
