@@ -32,6 +32,7 @@ from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
+from femgear.trains.gearbox.play import loose_notes
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.silence import exciting_sections
 
@@ -350,15 +351,5 @@ def describe_balance(data: xr.Dataset) -> Block:
         "on the back": lambda i: f"{float(data['back_share'].values[i]):.1%}",
     }
     note = "each stage with the meshes of the others as springs; uneven: largest over mean of the mean mesh force"
-    notes = (note, *_loose_bearings(data)) if "bearing" in data.sizes else (note,)
+    notes = (note, *loose_notes(data)) if "bearing" in data.sizes else (note,)
     return tabulate("Teeth that part, harmonic balance", range(data.sizes["mesh"]), columns, notes)
-
-
-def _loose_bearings(data: xr.Dataset) -> Iterator[str]:
-    """Say of bearings with play what they carry, over all stages."""
-    largest, lowest = data["bearing_largest"].values.max(axis=0), data["bearing_lowest"].values.min(axis=0)
-    for name, high, low, loose in zip(
-        data["bearing"].values, largest, lowest, data["bearing_loose"].values.max(axis=0), strict=True
-    ):
-        force = f"{low:.5g} N to {high:.5g} N" if high else "nothing"
-        yield f"bearing {name} carries {force}" + (f", {loose:.1%} of the time nothing" if 0.0 < loose < 1.0 else "")

@@ -97,3 +97,13 @@ def play_findings(data: xr.Dataset) -> Iterator[Finding]:
         )
         remedy = "give weight ([gravity]), preload or less clearance, or a load that presses"
         yield Finding("W-PLAY", "bearing", text, remedy=remedy)
+
+
+def loose_notes(data: xr.Dataset) -> Iterator[str]:
+    """Say what bearings with play carry in a motion, over all stages of it; ``data`` is that of balance.nc."""
+    largest, lowest = data["bearing_largest"].values.max(axis=0), data["bearing_lowest"].values.min(axis=0)
+    for name, high, low, loose in zip(
+        data["bearing"].values, largest, lowest, data["bearing_loose"].values.max(axis=0), strict=True
+    ):
+        force = f"{low:.5g} N to {high:.5g} N" if high else "nothing"
+        yield f"bearing {name} carries {force}" + (f", {loose:.1%} of the time nothing" if 0.0 < loose < 1.0 else "")
