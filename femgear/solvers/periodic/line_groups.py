@@ -38,11 +38,11 @@ class LineGroups:
         for members, factor in zip(self.members, self.factors, strict=True):
             right = lines[:, members].T.ravel()
             if np.iscomplexobj(factor[0]):
-                found = linalg.lu_solve(factor, right)
+                solution = linalg.lu_solve(factor, right)
             else:
-                found = linalg.lu_solve(factor, np.concatenate([np.real(right), np.imag(right)]))
-                found = found[: len(right)] + 1j * found[len(right) :]
-            solved[:, members] = found.reshape(len(members), -1).T
+                solution = linalg.lu_solve(factor, np.concatenate([np.real(right), np.imag(right)]))
+                solution = solution[: len(right)] + 1j * solution[len(right) :]
+            solved[:, members] = solution.reshape(len(members), -1).T
         return solved
 
 
