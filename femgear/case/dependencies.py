@@ -39,8 +39,8 @@ _LIMITS = {
 }
 _OIL = {"lubricant", "losses"}
 SPECTRUM_ENTRIES = {"operation.load_case", "operation.required_hours"}
-_PLANET_RATINGS = {"planet.dynamic_rating", "planet.bearing_kind"}
-"""Of lives alone."""
+_PLANET_RATINGS = {"planet.dynamic_rating", "planet.bearing_kind", "planet.bearing_pitch_diameter"}
+"""Of lives and losses alone."""
 _WORDS = {"format", "title", "housing", "runup", "strength", *_OIL, *_LIMITS, *SPECTRUM_ENTRIES, *_PLANET_RATINGS}
 """No stage before housing and run-up depends on them."""
 _SUPPORTS = {"support_stiffness", "support_shaft", "bearing_stiffness", "bearing_clearance"}

@@ -6,10 +6,11 @@ with the entry that would give it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from functools import partial
 from typing import Annotated, Any, Literal
 
-from pydantic import StrictBool, model_validator
+from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
 from femgear.case.quantities import (
     CELSIUS,
@@ -24,6 +25,7 @@ from femgear.case.quantities import (
     Section,
     Temperature,
     Values,
+    printable_line,
 )
 from femgear.errors import CaseError
 from femgear.findings import Finding
@@ -126,11 +128,19 @@ class FrictionTableSection(Section):
         return self
 
 
+class SealSection(Section):
+    """A radial shaft seal between a shaft and the casing: where its lip runs."""
+
+    shaft: Annotated[str, BeforeValidator(partial(printable_line, name="name", least=1, most=60))]
+    diameter: Annotated[float, Quantity(LENGTH, 1e-3, 5.0)]
+
+
 class LossesSection(Section):
     """How losses are found: the coefficient of friction of the teeth, bearings, and a map over torque and speed.
 
     ``friction`` names the formula, or says that it is the ``coefficient`` or the ``table``. ``roughness`` is the mean
-    R_a of both flanks. The map has the ``torque_shares`` and ``speed_shares`` of the torque and the speed of operation.
+    R_a of both flanks. A ``seal`` and ``bearings`` lose beside teeth. The map has the ``torque_shares`` and
+    ``speed_shares`` of the torque and the speed of operation.
     With ``excites`` the friction of the teeth acts on the gears, at rest and in motion.
     """
 
@@ -140,6 +150,7 @@ class LossesSection(Section):
     roughness: Annotated[float, Quantity(LENGTH, 1e-9, 2e-5)] | None = None
     bearings: StrictBool = True
     excites: StrictBool = False
+    seal: Annotated[tuple[SealSection, ...], Field(max_length=100)] = ()
     torque_shares: Annotated[tuple[_Share, ...], Values(max_length=50)] = ()
     speed_shares: Annotated[tuple[_Share, ...], Values(max_length=200)] = ()
 
@@ -171,6 +182,27 @@ def oil_at(case: Any, temperature: float | None = None) -> float:
         remedy = 'give lubricant.temperature = "70 degC", that of the oil in operation'
         raise _missing(case, "the temperature of the oil is missing", "lubricant.temperature", remedy)
     return oil_viscosity(oil.viscosity_40, oil.viscosity_100, hot - CELSIUS) * oil.density
+
+
+def operating_viscosity(case: Any) -> float | None:
+    """Find the kinematic viscosity of the oil in operation [m^2/s]; None of a case that does not tell it."""
+    oil: LubricantSection | None = case.lubricant
+    if oil is None or (oil.viscosity is None and None in (oil.viscosity_40, oil.viscosity_100, oil.temperature)):
+        return None
+    return oil_at(case) / oil.density
+
+
+def check_seals(losses: LossesSection, shafts: Sequence[str]) -> Iterator[CaseError]:
+    """Refuse seals on shafts that there are not."""
+    for number, seal in enumerate(losses.seal):
+        if seal.shaft not in shafts:
+            yield CaseError(
+                "there is no such shaft",
+                code="E-CHOICE",
+                key=f"losses.seal[{number}].shaft",
+                value=seal.shaft,
+                limit=", ".join(shafts),
+            )
 
 
 def check_losses(case: Any) -> None:

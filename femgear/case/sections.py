@@ -404,7 +404,8 @@ class SunSection(ToothMeasures):
 
 
 class PlanetSection(ToothMeasures):
-    """One of the equal planets; a dynamic rating of its bearing gives that a life over load cases."""
+    """One of the equal planets; a dynamic rating of its bearing gives that a life over load cases, its pitch diameter
+    losses."""
 
     teeth: Annotated[int, Count(5, 5000, note=_MANY_TEETH)]
     profile_shift: Shift = 0.0
@@ -416,7 +417,8 @@ class PlanetSection(ToothMeasures):
     bearing_stiffness: Stiffness = LEFT_OUT
     bearing_clearance: Annotated[float, Quantity(LENGTH, 0.0, 0.002)] = 0.0
     dynamic_rating: Annotated[float, Quantity(FORCE, 1.0, 1e9)] | None = None
-    bearing_kind: Literal["ball", "roller"] = "roller"
+    bearing_kind: Literal["ball", "roller", "needle"] = "roller"
+    bearing_pitch_diameter: Diameter | None = None
     tilt_stiffness: Turning | None = None
     misalignment: Annotated[tuple[PlanetMisalignment, ...], Field(max_length=1000)] = ()
     tip_diameter: TipDiameter | None = None

@@ -8,19 +8,26 @@ computed loads, which stands beside that of equal loads on all pairs, the figure
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.case.dependencies import loss_entries
-from femgear.case.lubrication import check_film, check_losses, losses_wanted
+from femgear.case.lubrication import (
+    LossesSection,
+    check_film,
+    check_losses,
+    check_seals,
+    losses_wanted,
+    operating_viscosity,
+)
 from femgear.case.tooth_friction import friction_coefficient, shaft_turning
 from femgear.errors import CaseError
 from femgear.gears.friction import closed_loss_factor, loss_factor, sliding_per_path
 from femgear.gears.power_flow import pair_condition, planetary_condition
-from femgear.gears.power_losses import LossyFlow, lossy_flow
+from femgear.gears.power_losses import FrictionTorque, LossyFlow, lossy_flow
 from femgear.gears.profile import base_helix_angle
 from femgear.stages.losses_results import (
     LossesResult,
@@ -29,8 +36,10 @@ from femgear.stages.losses_results import (
     describe_losses,
     loss_tables,
 )
+from femgear.stages.planet_bearings import has_planet_friction, planet_friction
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.stages.static import slices_ahead, solve_static
+from femgear.system.bearing_friction import seal_torque
 
 if TYPE_CHECKING:
     from femgear.case.dependencies import Steps
@@ -168,6 +177,8 @@ def _point(case: Any, static: StaticResult, torque: float, speed: float) -> Loss
     turning, frequency = shaft_turning(case, gears, speed)
     friction, operation = mesh_friction(case, static, frequency, helix_angle=helix), _operation(case, gears)
     name = operation.condition.name
+    seals = seal_frictions(case.losses, operation.shafts)
+    bearings = _planet_bearings(case, static, operation, turning.get("carrier", 0.0), frequency)
     flow = lossy_flow(
         operation.shafts,
         (operation.condition,),
@@ -175,8 +186,38 @@ def _point(case: Any, static: StaticResult, torque: float, speed: float) -> Loss
         torques={operation.given: torque},
         outputs=(operation.output,),
         efficiencies={name: friction.passed},
+        friction=[*seals, *bearings],
     )
-    return LossPoint(flow, {name: friction}, {name: losses_of_meshes(flow, name, friction, gears)}, {})
+    lost = {each.name: flow.friction_loss[each.name] for each in (*seals, *bearings)}
+    return LossPoint(
+        flow,
+        {name: friction},
+        {name: losses_of_meshes(flow, name, friction, gears)},
+        {each.name: lost[each.name] for each in bearings},
+        {each.name: lost[each.name] for each in seals},
+    )
+
+
+def seal_frictions(losses: LossesSection, shafts: Sequence[str]) -> list[FrictionTorque]:
+    """List the torques of the seals of shafts that turn; ``gear_1`` of a case is the shaft "gear 1" of a pair."""
+    names = {shaft.replace(" ", "_"): shaft for shaft in shafts} | {shaft: shaft for shaft in shafts}
+    return [
+        FrictionTorque(f"seal {number} on {seal.shaft}", (names[seal.shaft], None), seal_torque(seal.diameter))
+        for number, seal in enumerate(losses.seal, start=1)
+        if seal.shaft in names
+    ]
+
+
+def _planet_bearings(
+    case: Any, static: StaticResult, operation: _Operation, carrier_speed: float, mesh_frequency: float
+) -> list[FrictionTorque]:
+    """Torque of the bearings of all planets between sun and carrier; none where nothing tells it."""
+    if not (case.losses.bearings and has_planet_friction(case)):
+        return []
+    sun, carrier = (name if name in operation.shafts else None for name in ("sun", "carrier"))
+    of_case = {"carrier_speed": carrier_speed, "mesh_frequency": mesh_frequency}
+    torque = planet_friction(case, static.planetary_set, static.cycle, **of_case, viscosity=operating_viscosity(case))
+    return [FrictionTorque("planets", (sun, carrier), torque)]
 
 
 @one_blas_thread()
@@ -217,8 +258,11 @@ def _simplified(case: Any, static: StaticResult) -> Iterator[str]:
             "loss factors of helical teeth by the loads of their spur transverse section; static.slices gives those "
             "over the width"
         )
-    if static.planetary_set.members:
-        yield "bearings of planets and members are left out: nothing tells their friction"
+    if static.planetary_set.members and case.losses.bearings:
+        if not has_planet_friction(case):
+            yield "bearings of planets lose nothing here without planet.bearing_pitch_diameter, of rollers or needles"
+        elif operating_viscosity(case) is None:
+            yield "bearings of planets lose nothing by their lubricant: give the section lubricant"
 
 
 def no_losses(case: Any) -> str:
@@ -235,6 +279,9 @@ def check_loss_entries(case: Any) -> None:
     check_losses(case)
     check_film(case)
     losses = case.losses
+    for problem in check_seals(losses, _shaft_names(case)) if losses is not None else ():
+        problem.file = case.location(str(problem.key))
+        raise problem
     if losses is not None and bool(losses.torque_shares) != bool(losses.speed_shares):
         key = f"losses.{'speed' if losses.torque_shares else 'torque'}_shares"
         raise CaseError(
@@ -244,6 +291,13 @@ def check_loss_entries(case: Any) -> None:
             file=case.location(key),
             remedy=f"give {key.removeprefix('losses.')} = [0.5, 1.0] too",
         )
+
+
+def _shaft_names(case: Any) -> tuple[str, ...]:
+    """Names of shafts that a seal may be on."""
+    if hasattr(case, "shaft"):
+        return tuple(shaft.name for shaft in case.shaft)
+    return ("sun", "carrier", "ring") if hasattr(case, "planet") else tuple(case.gear_names)
 
 
 LOSSES = Stage(

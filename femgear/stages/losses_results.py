@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,6 +39,7 @@ LOSS_VARIABLES = {
     "mesh_loss": ("{} mesh", "W", "loss of the mesh by friction of its teeth"),
     "mesh_power": ("{} stage", "W", "power that rolls through the teeth of the stage, against its carrier"),
     "stage_efficiency": ("{} stage", "1", "efficiency of the stage with its carrier held, the product of its meshes"),
+    "seal_loss": ("{} seal", "W", "loss of the shaft seal"),
     "bearing_loss": ("{} bearing", "W", "loss of the bearing; NaN where nothing tells its friction"),
     "input_power": ("{}", "W", "power that enters"),
     "output_power": ("{}", "W", "power that leaves"),
@@ -89,12 +90,15 @@ class LossPoint:
         By stage: losses of its meshes (M,) [W].
     bearing_loss : mapping
         By bearing [W]; NaN where nothing tells its friction.
+    seal_loss : mapping
+        By seal [W].
     """
 
     flow: LossyFlow
     friction: Mapping[str, MeshFriction]
     mesh_loss: Mapping[str, np.ndarray]
     bearing_loss: Mapping[str, float]
+    seal_loss: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -131,6 +135,13 @@ class LossesResult(StageResult):
     section: LossesSection
     efficiency_map: np.ndarray
     missing: tuple[str, ...]
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """What losses are of: teeth, and bearings and seals as far as something tells theirs."""
+        first = self.points[0]
+        bearings = any(math.isfinite(loss) for loss in first.bearing_loss.values())
+        return ("teeth", *(("bearings",) if bearings else ()), *(("seals",) if first.seal_loss else ()))
 
     @property
     def residual(self) -> float:
@@ -184,6 +195,9 @@ class LossesResult(StageResult):
         if bearings:
             values["bearing_loss"] = [[point.bearing_loss[name] for name in bearings] for point in points]
             coords["bearing"] = ("bearing", bearings, "1", "bearing")
+        if seals := [*first.seal_loss]:
+            values["seal_loss"] = [[point.seal_loss[name] for name in seals] for point in points]
+            coords["seal"] = ("seal", seals, "1", "shaft seal")
         if self.efficiency_map.size:
             values["efficiency_map"] = self.efficiency_map
             for name in ("torque", "speed"):
@@ -194,6 +208,7 @@ class LossesResult(StageResult):
             "title": "losses and efficiency",
             "friction": self.section.friction,
             "missing": " | ".join(self.missing),
+            "contains": ", ".join(self.parts),
         }
         return Contents(declared(texts, {name: np.asarray(value) for name, value in values.items()}), coords, attrs)
 
@@ -243,6 +258,8 @@ def describe_losses(data: Any) -> Block:
     }
     if "bearing_loss" in data:
         columns["bearings [W]"] = lambda i: watts("bearing_loss", i)
+    if "seal_loss" in data:
+        columns["seals [W]"] = lambda i: watts("seal_loss", i)
     columns |= {
         "losses [W]": lambda i: watts("loss", i),
         "output [W]": lambda i: watts("output_power", i),
@@ -250,7 +267,14 @@ def describe_losses(data: Any) -> Block:
     }
     left = (f"the first {_SHOWN} of {count}; all in losses.nc",) if count > _SHOWN else ()
     missing = tuple(filter(None, str(data.attrs["missing"]).split(" | ")))
-    return tabulate("Losses", range(min(count, _SHOWN)), columns, (*_friction_words(data), *left, *missing))
+    notes = (*_friction_words(data), *left, *missing, f"not in it: {', '.join(_not_contained(data))}")
+    return tabulate("Losses", range(min(count, _SHOWN)), columns, notes)
+
+
+def _not_contained(data: Any) -> list[str]:
+    """Losses that an efficiency has not."""
+    contains = str(data.attrs.get("contains", "teeth")).split(", ")
+    return [*(part for part in ("bearings", "seals") if part not in contains), "churning and windage"]
 
 
 _FORMULAS = {
@@ -316,4 +340,6 @@ def efficiency_rows(results: Any, marks: Marks) -> Iterator[tuple[str, str]]:
     text = marks(f"{100.0 * values[at]:.3f} %", "W-LOSSES", "W-OIL", of=("losses",))
     where = f" at {_label(data, at)}" if point_dim(data) == "speed" else f", {_label(data, at)}"
     least = "smallest " if len(values) > 1 else ""
-    yield f"{least}efficiency", f"{text}{where}: {loss:.4g} W of losses"
+    parts = str(data.attrs.get("contains", "teeth"))
+    without = ", ".join(_not_contained(data))
+    yield f"{least}efficiency", f"{text}{where}: {loss:.4g} W of losses of {parts}; without {without}"

@@ -1,4 +1,4 @@
-"""Lives of the bearings between planets and pins over load cases, ISO 281.
+"""Bearings between planets and pins: their lives over load cases, ISO 281, and their friction.
 
 The load of a bearing is the force of its pin: the mesh forces of the static solution with its sharing of the planets,
 and what holds the planet on its circle, mass times radius times the square of the speed of the carrier, inwards. Over
@@ -18,9 +18,12 @@ import numpy as np
 from femgear.findings import Finding
 from femgear.gears.pair import BRANCH, GearSet
 from femgear.report.tables import Block, Marks, tabulate
+from femgear.system.bearing_friction import OIL_BATH, FrictionFactors, Kind, friction_load, load_factor
 
-EXPONENTS = {"ball": 3.0, "roller": 10.0 / 3.0}
+EXPONENTS = {"ball": 3.0, "roller": 10.0 / 3.0, "needle": 10.0 / 3.0}
 """Exponents p of the life by the kind of bearing."""
+_FRICTION: dict[str, Kind] = {"roller": "cylindrical", "needle": "needle"}
+"""Kinds whose friction goes without a static rating."""
 _MILLION, _HOUR = 1e6, 3600.0
 
 
@@ -92,6 +95,44 @@ def equivalent_pin_load(
     size = np.hypot(force[:, 0], force[:, 1])
     largest = size.max()
     return largest * ((size / largest) ** exponent).mean(axis=1) ** (1.0 / exponent) if largest else size[:, 0]
+
+
+def has_planet_friction(case: Any) -> bool:
+    """Tell whether a case gives what the friction of its planets' bearings needs."""
+    planet = getattr(case, "planet", None)
+    return planet is not None and planet.bearing_pitch_diameter is not None and planet.bearing_kind in _FRICTION
+
+
+def planet_friction(
+    case: Any, gears: GearSet, cycle: Any, *, carrier_speed: float, mesh_frequency: float, viscosity: float | None
+) -> float:
+    """Compute the friction of all planets' bearings as a torque between sun and carrier [N m].
+
+    Planets turn on their pins ``z_s/z_p`` times as fast as the sun against the carrier: that torque takes the power
+    of M_0 + M_1 of `femgear.system.bearing_friction`, with the mean force of every pin. The load of a planet counts as
+    that of one bearing.
+
+    Parameters
+    ----------
+    case : case of gears
+        With `has_planet_friction`.
+    gears, cycle, carrier_speed
+        As for `equivalent_pin_load`.
+    mesh_frequency : float
+        [Hz]
+    viscosity : float or None
+        Kinematic [m^2/s]; without it M_1 alone.
+    """
+    kind, diameter = _FRICTION[case.planet.bearing_kind], case.planet.bearing_pitch_diameter
+    force = equivalent_pin_load(cycle, gears, mass=case.planet.mass, carrier_speed=carrier_speed, exponent=1.0)
+    turning = 2.0 * math.pi * abs(mesh_frequency) / gears.gears[BRANCH].teeth
+    torques = [
+        FrictionFactors(load_factor(kind, 0.0, load, 0.0, None), OIL_BATH[kind]).torque(
+            friction_load(kind, 0.0, load, 0.0), diameter, turning, viscosity
+        )
+        for load in force.tolist()
+    ]
+    return math.fsum(torques) * gears.gears[0].teeth / gears.gears[BRANCH].teeth
 
 
 def planet_bearings(

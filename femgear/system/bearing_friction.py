@@ -3,7 +3,9 @@ Kotzalas, Essential Concepts of Bearing Technology, 2006, chapter 10).
 
 ``M = M_0 + M_1``. The part of the lubricant is ``M_0 = 1e-7 f_0 (nu n)^(2/3) d_m^3``, from ``nu n = 2000`` mm^2/s rpm
 on, below it ``160e-7 f_0 d_m^3``, in N mm, with the viscosity nu [mm^2/s], the speed n [rpm] and the pitch diameter d_m
-[mm]. The part of the load is ``M_1 = f_1 P_1 d_m``. Friction at ribs, seals, and drag in a deep bath are left out.
+[mm]. The part of the load is ``M_1 = f_1 P_1 d_m``. Friction at ribs and drag in a deep bath are left out.
+
+A radial shaft seal takes ``P = 7.69e-6 d^2 n`` [W, mm, rpm] (ISO/TR 14179-2), whatever its oil: a torque.
 """
 
 from __future__ import annotations
@@ -24,8 +26,15 @@ LOAD = {"cylindrical": 3e-4, "needle": 1e-3, "tapered": 4e-4, "spherical": 4.5e-
 """f_1 of roller bearings, means of their ranges."""
 BALL_LOAD = {"ball": (5e-4, 0.55), "angular": (1e-3, 0.33)}
 """z and y in ``f_1 = z (P_0/C_0)^y`` of ball bearings; P_0 is the equivalent static load."""
+SEAL_POWER = 7.69e-6
+"""Power of a radial shaft seal over diameter squared and speed [W/(mm^2 rpm)], ISO/TR 14179-2."""
 _RADIAL = math.radians(1.0)
 _LEAST_PRODUCT = 2000.0  # mm^2/s rpm
+
+
+def seal_torque(diameter: float) -> float:
+    """Compute the friction torque of a radial shaft seal [N m] of a diameter [m]."""
+    return SEAL_POWER * (1e3 * diameter) ** 2 * 30.0 / math.pi
 
 
 def friction_kind(kind: Kind, contact_angle: float) -> str:

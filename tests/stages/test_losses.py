@@ -78,6 +78,44 @@ def test_helical_teeth_in_slices_have_losses_of_their_slices():
     assert data.attrs["missing"] == ""
 
 
+def test_bearings_of_planets_and_seals_lose_beside_the_teeth():
+    """By hand: M_0 + M_1 of every planet at its speed against the carrier, 7.69e-6 d^2 n of a seal."""
+    seals = [{"shaft": "sun", "diameter": "20 mm"}, {"shaft": "carrier", "diameter": "50 mm"}]
+    oil = {"lubricant": {"viscosity": "20 mm^2/s"}, "losses": CONSTANT["losses"] | {"seal": seals}}
+    bearing = {
+        "planet.bearing_pitch_diameter": "27 mm",
+        "planet.bearing_kind": "needle",
+        "operation.speeds": ["3100 rpm"],
+    }
+    case, static, result = solved("planetary_27_40_108", **oil, **bearing)
+    check_loss_entries(case)
+    data = result.dataset()
+    assert data["seal_loss"].values[0] == pytest.approx([7.69e-6 * 20**2 * 3100, 7.69e-6 * 50**2 * 620], rel=1e-12)
+    turns = (3100.0 - 620.0) * 27 / 40
+    held = 0.355 * 0.051 * (620.0 * np.pi / 30.0) ** 2  # inwards; mesh forces are tangential on the whole
+    force = np.hypot(static.cycle.bearing_force[0, 0].mean() - held, static.cycle.bearing_force[0, 1].mean())
+    moment = 1e-7 * 12.0 * (20.0 * turns) ** (2 / 3) * 27.0**3 + 1e-3 * force * 27.0
+    loss = 3 * 1e-3 * moment * turns * np.pi / 30.0
+    assert data["bearing_loss"].values[0] == pytest.approx([loss], rel=2e-3)
+    whole = sum(float(data[f"{part}_loss"].sum()) for part in ("mesh", "bearing", "seal"))
+    assert float(data["loss"][0]) == pytest.approx(whole, rel=1e-12)
+    assert abs(float(data["power_imbalance"][0])) < 1e-12 and not result.findings
+    assert data.attrs["contains"] == "teeth, bearings, seals"
+    # without bearings, and with a seal on a shaft that stands still
+    seals = [{"shaft": "ring", "diameter": "50 mm"}]
+    changes = {"losses": CONSTANT["losses"] | {"bearings": False, "seal": seals}}
+    alone = solve_losses(with_values(case, changes), static).dataset()
+    assert float(alone["loss"][0]) == pytest.approx(float(alone["mesh_loss"].sum()))
+    assert alone.attrs["contains"] == "teeth"
+
+
+def test_seals_are_on_shafts_that_there_are():
+    changes = {"losses": CONSTANT["losses"] | {"seal": [{"shaft": "gear_3", "diameter": "20 mm"}]}}
+    with pytest.raises(CaseError, match="no such shaft") as refused:
+        check_loss_entries(with_values(read_case("cases/spur_pair.toml"), changes))
+    assert refused.value.key == "losses.seal[0].shaft" and "gear_1, gear_2" in str(refused.value.limit)
+
+
 def test_sections_of_losses_decide_losses_alone():
     plain = read_case("cases/planetary_27_40_108.toml")
     case = with_values(plain, CONSTANT | {"lubricant": {"viscosity": "20 mm^2/s"}})

@@ -5,7 +5,14 @@ import math
 import pytest
 
 from femgear.errors import CaseError
-from femgear.system.bearing_friction import LOAD, friction_kind, friction_load, load_factor, lubricant_torque
+from femgear.system.bearing_friction import (
+    LOAD,
+    friction_kind,
+    friction_load,
+    load_factor,
+    lubricant_torque,
+    seal_torque,
+)
 
 
 def test_torque_of_the_lubricant_grows_with_the_power_two_thirds_from_a_speed_on():
@@ -36,3 +43,8 @@ def test_balls_need_their_static_rating_and_rollers_do_not():
     with pytest.raises(CaseError) as refused:
         load_factor("ball", 0.0, 1.0, 0.0, None)
     assert refused.value.key == "static_rating"
+
+
+def test_a_seal_takes_the_power_of_its_diameter_squared():
+    speed = 1500.0 * math.pi / 30.0
+    assert seal_torque(40e-3) * speed == pytest.approx(7.69e-6 * 40.0**2 * 1500.0, rel=1e-12)

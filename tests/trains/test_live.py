@@ -46,6 +46,7 @@ CHANGES: tuple[dict[str, object], ...] = (
     {"material.density": "7700 kg/m^3"},
     {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"},
     {"planet.dynamic_rating": "20 kN", "planet.bearing_kind": "ball"},
+    {"planet.bearing_pitch_diameter": "27 mm"},
     {"operation.load_case": [{"name": "run", "torque": "30 N m", "speed": "500 rpm", "share": 1.0}]},
     {
         "operation.load_case": [{"torque": "30 N m", "speed": "500 rpm", "hours": 100}],
@@ -81,6 +82,7 @@ CHANGES: tuple[dict[str, object], ...] = (
             "table": {"line_loads": ["100 N/mm"], "speeds": ["1 m/s", "10 m/s"], "coefficients": [[0.06, 0.04]]},
             "roughness": "0.5 um",
             "bearings": False,
+            "seal": [{"shaft": "sun", "diameter": "20 mm"}],
             "torque_shares": [1.0],
             "speed_shares": [0.5],
         },

@@ -21,8 +21,9 @@ from femgear.findings import Finding
 from femgear.gears.power_losses import FrictionTorque, lossy_flow
 from femgear.stages.heat import heat_result, mesh_heat
 from femgear.stages.heat_results import HeatResult, MeshHeat, describe_heat, heat_tables
-from femgear.stages.losses import NO_LOSSES, check_loss_entries, losses_of_meshes, mesh_friction
+from femgear.stages.losses import NO_LOSSES, check_loss_entries, losses_of_meshes, mesh_friction, seal_frictions
 from femgear.stages.losses_results import LossesResult, LossPoint, MeshFriction, describe_losses, loss_tables
+from femgear.stages.planet_bearings import has_planet_friction, planet_friction
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.system.bearing_friction import (
     OIL_BATH,
@@ -31,7 +32,13 @@ from femgear.system.bearing_friction import (
     friction_load,
     load_factor,
 )
-from femgear.trains.gearbox.case_file import CASING, GearboxCase, LoadCaseSection
+from femgear.trains.gearbox.case_file import (
+    CASING,
+    BoxPlanetarySection,
+    GearboxCase,
+    LoadCaseSection,
+    teeth_of,
+)
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.key_figures import stage_meshes
 from femgear.trains.gearbox.life import turning_speed
@@ -81,17 +88,23 @@ def loss_point(state: Deflection, load_case: LoadCaseSection, speed_share: float
     torques = {}
     if case.losses is not None and case.losses.bearings:
         torques = {name: bearing_torque(state, number, speed_share) for number, name in enumerate(model.bearing_names)}
-    rings = {
+    rings: dict[str, tuple[str | None, str | None]] = {
         name: (section.shaft, section.outer_shaft if section.outer_shaft != CASING else None)
         for name, section in zip(model.bearing_names, case.bearing, strict=True)
     }
+    seals = [] if case.losses is None else seal_frictions(case.losses, [shaft.name for shaft in case.shaft])
+    for stage, torque in _planet_torques(state, speed_share).values():
+        torques[f"{stage.name} planets"] = torque
+        sun, carrier = (None if shaft == CASING else shaft for shaft in (stage.sun, stage.carrier))
+        rings[f"{stage.name} planets"] = sun, carrier
     flow = lossy_flow(
         [shaft.name for shaft in case.shaft],
         stage_conditions(case),
         speeds=speed,
         efficiencies={name: of_stage.passed for name, of_stage in friction.items()},
         friction=[
-            FrictionTorque(name, rings[name], torque) for name, torque in torques.items() if math.isfinite(torque)
+            *seals,
+            *(FrictionTorque(name, rings[name], torque) for name, torque in torques.items() if math.isfinite(torque)),
         ],
         **flow_entries(case, load_case),
     )
@@ -101,7 +114,32 @@ def loss_point(state: Deflection, load_case: LoadCaseSection, speed_share: float
         friction,
         {name: losses_of_meshes(flow, name, friction[name], sets[name]) for name in friction},
         {name: flow.friction_loss.get(name, math.nan) for name in torques},
+        {seal.name: flow.friction_loss[seal.name] for seal in seals},
     )
+
+
+def _planet_torques(state: Deflection, speed_share: float) -> dict[str, tuple[BoxPlanetarySection, float]]:
+    """Friction of the planets' bearings of sets whose teeth tell it, as torques between sun and carrier [N m]."""
+    case, torques = state.model.case, {}
+    for stage in case.planetary if case.losses is not None and case.losses.bearings else ():
+        teeth = teeth_of(stage)
+        if teeth is None or not has_planet_friction(teeth):
+            continue
+        contact = state.contacts.get(stage.name)
+        torques[stage.name] = (
+            stage,
+            0.0
+            if contact is None
+            else planet_friction(
+                contact.case,
+                contact.result.planetary_set,
+                contact.result.cycle,
+                carrier_speed=speed_share * state.model.flow.speed.get(stage.carrier, 0.0),
+                mesh_frequency=speed_share * state.model.flow.mesh_frequency[stage.name],
+                viscosity=_kinematic(case),
+            ),
+        )
+    return torques
 
 
 @one_blas_thread()
@@ -197,8 +235,12 @@ def _left_out(case: GearboxCase, point: LossPoint) -> Iterator[str]:
             f"bearings lose nothing here without kind, pitch_diameter and, of balls, static_rating: "
             f"{', '.join(silent_bearings)}"
         )
-    if case.planetary:
-        yield "bearings of planets lose nothing here: their stiffness alone is given"
+    teeth = {stage.name: teeth_of(stage) for stage in case.planetary}
+    if silent_sets := [name for name, tables in teeth.items() if tables is None or not has_planet_friction(tables)]:
+        yield (
+            "bearings of planets lose nothing here without planet.bearing_pitch_diameter in the teeth, of rollers or "
+            f"needles: {', '.join(silent_sets)}"
+        )
     if point.bearing_loss and case.lubricant is None:
         yield "bearings lose nothing by their lubricant: give the section lubricant"
 

@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 from small_gearbox import pair_tables, set_on_shafts
 
+from femgear.case.lubrication import oil_at
+from femgear.errors import CaseError
 from femgear.gears.power_losses import planetary_efficiency
 from femgear.stages.key_figures import figure_of
+from femgear.stages.losses import check_loss_entries
+from femgear.stages.planet_bearings import planet_friction
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.losses import (
@@ -90,6 +94,37 @@ def test_without_oil_bearings_lose_by_their_load_alone(loaded, result):
     none = geared(losses=LOSSES | {"bearings": False})
     alone = loss_point(loaded.of(none).state, none.load_case)
     assert alone.bearing_loss == {} and alone.flow.efficiency == pytest.approx(alone.friction["stage"].passed[0])
+
+
+def test_seals_and_planets_lose_beside_bearings(loaded):
+    sealed = geared(losses=LOSSES | {"seal": [{"shaft": "input", "diameter": "30 mm"}]})
+    point = loss_point(loaded.of(sealed).state, sealed.load_case)
+    assert point.seal_loss == pytest.approx({"seal 1 on input": 7.69e-6 * 30.0**2 * 1000.0})
+    assert abs(point.flow.imbalance) < 1e-12
+    wrong = geared(losses=LOSSES | {"seal": [{"shaft": "motor", "diameter": "30 mm"}]})
+    with pytest.raises(CaseError, match="no such shaft"):
+        check_loss_entries(wrong)
+
+
+@pytest.mark.slow
+def test_planets_of_a_set_lose_by_their_bearings():
+    tables = set_on_shafts(slices=1) | {"losses": LOSSES, "lubricant": OIL}
+    tables["planetary"][0]["teeth"]["planet"] |= {"bearing_pitch_diameter": "16 mm", "bearing_kind": "needle"}
+    case = read_case(tables)
+    state = solved(case).state
+    point, contact = loss_point(state, case.load_case), state.contacts["set"]
+    frequency = state.model.flow.mesh_frequency["set"]
+    torque = planet_friction(
+        contact.case,
+        contact.result.planetary_set,
+        contact.result.cycle,
+        carrier_speed=state.model.flow.speed["output"],
+        mesh_frequency=frequency,
+        viscosity=oil_at(case) / case.lubricant.density,
+    )
+    sun = contact.result.planetary_set.gears[0].teeth
+    assert point.bearing_loss["set planets"] == pytest.approx(torque * 2.0 * math.pi * abs(frequency) / sun)
+    assert abs(point.flow.imbalance) < 1e-9
 
 
 def test_key_figures_are_those_of_the_file(loaded, result):
