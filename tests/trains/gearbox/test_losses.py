@@ -108,7 +108,7 @@ def test_seals_and_planets_lose_beside_bearings(loaded):
 
 @pytest.mark.slow
 def test_planets_of_a_set_lose_by_their_bearings():
-    tables = set_on_shafts(slices=3) | {"losses": LOSSES, "lubricant": OIL}
+    tables = set_on_shafts(slices=9) | {"losses": LOSSES, "lubricant": OIL}
     tables["planetary"][0]["teeth"]["planet"] |= {"bearing_pitch_diameter": "16 mm", "bearing_kind": "needle"}
     case = read_case(tables)
     state = solved(case).state
