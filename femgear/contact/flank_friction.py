@@ -6,10 +6,11 @@ of the tangent from its axis, beside F with the base radius:
 
     (G + mu sigma R)^T p = load,    sigma = sign of the path coordinate,
 
-with ``rho_i / r_bi`` in R for arcs on base circles and the tangential direction for members that move (G. W.
-Blankenship, R. Singh, J. Sound Vib. 182, 1995, 5-34; S. He, R. Gunda, R. Singh, J. Sound Vib. 301, 2007, 927-949). The
-gaps keep G: what ``mu F`` bends along the tangent is left out. The compliance is symmetric no more, the power of the
-torques is: what goes in less what comes out is the sum of ``mu F |v_s|``, for any pressures in equilibrium.
+with ``rho_i / r_bi`` in R for arcs on base circles and the tangential direction for members that move (M. Vaishya, R.
+Singh, J. Sound Vib. 248, 2001, 671-694; S. He, R. Gunda, R. Singh, J. Sound Vib. 301, 2007, 927-949). The gaps keep G:
+what ``mu F`` bends is left out (G. Liu, R. G. Parker, J. Sound Vib. 320, 2009, 1039-1063, have it). The compliance is
+symmetric no more, the power of the torques is: what goes in less what comes out is the sum of ``mu F |v_s|``, for any
+pressures in equilibrium.
 """
 
 from __future__ import annotations

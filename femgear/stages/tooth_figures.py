@@ -5,13 +5,23 @@ from __future__ import annotations
 from typing import Any
 
 from femgear.case.load_spectrum import has_rated_bearings, required_life
+from femgear.case.tooth_friction import friction_acts
 from femgear.stages.heat_results import HEAT_KEY_FIGURES
-from femgear.stages.key_figures import MICROMETRES, STRESS, KeyFigure, Stored
+from femgear.stages.key_figures import DECIBEL, MICROMETRES, STRESS, KeyFigure, Stored
 from femgear.stages.life_results import LIFE_FIGURES, PLANET_BEARING_FIGURE, SPECTRUM_FIGURES
 from femgear.stages.losses_results import LOSS_FIGURES
 from femgear.stages.static_results import peak_to_peak
 
-TOOTH_FIGURES = (*LIFE_FIGURES, *SPECTRUM_FIGURES, PLANET_BEARING_FIGURE, *LOSS_FIGURES, *HEAT_KEY_FIGURES)
+FRICTION_FIGURE = KeyFigure("friction change", DECIBEL, "dynamics", Stored("friction_change"), whole=True)
+"""What friction that acts adds to the level of the housing, of a pair to the bearing forces, at most."""
+TOOTH_FIGURES = (
+    *LIFE_FIGURES,
+    *SPECTRUM_FIGURES,
+    PLANET_BEARING_FIGURE,
+    *LOSS_FIGURES,
+    *HEAT_KEY_FIGURES,
+    FRICTION_FIGURE,
+)
 """Of all that load cases, oil and losses give a set or a pair."""
 
 
@@ -24,6 +34,8 @@ def missing_entry(case: Any, figure: KeyFigure) -> str:
     """Say which entry would give a case a figure that the stage has not without it; empty where nothing is missing."""
     if figure in SPECTRUM_FIGURES and required_life(case.operation) is None:
         return "operation.required_hours"
+    if figure == FRICTION_FIGURE and not friction_acts(case):
+        return "losses.excites"
     if figure == PLANET_BEARING_FIGURE and not has_rated_bearings(case):
         return "planet.dynamic_rating" if hasattr(case, "planet") else "a planetary set"
     return ""
