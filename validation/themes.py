@@ -128,7 +128,7 @@ THEMES = (
         "Losses",
         "Loss factors, coefficients of friction and efficiencies. Rows *C14*, *A* and *H501* are FZG test gears. "
         "Compared with: reports of GEARpie, closed forms, sums over the path; gates: printed digits; 5 % between loads "
-        "of finite elements and those of a formula; 1e-9 for balances of powers. Rows with *mu 0.06* are of friction that "
+        "of finite elements and those of a formula; 1e-9 for balances of powers. Rows with *mu 0.06*: friction that "
         "acts, beside closed forms and time integration; gates: 1e-12, 1e-9, 1e-6, 5 % of what is of the first order.",
         (losses.fzg_gears, losses.sets, losses.computed_loads),
         (losses.gearbox, friction.friction_of_a_pair, friction.friction_of_sets),

@@ -50,6 +50,7 @@ def test_what_a_figure_needs_is_named(pair):
         (plain, "efficiency", "[losses]"),
         (plain, "root life", "load cases"),
         (pair, "film ratio", "lubricant.temperature"),
+        (pair, "friction change", "losses.excites"),
     ):
         with pytest.raises(CaseError, match="needs") as refused:
             named_quantity(words, case=case)
