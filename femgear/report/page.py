@@ -25,6 +25,7 @@ from femgear.findings import SEVERITIES, Finding, by_severity, remark
 from femgear.report.charts import chart
 from femgear.report.explorer import DRAWN, EXPLORER
 from femgear.report.solid import SOLID
+from femgear.report.space import SPACE
 from femgear.report.style import png_bytes
 from femgear.report.tables import Block
 from femgear.second_process import shared
@@ -48,9 +49,13 @@ _WEB = Path(__file__).parent / "web"
 """Style sheet, scripts, and the libraries that they draw with."""
 _CHARTS = "charts.json"
 """File of what the charts of the page show."""
-_DATA = {_CHARTS: "charts", SOLID: "solid", EXPLORER: "runup"}
+_DATA = {_CHARTS: "charts", SOLID: "solid", SPACE: "space", EXPLORER: "runup"}
 """Files of a run that the scripts of its page draw, and their names there."""
-_PARTS = {"solid": ("three.min.js", "solid.js"), "runup": ("explorer.js",)}
+_PARTS = {
+    "solid": ("three.min.js", "view.js", "solid.js"),
+    "space": ("three.min.js", "view.js", "space.js"),
+    "runup": ("explorer.js",),
+}
 """Scripts of the parts of the page that have a place of their own."""
 
 
@@ -161,7 +166,7 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
             f"<h1>{escape(case.title)}</h1>\n",
             f'<p class="lead">{escape(_lead(results))}</p>\n',
             _contents(sections, numbers, pictures),
-            _front(train, results, charts, gears if "solid" in data else ()),
+            _front(train, results, charts, _caption(gears, data)),
             notice,
             _folded("verdict", "Verdict in numbers", "".join(map(table, verdict)), True) if verdict else "",
             _folded("gears", "Gears and operation", "".join(map(table, gears)), unfolded),
@@ -242,22 +247,31 @@ def _anchor(name: str) -> str:
     return name.lower().replace(" ", "-")
 
 
-def _front(train: Train, results: Results, charts, gears: Sequence[Block]) -> str:
+def _front(train: Train, results: Results, charts, caption: str | None) -> str:
     """Make page one: a sentence, a card for every question, the gears in space and two charts.
 
-    ``gears`` are drawn in space where there are any.
+    The gears are drawn in space where there is a caption of them.
     """
     sentence, judgements = train.summary(results)
     text = f'<p class="sentence">{escape(sentence)}</p>\n' if sentence else ""
     cards = "".join(map(_card, judgements))
     shown = "".join(front_chart(*place) for place in _front_places(train, charts))
-    solid = part_of("solid").format(escape("; ".join(gears[0].notes[:2]) + ".")) if gears else ""
+    solid = "" if caption is None else part_of("solid").format(escape(caption))
     charts_beside = f'<div class="charts">\n{shown}</div>\n' if shown else ""
     both = " both" * bool(solid and shown)
     below = f'<div class="top{both}">\n{solid}{charts_beside}</div>\n' if solid or shown else ""
     columns = 3 if len(judgements) == 6 else min(len(judgements), 5)
     listed_cards = f'<ul class="cards" style="--columns: {columns}">\n{cards}</ul>\n' if cards else ""
     return f'<section class="front" aria-label="Page one">\n{text}{listed_cards}{below}</section>\n'
+
+
+def _caption(gears: Sequence[Block], data) -> str | None:
+    """Say what is seen of the gears in space; None where nothing was drawn."""
+    if "solid" in data:
+        return "; ".join(gears[0].notes[:2]) + ". Blue: paths of contact, on the lines of action."
+    return (
+        "Gears, shafts, bearings, sensors (red) and feet (black). The pointer names them." if "space" in data else None
+    )
 
 
 def _front_places(train: Train, charts) -> list[tuple[str, int]]:

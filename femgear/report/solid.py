@@ -83,8 +83,8 @@ def solid(
                 "kind": body.kind,
                 "centre": [1e3 * float(x) for x in body.centre],
                 "angle": float(body.angle),
-                "displacement": _packed(1e6 * moved[:, sector.nodes]),
-                "stress": _packed(1e-6 * stress[:, sector.nodes]),
+                "displacement": packed_values(1e6 * moved[:, sector.nodes]),
+                "stress": packed_values(1e-6 * stress[:, sector.nodes]),
             }
         )
     gears = {gear.name: gear for gear in planetary_set.gears}
@@ -206,7 +206,7 @@ def _waves(modes: xr.Dataset, mode: int) -> list[list[float]]:
     return [[int(numbers[i]), *(float(f"{v:.5g}") for v in parts[:, i])] for i in kept]
 
 
-def _packed(values: np.ndarray) -> dict[str, Any]:
+def packed_values(values: np.ndarray) -> dict[str, Any]:
     """Whole numbers of sixteen bits and what one of them is worth."""
     largest = float(np.abs(values).max(initial=0.0)) or 1.0
     whole = np.round(values * (32767 / largest)).astype("<i2")

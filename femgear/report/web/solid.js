@@ -8,33 +8,9 @@ page.solid = () => {
     place.textContent = "An older femgear wrote these results, with other units of the modes: femgear run draws the set.";
     return;
   }
-  const unpack = ({ unit, values }) => {
-    const bytes = Uint8Array.from(atob(values), (letter) => letter.charCodeAt(0));
-    return Float32Array.from(new Int16Array(bytes.buffer), (whole) => whole * unit);
-  };
-  let renderer;
-  try {
-    renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
-  } catch {
-    place.textContent = "This browser has no WebGL; the pictures below show the set.";
-    return;
-  }
-  place.append(renderer.domElement);
-  renderer.domElement.tabIndex = 0;
-  renderer.domElement.setAttribute("aria-label", "The gear set in space; arrow keys turn it");
-  const scene = new THREE.Scene(), group = new THREE.Group(), radius = model.radius;
-  scene.add(group, new THREE.HemisphereLight(0xffffff, 0x777777, 2.6));
-  const camera = new THREE.PerspectiveCamera(32, 1, radius / 50, radius * 40);
-  camera.position.set(0.75 * radius, -1.8 * radius, 3.1 * radius);
-  const orbit = new THREE.OrbitControls(camera, renderer.domElement);
-
-  // from grey to dark red, darker all the way: told apart with every kind of colour vision
-  const COLOURS = [[208, 214, 220], [226, 203, 150], [233, 163, 66], [206, 96, 24], [122, 28, 10]];
-  const tint = (share) => {
-    const at = Math.min(Math.max(share, 0), 1) * (COLOURS.length - 1), i = Math.min(Math.floor(at), COLOURS.length - 2);
-    return COLOURS[i].map((low, k) => (low + (at - i) * (COLOURS[i + 1][k] - low)) / 255);
-  };
-  const linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+  const view = page.view(place, model.radius, [0.75, -1.8, 3.1]);
+  if (!view) return;
+  const { group, render } = view, radius = model.radius, { unpack } = page;
 
   // all copies of a sector in the frame of the set: both faces, and walls in layers that turn along the helix
   const LAYER = 0.06;
@@ -110,7 +86,7 @@ page.solid = () => {
     body.shape.attributes.position.needsUpdate = true;
   };
   const paint = (body, values, largest) => {
-    for (let i = 0; i < body.size; i++) body.colour.set(tint(values[i] / largest).map(linear), 3 * i);
+    for (let i = 0; i < body.size; i++) body.colour.set(page.tint(values[i] / largest).map(page.linear), 3 * i);
     body.shape.attributes.color.needsUpdate = true;
   };
   const sizes = (field) => Float32Array.from({ length: field.length / 2 }, (_, i) => Math.hypot(field[2 * i], field[2 * i + 1]));
@@ -145,13 +121,7 @@ page.solid = () => {
   ["von Mises stress, static, position 0", "displacement, static, position 0", ...model.modes.map((mode) => "mode " + mode.title)]
     .forEach((text, i) => chooser.add(new Option(text, String(i))));
   const state = { fields: [], factor: 1, moving: false, wave: false };
-  const legend = (text, largest) => {
-    const stops = COLOURS.map((one) => `rgb(${one.join(",")})`).join(",");
-    bar.replaceChildren(`${text}: 0 `);
-    const strip = document.createElement("span");
-    strip.style.cssText = `display:inline-block;width:12rem;height:0.8rem;margin:0 0.5rem;background:linear-gradient(90deg,${stops})`;
-    bar.append(strip, largest);
-  };
+  const legend = (text, largest) => page.legend(bar, text, largest);
   const choose = () => {
     const choice = Number(chooser.value);
     if (choice < 2) {
@@ -177,7 +147,7 @@ page.solid = () => {
   const draw = (time) => {
     const swing = state.wave ? Math.cos(time / 350) : state.moving ? 0.5 - 0.5 * Math.cos(time / 700) : 1;
     bodies.forEach((body, i) => move(body, state.fields[i], state.factor * Number(scale.value) * swing));
-    renderer.render(scene, camera);
+    render();
   };
   const run = (time) => { if (state.moving) { draw(time); requestAnimationFrame(run); } };
   const play = (moving) => {
@@ -189,42 +159,7 @@ page.solid = () => {
   button.addEventListener("click", () => play(!state.moving));
   chooser.addEventListener("change", choose);
   scale.addEventListener("input", () => draw(0));
-  orbit.addEventListener("change", () => renderer.render(scene, camera));
-  renderer.domElement.addEventListener("keydown", (event) => {
-    const step = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] }[event.key];
-    if (!step) return;
-    event.preventDefault();
-    const p = camera.position, length = p.length();
-    const around = Math.atan2(p.x, p.z) + step[0], up = Math.asin(p.y / length) + step[1], clipped = Math.min(Math.max(up, -1.5), 1.5);
-    p.set(length * Math.cos(clipped) * Math.sin(around), length * Math.sin(clipped), length * Math.cos(clipped) * Math.cos(around));
-    camera.lookAt(0, 0, 0);
-    renderer.render(scene, camera);
-  });
-  const fit = () => {
-    const { clientWidth: w, clientHeight: h } = place;
-    renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
-    renderer.setSize(w, h, false);
-    camera.aspect = w / h;
-    // a narrow view shows the whole width of the set
-    camera.fov = 32 / Math.min(1, camera.aspect);
-    camera.updateProjectionMatrix();
-    renderer.render(scene, camera);
-  };
-  new ResizeObserver(fit).observe(place);
-  // paper shows what was drawn last: a plain copy stands for the canvas, whose picture may come too late
-  const copy = document.createElement("canvas");
-  addEventListener("beforeprint", () => {
-    place.append(copy);
-    renderer.domElement.style.display = "none";
-    fit();
-    [copy.width, copy.height] = [renderer.domElement.width, renderer.domElement.height];
-    copy.getContext("2d").drawImage(renderer.domElement, 0, 0);
-  });
-  addEventListener("afterprint", () => {
-    copy.remove();
-    renderer.domElement.style.display = "";
-    setTimeout(fit);
-  });
+  document.getElementById("solid-reset").addEventListener("click", view.reset);
   choose();
   place.solid = { bodies, state };
 };

@@ -16,6 +16,7 @@ from femgear.stages.life_figures import LIFE_CAPTION, draw_damage
 from femgear.stages.protocol import Drawn, Figures
 from femgear.trains.gearbox.casing_results import seat_curve
 from femgear.trains.gearbox.response_figures import RESPONSE_FIGURES
+from femgear.trains.gearbox.solid_bodies import write_space
 from femgear.trains.gearbox.stage_figures import draw_stage_energy
 from femgear.trains.gearbox.transient_figures import TRANSIENT_FIGURES
 
@@ -280,6 +281,7 @@ FIGURES = {
             "damage": LIFE_CAPTION,
         },
         _draw_deflection,
+        (write_space,),
     ),
     "modes": Figures(
         {

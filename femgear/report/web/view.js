@@ -1,0 +1,80 @@
+// A place of the page that shows bodies in space: light, camera, mouse, keys, resizing, paper; drawn by three.js.
+"use strict";
+
+// from grey to dark red, darker all the way: told apart with every kind of colour vision
+page.HEAT = [[208, 214, 220], [226, 203, 150], [233, 163, 66], [206, 96, 24], [122, 28, 10]];
+page.tint = (share) => {
+  const at = Math.min(Math.max(share, 0), 1) * (page.HEAT.length - 1), i = Math.min(Math.floor(at), page.HEAT.length - 2);
+  return page.HEAT[i].map((low, k) => (low + (at - i) * (page.HEAT[i + 1][k] - low)) / 255);
+};
+page.linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+page.unpack = ({ unit, values }) => {
+  const bytes = Uint8Array.from(atob(values), (letter) => letter.charCodeAt(0));
+  return Float32Array.from(new Int16Array(bytes.buffer), (whole) => whole * unit);
+};
+page.legend = (bar, text, largest) => {
+  const stops = page.HEAT.map((one) => `rgb(${one.join(",")})`).join(",");
+  bar.replaceChildren(`${text}: 0 `);
+  const strip = document.createElement("span");
+  strip.style.cssText = `display:inline-block;width:12rem;height:0.8rem;margin:0 0.5rem;background:linear-gradient(90deg,${stops})`;
+  bar.append(strip, largest);
+};
+
+// null without WebGL; radius is that of what is shown, from the direction in which it is first seen
+page.view = (place, radius, from) => {
+  let renderer;
+  try {
+    renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+  } catch {
+    place.textContent = "This browser has no WebGL; the pictures below show the set.";
+    return null;
+  }
+  place.append(renderer.domElement);
+  renderer.domElement.tabIndex = 0;
+  renderer.domElement.setAttribute("aria-label", "The gears in space; arrow keys turn them");
+  const scene = new THREE.Scene(), group = new THREE.Group();
+  scene.add(group, new THREE.HemisphereLight(0xffffff, 0x777777, 2.6));
+  const camera = new THREE.PerspectiveCamera(32, 1, radius / 50, radius * 40);
+  camera.position.set(...from.map((one) => one * radius));
+  const orbit = new THREE.OrbitControls(camera, renderer.domElement);
+  const render = () => renderer.render(scene, camera);
+  orbit.addEventListener("change", render);
+  renderer.domElement.addEventListener("keydown", (event) => {
+    const step = { ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1] }[event.key];
+    if (!step) return;
+    event.preventDefault();
+    const p = camera.position, length = p.length();
+    const around = Math.atan2(p.x, p.z) + step[0], up = Math.asin(p.y / length) + step[1], clipped = Math.min(Math.max(up, -1.5), 1.5);
+    p.set(length * Math.cos(clipped) * Math.sin(around), length * Math.sin(clipped), length * Math.cos(clipped) * Math.cos(around));
+    camera.lookAt(0, 0, 0);
+    render();
+  });
+  const reset = () => { camera.position.set(...from.map((one) => one * radius)); orbit.target.set(0, 0, 0); orbit.update(); render(); };
+  const fit = () => {
+    const { clientWidth: w, clientHeight: h } = place;
+    if (!w || !h) return;
+    renderer.setPixelRatio(Math.min(devicePixelRatio, 2));
+    renderer.setSize(w, h, false);
+    camera.aspect = w / h;
+    // a narrow view shows the whole width of the set
+    camera.fov = 32 / Math.min(1, camera.aspect);
+    camera.updateProjectionMatrix();
+    render();
+  };
+  new ResizeObserver(fit).observe(place);
+  // paper shows what was drawn last: a plain copy stands for the canvas, whose picture may come too late
+  const copy = document.createElement("canvas");
+  addEventListener("beforeprint", () => {
+    place.append(copy);
+    renderer.domElement.style.display = "none";
+    fit();
+    [copy.width, copy.height] = [renderer.domElement.width, renderer.domElement.height];
+    copy.getContext("2d").drawImage(renderer.domElement, 0, 0);
+  });
+  addEventListener("afterprint", () => {
+    copy.remove();
+    renderer.domElement.style.display = "";
+    setTimeout(fit);
+  });
+  return { group, camera, render, reset, canvas: renderer.domElement };
+};

@@ -1,0 +1,249 @@
+"""A gearbox in space for the page: its bodies from the case, its motions from the files of the run.
+
+Gears without teeth of their own are discs of their pitch circle. Teeth of mates are turned into one another's gaps.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from femgear.case.gear_set import planetary_set
+from femgear.gears.gear import Gear
+from femgear.report.space import SPACE, DrawnBody, Motion, space, tooth_section
+from femgear.stages.protocol import Drawn
+from femgear.storage.files import write_text
+from femgear.trains.gearbox.case_file import (
+    CASING,
+    BoxPlanetarySection,
+    BoxShaftSection,
+    GearboxCase,
+    PairSection,
+    teeth_of,
+)
+from femgear.trains.gearbox.casing import bearing_name
+from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, planet_radius, set_sizes
+
+MODES_SHOWN = 40
+"""Modes that can be chosen."""
+_DISC, _RIM, _BORE = 0.3, 1.15, 0.45
+"""Width of a disc, radius of a rim and of a bore that are not given, over the pitch radius."""
+_MARK = 0.04
+"""Size of sensors and feet over that of the gearbox."""
+
+
+def write_space(drawn: Drawn, folder: Path) -> list[str]:
+    """Write the bodies of a gearbox and their motions for the page; returns the names of the files."""
+    if "deflection" not in drawn.data:
+        return []
+    deflection = drawn.data["deflection"]
+    members = [str(member) for member in deflection["member"].values]
+    stations = [str(name) for name in deflection["station"].values]
+    place = deflection["place"].values
+    # planets and seats move by themselves, shafts with all of their stations
+    shafts = {shaft.name for shaft in drawn.case.shaft}
+    carriers = [member if member in shafts else name for member, name in zip(members, stations, strict=True)]
+    motions = [
+        Motion(f"deflection, {name}" if deflection.sizes["load_case"] > 1 else "deflection", moved, swings=False)
+        for name, moved in zip(deflection["load_case"].values, deflection["displacement"].values, strict=True)
+    ]
+    motions += _modes(drawn, stations)
+    bodies = [*gearbox_bodies(drawn.case, dict(zip(stations, place, strict=True))), *_marks(deflection)]
+    if not bodies:
+        return []
+    model = space(bodies, carriers, place, motions)
+    write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SPACE)
+    return [SPACE]
+
+
+def _modes(drawn: Drawn, stations: list[str]) -> Iterator[Motion]:
+    """Yield the elastic modes of the stations, of modes.nc."""
+    modes = drawn.data.get("modes")
+    if modes is None or [str(name) for name in modes["station"].values] != stations:
+        return
+    hertz = modes["frequency"].values
+    for number in np.flatnonzero(hertz > 0.0)[:MODES_SHOWN]:
+        title = f"mode {number + 1}: {hertz[number]:.5g} Hz, {modes['kind'].values[number]}"
+        yield Motion(title, modes["motion"].values[:, :, number])
+
+
+def gearbox_bodies(case: GearboxCase, places: dict[str, np.ndarray]) -> Iterator[DrawnBody]:
+    """List the bodies of a gearbox: gears, parts of shafts, and bearings.
+
+    Parameters
+    ----------
+    case : GearboxCase
+    places : mapping of str to (3,) array
+        Of the stations by name, as those of planets [m].
+    """
+    for number, stage in enumerate((*case.pair, *case.planetary)):
+        bodies = _of_pair(case, stage) if isinstance(stage, PairSection) else _of_set(case, stage, places)
+        yield from (replace(body, stage=number) for body in bodies)
+    for shaft in case.shaft:
+        yield from _of_shaft(shaft)
+    yield from _of_bearings(case)
+
+
+def _marks(data: Any) -> Iterator[DrawnBody]:
+    """Sensors and feet of deflection.nc, as short cylinders on the casing."""
+    size = _MARK * float(np.ptp(data["place"].values, axis=0).max())
+    for kind in ("sensor", "foot"):
+        if f"{kind}_place" in data:
+            for name, (x, y, z) in zip(data[kind].values, data[f"{kind}_place"].values, strict=True):
+                radii, ends = (0.0, 0.5 * size), (z - 0.5 * size, z + 0.5 * size)
+                yield DrawnBody(f"{kind} {name}", kind, CASING, (x, y), ends, (radii, radii))
+
+
+def _of_shaft(shaft: BoxShaftSection) -> Iterator[DrawnBody]:
+    """Parts of a shaft, cones between the diameters of their ends."""
+    places = shaft.start + np.asarray(shaft.places)
+    for part, low, high in zip(shaft.part, places[:-1], places[1:], strict=True):
+        last = part.end_outer_diameter or part.outer_diameter
+        first, second = (0.5 * part.inner_diameter, 0.5 * part.outer_diameter), (0.5 * part.bore_at_end, 0.5 * last)
+        axis = shaft.axis[0], shaft.axis[1]
+        yield DrawnBody(f"shaft {shaft.name}", "shaft", shaft.name, axis, (float(low), float(high)), (first, second))
+
+
+def _of_bearings(case: GearboxCase) -> Iterator[DrawnBody]:
+    """Rolling bearings with their sizes, others as narrow rings around their shafts."""
+    for number, section in enumerate(case.bearing):
+        shaft = case.shaft_named(section.shaft)
+        z = shaft.start + (section.position or 0.0)
+        outer = max((part.outer_diameter for part in shaft.part), default=0.0)
+        if section.pitch_diameter is not None and section.element_diameter is not None:
+            half = 0.75 * section.element_diameter
+            radii = 0.5 * section.pitch_diameter - half, 0.5 * section.pitch_diameter + half
+            width = section.effective_length or 1.6 * section.element_diameter
+        elif outer > 0.0:
+            radii, width = (0.5 * outer, 0.7 * outer), 0.3 * outer
+        else:
+            continue
+        axis, ends = (shaft.axis[0], shaft.axis[1]), (z - 0.5 * width, z + 0.5 * width)
+        yield DrawnBody(f"bearing {bearing_name(section, number)}", "bearing", shaft.name, axis, ends, (radii, radii))
+
+
+@dataclass(frozen=True)
+class _Seat:
+    """Where a gear sits.
+
+    Parameters
+    ----------
+    name, member : str
+        Of the gear, and of what moves it.
+    axis : (float, float)
+        x and y [m].
+    middle : float
+        z of the middle of its face width [m].
+    """
+
+    name: str
+    member: str
+    axis: tuple[float, float]
+    middle: float
+
+
+@dataclass(frozen=True)
+class _Teeth:
+    """What the teeth of a gear look like.
+
+    Parameters
+    ----------
+    gear : Gear or None
+        In its transverse section; None of a gear without teeth of its own.
+    count : int
+        Number of the gear in its stage.
+    pitch : float
+        Radius of its pitch circle [m].
+    hand : float
+        1 of a right-handed helix where that of gear 1 or the sun is right-handed, else -1.
+    angle : float
+        Of a tooth at mid-width [rad].
+    internal : bool
+        Whether the teeth stand inside.
+    """
+
+    gear: Gear | None
+    count: int
+    pitch: float
+    hand: float
+    angle: float
+    internal: bool = False
+
+
+def _gear(seat: _Seat, sizes: StageSizes, teeth: _Teeth) -> DrawnBody:
+    """Make a gear from its teeth, or a disc of its pitch circle where it has none."""
+    width, pitch, gear = sizes.face_widths[teeth.count] or _DISC * teeth.pitch, teeth.pitch, teeth.gear
+    place = seat.name, "gear", seat.member, seat.axis, (seat.middle - 0.5 * width, seat.middle + 0.5 * width)
+    if gear is None:
+        radii = (pitch, _RIM * pitch) if teeth.internal else (_BORE * pitch, pitch)
+        return DrawnBody(*place, (radii, radii))
+    twist = teeth.hand * width * math.tan(sizes.base_helix) / sizes.base_radii[teeth.count]
+    inner = gear.rim_radius if teeth.internal else min(_BORE * pitch, gear.rim_radius)
+    radii = inner, gear.tip_radius
+    turned = teeth.angle - 0.5 * twist
+    section = tooth_section(gear)
+    return DrawnBody(*place, (radii, radii), section, gear.teeth, twist, teeth.internal, turned)
+
+
+def _gears_of(stage: PairSection | BoxPlanetarySection) -> tuple[Gear | None, ...]:
+    """Gears of a stage in their transverse section; None of each where it has no teeth."""
+    teeth = teeth_of(stage)
+    if teeth is None:
+        return (None, None, None)
+    gears: Any = planetary_set(teeth)
+    return tuple(gears.gears)
+
+
+def _of_pair(case: GearboxCase, pair: PairSection) -> Iterator[DrawnBody]:
+    """Both gears, a tooth of gear 1 on the line of centres in a gap of gear 2."""
+    sizes, gears = pair_sizes(pair), _gears_of(pair)
+    on_shaft = next(name for name in pair.shafts if name != CASING)
+    axes = [case.shaft_named(name if name != CASING else on_shaft).axis for name in pair.shafts]
+    across = math.atan2(axes[1][1] - axes[0][1], axes[1][0] - axes[0][0])
+    # in an internal gear the pinion touches on the side away from the axis of the gear
+    touch = across + math.pi if sizes.internal else across
+    gap = touch if sizes.internal else across + math.pi
+    angles, hands = (touch, gap + math.pi / sizes.teeth[1]), (1.0, 1.0 if sizes.internal else -1.0)
+    for number, name in enumerate(pair.shafts):
+        if name == CASING:
+            continue
+        shaft = case.shaft_named(name)
+        middle = shaft.start + (pair.positions[number] if pair.positions else 0.0)
+        words = f"gear {number + 1} of {pair.name}, {sizes.teeth[number]} teeth"
+        pitch = sizes.base_radii[number] / math.cos(sizes.pressure_angles[0])
+        internal = sizes.internal and number == 1
+        teeth = _Teeth(gears[number], number, pitch, hands[number], angles[number], internal)
+        yield _gear(_Seat(words, name, (shaft.axis[0], shaft.axis[1]), middle), sizes, teeth)
+
+
+def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.ndarray]) -> Iterator[DrawnBody]:
+    """Sun, planets and ring, teeth in gaps: a tooth of the sun points to planet 1."""
+    sizes, gears = set_sizes(stage), _gears_of(stage)
+    z_s, z_p, z_r = sizes.teeth
+    holder = next(name for name in ("sun", "carrier", "ring") if getattr(stage, name) != CASING)
+    shaft = case.shaft_named(getattr(stage, holder))
+    middle = shaft.start + (getattr(stage, f"{holder}_position") or 0.0)
+    axis = shaft.axis[0], shaft.axis[1]
+    planet = planet_radius(sizes)
+    angles = [stage.angle + angle for angle in sizes.planet_angles]
+    of_planets = [psi + math.pi - (angles[0] - psi) * z_s / z_p + math.pi / z_p for psi in angles]
+    of_ring = angles[0] + (of_planets[0] - angles[0]) * z_p / z_r + math.pi / z_r
+    seat = f"seat ring of {stage.name}"
+    in_casing = seat if seat in places else CASING
+    sun = _Teeth(gears[0], 0, sizes.centre_distance - planet, 1.0, angles[0])
+    yield _gear(_Seat(f"sun of {stage.name}, {z_s} teeth", stage.sun, axis, middle), sizes, sun)
+    for number, (psi, angle) in enumerate(zip(angles, of_planets, strict=True), start=1):
+        name, distance = f"{stage.name} planet {number}", sizes.centre_distance
+        x, y = axis[0] + distance * math.cos(psi), axis[1] + distance * math.sin(psi)
+        z = float(places[name][2]) if name in places else middle
+        teeth = _Teeth(gears[1], 1, planet, -1.0, angle)
+        yield _gear(_Seat(f"{name}, {z_p} teeth", name, (x, y), z), sizes, teeth)
+    ring = _Teeth(gears[2], 2, sizes.centre_distance + planet, -1.0, of_ring, internal=True)
+    member = in_casing if stage.ring == CASING else stage.ring
+    yield _gear(_Seat(f"ring of {stage.name}, {z_r} teeth", member, axis, middle), sizes, ring)
