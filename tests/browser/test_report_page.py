@@ -181,6 +181,29 @@ def test_modes_in_space_move_bodies_as_modes_nc_says(opened, report):
             assert size == pytest.approx(wanted[name], rel=0.03, abs=2e-3 * largest), (mode["title"], name)
 
 
+def test_bodies_of_a_gearbox_move_as_their_stations_do(opened, report):
+    """A mode of rigid bodies: every vertex moves as translation and rotation of its station, of modes.nc."""
+    name = "four_stage_reducer"
+    modes, model = (
+        open_results(report(name).parent)["modes"],
+        json.loads((report(name).parent / "space.json").read_text()),
+    )
+    tab = opened(name)
+    moved = """(choice) => { const chooser = document.getElementById('solid-view');
+        chooser.value = String(choice); chooser.dispatchEvent(new Event('change'));
+        const { bodies, state } = document.getElementById('solid-place').space;
+        return bodies.map((body, k) => [body.member, Array.from(body.rest.slice(0, 3)), Array.from(state.fields[k].slice(0, 3))]); }"""
+    stations = modes["station"].values.tolist()
+    choice = next(i for i, motion in enumerate(model["motions"], start=1) if motion["swings"])
+    number = int(model["motions"][choice - 1]["title"].split(":")[0].split()[1]) - 1
+    motion, place = modes["motion"].values[:, :, number], 1e3 * modes["place"].values
+    largest = 1e3 * np.abs(motion[:, :3]).max() + np.abs(motion[:, 3:]).max() * 100.0
+    for member, rest, field in tab.evaluate(moved, choice):
+        at = stations.index(member)
+        wanted = 1e3 * motion[at, :3] + np.cross(motion[at, 3:], rest - place[at])
+        assert field == pytest.approx(wanted.tolist(), rel=0.01, abs=2e-3 * largest), member
+
+
 def outer_surface(mode):
     """Return the largest displacement of the outer surface of the ring in a mode [m]."""
     angle = np.linspace(0.0, 2 * np.pi, 1441)

@@ -5,13 +5,14 @@ page.space = () => {
   const model = page.data.space, place = document.getElementById("solid-place");
   if (!model || !place) return;
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-  model.bodies.forEach(({ axis, ends, radii }) => [0, 1, 2].forEach((k) => {
+  const outer = model.bodies.filter(({ kind }) => kind !== "sensor" && kind !== "foot");
+  outer.forEach(({ axis, ends, radii }) => [0, 1, 2].forEach((k) => {
     const reach = k < 2 ? Math.max(...radii) : 0, at = k < 2 ? [axis[k]] : ends;
     low[k] = Math.min(low[k], ...at.map((one) => one - reach));
     high[k] = Math.max(high[k], ...at.map((one) => one + reach));
   }));
   const middle = low.map((one, k) => (one + high[k]) / 2), size = Math.hypot(...low.map((one, k) => high[k] - one));
-  const view = page.view(place, size / 2, [-2.0, 1.1, 2.6]);
+  const view = page.view(place, size / 2, [2.35, 1.05, 1.7]);
   if (!view) return;
   const { group, render, camera, canvas } = view;
   const COLOURS = { shaft: [0.62, 0.65, 0.69], bearing: [0.30, 0.33, 0.38], sensor: [0.80, 0.24, 0.0], foot: [0.16, 0.16, 0.18] };
@@ -152,6 +153,7 @@ page.space = () => {
   // what is under the pointer: the nearest vertex to the eye within some pixels of it
   const tip = document.createElement("output");
   tip.className = "pointed";
+  tip.hidden = true;
   place.append(tip);
   let asked = false;
   canvas.addEventListener("pointermove", (event) => {

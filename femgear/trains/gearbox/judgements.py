@@ -94,7 +94,7 @@ def _noise(results: Any) -> Judgement:
     size = np.hypot(data["lines_real"].values[0, sensor], data["lines_imag"].values[0, sensor])
     line = int(size.argmax())
     hertz = float(data["order"].values[line]) * speed / 60.0
-    near = "" if modes is None else f", near {nearest_mode(modes, hertz)}"
+    near = "" if modes is None else f", near {nearest_mode(modes, hertz)},"
     main = (
         f"{line_origin(data, line)} at {hertz:,.0f} Hz{near} makes {0.5 * (size[line] / whole) ** 2:.0%} of the power"
     )

@@ -1,0 +1,85 @@
+"""Bodies of a gearbox in space: where its gears are, teeth in the gaps of their mates, motions of the files."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from casings import answer_in_a_casing
+from matplotlib.path import Path as Outline
+
+from femgear.report.space import SPACE
+from femgear.stages.protocol import Drawn
+from femgear.trains.gearbox.solid_bodies import gearbox_bodies, write_space
+from femgear.trains.reading import read_case, with_value
+
+CASES = Path(__file__).parents[3] / "cases"
+
+
+def outline(body) -> np.ndarray:
+    """Polygon of a gear at mid-width, (n, 2) [m]."""
+    turns = body.angle + 0.5 * body.twist + 2.0 * np.pi * np.arange(body.teeth) / body.teeth
+    turned = [body.section @ np.array([[np.cos(a), np.sin(a)], [-np.sin(a), np.cos(a)]]) for a in turns]
+    return np.vstack(turned) + body.axis
+
+
+def overlap(body, mate) -> float:
+    """Share of the points of the teeth of a gear near its mate that lie inside of the material of the mate."""
+    points, other = outline(body), outline(mate)
+    inside = Outline(other).contains_points(points, radius=0.0)
+    inside = ~inside if mate.internal else inside
+    return float(inside.mean())
+
+
+@pytest.fixture(scope="module")
+def axle():
+    return read_case(CASES / "e_axle.toml")
+
+
+def test_teeth_stand_in_the_gaps_of_their_mates(axle):
+    bodies = {body.name.rsplit(",", 1)[0]: body for body in gearbox_bodies(axle, {}) if body.kind == "gear"}
+    pinion, wheel = bodies["gear 1 of first stage"], bodies["gear 2 of first stage"]
+    sun, ring = bodies["sun of second stage"], bodies["ring of second stage"]
+    planets = [bodies[f"second stage planet {number}"] for number in (1, 2, 3)]
+    mates = [(pinion, wheel), *((sun, planet) for planet in planets), *((planet, ring) for planet in planets)]
+    for body, mate in mates:
+        turned = replace(body, angle=body.angle + np.pi / body.teeth)
+        # edges of hollow flanks are chords, into which points of contact reach; half a pitch away teeth overlap
+        assert overlap(body, mate) < 0.01 < 0.03 < overlap(turned, mate), (body.name, mate.name)
+
+
+def test_helical_mates_have_opposite_hands_and_one_base_helix(axle):
+    helical = with_value(axle, "pair[0].teeth.helix_angle", "12 deg") if axle.pair[0].teeth is None else axle
+    pinion, wheel = (body for body in gearbox_bodies(helical, {}) if body.name.startswith("gear"))
+    assert pinion.twist * wheel.twist < 0.0
+    # the lead of both is the same over the base radii, which go with the teeth
+    assert pinion.twist * pinion.teeth == pytest.approx(-wheel.twist * wheel.teeth)
+
+
+def test_parts_of_shafts_and_bearings_lie_along_their_axes(axle):
+    bodies = list(gearbox_bodies(axle, {}))
+    parts = [body for body in bodies if body.kind == "shaft"]
+    assert len(parts) == sum(len(shaft.part) for shaft in axle.shaft)
+    for shaft in axle.shaft:
+        own = [body for body in parts if body.member == shaft.name]
+        assert own[0].ends[0] == pytest.approx(shaft.start)
+        assert own[-1].ends[1] == pytest.approx(shaft.start + shaft.length)
+        assert all(body.axis == pytest.approx(shaft.axis) for body in own)
+    bearings = [body for body in bodies if body.kind == "bearing"]
+    assert len(bearings) == len(axle.bearing)
+
+
+def test_motions_are_deflections_and_modes_of_the_run(tmp_path):
+    answer = answer_in_a_casing()
+    data = {name: answer[name].contents() for name in ("deflection", "modes")}
+    assert write_space(Drawn(answer.case, data), tmp_path) == [SPACE]
+    model = json.loads((tmp_path / SPACE).read_text(encoding="utf-8"))
+    cases, elastic = data["deflection"].sizes["load_case"], (data["modes"]["frequency"].values > 0.0).sum()
+    swings = [motion["swings"] for motion in model["motions"]]
+    assert swings == [False] * cases + [True] * min(elastic, 40)
+    kinds = [body["kind"] for body in model["bodies"]]
+    assert {"gear", "shaft", "sensor", "foot"} <= {*kinds}
+    movers = {body["member"] for body in model["bodies"]}
+    assert movers <= model["members"].keys()
+    assert write_space(Drawn(answer.case, {}), tmp_path) == []
