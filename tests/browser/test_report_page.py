@@ -192,7 +192,8 @@ def test_bodies_of_a_gearbox_move_as_their_stations_do(opened, report):
     moved = """(choice) => { const chooser = document.getElementById('solid-view');
         chooser.value = String(choice); chooser.dispatchEvent(new Event('change'));
         const { bodies, state } = document.getElementById('solid-place').space;
-        return bodies.map((body, k) => [body.member, Array.from(body.rest.slice(0, 3)), Array.from(state.fields[k].slice(0, 3))]); }"""
+        const first = (array) => Array.from(array.slice(0, 3));
+        return bodies.map((body, k) => [body.member, first(body.rest), first(state.fields[k])]); }"""
     stations = modes["station"].values.tolist()
     choice = next(i for i, motion in enumerate(model["motions"], start=1) if motion["swings"])
     number = int(model["motions"][choice - 1]["title"].split(":")[0].split()[1]) - 1

@@ -182,11 +182,16 @@ page.draw = (div) => {
   });
   layout.annotations = notes;
   layout.showlegend = seen.size > 1;
+  // room for the lines of a legend beyond the first, before the panels of a small chart are squeezed to nothing
+  const longest = Math.max(0, ...[...seen].map((name) => name.length)), each = Math.max(1, Math.floor((width - 90) / (45 + 6.2 * longest)));
+  const more = layout.showlegend && chart.least ? 19 * (Math.ceil(seen.size / each) - 1) : 0;
+  layout.height = height + more;
+  layout.margin.b = gaps.bottom + more;
   Plotly.react(div, traces, layout, { displaylogo: false, responsive: false, displayModeBar: "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] });
   // a legend of several lines makes the picture higher, not the panels lower
   const legend = layout.showlegend ? div._fullLayout.legend._height - 34 : 0;
-  if (legend > 0) Plotly.relayout(div, { height: height + legend, "margin.b": gaps.bottom + legend });
+  if (legend > more) Plotly.relayout(div, { height: height + legend, "margin.b": gaps.bottom + legend });
   div.style.minHeight = "";
   div.dataset.drawn = String(width);
 };
