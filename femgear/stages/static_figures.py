@@ -46,6 +46,7 @@ from femgear.report.style import (
     periodic,
     position_words,
 )
+from femgear.stages.gears_in_space import write_gears_in_space
 from femgear.stages.heat_figures import HEAT_FIGURES, LOSSES_FIGURES
 from femgear.stages.life_figures import LIFE_FIGURES
 from femgear.stages.protocol import Drawn, Figures
@@ -829,5 +830,5 @@ FIGURES = {
     "life": LIFE_FIGURES,
     "heat": HEAT_FIGURES,
     "losses": LOSSES_FIGURES,
-    "": Figures({}, draw=_deviation_figures),
+    "": Figures({}, draw=_deviation_figures, write=(write_gears_in_space,)),
 }

@@ -17,6 +17,7 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.gears.gear import Gear
 from femgear.report.space import SPACE, DrawnBody, Motion, space, tooth_section
+from femgear.stages.gears_in_space import MODES_SHOWN, tooth_angles
 from femgear.stages.protocol import Drawn
 from femgear.storage.files import write_text
 from femgear.trains.gearbox.case_file import (
@@ -30,8 +31,6 @@ from femgear.trains.gearbox.case_file import (
 from femgear.trains.gearbox.casing import bearing_name
 from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, planet_radius, set_sizes
 
-MODES_SHOWN = 40
-"""Modes that can be chosen."""
 _DISC, _RIM, _BORE = 0.3, 1.15, 0.45
 """Width of a disc, radius of a rim and of a bore that are not given, over the pitch radius."""
 _MARK = 0.04
@@ -191,25 +190,24 @@ def _gear(seat: _Seat, sizes: StageSizes, teeth: _Teeth) -> DrawnBody:
     return DrawnBody(*place, (radii, radii), section, gear.teeth, twist, teeth.internal, turned)
 
 
-def _gears_of(stage: PairSection | BoxPlanetarySection) -> tuple[Gear | None, ...]:
-    """Gears of a stage in their transverse section; None of each where it has no teeth."""
-    teeth = teeth_of(stage)
-    if teeth is None:
-        return (None, None, None)
-    gears: Any = planetary_set(teeth)
-    return tuple(gears.gears)
+def _turned(stage: PairSection | BoxPlanetarySection, turn: float) -> tuple[tuple[Gear | None, ...], Any]:
+    """Gears of a stage, and angles of a tooth of every copy of each, turned as a whole; no gears without teeth."""
+    section = teeth_of(stage)
+    if section is None:
+        return (None, None, None), None
+    gears: Any = planetary_set(section)
+    return tuple(gears.gears), [[turn + angle for angle in of_gear] for of_gear in tooth_angles(gears)]
 
 
 def _of_pair(case: GearboxCase, pair: PairSection) -> Iterator[DrawnBody]:
-    """Both gears, a tooth of gear 1 on the line of centres in a gap of gear 2."""
-    sizes, gears = pair_sizes(pair), _gears_of(pair)
+    """Both gears, on their shafts."""
+    sizes = pair_sizes(pair)
     on_shaft = next(name for name in pair.shafts if name != CASING)
     axes = [case.shaft_named(name if name != CASING else on_shaft).axis for name in pair.shafts]
     across = math.atan2(axes[1][1] - axes[0][1], axes[1][0] - axes[0][0])
-    # in an internal gear the pinion touches on the side away from the axis of the gear
-    touch = across + math.pi if sizes.internal else across
-    gap = touch if sizes.internal else across + math.pi
-    angles, hands = (touch, gap + math.pi / sizes.teeth[1]), (1.0, 1.0 if sizes.internal else -1.0)
+    # gear 2 of a pair lies on x, an internal one on the other side
+    gears, angles = _turned(pair, across + math.pi if sizes.internal else across)
+    hands = 1.0, 1.0 if sizes.internal else -1.0
     for number, name in enumerate(pair.shafts):
         if name == CASING:
             continue
@@ -218,13 +216,15 @@ def _of_pair(case: GearboxCase, pair: PairSection) -> Iterator[DrawnBody]:
         words = f"gear {number + 1} of {pair.name}, {sizes.teeth[number]} teeth"
         pitch = sizes.base_radii[number] / math.cos(sizes.pressure_angles[0])
         internal = sizes.internal and number == 1
-        teeth = _Teeth(gears[number], number, pitch, hands[number], angles[number], internal)
+        angle = angles[number][0] if angles else 0.0
+        teeth = _Teeth(gears[number], number, pitch, hands[number], angle, internal)
         yield _gear(_Seat(words, name, (shaft.axis[0], shaft.axis[1]), middle), sizes, teeth)
 
 
 def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.ndarray]) -> Iterator[DrawnBody]:
-    """Sun, planets and ring, teeth in gaps: a tooth of the sun points to planet 1."""
-    sizes, gears = set_sizes(stage), _gears_of(stage)
+    """Sun, planets and ring, each on its member."""
+    sizes = set_sizes(stage)
+    gears, turned = _turned(stage, stage.angle)
     z_s, z_p, z_r = sizes.teeth
     holder = next(name for name in ("sun", "carrier", "ring") if getattr(stage, name) != CASING)
     shaft = case.shaft_named(getattr(stage, holder))
@@ -232,11 +232,10 @@ def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.
     axis = shaft.axis[0], shaft.axis[1]
     planet = planet_radius(sizes)
     angles = [stage.angle + angle for angle in sizes.planet_angles]
-    of_planets = [psi + math.pi - (angles[0] - psi) * z_s / z_p + math.pi / z_p for psi in angles]
-    of_ring = angles[0] + (of_planets[0] - angles[0]) * z_p / z_r + math.pi / z_r
+    of_sun, of_planets, of_ring = turned or ((0.0,), (0.0,) * len(angles), (0.0,))
     seat = f"seat ring of {stage.name}"
     in_casing = seat if seat in places else CASING
-    sun = _Teeth(gears[0], 0, sizes.centre_distance - planet, 1.0, angles[0])
+    sun = _Teeth(gears[0], 0, sizes.centre_distance - planet, 1.0, of_sun[0])
     yield _gear(_Seat(f"sun of {stage.name}, {z_s} teeth", stage.sun, axis, middle), sizes, sun)
     for number, (psi, angle) in enumerate(zip(angles, of_planets, strict=True), start=1):
         name, distance = f"{stage.name} planet {number}", sizes.centre_distance
@@ -244,6 +243,6 @@ def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.
         z = float(places[name][2]) if name in places else middle
         teeth = _Teeth(gears[1], 1, planet, -1.0, angle)
         yield _gear(_Seat(f"{name}, {z_p} teeth", name, (x, y), z), sizes, teeth)
-    ring = _Teeth(gears[2], 2, sizes.centre_distance + planet, -1.0, of_ring, internal=True)
+    ring = _Teeth(gears[2], 2, sizes.centre_distance + planet, -1.0, of_ring[0], internal=True)
     member = in_casing if stage.ring == CASING else stage.ring
     yield _gear(_Seat(f"ring of {stage.name}, {z_r} teeth", member, axis, middle), sizes, ring)
