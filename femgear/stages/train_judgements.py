@@ -72,15 +72,27 @@ def _stresses(results: Any) -> str:
 def _motion(results: Any) -> str:
     """Write transmission errors and dynamic factors of a run by kind of mesh."""
     parts = []
-    if "static" in results.stages:
-        static = results.static
-        kinds = kind_names(static["mesh"].values)
-        error = 1e6 * peak_to_peak(static, "ste").reshape(len(kinds), -1).max(axis=1)
-        parts.append(f"transmission error {_joined(error, 2)} µm")
+    errors = _transmission_error(results)
+    if errors is not None:
+        names, error = errors
+        of_kinds = 1e6 * error.reshape(len(kind_names(names)), -1).max(axis=1)
+        parts.append(f"transmission error {_joined(of_kinds, 2)} µm")
     if "dynamics" in results.stages:
         kinds = kind_names(results.dynamics["mesh"].values)
         parts.append(f"K_v {_joined(computed_dynamic_factor(results.dynamics, len(kinds)), 2)}")
     return ", ".join(parts) or "-"
+
+
+def _transmission_error(results: Any) -> tuple[np.ndarray, np.ndarray] | None:
+    """Peak to peak of the transmission error of every mesh [m], with the names of the meshes; None where there is none.
+
+    Of helical sets it is that of modes.nc: static.nc has the spur gears of their transverse section.
+    """
+    if "modes" in results.stages and "helical_ste" in results.modes:
+        return results.modes["mesh"].values, np.ptp(results.modes["helical_ste"].values, axis=-1)
+    if "static" not in results.stages or getattr(results.case, "helical", None) is not None:
+        return None
+    return results.static["mesh"].values, peak_to_peak(results.static, "ste")
 
 
 def _joined(values: Sequence[float] | np.ndarray, places: int) -> str:

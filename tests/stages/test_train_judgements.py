@@ -48,3 +48,13 @@ def test_a_pair_with_limits_is_rated_and_has_no_level():
     assert judged[QUIET].state == "open" and "femgear gearbox" in judged[QUIET].limit
     enough = with_values(case, {"strength.required_flank_safety": 0.1})
     assert next(set_judgements(Files(enough))).state == "good"
+
+
+def test_the_error_of_helical_meshes_is_that_of_the_slices(static):
+    """static.nc has the spur gears of the transverse section, whose error nobody hears."""
+    case = read_case(CASES / "helical_30_20_70.toml")
+    curve = 1e-6 * np.array([[4.0, 4.25], [4.0, 4.125], [3.0, 3.0625], [3.0, 3.0]])
+    modes = xr.Dataset({"helical_ste": (("mesh", "position"), curve)}, {"mesh": static["mesh"]})
+    runs = {"static": static, "modes": modes}, {"static": static}
+    answers = [list(judge_teeth(Files(case, **data), None))[-1].answer for data in runs]
+    assert answers == ["transmission error 0.25 and 0.0625 µm", "-"]

@@ -12,7 +12,9 @@ page.space = () => {
     high[k] = Math.max(high[k], ...at.map((one) => one + reach));
   }));
   const middle = low.map((one, k) => (one + high[k]) / 2), size = Math.hypot(...low.map((one, k) => high[k] - one));
-  const view = page.view(place, size / 2, [2.35, 1.05, 1.7]);
+  // long boxes from the side, flat ones from the front
+  const flat = high[2] - low[2] < 0.5 * Math.max(high[0] - low[0], high[1] - low[1]);
+  const view = page.view(place, size / 2, flat ? [0.75, -1.5, 2.7] : [2.35, 1.05, 1.7]);
   if (!view) return;
   const { group, render, camera, canvas } = view;
   const COLOURS = { shaft: [0.62, 0.65, 0.69], bearing: [0.30, 0.33, 0.38], sensor: [0.80, 0.24, 0.0], foot: [0.16, 0.16, 0.18] };
