@@ -26,7 +26,7 @@ _DIGITS = 4
 
 
 @dataclass(frozen=True)
-class DrawnBody:
+class SpaceBody:
     """A body in space.
 
     Parameters
@@ -105,13 +105,13 @@ def tooth_section(gear: Gear) -> np.ndarray:
 
 
 def space(
-    bodies: Sequence[DrawnBody], members: Sequence[str], place: np.ndarray, motions: Sequence[Motion]
+    bodies: Sequence[SpaceBody], members: Sequence[str], place: np.ndarray, motions: Sequence[Motion]
 ) -> dict[str, Any]:
     """Collect what the browser draws of a gearbox in space.
 
     Parameters
     ----------
-    bodies : sequence of DrawnBody
+    bodies : sequence of SpaceBody
     members : sequence of str
         Of every station the member that it is of.
     place : (n_stations, 3) array
@@ -147,7 +147,7 @@ def _lengths(values: Any) -> list[float]:
     return [round(1e3 * float(value), _DIGITS) for value in np.ravel(values)]
 
 
-def _body(body: DrawnBody) -> dict[str, Any]:
+def _body(body: SpaceBody) -> dict[str, Any]:
     """Write a body for JSON, in mm and rad."""
     data: dict[str, Any] = {
         "name": body.name,

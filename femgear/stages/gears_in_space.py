@@ -15,7 +15,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.gears.pair import GearSet
 from femgear.gears.profile import base_helix_angle
 from femgear.report.solid import SOLID
-from femgear.report.space import SPACE, DrawnBody, Motion, space, tooth_section
+from femgear.report.space import SPACE, Motion, SpaceBody, space, tooth_section
 from femgear.stages.protocol import Drawn
 from femgear.storage.files import write_text
 
@@ -57,7 +57,7 @@ def gear_hands(gears: GearSet) -> tuple[float, ...]:
     return tuple(hands)
 
 
-def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[DrawnBody]:
+def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
     """List the gears of a pair or a set, their axes along z.
 
     Parameters
@@ -75,7 +75,7 @@ def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[DrawnBody]:
         for copy, (centre, angle) in enumerate(zip(gears.centres[number], angles[number], strict=True), start=1):
             name = f"{words} {copy}" if gears.repeated[number] else words
             radii = gear.rim_radius, gear.tip_radius
-            yield DrawnBody(
+            yield SpaceBody(
                 f"{name}, {gear.teeth} teeth",
                 "gear",
                 name,

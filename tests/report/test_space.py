@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from femgear.case.gear_set import planetary_set
-from femgear.report.space import DrawnBody, Motion, space, tooth_section
+from femgear.report.space import Motion, SpaceBody, space, tooth_section
 from femgear.trains.reading import read_case
 
 CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
@@ -34,7 +34,7 @@ def unpacked(data):
 def test_motions_are_those_of_the_stations_in_mm_and_rad():
     place = np.array([[0.0, 0.0, 0.2], [0.0, 0.0, 0.1], [0.05, 0.0, 0.0]])
     values = np.arange(18.0).reshape(3, 6) * 1e-6
-    body = DrawnBody("shaft a", "shaft", "a", (0.0, 0.0), (0.1, 0.2), ((0.0, 0.01), (0.0, 0.02)))
+    body = SpaceBody("shaft a", "shaft", "a", (0.0, 0.0), (0.1, 0.2), ((0.0, 0.01), (0.0, 0.02)))
     model = space([body], ["a", "a", "b"], place, [Motion("mode 1", values)])
     (drawn,) = model["bodies"]
     assert (drawn["ends"], drawn["radii"]) == ([100.0, 200.0], [0.0, 10.0, 0.0, 20.0])

@@ -16,7 +16,7 @@ import numpy as np
 
 from femgear.case.gear_set import planetary_set
 from femgear.gears.gear import Gear
-from femgear.report.space import SPACE, DrawnBody, Motion, space, tooth_section
+from femgear.report.space import SPACE, Motion, SpaceBody, space, tooth_section
 from femgear.stages.gears_in_space import MODES_SHOWN, tooth_angles
 from femgear.stages.protocol import Drawn
 from femgear.storage.files import write_text
@@ -72,7 +72,7 @@ def _modes(drawn: Drawn, stations: list[str]) -> Iterator[Motion]:
         yield Motion(title, modes["motion"].values[:, :, number])
 
 
-def gearbox_bodies(case: GearboxCase, places: dict[str, np.ndarray]) -> Iterator[DrawnBody]:
+def gearbox_bodies(case: GearboxCase, places: dict[str, np.ndarray]) -> Iterator[SpaceBody]:
     """List the bodies of a gearbox: gears, parts of shafts, and bearings.
 
     Parameters
@@ -89,27 +89,27 @@ def gearbox_bodies(case: GearboxCase, places: dict[str, np.ndarray]) -> Iterator
     yield from _of_bearings(case)
 
 
-def _marks(data: Any) -> Iterator[DrawnBody]:
+def _marks(data: Any) -> Iterator[SpaceBody]:
     """Sensors and feet of deflection.nc, as short cylinders on the casing."""
     size = _MARK * float(np.ptp(data["place"].values, axis=0).max())
     for kind in ("sensor", "foot"):
         if f"{kind}_place" in data:
             for name, (x, y, z) in zip(data[kind].values, data[f"{kind}_place"].values, strict=True):
                 radii, ends = (0.0, 0.5 * size), (z - 0.5 * size, z + 0.5 * size)
-                yield DrawnBody(f"{kind} {name}", kind, CASING, (x, y), ends, (radii, radii))
+                yield SpaceBody(f"{kind} {name}", kind, CASING, (x, y), ends, (radii, radii))
 
 
-def _of_shaft(shaft: BoxShaftSection) -> Iterator[DrawnBody]:
+def _of_shaft(shaft: BoxShaftSection) -> Iterator[SpaceBody]:
     """Parts of a shaft, cones between the diameters of their ends."""
     places = shaft.start + np.asarray(shaft.places)
     for part, low, high in zip(shaft.part, places[:-1], places[1:], strict=True):
         last = part.end_outer_diameter or part.outer_diameter
         first, second = (0.5 * part.inner_diameter, 0.5 * part.outer_diameter), (0.5 * part.bore_at_end, 0.5 * last)
         axis = shaft.axis[0], shaft.axis[1]
-        yield DrawnBody(f"shaft {shaft.name}", "shaft", shaft.name, axis, (float(low), float(high)), (first, second))
+        yield SpaceBody(f"shaft {shaft.name}", "shaft", shaft.name, axis, (float(low), float(high)), (first, second))
 
 
-def _of_bearings(case: GearboxCase) -> Iterator[DrawnBody]:
+def _of_bearings(case: GearboxCase) -> Iterator[SpaceBody]:
     """Rolling bearings with their sizes, others as narrow rings around their shafts."""
     for number, section in enumerate(case.bearing):
         shaft = case.shaft_named(section.shaft)
@@ -124,7 +124,7 @@ def _of_bearings(case: GearboxCase) -> Iterator[DrawnBody]:
         else:
             continue
         axis, ends = (shaft.axis[0], shaft.axis[1]), (z - 0.5 * width, z + 0.5 * width)
-        yield DrawnBody(f"bearing {bearing_name(section, number)}", "bearing", shaft.name, axis, ends, (radii, radii))
+        yield SpaceBody(f"bearing {bearing_name(section, number)}", "bearing", shaft.name, axis, ends, (radii, radii))
 
 
 @dataclass(frozen=True)
@@ -175,19 +175,19 @@ class _Teeth:
     internal: bool = False
 
 
-def _gear(seat: _Seat, sizes: StageSizes, teeth: _Teeth) -> DrawnBody:
+def _gear(seat: _Seat, sizes: StageSizes, teeth: _Teeth) -> SpaceBody:
     """Make a gear from its teeth, or a disc of its pitch circle where it has none."""
     width, pitch, gear = sizes.face_widths[teeth.count] or _DISC * teeth.pitch, teeth.pitch, teeth.gear
     place = seat.name, "gear", seat.member, seat.axis, (seat.middle - 0.5 * width, seat.middle + 0.5 * width)
     if gear is None:
         radii = (pitch, _RIM * pitch) if teeth.internal else (_BORE * pitch, pitch)
-        return DrawnBody(*place, (radii, radii))
+        return SpaceBody(*place, (radii, radii))
     twist = teeth.hand * width * math.tan(sizes.base_helix) / sizes.base_radii[teeth.count]
     inner = gear.rim_radius if teeth.internal else min(_BORE * pitch, gear.rim_radius)
     radii = inner, gear.tip_radius
     turned = teeth.angle - 0.5 * twist
     section = tooth_section(gear)
-    return DrawnBody(*place, (radii, radii), section, gear.teeth, twist, teeth.internal, turned)
+    return SpaceBody(*place, (radii, radii), section, gear.teeth, twist, teeth.internal, turned)
 
 
 def _turned(stage: PairSection | BoxPlanetarySection, turn: float) -> tuple[tuple[Gear | None, ...], Any]:
@@ -199,7 +199,7 @@ def _turned(stage: PairSection | BoxPlanetarySection, turn: float) -> tuple[tupl
     return tuple(gears.gears), [[turn + angle for angle in of_gear] for of_gear in tooth_angles(gears)]
 
 
-def _of_pair(case: GearboxCase, pair: PairSection) -> Iterator[DrawnBody]:
+def _of_pair(case: GearboxCase, pair: PairSection) -> Iterator[SpaceBody]:
     """Both gears, on their shafts."""
     sizes = pair_sizes(pair)
     on_shaft = next(name for name in pair.shafts if name != CASING)
@@ -221,7 +221,7 @@ def _of_pair(case: GearboxCase, pair: PairSection) -> Iterator[DrawnBody]:
         yield _gear(_Seat(words, name, (shaft.axis[0], shaft.axis[1]), middle), sizes, teeth)
 
 
-def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.ndarray]) -> Iterator[DrawnBody]:
+def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.ndarray]) -> Iterator[SpaceBody]:
     """Sun, planets and ring, each on its member."""
     sizes = set_sizes(stage)
     gears, turned = _turned(stage, stage.angle)
