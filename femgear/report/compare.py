@@ -10,13 +10,18 @@ from dataclasses import replace
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from femgear.report.page import chart_figure, document, part_of, shown_data, table
+from femgear.report.page import chart_figure, document, folded, part_of, shown_data, table
 from femgear.report.tables import MARKS, WARNINGS, Block, is_bound, unmarked
 
 if TYPE_CHECKING:
+    from femgear.stages.judgements import Judgement
     from femgear.stages.protocol import Train
     from femgear.storage.results import Results
 
+ANSWERS = "Page one of both"
+"""Title of the table of what page one answers."""
+OPEN = ANSWERS, "Key figures", "Cases"
+"""Titles of the tables that are not folded away."""
 _MEETING = ("operating [rpm]", "mode", "kind", "mesh harmonic")
 """Columns that tell which resonance a row is."""
 _EXCITED = "excited up to"
@@ -30,11 +35,12 @@ _FADED = 0.55
 
 
 def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]:
-    """Tabulate what differs between two runs of one train: entries of the case, then numbers by stage."""
+    """Tabulate two runs of one train: what page one answers of both, then entries and numbers that differ."""
     cases = [(run.case.source, run.case.model_dump(by_alias=True)) for run in (first, second)]
     rows = tuple(_entries(*cases))
     entries = Block("Cases", ("entry", "first", "second") if rows else (), rows, () if rows else ("the same",))
-    blocks, others = [entries, *_key_figures(train, first, second)], train.describe_stages(second)
+    blocks = [*_answers(train, first, second), entries, *_key_figures(train, first, second)]
+    others = train.describe_stages(second)
     verdicts = {block.title: block for block in train.verdict(second)}
     for block in train.verdict(first):
         if block.title in verdicts:
@@ -43,6 +49,22 @@ def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]
         if title in others:
             blocks.append(_differences(block, others[title]))
     return (*blocks, _findings(first, second))
+
+
+def _answers(train: Train, first: Results, second: Results) -> Iterator[Block]:
+    """Tabulate what page one answers of both runs, question by question."""
+    both = [{judgement.question: judgement for judgement in train.summary(run)[1]} for run in (first, second)]
+    questions = dict.fromkeys([*both[0], *both[1]])
+    rows = tuple(
+        (question, *(_answer(of_run[question]) if question in of_run else "-" for of_run in both))
+        for question in questions
+    )
+    if rows:
+        yield Block(ANSWERS, ("", "first", "second"), rows)
+
+
+def _answer(judgement: Judgement) -> str:
+    return f"{judgement.words}: {judgement.answer}"
 
 
 def _key_figures(train: Train, first: Results, second: Results) -> Iterator[Block]:
@@ -187,9 +209,9 @@ def compare_page(train: Train, first: Results, second: Results) -> str:
     title = f"{first.folder.name} and {second.folder.name}"
     runs = {f"runup {i}": run_data["runup"] for i, run_data in enumerate(data, 1) if "runup" in run_data}
     main = [f"<h1>{escape(title)}</h1>\n"]
-    for block in compared(train, first, second):
-        words = table(block, heading=False)
-        main.append(f'<h2>{escape(block.title)}</h2>\n<div class="compare">{words}</div>')
+    for number, block in enumerate(compared(train, first, second)):
+        content = f'<div class="compare">{table(block, heading=False)}</div>'
+        main.append(folded(f"difference-{number}", block.title, content, block.title in OPEN))
     for run, key in zip((first, second), runs):
         place = part_of("runup").replace('data-run="runup"', f'data-run="{key}"')
         main.append(f"<h2>Run-up of {escape(run.folder.name)}</h2>\n{place}")

@@ -168,8 +168,8 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
             _contents(sections, numbers, pictures),
             _front(train, results, charts, _caption(gears, data)),
             notice,
-            _folded("verdict", "Verdict in numbers", "".join(map(table, verdict)), True) if verdict else "",
-            _folded("gears", "Gears and operation", "".join(map(table, gears)), unfolded),
+            folded("verdict", "Verdict in numbers", "".join(map(table, verdict)), True) if verdict else "",
+            folded("gears", "Gears and operation", "".join(map(table, gears)), unfolded),
         )
     )
     parts = {stage.title: part_of(stage.name) for stage in train.stages if stage.name in {*data} & {*_PARTS}}
@@ -301,7 +301,7 @@ def front_chart(name: str, panel: int) -> str:
     return f'<div class="chart" role="group" aria-label="{words}" {place}></div>\n'
 
 
-def _folded(key: str, title: str, content: str, shown: bool) -> str:
+def folded(key: str, title: str, content: str, shown: bool) -> str:
     """Fold a section away under its title; paper, and pages without scripts, show it."""
     return f'<details id="{key}"{" open" * shown}>\n<summary><h2>{escape(title)}</h2></summary>\n{content}</details>\n'
 
@@ -324,7 +324,7 @@ def _section(
         return ""
     tables = "".join(table(block, heading=i > 0) for i, block in enumerate(blocks))
     content = part + tables + "".join(_figure(figure, charts) for figure in figures)
-    return _folded(_anchor(name), name, content, static)
+    return folded(_anchor(name), name, content, static)
 
 
 def table(block: Block, *, heading: bool = True) -> str:
@@ -468,4 +468,4 @@ def _trust(results: Results, numbers, warnings: Sequence[Finding], static: bool)
         f'<h3 id="warnings">Warnings</h3>\n{items}{tables}'
         f'<h3>Case as run</h3>\n<pre tabindex="0">{escape(results.case.source)}</pre>\n'
     )
-    return _folded("trust", "Trust: warnings, residuals, checksums, case", content, static)
+    return folded("trust", "Trust: warnings, residuals, checksums, case", content, static)

@@ -132,6 +132,9 @@ def test_key_figures_of_two_runs_are_compared_by_name(tmp_path):
             run_case(changed, place, pictures=False)
         runs.append(open_results(tmp_path / name))
     blocks = {block.title: block for block in compare.compared(train_of(case), *runs)}
+    answers = {row[0]: row[1:] for row in blocks[compare.ANSWERS].rows}
+    assert next(iter(blocks)) == compare.ANSWERS and "Is it strong enough?" in answers
+    assert all(word[0] in "✓▲✕○" for both in answers.values() for word in both)
     assert [row[0] for row in blocks["Cases"].rows] == ["bearing[0].radial"]
     rows = {row[0]: row[1:] for row in blocks["Key figures"].rows}
     slopes = [float(np.abs(run.deflection["mesh_misalignment"].values).max()) for run in runs]
