@@ -262,7 +262,8 @@ def _front(train: Train, results: Results, charts, caption: str | None) -> str:
     below = f'<div class="top{both}">\n{solid}{charts_beside}</div>\n' if solid or shown else ""
     columns = 3 if len(judgements) == 6 else min(len(judgements), 5)
     listed_cards = f'<ul class="cards" style="--columns: {columns}">\n{cards}</ul>\n' if cards else ""
-    return f'<section class="front" aria-label="Page one">\n{text}{listed_cards}{below}</section>\n'
+    many = " many" * (columns < len(judgements))
+    return f'<section class="front{many}" aria-label="Page one">\n{text}{listed_cards}{below}</section>\n'
 
 
 def _caption(gears: Sequence[Block], data) -> str | None:

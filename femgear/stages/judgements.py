@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from femgear.case.sections import StrengthSection
-from femgear.findings import DOUBT, FAULT, Finding
+from femgear.findings import DOUBT, NOTE, Finding
 from femgear.report.tables import Block
 from femgear.stages.life_results import hours_text
 from femgear.stages.strength import RatedFlank, Rating
@@ -31,6 +31,9 @@ STRONG, LIFE, HEAT, SMOOTH, QUIET, SURE = (
     "Can the numbers be relied on?",
 )
 """The questions, in the order of the cards."""
+
+_BEYOND = {"W-PRESSURE", "W-STRENGTH"}
+"""Codes of the findings that no steel carries the load."""
 
 
 @dataclass(frozen=True)
@@ -111,8 +114,32 @@ def least_of(rating: Rating) -> tuple[Least | None, Least | None]:
     return least(roots, "root"), least(contacts, "flank")
 
 
+def least_over_life(data: Any, kind: str, of_load: Least | None) -> Least | None:
+    """Choose the smaller of a safety under the load and of those over the life asked for.
+
+    Parameters
+    ----------
+    data : dataset
+        With the variables of lives, as far as there are any.
+    kind : {"root", "flank"}
+    of_load : Least or None
+        Under the load of the run.
+    """
+    name = f"{kind}_spectrum_safety"
+    if name not in data or not np.isfinite(data[name].values).any():
+        return of_load
+    at = int(np.nanargmin(data[name].values))
+    over_life = Least(float(data[name].values[at]), f"{kind} of {data[kind].values[at]}, over the life asked for")
+    return over_life if of_load is None or over_life.value < of_load.value else of_load
+
+
 def judge_strength(
-    root: Least | None, flank: Least | None, limits: StrengthSection, stresses: str = "", doubtful: bool = False
+    root: Least | None,
+    flank: Least | None,
+    limits: StrengthSection,
+    stresses: str = "",
+    findings: Iterable[Finding] = (),
+    doubts: Sequence[str] = (),
 ) -> Judgement:
     """Judge safeties against those that the case asks for.
 
@@ -124,9 +151,13 @@ def judge_strength(
         With the safeties asked for.
     stresses : str
         Largest stresses in words, for the answer where there are no safeties.
-    doubtful : bool
-        Whether findings concern the safeties.
+    findings : iterable of Finding
+        Of the run: what no steel carries fails, whatever limits there are.
+    doubts : sequence of str
+        Codes of the findings that concern the safeties.
     """
+    raised = {finding.code for finding in findings if finding.severity != NOTE}
+    beyond = sorted(raised & _BEYOND)
     rated = [
         (symbol, least, required)
         for symbol, least, required in (
@@ -135,6 +166,9 @@ def judge_strength(
         )
         if least is not None
     ]
+    if beyond:
+        answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated) or stresses
+        return Judgement(STRONG, "bad", answer, ", ".join(beyond), f"Not strong enough ({', '.join(beyond)})")
     if not rated:
         how = "give material.treatment and material.hardness for safeties"
         return Judgement(STRONG, "open", stresses or "not rated", how, "Its strength is not rated")
@@ -149,7 +183,7 @@ def judge_strength(
     if len(rated) == 1:
         missing = "S_H is not rated" if rated[0][0] == "S_F" else "S_F is not rated"
         return Judgement(STRONG, "look", answer, f"{limit}; {missing}", f"Strong enough by {answer}; {missing}")
-    return Judgement(STRONG, "look" if doubtful else "good", answer, limit, f"Strong enough: {answer}")
+    return Judgement(STRONG, "look" if raised & {*doubts} else "good", answer, limit, f"Strong enough: {answer}")
 
 
 def judge_lives(parts: Iterable[tuple[str, float, str]], required: float | None) -> Iterator[Judgement]:
@@ -298,13 +332,12 @@ def judge_noise(answer: str, sentence: str, resonance: str = "", open_words: str
 
 
 def judge_numbers(findings: Sequence[Finding], complete: bool) -> Judgement:
-    """Judge the numbers by the findings of the run: faults, doubts, and a run that did not end."""
-    faults, doubts = ([f for f in findings if f.severity == severity] for severity in (FAULT, DOUBT))
+    """Judge the numbers by the doubts of the run, and whether it ended; faults are of the gears, not of numbers."""
+    doubts = [finding for finding in findings if finding.severity == DOUBT]
     if not complete:
         return Judgement(SURE, "bad", "the run did not come to its end", "", "The run did not come to its end")
-    if faults or doubts:
-        count = [f"{len(f)} {word}{'s' * (len(f) > 1)}" for f, word in ((faults, "fault"), (doubts, "doubt")) if f]
-        codes = list(dict.fromkeys(finding.code for finding in (*faults, *doubts) if finding.code))
+    if doubts:
+        codes = list(dict.fromkeys(finding.code for finding in doubts if finding.code))
         shown = ", ".join(codes[:4]) + (f" and {len(codes) - 4} more" if len(codes) > 4 else "")
-        return Judgement(SURE, "bad" if faults else "look", " and ".join(count), shown)
+        return Judgement(SURE, "look", f"{len(doubts)} doubt{'s' * (len(doubts) > 1)}", shown)
     return Judgement(SURE, "good", "no doubt was raised", "solutions converged, samples resolve them")

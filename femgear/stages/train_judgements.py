@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from femgear.case.load_spectrum import required_life
-from femgear.findings import DOUBT, FAULT
 from femgear.report.tables import significant
 from femgear.stages.judgements import (
     Judgement,
@@ -19,6 +18,7 @@ from femgear.stages.judgements import (
     judge_smoothness,
     judge_strength,
     least_of,
+    least_over_life,
     lives_of_bearings,
     lives_of_teeth,
 )
@@ -27,7 +27,7 @@ from femgear.stages.strength import Rating
 from femgear.stages.strength_results import computed_dynamic_factor, kind_names, rate_results
 from femgear.stages.stress_reasons import largest_pressure
 
-_OF_SAFETIES = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION", "W-PRESSURE"
+_OF_SAFETIES = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
 _RESPONSES = "dynamics", "response", "runup", "branch"
 """Stages with motion."""
 
@@ -51,8 +51,9 @@ def judge_teeth(results: Any, rating: Rating | None) -> Iterator[Judgement]:
     """
     case, stages, findings = results.case, results.stages, results.findings
     root, flank = (None, None) if rating is None else least_of(rating)
-    doubtful = any(f.code in _OF_SAFETIES and f.severity in (DOUBT, FAULT) for f in findings)
-    yield judge_strength(root, flank, case.strength, _stresses(results), doubtful)
+    if "life" in stages:
+        root, flank = (least_over_life(results.life, *least) for least in (("root", root), ("flank", flank)))
+    yield judge_strength(root, flank, case.strength, _stresses(results), findings, _OF_SAFETIES)
     if "life" in stages:
         parts = (*lives_of_teeth(results.life), *lives_of_bearings(results.life))
         yield from judge_lives(parts, required_life(case.operation))

@@ -18,6 +18,7 @@ from femgear.stages.judgements import (
     judge_smoothness,
     judge_strength,
     least_of,
+    least_over_life,
     lives_of_bearings,
     lives_of_teeth,
 )
@@ -47,7 +48,26 @@ def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
     assert "material.treatment" in open_.limit and open_.words == "○ no limit"
     half = judge_strength(None, FLANK, StrengthSection())
     assert half.state == "look" and half.limit.endswith("S_F is not rated")
-    assert judge_strength(ROOT, FLANK, StrengthSection(), doubtful=True).state == "look"
+    doubt = Finding("W-FACE-LOAD", "", "text", severity=DOUBT)
+    assert judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-FACE-LOAD"]).state == "look"
+    assert judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-THRUST"]).state == "good"
+
+
+def test_what_no_steel_carries_fails_whatever_its_safeties():
+    fault = Finding("W-PRESSURE", "", "text", severity=FAULT)
+    assert judge_strength(ROOT, FLANK, StrengthSection(), "", [fault]).state == "bad"
+    unrated = judge_strength(None, None, StrengthSection(), "root 900 MPa", [fault])
+    assert (unrated.state, unrated.answer, unrated.limit) == ("bad", "root 900 MPa", "W-PRESSURE")
+
+
+def test_the_safety_over_the_life_counts_where_it_is_smaller():
+    data = xr.Dataset({"root_spectrum_safety": ("root", [2.5, 1.24])}, {"root": ["sun", "planet, sun side"]})
+    least = least_over_life(data, "root", ROOT)
+    assert least == Least(1.24, "root of planet, sun side, over the life asked for")
+    assert least_over_life(data, "root", Least(1.1, "root")) == Least(1.1, "root")
+    assert least_over_life(data, "flank", FLANK) == FLANK and least_over_life(data, "root", None) == least
+    nothing = xr.Dataset({"root_spectrum_safety": ("root", [math.nan])}, {"root": ["sun"]})
+    assert least_over_life(nothing, "root", None) is None
 
 
 def test_the_smallest_safety_is_that_of_its_flank():
@@ -146,6 +166,8 @@ def test_numbers_are_judged_by_the_findings():
     )
     assert judge_numbers([note], complete=True).state == "good"
     assert judge_numbers([note, doubt], complete=True).state == "look"
-    judged = judge_numbers([doubt, fault, fault], complete=True)
-    assert (judged.state, judged.answer, judged.limit) == ("bad", "2 faults and 1 doubt", "W-LIFE, W-TAIL")
+    judged = judge_numbers([doubt, fault, doubt], complete=True)
+    assert (judged.state, judged.answer, judged.limit) == ("look", "2 doubts", "W-TAIL")
+    # gears that fail say nothing against their numbers
+    assert judge_numbers([fault], complete=True).state == "good"
     assert judge_numbers([], complete=False).state == "bad"

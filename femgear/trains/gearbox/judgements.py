@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from femgear.case.load_spectrum import required_life
-from femgear.findings import NOTE
 from femgear.stages.judgements import (
     Judgement,
     Least,
@@ -19,6 +18,7 @@ from femgear.stages.judgements import (
     judge_numbers,
     judge_smoothness,
     judge_strength,
+    least_over_life,
     lives_of_bearings,
     lives_of_teeth,
 )
@@ -38,8 +38,8 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
         data = results.deflection
         response = results.dynamics if "dynamics" in stages else None
         root, flank = (_least(least_safety(data, response, symbol), data) for symbol in ("S_F", "S_H"))
-        doubtful = any(f.code in OF_TEETH and f.severity != NOTE for f in findings)
-        yield judge_strength(root, flank, case.strength, _stresses(results), doubtful)
+        root, flank = (least_over_life(data, *least) for least in (("root", root), ("flank", flank)))
+        yield judge_strength(root, flank, case.strength, _stresses(results), findings, OF_TEETH)
         yield from judge_lives((*lives_of_teeth(data), *lives_of_bearings(data)), required_life(case.operation))
     yield from judge_heat(results)
     yield judge_smoothness(_motion(results), results, _RESPONSES)
