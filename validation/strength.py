@@ -16,14 +16,25 @@ from femgear.gears.iso6336 import (
     single_pair_factors,
     zone_factor,
 )
-from femgear.gears.iso6336_load import disc_inertia, dynamic_factor, reduced_mass, resonance_speed
+from femgear.gears.iso6336_load import (
+    disc_inertia,
+    dynamic_factor,
+    face_load_factor,
+    reduced_mass,
+    resonance_speed,
+)
 from femgear.gears.iso6336_root import (
     NominalRootStress,
     fillet_section,
     load_distribution_factor,
     nominal_root_stress,
 )
-from femgear.gears.iso6336_stiffness import BENDING_SHARE, gear_blank_factor, pair_mesh_stiffness
+from femgear.gears.iso6336_stiffness import (
+    BENDING_SHARE,
+    gear_blank_factor,
+    pair_mesh_stiffness,
+    theoretical_single_stiffness,
+)
 from femgear.gears.pair import GearPair, close_pair
 from femgear.gears.planetary import PlanetarySet, equal_planet_angles
 from femgear.gears.profile import (
@@ -328,6 +339,28 @@ def helical_fzg_gear() -> tuple[Row, ...]:
         for name, reference, number in sizes:
             words = f"{gear.name}: {name} [mm], rounding 0.38"
             rows.append(within("H501", generated, words, 1e3 * reference, 1e3 * number, 1e-5))
+    return tuple(rows)
+
+
+def face_factors() -> tuple[Row, ...]:
+    """K_Hbeta of two reports of GEARpie by method C, from its own deviations, stiffness (DIN 3990) and load.
+
+    Its F_beta is ``0.1 sqrt(d_2) + 0.63 sqrt(b) + 4.2`` um, f_ma half of it, y_beta 15 % of that, f_sh 0.
+    """
+    spur = "GEARpie, report of FZG gear C14, 16/24, m 4.5, 200 N m"
+    rows = []
+    for case, source, teeth, shifts, (module, width, degrees), (force, dynamic, ratio), reference in (
+        ("C14", spur, (16, 24), (0.1817, 0.1715), (4.5, 14.0, 0.0), (5464.5, 1.02, 1.46), "1.06"),
+        ("H501", FZG_H, (20, 30), (0.1809, 0.0891), (3.5, 23.0, 15.0), (2732.2, 1.03, 1.46), "1.20"),
+    ):
+        beta = math.radians(degrees)
+        virtual = [z / (math.cos(base_helix_angle(ALPHA, beta)) ** 2 * math.cos(beta)) for z in teeth]
+        single = 0.8 * math.cos(beta) * theoretical_single_stiffness(*virtual, *shifts)
+        tolerance = 0.1 * math.sqrt(module * teeth[1] / math.cos(beta)) + 0.63 * math.sqrt(width) + 4.2
+        line_load = 1.25 * dynamic * force / width
+        stiffness = single * (0.75 * ratio + 0.25)
+        ours = face_load_factor(0.85 * 0.5e-6 * tolerance, 1e3 * line_load, stiffness)
+        rows.append(printed(case, source, "face load factor K_Hbeta, method C", reference, ours))
     return tuple(rows)
 
 

@@ -305,6 +305,7 @@ THEMES = (
             strength.technical_report,
             strength.fzg_gears,
             strength.helical_fzg_gear,
+            strength.face_factors,
             strength.edition_of_2019,
             strength.tolerances,
             strength.life_factors,

@@ -243,6 +243,32 @@ def transverse_load_factors(
     return max(min(factor, flank), 1.0), max(min(factor, root), 1.0)
 
 
+def mesh_misalignment_of_tolerances(
+    line_load: float, slopes: tuple[float, float], *, width: float, pinion_diameter: float | None = None
+) -> float:
+    """Compute F_betax of a mesh [m] without its shafts and bearings (ISO 6336-1, section 7, method C).
+
+    ``1.33 f_sh + f_ma``, at least ``0.005 F_m/b`` and half of f_Hbeta. The misalignment of manufacture f_ma has the
+    tolerances of both gears, ``sqrt(f_Hbeta1^2 + f_Hbeta2^2)``. The deflection of the pinion is that of a solid shaft
+    of its own diameter in the middle between its bearings, ``f_sh = 0.023 F_m/b (b/d_1)^2``; lengths in um and mm,
+    loads in N/mm.
+
+    Parameters
+    ----------
+    line_load : float
+        F_m/b [N/m].
+    slopes : (float, float)
+        f_Hbeta of both gears [m].
+    width : float
+        Common face width [m].
+    pinion_diameter : float, optional
+        d_1 [m]; without it no deflection is taken, as of gears of a set, whose forces balance.
+    """
+    load = 1e-3 * line_load
+    bent = 0.0 if pinion_diameter is None else 0.023e-6 * load * (width / pinion_diameter) ** 2
+    return max(1.33 * bent + math.hypot(*slopes), 0.005e-6 * load, 0.5 * max(slopes))
+
+
 def face_load_factor(misalignment: float, line_load: float, stiffness: float) -> float:
     """Compute K_Hbeta of linear teeth under a misalignment (ISO 6336-1, section 7, method C).
 

@@ -37,13 +37,16 @@ from femgear.gears.iso6336_load import (
     disc_inertia,
     dynamic_factor,
     dynamic_factor_of_speed,
+    face_load_factor,
+    face_running_in,
+    mesh_misalignment_of_tolerances,
     reduced_mass,
     resonance_speed,
     running_in,
     transverse_load_factors,
 )
 from femgear.gears.iso6336_root import NominalRootStress, nominal_root_stress
-from femgear.gears.iso6336_stiffness import line_load_factor, material_factor, pair_mesh_stiffness
+from femgear.gears.iso6336_stiffness import BENDING_SHARE, line_load_factor, material_factor, pair_mesh_stiffness
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import BRANCH, GearSet
 from femgear.gears.tolerances import tolerances_of_gear
@@ -103,12 +106,15 @@ class StandardFactors:
         K_v by method C; NaN outside its classes.
     transverse, root_transverse : float
         K_Halpha and K_Falpha by method B.
+    face : float
+        K_Hbeta by method C, with shafts and bearings that are rigid.
     """
 
     dynamic: DynamicFactor
     by_speed: float
     transverse: float
     root_transverse: float
+    face: float
 
 
 @dataclass(frozen=True)
@@ -125,6 +131,8 @@ class MeshLoadFactors:
         By the names of these arrays where each comes from; none of factors that nothing told, which are 1.
     message : str
         Why there are no factors of part 1 although the case gives a flank tolerance class.
+    given_meshes : bool
+        Whether meshes have a given stiffness: part 1 has their K_Hbeta then, where contact over the width has none.
     """
 
     application: float
@@ -135,6 +143,7 @@ class MeshLoadFactors:
     root_transverse: np.ndarray
     sources: Mapping[str, str] = field(default_factory=dict)
     message: str = ""
+    given_meshes: bool = False
 
     @property
     def contact(self) -> np.ndarray:
@@ -286,7 +295,14 @@ def flank_modification(case: Any, strength: StrengthSection) -> str:
 
 
 def standard_factors(
-    case: Any, kind: int, *, torque: float, mesh_frequency: float, application: float, face: float, quality: int
+    case: Any,
+    kind: int,
+    *,
+    torque: float,
+    mesh_frequency: float,
+    application: float,
+    face: float | None,
+    quality: int,
 ) -> StandardFactors:
     """Compute the load factors of part 1 of a kind of mesh of a case.
 
@@ -300,8 +316,10 @@ def standard_factors(
         On the sun or gear 1 [N m].
     mesh_frequency : float
         [Hz]
-    application, face : float
-        ``K_A K_gamma`` and K_Hbeta.
+    application : float
+        ``K_A K_gamma``.
+    face : float or None
+        K_Hbeta; None has it by method C, see `femgear.gears.iso6336_load.mesh_misalignment_of_tolerances`.
     quality : int
         Flank tolerance class of ISO 1328-1.
 
@@ -335,14 +353,33 @@ def standard_factors(
     if quality >= 3:
         speed = {"teeth": pinion.teeth, "speed": turning * pinion.reference_radius, "ratio": ratio}
         by_speed = dynamic_factor_of_speed(grade=quality, line_load=line_load, overlap=overlap, **speed)
+    speed_of_pitch = turning * pinion.reference_radius
+    over_width = _face_factor(case, gears, kind, quality, line_load * dynamic.factor, mean, speed_of_pitch)
     transverse = transverse_load_factors(
-        line_load=line_load * dynamic.factor * face,
+        line_load=line_load * dynamic.factor * (over_width if face is None else face),
         mesh_stiffness=mean,
         contact_ratio=pair.contact_ratio,
         overlap=overlap,
         pitch_deviation=pitch,
     )
-    return StandardFactors(dynamic, by_speed, *transverse)
+    return StandardFactors(dynamic, by_speed, *transverse, over_width)
+
+
+def _face_factor(
+    case: Any, gears: GearSet, kind: int, quality: int, line_load: float, stiffness: float, speed: float
+) -> float:
+    """K_Hbeta by method C at a line load [N/m], with c_gammaalpha [N/m^2] and the pitch line velocity [m/s]."""
+    pair, numbers = gears.kinds[kind], gears.mates[kind]
+    first, second = (tolerances_of_gear(gear, quality).helix_slope for gear in pair.gears)
+    pinion = None if gears.members else 2.0 * min(gear.reference_radius for gear in pair.gears)
+    misalignment = mesh_misalignment_of_tolerances(
+        line_load, (first, second), width=pair.face_width, pinion_diameter=pinion
+    )
+    limits = [gear_material(case, case.gear_names[number]).contact_stress_limit for number in numbers]
+    taken = [
+        face_running_in(misalignment, _running(limit), contact_limit=limit or HARDENED, speed=speed) for limit in limits
+    ]
+    return face_load_factor(misalignment - 0.5 * sum(taken), line_load, BENDING_SHARE * stiffness)
 
 
 def _elastic_factor(case: Any, numbers: tuple[int, int]) -> float:
@@ -431,21 +468,24 @@ def mesh_load_factors(
     ones, sources = np.ones(len(gears.kinds)), dict[str, str]()
     computed = {"sharing": sharing, "dynamic": dynamic, "face": face}
     sources |= {name: "computed" for name, values in computed.items() if values is not None}
-    sharing, face = (ones if values is None else values for values in (sharing, face))
+    by_deviations, width = face is None and _has_given_meshes(case), ones if face is None else face
+    sharing = ones if sharing is None else sharing
     standard, messages = list[StandardFactors | None](), list[str]()
     for kind in range(len(gears.kinds)):
-        load = {"application": given.application_factor * float(sharing[kind]), "face": float(face[kind])}
+        application = given.application_factor * float(sharing[kind])
+        load = {"application": application, "face": None if by_deviations else float(width[kind])}
         try:
             standard.append(_largest_standard(case, kind, frequencies, torque=torque, quality=given.quality, **load))
         except GeometryError as error:
             standard.append(None)
             messages.append(error.message)
-    transverse, root_transverse = ones.copy(), ones.copy()
-    of_part_1 = ones.copy()
+    transverse, root_transverse, of_part_1, over_width = (ones.copy() for _ in range(4))
     for kind, factors in enumerate(standard):
         if factors is not None:
             transverse[kind], root_transverse[kind] = factors.transverse, factors.root_transverse
-            of_part_1[kind] = factors.dynamic.factor
+            of_part_1[kind], over_width[kind] = factors.dynamic.factor, factors.face
+    if any(standard) and by_deviations:
+        width, sources["face"] = over_width, f"part 1, method C, class {given.quality}, shafts and bearings rigid"
     if any(standard):
         sources["transverse"] = f"part 1, class {given.quality}"
         sources.setdefault("dynamic", f"part 1, method B, class {given.quality}")
@@ -454,17 +494,24 @@ def mesh_load_factors(
         given.application_factor,
         sharing,
         dynamic,
-        face,
+        width,
         transverse,
         root_transverse,
         sources,
         "; ".join(dict.fromkeys(messages)),
+        _has_given_meshes(case),
     )
     return factors, tuple(standard)
 
 
+def _has_given_meshes(case: Any) -> bool:
+    """Whether the meshes of a planar or helical case have a given stiffness."""
+    sections = (getattr(case, name, None) for name in ("planar", "helical"))
+    return any(section is not None and section.mesh_stiffness is not None for section in sections)
+
+
 def _largest_standard(
-    case: Any, kind: int, frequencies: Sequence[float], *, quality: int | None, **load: float
+    case: Any, kind: int, frequencies: Sequence[float], *, quality: int | None, **load: Any
 ) -> StandardFactors | None:
     """Factors of part 1 at the mesh frequency with the largest K_v; None without a class, a load or a speed."""
     if quality is None or not frequencies or load["torque"] == 0.0:

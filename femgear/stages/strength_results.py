@@ -208,6 +208,8 @@ def factor_names(factors: MeshLoadFactors) -> list[str]:
 def _missing_factors(factors: MeshLoadFactors, *, planets: bool) -> Iterator[str]:
     """Say of the load factors that nothing told what would give them; without planets there is no K_gamma."""
     wanted = {name: text for name, text in _GIVEN_BY.items() if planets or name != "sharing"}
+    if factors.given_meshes:
+        wanted["face"] = "K_Hβ (strength.quality)"
     missing = [text for name, text in wanted.items() if name not in factors.sources]
     if missing:
         yield f"taken as 1, in brackets what gives them: {', '.join(missing)}"
@@ -269,6 +271,8 @@ def _factors_of(rating: Rating, kind: int) -> str:
         resonance = f"N {dynamic.resonance_ratio:.3f}, {dynamic.range}"
         texts.append(f"K_Fα {of_part_1.root_transverse:.3f}")
         texts.append(f"by part 1 K_v {dynamic.factor:.3f} (method B, {resonance}) and {by_speed} (method C)")
+        if not factors.sources.get("face", "").startswith("part 1"):
+            texts.append(f"K_Hβ {of_part_1.face:.3f} (method C, shafts and bearings rigid)")
     return ", ".join(texts)
 
 

@@ -11,6 +11,7 @@ from femgear.gears.iso6336_load import (
     dynamic_factor_of_speed,
     face_load_factor,
     face_running_in,
+    mesh_misalignment_of_tolerances,
     reduced_mass,
     resonance_speed,
     running_in,
@@ -97,6 +98,16 @@ def test_face_load_factor_is_that_of_linear_teeth():
     assert face_load_factor(10e-6, 100e3, 11e9) == pytest.approx(1.55)
     assert face_load_factor(100e-6 / 5.5, 100e3, 11e9) == pytest.approx(2.0)
     assert face_load_factor(60e-6, 100e3, 11.084e9) == pytest.approx(3.647, abs=5e-4)
+
+
+def test_misalignment_of_tolerances_has_a_least_value():
+    """By hand: 1.33 * 0.023 * 200 (20/50)^2 = 0.979 um bent, sqrt(6^2 + 8^2) = 10 um of manufacture."""
+    slopes, size = (6e-6, 8e-6), {"width": 20e-3}
+    bent = mesh_misalignment_of_tolerances(200e3, slopes, **size, pinion_diameter=50e-3)
+    assert bent == pytest.approx(10e-6 + 1.33 * 0.023e-6 * 200.0 * 0.16, rel=1e-12)
+    assert mesh_misalignment_of_tolerances(200e3, slopes, **size) == pytest.approx(10e-6)
+    # 0.005 um mm/N of the load
+    assert mesh_misalignment_of_tolerances(3000e3, slopes, **size) == pytest.approx(15e-6)
 
 
 def test_running_in_by_material_and_speed():

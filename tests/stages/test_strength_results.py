@@ -102,7 +102,23 @@ def test_sets_whose_mesh_stiffness_is_given_are_rated_by_teeth_and_torque(name, 
     assert rows["safety S_F, ISO 6336-3:2019"].startswith(f"sun {rating.flanks[0].root_safety:.2f}")
     assert "smallest safety" in rows and len(table.rows) == 4
     (missing,) = [note for note in verdict.notes if note.startswith("taken as 1")]
-    assert all(symbol in missing for symbol in ("K_γ (", "K_v (", "K_Hβ (", "K_Hα"))
+    assert all(symbol in missing for symbol in ("K_γ (", "K_v (", "K_Hβ (strength.quality)", "K_Hα"))
+    # a flank tolerance class gives K_Hbeta by method C: nothing else can
+    rated = rate_case(with_values(case, {"strength.quality": 6}))
+    assert rated.factors.face == pytest.approx([of_kind.face for of_kind in rated.standard])
+    assert (rated.factors.face > 1.0).all() and "method C" in rated.factors.sources["face"]
+    assert not any("K_Hβ (" in note for note in safety_notes(rated) if note.startswith("taken as 1"))
+
+
+def test_teeth_with_a_contact_keep_its_face_load_factor(pair):
+    """Method C stands beside it, for information."""
+    classed = with_values(pair, {**LIMITS, "strength.quality": 6})
+    rated = rate_case(classed)
+    assert rated.factors.face == pytest.approx([1.0]) and rated.standard[0].face > 1.0
+    computed = rate_case(classed, face=np.array([1.2]))
+    assert computed.factors.face == pytest.approx([1.2]) and computed.standard[0].face == rated.standard[0].face
+    (block,) = [strength_block(rated, ["gear 1-gear 2"])]
+    assert f"K_Hβ {rated.standard[0].face:.3f} (method C" in " ".join(block.notes)
 
 
 def test_what_is_missing_for_a_safety_is_named_by_its_key(pair):
