@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 import math
+import tomllib
 from typing import Any
 
 import numpy as np
@@ -15,10 +17,13 @@ from published.wind_turbine_drivetrain import (
 )
 from two_wheels import RADII, STIFFNESS, TEETH, two_wheels
 
-from femgear.solvers.time.flank_motion import Records, march_flanks
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
+from femgear.solvers.periodic.solution import PeriodicSolution
+from femgear.solvers.time.flank_motion import MarchedRun, Records, march_flanks
 from femgear.solvers.time.free_turn import TorqueHistory
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import harmonics_of
+from femgear.trains.gearbox.balance import held_together, loaded_lines
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.excitation import pair_count_excitation
 from femgear.trains.gearbox.geometry import set_sizes
@@ -283,3 +288,123 @@ def contact_loss() -> tuple[Row, ...]:
         at_most("contact loss", "closed form", f"{text} approach over its range", 1e-4, error),
         at_most("contact loss", "theory", f"{text} energy balance", 1e-9, run.energy_balance.error),
     )
+
+
+LOOSE = ("carrier 1", "carrier 2 upwind", "carrier 2 downwind", "wheel upwind", "wheel downwind")
+"""Bearings of the five-megawatt chain that have play."""
+CHAIN_TIME = "harmonic balance, integration in time from its state"
+
+
+def chain_in_its_play() -> tuple[Row, ...]:
+    """Five-megawatt chain under torque and weight, with play: both carriers turn, meshes have constant stiffness."""
+    duration, rate = 5.0, 1e3
+    model = loose_chain(duration, rate)
+    carriers = {"first stage carrier", "second stage carrier"}
+    solution = chain_balance(model, {name: 4 for name in carriers}, {})
+    run, apart = chain_apart(model, solution)
+    # once around: how unequally the planets of a stage are loaded
+    names = np.array(run.meshes)
+    first = run.force[:, [name.startswith("first stage") for name in names]]
+    rows = [at_most("five-megawatt chain", CHAIN_TIME, _largest("mesh forces over a turn"), 1e-4, apart["meshes"])]
+    rows.append(at_most("five-megawatt chain", CHAIN_TIME, _largest("bearing forces over a turn"), 1e-4, apart["play"]))
+    uneven = first.max() / first.mean()
+    tight = loose_chain(duration, rate, play="0 um")
+    held = chain_apart(tight, chain_balance(tight, {name: 4 for name in carriers}, {}))[0]
+    without = held.force[:, : len(names)][:, [name.startswith("first stage") for name in names]]
+    text = "largest force of a planet of the first stage over its mean, play of 0.1 mm; reference: without play"
+    rows.append(information("five-megawatt chain", CHAIN_TIME, text, without.max() / without.mean(), uneven))
+    return tuple(rows)
+
+
+def chain_side_bands() -> tuple[Row, ...]:
+    """The same with tooth pairs of the second stage that come and go: side bands of both carriers."""
+    model = loose_chain(0.02, 6.4e4, contact_ratio=1.6, harmonics=1)
+    carriers = {"first stage carrier": 2, "second stage carrier": 2}
+    solution = chain_balance(model, carriers, {"second stage mesh": 13})
+    apart = chain_apart(model, solution)[1]
+    text = _largest("mesh forces over 1.5 mesh periods, second stage excites")
+    return (at_most("five-megawatt chain", CHAIN_TIME, text, 1e-4, apart["meshes"]),)
+
+
+def _largest(what: str) -> str:
+    return f"{what}, largest difference over the largest"
+
+
+def loose_chain(
+    duration: float, rate: float, *, play: str = "100 um", contact_ratio: float | None = None, harmonics: int = 1
+) -> GearboxInTime:
+    """Make the five-megawatt chain with play in its bearings ready for time, its flanks parting."""
+    with open("cases/five_megawatt_chain.toml", "rb") as file:
+        tables = tomllib.load(file)
+    for bearing in tables["bearing"]:
+        if bearing["name"] in LOOSE:
+            bearing["clearance"] = play
+    if contact_ratio:
+        for mesh in ("sun_mesh", "ring_mesh"):
+            tables["planetary"][1][mesh]["contact_ratio"] = contact_ratio
+    entries = {"harmonics": harmonics, "contact_loss": True, "duration": f"{duration} s", "rate": f"{rate} Hz"}
+    case = read_case(tables | {"transient": entries})
+    return gearbox_in_time(solve_deflection(case), case.transient)
+
+
+def chain_balance(model: GearboxInTime, carriers: dict[str, int], meshes: dict[str, int]) -> PeriodicSolution:
+    """Solve for the motion of all stages at once, with lines up to orders of some base frequencies by name."""
+    box, highest = model.box, carriers | meshes
+    ranges = [range(-highest.get(name, 0), highest.get(name, 0) + 1) for name in box.bases]
+    turning = [box.bases.index(name) for name in carriers]
+    orders = np.array([order for order in itertools.product(*ranges) if _is_line(order, turning, carriers)])
+    orders = orders[np.argsort(orders.any(axis=1), kind="stable")]
+    samples = tuple(
+        max(4 * highest[name], 16) if name in carriers else max(4 * highest[name], 32) if name in meshes else 1
+        for name in box.bases
+    )
+    options: dict[str, Any] = {"orders": orders, "samples": samples, "stability": False, "radius": False}
+    held = solve_harmonic_balance(held_together(box), box.frequency, start=loaded_lines(box, len(orders)), **options)
+    solution = solve_harmonic_balance(box.problem, box.frequency, start=held, **options)
+    assert solution.converged
+    return solution
+
+
+def _is_line(order: tuple[int, ...], turning: list[int], carriers: dict[str, int]) -> bool:
+    """One of a line and its conjugate, with no more orders of carriers in all than of one."""
+    few = sum(abs(order[base]) for base in turning) <= max(carriers.values())
+    return few and order >= tuple(-value for value in order)
+
+
+def chain_apart(model: GearboxInTime, solution: PeriodicSolution) -> tuple[MarchedRun, dict[str, float]]:
+    """Integrate from the state of a balance on: the run, largest differences of forces over the largest."""
+    box, spun = model.box, model.spun
+    transient = box.deflection.model.case.transient
+    assert transient is not None
+    lines, omega = displacements(box.problem, solution), solution.line_frequency
+    place, velocity = lines.sum(axis=1).real, (1j * omega * lines).sum(axis=1).real
+    place = place - spun.spin * (spun.carried @ place) / spun.inertia
+    run = march_flanks(
+        spun,
+        [(torque, model.rotation(torque.body)) for torque in model.torques],
+        duration=transient.duration,
+        step=1.0 / transient.rate,
+        speed=model.speed,
+        start=(place, velocity),
+        outputs=spun.basic.T,
+        contact_loss=True,
+    )
+    x, theta = solution.at(run.time), run.time[:, None] * box.frequency
+    meshes = np.hstack(
+        [_drive_forces(front, x, theta) for front, _ in box.flanks],
+    )
+    apart = {"meshes": float((np.abs(meshes - run.force).max(axis=0) / meshes.max(axis=0)).max()), "play": 0.0}
+    pressed = []
+    for ring in box.bearings.values():
+        columns = ring.columns
+        forces = [ring.evaluate(motion[:, columns], None)[0][:, 0] for motion in (x, run.motion)]
+        pressed.append((np.abs(forces[0] - forces[1]).max(), np.abs(forces[0]).max()))
+    if pressed:
+        apart["play"] = float(max(one for one, _ in pressed) / max(size for _, size in pressed))
+    return run, apart
+
+
+def _drive_forces(element: Any, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
+    if hasattr(element, "flank_forces"):
+        return np.maximum(element.flank_forces(x[:, element.columns], theta)[1], 0.0)
+    return element.forces(x[:, element.columns], theta)

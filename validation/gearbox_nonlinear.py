@@ -9,7 +9,7 @@ import numpy as np
 from casings import casing_tables
 from gearbox_equivalents import pair_of_rigid_gears_tables, set_tables
 from scipy.integrate import solve_ivp
-from small_gearbox import planetary_tables
+from small_gearbox import loose_pair_tables, planetary_tables
 
 from femgear.case.gear_set import planetary_set
 from femgear.housing.two_way.running_planets import solve_running
@@ -17,14 +17,16 @@ from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.solvers.time.transient import solve_transient
-from femgear.stages.lumped_set import Gravity, gear_set_problem
+from femgear.stages.lumped_set import Bearings, Gravity, MemberBearing, gear_set_problem
 from femgear.stages.static import solve_static
 from femgear.system.assembly import Assembly
 from femgear.system.fourier import side_bands
 from femgear.system.mesh_directions import mesh_elements
 from femgear.system.rigid_bodies import PlanarBody, PlanarSet, PlanarTorque
 from femgear.system.system import MechanicalSystem, MeshExcitation, NonlinearSystem
+from femgear.trains.gearbox.balance import forces_of_bearings, loaded_lines
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.excitation import excitation_of
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, centrifugal_pull, nonlinear_gearbox, wave_generator
 from femgear.trains.gearbox.stage_structure import running_stage
 from femgear.trains.pair.model import pair_excitation, pair_model, separating_pair
@@ -295,3 +297,73 @@ def turning_in_time() -> tuple[Row, ...]:
         assert parted > 0.0 and behind > 0.0
         rows.append(at_most(name, IN_TIME, text, 1e-6, apart))
     return tuple(rows)
+
+
+def loose_carrier() -> tuple[Row, ...]:
+    """A rigid set under torque and weight whose carrier rolls in the play of a bearing, with planets that turn."""
+    data = rigid_set(held=1e6)
+    data = replace(data, carrier=replace(data.carrier, support=2e7))
+    stiffness, play, turn, mesh, weight = 3e8, 4e-6, 20.0, 2.0 * np.pi * 1300.0, 30.0
+    drive = wave_of_stiffness(data, np.inf)
+    tables = set_tables(data, TEETH) | {"gravity": {"acceleration": f"{weight} m/s^2"}}
+    tables["bearing"].append(
+        {"name": "loose", "shaft": "set carrier", "radial": f"{stiffness} N/m", "clearance": f"{2.0 * play} m"}
+    )
+    speed = {"set carrier": f"{turn} rad/s", "set ring": "0 rpm"}
+    tables["operation"]["load_case"] = [{"torque": {"set sun": "100 N m"}, "speed": speed}]
+    found = solve_deflection(read_case(tables))
+    box = nonlinear_gearbox(found, {"set": drive}, harmonics=4, damping_ratio=0.0, separates=False)
+    known = {"separates": False, "backlash": drive.backlash, "harmonics": 4, "orders": (0, 1)}
+    wanted = gear_set_problem(
+        data,
+        meshes=mesh_elements(data, stiffness=drive, **known),
+        torque=PlanarTorque(100.0, "sun", "carrier"),
+        gravity=Gravity(weight, -0.5 * np.pi, (1, 0)),
+        carrier_speed=turn,
+        bearings=Bearings(None, (MemberBearing(stiffness, play, "carrier"),)),
+    )
+    orders = side_bands(10, 6, 10)
+    options: dict[str, Any] = {"orders": orders, "stability": False, "radius": False, "samples": (128, 64)}
+    problem = replace(box.problem, system=without_pull(found, box))
+    start = loaded_lines(box, len(orders))
+    ours = solve_harmonic_balance(problem, [turn, mesh], start=start, tolerance=1e-12, **options)
+    reference = solve_harmonic_balance(wanted, [turn, mesh], tolerance=1e-12, **options)
+    times = np.linspace(0.0, 2.0 * np.pi / turn, 701)
+    meshes = [
+        flank_forces(replace(one, elements=one.elements[:1]), solution, times)
+        for one, solution in ((problem, ours), (wanted, reference))
+    ]
+    apart = np.abs(meshes[0] - meshes[1]).max() / np.abs(meshes[1]).max()
+    # the planar set moves in axes that turn with its carrier
+    place, turned = ours.at(times)[:, -2:], reference.at(times)[:, -2:]
+    there, expected = place @ [1.0, 1.0j], turned @ [1.0, 1.0j] * np.exp(1j * turn * times)
+    assert np.abs(there).min() < play < np.abs(there).max()
+    rolled = np.abs(there - expected).max() / np.abs(expected).max()
+    name = "planar set, its carrier in a bearing with play, weight"
+    return (
+        at_most(name, PLANAR, "forces of all flanks over time, largest difference over the largest", 1e-6, apart),
+        at_most(name, PLANAR, "motion in the bearing over time, largest difference over the largest", 1e-6, rolled),
+    )
+
+
+def loose_pair() -> tuple[Row, ...]:
+    """Two rigid gears under weight, one in a bearing that carries nothing for half of the time."""
+    found = solve_deflection(read_case(loose_pair_tables("20 um", weight="28 kg")))
+    drive = excitation_of(found, found.model.stages[0])
+    error = 5e-6 * np.cos(2.0 * np.pi * np.arange(drive.deflection.shape[1]) / drive.deflection.shape[1])
+    drive = replace(drive, deflection=drive.deflection + error)
+    box = nonlinear_gearbox(found, {"stage": drive}, harmonics=2, damping_ratio=0.05, separates=False)
+    omega, harmonics = 2.0 * np.pi * 250.0, 64
+    options = {"harmonics": harmonics, "samples": 8192, "stability": False, "radius": False}
+    solution = solve_harmonic_balance(box.problem, omega, **options)
+    loose = float((forces_of_bearings(box, solution) == 0.0).mean())
+    assert 0.4 < loose < 0.6
+    lines, order = displacements(box.problem, solution), np.arange(harmonics + 1)
+    start = lines.sum(axis=1).real, (1j * omega * order * lines).sum(axis=1).real
+    times = np.linspace(0.0, 4.0 * np.pi / omega, 65)
+    motion = solve_transient(box.problem, omega, times, start=start, method="DOP853", tolerance=1e-11)
+    wanted = motion.deflection
+    apart = np.abs(solution.at(times) - wanted).max(axis=0) / np.ptp(wanted, axis=0)
+    text = "motions of mesh and bearing over two periods, largest difference over the range"
+    name = "pair in a bearing with play, without load for half of the time"
+    return (at_most(name, "DOP853", text, 1e-6, float(apart.max())),)

@@ -445,12 +445,18 @@ THEMES = (
     Theme(
         "gearbox_nonlinear",
         "Gearboxes whose teeth part",
-        "Contact loss, back flanks that wedge, weight and turning planets on uneven supports, on one assembled system. "
+        "Contact loss, back flanks that wedge, weight, bearings with play and turning planets on uneven supports, on "
+        "one assembled system. "
         "Compared with: the trains of a pair and of a planar set, by harmonic balance; the linear response; the "
         "same bodies in axes at rest, integrated by DOP853. "
-        "Gates: 1e-9; 1e-8 of the linear response; 1e-6 in time.",
+        "Gates: 1e-9; 1e-8 of the linear response; 1e-6 in time and with play.",
         (gearbox_nonlinear.pairs, gearbox_nonlinear.linear_meshes),
-        (gearbox_nonlinear.planar_sets, gearbox_nonlinear.turning_in_time),
+        (
+            gearbox_nonlinear.planar_sets,
+            gearbox_nonlinear.turning_in_time,
+            gearbox_nonlinear.loose_carrier,
+            gearbox_nonlinear.loose_pair,
+        ),
     ),
     Theme(
         "moving",
@@ -518,8 +524,9 @@ THEMES = (
         "drivetrain",
         "Wind turbine drivetrain",
         "Gearboxes integrated in time. Compared with: the train of drivetrains that had these cases before, modes, "
-        "histories and spectra; the integrator of any nonlinear system; closed forms, energy and momentum; gates: "
-        "0.1 %; 1e-9, of lines 1e-8; 1e-6.",
+        "histories and spectra; the integrator of any nonlinear system; closed forms, energy and momentum; harmonic "
+        "balance of a whole chain in the play of its bearings; gates: 0.1 %; 1e-9, of lines 1e-8; 1e-6; 1e-4 of the "
+        "chain.",
         (
             drivetrain.shaft_joints,
             drivetrain.kinematics,
@@ -534,7 +541,7 @@ THEMES = (
             drivetrain.growth,
             drivetrain.contact_loss,
         ),
-        (drivetrain.former_spectra, drivetrain.minute),
+        (drivetrain.former_spectra, drivetrain.minute, drivetrain.chain_in_its_play, drivetrain.chain_side_bands),
     ),
     Theme(
         "bearings",
