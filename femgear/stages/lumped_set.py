@@ -335,6 +335,7 @@ def mixed_modes(modes: Modes, Q: np.ndarray) -> Modes:
         shape=modes.shape @ Q,
         mesh_deflection=modes.mesh_deflection @ Q,
         modal_load=None if modes.modal_load is None else Q.T @ modes.modal_load,
+        source_load=None if modes.source_load is None else Q.T @ modes.source_load,
     )
 
 

@@ -144,32 +144,47 @@ def solve_static(
     width = over_width(case, gears, cache=cache, steps=steps)
     sun_torque = case.torque_on_first_gear()
     periods, period_message = common_period(deviations, gears, limit=case.static.longest_record)
-    cycle = walk_mesh_cycle(
-        gears,
-        bodies,
-        sun_torque=sun_torque,
-        positions=record_positions(case, gears),
-        contact=case.static.contact,
-        # thickness errors separate the back flanks alone
-        deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
-        supports=static_supports(case),
-        periods=periods,
-        options=CycleOptions(
-            both_flanks=case.static.back_flanks,
-            # pressures of the plane contact are not those of slices
-            pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
-            peaks=True,
-            friction=acting_friction(case, gears),
-            progress=partial(progress, "contact"),
-            **width,
-        ),
+    options = CycleOptions(
+        both_flanks=case.static.back_flanks,
+        # pressures of the plane contact are not those of slices
+        pressures=case.static.stresses and periods == 1 and case.static.slices < 2,
+        peaks=True,
+        friction=acting_friction(case, gears),
+        progress=partial(progress, "contact"),
+        **width,
     )
+    cycle = _case_cycle(case, gears, bodies, deviations, periods, options)
     _check_motions(case, cycle, gears.gears[0].module)
     overlap = _overlap(case, gears) if cycle.helical else 0.0
     base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
     parts = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
     drawing = drawing_attributes(case)
     return StaticResult(*parts, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"), drawing=drawing)
+
+
+def _case_cycle(
+    case: Any, gears: GearSet, bodies: Bodies, deviations: SetDeviations, periods: int, options: CycleOptions
+) -> MeshCycle:
+    """Walk through the mesh cycle of a case."""
+    return walk_mesh_cycle(
+        gears,
+        bodies,
+        sun_torque=case.torque_on_first_gear(),
+        positions=record_positions(case, gears),
+        contact=case.static.contact,
+        # thickness errors separate the back flanks alone
+        deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
+        supports=static_supports(case),
+        periods=periods,
+        options=options,
+    )
+
+
+def frictionless_cycle(case: Any, static: StaticResult) -> MeshCycle:
+    """Solve the positions of a static solution without the friction that acts in it."""
+    gears = static.planetary_set
+    options = CycleOptions(**over_width(case, gears, waves=static.waves))
+    return _case_cycle(case, gears, static.bodies, set_deviations(case), static.cycle.periods, options)
 
 
 def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:

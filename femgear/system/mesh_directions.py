@@ -57,6 +57,7 @@ def gear_set_system(
     carrier_speed: float = 0.0,
     back_flanks: bool = False,
     planet_bearings: bool = False,
+    friction: bool = False,
 ) -> MechanicalSystem:
     """Assemble the matrices of a planetary set; the meshes are columns of ``W`` and not in ``K``.
 
@@ -78,6 +79,9 @@ def gear_set_system(
         (Y. Guo and R. G. Parker, Eur. J. Mech. A 29, 2010, 1022-1033: tooth wedging).
     planet_bearings : bool
         They become columns of ``W``, radial and tangential, planet less pin; their stiffness is not in ``K``.
+
+    friction : bool
+        Gives sources for the friction of the flanks, `friction_directions`, and for what is lost at the output.
 
     Returns
     -------
@@ -110,7 +114,7 @@ def gear_set_system(
         stiffness -= carrier_speed**2 * np.diag(along)
         load[9::3] += carrier_speed**2 * data.planet.mass * data.centre_distance
         gyroscopic = _gyroscopic(along)
-    return assemble(
+    system = assemble(
         masses.ravel(),
         stiffness,
         np.hstack(columns),
@@ -119,6 +123,12 @@ def gear_set_system(
         dofs=np.array(dof_names(data))[kept].tolist(),
         gyroscopic=gyroscopic,
     )
+    if not friction:
+        return system
+    taken = np.zeros(kept.size)
+    if torque is not None and torque.output is not None:
+        taken[len(data.axes) * (CENTRAL.index(torque.output) + 1) - 1] = 1.0
+    return replace(system, sources=T.T @ np.column_stack([friction_directions(data, flank), taken]))
 
 
 def dof_names(data: RigidSet) -> tuple[str, ...]:
@@ -273,6 +283,14 @@ def mesh_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
     ``delta_rn = y_r cos psi_rn - x_r sin psi_rn + zeta_n sin alpha_r - eta_n cos alpha_r + u_r - u_n``
     """
     return station_motions(data).T @ set_assembly(data, flank).columns
+
+
+def friction_directions(data: RigidSet, flank: int = 1) -> np.ndarray:
+    """Make the directions (n, 4N S) of friction along the flanks of all slices, then of its moments.
+
+    In all coordinates, see `femgear.system.assembly.Assembly.sliding_columns`.
+    """
+    return station_motions(data).T @ set_assembly(data, flank).sliding_columns
 
 
 def pin_directions(data: RigidSet) -> np.ndarray:

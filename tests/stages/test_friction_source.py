@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from femgear.gears.friction import sliding_per_path
 from femgear.housing.orders import order_level
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.stages.losses import solve_losses
@@ -15,6 +16,7 @@ from femgear.stages.static import solve_static
 from femgear.system.fourier import harmonics_of, sample
 from femgear.system.system import mesh_harmonics, source_harmonics
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
+from femgear.trains.helical.stages import solve_helical_dynamics, solve_helical_modes, solve_helical_static
 from femgear.trains.pair.stages import solve_pair_dynamics, solve_pair_modes
 from femgear.trains.reading import read_case, with_values
 
@@ -180,6 +182,54 @@ def test_the_statics_lose_what_the_losses_say_to_first_order():
     loss = 1.0 - solve_losses(plain, solve_static(plain)).points[0].flow.efficiency
     # of 0.9 % a few per cent are of the second order, or of the places between positions
     assert 1.0 - passed == pytest.approx(loss, rel=0.05)
+
+
+@cache
+def helical():
+    changed = ACTS | {"static.flank_elements": 8, "carrier.inertia": "1e6 kg m^2", "helical.slices": 3}
+    case = with_values(read_case(CASES / "helical_30_20_70.toml"), changed | {"operation.speeds": ["1000 rpm"]})
+    return case, solve_helical_modes(case, solve_helical_static(case))
+
+
+def test_helical_teeth_at_rest_are_in_the_equilibrium_of_their_statics():
+    """A heavy carrier stands still; planets share as their pins let them, their sum is the load."""
+    _, modes = helical()
+    response = solve_spectral(modes.modes, modes.excitation, 0.01, excitation_harmonics=12, response_harmonics=60)
+    static = modes.excitation.every_harmonic[2][:, :8].reshape(2, -1, 8).sum(axis=1)
+    assert np.abs(static[:, 1:]).max() > 1e-3 * static[0, 0].real
+    moving = response.force[0, :, :8].reshape(2, -1, 8).sum(axis=1)
+    assert np.abs(moving - static).max() < 1e-4 * np.abs(static[:, 1:]).max()
+
+
+def test_helical_teeth_without_friction_are_quieter():
+    case, modes = helical()
+    dynamics = solve_helical_dynamics(case, modes)
+    plain = with_values(case, {"losses": None})
+    before = solve_helical_modes(plain, solve_helical_static(plain))
+    assert modes.frictionless.force == pytest.approx(before.excitation.force, rel=1e-12)
+    levels = [
+        (np.abs(loads["support"][0, :, :3, 1:]) ** 2).sum()
+        for loads in (dynamics.loads, solve_helical_dynamics(plain, before).loads)
+    ]
+    assert dynamics.friction_change == pytest.approx(10.0 * np.log10(levels[0] / levels[1]), abs=1e-3)
+    assert dynamics.friction_change[0] > 1.0
+
+
+def test_friction_works_by_the_sliding_of_rigid_gears_alone():
+    """Turning without strain slides at the pitch point by nothing, and beside it by the relative speed of the gears."""
+    of_pair, of_set, of_helical = pair(), planetary(), helical()
+    for gears, system, basis in (
+        (of_pair[1].planetary_set, of_pair[2].model.system, of_pair[2].modes),
+        (of_set[1].planetary_set, of_set[2].model.system, of_set[2].modes),
+        (of_helical[1].planetary_set, of_helical[1].system, of_helical[1].modes),
+    ):
+        (turning,) = basis.shape[:, basis.frequency == 0.0].T
+        columns, scale = system.W.shape[1], np.abs(turning).max()
+        slid, turned = np.split((system.sources.T @ turning)[:-1].reshape(2, columns), 2)
+        assert max(np.abs(slid).max(), np.abs(system.W.T @ turning).max()) < 1e-8 * scale
+        relative = [sliding_per_path(kind) / kind.gear_1.base_radius for kind in gears.kinds]
+        rolling = turned.reshape(len(relative), -1) / np.array(relative)[:, None]
+        assert rolling == pytest.approx(np.full(rolling.shape, rolling[0, 0]))
 
 
 def test_sources_are_those_of_the_loaded_state():

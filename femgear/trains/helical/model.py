@@ -53,6 +53,7 @@ from femgear.system.system import MeshExcitation
 from femgear.trains.helical.section import HelicalCase
 
 if TYPE_CHECKING:
+    from femgear.contact.cycle import MeshCycle
     from femgear.gears.planetary import PlanetarySet
 
 # Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.
@@ -245,6 +246,26 @@ def helical_excitation(record: MeshExcitation, overlap_ratio, *, slices: int = 1
     )
 
 
+def helical_friction(
+    cycle: MeshCycle, overlap_ratio: np.ndarray, *, slices: int = 1, hand: int = 1, reversed_time: bool = False
+) -> np.ndarray | None:
+    """Make the loads (4N S + 1, P) of friction on all slices from the record of spur teeth; None without.
+
+    Forces along the flanks [N], then their moments about the pitch points [N m], as they act on the coordinates along
+    `femgear.system.mesh_directions.friction_directions`, and zeros for what takes their mean. Slices are those of
+    `helical_excitation`.
+    """
+    if cycle.friction_force is None or cycle.friction_moment is None:
+        return None
+    count = len(cycle.friction_force)
+    ahead = slice_phases(np.zeros(count), overlap_ratio, slices=slices, hand=hand).reshape(count, slices)
+    rows = list[np.ndarray]()
+    for values in (cycle.friction_force, cycle.friction_moment):
+        record = np.roll(values[:, ::-1], 1, axis=1) if reversed_time else values
+        rows.append(-_sliced(record, cycle.periods, ahead, overlap_ratio / slices).reshape(count * slices, -1) / slices)
+    return np.concatenate([*rows, np.zeros((1, rows[0].shape[1]))])
+
+
 def slice_phases(phases, overlap_ratio, *, slices: int, hand: int = 1) -> np.ndarray:
     """Compute phases (n_meshes S,) of the slices, in mesh periods, from those at mid-face (n_meshes,).
 
@@ -413,9 +434,9 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
     far apart, a torque that no teeth carry. E-PERIODS: a static record of several mesh periods. E-GEOMETRY:
     virtual gears that cannot be made.
     """
-    no_acting_friction(case, "helical sets in space have no place for friction along the flanks")
     _check_supports(case, gears)
     if case.helical.mesh_stiffness is not None:
+        no_acting_friction(case, "a given helical.mesh_stiffness has no tooth loads, and so no friction")
         return
     _check_torque(case, gears)
     check_one_period(case, gears, "the helical model takes")

@@ -67,6 +67,8 @@ class HelicalModesResult(StageResult):
     excitation, whole : MeshExcitation, optional
         Along the tooth normals, a row a slice, and a row a mesh at its static state with fixed centres; None where
         the mesh stiffness is given.
+    frictionless : MeshExcitation, optional
+        ``excitation`` without the friction that acts.
     """
 
     planetary_set: PlanetarySet
@@ -78,6 +80,7 @@ class HelicalModesResult(StageResult):
     section: SectionStiffness | None = None
     excitation: MeshExcitation | None = None
     whole: MeshExcitation | None = None
+    frictionless: MeshExcitation | None = None
 
     def contents(self) -> Contents:
         """Collect the contents of modes.nc of a helical case: six motions of all bodies, no elastic ring."""
@@ -116,7 +119,8 @@ class HelicalDynamicsResult(StageResult):
 
     ``modes`` are those it is made of, ``speeds`` those of the members, ``response`` the harmonics of the meshes.
     ``loads`` holds complex harmonics by name: ``pin`` (speeds, N, 6, H + 1) and ``support``
-    (speeds, 3, 6, H + 1), three forces [N] and three moments [N m] each.
+    (speeds, 3, 6, H + 1), three forces [N] and three moments [N m] each. ``friction_change`` (speeds,) [dB] is what
+    friction adds to the forces of all supports, where it acts.
     """
 
     modes: HelicalModesResult
@@ -125,6 +129,7 @@ class HelicalDynamicsResult(StageResult):
     response: Response
     stability: Stability
     loads: dict[str, np.ndarray]
+    friction_change: np.ndarray | None = None
 
     @property
     def converged(self) -> bool:
@@ -184,8 +189,12 @@ class HelicalDynamicsResult(StageResult):
             ("support_force", on_member, support[:, :, :3], "N", "force of the support on the member"),
             ("support_moment", on_member, support[:, :, 3:], "N m", "moment of the support on the member"),
         )
+        variables = response_variables(self) | complex_entries(entries)
+        if self.friction_change is not None:
+            words = "what the friction of the teeth adds to the fluctuation of the forces of all supports"
+            variables["friction_change"] = ("speed", self.friction_change, "dB", words)
         return Contents(
-            response_variables(self) | complex_entries(entries),
+            variables,
             coords=_coordinates(self),
             attrs={
                 "title": "periodic response of the helical set by the spectral method",

@@ -14,12 +14,14 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, check_entries, static_entries
 from femgear.case.gear_set import planetary_set
+from femgear.case.tooth_friction import friction_acts
 from femgear.errors import CaseError
 from femgear.gears import profile
-from femgear.report.tables import describe_modes, describe_response
-from femgear.solvers.linear.modal import output_load, output_response, residual_output
+from femgear.report.tables import Block, describe_modes, describe_response
+from femgear.solvers.linear.modal import output_load, output_response, residual_output, source_output
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
+from femgear.stages.friction_source import balanced_source, friction_rows
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE, LifeResult, solve_life
 from femgear.stages.losses import LOSSES
@@ -41,12 +43,25 @@ from femgear.stages.protocol import (
     response_verdict,
     silent,
 )
-from femgear.stages.static import STATIC, STRESS, mesh_backlash, solve_static, solve_stress
+from femgear.stages.static import (
+    STATIC,
+    STRESS,
+    frictionless_cycle,
+    mesh_backlash,
+    solve_static,
+    solve_stress,
+)
 from femgear.stages.static_results import StaticResult, StressResult, describe_set, set_warnings
 from femgear.stages.strength_results import strength_verdict
 from femgear.stages.tooth_figures import tooth_key_figures
 from femgear.stages.train_judgements import set_judgements
-from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_directions, pin_directions
+from femgear.system.mesh_directions import (
+    free_motions,
+    friction_directions,
+    gear_set_system,
+    mesh_directions,
+    pin_directions,
+)
 from femgear.system.mode_kinds import gear_set_motions, phasing
 from femgear.system.rigid_bodies import flank_sign
 from femgear.system.system import MeshExcitation, Response
@@ -56,6 +71,7 @@ from femgear.trains.helical.model import (
     contact_ratios,
     helical_data,
     helical_excitation,
+    helical_friction,
     normal_record,
     section_stiffness,
     shared_load,
@@ -69,6 +85,9 @@ from femgear.trains.helical.results import (
 from femgear.trains.helical.section import HelicalCase
 
 if TYPE_CHECKING:
+    import xarray as xr
+
+    from femgear.contact.cycle import MeshCycle
     from femgear.storage.results import Results
 
 _NOTHING_EXCITES = "a given helical.mesh_stiffness does not vary: nothing excites the set"
@@ -137,7 +156,7 @@ def solve_helical_modes(
     """
     gears = planetary_set(case)
     check_helical_case(case, gears)
-    excitation, whole = None, None
+    excitation, whole, frictionless = None, None, None
     if case.helical.mesh_stiffness is None:
         static = needed(static, "static")
         check_entries(static, StaticResult, static_entries(_drive_flanks(case)), "static solution")
@@ -145,22 +164,32 @@ def solve_helical_modes(
         if case.helical.section == "normal" and not in_contact:
             section = section or section_stiffness(case, gears, cache=cache)
             factor = section.factor
-        sense, cycle, beta = rotation_sense(case, gears), static.cycle, case.helical.helix_angle
+        sense, beta = rotation_sense(case, gears), case.helical.helix_angle
         # contact in slices has the helix in it
         overlap = np.repeat(contact_ratios(gears, helix_angle=beta)[:, 1], gears.n_planets) * (not in_contact)
         base = profile.base_helix_angle(case.sun.pressure_angle, beta)
-        spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, mesh_backlash(gears))
-        record = normal_record(spur, factor, base, reversed_time=sense < 0)
         hand = sense * (1 if case.helical.hand == "right" else -1)
+        sliced = {"slices": case.helical.slices, "hand": hand}
+
+        def along_normals(cycle: MeshCycle) -> tuple[MeshExcitation, MeshExcitation]:
+            spur = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, mesh_backlash(gears))
+            record = normal_record(spur, factor, base, reversed_time=sense < 0)
+            source = helical_friction(cycle, overlap, **sliced, reversed_time=sense < 0)
+            return record, replace(helical_excitation(record, overlap, **sliced), source=source)
+
+        record, excitation = along_normals(static.cycle)
         whole = record if in_contact else shared_load(helical_excitation(record, overlap))
-        excitation = helical_excitation(record, overlap, slices=case.helical.slices, hand=hand)
+        if friction_acts(case):
+            frictionless = along_normals(frictionless_cycle(_drive_flanks(case), static))[1]
     data = helical_data(case, gears, None if whole is None else whole.stiffness.mean(axis=1))
     torque = driving_torque(case)
-    system, flank = gear_set_system(data, torque=torque), flank_sign(data, torque)
+    system, flank = gear_set_system(data, torque=torque, friction=friction_acts(case)), flank_sign(data, torque)
     stiffness = data.column_stiffness if excitation is None else excitation.stiffness.mean(axis=1)
     modes = gear_set_modes(data, system=system, mesh_stiffness=stiffness, damping_ratio=case.dynamics.damping_ratio)
     phases = phasing(gear_set_motions(data, modes.shape))
-    return HelicalModesResult(gears, data, system, modes, phases, flank, section, excitation, whole)
+    if excitation is not None:
+        excitation = balanced_source(excitation, modes)
+    return HelicalModesResult(gears, data, system, modes, phases, flank, section, excitation, whole, frictionless)
 
 
 @one_blas_thread()
@@ -199,10 +228,26 @@ def helical_dynamics_parts(
         )
         verdict = floquet_verdict(modes.modes, modes.excitation, frequency, excitation_harmonics=case.mesh_harmonics)
         responses.append(response.without_lines())
-        loads = _loads(modes, response)
+        loads, change = _loads(modes, response), None
         response = replace(response, message=joint_message(responses))
-        yield part, HelicalDynamicsResult(modes, np.array(speeds), turning, response, verdict, loads)
+        if modes.frictionless is not None:
+            without = solve_spectral(
+                modes.modes,
+                modes.frictionless,
+                frequency,
+                excitation_harmonics=case.mesh_harmonics,
+                response_harmonics=case.response_harmonics,
+                tolerance=case.dynamics.tolerance,
+                radius=False,
+            )
+            change = 20.0 * np.log10(_fluctuating(loads) / _fluctuating(_loads(modes, without)))
+        yield part, HelicalDynamicsResult(modes, np.array(speeds), turning, response, verdict, loads, change)
         progress("dynamics", float(numbers[-1] + 1), float(count))
+
+
+def _fluctuating(loads: dict[str, np.ndarray]) -> np.ndarray:
+    """Root mean square (speeds,) of the forces of all supports about their means [N]."""
+    return np.sqrt(0.5 * (np.abs(loads["support"][:, :, :3, 1:]) ** 2).sum(axis=(1, 2, 3)))
 
 
 def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarray]:
@@ -224,12 +269,15 @@ def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarr
         rows @ basis.shape,
         residual=residual_output(system, basis, rows),
         load=output_load(system, basis, rows),
+        source=source_output(system, basis, rows),
     )
     pin, support = forces[:, : 6 * N], forces[:, 6 * N :].copy()
     # what holds a motion takes up what meshes and pins exert on it
-    W = mesh_directions(data, result.flank)[:18]
+    W, rubbed = mesh_directions(data, result.flank)[:18], friction_directions(data, result.flank)[:18]
     for row in np.flatnonzero(np.isinf(springs).ravel()):
         meshes = np.einsum("j,sjh->sh", W[row], response.force)
+        if response.source is not None:
+            meshes = meshes - np.einsum("j,sjh->sh", rubbed[row], response.source[:, :-1])
         on_pins = np.einsum("p,sph->sh", pins[row].reshape(-1), pin)
         support[:, row] = (meshes - on_pins) * scale.ravel()[row]
     shape = (len(forces), -1, 6, forces.shape[-1])
@@ -239,6 +287,12 @@ def _loads(result: HelicalModesResult, response: Response) -> dict[str, np.ndarr
 def _remarks(results: Results, stem: str) -> Iterator[str]:
     if stem in _SPUR_TEETH:
         yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
+
+
+def _describe_dynamics(data: xr.Dataset) -> Block:
+    block = describe_response(data)
+    notes = (f"{words}: {text}" for words, text in friction_rows(data, "forces of the supports"))
+    return replace(block, notes=(*block.notes, *notes))
 
 
 def _given(case: HelicalCase) -> bool:
@@ -290,7 +344,7 @@ HELICAL = Train(
             takes=("modes",),
             options=("progress",),
             verdict=response_verdict,
-            describe=lambda results: describe_response(results.dynamics),
+            describe=lambda results: _describe_dynamics(results.dynamics),
             unavailable=lambda case: _NOTHING_EXCITES if _given(case) else "",
             warnings=HelicalDynamicsResult.warnings,
         ),
