@@ -47,7 +47,7 @@ TEETH: dict[str, Any] = {
     "gear_1": {"teeth": 24, "profile_shift": 0.0, "bore_radius": "15 mm"},
     "gear_2": {"teeth": 36, "profile_shift": 0.0, "bore_radius": "20 mm"},
     "operation": {"torque": "100 N m"},
-    "static": {"positions": 16},
+    "static": {"positions": 16, "flank_elements": 6},
 }
 
 

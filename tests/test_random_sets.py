@@ -469,10 +469,9 @@ INVARIANTS = (
     converged_in_excitation,
 )
 QUICK_INVARIANTS = {
-    1: (equal_where_it_is_turned, converged_in_excitation),
+    1: (equal_where_it_is_turned,),
     7: (similar_in_length, equal_in_the_mirror, equal_with_other_numbers, converged_in_positions),
     18: (similar_in_modulus_and_torque,),
-    23: (equal_in_the_mirror,),
 }
 """Some for each of few sets; all of them are in the slow tests."""
 

@@ -114,7 +114,7 @@ def test_pictures_that_a_report_adds_replace_nothing_foreign(tmp_path, refused):
     out = prepare_output(tmp_path / "out")
     write_run(out)
     (out / "load_sharing.png").unlink()
-    names = ["case.toml", "static.nc", "modes.nc"]
+    names = ["case.toml", "static.nc"]
     finish(out, names, timings={}, convergence={})
     (out / "load_sharing.png").write_bytes(b"mine")
     assert "load_sharing.png" in refused(out, "report", out)

@@ -47,6 +47,7 @@ def test_a_relief_is_best_near_its_torque(quick_case, tmp_path):
     assert curve[1, 1] < 0.35 * curve[0, 1]
 
 
+@pytest.mark.slow
 def test_one_negative_torque(quick_case, tmp_path):
     arguments = ("--relief", "0 um", "--relief", "4 um", "--positions", "8")
     peaks = []
@@ -92,6 +93,7 @@ def test_without_relief_the_numbers_are_those_of_a_run(values, quick_case, tmp_p
     assert found["sun-ring STE peak to peak [m]"][0] == pytest.approx(run.peak_to_peak("sun_arc"), rel=1e-8)
 
 
+@pytest.mark.slow
 def test_a_map_goes_on_from_its_journal(quick_case, tmp_path):
     arguments = ("--relief", "0 um", "--relief", "4 um", "--torque", "100 N m", "--positions", "8", "-o", "out")
     first = harris(quick_case, *arguments, folder=tmp_path)

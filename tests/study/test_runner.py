@@ -205,7 +205,7 @@ def test_a_sweep_has_the_same_bits_whoever_computes(case, processes, dask_runner
         assert (other.errors, other.points, other.computed) == (whole.errors, whole.points, 8)
 
 
-@pytest.mark.parametrize("most", [None, 23])
+@pytest.mark.parametrize("most", [pytest.param(None, marks=pytest.mark.slow), 23])
 def test_a_search_has_the_same_bits_whoever_computes(case, processes, dask_runner, most, tmp_path):
     variables = [Variable(RATIO, 0.05, 0.95, "5 %"), Variable("carrier.mass", "0.1 kg", "3 kg", "0.1 kg")]
     limits = [Limit(small_tasks.VALLEY, high=9.0)]

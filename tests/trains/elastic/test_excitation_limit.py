@@ -59,6 +59,7 @@ def levels(case, static, modes):
     return dynamics, order_level(solve_housing(case, dynamics).lines)
 
 
+@pytest.mark.slow
 def test_default_reaches_the_modes_of_the_meshes_and_the_level_has_converged(case, static, modes, reference, steps):
     """Also by hand: the level with a limit of twice the frequency that is found."""
     dynamics, found = reference

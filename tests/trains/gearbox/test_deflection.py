@@ -155,7 +155,8 @@ def test_the_slope_of_a_mesh_is_the_line_through_its_slices():
     assert mesh_slopes(assembly, found.motion) == pytest.approx([line], rel=1e-9)
 
 
-@pytest.mark.parametrize("torque", [pytest.param(100.0, marks=pytest.mark.slow), -100.0])
+@pytest.mark.slow
+@pytest.mark.parametrize("torque", [100.0, -100.0])
 def test_unequal_planets_carry_what_the_set_alone_on_its_bearings_says(torque):
     """Errors of pins in the plane, against the contact with sun and planets on springs, a solver of its own."""
     tables = elastic_set_tables("cases/planetary_27_40_108.toml")

@@ -116,6 +116,7 @@ def in_casing():
     return found, elastic_ring(found.model, found.model.stages[0])
 
 
+@pytest.mark.slow
 def test_a_ring_in_a_casing_vibrates_as_all_coordinates_of_both(in_casing):
     """Planets that run around at speed zero, and the assembled gearbox with all coordinates of the ring."""
     found, ring = in_casing

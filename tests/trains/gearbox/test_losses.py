@@ -78,6 +78,7 @@ def test_bearings_without_a_kind_are_left_out_and_that_is_said(result):
     assert [finding.code for finding in result.findings] == ["W-LOSSES"] and "B, D" in result.findings[0].text
 
 
+@pytest.mark.slow
 def test_entries_of_a_bearing_go_before_the_factors_of_its_kind(loaded):
     state = loaded.state
     force = state.bearing_force[0]

@@ -48,6 +48,7 @@ def test_paths_of_a_pair_add_up():
     assert shares.sum(axis=1) == pytest.approx(np.ones((1, 3)), abs=1e-7)
 
 
+@pytest.mark.slow
 def test_the_ring_of_a_set_is_a_path_of_its_own():
     response = by_path(set_in_a_casing())
     assert "meshes of set" in response.paths
@@ -56,6 +57,7 @@ def test_the_ring_of_a_set_is_a_path_of_its_own():
     assert np.abs(ring).max() > 0.0
 
 
+@pytest.mark.slow
 def test_rigid_bearings_are_one_path_with_the_rest():
     tables = pair_tables(teeth=True) | {"dynamics": {"up_to": "2 kHz"}}
     tables |= {"casing": casing_tables(), "sensor": [{"name": "x", "position": ["0 mm"] * 3, "direction": "x"}]}

@@ -73,7 +73,7 @@ def apart(found: Deflection, stage: StageModel) -> float:
 
 
 @pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=pytest.mark.slow if seed in (1, 3, 5, 6, 7, 9, 12) else ()) for seed in range(16)]
+    "seed", [pytest.param(seed, marks=pytest.mark.slow if seed in (1, 3, 5, 6, 7, 9, 10, 12) else ()) for seed in range(16)]
 )
 def test_a_stage_at_rest_moves_the_gearbox_as_forces_at_its_meshes_do(seed):
     found = solve_deflection(read_case(random_gearbox(seed, 3)))
@@ -115,6 +115,7 @@ def test_the_structure_has_no_planets_and_no_meshes_of_the_stage():
     assert not any("planet" in name for name in system.dofs)
 
 
+@pytest.mark.slow
 def test_excitation_has_the_mean_of_the_contact_along_the_normal():
     tables = pair_tables(teeth=True)
     tables["pair"][0]["teeth"]["set"]["helix_angle"] = "12 deg"

@@ -79,6 +79,7 @@ def test_the_verdict_names_the_worst_of_all_load_cases(results):
     assert "stage mesh" in rows["mesh line nearest to a mode"]
 
 
+@pytest.mark.slow
 def test_a_run_on_feet_has_pictures_tables_and_signals_of_its_response(tmp_path):
     tables = pair_tables(teeth=True) | {"casing": casing_tables(), "dynamics": {"up_to": "2 kHz"}}
     tables["sensor"] = [{"name": "top", "position": ["90 mm", "80 mm", "40 mm"], "direction": "y"}]

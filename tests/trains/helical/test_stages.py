@@ -172,6 +172,7 @@ def test_a_vanishing_helix_gives_the_static_solution_of_spur_teeth(coarse):
     np.testing.assert_allclose(found.whole.force, static.cycle.force, rtol=2e-3)
 
 
+@pytest.mark.slow
 def test_a_whole_overlap_ratio_flattens_the_stiffness(coarse, again):
     width = 2 * math.pi * 1.6e-3 / math.sin(coarse.helical.helix_angle)
     wide = with_value(coarse, "set.face_width", f"{width!r} m")

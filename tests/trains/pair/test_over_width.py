@@ -52,6 +52,7 @@ def test_spur_slices_are_the_plane_pair(kind):
     assert sliced.face_load_factor == pytest.approx(1.0, abs=1e-9)
 
 
+@pytest.mark.slow
 @ONE_KIND
 def test_the_other_hand_mirrors_the_width(kind):
     """Under the other torque too, which is that of the other hand from behind."""
@@ -177,6 +178,7 @@ def test_helices_beyond_those_validated_are_told(angle, steep):
     assert [(one.code, one.key) for one in found] == [("W-HELIX", "set.helix_angle")] * steep
 
 
+@pytest.mark.slow
 def test_the_slices_that_a_warning_advises_can_be_taken():
     """Under a load that makes contacts a sixteenth of the width wide."""
     slope = [{"kind": "lead slope", "amount": "40 um"}]
