@@ -471,7 +471,6 @@ INVARIANTS = (
 QUICK_INVARIANTS = {
     1: (equal_where_it_is_turned,),
     7: (similar_in_length, equal_in_the_mirror, equal_with_other_numbers, converged_in_positions),
-    18: (similar_in_modulus_and_torque,),
 }
 """Some for each of few sets; all of them are in the slow tests."""
 
