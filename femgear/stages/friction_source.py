@@ -17,9 +17,8 @@ from femgear.contact.cycle import FRICTION
 from femgear.report.tables import chosen
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from femgear.contact.loaded_period import LoadedPeriod
+    from femgear.storage.results import Results
     from femgear.system.system import MeshExcitation, Modes
 
 
@@ -44,11 +43,11 @@ def balanced_source(excitation: MeshExcitation, modes: Modes) -> MeshExcitation:
     return replace(excitation, source=source)
 
 
-def friction_rows(dynamics: xr.Dataset, words: str) -> list[tuple[str, str]]:
-    """Write what friction adds to a level at some speeds of dynamics.nc, for the verdict; none without."""
-    if "friction_change" not in dynamics:
+def friction_rows(results: Results) -> list[tuple[str, str]]:
+    """Write what friction adds to a level at some speeds of a run, for the verdict; none where it does not act."""
+    if "dynamics" not in results.stages or "friction_change" not in results.dynamics:
         return []
-    change = dynamics["friction_change"]
-    change = change.max(dim=[dim for dim in change.dims if dim != "speed"])
-    shown = [f"{float(change[i]):+.1f} dB at {float(dynamics.speed[i]):g} rpm" for i in chosen(len(change))]
-    return [(f"friction of the teeth adds to the {words}", ", ".join(shown))]
+    change = results.dynamics["friction_change"]
+    largest = change.max(dim=[dim for dim in change.dims if dim != "speed"])
+    shown = [f"{float(largest[i]):+.1f} dB at {float(largest.speed[i]):g} rpm" for i in chosen(len(largest))]
+    return [(str(change.attrs["long_name"]), ", ".join(shown))]

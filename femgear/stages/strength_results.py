@@ -15,6 +15,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.report.response import stored_harmonics
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, tabulate
+from femgear.stages.friction_source import friction_rows
 from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
@@ -49,7 +50,8 @@ def strength_verdict(results: Results) -> Iterator[Block]:
     """
     marks, stages = Marks(results.findings), results.stages
     reasons = list(reason_row(results.stress)) if "stress" in stages else []
-    rows = [*reasons, *_lives(results, marks), *efficiency_rows(results, marks), *heat_rows(results, marks)]
+    rows = [*reasons, *friction_rows(results), *_lives(results, marks)]
+    rows += [*efficiency_rows(results, marks), *heat_rows(results, marks)]
     rated = rate_results(results)
     if rated is None:
         if rows:

@@ -3,14 +3,17 @@
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xarray as xr
 from scipy.integrate import solve_ivp
 
 from femgear.gears.friction import sliding_per_path
 from femgear.housing.orders import order_level
 from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.stages.friction_source import friction_rows
 from femgear.stages.losses import solve_losses
 from femgear.stages.static import solve_static
 from femgear.system.fourier import harmonics_of, sample
@@ -230,6 +233,15 @@ def test_friction_works_by_the_sliding_of_rigid_gears_alone():
         relative = [sliding_per_path(kind) / kind.gear_1.base_radius for kind in gears.kinds]
         rolling = turned.reshape(len(relative), -1) / np.array(relative)[:, None]
         assert rolling == pytest.approx(np.full(rolling.shape, rolling[0, 0]))
+
+
+def test_the_verdict_says_what_friction_adds():
+    speeds = np.array([250.0, 3100.0])
+    change = xr.DataArray([24.2, 2.94], dims="speed", coords={"speed": speeds}, attrs={"long_name": "added"})
+    run = SimpleNamespace(stages=("dynamics",), dynamics=xr.Dataset({"friction_change": change}))
+    assert friction_rows(run) == [("added", "+24.2 dB at 250 rpm, +2.9 dB at 3100 rpm")]
+    assert friction_rows(SimpleNamespace(stages=("dynamics",), dynamics=xr.Dataset())) == []
+    assert friction_rows(SimpleNamespace(stages=())) == []
 
 
 def test_sources_are_those_of_the_loaded_state():

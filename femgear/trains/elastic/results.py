@@ -111,7 +111,7 @@ _ROUNDED, _MANY = 1e-5, 40
 # speeds, and bands at each of them, that are listed
 _FEW, _CUTS = 4, 24
 _FIRST, _STRONGEST = 6, 4
-FRICTION_CHANGE = "what the friction of the teeth adds to the level of the housing"
+FRICTION_CHANGE = "added by friction to the level of the housing"
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
 _PARTS = ("sun", "planet, sun side", "planet, ring side", "ring")
@@ -624,7 +624,7 @@ def verdict(results: Results) -> Iterator[Block]:
         text = _kinds("{:.3f}", factors.max(axis=0), lambda text: marks(text, *codes, of=_OF_LEVEL))
         rows.append(("largest dynamic factor K_v, at operating speeds", text))
         computed = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
-        rows += friction_rows(results.dynamics, "level of the housing")
+        rows += friction_rows(results)
     rated = rating_wanted(results.case)
     if "static" in stages and "face_load_factor" in (static := results.static):
         computed["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)

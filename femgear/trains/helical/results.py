@@ -191,7 +191,7 @@ class HelicalDynamicsResult(StageResult):
         )
         variables = response_variables(self) | complex_entries(entries)
         if self.friction_change is not None:
-            words = "what the friction of the teeth adds to the fluctuation of the forces of all supports"
+            words = "added by friction to the fluctuation of the forces of all supports"
             variables["friction_change"] = ("speed", self.friction_change, "dB", words)
         return Contents(
             variables,

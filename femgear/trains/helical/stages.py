@@ -17,11 +17,11 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.tooth_friction import friction_acts
 from femgear.errors import CaseError
 from femgear.gears import profile
-from femgear.report.tables import Block, describe_modes, describe_response
+from femgear.report.tables import describe_modes, describe_response
 from femgear.solvers.linear.modal import output_load, output_response, residual_output, source_output
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
-from femgear.stages.friction_source import balanced_source, friction_rows
+from femgear.stages.friction_source import balanced_source
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE, LifeResult, solve_life
 from femgear.stages.losses import LOSSES
@@ -85,8 +85,6 @@ from femgear.trains.helical.results import (
 from femgear.trains.helical.section import HelicalCase
 
 if TYPE_CHECKING:
-    import xarray as xr
-
     from femgear.contact.cycle import MeshCycle
     from femgear.storage.results import Results
 
@@ -289,12 +287,6 @@ def _remarks(results: Results, stem: str) -> Iterator[str]:
         yield "Transverse spur section: these are spur gears of that section, not yet the helical ones."
 
 
-def _describe_dynamics(data: xr.Dataset) -> Block:
-    block = describe_response(data)
-    notes = (f"{words}: {text}" for words, text in friction_rows(data, "forces of the supports"))
-    return replace(block, notes=(*block.notes, *notes))
-
-
 def _given(case: HelicalCase) -> bool:
     return case.helical.mesh_stiffness is not None
 
@@ -344,7 +336,7 @@ HELICAL = Train(
             takes=("modes",),
             options=("progress",),
             verdict=response_verdict,
-            describe=lambda results: _describe_dynamics(results.dynamics),
+            describe=lambda results: describe_response(results.dynamics),
             unavailable=lambda case: _NOTHING_EXCITES if _given(case) else "",
             warnings=HelicalDynamicsResult.warnings,
         ),

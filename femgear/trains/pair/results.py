@@ -15,7 +15,6 @@ from femgear.findings import Finding, tell
 from femgear.gears.pair import GearPair
 from femgear.housing.sound import run_up_signal, sampled_signal, whole_turns
 from femgear.report.tables import Block, chosen, first_speeds, response_warnings, tabulate
-from femgear.stages.friction_source import friction_rows
 from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
@@ -209,7 +208,7 @@ class PairDynamicsResult(StageResult):
         variables = response_variables(self) | {"excitation_limit": reach} | motion.levels("speed")
         variables["backlash"] = ("mesh", self.backlash, *_PLAY)
         if self.friction_change is not None:
-            words = "what the friction of the teeth adds to the fluctuation of the bearing force"
+            words = "added by friction to the fluctuation of the bearing force"
             variables["friction_change"] = ("speed gear", self.friction_change, "dB", words)
         title = {"title": "periodic response of the pair", "message": self.response.message}
         return Contents(
@@ -381,11 +380,10 @@ def describe_dynamics(data: xr.Dataset) -> Block:
         "method": lambda row: str(row.method.values),
         "Floquet": lambda row: f"{float(row.floquet_multiplier):.4f}",
     }
-    notes = [
+    notes = (
         "K_v: largest over mean mesh force; contact: share of the time with drive flanks closed; Floquet: "
-        "largest multiplier, stable up to 1"
-    ]
-    notes += [f"{words}: {text}" for words, text in friction_rows(data, "bearing forces")]
+        "largest multiplier, stable up to 1",
+    )
     return tabulate("Dynamics", (data.isel(speed=i) for i in chosen(data.sizes["speed"])), columns, notes)
 
 
