@@ -198,6 +198,7 @@ def test_planet_far_away_carries_nothing(gears, bodies):
     assert "lose all load" in cycle.message
 
 
+@pytest.mark.slow
 def test_unequally_spaced_sequentially_phased_planets():
     """z 30/21/72 with N = 3 at multiples of 360/102 deg: the phases differ and loads stay near one third."""
     common = dict(module=2e-3, pressure_angle=ALPHA, face_width=0.02)
@@ -220,6 +221,7 @@ def test_unequally_spaced_sequentially_phased_planets():
     assert np.abs(np.ptp(cycle.overall_deflection, axis=0)).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_face_width_scales_out(gears, bodies):
     """Twice the width and torque give the same deflections."""
     wide_gears = replace(
@@ -269,6 +271,7 @@ def test_planets_that_come_to_the_same_states_are_solved_once(five, torque, monk
             assert np.abs(apart).max(initial=0.0) <= 1e-9 * size, field.name
 
 
+@pytest.mark.slow
 def test_peaks_between_positions_are_those_of_every_planet(five):
     gears, bodies = five
     peaks = walk_mesh_cycle(gears, bodies, sun_torque=TORQUE, positions=20, options=CycleOptions(peaks=True, cells=20))

@@ -191,6 +191,7 @@ def test_tip_relief_that_makes_the_error_small(reference, power):
         assert apart < 0.03
 
 
+@pytest.mark.slow
 def test_errors_over_torque_have_no_steps(reference):
     """41 torques within 0.5 %: second differences are those of smooth curves, not of cells that move."""
     gears, bodies = reference

@@ -119,6 +119,7 @@ def test_external_tooth_against_a_direct_analysis_of_a_finer_whole_gear():
         assert by_superposition(EXTERNAL, place, flank_elements=24) == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.slow
 def test_internal_tooth_against_a_direct_analysis_of_the_whole_gear():
     sizes = {"flank_elements": 12, "refine": 0.5}
     (reference,) = direct(INTERNAL, [0.3], **sizes)
@@ -287,6 +288,7 @@ def wedged():
     return gears, sectors, bodies, pushed, set_root_stress(sectors, STEEL)
 
 
+@pytest.mark.slow
 def test_back_flanks_add_their_loads(wedged):
     """Also against the field of whole bodies; both flanks of the sun's teeth carry kilonewtons."""
     gears, sectors, bodies, pushed, roots = wedged

@@ -20,6 +20,7 @@ def thin():
     return rims.static_with(thin=True)
 
 
+@pytest.mark.slow
 def test_the_rim_is_one_module_thick(thin):
     ring = thin.planetary_set.ring
     assert ring.rim_radius - ring.root_radius == pytest.approx(ring.module, rel=1e-6)
@@ -33,12 +34,14 @@ def test_sector_and_108_sectors_in_one_solution_agree():
     assert rims.planet_comparison(**SIZES).same_grid < 1e-9
 
 
+@pytest.mark.slow
 def test_displacement_all_around_against_cubic_elements_on_another_grid():
     """0.6 % with these coarse cubic elements, 0.2 % and 0.07 % with finer ones (see the slow test)."""
     found = rims.ring_comparison(**SIZES)
     assert max(found.field, found.rim) < 0.01
 
 
+@pytest.mark.slow
 def test_flanks_at_the_meshes_against_cubic_elements():
     """The compliance of the contact solution, half plane included, along all loaded flanks."""
     assert rims.ring_comparison(**SIZES).flanks < 0.01

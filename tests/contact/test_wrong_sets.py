@@ -48,6 +48,7 @@ def check_equilibrium(result, torque):
     assert cycle.residual.max() < 1e-9
 
 
+@pytest.mark.slow
 def test_pin_error_beyond_the_play_unloads_its_planet(solved):
     """120 um move planet 1 back by 224 um along both lines of action: deflections do not reach that far."""
     result = solved(set__pin_errors=TANGENTIAL)
@@ -78,6 +79,7 @@ def test_pin_error_beyond_the_play_presses_on_the_back_flanks(solved):
     assert alone.cycle.sun_arc.mean() == pytest.approx(taken_up, rel=0.03)
 
 
+@pytest.mark.slow
 def test_planet_pushed_into_the_sun_is_wedged(solved):
     result = solved(
         set__pin_errors=[{"planet": 1, "radial": "-0.12 mm"}],

@@ -22,13 +22,11 @@ def tables(text: str) -> list[str]:
 
 def coarsen(case: Path) -> None:
     """Give the teeth of a gearbox few positions and elements, and its contact few slices."""
-    text, few = (
-        case.read_text(encoding="utf-8"),
-        "[pair.teeth.static]\npositions = 8\nflank_elements = 6\nstresses = false\n\n",
-    )
+    text = case.read_text(encoding="utf-8")
+    few = "[pair.teeth.static]\npositions = 8\nflank_elements = 6\nstresses = false\n\n"
     coarse = text.replace("[pair.teeth.rack]", f"{few}[pair.teeth.rack]")
     assert coarse.count(few) == text.count("[[pair]]") == 2
-    case.write_text(f"{coarse}\n[deflection]\nslices = 3\n", encoding="utf-8")
+    case.write_text(f'{coarse}\n[deflection]\nslices = 3\n\n[dynamics]\nup_to = "3 kHz"\n', encoding="utf-8")
 
 
 def test_the_case_of_the_example(tmp_path, monkeypatch, capsys):
@@ -53,7 +51,7 @@ def test_a_unit_becomes_the_gearbox_of_the_page(tmp_path, monkeypatch, capsys):
         assert cli.main(command) == 0
     assert "Power flow" in capsys.readouterr().out
     coarsen(Path("box.toml"))
-    assert cli.main([*commands[2], "--no-pictures"]) == 0
+    assert cli.main([*commands[2], "--no-pictures", "--verbose"]) == 0
     assert "K_Hbeta" in capsys.readouterr().out
 
 

@@ -57,8 +57,10 @@ def figures():
 
 @pytest.fixture(scope="module")
 def pictures(figures):
-    """Bytes of the figures, which are laid out then as they are written."""
-    return {name: style.png_bytes(figure) for name, figure in figures.items()}
+    """Bytes of the figures with fewer pixels, which are laid out then as they are written."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(style, "_DPI", style._DPI // 2)
+        return {name: style.png_bytes(figure) for name, figure in figures.items()}
 
 
 def test_every_figure_is_a_picture(pictures):

@@ -1,5 +1,6 @@
 """scripts/drivetrain.py on chains that have no gears, or no picture of contact loss."""
 
+import pytest
 from script_runs import run_script
 
 
@@ -7,6 +8,7 @@ def run(path, output):
     return run_script("drivetrain.py", path, "-o", output, folder=path.parent)
 
 
+@pytest.mark.slow
 def test_drivetrain_takes_a_chain_without_gears(tmp_path):
     path = tmp_path / "discs.toml"
     path.write_text("""

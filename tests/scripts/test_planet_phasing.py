@@ -23,6 +23,7 @@ def test_impossible_sets_end_in_a_message(tmp_path, arguments, words):
     assert "Traceback" not in done.stderr and list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_sets_that_need_shifts_are_remarked_on_above_the_tables(tmp_path):
     done = run(tmp_path, "--planet", "19", "--points", "20", "--distance", "1", "-o", str(tmp_path))
     assert done.returncode == 0, done.stderr

@@ -230,6 +230,7 @@ def test_load_sharing_with_gaps(quick_case, tmp_path):
     assert teeth["tooth load [N]"][chosen].sum() == pytest.approx(1751.733, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_load_sharing_under_negative_torque_keeps_the_planet_numbers(quick_case, tmp_path):
     case = tmp_path / "negative.toml"
     case.write_text(quick_case.read_text().replace('"100 N m"', '"-100 N m"'))

@@ -32,7 +32,7 @@ def fill(memory: mmap.mmap) -> int:
     return sum(memory.write(b"x" * 1_000_000) for _ in range(len(memory) // 1_000_000))
 
 
-@pytest.mark.parametrize("count", [600, pytest.param(2000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [300, pytest.param(2000, marks=pytest.mark.slow)])
 def test_mutated_case_files(folder, count):
     tally = passed(trials.run_trials("case_text", case_text.short(count), folder))
     assert tally.said["described"] > count / 40 and len(tally.said) > 12

@@ -115,6 +115,7 @@ def test_a_case_without_load_cases_has_no_lives():
     assert with_values(plain, {"operation.torque": "1 N m"}).operation.load_case == ()
 
 
+@pytest.mark.slow
 def test_planar_sets_have_lives_beside_a_given_mesh_stiffness():
     load = {"torque": "10 kN m", "speed": "20 rpm"}
     case = case_of(load, name="nrel_pgb")

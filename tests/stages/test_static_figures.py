@@ -204,6 +204,7 @@ def test_spectrum_and_bending_show_the_numbers(whole):
     assert ax.lines[1].get_ydata() == pytest.approx(1e-6 * whole.planet_root_stress.values[3])
 
 
+@pytest.mark.slow
 def test_new_figures_hide_nothing(whole):
     for figure in (draw_contact_pressure(whole), draw_load_spectrum(whole), planet_bending(whole)):
         canvas = FigureCanvasAgg(figure)

@@ -69,6 +69,7 @@ def test_a_negative_torque_is_the_mirror_image(changes):
         np.testing.assert_allclose(back[name][:, -np.arange(8) % 8], there[name], rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_twice_the_size_under_eight_times_the_torque():
     case = {"set.module": 6, "set.face_width": 40, "set.centre_distance": 183, "gear_1.bore_radius": 30}
     large = {key: f"{value} mm" for key, value in {**case, "gear_2.bore_radius": 50, **LARGE_TIPS}.items()}

@@ -612,6 +612,7 @@ def sliced(case):
     return with_value(case, "static.slices", 9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "values",
     [

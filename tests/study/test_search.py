@@ -358,6 +358,7 @@ def test_doubtful_numbers_of_a_sweep_have_the_codes_of_their_findings(case, tmp_
         assert describe_sweep(sweep(case, over, [X_ALONE])).header[-1] == "x [1]"
 
 
+@pytest.mark.slow
 def test_forces_and_levels_over_speeds_tell_where_their_excitation_ends_short(case):
     """Three mesh harmonics, against none given; whatever finds the response."""
     coarse = {"static.flank_elements": 6, "static.positions": 16}

@@ -31,7 +31,7 @@ def test_trains_of_rigid_bodies_bend_as_much_as_gearboxes(trains):
         assert max(differences(ours, other).values()) <= LARGEST, name
 
 
-@pytest.mark.parametrize("train", [pair_with_teeth, reference_set])
+@pytest.mark.parametrize("train", [pair_with_teeth, pytest.param(reference_set, marks=pytest.mark.slow)])
 def test_teeth_in_a_gearbox_touch_as_alone(train):
     state = train()
     assert max(state.apart.values()) <= LARGEST

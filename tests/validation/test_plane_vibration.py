@@ -155,6 +155,7 @@ def test_free_bodies_have_three_rigid_motions():
     assert np.all(ours[:3] < 1e-6 * ours[3]) and ours[3] > 100
 
 
+@pytest.mark.slow
 def test_changes_with_the_carrier_speed_are_those_of_the_page():
     """Table of docs/theory.md from the rows: bold where a change exceeds the 1 % that the paper states."""
     import re

@@ -116,6 +116,7 @@ def test_gear_pair_with_backlash_bends_over_twice():
         np.testing.assert_allclose(again.deflection, found.lines[i], atol=1e-8)
 
 
+@pytest.mark.slow
 def test_backlash_as_parameter_and_a_limit_that_nothing_may_pass():
     start = solve_harmonic_balance(gear_pair(0.5), 0.9, harmonics=7)
     found = parameter_curve(gear_pair, (0.5, 0.0), 0.9, harmonics=7, start=start, stability=False)
@@ -323,6 +324,7 @@ def test_motions_that_lost_their_symmetry_form_a_closed_loop(stops):
         assert np.abs(loop.lines[:, 0, 0]).max() > 2e-5
 
 
+@pytest.mark.slow
 def test_sharp_corners_of_sampled_contact_are_passed():
     """Without smoothing the first samples in contact turn the tangent by 0.4 rad at once, at 85.8 Hz."""
     problem = two_masses(0.0, between=True, forced=1)

@@ -47,6 +47,7 @@ def test_no_tolerance_lets_it_through(tolerance):
     assert not found.converged and NOTE in found.message
 
 
+@pytest.mark.slow
 def test_other_entry_points_say_so_too():
     problem = pair(-120.0)
     found = periodic_response(problem, 2.7e4, harmonics=5)
@@ -121,6 +122,7 @@ def test_a_steady_force_is_a_mean_load(load, steady):
             assert NOTE in found.message and "it needs -2 N" in found.message
 
 
+@pytest.mark.slow
 def test_of_two_contacts_the_one_that_is_pulled_is_named():
     two = MechanicalSystem(np.eye(2), 0.1 * np.eye(2), np.zeros((2, 2)), np.eye(2), np.array([0.4, -0.1]), ("x", "y"))
     mesh = FourierSeries([[1.0, 0.1]])
@@ -146,6 +148,7 @@ def test_a_spring_in_tension_is_not_blamed():
     assert "nothing carries" not in found.message
 
 
+@pytest.mark.slow
 def test_every_iteration_after_an_embedding_costs_a_factorisation():
     loose, tight = (
         solve_harmonic_balance(pulled_spring(3.0), 1.3, harmonics=4, tolerance=one) for one in (1e-12, 1e-17)

@@ -242,6 +242,7 @@ def test_modes_left_out_count_as_static_flexibility(geared_chain):
     np.testing.assert_allclose(part.displacement[2:], full.displacement[2:], atol=2e-3 * size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", [FIXED[0], FIXED[4], "modal"])
 def test_planet_set_with_backlash_approaches_contact_events_by_the_square_of_the_step(geared_set, method):
     times = np.linspace(0.0, 4.0 * np.pi, 81)
@@ -321,6 +322,7 @@ def test_tabulated_laws_are_the_elements():
             np.testing.assert_allclose(slope, tangent - np.diag(problem.reference), atol=1e-13)
 
 
+@pytest.mark.slow
 def test_a_bearing_with_clearance_against_adaptive_integration():
     """A rotating force in a ring of springs: coupled columns, contact events in the reference."""
     system = MechanicalSystem(

@@ -192,7 +192,7 @@ def test_a_pull_is_told_with_its_share_of_the_time():
     assert list(pulling_meshes(rpm, names, [pulls_of(force[:1])])) == []
 
 
-@pytest.mark.parametrize("torque", ["50 N m", "-50 N m"])
+@pytest.mark.parametrize("torque", ["50 N m", pytest.param("-50 N m", marks=pytest.mark.slow)])
 def test_meshes_that_pull_are_warned_of_by_result_and_file(case, torque):
     """At a resonance without much damping, whatever flanks carry."""
     changes = {"dynamics.damping_ratio": 0.002, "dynamics.mesh_harmonics": 6, "static.positions": 16}

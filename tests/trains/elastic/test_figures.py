@@ -114,6 +114,7 @@ def test_motion_of_the_housing_is_that_of_one_cosine():
         assert np.abs(values) == pytest.approx(size * np.abs([np.cos, np.sin][row % 2](phase)), abs=2e-3 * size)
 
 
+@pytest.mark.slow
 def test_silent_housing_is_drawn():
     housing = synthetic.housing()
     for name in ("lines_real", "lines_imag"):

@@ -65,7 +65,8 @@ def test_the_paper_and_the_reference_set_are_one_set_with_another_excitation_and
     assert differ == {"title", "dynamics", "housing"}
 
 
-@pytest.mark.parametrize("torque", [pytest.param("100 N m", marks=pytest.mark.slow), "-60 N m"])
+@pytest.mark.slow
+@pytest.mark.parametrize("torque", ["100 N m", "-60 N m"])
 def test_at_standstill_the_dynamic_transmission_error_is_that_of_the_set_on_its_supports(case, torque, steps):
     """0.01 rpm, whatever static.members shows: mean and fluctuation of all meshes, and the forces."""
     case = with_value(with_value(case, "operation.speeds", ["0.01 rpm"]), "operation.torque", torque)

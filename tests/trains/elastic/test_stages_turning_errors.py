@@ -167,6 +167,7 @@ def test_pictures_span_what_repeats(three):
     response.transmission_error_spectrum(data), response.mesh_force_period(data)
 
 
+@pytest.mark.slow
 def test_orders_obey_the_rule_of_turns_in_space(solved):
     """``L = N q + m S``: four planets, a sun that turns 80/21 times, its error seven waves in a turn."""
     errors = {"sun.errors": {"cumulative_pitch": pitch(3, -1, 0, teeth=21)}}

@@ -159,6 +159,7 @@ def test_a_vanishing_helix_gives_the_modes_of_the_planar_set(given):
     assert len(planar) == 21 and away[planar > 0.0].max() < 1e-6
 
 
+@pytest.mark.slow
 def test_a_vanishing_helix_gives_the_static_solution_of_spur_teeth(coarse):
     thin = changed(coarse, {"rack.root_radius": 0.15, "helical.helix_angle": "0.01 deg"})
     static = solve_helical_static(thin, cache=grid_cache())

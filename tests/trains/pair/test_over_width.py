@@ -77,7 +77,10 @@ def test_the_other_hand_mirrors_the_width(kind):
     assert len(contact_pattern(right).axes) == 2  # the mesh and its colours
 
 
-@pytest.mark.parametrize("ahead", [None, 0.8 * HEIGHT], ids=["spur, lead slope", "helical"])
+@pytest.mark.parametrize(
+    "ahead",
+    [pytest.param(None, marks=pytest.mark.slow, id="spur, lead slope"), pytest.param(0.8 * HEIGHT, id="helical")],
+)
 def test_a_set_whose_planet_does_not_couple_its_flanks_is_two_pairs(ahead):
     """In slices as in the plane: neither bodies nor their waves carry from one flank to the other."""
     s = replace(reference_set(), planet_angles=(0.0,))

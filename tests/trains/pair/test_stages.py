@@ -72,9 +72,10 @@ HELICAL = (
 CROWNED = (("static.slices", 9), ("gear_1.modifications", [{"kind": "lead crowning", "amount": "10 um"}]))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "changes",
-    [pytest.param((), marks=pytest.mark.slow), HELICAL, pytest.param(CROWNED, marks=pytest.mark.slow)],
+    [(), HELICAL, CROWNED],
     ids=["spur", "helical", "crowned"],
 )
 def test_slow_gears_follow_the_static_solution(changes):

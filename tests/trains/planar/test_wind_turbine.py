@@ -43,6 +43,7 @@ def solved(problem, hertz, harmonics=9, **options):
     return found
 
 
+@pytest.mark.slow
 def test_quick_validation_rows_pass():
     rows = (*nrel.frequencies(), *nrel.linear_peak())
     assert [row for row in rows if row.verdict not in ("passes", "information")] == []
