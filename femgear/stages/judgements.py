@@ -140,6 +140,7 @@ def judge_strength(
     stresses: str = "",
     findings: Iterable[Finding] = (),
     doubts: Sequence[str] = (),
+    open_factors: str = "",
 ) -> Judgement:
     """Judge safeties against those that the case asks for.
 
@@ -155,6 +156,8 @@ def judge_strength(
         Of the run: what no steel carries fails, whatever limits there are.
     doubts : sequence of str
         Codes of the findings that concern the safeties.
+    open_factors : str
+        Load factors that were taken as 1, in words.
     """
     raised = {finding.code for finding in findings if finding.severity != NOTE}
     beyond = sorted(raised & _BEYOND)
@@ -177,6 +180,7 @@ def judge_strength(
     limit = (
         f"{' and '.join(f'{symbol} at least {required:g}' for symbol, _, required in rated)}, ISO 6336:{limits.edition}"
     )
+    limit += f"; {open_factors}" if open_factors else ""
     if low:
         failing = " and ".join(f"{symbol} {least.value:.2f} of the {least.where}" for symbol, least, _ in low)
         return Judgement(STRONG, "bad", answer, limit, f"Not strong enough: {failing}")

@@ -6,7 +6,7 @@ Where a safety is asked for and something is missing, notes name the entry of th
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -78,6 +78,7 @@ def rate_results(results: Results) -> tuple[Rating, list[str]] | None:
         dynamic = computed_dynamic_factor(results.dynamics, len(kinds))
     elif "response" in stages:
         dynamic = factor_of_two_frequencies(results.response, len(kinds))
+        sharing = sharing_of_two_frequencies(results.response, len(kinds)) if sharing is None else sharing
     return rate_case(results.case, sharing=sharing, dynamic=dynamic, face=face), kinds
 
 
@@ -90,6 +91,16 @@ def computed_load_factors(static: xr.Dataset, kinds: Sequence[str]) -> tuple[np.
         return None, face
     share = static["load_share"].mean("position").values.max() * planets
     return np.full(len(kinds), share), face
+
+
+def sharing_of_two_frequencies(response: xr.Dataset, kinds: int) -> np.ndarray:
+    """Find K_gamma (kinds,) of response.nc: largest mean force of a mesh over that of all of its kind, at any speed."""
+    mean = (response["carrier_order"].values == 0) & (response["mesh_order"].values == 0)
+    shares = []
+    for i in range(response.sizes["speed"]):
+        force = np.real(stored_harmonics(response.isel(speed=i), "mesh_force")[:, mean].sum(axis=1)).reshape(kinds, -1)
+        shares.append(force.max(axis=1) / force.mean(axis=1))
+    return np.max(shares, axis=0)
 
 
 def factor_of_two_frequencies(response: xr.Dataset, kinds: int) -> np.ndarray:
@@ -212,9 +223,20 @@ def _missing_factors(factors: MeshLoadFactors, *, planets: bool) -> Iterator[str
     wanted = {name: text for name, text in _GIVEN_BY.items() if planets or name != "sharing"}
     if factors.given_meshes:
         wanted["face"] = "K_Hβ (strength.quality)"
-    missing = [text for name, text in wanted.items() if name not in factors.sources]
+    missing = [wanted[name] for name in missing_factors(factors, planets=planets)]
     if missing:
         yield f"taken as 1, in brackets what gives them: {', '.join(missing)}"
+
+
+def missing_factors(factors: MeshLoadFactors, *, planets: bool) -> list[str]:
+    """List the names of the load factors that nothing told, which are 1; without planets there is no K_gamma."""
+    return [name for name in _GIVEN_BY if name not in factors.sources and (planets or name != "sharing")]
+
+
+def taken_as_one(names: Iterable[str]) -> str:
+    """Say for an answer that load factors were taken as 1; empty of none."""
+    symbols = [SYMBOLS[name].replace("K_gamma", "K_γ") for name in names]
+    return f"{', '.join(symbols)} taken as 1" if symbols else ""
 
 
 def _missing_limits(flanks: Sequence[RatedFlank]) -> str:

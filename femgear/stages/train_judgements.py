@@ -24,7 +24,13 @@ from femgear.stages.judgements import (
 )
 from femgear.stages.static_results import peak_to_peak
 from femgear.stages.strength import Rating
-from femgear.stages.strength_results import computed_dynamic_factor, kind_names, rate_results
+from femgear.stages.strength_results import (
+    computed_dynamic_factor,
+    kind_names,
+    missing_factors,
+    rate_results,
+    taken_as_one,
+)
 from femgear.stages.stress_reasons import largest_pressure
 
 _OF_SAFETIES = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
@@ -53,7 +59,11 @@ def judge_teeth(results: Any, rating: Rating | None) -> Iterator[Judgement]:
     root, flank = (None, None) if rating is None else least_of(rating)
     if "life" in stages:
         root, flank = (least_over_life(results.life, *least) for least in (("root", root), ("flank", flank)))
-    yield judge_strength(root, flank, case.strength, _stresses(results), findings, _OF_SAFETIES)
+    open_factors = ""
+    if rating is not None:
+        planets = any(of_gear.gear == "planet" for of_gear in rating.flanks)
+        open_factors = taken_as_one(missing_factors(rating.factors, planets=planets))
+    yield judge_strength(root, flank, case.strength, _stresses(results), findings, _OF_SAFETIES, open_factors)
     if "life" in stages:
         parts = (*lives_of_teeth(results.life), *lives_of_bearings(results.life))
         yield from judge_lives(parts, required_life(case.operation))

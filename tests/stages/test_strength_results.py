@@ -12,11 +12,14 @@ from femgear.stages.strength_results import (
     computed_dynamic_factor,
     factor_of_two_frequencies,
     kind_names,
+    missing_factors,
     safety_notes,
     safety_rows,
+    sharing_of_two_frequencies,
     smallest_safety,
     strength_block,
     strength_verdict,
+    taken_as_one,
 )
 from femgear.trains.reading import read_case, with_values
 
@@ -131,6 +134,24 @@ def test_what_is_missing_for_a_safety_is_named_by_its_key(pair):
     (half, _) = strength_verdict(SimpleNamespace(case=halved, stages=(), findings=()))
     keys = next(note for note in half.notes if note.startswith("give "))
     assert "gear_2.material.root_stress_limit" in keys and "material.contact_stress_limit" in keys
+
+
+def test_sharing_of_two_frequencies_is_that_of_mean_forces():
+    orders = {"carrier_order": ("line", [0, 1]), "mesh_order": ("line", [0, 0])}
+    real = np.zeros((2, 4, 2))
+    real[..., 0], real[..., 1] = 10.0, 5.0
+    real[1, 0, 0], real[1, 1, 0] = 12.0, 8.0
+    lines = ("speed", "mesh", "line")
+    data = xr.Dataset({"mesh_force_real": (lines, real), "mesh_force_imag": (lines, 0.0 * real)}, coords=orders)
+    assert sharing_of_two_frequencies(data, 2) == pytest.approx([1.2, 1.0])
+
+
+def test_factors_that_nothing_told_are_named(pair, planetary):
+    plain = rate_case(with_values(pair, LIMITS)).factors
+    assert taken_as_one(missing_factors(plain, planets=False)) == "K_v, K_Hβ, K_Hα taken as 1"
+    classed = rate_case(with_values(planetary, {**LIMITS, "strength.quality": 6}), face=np.ones(2)).factors
+    assert taken_as_one(missing_factors(classed, planets=True)) == "K_γ taken as 1"
+    assert not taken_as_one([])
 
 
 def test_the_factor_of_two_frequencies_is_the_largest_force_at_any_phases_over_the_mean():

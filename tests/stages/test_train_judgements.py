@@ -47,7 +47,8 @@ def test_a_pair_with_limits_is_rated_and_has_no_level():
     assert judged[STRONG].state == "bad" and "S_H at least 3" in judged[STRONG].limit
     assert judged[QUIET].state == "open" and "femgear gearbox" in judged[QUIET].limit
     enough = with_values(case, {"strength.required_flank_safety": 0.1})
-    assert next(set_judgements(Files(enough))).state == "good"
+    strong = next(set_judgements(Files(enough)))
+    assert strong.state == "good" and strong.limit.endswith("K_v, K_Hβ, K_Hα taken as 1")
 
 
 def test_the_error_of_helical_meshes_is_that_of_the_slices(static):

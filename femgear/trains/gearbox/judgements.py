@@ -23,6 +23,7 @@ from femgear.stages.judgements import (
     lives_of_teeth,
 )
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
+from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.trains.gearbox.mode_words import nearest_mode
 from femgear.trains.gearbox.response_results import line_origin
 from femgear.trains.gearbox.strength import OF_TEETH, least_safety
@@ -39,7 +40,10 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
         response = results.dynamics if "dynamics" in stages else None
         root, flank = (_least(least_safety(data, response, symbol), data) for symbol in ("S_F", "S_H"))
         root, flank = (least_over_life(data, *least) for least in (("root", root), ("flank", flank)))
-        yield judge_strength(root, flank, case.strength, _stresses(results), findings, OF_TEETH)
+        # deflection.nc has no response
+        missing = {*str(data.attrs.get("iso_missing", "")).split()} - ({"dynamic"} if response is not None else set())
+        open_factors = taken_as_one(name for name in SYMBOLS if name in missing)
+        yield judge_strength(root, flank, case.strength, _stresses(results), findings, OF_TEETH, open_factors)
         yield from judge_lives((*lives_of_teeth(data), *lives_of_bearings(data)), required_life(case.operation))
     yield from judge_heat(results)
     yield judge_smoothness(_motion(results), results, _RESPONSES)

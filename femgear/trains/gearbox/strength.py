@@ -17,7 +17,7 @@ from femgear.case import text as case_text
 from femgear.case.sections import StrengthSection
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.strength import Rating, rate_case, rating_wanted
-from femgear.stages.strength_results import factor_names, kind_names, safety_notes
+from femgear.stages.strength_results import factor_names, kind_names, missing_factors, safety_notes
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
 from femgear.trains.gearbox.contact import StageContact, loaded_tables
 from femgear.trains.gearbox.deflection import Deflection
@@ -138,7 +138,10 @@ def strength_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], d
         if any({*gear.pushes(state.model.flow)} >= {1, -1} for state in states):
             notes.append(f"Y_M = 0.7 of {gear.name}, whose mates bend its teeth both ways")
     editions = ", ".join(dict.fromkeys(str(rating.nominal.edition) for rating in first.values()))
-    return variables, coords, {"iso_edition": editions, "iso_notes": " | ".join(notes)}
+    planets = {name: any(of_gear.gear == "planet" for of_gear in rating.flanks) for name, rating in first.items()}
+    missing = [name for stage in first for name in missing_factors(first[stage].factors, planets=planets[stage])]
+    attrs = {"iso_edition": editions, "iso_notes": " | ".join(notes), "iso_missing": " ".join(dict.fromkeys(missing))}
+    return variables, coords, attrs
 
 
 def _places(stage: Any, rating: Rating | None) -> Iterator[tuple[int, int, Any, float]]:
