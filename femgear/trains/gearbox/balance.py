@@ -19,7 +19,7 @@ from femgear.case.dependencies import Steps
 from femgear.errors import CaseError, several
 from femgear.findings import Finding
 from femgear.report.tables import Block, tabulate
-from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.solvers.periodic.harmonic_balance import displacements, solve_harmonic_balance
 from femgear.solvers.periodic.solution import PeriodicSolution
 from femgear.stages.protocol import Progress, StageResult, silent
 from femgear.storage.contents import Contents
@@ -34,6 +34,7 @@ from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
 from femgear.trains.gearbox.play import loose_notes
 from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.silence import exciting_sections
 
 if TYPE_CHECKING:
@@ -64,6 +65,10 @@ class StageBalance:
         Names of the b bearings with play.
     bearing_force : (T, I, b) array
         Sizes of their forces [N].
+    acceleration : (s, L) complex array
+        Of the lines of the solution at all sensors [m/s^2].
+    periods : int
+        Mesh periods of the period of the excitation.
     """
 
     name: str
@@ -73,6 +78,8 @@ class StageBalance:
     back: np.ndarray
     bearings: tuple[str, ...] = ()
     bearing_force: np.ndarray = field(default_factory=lambda: np.zeros((1, _INSTANTS, 0)))
+    acceleration: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), complex))
+    periods: int = 1
 
     @property
     def uneven(self) -> np.ndarray:
@@ -106,8 +113,8 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
     for number, stage in enumerate(stages):
         progress("balance", number, len(stages))
         drive = excitation_of(found, stage, steps=steps)
-        known = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
-        box = nonlinear_gearbox(found, {stage.name: drive}, **known)
+        known: dict[str, Any] = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
+        box = nonlinear_gearbox(found, {stage.name: drive}, **known, mean_damping=True)
         lines = wanted.harmonics * drive.periods
         orders = harmonic_lines(lines)
         if len(box.frequency) > 1:
@@ -119,8 +126,17 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
         if not solution.converged:
             solution = solve_harmonic_balance(box.problem, box.frequency, **options)
         forces = *forces_of_flanks(box, solution), tuple(box.bearings), forces_of_bearings(box, solution)
-        solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *forces))
+        moved = accelerations(box, solution), drive.periods
+        solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *forces, *moved))
     return solved
+
+
+def accelerations(box: NonlinearGearbox, solution: PeriodicSolution) -> np.ndarray:
+    """Compute the lines (s, L) of the accelerations at all sensors [m/s^2]."""
+    rows = sensor_rows(box.deflection.model)
+    if not len(rows):
+        return np.zeros((0, len(solution.orders)), complex)
+    return -(solution.line_frequency**2) * displacements(box.problem, solution, rows @ box.motion)
 
 
 def loaded_lines(box: NonlinearGearbox, count: int) -> np.ndarray:
@@ -208,11 +224,12 @@ def _forces(element: Element, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
 class GearboxBalanceResult(StageResult):
     """Motions with flanks that part at the speed of the load case, stage by stage: ``stages``.
 
-    ``rigid`` names the rings that modes and response have elastic.
+    ``rigid`` names the rings that modes and response have elastic, ``sensors`` those whose accelerations there are.
     """
 
     stages: tuple[StageBalance, ...]
     rigid: tuple[str, ...] = ()
+    sensors: tuple[str, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -296,8 +313,31 @@ class GearboxBalanceResult(StageResult):
         if stages and stages[0].bearings:
             variables |= _of_bearings(stages)
             coords["bearing"] = (("bearing",), list(stages[0].bearings), "1", "bearing with play")
+        if stages and len(stages[0].acceleration):
+            variables |= _at_sensors(stages)
+            coords["sensor"] = (("sensor",), list(self.sensors), "1", "sensor")
         attrs = {"title": "teeth that part, by harmonic balance", "rigid": ", ".join(self.rigid)}
         return Contents(variables, coords, attrs)
+
+
+def _at_sensors(stages: tuple[StageBalance, ...]) -> dict[str, Any]:
+    """Lines at the sensors, one stage after the other, and their levels."""
+    lines = np.concatenate([stage.acceleration for stage in stages], axis=1)
+    level = [np.sqrt(0.5 * (np.abs(stage.acceleration) ** 2).sum(axis=1)) for stage in stages]
+    orders = [stage.solution.orders for stage in stages]
+    frequency = np.concatenate([stage.solution.line_frequency for stage in stages]) / (2.0 * np.pi)
+    harmonic = [order[:, -1] / stage.periods for order, stage in zip(orders, stages, strict=True)]
+    bands = [order[:, 0] * (order.shape[1] > 1) for order in orders]
+    origin = [stage.name for stage in stages for _ in stage.solution.orders]
+    return {
+        "level_of_stage": ("sensor stage", np.transpose(level), "m/s^2", "root mean square of the acceleration"),
+        "lines_real": ("sensor line", np.real(lines), "m/s^2", "acceleration, amplitude of the line"),
+        "lines_imag": ("sensor line", np.imag(lines), "m/s^2", "acceleration, amplitude of the line"),
+        "line_frequency": ("line", frequency, "Hz", "frequency of the line"),
+        "origin": ("line", origin, "1", "stage that excites"),
+        "harmonic": ("line", np.concatenate(harmonic), "1", "multiple of the mesh frequency"),
+        "side_band": ("line", np.concatenate(bands), "1", "turns of the carrier beside it"),
+    }
 
 
 def _of_bearings(stages: tuple[StageBalance, ...]) -> dict[str, Any]:
@@ -351,5 +391,8 @@ def describe_balance(data: xr.Dataset) -> Block:
         "on the back": lambda i: f"{float(data['back_share'].values[i]):.1%}",
     }
     note = "each stage with the meshes of the others as springs; uneven: largest over mean of the mean mesh force"
-    notes = (note, *loose_notes(data)) if "bearing" in data.sizes else (note,)
-    return tabulate("Teeth that part, harmonic balance", range(data.sizes["mesh"]), columns, notes)
+    notes = [note, *(loose_notes(data) if "bearing" in data.sizes else ())]
+    if "sensor" in data.sizes:
+        level = np.sqrt((data["level_of_stage"].values ** 2).sum(axis=1))
+        notes += [f"sensor {name}: {value:.4g} m/s^2" for name, value in zip(data["sensor"].values, level, strict=True)]
+    return tabulate("Teeth that part, harmonic balance", range(data.sizes["mesh"]), columns, tuple(notes))

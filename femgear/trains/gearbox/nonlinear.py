@@ -144,6 +144,7 @@ def nonlinear_gearbox(
     gyroscopic: bool = True,
     turning: bool = True,
     damping_ratio: float | None = None,
+    mean_damping: bool = False,
 ) -> NonlinearGearbox:
     """Assemble a gearbox with the meshes of some stages as elements.
 
@@ -165,7 +166,10 @@ def nonlinear_gearbox(
     turning : bool
         Directions of meshes go round with the carriers; without it they are those at the angle where these stand.
     damping_ratio : float, optional
-        Of all modes with the planets where they stand, viscous; by default that of the case.
+        Of all modes, viscous; by default that of the case.
+    mean_damping : bool
+        Modes are those with the mean of the meshes over the turn of their carriers, which no angle of theirs prefers;
+        without it those with the planets where they stand.
 
     Raises
     ------
@@ -193,7 +197,8 @@ def nonlinear_gearbox(
     )
     ratio = model.case.modes.damping_ratio if damping_ratio is None else damping_ratio
     closed = sum(ring.stiffness * across @ across.T for ring, across in rings.values())
-    damping, free = _damping(replace(system, K=T.T @ stiffness @ T + closed), staged, ratio)
+    damped = replace(system, K=T.T @ stiffness @ T + closed)
+    damping, free = _damping(damped, staged, ratio, over_the_turn=mean_damping)
     # torques that radii beside their tooth numbers leave out of balance speed the gearbox up as a whole
     balanced = system.load - system.M @ (free @ (free.T @ system.load))
     columns, elements, flanks = _elements(system.M, staged, harmonics, len(bases), separates=separates)
@@ -447,16 +452,27 @@ def centrifugal_pull(model: GearboxModel, stage: StageModel, mass: np.ndarray, s
     return found
 
 
-def _damping(system: MechanicalSystem, stages: Sequence[NonlinearStage], ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    """Viscous damping (n, n) of all modes with the meshes at their means, planets where they stand, and free motions.
+def _damping(
+    system: MechanicalSystem, stages: Sequence[NonlinearStage], ratio: float, *, over_the_turn: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """Viscous damping (n, n) of all modes with the meshes at their means, and free motions.
 
-    The latter (n, r) have a modal mass of one.
+    Planets are where they stand, or with the mean ``S_0^T k S_0 + (S_c^T k S_c + S_s^T k S_s) / 2`` over the turn of
+    their carriers. Free motions (n, r) have a modal mass of one.
     """
     rows = [np.zeros((0, len(system.M)))]
     stiffness = [np.zeros(0)]
     for stage in stages:
-        rows += [stage.drive.at(0.0), stage.slope.at(0.0)]
-        stiffness += [stage.excitation.stiffness.mean(axis=1), stage.slope_stiffness]
+        for directions, k in (
+            (stage.drive, stage.excitation.stiffness.mean(axis=1)),
+            (stage.slope, stage.slope_stiffness),
+        ):
+            if over_the_turn and stage.turns:
+                rows.append(directions.stacked)
+                stiffness.append(np.concatenate([k, 0.5 * k, 0.5 * k]))
+            else:
+                rows.append(directions.at(0.0))
+                stiffness.append(k)
     unloaded = replace(system, W=np.vstack(rows).T, load=0.0 * system.load)
     modes = undamped_modes(unloaded, np.concatenate(stiffness), damping_ratio=ratio)
     carried = system.M @ modes.shape

@@ -49,7 +49,7 @@ from femgear.trains.gearbox.results import (
     gearbox_warnings,
 )
 from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_speeds
-from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors
+from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors, gearbox_sensors
 from femgear.trains.gearbox.signals import GEARBOX_RECORDED
 from femgear.trains.gearbox.silence import why_silent
 from femgear.trains.gearbox.spectrum import (
@@ -141,8 +141,8 @@ def solve_box_balance(
 ) -> GearboxBalanceResult:
     """Solve for motions with teeth that part at the speed of the chosen load case, stage by stage."""
     rings = tuple(f"ring of {stage.name}" for stage in case.planetary if stage.elastic_ring)
-    state = deflection.of(case).state
-    return GearboxBalanceResult(tuple(solve_balance(state, steps=steps, progress=progress)), rings)
+    state, sensors = deflection.of(case).state, tuple(sensor.name for sensor in gearbox_sensors(case))
+    return GearboxBalanceResult(tuple(solve_balance(state, steps=steps, progress=progress)), rings, sensors)
 
 
 def _no_balance(case: GearboxCase) -> str:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from casings import casing_tables
 from small_gearbox import loose_pair_tables, pair_tables, planetary_tables
 
 from femgear.errors import CaseError
@@ -20,10 +21,13 @@ from femgear.trains.gearbox.balance import (
     held_together,
     solve_balance,
 )
+from femgear.trains.gearbox.case_file import GearboxCase
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import excitation_of
 from femgear.trains.gearbox.nonlinear import nonlinear_gearbox
+from femgear.trains.gearbox.results import DeflectionResult
 from femgear.trains.gearbox.silence import idle_entries
+from femgear.trains.gearbox.stages import solve_box_balance, solve_deflections
 from femgear.trains.reading import read_case
 
 
@@ -55,6 +59,32 @@ def test_mesh_forces_of_planets_under_load_are_those_of_the_torque():
     assert sums == pytest.approx([100.0 / radius] * 2, rel=1e-8)
     # the weight loads planets unequally as they go round
     assert np.ptp(stage.drive.mean(axis=1)[:, 0]) > 1.0
+
+
+def in_a_casing(**gravity) -> tuple[GearboxCase, DeflectionResult]:
+    """Case and loaded state of a plane set whose carrier has play in a casing on uneven feet, with a sensor."""
+    mesh = {"stiffness": "3e8 N/m", "contact_ratio": 1.6}
+    tables = planetary_tables(sun_mesh=mesh, ring_mesh=mesh) | {"casing": casing_tables(), "motions": "plane"}
+    tables["planetary"][0]["planet"]["bearing"] = {"radial": "3e8 N/m"}
+    tables["bearing"][1] |= {"radial": "1e7 N/m"}
+    tables["bearing"].append({"name": "loose", "shaft": "carrier", "radial": "5e8 N/m", "clearance": "10 um"})
+    tables["sensor"] = [{"name": "top", "position": ["0.1 m", "0.2 m", "0 m"], "direction": [0, 1, 0]}]
+    tables["balance"] = {"harmonics": 2, "side_bands": 4}
+    case = read_case(tables | gravity)
+    return case, solve_deflections(case)
+
+
+def test_the_casing_feels_lines_at_multiples_of_the_planets_passing():
+    data = solve_box_balance(*in_a_casing(gravity={"acceleration": "100 m/s^2"})).dataset()
+    assert data["converged"].item() == 1.0 and 0.0 < data["bearing_largest"].max()
+    lines = np.hypot(data["lines_real"], data["lines_imag"]).values[0]
+    # three equal planets, wherever they stand, come round thrice a turn
+    mesh = int(np.flatnonzero((data["harmonic"] == 1) & (data["side_band"] == 0))[0])
+    order = np.rint(61.0 * data["line_frequency"].values / data["line_frequency"].values[mesh]).astype(int)
+    assert lines[order % 3 != 0].max() < 1e-9 * lines.max()
+    assert lines[(order % 3 == 0) & (order > 4)].min() > 1e-6 * lines.max()
+    assert data["level_of_stage"].item() == pytest.approx(np.sqrt(0.5 * (lines**2).sum()), rel=1e-12)
+    assert any(note.startswith("sensor top: ") for note in describe_balance(data).notes)
 
 
 @pytest.mark.slow
