@@ -126,12 +126,12 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
         if not solution.converged:
             solution = solve_harmonic_balance(box.problem, box.frequency, **options)
         forces = *forces_of_flanks(box, solution), tuple(box.bearings), forces_of_bearings(box, solution)
-        moved = accelerations(box, solution), drive.periods
+        moved = accelerations_at_sensors(box, solution), drive.periods
         solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *forces, *moved))
     return solved
 
 
-def accelerations(box: NonlinearGearbox, solution: PeriodicSolution) -> np.ndarray:
+def accelerations_at_sensors(box: NonlinearGearbox, solution: PeriodicSolution) -> np.ndarray:
     """Compute the lines (s, L) of the accelerations at all sensors [m/s^2]."""
     rows = sensor_rows(box.deflection.model)
     if not len(rows):
