@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -104,6 +105,18 @@ def _integrated(modes: Any, frequency: float = 1.9e3, count: int = 6) -> float:
     return float(np.abs(approach - row @ moved[:m]).max() / np.ptp(approach))
 
 
+def _order_of_the_mesh() -> tuple[np.ndarray, np.ndarray]:
+    """Lines of a set with three planets out of phase, and all carrier orders, of which none is left out."""
+    teeth = {"sun.teeth": 26, "ring.teeth": 106, "set.centre_distance": "49.8 mm"}
+    left_open = dict.fromkeys(("sun.profile_shift", "ring.profile_shift", "sun.tip_diameter"))
+    shape = {"static.positions": 16, "operation.speeds": ["250 rpm"], **teeth, **left_open}
+    case = with_values(read_case("cases/planetary_27_40_108.toml"), ACTS | shape)
+    static = solve_static(case)
+    modes = replace(solve_modes(case, static), symmetry=1)
+    lines = solve_housing(case, solve_dynamics(case, static, modes)).exact
+    return np.abs(lines.displacement[0]), lines.order
+
+
 def friction_of_sets() -> tuple[Row, ...]:
     """Balances of all bodies and of powers of an uneven set whose sun floats, and orders of equal planets."""
     case = with_values(read_case("cases/planetary_27_40_108.toml"), ACTS | {"static.positions": 16})
@@ -130,8 +143,7 @@ def friction_of_sets() -> tuple[Row, ...]:
     ]
     lost = (MU * cycle.tooth_load * sliding).sum(axis=(0, 1))
     out = (torque + arcs[1][3:].sum(axis=0) * uneven.ring.base_radius) * turning.carrier
-    lines = solve_housing(case, solve_dynamics(case, static, solve_modes(case, static))).exact
-    strength = np.abs(lines.displacement).max(axis=0)
+    strength, order = _order_of_the_mesh()
     name, equilibrium = "27/40/108, uneven planets, floating sun, mu 0.06", "equilibrium"
     return (
         at_most(name, equilibrium, "torque of the sun less that of its teeth, relative", 1e-9,
@@ -140,7 +152,7 @@ def friction_of_sets() -> tuple[Row, ...]:
                 float(np.abs(arcs[1][:3] - arcs[0][3:]).max() * uneven.planet.base_radius / torque)),
         at_most(name, "sum of mu F |v_s| over all tooth pairs", "power in less power out, less losses, relative", 1e-9,
                 float(np.abs(torque * turning.sun - out - lost).max() / (torque * turning.sun))),
-        at_most("27/40/108, equal planets, mu 0.06", "planets that repeat one another",
-                "largest carrier order that is no multiple of 3, over the largest one", 1e-9,
-                float(strength[np.mod(lines.order, 3) > 0.5].max(initial=0.0) / strength.max())),
+        at_most("26/40/106, equal planets out of phase, mu 0.06", "planets that repeat one another",
+                "largest carrier order that is no multiple of 3, 106 among them, over the largest one", 1e-9,
+                float(strength[np.mod(order, 3) > 0.5].max() / strength.max())),
     )  # fmt: skip
