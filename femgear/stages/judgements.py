@@ -14,9 +14,9 @@ from typing import Any, Literal
 import numpy as np
 
 from femgear.case.sections import StrengthSection
-from femgear.findings import DOUBT, NOTE, Finding
+from femgear.findings import CATALOGUE, DOUBT, NOTE, Finding
 from femgear.report.tables import Block
-from femgear.stages.life_results import hours_text
+from femgear.stages.life_results import first_to_fail, hours_text
 from femgear.stages.strength import RatedFlank, Rating
 
 State = Literal["good", "look", "bad", "open"]
@@ -171,7 +171,8 @@ def judge_strength(
     ]
     if beyond:
         answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated) or stresses
-        return Judgement(STRONG, "bad", answer, ", ".join(beyond), f"Not strong enough ({', '.join(beyond)})")
+        how = "; ".join(f"{code}: {CATALOGUE[code][1].rstrip('.')}" for code in beyond)
+        return Judgement(STRONG, "bad", answer, how, f"Not strong enough ({', '.join(beyond)})")
     if not rated:
         how = "give material.treatment and material.hardness for safeties"
         return Judgement(STRONG, "open", stresses or "not rated", how, "Its strength is not rated")
@@ -231,8 +232,7 @@ def lives_of_teeth(data: Any) -> Iterator[tuple[str, float, str]]:
     if not kinds:
         return
     kind = min(kinds, key=lambda kind: float(data[f"{kind}_life"].values.min()))
-    lives = data[f"{kind}_life"].values
-    at = int(lives.argmin())
+    lives, at = data[f"{kind}_life"].values, first_to_fail(data, kind)
     yield "teeth", float(lives[at]), f"the {kind} of {data[kind].values[at]}"
 
 

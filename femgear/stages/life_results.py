@@ -73,7 +73,7 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
         return
     shortest = min(kinds, key=lambda kind: float(data[f"{kind}_life"].values.min()))
     lives = data[f"{shortest}_life"].values
-    at = _first_to_fail(data, shortest)
+    at = first_to_fail(data, shortest)
     if math.isinf(lives[at]):
         yield "shortest life of the teeth, ISO 6336-6", _NO_DAMAGE
     else:
@@ -105,8 +105,11 @@ def _share_text(share: float, life: float) -> str:
     return "fails at once" if share > 0.0 else "-"
 
 
-def _first_to_fail(data: Any, kind: str) -> int:
-    """Number of the root or flank with the shortest life; of those without any damage that with the largest stress."""
+def first_to_fail(data: Any, kind: str) -> int:
+    """Find the number of the root or flank with the shortest life; of equal ones that with the largest stress.
+
+    ``data`` has the variables of `tooth_life_variables`, ``kind`` is "root" or "flank".
+    """
     lives = data[f"{kind}_life"].values
     return int(np.lexsort((-data[f"{kind}_stress_ratio"].values.max(axis=0), lives))[0])
 
@@ -164,7 +167,7 @@ def describe_damage(data: Any) -> Iterator[Block]:
     count = data.sizes["load_case"]
     if not kinds or count < 2:
         return
-    first = {kind: _first_to_fail(data, kind) for kind in kinds}
+    first = {kind: first_to_fail(data, kind) for kind in kinds}
     columns = {
         "load case": lambda i: str(data["load_case"].values[i]),
         "share": lambda i: f"{float(data['share'].values[i]):.4g}",
