@@ -105,6 +105,33 @@ def test_a_pair_at_rest_is_in_the_equilibrium_of_its_statics():
     assert case.losses.excites
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("torque", ["-200 N m", "200 N m"])
+def test_bearings_carry_the_forces_of_teeth_and_friction_that_the_statics_have(torque):
+    """Directions of the contact are those of the gears, those of the sources of their stations, on either flank."""
+    _, static, modes = pair(**{"operation.torque": torque, "static.positions": 128})
+    force, source = (modes.excitation.force[0].mean(), modes.excitation.source[0].mean())
+    on_second = modes.model.normal * force - modes.model.tangent * source
+    # equidistant positions place the step of friction by one of them
+    step = np.ptp(modes.excitation.source[0]) / 128
+    assert static.cycle.bearing_force[0].mean(axis=1) == pytest.approx(-on_second, abs=step)
+    assert abs(source) > 4.0 * step
+
+
+@pytest.mark.slow
+def test_gears_driven_the_other_way_are_in_the_equilibrium_of_their_statics():
+    heavy = {"brake.inertia": "1e4 kg m^2", "brake.coupling_stiffness": "1e6 N m/rad"}
+    for modes in (
+        pair(**heavy, **{"operation.torque": "-200 N m"})[2],
+        planetary(**{"operation.torque": "-100 N m", "brake.inertia": "1e6 kg m^2"})[2],
+    ):
+        response = solve_spectral(
+            modes.modes, modes.excitation, 0.05, excitation_harmonics=20, response_harmonics=60, tolerance=1e-9
+        )
+        static = modes.excitation.every_harmonic[2][:, :10]
+        assert np.abs(response.force[0, :, :10] - static).max() < 2e-3 * np.abs(static[:, 1]).max()
+
+
 def test_forces_on_rigid_bearings_are_those_of_teeth_and_friction():
     case, _, modes = pair(**{"gear_1.bearing_stiffness": None, "gear_2.bearing_stiffness": None})
     dynamics = solve_pair_dynamics(case, modes)
