@@ -389,6 +389,39 @@ def run(
 
 
 @app.command
+def cad(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Write all gears of a case with their exact teeth, in their places: solids as STEP, or outlines as DXF.
+
+    Parameters
+    ----------
+    case
+        TOML case file of a set, a pair or a gearbox.
+    output
+        File to write; the end of its name, .step or .dxf, tells the format. Default: CASE.step.
+    force
+        Replace the file.
+    """
+    from femgear.exchange.cad import placed_gears, write_cad
+    from femgear.trains.reading import read_case
+    from femgear.trains.registry import train_of
+
+    data = read_case(case)
+    bodies = train_of(data).bodies
+    gears = placed_gears(bodies(data) if bodies is not None else ())
+    output = output or Path(f"{case.stem}.step")
+    _need_new([output], force=force)
+    write_cad(gears, output, _say)
+    _say(f"written: {output}")
+    return 0
+
+
+@app.command
 def explain(code: str, /) -> int:
     """Say what the code of a refusal or a warning means, as in "femgear explain W-PULL".
 

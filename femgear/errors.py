@@ -19,6 +19,7 @@ CODES = {
     "E-ASSEMBLY": "Tooth numbers, centre distance and planet angles do not fit each other.",
     "E-BACKLASH": "Flanks overlap, or have less play than what is asked of them needs.",
     "E-BEARING": "A bearing has values or springs that no model can have.",
+    "E-CAD": "OpenCASCADE made no solids of gears, or cannot be loaded.",
     "E-CASE": "The case file has several mistakes, or one that has no code of its own.",
     "E-CENTRE-DISTANCE": "The centre distance leaves no line of action.",
     "E-CHOICE": "The value is none of the choices.",
@@ -223,8 +224,8 @@ def _one_line(value: object, limit: int = 120) -> str:
 
 
 @contextmanager
-def nvh_library(words: str) -> Iterator[None]:
-    """Say how the libraries of the extra ``nvh`` are installed where the block lacks one (E-LIBRARY)."""
+def nvh_library(words: str, extra: str = "nvh") -> Iterator[None]:
+    """Say how the libraries of an extra of the package are installed where the block lacks one (E-LIBRARY)."""
     try:
         yield
     except ImportError as error:
@@ -233,7 +234,7 @@ def nvh_library(words: str) -> Iterator[None]:
         raise FemgearError(
             f"{words} need a library that is not installed: {error}",
             code="E-LIBRARY",
-            remedy=f'{python} -m pip install "femgear[nvh]"',
+            remedy=f'{python} -m pip install "femgear[{extra}]"',
         ) from error
 
 

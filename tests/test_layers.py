@@ -38,6 +38,7 @@ SOLVING = {"scipy.linalg", "scipy.sparse", "femgear.stages.protocol"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 WITHOUT_TEST_FILE = {
     "__main__.py": "calls the command line and nothing else: tests/test_cli.py",
+    "exchange/_cad_worker.py": "a process of its own, which test_cad.py starts",
     "fe/_gmsh_worker.py": "a process of its own, which test_meshing.py starts",
     "report/explorer.py": "data of a page's script, from a whole run-up: tests/trains/elastic/test_runup.py",
     "trains/elastic/outputs.py": "rows of the models of a whole set: test_stages.py, test_excitation_limit.py",

@@ -54,6 +54,8 @@ class SpaceBody:
         By which the first tooth is turned from the x axis [rad].
     stage : int
         Number of the stage of a gear, which gives its colour.
+    gear : Gear, optional
+        That has the teeth, in its transverse section.
     """
 
     name: str
@@ -68,6 +70,7 @@ class SpaceBody:
     internal: bool = False
     angle: float = 0.0
     stage: int = 0
+    gear: Gear | None = None
 
 
 @dataclass(frozen=True)

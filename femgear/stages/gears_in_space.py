@@ -76,7 +76,7 @@ def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
             name = f"{words} {copy}" if gears.repeated[number] else words
             radii = gear.rim_radius, gear.tip_radius
             yield SpaceBody(
-                f"{name}, {gear.teeth} teeth",
+                name,
                 "gear",
                 name,
                 (centre.real, centre.imag),
@@ -88,15 +88,20 @@ def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
                 gear.internal,
                 angle - 0.5 * twist,
                 stage=number,
+                gear=gear,
             )
+
+
+def case_bodies(case: Any) -> Iterator[SpaceBody]:
+    """List the gears of the case of a pair or a set."""
+    return gear_bodies(planetary_set(case), base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
 
 
 def write_gears_in_space(drawn: Drawn, folder: Path) -> list[str]:
     """Write gears and modes for the page where their static state is not drawn in space already; returns file names."""
     if (folder / SOLID).exists():
         return []
-    case, gears = drawn.case, planetary_set(drawn.case)
-    bodies = list(gear_bodies(gears, base_helix_angle(case.pressure_angle, case.helix_angle or 0.0)))
+    bodies = list(case_bodies(drawn.case))
     names = [body.member for body in bodies]
     place = np.array([[*body.axis, 0.0] for body in bodies])
     model = space(bodies, names, place, list(_modes(drawn.data.get("modes"), names)))

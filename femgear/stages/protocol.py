@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from femgear.case.text import ReadCase
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
     from femgear.findings import Finding
+    from femgear.report.space import SpaceBody
     from femgear.stages.key_figures import KeyFigure
     from femgear.storage.results import Results
 
@@ -321,6 +322,9 @@ class Train:
         ``(case) -> figures`` by which cases are compared, none of trains whose studies have quantities of their own.
     judgements : callable
         ``(Results) -> judgements``: the questions that page one answers, in their order.
+    bodies : callable, optional
+        ``(case) -> bodies`` of it in space, as `femgear.report.space.SpaceBody`; None of trains whose gears have no
+        teeth.
     front : tuple of (str, int)
         Charts of page one, the first two of which are there: name of the figure, and number of its panel.
     """
@@ -336,6 +340,7 @@ class Train:
     verdict: Callable[[Results], Iterable[Block]] = lambda results: ()
     key_figures: Callable[[Any], tuple[KeyFigure, ...]] = lambda case: ()
     judgements: Callable[[Results], Iterable[Judgement]] = lambda results: ()
+    bodies: Callable[[Any], Iterable[SpaceBody]] | None = None
     front: tuple[tuple[str, int], ...] = ()
 
     def stage(self, name: str) -> Stage | None:

@@ -86,7 +86,7 @@ def _motion(results: Any) -> str:
     errors = _transmission_error(results)
     if errors is not None:
         names, error = errors
-        of_kinds = 1e6 * error.reshape(len(kind_names(names)), -1).max(axis=1)
+        of_kinds = 1e6 * error.reshape(len(kind_names([str(name) for name in names])), -1).max(axis=1)
         parts.append(f"transmission error {_joined(of_kinds, 2)} µm")
     if "dynamics" in results.stages:
         kinds = kind_names(results.dynamics["mesh"].values)

@@ -178,7 +178,8 @@ page.space = () => {
       tip.hidden = !best;
       if (!best) return;
       const value = state.factor ? `: ${(state.values[best.k][best.i] * state.unit[1]).toPrecision(3)}${state.unit[0]}` : "";
-      tip.textContent = bodies[best.k].name + value;
+      const { name, teeth } = bodies[best.k];
+      tip.textContent = `${name}${teeth ? `, ${teeth} teeth` : ""}${value}`;
       tip.style.left = `${Math.min(px + 12, frame.width - 200)}px`;
       tip.style.top = `${Math.max(py - 28, 0)}px`;
     });

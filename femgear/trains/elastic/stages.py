@@ -59,6 +59,7 @@ from femgear.solvers.linear.resonances import (
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics
 from femgear.stages.friction_source import balanced_source
+from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE
 from femgear.stages.losses import LOSSES
@@ -855,6 +856,7 @@ ELASTIC = Train(
     warnings=_warnings,
     verdict=verdict,
     key_figures=tooth_key_figures,
+    bodies=case_bodies,
     judgements=set_with_ring_judgements,
     front=(("run_up_levels", 0), ("static_transmission_error", 0), ("load_sharing", 0)),
     figures=FiguresOf("femgear.trains.elastic.figures:FIGURES"),

@@ -187,7 +187,7 @@ def _gear(seat: _Seat, sizes: StageSizes, teeth: _Teeth) -> SpaceBody:
     radii = inner, gear.tip_radius
     turned = teeth.angle - 0.5 * twist
     section = tooth_section(gear)
-    return SpaceBody(*place, (radii, radii), section, gear.teeth, twist, teeth.internal, turned)
+    return SpaceBody(*place, (radii, radii), section, gear.teeth, twist, teeth.internal, turned, gear=gear)
 
 
 def _turned(stage: PairSection | BoxPlanetarySection, turn: float) -> tuple[tuple[Gear | None, ...], Any]:
@@ -213,7 +213,7 @@ def _of_pair(case: GearboxCase, pair: PairSection) -> Iterator[SpaceBody]:
             continue
         shaft = case.shaft_named(name)
         middle = shaft.start + (pair.positions[number] if pair.positions else 0.0)
-        words = f"gear {number + 1} of {pair.name}, {sizes.teeth[number]} teeth"
+        words = f"gear {number + 1} of {pair.name}"
         pitch = sizes.base_radii[number] / math.cos(sizes.pressure_angles[0])
         internal = sizes.internal and number == 1
         angle = angles[number][0] if angles else 0.0
@@ -225,7 +225,6 @@ def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.
     """Sun, planets and ring, each on its member."""
     sizes = set_sizes(stage)
     gears, turned = _turned(stage, stage.angle)
-    z_s, z_p, z_r = sizes.teeth
     holder = next(name for name in ("sun", "carrier", "ring") if getattr(stage, name) != CASING)
     shaft = case.shaft_named(getattr(stage, holder))
     middle = shaft.start + (getattr(stage, f"{holder}_position") or 0.0)
@@ -236,13 +235,13 @@ def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.
     seat = f"seat ring of {stage.name}"
     in_casing = seat if seat in places else CASING
     sun = _Teeth(gears[0], 0, sizes.centre_distance - planet, 1.0, of_sun[0])
-    yield _gear(_Seat(f"sun of {stage.name}, {z_s} teeth", stage.sun, axis, middle), sizes, sun)
+    yield _gear(_Seat(f"sun of {stage.name}", stage.sun, axis, middle), sizes, sun)
     for number, (psi, angle) in enumerate(zip(angles, of_planets, strict=True), start=1):
         name, distance = f"{stage.name} planet {number}", sizes.centre_distance
         x, y = axis[0] + distance * math.cos(psi), axis[1] + distance * math.sin(psi)
         z = float(places[name][2]) if name in places else middle
         teeth = _Teeth(gears[1], 1, planet, -1.0, angle)
-        yield _gear(_Seat(f"{name}, {z_p} teeth", name, (x, y), z), sizes, teeth)
+        yield _gear(_Seat(name, name, (x, y), z), sizes, teeth)
     ring = _Teeth(gears[2], 2, sizes.centre_distance + planet, -1.0, of_ring[0], internal=True)
     member = in_casing if stage.ring == CASING else stage.ring
-    yield _gear(_Seat(f"ring of {stage.name}, {z_r} teeth", member, axis, middle), sizes, ring)
+    yield _gear(_Seat(f"ring of {stage.name}", member, axis, middle), sizes, ring)

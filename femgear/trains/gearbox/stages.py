@@ -52,6 +52,7 @@ from femgear.trains.gearbox.run_up_speeds import gearbox_resonances, run_up_spee
 from femgear.trains.gearbox.sensors import check_sensors, describe_modes_at_sensors, gearbox_sensors
 from femgear.trains.gearbox.signals import GEARBOX_RECORDED
 from femgear.trains.gearbox.silence import why_silent
+from femgear.trains.gearbox.solid_bodies import gearbox_bodies
 from femgear.trains.gearbox.spectrum import (
     sign_of_forces,
     solve_box_spectrum,
@@ -329,6 +330,7 @@ GEARBOX = Train(
     ),
     describe=describe_gearbox,
     warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case)),
+    bodies=lambda case: gearbox_bodies(case, {}),
     judgements=gearbox_judgements,
     front=(
         ("run_up_levels", 0),

@@ -22,6 +22,7 @@ from femgear.solvers.linear.modal import output_load, output_response, residual_
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import stability as floquet_verdict
 from femgear.stages.friction_source import balanced_source
+from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE, LifeResult, solve_life
 from femgear.stages.losses import LOSSES
@@ -343,6 +344,7 @@ HELICAL = Train(
     ),
     describe=lambda case: (*describe_set(case), *describe_helical(case, planetary_set(case))),
     warnings=set_warnings,
+    bodies=case_bodies,
     judgements=set_judgements,
     front=(("speed_sweep", 0), ("helical_mesh_stiffness", 1), ("dynamic_transmission_error", 0)),
     figures=FiguresOf("femgear.trains.helical.figures:FIGURES"),

@@ -47,6 +47,7 @@ from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics, stability
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.friction_source import balanced_source
+from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE
 from femgear.stages.losses import LOSSES
@@ -479,6 +480,7 @@ PAIR = Train(
     ),
     describe=_describe_case,
     warnings=_warnings,
+    bodies=case_bodies,
     judgements=set_judgements,
     front=(("run_up_levels", 1), ("static_transmission_error", 0)),
     figures={

@@ -21,6 +21,7 @@ from femgear.errors import CaseError, ConvergenceError
 from femgear.report.tables import describe_modes
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
+from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE, no_load_cases
 from femgear.stages.losses import LOSSES
@@ -441,6 +442,7 @@ PLANAR = Train(
     ),
     describe=lambda case: (*describe_set(case), describe_planar(case, planetary_set(case))),
     warnings=planar_warnings,
+    bodies=case_bodies,
     judgements=set_judgements,
     front=(("weight_response", 0), ("tooth_contact", 0), ("response_mesh_forces", 0)),
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),

@@ -38,7 +38,7 @@ def axle():
 
 
 def test_teeth_stand_in_the_gaps_of_their_mates(axle):
-    bodies = {body.name.rsplit(",", 1)[0]: body for body in gearbox_bodies(axle, {}) if body.kind == "gear"}
+    bodies = {body.name: body for body in gearbox_bodies(axle, {}) if body.kind == "gear"}
     pinion, wheel = bodies["gear 1 of first stage"], bodies["gear 2 of first stage"]
     sun, ring = bodies["sun of second stage"], bodies["ring of second stage"]
     planets = [bodies[f"second stage planet {number}"] for number in (1, 2, 3)]

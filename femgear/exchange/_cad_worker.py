@@ -1,0 +1,111 @@
+"""Runs Gmsh's OpenCASCADE on prepared gears, in a process of its own: ``python _cad_worker.py FILE.step < IN.npz``.
+
+Gmsh has one global model and installs signal handlers. Only gmsh and numpy are imported, never femgear. Lengths are in
+mm. Prints the volume of every body [mm^3]; exit codes: 0 done; 3 gmsh cannot be imported; 4 gmsh refused the gears.
+"""
+
+import io
+import sys
+
+import numpy as np
+
+SECTIONS = 3
+"""Sections through which the surfaces of helical teeth go, per the twist of `STEP` rad and at least."""
+STEP = 0.15
+
+
+def outline(occ, gear, turn, height):
+    """Add the curves of all teeth, turned, at a height: splines on flanks and fillets, arcs at tips and roots."""
+    teeth, flank, fillet = int(gear["teeth"]), gear["flank"], gear["fillet"]
+    centre = occ.addPoint(0.0, 0.0, height)
+    mirrored = np.array([1.0, -1.0])
+    curves, gaps, pitch = [], [], 2.0 * np.pi / teeth
+
+    def points(places, angle):
+        c, s = np.cos(angle), np.sin(angle)
+        return [occ.addPoint(*place, height) for place in places @ np.array([[c, s], [-s, c]])]
+
+    # without a root circle fillets meet in the middle of the gap, in one point
+    meeting = [] if gear["root"] else [points(fillet[-1:], turn + number * pitch)[0] for number in range(teeth)]
+    for number in range(teeth):
+        angle = turn + number * pitch
+        upper, upper_root = points(flank, angle), points(fillet[1:], angle)
+        lower, lower_root = points(flank * mirrored, angle), points(fillet[1:] * mirrored, angle)
+        if meeting:
+            lower_root[-1], upper_root[-1] = meeting[number - 1], meeting[number]
+        curves.append(
+            [
+                occ.addSpline([*lower_root[::-1], lower[-1]]),
+                occ.addSpline(lower[::-1]),
+                occ.addCircleArc(lower[0], centre, upper[0]),
+                occ.addSpline(upper),
+                occ.addSpline([upper[-1], *upper_root]),
+            ]
+        )
+        gaps.append((lower_root[-1], upper_root[-1]))
+    joined = []
+    for number in range(teeth):
+        joined += curves[number]
+        if not meeting:
+            joined.append(occ.addCircleArc(gaps[number][1], centre, gaps[(number + 1) % teeth][0]))
+    return joined
+
+
+def body(occ, gear):
+    """Add one gear with its first end at z = 0; returns the tag of its volume."""
+    width, rim, internal, twist = float(gear["width"]), float(gear["rim"]), bool(gear["internal"]), float(gear["twist"])
+    if twist == 0.0:
+        teeth = occ.addCurveLoop(outline(occ, gear, 0.0, 0.0))
+        circle = occ.addCurveLoop([occ.addCircle(0.0, 0.0, 0.0, rim)])
+        face = occ.addPlaneSurface([circle, teeth] if internal else [teeth, circle])
+        return next(tag for dim, tag in occ.extrude([(2, face)], 0.0, 0.0, width) if dim == 3)
+    count = max(SECTIONS, 1 + int(np.ceil(abs(twist) / STEP)))
+    wires = [occ.addWire(outline(occ, gear, twist * share, width * share)) for share in np.linspace(0.0, 1.0, count)]
+    teeth = next(tag for dim, tag in occ.addThruSections(wires, makeSolid=True) if dim == 3)
+    if internal:
+        blank = occ.addCylinder(0.0, 0.0, 0.0, 0.0, 0.0, width, rim)
+        return occ.cut([(3, blank)], [(3, teeth)])[0][0][1]
+    bore = occ.addCylinder(0.0, 0.0, -1.0, 0.0, 0.0, width + 2.0, rim)
+    return occ.cut([(3, teeth)], [(3, bore)])[0][0][1]
+
+
+def assemble(gmsh, job, path):
+    """Write the gears in their places as a STEP file; returns the volumes."""
+    occ, volumes, made = gmsh.model.occ, [], {}
+    places = job["places"]
+    for kind, x, y, z, angle in places:
+        kind = int(kind)
+        if kind not in made:
+            names = ("teeth", "flank", "fillet", "root", "width", "rim", "internal", "twist")
+            made[kind] = body(occ, {name: job[f"{name}_{kind}"] for name in names})
+        tag = occ.copy([(3, made[kind])])[0][1]
+        occ.rotate([(3, tag)], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, angle)
+        occ.translate([(3, tag)], x, y, z)
+        volumes.append(tag)
+    occ.remove([(3, tag) for tag in made.values()], recursive=True)
+    occ.synchronize()
+    for number, tag in enumerate(volumes):
+        gmsh.model.setEntityName(3, tag, str(job["names"][number]))
+    gmsh.write(path)
+    return [occ.getMass(3, tag) for tag in volumes]
+
+
+if __name__ == "__main__":
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:
+        print(error, file=sys.stderr)
+        sys.exit(3)
+    with np.load(io.BytesIO(sys.stdin.buffer.read())) as file:
+        job = dict(file)
+    gmsh.initialize(["femgear"], readConfigFiles=False, interruptible=False)
+    try:
+        gmsh.option.setNumber("General.Terminal", 0)
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+        result = assemble(gmsh, job, sys.argv[1])
+    except Exception as error:  # gmsh raises bare Exception
+        print(str(error) or gmsh.logger.getLastError(), file=sys.stderr)
+        sys.exit(4)
+    finally:
+        gmsh.finalize()
+    print("volumes", *(f"{volume:.12g}" for volume in result))
