@@ -271,7 +271,12 @@ def _show_warning(message, category, filename, lineno, file=None, line=None) -> 
 
 @app.command
 def check(
-    case: Path, /, *, neighbours: Annotated[bool, Parameter(negative="")] = False, only: str | None = None
+    case: Path,
+    /,
+    *,
+    neighbours: Annotated[bool, Parameter(negative="")] = False,
+    only: str | None = None,
+    json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Read a case, check its gears, print what they are, and refuse what a run would refuse.
 
@@ -283,11 +288,15 @@ def check(
         Print which neighbouring tooth numbers would fit, too.
     only
         Refuse only what femgear run --only with this stage would refuse.
+    json
+        Print findings and refusal as data (docs/command_line.md).
     """
     from femgear.trains.reading import read_case
     from femgear.trains.registry import check_case, train_of
 
     data = read_case(case)
+    if json:
+        return _check_as_data(data, only)
     _print(block for block in train_of(data).describe_case(data) if neighbours or not block.beside)
     try:
         check_case(data, only)
@@ -297,6 +306,27 @@ def check(
             print(_refused_stages(data), file=sys.stderr)
         raise
     return 0
+
+
+def _check_as_data(case: ReadCase, only: str | None) -> int:
+    """Print what is said of a case as data; the exit code is that of its refusal."""
+    from femgear.stages.summary_data import check_data
+    from femgear.trains.registry import check_case, train_of
+
+    refusal = None
+    try:
+        check_case(case, only)
+    except FemgearError as error:
+        refusal = error
+    _print_data(check_data(train_of(case), case, refusal))
+    return 0 if refusal is None else refusal.exit_code
+
+
+def _print_data(data: object) -> None:
+    """Print data as JSON on standard output."""
+    import json
+
+    print(json.dumps(data, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def _refused_stages(case: ReadCase) -> str:
@@ -323,6 +353,7 @@ def run(
     pictures: bool = True,
     force: bool = False,
     verbose: Annotated[bool, Parameter(negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Compute a case and write results, pictures and report.
 
@@ -344,6 +375,8 @@ def run(
         Replace the results that the folder holds, once the new ones are complete.
     verbose
         Print the tables of all stages.
+    json
+        Print what decides as data, and nothing else on standard output (docs/command_line.md).
     """
     from femgear.run import run_case
     from femgear.storage.files import resumable
@@ -373,18 +406,32 @@ def run(
             def tell_numbers(results) -> None:
                 """Print what was found, before anything is drawn."""
                 with progress.aside():
-                    _print(train.describe_results(results) if verbose else train.describe_briefly(results, only))
+                    if not json:
+                        _print(train.describe_results(results) if verbose else train.describe_briefly(results, only))
                     _warn(train.result_warnings(results))
                     sys.stdout.flush()
                 if pictures:
                     _load_xarray()
 
             run_case(data, folder, only=only, pictures=pictures, progress=progress, computed=tell_numbers)
+        if json:
+            return _print_run(output)
         _say(f"results: {output}")
         if pictures:
             _say(f"report:  {output / 'report.html'}")
         if not verbose:
             _say(f"tables:  femgear report {shlex.quote(str(output))} --verbose")
+    return 0
+
+
+def _print_run(folder: Path) -> int:
+    """Print what decides about a run as data."""
+    from femgear.stages.summary_data import run_data
+    from femgear.trains.reading import open_results
+    from femgear.trains.registry import train_of
+
+    results = open_results(folder)
+    _print_data(run_data(train_of(results.case), results))
     return 0
 
 
@@ -488,6 +535,7 @@ def report(
     *,
     static: Annotated[bool, Parameter(negative="")] = False,
     verbose: Annotated[bool, Parameter(negative="")] = False,
+    json: Annotated[bool, Parameter(negative="")] = False,
 ) -> int:
     """Write report.html from the results in a folder.
 
@@ -499,11 +547,15 @@ def report(
         Pictures and no scripts: for paper, and where scripts are not allowed.
     verbose
         Print the tables of all stages.
+    json
+        Print what decides as data, and write no page (docs/command_line.md).
     """
     from femgear.run import report_again
     from femgear.trains.reading import open_results
     from femgear.trains.registry import train_of
 
+    if json:
+        return _print_run(folder)
     report_again(folder, static=static)
     if verbose:
         results = open_results(folder)
