@@ -436,6 +436,32 @@ def _print_run(folder: Path) -> int:
 
 
 @app.command
+def mcp(folder: Path = Path(), /) -> int:
+    """Serve assistants by the Model Context Protocol on standard input and output, inside of one folder.
+
+    Parameters
+    ----------
+    folder
+        Folder of the case files and results that the assistant may read and write.
+    """
+    from femgear.assistant import make_server
+
+    if not folder.is_dir():
+        raise CaseError("there is no such folder", code="E-FILE", key="folder", value=str(folder), limit="a folder")
+    make_server(folder.resolve()).run()
+    return 0
+
+
+@app.command
+def skill() -> int:
+    """Print what teaches an assistant how to write case files and how to read results."""
+    from femgear.assistant import SKILL
+
+    print(SKILL.read_text(encoding="utf-8"), end="")
+    return 0
+
+
+@app.command
 def cad(
     case: Path,
     /,

@@ -24,6 +24,7 @@ LAYERS = (
     ("trains",),
     ("study",),
     ("run",),
+    ("assistant",),
     ("cli",),
     ("__main__",),
 )

@@ -14,7 +14,7 @@ SECTIONS = 3
 STEP = 0.15
 
 
-def outline(occ, gear, turn, height):
+def _outline(occ, gear, turn, height):
     """Add the curves of all teeth, turned, at a height: splines on flanks and fillets, arcs at tips and roots."""
     teeth, flank, fillet = int(gear["teeth"]), gear["flank"], gear["fillet"]
     centre = occ.addPoint(0.0, 0.0, height)
@@ -51,16 +51,16 @@ def outline(occ, gear, turn, height):
     return joined
 
 
-def body(occ, gear):
+def _body(occ, gear):
     """Add one gear with its first end at z = 0; returns the tag of its volume."""
     width, rim, internal, twist = float(gear["width"]), float(gear["rim"]), bool(gear["internal"]), float(gear["twist"])
     if twist == 0.0:
-        teeth = occ.addCurveLoop(outline(occ, gear, 0.0, 0.0))
+        teeth = occ.addCurveLoop(_outline(occ, gear, 0.0, 0.0))
         circle = occ.addCurveLoop([occ.addCircle(0.0, 0.0, 0.0, rim)])
         face = occ.addPlaneSurface([circle, teeth] if internal else [teeth, circle])
         return next(tag for dim, tag in occ.extrude([(2, face)], 0.0, 0.0, width) if dim == 3)
     count = max(SECTIONS, 1 + int(np.ceil(abs(twist) / STEP)))
-    wires = [occ.addWire(outline(occ, gear, twist * share, width * share)) for share in np.linspace(0.0, 1.0, count)]
+    wires = [occ.addWire(_outline(occ, gear, twist * share, width * share)) for share in np.linspace(0.0, 1.0, count)]
     teeth = next(tag for dim, tag in occ.addThruSections(wires, makeSolid=True) if dim == 3)
     if internal:
         blank = occ.addCylinder(0.0, 0.0, 0.0, 0.0, 0.0, width, rim)
@@ -69,7 +69,7 @@ def body(occ, gear):
     return occ.cut([(3, teeth)], [(3, bore)])[0][0][1]
 
 
-def assemble(gmsh, job, path):
+def write_solids(gmsh, job, path):
     """Write the gears in their places as a STEP file; returns the volumes."""
     occ, volumes, made = gmsh.model.occ, [], {}
     places = job["places"]
@@ -77,7 +77,7 @@ def assemble(gmsh, job, path):
         kind = int(kind)
         if kind not in made:
             names = ("teeth", "flank", "fillet", "root", "width", "rim", "internal", "twist")
-            made[kind] = body(occ, {name: job[f"{name}_{kind}"] for name in names})
+            made[kind] = _body(occ, {name: job[f"{name}_{kind}"] for name in names})
         tag = occ.copy([(3, made[kind])])[0][1]
         occ.rotate([(3, tag)], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, angle)
         occ.translate([(3, tag)], x, y, z)
@@ -102,7 +102,7 @@ if __name__ == "__main__":
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
-        result = assemble(gmsh, job, sys.argv[1])
+        result = write_solids(gmsh, job, sys.argv[1])
     except Exception as error:  # gmsh raises bare Exception
         print(str(error) or gmsh.logger.getLastError(), file=sys.stderr)
         sys.exit(4)

@@ -1,0 +1,197 @@
+"""femgear for assistants: a server of the Model Context Protocol on standard input and output, and what teaches it.
+
+Every tool is a command of the command line in a process of its own, in one folder: names of files stay in it, texts
+have a largest size, and case files may not name files outside.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from femgear.errors import CaseError, FemgearError, nvh_library
+
+if TYPE_CHECKING:
+    from mcp.server.mcpserver import MCPServer
+
+SKILL = Path(__file__).with_name("skill.md")
+"""What `femgear skill` prints."""
+MOST_TEXT = 200_000
+"""Longest text of a case file, and of an answer [characters]."""
+MOST_FILES = 200
+"""Files and folders that are listed."""
+LONGEST_RUN = 3600.0
+"""Longest time of a command [s]."""
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}(/[A-Za-z0-9][A-Za-z0-9 ._-]{0,99}){0,4}")
+_OUTSIDE = re.compile(r"^(/|~|\\|[A-Za-z]:[\\/])|(^|[\\/])\.\.([\\/]|$)")
+"""Texts that name a place outside of the folder."""
+
+
+def place_in(folder: Path, name: str) -> Path:
+    """Find a file or folder by its name in a folder.
+
+    Raises
+    ------
+    CaseError
+        E-FILE: a name that leads out of the folder, or is none.
+    """
+    if not _NAME.fullmatch(name) or not (folder / name).resolve().is_relative_to(folder.resolve()):
+        raise CaseError(
+            "only files of one folder are at hand",
+            code="E-FILE",
+            key="name",
+            value=name[:100],
+            limit="letters, digits, blanks and . _ - in each part, inside of the folder",
+        )
+    return (folder / name).resolve()
+
+
+def check_text(text: str) -> None:
+    """Refuse the text of a case file that is too long, no TOML, or names files outside of its folder.
+
+    Raises
+    ------
+    CaseError
+        E-TOML; E-FILE: too long, or files outside.
+    """
+    if len(text) > MOST_TEXT:
+        limit = f"up to {MOST_TEXT} characters"
+        raise CaseError("the case file is too long", code="E-FILE", value=f"{len(text)} characters", limit=limit)
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CaseError(f"the text is no TOML: {error}", code="E-TOML") from error
+    for path, value in _texts(tables):
+        if _OUTSIDE.search(value):
+            remedy = "copy the file into the folder and give its name"
+            raise CaseError("files outside are not at hand", code="E-FILE", key=path, value=value[:100], remedy=remedy)
+
+
+def _texts(value: Any, path: str = "") -> list[tuple[str, str]]:
+    """Texts of all entries with their paths."""
+    if isinstance(value, str):
+        return [(path, value)]
+    if isinstance(value, dict):
+        return [pair for key, part in value.items() for pair in _texts(part, f"{path}.{key}".lstrip("."))]
+    if isinstance(value, list):
+        return [pair for number, part in enumerate(value) for pair in _texts(part, f"{path}[{number}]")]
+    return []
+
+
+def command(folder: Path, *arguments: str) -> dict[str, Any]:
+    """Run a command of femgear in a folder: exit code, what it printed, as data where that is JSON, and messages."""
+    try:
+        done = subprocess.run(
+            [sys.executable, "-m", "femgear", *arguments],
+            cwd=folder,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=LONGEST_RUN,
+        )
+    except subprocess.TimeoutExpired:
+        return {"exit_code": 124, "data": None, "messages": f"stopped after {LONGEST_RUN:g} s"}
+    try:
+        data = json.loads(done.stdout)
+    except json.JSONDecodeError:
+        data = done.stdout[:MOST_TEXT]
+    return {"exit_code": done.returncode, "data": data, "messages": done.stderr[-MOST_TEXT:]}
+
+
+def make_server(folder: Path) -> MCPServer:
+    """Make the server of a folder, with the tools list, read, write, new, check, run, results, compare and explain.
+
+    Raises
+    ------
+    FemgearError
+        E-LIBRARY: the package mcp is not installed.
+    """
+    with nvh_library("tools for assistants", "assistant"):
+        from mcp.server.mcpserver import MCPServer
+        from mcp.server.mcpserver.exceptions import ToolError
+
+    def with_refusals(tool: Callable[..., Any]) -> Callable[..., Any]:
+        """Tell refusals in their own words, which other exceptions are not."""
+
+        @wraps(tool)
+        def refusing(*arguments: Any, **named: Any) -> Any:
+            try:
+                return tool(*arguments, **named)
+            except (FemgearError, OSError, UnicodeError) as error:
+                raise ToolError(str(error)) from error
+
+        return refusing
+
+    server = MCPServer("femgear", instructions=SKILL.read_text(encoding="utf-8"), log_level="WARNING")
+    for tool in _tools(folder):
+        server.tool()(with_refusals(tool))
+    return server
+
+
+def _tools(folder: Path) -> list[Callable[..., Any]]:
+    """Tools of the server, whose docstrings tell an assistant what they are for."""
+
+    def list_files() -> list[str]:
+        """List case files and folders of results."""
+        paths = sorted(path for path in folder.iterdir() if path.suffix == ".toml" or (path / "manifest.json").exists())
+        return [path.name for path in paths[:MOST_FILES]]
+
+    def read_case(name: str) -> str:
+        """Read a case file, TOML text."""
+        path = place_in(folder, name)
+        if path.suffix != ".toml" or not path.is_file():
+            raise CaseError(
+                "there is no such case file", code="E-FILE", key="name", value=name, limit="a name of list_files"
+            )
+        return path.read_text(encoding="utf-8")[:MOST_TEXT]
+
+    def write_case(name: str, text: str) -> str:
+        """Write or replace a case file, whose name ends in .toml; check it afterwards."""
+        path = place_in(folder, name)
+        if path.suffix != ".toml" or path.parent != folder.resolve():
+            raise CaseError("case files stand in the folder and end in .toml", code="E-FILE", key="name", value=name)
+        check_text(text)
+        path.write_text(text, encoding="utf-8")
+        return f"written: {name}"
+
+    def new(kind: str, name: str) -> dict[str, Any]:
+        """Write a commented case of a kind: planetary, planar, helical, pair, gear_pair, gearbox; edit and check it."""
+        place_in(folder, name)
+        return command(folder, "new", kind, "-o", name)
+
+    def check(name: str) -> dict[str, Any]:
+        """Check a case: what it is, its warnings, and why a run would refuse it. Takes a second."""
+        check_text(place_in(folder, name).read_text(encoding="utf-8"))
+        return command(folder, "check", name, "--json")
+
+    def run(name: str, results: str, only: str = "") -> dict[str, Any]:
+        """Compute a case into a folder of results; only: one stage and what it needs. Seconds to minutes."""
+        check_text(place_in(folder, name).read_text(encoding="utf-8"))
+        place_in(folder, results)
+        stage = ("--only", only) if only else ()
+        return command(folder, "run", name, "-o", results, "--json", "--force", *stage)
+
+    def results(folder_name: str) -> dict[str, Any]:
+        """Tell what decides about a finished run: answers with limits, findings, key figures, files."""
+        place_in(folder, folder_name)
+        return command(folder, "report", folder_name, "--json")
+
+    def compare(first: str, second: str, output: str) -> dict[str, Any]:
+        """Compare two folders of results; writes compare.html into a folder."""
+        for name in (first, second, output):
+            place_in(folder, name)
+        return command(folder, "compare", first, second, "-o", output)
+
+    def explain(code: str) -> dict[str, Any]:
+        """Say what a code of a refusal (E-...) or a warning (W-...) means."""
+        return command(folder, "explain", code[:100])
+
+    return [list_files, read_case, write_case, new, check, run, results, compare, explain]

@@ -1,0 +1,106 @@
+"""The server for assistants, called by the client of its library: tools, answers, and what stays closed."""
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+
+import pytest
+
+from femgear.assistant import MOST_TEXT, SKILL, check_text, command, make_server, place_in
+from femgear.cli import main
+from femgear.errors import CaseError
+
+pytest.importorskip("mcp", reason='pip install "femgear[assistant]"')
+CASE = Path(__file__).parents[1] / "cases" / "spur_pair.toml"
+TOOLS = ["list_files", "read_case", "write_case", "new", "check", "run", "results", "compare", "explain"]
+
+
+def asked(server, *calls):
+    """Texts and error flags of calls of tools, by the client of the library."""
+    from mcp import Client
+
+    async def talk():
+        async with Client(server) as client:
+            tools = [tool.name for tool in (await client.list_tools()).tools]
+            answers = [await client.call_tool(name, arguments) for name, arguments in calls]
+            return tools, [("".join(part.text for part in answer.content), bool(answer.is_error)) for answer in answers]
+
+    return asyncio.run(talk())
+
+
+def test_a_case_goes_from_new_to_its_answers(tmp_path):
+    server = make_server(tmp_path)
+    text = CASE.read_text(encoding="utf-8")
+    tools, answers = asked(
+        server,
+        ("write_case", {"name": "pair.toml", "text": text}),
+        ("list_files", {}),
+        ("check", {"name": "pair.toml"}),
+        ("run", {"name": "pair.toml", "results": "out", "only": "static"}),
+        ("results", {"folder_name": "out"}),
+        ("explain", {"code": "W-PULL"}),
+        ("read_case", {"name": "pair.toml"}),
+    )
+    assert tools == TOOLS and not any(error for _, error in answers)
+    _, listed, checked, ran, told, explained, read = (answer for answer, _ in answers)
+    assert "pair.toml" in listed and json.loads(checked)["data"]["accepted"] and read == text
+    done = json.loads(ran)
+    assert done["exit_code"] == 0 and done["data"]["stages"] == ["static"] and done["data"]["kind"] == "pair"
+    assert json.loads(told)["data"]["judgements"] == done["data"]["judgements"]
+    assert "Meshes pull" in explained
+
+
+def test_what_lies_outside_stays_closed(tmp_path):
+    inside = tmp_path / "inside"
+    inside.mkdir()
+    (tmp_path / "secret.toml").write_text("model = 1", encoding="utf-8")
+    (inside / "link.toml").symlink_to(tmp_path / "secret.toml")
+    names = "../secret.toml", "/etc/passwd", "a/../../secret.toml", "link.toml", "", "x" * 200, "-o", "a\\..\\b", "\x00"
+    for name in names:
+        with pytest.raises(CaseError):
+            place_in(inside, name)
+    _, answers = asked(
+        make_server(inside),
+        ("read_case", {"name": "../secret.toml"}),
+        ("write_case", {"name": "../new.toml", "text": "a = 1"}),
+        ("write_case", {"name": "case.txt", "text": "a = 1"}),
+        ("write_case", {"name": "case.toml", "text": 'a = "' + "x" * 10_000_000 + '"'}),
+        ("run", {"name": "../secret.toml", "results": "out"}),
+        ("results", {"folder_name": "/"}),
+    )
+    assert all(error and "E-FILE" in answer for answer, error in answers)
+    assert sorted(path.name for path in tmp_path.rglob("*")) == ["inside", "link.toml", "secret.toml"]
+
+
+def test_case_files_may_not_name_files_outside():
+    for text in ('file = "/etc/passwd"', '[a]\nb = ["../x.op2"]', 'c = "C:\\\\x"', 'd = "~/x"', 'e = "a/../../b"'):
+        with pytest.raises(CaseError, match="outside"):
+            check_text(text)
+    check_text('title = "1/2 of a set"\nfile = "casing.npz"')
+    with pytest.raises(CaseError, match="too long"):
+        check_text("#" * (MOST_TEXT + 1))
+    with pytest.raises(CaseError, match="no TOML"):
+        check_text("a = ")
+
+
+def test_commands_have_exit_code_data_and_messages(tmp_path):
+    done = command(tmp_path, "check", "absent.toml", "--json")
+    assert done["exit_code"] == 2 and done["data"] == "" and "E-FILE" in done["messages"]
+
+
+@pytest.mark.slow
+def test_the_server_talks_on_standard_input_and_output(tmp_path):
+    from mcp import StdioServerParameters
+
+    server = StdioServerParameters(command=sys.executable, args=["-m", "femgear", "mcp", str(tmp_path)])
+    tools, ((answer, error),) = asked(server, ("new", {"kind": "pair", "name": "own.toml"}))
+    assert tools == TOOLS and not error and json.loads(answer)["exit_code"] == 0 and (tmp_path / "own.toml").exists()
+
+
+def test_the_skill_names_tools_that_there_are(capsys):
+    assert main(["skill"]) == 0
+    text = capsys.readouterr().out
+    assert text == SKILL.read_text(encoding="utf-8")
+    assert all(f"`{name}`" in text for name in ("new", "read_case", "write_case", "check", "run", "compare", "explain"))
+    assert main(["mcp", "no/such/folder"]) == 2
