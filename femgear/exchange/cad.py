@@ -199,7 +199,7 @@ def write_dxf(gears: Sequence[PlacedGear], path: Path) -> None:
     write_text(text.getvalue(), path)
 
 
-def write_cad(gears: Sequence[PlacedGear], path: Path, told: Callable[[str], object] = lambda text: None) -> None:
+def write_cad(gears: Sequence[PlacedGear], path: Path, tell: Callable[[str], object] = lambda text: None) -> None:
     """Write gears as STEP or DXF, as the name of the file ends, and tell the volumes of solids.
 
     Raises
@@ -222,4 +222,4 @@ def write_cad(gears: Sequence[PlacedGear], path: Path, told: Callable[[str], obj
         write_dxf(gears, path)
         return
     for placed, volume in zip(gears, write_step(gears, path), strict=True):
-        told(f"{placed.name}: {1e9 * volume:,.1f} mm^3")
+        tell(f"{placed.name}: {1e9 * volume:,.1f} mm^3")
