@@ -46,7 +46,7 @@ from femgear.gears.profile import (
     transverse_tool,
 )
 from femgear.gears.tolerances import flank_tolerances
-from validation.rows import Row, printed, within
+from validation.rows import Row, information, printed, within
 
 ALPHA = math.radians(20.0)
 STAGE_1 = "KISSsoft report, NREL 5 MW gearbox, planetary stage 1"
@@ -361,6 +361,30 @@ def face_factors() -> tuple[Row, ...]:
         stiffness = single * (0.75 * ratio + 0.25)
         ours = face_load_factor(0.85 * 0.5e-6 * tolerance, 1e3 * line_load, stiffness)
         rows.append(printed(case, source, "face load factor K_Hbeta, method C", reference, ours))
+    return tuple(rows)
+
+
+def life_lines_of_a_program() -> tuple[Row, ...]:
+    """Z_NT and Y_NT between their knees as a public program has them, which read the figures of the standard.
+
+    Its Z_NT of steels that may stand 5e7 load cycles has numbers of load cycles beside its factors that are those of
+    other materials: it is left out.
+    """
+    program = "ddjokic/python-gearbox, tables of ISO 6336-2 and -3"
+    rows = []
+    for kind, treatment, factors in (
+        ("Y_NT", "case hardened steel", {1e4: 1.97, 1e5: 1.53, 1e6: 1.15, 1e8: 0.94}),
+        ("Y_NT", "through hardened alloy steel", {1e5: 1.79, 1e6: 1.2, 1e9: 0.895}),
+        ("Y_NT", "nitrided steel", {1e4: 1.4, 1e5: 1.21, 1e6: 1.07}),
+        ("Y_NT", "nitrocarburised steel", {1e5: 1.05}),
+        ("Z_NT", "nitrided steel", {1e6: 1.07, 1e7: 0.97, 1e8: 0.93}),
+        ("Z_NT", "nitrocarburised steel", {1e6: 1.02, 1e9: 0.89}),
+    ):
+        steel = GEAR_STEELS[treatment]
+        line = steel.root_life if kind == "Y_NT" else steel.contact_life
+        for cycles, reference in factors.items():
+            quantity = f"{kind} of {treatment} at {cycles:.0e} load cycles"
+            rows.append(information("life factors", program, quantity, reference, line.at(cycles)))
     return tuple(rows)
 
 

@@ -306,6 +306,7 @@ THEMES = (
             strength.fzg_gears,
             strength.helical_fzg_gear,
             strength.face_factors,
+            strength.life_lines_of_a_program,
             strength.edition_of_2019,
             strength.tolerances,
             strength.life_factors,

@@ -2,6 +2,7 @@
 
 import math
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -103,7 +104,7 @@ def test_lives_without_end_hold_and_none_is_not_judged():
 
 
 def test_lives_come_from_the_files():
-    teeth = {"root_life": ("root", [math.inf, 400.0]), "flank_life": ("flank", [900.0, math.inf])}
+    teeth: dict[str, Any] = {"root_life": ("root", [math.inf, 400.0]), "flank_life": ("flank", [900.0, math.inf])}
     for kind in ("root", "flank"):
         teeth[f"{kind}_stress_ratio"] = (("load_case", kind), [[0.8, 0.9]])
     gears = {"root": ["sun", "ring"], "flank": ["sun", "ring"]}
