@@ -1,7 +1,8 @@
 """Teeth that part in a gearbox, by harmonic balance at the speed of the load case, and the results of it.
 
 Stage by stage, as the response is solved: flanks of one stage part, and touch their back flanks, while meshes of all
-others are springs about the loaded state (`femgear.trains.gearbox.nonlinear`). A pair has the mesh frequency alone, a
+others are springs about the loaded state (`femgear.trains.gearbox.nonlinear`). With ``together`` flanks of all stages
+part and all carriers turn, while the stiffness of the one stage fluctuates. A pair has the mesh frequency alone, a
 set whose carrier turns that of the carrier too, by which weight and uneven supports act on its planets. Bearings with
 play that are given by their stiffness keep it.
 """
@@ -11,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -27,9 +29,9 @@ from femgear.system.force_laws import Element, GearMeshes, positive_part
 from femgear.system.fourier import harmonic_lines, side_bands
 from femgear.system.system import NonlinearSystem
 from femgear.system.turning_meshes import TurningMeshes, planet_wave_generator
-from femgear.trains.gearbox.case_file import CASING, GearboxCase, PairSection
+from femgear.trains.gearbox.case_file import CASING, BoxBalanceSection, GearboxCase, PairSection
 from femgear.trains.gearbox.deflection import Deflection
-from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
+from femgear.trains.gearbox.excitation import constant_excitation, excitation_of, exciting_stages
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, nonlinear_gearbox
 from femgear.trains.gearbox.play import loose_notes
@@ -42,6 +44,13 @@ if TYPE_CHECKING:
 
 _INSTANTS, _TURNS = 512, 48
 """Instants of a mesh period, and angles of the carrier, at which forces are looked at."""
+_ANGLES = 8
+"""Angles of all other carriers for each of these, spread evenly by steps of `_STEP` of their turn."""
+_STEP = 0.5 * (math.sqrt(5.0) - 1.0)
+_SAMPLES = (4, 16), (8, 64)
+"""Samples for an order, and at least, of carriers and of the mesh that excites, of several stages together."""
+_EMBEDDED = 4000
+"""Unknowns up to which a balance that fails is followed from its linear springs on."""
 _TAIL = 0.05
 """Share of the amplitude in the upper half of the lines that is told."""
 
@@ -67,8 +76,9 @@ class StageBalance:
         Sizes of their forces [N].
     acceleration : (s, L) complex array
         Of the lines of the solution at all sensors [m/s^2].
-    periods : int
-        Mesh periods of the period of the excitation.
+    harmonic, side_band : (L,) arrays
+        Of the lines of the solution: multiple of the mesh frequency, turns of the carrier beside it; none where the
+        stage does not excite.
     """
 
     name: str
@@ -79,7 +89,8 @@ class StageBalance:
     bearings: tuple[str, ...] = ()
     bearing_force: np.ndarray = field(default_factory=lambda: np.zeros((1, _INSTANTS, 0)))
     acceleration: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), complex))
-    periods: int = 1
+    harmonic: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    side_band: np.ndarray = field(default_factory=lambda: np.zeros(0))
 
     @property
     def uneven(self) -> np.ndarray:
@@ -112,23 +123,73 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
     stages = exciting_stages(found)
     for number, stage in enumerate(stages):
         progress("balance", number, len(stages))
-        drive = excitation_of(found, stage, steps=steps)
+        drives = {stage.name: excitation_of(found, stage, steps=steps)}
+        if wanted.together:
+            others = (one for one in found.model.stages if one is not stage)
+            drives |= {one.name: constant_excitation(found, one, steps=steps) for one in others}
         known: dict[str, Any] = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
-        box = nonlinear_gearbox(found, {stage.name: drive}, **known, mean_damping=True)
-        lines = wanted.harmonics * drive.periods
-        orders = harmonic_lines(lines)
-        if len(box.frequency) > 1:
-            orders = side_bands(wanted.side_bands, lines, wanted.side_bands)
-        options = {"orders": orders, "stability": False, "radius": False}
-        loaded = loaded_lines(box, len(orders)) if box.bearings else None
-        held = solve_harmonic_balance(held_together(box), box.frequency, start=loaded, **options)
-        solution = solve_harmonic_balance(box.problem, box.frequency, start=held, **options)
-        if not solution.converged:
-            solution = solve_harmonic_balance(box.problem, box.frequency, **options)
-        forces = *forces_of_flanks(box, solution), tuple(box.bearings), forces_of_bearings(box, solution)
-        moved = accelerations_at_sensors(box, solution), drive.periods
-        solved.append(StageBalance(stage.name, box.stages[0].meshes, solution, *forces, *moved))
+        box = nonlinear_gearbox(found, drives, **known, mean_damping=True)
+        names = [one.name for one in box.stages]
+        solution = _solved(box, wanted, names.index(stage.name))
+        solved.append(_moving(box, solution, names.index(stage.name)))
+        if not number:
+            silent_stages = [one for one in names if one not in {exciting.name for exciting in stages}]
+            solved += [_moving(box, solution, names.index(one), excites=False) for one in silent_stages]
     return solved
+
+
+def _moving(box: NonlinearGearbox, solution: PeriodicSolution, place: int, *, excites: bool = True) -> StageBalance:
+    """Take the stage at a place out of a solution; lines at the sensors are those of stages that excite."""
+    stage = box.stages[place]
+    orders = solution.orders[: len(solution.orders) * excites]
+    forces = *forces_of_flanks(box, solution, place), tuple(box.bearings), forces_of_bearings(box, solution, place)
+    lines = accelerations_at_sensors(box, solution)[:, : len(orders)]
+    harmonic = orders[:, stage.mesh_base] / stage.excitation.periods
+    return StageBalance(
+        stage.name, stage.meshes, solution, *forces, lines, harmonic, orders[:, stage.turn_base] * stage.turns
+    )
+
+
+def _solved(box: NonlinearGearbox, wanted: BoxBalanceSection, place: int) -> PeriodicSolution:
+    """Solve for the motion with the excitation of the stage at a place: flanks that may pull first."""
+    highest = wanted.harmonics * box.stages[place].excitation.periods
+    options: dict[str, Any] = {"stability": False, "radius": False}
+    if len(box.stages) > 1:
+        orders = options["orders"] = lines_together(box, place, highest, wanted.side_bands)
+        options["samples"] = _samples(orders, box.stages[place].mesh_base)
+    elif len(box.frequency) > 1:
+        orders = options["orders"] = side_bands(wanted.side_bands, highest, wanted.side_bands)
+    else:
+        orders = options["orders"] = harmonic_lines(highest)
+    loaded = loaded_lines(box, len(orders)) if box.bearings else None
+    held = solve_harmonic_balance(held_together(box), box.frequency, start=loaded, **options)
+    solution = solve_harmonic_balance(box.problem, box.frequency, start=held, **options)
+    if not solution.converged and solution.deflection.shape[0] * (2 * len(orders) - 1) <= _EMBEDDED:
+        solution = solve_harmonic_balance(box.problem, box.frequency, **options)
+    return solution
+
+
+def lines_together(box: NonlinearGearbox, place: int, harmonics: int, side_bands: int) -> np.ndarray:
+    """List the lines (L, n_bases) of all stages: so many harmonics of one mesh, so many turns of all carriers together.
+
+    The mean comes first; of a line and its conjugate one is listed.
+    """
+    turning = [stage.turn_base for stage in box.stages if stage.turns]
+    highest = np.zeros(len(box.frequency), int)
+    highest[turning], highest[box.stages[place].mesh_base] = side_bands, harmonics
+    ranges = [range(-top, top + 1) for top in highest.tolist()]
+    orders = np.array([order for order in product(*ranges) if order >= tuple(-value for value in order)])
+    orders = orders[np.abs(orders[:, turning]).sum(axis=1) <= side_bands]
+    return orders[np.argsort(orders.any(axis=1), kind="stable")]
+
+
+def _samples(orders: np.ndarray, mesh: int) -> tuple[int, ...]:
+    """Points along every base for lines of several stages together."""
+    counts = []
+    for base, top in enumerate(np.abs(orders).max(axis=0).tolist()):
+        times, least = _SAMPLES[base == mesh]
+        counts.append(max(times * top, least) if top else 1)
+    return tuple(counts)
 
 
 def accelerations_at_sensors(box: NonlinearGearbox, solution: PeriodicSolution) -> np.ndarray:
@@ -154,7 +215,8 @@ def check_balance(case: GearboxCase) -> None:
     CaseError: one for every such stage that excites the gearbox (E-TURNING).
     """
     flow, problems = gearbox_flow(case), list[CaseError]()
-    for stage in exciting_sections(case) if case.balance.harmonics else ():
+    exciting = exciting_sections(case) if case.balance.harmonics else ()
+    for stage in case.planetary if exciting and case.balance.together else exciting:
         if isinstance(stage, PairSection) or not flow.carries(stage):
             continue
         if stage.carrier == CASING or not flow.speed[stage.carrier]:
@@ -180,35 +242,49 @@ def held_together(box: NonlinearGearbox) -> NonlinearSystem:
     return replace(box.problem, elements=tuple(linear))
 
 
-def forces_of_flanks(box: NonlinearGearbox, solution: PeriodicSolution) -> tuple[np.ndarray, np.ndarray]:
-    """Compute the forces (T, I, M) of drive flanks and back flanks of the one stage of a system [N].
+def forces_of_flanks(
+    box: NonlinearGearbox, solution: PeriodicSolution, place: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the forces (T, I, M) of drive flanks and back flanks of the stage at a place [N].
 
-    At equal instants of the mesh period and equal angles of the carrier, see `StageBalance`.
+    At equal instants of its mesh period and equal angles of its carrier, see `StageBalance`.
     """
-    (stage,), ((front, behind),) = box.stages, box.flanks
-    x, theta = _deflections(box, solution)
-    shape = (-1, _INSTANTS, len(stage.meshes))
-    back = np.zeros((len(theta), len(stage.meshes)))
-    if behind is not None:
-        back[:, stage.back_flanks] = _forces(behind, x, theta)
-    return _forces(front, x, theta).reshape(shape), back.reshape(shape)
+    stage, (front, behind) = box.stages[place], box.flanks[place]
+    drive, back = list[np.ndarray](), list[np.ndarray]()
+    for x, theta in _deflections(box, solution, place):
+        drive.append(_forces(front, x, theta))
+        back.append(np.zeros_like(drive[-1]))
+        if behind is not None:
+            back[-1][:, stage.back_flanks] = _forces(behind, x, theta)
+    return np.array(drive), np.array(back)
 
 
-def forces_of_bearings(box: NonlinearGearbox, solution: PeriodicSolution) -> np.ndarray:
+def forces_of_bearings(box: NonlinearGearbox, solution: PeriodicSolution, place: int = 0) -> np.ndarray:
     """Compute the sizes (T, I, b) of the forces of bearings with play, at the instants of `forces_of_flanks` [N]."""
-    x, theta = _deflections(box, solution)
-    sizes = [np.hypot(*element.evaluate(x[:, element.columns], theta)[0][:, 0].T) for element in box.bearings.values()]
-    table = np.stack(sizes, axis=-1) if sizes else np.zeros((len(x), 0))
-    return table.reshape(len(x) // _INSTANTS, _INSTANTS, len(sizes))
+    rings, table = list(box.bearings.values()), list[np.ndarray]()
+    for x, theta in _deflections(box, solution, place) if rings else ():
+        sizes = [np.hypot(*ring.evaluate(x[:, ring.columns], theta)[0][:, 0].T) for ring in rings]
+        table.append(np.stack(sizes, axis=-1))
+    return np.array(table) if rings else np.zeros((1, _INSTANTS, 0))
 
 
-def _deflections(box: NonlinearGearbox, solution: PeriodicSolution) -> tuple[np.ndarray, np.ndarray]:
-    """Deflections (T I, n_columns) [m] and phases (T I, n_bases) [rad] of one stage, see `forces_of_flanks`."""
-    phases = [2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS]
-    if box.stages[0].turns:
-        phases = [2.0 * np.pi * np.arange(_TURNS) / _TURNS, *phases]
-    theta = np.stack(np.meshgrid(*phases, indexing="ij"), axis=-1).reshape(-1, len(phases))
-    return np.real(np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T), theta
+def _deflections(
+    box: NonlinearGearbox, solution: PeriodicSolution, place: int
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Deflections (I, n_columns) [m] and phases (I, n_bases) [rad] at one angle of the carrier after the other."""
+    own, turns = box.stages[place], np.zeros((1, len(box.frequency)))
+    others = [stage.turn_base for stage in box.stages if stage.turns and stage is not own]
+    if own.turns or others:
+        angles = np.arange(_TURNS * (_ANGLES if others else 1))
+        turns = np.zeros((len(angles), len(box.frequency)))
+        if own.turns:
+            turns[:, own.turn_base] = angles / _TURNS
+        for number, base in enumerate(others, 1):
+            turns[:, base] = angles * _STEP**number
+    for turn in turns:
+        theta = np.tile(2.0 * np.pi * (turn % 1.0), (_INSTANTS, 1))
+        theta[:, own.mesh_base] = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
+        yield np.real(np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T), theta
 
 
 def _forces(element: Element, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
@@ -224,12 +300,14 @@ def _forces(element: Element, x: np.ndarray, theta: np.ndarray) -> np.ndarray:
 class GearboxBalanceResult(StageResult):
     """Motions with flanks that part at the speed of the load case, stage by stage: ``stages``.
 
-    ``rigid`` names the rings that modes and response have elastic, ``sensors`` those whose accelerations there are.
+    ``rigid`` names the rings that modes and response have elastic, ``sensors`` those whose accelerations there are,
+    ``together`` tells whether all carriers turn at once.
     """
 
     stages: tuple[StageBalance, ...]
     rigid: tuple[str, ...] = ()
     sensors: tuple[str, ...] = ()
+    together: bool = False
 
     @property
     def converged(self) -> bool:
@@ -316,7 +394,8 @@ class GearboxBalanceResult(StageResult):
         if stages and len(stages[0].acceleration):
             variables |= _at_sensors(stages)
             coords["sensor"] = (("sensor",), list(self.sensors), "1", "sensor")
-        attrs = {"title": "teeth that part, by harmonic balance", "rigid": ", ".join(self.rigid)}
+        attrs: dict[str, Any] = {"title": "teeth that part, by harmonic balance", "rigid": ", ".join(self.rigid)}
+        attrs["together"] = int(self.together)
         return Contents(variables, coords, attrs)
 
 
@@ -324,11 +403,10 @@ def _at_sensors(stages: tuple[StageBalance, ...]) -> dict[str, Any]:
     """Lines at the sensors, one stage after the other, and their levels."""
     lines = np.concatenate([stage.acceleration for stage in stages], axis=1)
     level = [np.sqrt(0.5 * (np.abs(stage.acceleration) ** 2).sum(axis=1)) for stage in stages]
-    orders = [stage.solution.orders for stage in stages]
-    frequency = np.concatenate([stage.solution.line_frequency for stage in stages]) / (2.0 * np.pi)
-    harmonic = [order[:, -1] / stage.periods for order, stage in zip(orders, stages, strict=True)]
-    bands = [order[:, 0] * (order.shape[1] > 1) for order in orders]
-    origin = [stage.name for stage in stages for _ in stage.solution.orders]
+    harmonic, bands = [stage.harmonic for stage in stages], [stage.side_band for stage in stages]
+    omega = np.concatenate([stage.solution.line_frequency[: len(stage.harmonic)] for stage in stages])
+    frequency = omega / (2.0 * np.pi)
+    origin = [stage.name for stage in stages for _ in stage.harmonic]
     return {
         "level_of_stage": ("sensor stage", np.transpose(level), "m/s^2", "root mean square of the acceleration"),
         "lines_real": ("sensor line", np.real(lines), "m/s^2", "acceleration, amplitude of the line"),
@@ -390,7 +468,8 @@ def describe_balance(data: xr.Dataset) -> Block:
         "apart": lambda i: f"{float(data['parted_share'].values[i]):.1%}",
         "on the back": lambda i: f"{float(data['back_share'].values[i]):.1%}",
     }
-    note = "each stage with the meshes of the others as springs; uneven: largest over mean of the mean mesh force"
+    others = "all carriers turning" if data.attrs["together"] else "the meshes of the others as springs"
+    note = f"each stage with {others}; uneven: largest over mean of the mean mesh force"
     notes = [note, *(loose_notes(data) if "bearing" in data.sizes else ())]
     if "sensor" in data.sizes:
         level = np.sqrt((data["level_of_stage"].values ** 2).sum(axis=1))

@@ -629,12 +629,14 @@ class BoxBalanceSection(Section):
     """Teeth that part, by harmonic balance: harmonics of excitation and motion; none leaves it out.
 
     Planets on a carrier that turns make ``side_bands`` at either side of each mesh harmonic. Teeth that part touch
-    their ``back_flanks`` beyond their backlash.
+    their ``back_flanks`` beyond their backlash. With ``together`` flanks of all stages part and all carriers turn,
+    while one stage after the other excites; without it the meshes of the others are springs.
     """
 
     harmonics: Annotated[int, Count(0, 64)] = 0
     side_bands: Annotated[int, Count(0, 24)] = 3
     back_flanks: StrictBool = True
+    together: StrictBool = False
 
 
 class GearboxCase(Section, ReadCase):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -58,6 +59,21 @@ def excitation_of(
     if stage.name in found.contacts:
         return stage_excitation(found.contacts[stage.name], steps=steps)
     return pair_count_excitation(found.model, stage)
+
+
+def constant_excitation(found: Deflection, stage: StageModel, *, steps: Steps | None = None) -> MeshExcitation:
+    """Make meshes that excite nothing: of the means of a stage that excites, else of a constant stiffness."""
+    count = 512
+    if stage in exciting_stages(found):
+        drive = excitation_of(found, stage, steps=steps)
+        means = {
+            name: np.repeat(getattr(drive, name).mean(axis=1, keepdims=True), count, axis=1)
+            for name in ("stiffness", "deflection", "force")
+        }
+        return replace(drive, **means, periods=1)
+    contacts = found.model.assembly.contacts
+    k = np.repeat([[contacts[mesh].stiffness.sum()] for mesh in stage.meshes], count, axis=1)
+    return MeshExcitation(k, 0.0 * k, 0.0 * k, np.zeros(len(k)))
 
 
 def pair_count_excitation(model: GearboxModel, stage: StageModel) -> MeshExcitation:

@@ -143,7 +143,8 @@ def solve_box_balance(
     """Solve for motions with teeth that part at the speed of the chosen load case, stage by stage."""
     rings = tuple(f"ring of {stage.name}" for stage in case.planetary if stage.elastic_ring)
     state, sensors = deflection.of(case).state, tuple(sensor.name for sensor in gearbox_sensors(case))
-    return GearboxBalanceResult(tuple(solve_balance(state, steps=steps, progress=progress)), rings, sensors)
+    stages = tuple(solve_balance(state, steps=steps, progress=progress))
+    return GearboxBalanceResult(stages, rings, sensors, case.balance.together)
 
 
 def _no_balance(case: GearboxCase) -> str:

@@ -23,8 +23,7 @@ from femgear.system.force_laws import GearMeshes
 from femgear.system.system import MeshExcitation
 from femgear.system.turning_meshes import TurningMeshes
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
-from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
-from femgear.trains.gearbox.model import StageModel
+from femgear.trains.gearbox.excitation import constant_excitation, excitation_of, exciting_stages
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, NonlinearStage, nonlinear_gearbox
 from femgear.trains.gearbox.response import reference_shaft
 from femgear.trains.gearbox.transient_case import TorqueOverTimeSection, TransientSection, torque_histories
@@ -135,15 +134,9 @@ def all_excitations(found: Deflection, *, steps: Steps | None = None) -> Mapping
     return {
         stage.name: excitation_of(found, stage, steps=steps)
         if stage.name in exciting or stage.section.counts_pairs
-        else _constant(found, stage)
+        else constant_excitation(found, stage, steps=steps)
         for stage in found.model.stages
     }
-
-
-def _constant(found: Deflection, stage: StageModel) -> MeshExcitation:
-    contacts = found.model.assembly.contacts
-    k = np.repeat([[contacts[mesh].stiffness.sum()] for mesh in stage.meshes], 512, axis=1)
-    return MeshExcitation(k, 0.0 * k, 0.0 * k, np.zeros(len(k)))
 
 
 def _groups(box: NonlinearGearbox) -> list[ContactGroup]:

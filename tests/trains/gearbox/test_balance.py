@@ -1,5 +1,6 @@
 """Teeth that part in a gearbox: balance of torques, the same motion by time integration, what the file says."""
 
+import copy
 from dataclasses import replace
 
 import numpy as np
@@ -85,6 +86,43 @@ def test_the_casing_feels_lines_at_multiples_of_the_planets_passing():
     assert lines[(order % 3 == 0) & (order > 4)].min() > 1e-6 * lines.max()
     assert data["level_of_stage"].item() == pytest.approx(np.sqrt(0.5 * (lines**2).sum()), rel=1e-12)
     assert any(note.startswith("sensor top: ") for note in describe_balance(data).notes)
+
+
+def two_sets(**balance) -> Deflection:
+    """Two plane sets in series under weight, of which the second one alone excites."""
+    tables = planetary_tables() | {"motions": "plane", "gravity": {}}
+    first, second = tables["planetary"][0], copy.deepcopy(tables["planetary"][0])
+    for stage in (first, second):
+        stage["planet"]["bearing"] = {"radial": "3e8 N/m"}
+        stage["gears"]["teeth"] = [20, 20, 61]
+    first |= {"name": "slow", "sun": "carrier", "carrier": "slow carrier"}
+    for mesh in ("sun_mesh", "ring_mesh"):
+        second[mesh] = {"stiffness": "3e8 N/m", "contact_ratio": 1.6, "backlash": "20 um"}
+    tables["planetary"] = [first, second]
+    tables["shaft"].append({"name": "slow carrier"})
+    tables["mass"].append({"shaft": "slow carrier", "mass": "20 kg", "inertia": "0.2 kg m^2"})
+    tables["bearing"].append({"name": "loose", "shaft": "slow carrier", "radial": "5e8 N/m", "clearance": "10 um"})
+    tables["operation"]["output"] = ["slow carrier"]
+    return solve_deflection(read_case(tables | {"balance": {"harmonics": 1, "side_bands": 1} | balance}))
+
+
+def test_stages_together_are_those_one_by_one_where_little_couples_them():
+    found = two_sets(together=True)
+    (alone,), (together, still) = solve_balance(two_sets()), solve_balance(found)
+    assert alone.solution.converged and together.solution.converged
+    assert (together.name, still.name) == ("set", "slow") and not len(still.harmonic)
+    # a line of both carriers, the mean once, no line and its conjugate
+    orders = together.solution.orders
+    assert len(orders) == 1 + 2 + 5 and not orders[0].any() and not orders[1:, [0]].any(axis=1).all()
+    assert len(np.unique(np.vstack([orders, -orders]), axis=0)) == 2 * len(orders) - 1
+    mean = alone.drive.mean(axis=(0, 1))
+    assert together.drive.mean(axis=(0, 1)) == pytest.approx(mean, rel=1e-3)
+    assert together.uneven == pytest.approx(alone.uneven, rel=1e-2)
+    # the slow set carries the torque that the other one gives on
+    radius = next(stage for stage in found.model.stages if stage.name == "slow").sizes.base_radii[0]
+    assert still.drive[..., :3].sum(axis=2).mean() == pytest.approx(100.0 * (1 + 61 / 20) / radius, rel=1e-2)
+    data = GearboxBalanceResult((together, still), together=True).dataset()
+    assert data.sizes["mesh"] == 12 and "all carriers turning" in describe_balance(data).notes[0]
 
 
 @pytest.mark.slow
