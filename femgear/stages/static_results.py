@@ -118,6 +118,11 @@ PEAK_VARIABLES = {
     "mesh_stiffness_between": ("mesh between", "N/m", "tangent mesh stiffness at the positions between"),
 }
 """Extremes and means, and further positions at which extremes lie."""
+FRICTION_VARIABLES = {
+    "friction_force": ("mesh position", "N", "friction force of gear 1 on gear 2 along the tangent, as flank 1 moves"),
+    "friction_moment": ("mesh position", "N m", "moment of these forces about the pitch point"),
+}
+"""Variables of static.nc where friction acts (`losses.excites`)."""
 SLICE_VARIABLES = {
     "slice_load": ("mesh tooth slice position", "N", "load of a tooth pair in a slice, times their number"),
     "face_load_factor": (
@@ -315,6 +320,8 @@ class StaticResult(StageResult):
         variables, width = STATIC_VARIABLES, min(gears.mesh_widths)
         if cycle.slice_load is not None:
             variables = variables | SLICE_VARIABLES
+        if cycle.friction_force is not None:
+            variables = variables | FRICTION_VARIABLES
         values = {name: getattr(cycle, _ATTRIBUTES.get(name, name)) for name in variables}
         if self.overlap_ratio:
             # a right-handed gear that turns another counter-clockwise pushes it towards -z

@@ -287,6 +287,15 @@ def test_the_verdict_says_what_friction_adds():
     assert friction_rows(SimpleNamespace(stages=())) == []
 
 
+def test_files_have_friction_where_it_acts_alone():
+    case, static, _ = planetary()
+    data = static.dataset()
+    assert data["friction_force"].dims == data["friction_moment"].dims == ("mesh", "position")
+    assert np.array_equal(data["friction_force"], static.cycle.friction_force)
+    assert data["friction_moment"].attrs["units"] == "N m"
+    assert case.losses.excites
+
+
 def test_sources_are_those_of_the_loaded_state():
     _, _, modes = planetary()
     state, source = modes.state, modes.excitation.source
