@@ -57,6 +57,7 @@ def test_other_entry_points_say_so_too():
     assert NOTE in error.value.message and "16000 rad/s (2546.48 Hz)" in error.value.message
 
 
+@pytest.mark.slow
 def test_smoothing_does_not_pull():
     found = solve_harmonic_balance(one_mass(-1.0, smoothing=1e-3), 1.3, harmonics=4)
     assert not found.converged and NOTE in found.message

@@ -98,6 +98,7 @@ def two_wells(force):
     return oscillator(0.3, 0.0, PolynomialSprings([0], [[-1.0, 0.0, 1.0]]), force=force), 1.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "force, period",
     [

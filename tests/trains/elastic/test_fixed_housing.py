@@ -305,6 +305,7 @@ def test_refused_areas(before, folder, area, words):
     assert (error.value.code, error.value.key) == ("E-SHAPE", "housing.structure.file")
 
 
+@pytest.mark.slow
 def test_both_ways_are_told_beside_one_way(before):
     case = reference(**{"housing.support": FEET, "operation.speeds": ["3100 rpm", "400 rpm"]})
     result = heard(case, *before)

@@ -193,6 +193,7 @@ def test_contact_and_system_agree_on_unequal_forces_of_planets():
     assert np.ptp(apart[:3] + apart[3:]) > 1e-6
 
 
+@pytest.mark.slow
 def test_planets_without_load_settle():
     tables = elastic_set_tables("cases/planetary_27_40_108.toml") | {"deflection": {}}
     tables["planetary"][0] |= {"elastic_ring": False}

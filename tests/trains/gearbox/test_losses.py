@@ -146,6 +146,7 @@ def test_temperatures_are_those_of_the_teeth_of_every_stage(loaded):
     assert float(heat["scuffing_safety"].min()) > 1.0
 
 
+@pytest.mark.slow
 def test_a_load_case_without_torque_has_zeros_in_place_of_its_stages():
     oil = {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s", "temperature": "80 degC"}
     tables = pair_tables(teeth=True) | {"losses": LOSSES | {"roughness": "0.4 um"}, "lubricant": oil}

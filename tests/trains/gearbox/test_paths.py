@@ -57,7 +57,6 @@ def test_the_ring_of_a_set_is_a_path_of_its_own():
     assert np.abs(ring).max() > 0.0
 
 
-@pytest.mark.slow
 def test_rigid_bearings_are_one_path_with_the_rest():
     tables = pair_tables(teeth=True) | {"dynamics": {"up_to": "2 kHz"}}
     tables |= {"casing": casing_tables(), "sensor": [{"name": "x", "position": ["0 mm"] * 3, "direction": "x"}]}
