@@ -36,7 +36,7 @@ QUICK = {
     "static.flank_elements": 6,
     "static.stresses": False,
     "dynamics.mesh_harmonics": 6,
-    "runup.count": 12,
+    "runup.count": 4,
     "housing.published": [],
     "housing.microphone": {"distance": "0.5 m", "angle": "30 deg"},
 }

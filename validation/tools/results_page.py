@@ -36,6 +36,7 @@ RUNS = {
             "static.stresses": False,
             "dynamics.mesh_harmonics": 2,
             "operation.speeds": ["250 rpm"],
+            "runup.count": 2,
         },
     ),
     "planar": (
@@ -83,7 +84,7 @@ RUNS = {
             "response.from": 1.1,
             "response.to": 1.0,
             "response.harmonics": 3,
-            "response.largest_step": 0.1,
+            "response.largest_step": 0.3,
             "sweep": {"ranges": [{"from": 0.9, "to": 1.0, "count": 2}], "steps": 40, "most_periods": 20},
             "chaos": {
                 "from": 2.2,

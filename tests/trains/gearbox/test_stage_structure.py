@@ -74,7 +74,10 @@ def apart(found: Deflection, stage: StageModel) -> float:
 
 @pytest.mark.parametrize(
     "seed",
-    [pytest.param(seed, marks=pytest.mark.slow if seed in (1, 2, 3, 5, 6, 7, 9, 10, 12, 13) else ()) for seed in range(16)],
+    [
+        pytest.param(seed, marks=pytest.mark.slow if seed in (1, 2, 3, 5, 6, 7, 9, 10, 12, 13) else ())
+        for seed in range(16)
+    ],
 )
 def test_a_stage_at_rest_moves_the_gearbox_as_forces_at_its_meshes_do(seed):
     found = solve_deflection(read_case(random_gearbox(seed, 3)))

@@ -17,7 +17,7 @@ QUICK = {
     "response.from": 1.05,
     "response.to": 0.65,
     "response.harmonics": 6,
-    "response.largest_step": 0.15,
+    "response.largest_step": 0.3,
     "sweep": {"ranges": [{"from": 0.6, "to": 1.0, "count": 4}], "steps": 60, "most_periods": 60},
     "chaos": {"from": 2.2, "to": 1.8, "count": 2, "points": 8, "skip": 30, "steps": 60, "sections": [2.2]},
 }
