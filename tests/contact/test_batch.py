@@ -29,7 +29,7 @@ SPRUNG = Supports(sun=5e7, carrier=2e8, planet=3e8)
 LOOSE = Supports(sun=5e7, planet=3e8, planet_clearance=15e-6)
 # three, four and five planets: in phase, out of phase and unequally spaced
 SEEDS = (3, 4, 5, 6, 7, 8, 9, 10, 11)
-QUICK = ((3, 1.0), (6, -1.0), (7, 1.0), (9, 1.0))
+QUICK = ((3, 1.0), (6, -1.0))
 _solved = {}
 
 
@@ -254,7 +254,7 @@ def test_planets_in_the_same_state_are_solved_as_one(seed, images, supports, mon
     "seed, images, supports, overlap",
     [
         pytest.param(3, 3, SPRUNG, None, marks=pytest.mark.slow),
-        (6, 4, Supports(sun=0.0), None),
+        pytest.param(6, 4, Supports(sun=0.0), None, marks=pytest.mark.slow),
         pytest.param(7, 2, SPRUNG, None, marks=pytest.mark.slow),
         (3, 3, Supports(sun=0.0), 0.7),
         pytest.param(7, 2, SPRUNG, 1.2, marks=pytest.mark.slow),

@@ -181,6 +181,7 @@ def test_descents_find_the_relief_that_a_scan_finds(relief_problem, grids, tmp_p
     assert again.computed == 0 and again.after == found.after and again.designs == found.designs
 
 
+@pytest.mark.slow
 def test_derivatives_are_differences(relief_problem, grids):
     assert has_derivatives(relief_problem)
     with evaluations(relief_problem, cache=grids) as run:

@@ -86,6 +86,7 @@ def of_few_elements(more):
     return solve_deflection(read_case(tables | more))
 
 
+@pytest.mark.slow
 def test_the_response_is_that_of_the_set_on_its_foundation():
     """At a carrier that stands still: the set leaves out the terms of the turning frame."""
     reference = solve(with_values(read_case("cases/planetary_27_40_108.toml"), FEW), only="modes")["modes"]
@@ -153,6 +154,7 @@ def test_the_mass_of_a_ring_pushes_its_modes_where_its_seat_is_accelerated(in_ca
     assert ring.moves and set(ring.with_structure.diameter) == {0, 1}
 
 
+@pytest.mark.slow
 def test_shares_of_paths_add_up_on_the_casing_and_none_are_given_on_the_ring():
     on_casing = {"name": "foot", "position": ["150 mm", "-120 mm", "0 mm"], "direction": "y"}
     tables = {"sensor": [on_casing, *SENSORS], "casing": CASING, "deflection": {"contact": True}}

@@ -58,6 +58,7 @@ def test_planets_that_turn_share_the_torque_on_an_average():
     assert np.ptp(motion.run.force[late, 0]) > 1.0
 
 
+@pytest.mark.slow
 def test_computed_teeth_have_the_settled_motion_of_harmonic_balance():
     tables = pair_tables(teeth=True) | {"motions": "plane"}
     tables["operation"]["load_case"][0]["speed"] = {"input": "2000 rpm"}
