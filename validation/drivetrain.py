@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import tomllib
 from typing import Any
@@ -23,7 +22,7 @@ from femgear.solvers.time.flank_motion import MarchedRun, Records, march_flanks
 from femgear.solvers.time.free_turn import TorqueHistory
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import harmonics_of
-from femgear.trains.gearbox.balance import held_together, loaded_lines
+from femgear.trains.gearbox.balance import held_together, lines_together, loaded_lines
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.excitation import pair_count_excitation
 from femgear.trains.gearbox.geometry import set_sizes
@@ -350,10 +349,8 @@ def loose_chain(
 def chain_balance(model: GearboxInTime, carriers: dict[str, int], meshes: dict[str, int]) -> PeriodicSolution:
     """Solve for the motion of all stages at once, with lines up to orders of some base frequencies by name."""
     box, highest = model.box, carriers | meshes
-    ranges = [range(-highest.get(name, 0), highest.get(name, 0) + 1) for name in box.bases]
-    turning = [box.bases.index(name) for name in carriers]
-    orders = np.array([order for order in itertools.product(*ranges) if _is_line(order, turning, carriers)])
-    orders = orders[np.argsort(orders.any(axis=1), kind="stable")]
+    excites = [one.mesh_base for one in box.stages].index(box.bases.index(next(iter(meshes or ["second stage mesh"]))))
+    orders = lines_together(box, excites, max(meshes.values(), default=0), max(carriers.values()))
     samples = tuple(
         max(4 * highest[name], 16) if name in carriers else max(4 * highest[name], 32) if name in meshes else 1
         for name in box.bases
@@ -363,12 +360,6 @@ def chain_balance(model: GearboxInTime, carriers: dict[str, int], meshes: dict[s
     solution = solve_harmonic_balance(box.problem, box.frequency, start=held, **options)
     assert solution.converged
     return solution
-
-
-def _is_line(order: tuple[int, ...], turning: list[int], carriers: dict[str, int]) -> bool:
-    """One of a line and its conjugate, with no more orders of carriers in all than of one."""
-    few = sum(abs(order[base]) for base in turning) <= max(carriers.values())
-    return few and order >= tuple(-value for value in order)
 
 
 def chain_apart(model: GearboxInTime, solution: PeriodicSolution) -> tuple[MarchedRun, dict[str, float]]:

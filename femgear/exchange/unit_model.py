@@ -409,6 +409,9 @@ class _UnitWriter:
         if warm:
             tell(warm[0], f"temperatures of {', '.join(warm[:6])} are left out", remedy="give them again after import")
         for number, section in enumerate(case.bearing):
+            if section.gapped:
+                text = "REXS has no clearance of a bearing that is given by its stiffness: left out"
+                tell(f"bearing[{number}].clearance", text, remedy="give it again after import")
             if section.torsional:
                 tell(f"bearing[{number}].torsional", "REXS has no stiffness of a bearing against rotation: left out")
             if section.viscosity_ratio is not None or section.contamination is not None:

@@ -169,6 +169,11 @@ def _planetary(case: Any, given: Mapping[str, Any], tables: dict[str, Any]) -> d
             tables["coupling"].append({"between": [member, _CASING]} | texts)
         elif entries := spring_entries(springs):
             tables["bearing"].append({"shaft": member} | entries)
+    bearing = case.planar.carrier_bearing if case.train == "planar" else None
+    if bearing is not None:
+        entries = {"name": "carrier bearing", "shaft": "carrier", "radial": quantity(bearing.stiffness, "N/m")}
+        entries |= {"clearance": quantity(2.0 * bearing.clearance, "m")} if bearing.clearance else {}
+        tables["bearing"].append(entries | ({"outer_shaft": "ring"} if bearing.on == "ring" else {}))
     stage = {"name": SET, **members, "angle": quantity(planetary_set(case).planet_angles[0], "rad")}
     stage |= _gears(case, given, tables) | {"planet": _planet(case)}
     if elastic and members["ring"] == _CASING:
@@ -278,7 +283,7 @@ def _left_out(case: Any, given: Mapping[str, Any]) -> Iterator[Finding]:
         "dynamics.tolerance": "tolerance" in given.get("dynamics", {}),
         **{f"housing.{key}": key in housing for key in ("form", "points", "microphone", "published", "support")},
         "housing.structure": "structure" in housing,
-        **{f"planar.{key}": key in planar for key in ("branch", "response", "published", "carrier_bearing")},
+        **{f"planar.{key}": key in planar for key in ("branch", "response", "published")},
         "planet.bearing_clearance": bool(given.get("planet", {}).get("bearing_clearance")),
     }
     for key, there in entries.items():

@@ -51,7 +51,12 @@ def test_modes_are_those_of_the_case(name):
 
 def test_entries_without_a_place_are_told():
     written = gearbox_of_case(read_case("cases/nrel_pga.toml"))
-    assert {"planar.branch", "planar.carrier_bearing"} <= {one.key for one in written.findings}
+    assert "planar.branch" in {one.key for one in written.findings}
+    # the bearing between carrier and ring keeps its play, the whole way between its rings
+    (bearing,) = (one for one in read_case(written.tables).bearing if one.name == "carrier bearing")
+    given = read_case("cases/nrel_pga.toml").planar.carrier_bearing
+    assert (bearing.shaft, bearing.outer_shaft, bearing.radial) == ("carrier", "ring", given.stiffness)
+    assert bearing.clearance == pytest.approx(2.0 * given.clearance, rel=1e-12) and bearing.gapped
     assert written.tables["gravity"]["direction"][2] == 0.0
 
 

@@ -14,9 +14,9 @@ from two_wheels import RADII, STIFFNESS, TEETH, TwoWheels, two_wheels
 from femgear.errors import CaseError, ConvergenceError
 from femgear.solvers.time.flank_motion import PIECE, FreeMotion, Records, march_flanks
 from femgear.solvers.time.free_turn import TorqueHistory
-from femgear.solvers.time.spun_system import BACK, DRIVE, ContactGroup, spun_system
+from femgear.solvers.time.spun_system import BACK, DRIVE, ContactGroup, SpunSystem, spun_system
 from femgear.solvers.time.transient import solve_transient
-from femgear.system.force_laws import GearMeshes
+from femgear.system.force_laws import GearMeshes, RadialBearings
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import MechanicalSystem, NonlinearSystem
 
@@ -297,3 +297,26 @@ def test_gain_follows_the_sizes():
     assert free.gain() == pytest.approx(math.exp(4.0))
     free.sizes = [0.0, -math.inf]
     assert math.isnan(free.gain())
+
+
+def test_a_mass_falls_through_the_play_of_its_bearing_and_comes_back():
+    """From the middle at rest: the energy of the law and that of the weight say how far it sinks, and it returns."""
+    mass, stiffness, play, weight = 2.0, 1e7, 1e-4, 60.0
+    law = RadialBearings(np.array([[0, 1]]), stiffness, play)
+    load = np.array([0.0, -weight])
+    system = MechanicalSystem(mass * np.eye(2), np.zeros((2, 2)), np.zeros((2, 2)), np.eye(2), load, ("x", "y"))
+    nothing, none = np.zeros((0, 2, 0)), np.zeros(0)
+    ways, numbers = (np.eye(2), np.zeros((2, 0)), nothing, nothing, none), (none, none.astype(int), none.astype(int))
+    spun = SpunSystem(system, np.zeros(2), *ways, np.zeros((1, 0)), np.zeros((1, 0)), *numbers, (), (law,))
+    run = march_flanks(spun, duration=9e-3, step=6e-6, speed=1.0, start="zero")
+    radii = np.linspace(0.0, 5.0 * play, 200_001)
+    force = law.evaluate(np.stack([0.0 * radii, -radii], axis=1)[:, None], None)[0][:, 0, 1]
+    stored = np.append(0.0, np.cumsum(-0.5 * (force[1:] + force[:-1]) * np.diff(radii)))
+    lowest = radii[np.flatnonzero(stored < weight * radii)[-1]]
+    assert -run.motion[:, 1].min() == pytest.approx(lowest, rel=1e-4)
+    # no damping: it comes back to where it began
+    late = run.time > 0.5 * run.time[-1]
+    assert abs(run.motion[late, 1].max()) < 1e-3 * play and not run.motion[:, 0].any()
+    rest = march_flanks(spun, duration=1e-3, step=1e-5, speed=1.0, start="static").motion[:, 1]
+    held = law.evaluate(np.array([[0.0, rest[0]]]), None)[0][0, 1]
+    assert held == pytest.approx(-weight, rel=1e-9) and np.ptp(rest) < 1e-9 * play
