@@ -247,7 +247,7 @@ def forces_of_flanks(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Compute the forces (T, I, M) of drive flanks and back flanks of the stage at a place [N].
 
-    At equal instants of its mesh period and equal angles of its carrier, see `StageBalance`.
+    At equal instants of the mesh period that excites and equal angles of its own carrier, see `StageBalance`.
     """
     stage, (front, behind) = box.stages[place], box.flanks[place]
     drive, back = list[np.ndarray](), list[np.ndarray]()
@@ -281,9 +281,11 @@ def _deflections(
             turns[:, own.turn_base] = angles / _TURNS
         for number, base in enumerate(others, 1):
             turns[:, base] = angles * _STEP**number
+    # instants are those of the mesh that excites
+    exciting = [stage.mesh_base for stage in box.stages if solution.orders[:, stage.mesh_base].any()]
     for turn in turns:
         theta = np.tile(2.0 * np.pi * (turn % 1.0), (_INSTANTS, 1))
-        theta[:, own.mesh_base] = 2.0 * np.pi * np.arange(_INSTANTS) / _INSTANTS
+        theta[:, exciting or [own.mesh_base]] = 2.0 * np.pi * np.arange(_INSTANTS)[:, None] / _INSTANTS
         yield np.real(np.exp(1j * theta @ solution.orders.T) @ solution.deflection.T), theta
 
 
