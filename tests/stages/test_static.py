@@ -204,6 +204,7 @@ def test_axes_askew_in_a_case(case):
     assert found == pytest.approx(data["mesh_misalignment"].values[1].mean() * 1e6, abs=0.006)
 
 
+@pytest.mark.slow
 def test_an_offset_of_leads_is_no_deflection(case, straight):
     """A lead measured 200 um off its datum: flanks approach by that, teeth do not bend by it."""
     line = {"kind": "measured lead", "places": ["-1 mm", "1 mm"], "deviations": ["-200 um", "-200 um"]}

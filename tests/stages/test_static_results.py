@@ -85,6 +85,7 @@ def assert_fields_are_root_cycles(static, result, cycles, *, reverse=False):
             assert np.abs(expected - found).max() < 1e-9 * np.abs(found).max()
 
 
+@pytest.mark.slow
 def test_field_of_a_body_is_that_of_the_root_cycles(reference, reversed_torque):
     for (_, static, result), reverse in ((reference, False), (reversed_torque, True)):
         assert_fields_are_root_cycles(static, result, result.roots, reverse=reverse)
@@ -218,6 +219,7 @@ def pitch_error():
         yield with_pitch_error("8 um", monkeypatch)
 
 
+@pytest.mark.slow
 def test_the_tooth_with_the_pitch_error_is_found(pitch_error):
     _, static, result = pitch_error
     assert static.cycle.periods == 27 and result.closes
