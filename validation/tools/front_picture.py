@@ -1,4 +1,7 @@
-"""The picture of a report that README.md shows, from `make demo`; needs Chromium and `.[browser]`."""
+"""Pictures of page one: of `make demo` for README.md, of a gearbox for docs/report.md; need Chromium and `.[browser]`.
+
+The gearbox is run by `femgear run cases/e_axle_in_a_casing.toml -o out/e_axle`.
+"""
 
 import shutil
 from pathlib import Path
@@ -15,7 +18,7 @@ def draw(report: Path, picture: Path) -> None:
     chromium = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))))
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=chromium, args=OPTIONS)
-        tab = browser.new_page(viewport={"width": 1140, "height": 700}, device_scale_factor=2)
+        tab = browser.new_page(viewport={"width": 1400, "height": 900}, device_scale_factor=2)
         tab.goto(report.as_uri())
         # the set in space is drawn after the page has loaded
         tab.wait_for_timeout(3000)
@@ -28,3 +31,4 @@ def draw(report: Path, picture: Path) -> None:
 
 if __name__ == "__main__":
     draw(ROOT / "out" / "demo" / "report.html", ROOT / "docs" / "front" / "report.png")
+    draw(ROOT / "out" / "e_axle" / "report.html", ROOT / "docs" / "front" / "gearbox.png")
