@@ -41,7 +41,7 @@ def test_the_questions_of_a_gearbox_in_a_casing(results):
     power = 0.5 * (size[0, sensor, line] / data["level"].values[0, sensor]) ** 2
     sentence = judged[QUIET].sentence
     assert f"mesh harmonic {data['harmonic'].values[line]} at {hertz:,.0f} Hz" in sentence
-    assert f"near {nearest_mode(results.modes, hertz)} makes {power:.0%} of the power" in sentence
+    assert f"near {nearest_mode(results.modes, hertz)}, makes {power:.0%} of the power" in sentence
     way = data["path"].values[int(data["path_share"].values[0, :, sensor].argmax())]
     assert f"comes by {way}" in sentence and "Loudest of the run-up: " in sentence
 
