@@ -58,6 +58,13 @@ def dask_processes():
         yield runner
 
 
+@pytest.fixture
+def dask_victims():
+    """A cluster whose workers a test may end."""
+    with dask_cluster() as runner:
+        yield runner
+
+
 @pytest.fixture(params=["serial", "processes", "dask_runner", pytest.param("dask_processes", marks=pytest.mark.slow)])
 def runner(request):
     return Runner() if request.param == "serial" else request.getfixturevalue(request.param)
@@ -70,7 +77,7 @@ def remote(request):
 
 # Dask begins its workers anew, which takes seconds
 kills = pytest.mark.parametrize(
-    "remote", ["processes", pytest.param("dask_processes", marks=pytest.mark.slow)], indirect=True
+    "remote", ["processes", pytest.param("dask_victims", marks=pytest.mark.slow)], indirect=True
 )
 
 
@@ -298,6 +305,7 @@ def test_what_is_killed_loses_nothing(words, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("runner", ["serial", "processes", "dask_processes"], indirect=True)
 def test_ten_thousand_tasks_of_a_millisecond(runner, tmp_path):
     """Nothing is lost, nothing is computed twice."""
     found = [*runner.map(small_tasks.marked, ((str(tmp_path), x) for x in range(10_000)))]
