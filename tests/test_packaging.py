@@ -49,7 +49,7 @@ def imported():
 
 def test_what_is_imported_is_declared_and_what_is_declared_is_imported():
     core, extras = names(PROJECT["dependencies"]), PROJECT["optional-dependencies"]
-    optional = names(extras["cluster"]) | names(extras["nvh"])
+    optional = set().union(*(names(extras[extra]) for extra in ("assistant", "cad", "cluster", "nvh")))
     # by pyvista, xarray, h5netcdf, dask and pydantic
     brought = {"vtk", "pandas", "h5py", "distributed", "pydantic-core"}
     assert imported() - brought <= core | optional

@@ -54,7 +54,7 @@ def pairs() -> tuple[Row, ...]:
         ("pair on held axes, both flanks", {}, 2e-6, 0.95),
     ):
         case = with_values(read_case("cases/spur_pair.toml"), changes)
-        drive = replace(pair_excitation(case, solve_static(case)), backlash=np.array([play]))
+        drive = replace(pair_excitation(case, solve_static(case), None), backlash=np.array([play]))
         mean, ratio = drive.stiffness.mean(axis=1), case.dynamics.damping_ratio
         model = pair_model(case, planetary_set(case))
         modes = undamped_modes(model.system, mean, damping_ratio=ratio)

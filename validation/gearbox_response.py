@@ -47,7 +47,7 @@ def pair_on_bearings() -> tuple[Row, ...]:
     """Two rigid gears on bearings, k(t) from their teeth, without damping: a gearbox and a train of its own."""
     springs = {"gear_1.bearing_stiffness": "1e8 N/m", "gear_2.bearing_stiffness": "3e8 N/m"}
     case = with_values(read_case("cases/spur_pair.toml"), springs)
-    excitation = pair_excitation(case, solve_static(case))
+    excitation = pair_excitation(case, solve_static(case), None)
     mean = excitation.stiffness.mean(axis=1)
     modes = undamped_modes(pair_model(case, planetary_set(case)).system, mean, damping_ratio=0.0)
     found = solve_deflection(read_case(pair_of_rigid_gears_tables(case, float(mean[0]))))

@@ -153,7 +153,7 @@ def solve_static(
         progress=partial(progress, "contact"),
         **width,
     )
-    cycle = _case_cycle(case, gears, bodies, deviations, periods, options)
+    cycle = walk_mesh_cycle(gears, bodies, options=options, **_walk(case, gears, deviations, periods))
     _check_motions(case, cycle, gears.gears[0].module)
     overlap = _overlap(case, gears) if cycle.helical else 0.0
     base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0) if overlap else 0.0
@@ -162,29 +162,25 @@ def solve_static(
     return StaticResult(*parts, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"), drawing=drawing)
 
 
-def _case_cycle(
-    case: Any, gears: GearSet, bodies: Bodies, deviations: SetDeviations, periods: int, options: CycleOptions
-) -> MeshCycle:
-    """Walk through the mesh cycle of a case."""
-    return walk_mesh_cycle(
-        gears,
-        bodies,
-        sun_torque=case.torque_on_first_gear(),
-        positions=record_positions(case, gears),
-        contact=case.static.contact,
+def _walk(case: Any, gears: GearSet, deviations: SetDeviations, periods: int) -> dict[str, Any]:
+    """Collect how the mesh cycle of a case is walked through: load, positions, errors, supports."""
+    return {
+        "sun_torque": case.torque_on_first_gear(),
+        "positions": record_positions(case, gears),
+        "contact": case.static.contact,
         # thickness errors separate the back flanks alone
-        deviations=None if deviations.ideal and not case.static.back_flanks else deviations,
-        supports=static_supports(case),
-        periods=periods,
-        options=options,
-    )
+        "deviations": None if deviations.ideal and not case.static.back_flanks else deviations,
+        "supports": static_supports(case),
+        "periods": periods,
+    }
 
 
 def frictionless_cycle(case: Any, static: StaticResult) -> MeshCycle:
     """Solve the positions of a static solution without the friction that acts in it."""
     gears = static.planetary_set
     options = CycleOptions(**over_width(case, gears, waves=static.waves))
-    return _case_cycle(case, gears, static.bodies, set_deviations(case), static.cycle.periods, options)
+    walk = _walk(case, gears, set_deviations(case), static.cycle.periods)
+    return walk_mesh_cycle(gears, static.bodies, options=options, **walk)
 
 
 def _check_motions(case: Case, cycle: MeshCycle, module: float) -> None:

@@ -9,6 +9,7 @@ from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.sections import face_width, gear_material
 from femgear.errors import CaseError
 from femgear.gears.deviations import lead_separation
+from femgear.report.tables import Marks
 from femgear.stages.static_results import describe_set, width_warnings
 from femgear.stages.strength import nominal_stresses
 from femgear.trains.elastic.results import _safeties
@@ -85,7 +86,7 @@ def test_safeties_are_those_of_every_gear(case):
     other = with_values(case, strong | weak | tips)
     stresses = nominal_stresses(planetary_set(other), 100.0, materials_of(other))
     notes: list[str] = []
-    rows = dict(_safeties(other, {}, notes))
+    rows = dict(_safeties(other, {}, notes, Marks(()), ()))
     sun_root = 2 * 461e6 / stresses.root[0, 0]
     assert rows["safety S_F, ISO 6336-3:2019"].startswith(f"sun {sun_root:.2f}, planet, sun side")
     sun, sun_side, ring_side, ring = (
@@ -96,13 +97,13 @@ def test_safeties_are_those_of_every_gear(case):
     assert ring == pytest.approx(740e6 / stresses.contact[1], abs=0.005)
     assert ring_side < 1500.0 / 740.0 * ring  # Z_B of the planet; Z_D of an internal gear is 1
     assert any("306 MPa (ring)" in note for note in notes)
-    alike = dict(_safeties(with_values(case, strong | tips), {}, notes))
+    alike = dict(_safeties(with_values(case, strong | tips), {}, notes, Marks(()), ()))
     assert alike["safety S_H, ISO 6336-2:2019"].startswith(f"sun-planet {min(sun, sun_side):.2f}, planet-ring")
 
 
 def test_some_limits_give_some_safeties(case):
     other, notes = with_value(case, "ring.material.root_stress_limit", "306 MPa"), list[str]()
-    rows = dict(_safeties(other, {}, notes))
+    rows = dict(_safeties(other, {}, notes, Marks(()), ()))
     root = nominal_stresses(planetary_set(other), 100.0, materials_of(other)).root[1, 1]
     found = f"sun -, planet, sun side -, planet, ring side -, ring {2 * 306e6 / root:.2f}"
     assert rows["safety S_F, ISO 6336-3:2019"] == found and "S_H" not in " ".join(rows)

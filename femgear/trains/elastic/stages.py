@@ -221,7 +221,8 @@ def solve_modes(
     steps, gears, torque = steps or Steps(), static.planetary_set, static.sun_torque
     bodies, deviations = _ring_bodies(case, static, steps), set_deviations(case)
     friction, entries = acting_friction(case, gears), state_entries(case)
-    state = _loaded_state(case, static, bodies, steps, friction, partial(progress, "modes"))
+    loading, name = partial(_loading, case, static, steps, partial(progress, "modes")), "loaded state"
+    state = steps.kept(name, entries) or steps.keep(name, entries, loaded_period(gears, *bodies, **loading(friction)))
     stiffness = state.resampled("held_stiffness", RECORD * state.periods).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
     reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
@@ -230,7 +231,8 @@ def solve_modes(
     excitation, flexibility = springs or steps.keep("mesh springs", entries, mesh_springs(gears, ring, state))
     frictionless = None
     if friction is not None:
-        without = _loaded_state(case, static, bodies, steps, None, partial(progress, "modes"))
+        name, entries = f"{name} without friction", state_entries(case)
+        without = steps.kept(name, entries) or steps.keep(name, entries, loaded_period(gears, *bodies, **loading(None)))
         frictionless = mesh_springs(gears, ring, without)[0]
     model = elastic_set(case, gears, ring, sun_torque=torque, flexibility=flexibility)
     modes = undamped_modes(
@@ -255,28 +257,18 @@ def solve_modes(
     return ModesResult(ring, *made, sharing, frictionless)
 
 
-def _loaded_state(
-    case: Case, static: StaticResult, bodies: tuple[Bodies, Bodies], steps: Steps, friction, progress
-) -> LoadedPeriod:
-    """Loaded state of the set on its supports, with friction of every kind of mesh or without."""
-    gears, deviations, entries = static.planetary_set, set_deviations(case), state_entries(case)
-    name = "loaded state" if friction is not None or not friction_acts(case) else "loaded state without friction"
-    return steps.kept(name, entries) or steps.keep(
-        name,
-        entries,
-        loaded_period(
-            gears,
-            *bodies,
-            sun_torque=static.sun_torque,
-            positions=record_positions(case, gears),
-            contact=case.static.contact,
-            deviations=None if deviations.ideal else deviations,
-            supports=linear_supports(case),
-            options=CycleOptions(
-                friction=friction, progress=progress, **loaded_over_width(case, gears, static.waves, steps)
-            ),
-        ),
-    )
+def _loading(case: Case, static: StaticResult, steps: Steps, progress: Any, friction: Any) -> dict[str, Any]:
+    """Collect how the set on its supports is loaded, with friction of every kind of mesh or without."""
+    gears, deviations = static.planetary_set, set_deviations(case)
+    width = loaded_over_width(case, gears, static.waves, steps)
+    return {
+        "sun_torque": static.sun_torque,
+        "positions": record_positions(case, gears),
+        "contact": case.static.contact,
+        "deviations": None if deviations.ideal else deviations,
+        "supports": linear_supports(case),
+        "options": CycleOptions(friction=friction, progress=progress, **width),
+    }
 
 
 def _sharing_over_bearings(
