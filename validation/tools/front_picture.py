@@ -1,12 +1,10 @@
-"""Pictures of page one: of `make demo` for README.md, of a gearbox for docs/report.md; need Chromium and `.[browser]`.
-
-The gearbox is run by `femgear run cases/e_axle_in_a_casing.toml -o out/e_axle`.
-"""
+"""The picture of page one that README.md shows, from `make demo`; needs Chromium and `.[browser]`."""
 
 import shutil
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+_WIDTH, _COLOURS = 880, 96
 OPTIONS = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 
 
@@ -25,10 +23,9 @@ def draw(report: Path, picture: Path) -> None:
         tab.screenshot(path=picture)
         browser.close()
     with Image.open(picture) as large:
-        small = large.convert("RGB").resize((large.width // 2, large.height // 2), Image.Resampling.LANCZOS)
-    small.quantize(256).save(picture, optimize=True)
+        small = large.convert("RGB").resize((_WIDTH, large.height * _WIDTH // large.width), Image.Resampling.LANCZOS)
+    small.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE).save(picture, optimize=True)
 
 
 if __name__ == "__main__":
     draw(ROOT / "out" / "demo" / "report.html", ROOT / "docs" / "front" / "report.png")
-    draw(ROOT / "out" / "e_axle" / "report.html", ROOT / "docs" / "front" / "gearbox.png")
