@@ -136,7 +136,7 @@ page.chartOf = (div) => {
   if (div.dataset.panel === undefined) return chart;
   const panel = chart.panels[Number(div.dataset.panel)], titles = chart.panels.map(({ x }) => x.title).filter(Boolean);
   const x = { ...panel.x, title: panel.x.title || titles[titles.length - 1] };
-  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".many") ? 1.3 : div.closest(".both") ? 1.9 : 3.4], least: div.closest(".many") ? 90 : 120, title: "", panels: [{ ...panel, x, place: [0, 1, 0, 1], shared: 0 }] };
+  return { ...chart, rows: 1, columns: 1, size: [8, div.closest(".many") ? 1.3 : div.closest(".both") || div.closest(".paper") ? 1.9 : 3.4], least: div.closest(".many") ? 90 : 120, title: "", panels: [{ ...panel, x, place: [0, 1, 0, 1], shared: 0 }] };
 };
 
 page.draw = (div) => {
