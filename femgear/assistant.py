@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from femgear.errors import CaseError, FemgearError, nvh_library
+from femgear.storage import files
 
 if TYPE_CHECKING:
     from mcp.server.mcpserver import MCPServer
@@ -51,6 +52,13 @@ def place_in(folder: Path, name: str) -> Path:
             limit="letters, digits, blanks and . _ - in each part, inside of the folder",
         )
     return (folder / name).resolve()
+
+
+def _word(text: str) -> str:
+    """Refuse what is no word, as an option of a command would be (CaseError, E-ARGUMENTS)."""
+    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]{0,60}", text):
+        raise CaseError("a word is needed", code="E-ARGUMENTS", value=text[:60], limit="letters, digits, _ and -")
+    return text
 
 
 def check_text(text: str) -> None:
@@ -159,13 +167,13 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
         if path.suffix != ".toml" or path.parent != folder.resolve():
             raise CaseError("case files stand in the folder and end in .toml", code="E-FILE", key="name", value=name)
         check_text(text)
-        path.write_text(text, encoding="utf-8")
+        files.write_text(text, path)
         return f"written: {name}"
 
     def new(kind: str, name: str) -> dict[str, Any]:
         """Write a commented case of a kind: planetary, planar, helical, pair, gear_pair, gearbox; edit and check it."""
         place_in(folder, name)
-        return command(folder, "new", kind, "-o", name)
+        return command(folder, "new", _word(kind), "-o", name)
 
     def check(name: str) -> dict[str, Any]:
         """Check a case: what it is, its warnings, and why a run would refuse it. Takes a second."""
@@ -176,7 +184,7 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
         """Compute a case into a folder of results; only: one stage and what it needs. Seconds to minutes."""
         check_text(place_in(folder, name).read_text(encoding="utf-8"))
         place_in(folder, results)
-        stage = ("--only", only) if only else ()
+        stage = ("--only", _word(only)) if only else ()
         return command(folder, "run", name, "-o", results, "--json", "--force", *stage)
 
     def results(folder_name: str) -> dict[str, Any]:
@@ -192,6 +200,6 @@ def _tools(folder: Path) -> list[Callable[..., Any]]:
 
     def explain(code: str) -> dict[str, Any]:
         """Say what a code of a refusal (E-...) or a warning (W-...) means."""
-        return command(folder, "explain", code[:100])
+        return command(folder, "explain", _word(code))
 
     return [list_files, read_case, write_case, new, check, run, results, compare, explain]

@@ -294,9 +294,9 @@ def check(
     from femgear.trains.reading import read_case
     from femgear.trains.registry import check_case, train_of
 
-    data = read_case(case)
     if json:
-        return _check_as_data(data, only)
+        return _check_as_data(case, only)
+    data = read_case(case)
     _print(block for block in train_of(data).describe_case(data) if neighbours or not block.beside)
     try:
         check_case(data, only)
@@ -308,17 +308,19 @@ def check(
     return 0
 
 
-def _check_as_data(case: ReadCase, only: str | None) -> int:
+def _check_as_data(path: Path, only: str | None) -> int:
     """Print what is said of a case as data; the exit code is that of its refusal."""
     from femgear.stages.summary_data import check_data
+    from femgear.trains.reading import read_case
     from femgear.trains.registry import check_case, train_of
 
-    refusal = None
+    case, refusal = None, None
     try:
+        case = read_case(path)
         check_case(case, only)
     except FemgearError as error:
         refusal = error
-    _print_data(check_data(train_of(case), case, refusal))
+    _print_data(check_data(None if case is None else train_of(case), case, refusal))
     return 0 if refusal is None else refusal.exit_code
 
 

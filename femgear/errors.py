@@ -19,7 +19,7 @@ CODES = {
     "E-ASSEMBLY": "Tooth numbers, centre distance and planet angles do not fit each other.",
     "E-BACKLASH": "Flanks overlap, or have less play than what is asked of them needs.",
     "E-BEARING": "A bearing has values or springs that no model can have.",
-    "E-CAD": "OpenCASCADE made no solids of gears, or cannot be loaded.",
+    "E-CAD": "OpenCASCADE made no solids of gears.",
     "E-CASE": "The case file has several mistakes, or one that has no code of its own.",
     "E-CENTRE-DISTANCE": "The centre distance leaves no line of action.",
     "E-CHOICE": "The value is none of the choices.",

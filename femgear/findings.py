@@ -45,6 +45,7 @@ CATALOGUE = {
     "W-FILLET": (NOTE, "A tip runs into the root fillet of its mate by a little."),
     "W-FORMER": (NOTE, "A file of a former model is read as one of today."),
     "W-FREE": (DOUBT, "More modes have no stiffness than a gearbox has ways to turn."),
+    "W-FRICTION": (DOUBT, "Friction acts at all speeds with the coefficient of one of them."),
     "W-GROWTH": (DOUBT, "The free motion grows: a parametric resonance."),
     "W-HEAT": (DOUBT, "Teeth are hotter, or their oil film thinner, than the oil is good for."),
     "W-HELIX": (DOUBT, "The helix angle lies outside what is validated."),

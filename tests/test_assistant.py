@@ -68,8 +68,12 @@ def test_what_lies_outside_stays_closed(tmp_path):
         ("write_case", {"name": "case.toml", "text": 'a = "' + "x" * 10_000_000 + '"'}),
         ("run", {"name": "../secret.toml", "results": "out"}),
         ("results", {"folder_name": "/"}),
+        ("new", {"kind": "--help", "name": "own.toml"}),
+        ("explain", {"code": "-o"}),
     )
-    assert all(error and "E-FILE" in answer for answer, error in answers)
+    assert all(error for _, error in answers)
+    wanted = ["E-FILE"] * 6 + ["E-ARGUMENTS"] * 2
+    assert all(f"[{code}]" in answer for code, (answer, _) in zip(wanted, answers, strict=True))
     assert sorted(path.name for path in tmp_path.rglob("*")) == ["inside", "link.toml", "secret.toml"]
 
 
@@ -86,7 +90,8 @@ def test_case_files_may_not_name_files_outside():
 
 def test_commands_have_exit_code_data_and_messages(tmp_path):
     done = command(tmp_path, "check", "absent.toml", "--json")
-    assert done["exit_code"] == 2 and done["data"] == "" and "E-FILE" in done["messages"]
+    assert done["exit_code"] == 2 and not done["data"]["accepted"] and "E-FILE" in done["data"]["refusal"]
+    assert "Meshes pull" in command(tmp_path, "explain", "W-PULL")["data"]
 
 
 @pytest.mark.slow

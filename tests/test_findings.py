@@ -461,6 +461,14 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
             "transient.rate": "100 kHz",
         },
     ),
+    "W-FRICTION": lambda: of_case(
+        "spur_pair",
+        {
+            "lubricant": {"viscosity": "20 mm^2/s", "density": "850 kg/m^3"},
+            "losses": {"friction": "schlenk", "roughness": "0.4 um", "excites": True},
+            "operation.speeds": ["250 rpm", "3100 rpm"],
+        },
+    ),
     "W-OIL": lambda: of_case("e_axle", {"lubricant.temperature": "-40 degC"}),
     "W-TEETH": lambda: read_case(CASES / "wind_turbine_drivetrain.toml").notices,
     "W-TIP": lambda: of_case(PLANETARY, {"sun.tip_diameter": None}),

@@ -8,18 +8,24 @@ operating speed and of equal loads on all planets, one for every kind of mesh.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from femgear.case.lubrication import LubricantSection, oil_at
+from femgear.case.quantities import RPM
 from femgear.errors import CaseError
+from femgear.findings import Finding
 from femgear.gears.friction import FRICTION_LAWS, PathSpeeds, path_speeds, table_friction
 from femgear.gears.kinematics import speeds
 from femgear.gears.profile import base_helix_angle
 
 if TYPE_CHECKING:
     from femgear.gears.pair import GearPair, GearSet
+
+_NOTICEABLE = 0.05
+"""Share by which a coefficient may differ at other speeds without a word."""
 
 
 def friction_coefficient(
@@ -101,7 +107,30 @@ def acting_friction(case: Any, gears: GearSet) -> tuple[float, ...] | None:
     if not friction_acts(case):
         return None
     refuse_friction(case)
-    turning, frequency = shaft_turning(case, gears, case.operation.speeds[0])
+    return _friction_at(case, gears, case.operation.speeds[0])
+
+
+def friction_findings(case: Any, gears: GearSet) -> Iterator[Finding]:
+    """Tell where friction that acts has another coefficient at other operating speeds (W-FRICTION)."""
+    if not friction_acts(case) or not case.torque_on_first_gear():
+        return
+    speeds_of_operation = np.array(case.operation.speeds)
+    coefficients = np.abs([_friction_at(case, gears, speed) for speed in speeds_of_operation])
+    change = coefficients / coefficients[0] - 1.0
+    at, kind = np.unravel_index(int(np.abs(change).argmax()), change.shape)
+    if abs(change[at, kind]) > _NOTICEABLE:
+        first, other = (f"{speed / RPM:.5g} rpm" for speed in speeds_of_operation[[0, at]])
+        text = (
+            f"friction acts at all speeds with the coefficient {coefficients[0, kind]:.3g} of {first}; at {other} it "
+            f"would be {coefficients[at, kind]:.3g}, {change[at, kind]:+.0%}"
+        )
+        remedy = "put the speed that matters first, or compute speeds by themselves"
+        yield Finding("W-FRICTION", "losses.friction", text, remedy=remedy, limit=f"within {_NOTICEABLE:.0%}")
+
+
+def _friction_at(case: Any, gears: GearSet, speed: float) -> tuple[float, ...]:
+    """Coefficients of every kind of mesh at a speed of the input [rad/s], as of `acting_friction`."""
+    turning, frequency = shaft_turning(case, gears, speed)
     first = turning["sun"] - turning["carrier"] if gears.members else next(iter(turning.values()))
     torque = case.torque_on_first_gear()
     drives = 1.0 if torque * first >= 0.0 else -1.0

@@ -5,6 +5,7 @@ mm. Prints the volume of every body [mm^3]; exit codes: 0 done; 3 gmsh cannot be
 """
 
 import io
+import signal
 import sys
 
 import numpy as np
@@ -98,6 +99,8 @@ if __name__ == "__main__":
         sys.exit(3)
     with np.load(io.BytesIO(sys.stdin.buffer.read())) as file:
         job = dict(file)
+    if hasattr(signal, "alarm"):  # ends the process even when the one that started it is gone
+        signal.alarm(int(job["time_limit"]) + 5)
     gmsh.initialize(["femgear"], readConfigFiles=False, interruptible=False)
     try:
         gmsh.option.setNumber("General.Terminal", 0)

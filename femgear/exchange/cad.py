@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.errors import CaseError, StorageError, nvh_library
+from femgear.fe.meshing import gmsh_missing
 from femgear.gears.gear import Gear
 from femgear.gears.tooth import half_sector
 from femgear.storage.files import storage_errors, write_text
@@ -115,8 +116,10 @@ def write_step(gears: Sequence[PlacedGear], path: Path) -> tuple[float, ...]:
 
     Raises
     ------
+    GridError
+        E-GRID-GMSH: Gmsh cannot be loaded.
     StorageError
-        E-CAD: Gmsh cannot be loaded, or OpenCASCADE makes no solid of these gears.
+        E-CAD: OpenCASCADE makes no solid of these gears.
     """
     kinds: dict[tuple[Any, float, float], int] = {}
     job: dict[str, Any] = {}
@@ -138,7 +141,7 @@ def write_step(gears: Sequence[PlacedGear], path: Path) -> tuple[float, ...]:
                 "twist": placed.twist,
             }
             job |= {f"{name}_{kind}": value for name, value in of_kind.items()}
-    job |= {"places": np.array(places), "names": np.array([placed.name for placed in gears])}
+    job |= {"places": np.array(places), "time_limit": TIME_LIMIT, "names": np.array([placed.name for placed in gears])}
     source = io.BytesIO()
     np.savez(source, **job)
     unfinished = path.with_name(f".{path.stem}.unfinished.step")
@@ -152,7 +155,9 @@ def write_step(gears: Sequence[PlacedGear], path: Path) -> tuple[float, ...]:
     if done.returncode or "volumes" not in words:
         unfinished.unlink(missing_ok=True)
         text = " ".join(done.stderr.decode(errors="replace").split())[-400:]
-        remedy = "pip install gmsh" if done.returncode == 3 else "write a DXF of the outlines instead"
+        if done.returncode == 3:
+            raise gmsh_missing(text)
+        remedy = "write a DXF of the outlines instead"
         raise StorageError(f"Gmsh made no solids: {text}", code="E-CAD", remedy=remedy)
     with storage_errors(path):
         unfinished.replace(path)

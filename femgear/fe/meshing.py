@@ -400,7 +400,7 @@ def _content_hash(plan: Plan) -> str:
     try:
         gmsh = _version("gmsh")
     except metadata.PackageNotFoundError as error:
-        raise _library_error("the package gmsh is not installed") from error
+        raise gmsh_missing("the package gmsh is not installed") from error
     digest = hashlib.sha256(f"femgear grid {FORMAT} gmsh {gmsh}".encode())
     for array in (plan.points, plan.segments, plan.mids, *plan.loops):
         digest.update(np.ascontiguousarray(array).tobytes())
@@ -462,7 +462,7 @@ def _worker_error(done):
     """Refusal with the last words of the process of Gmsh."""
     text = " ".join(done.stderr.decode(errors="replace").split())[-400:]
     if done.returncode == 3:
-        return _library_error(text)
+        return gmsh_missing(text)
     return GridError(
         f"Gmsh failed (exit code {done.returncode}): {text}",
         code="E-GRID-GMSH",
@@ -470,7 +470,7 @@ def _worker_error(done):
     )
 
 
-def _library_error(text):
+def gmsh_missing(text):
     """Refusal of a Gmsh that cannot be loaded, with the package to install."""
     library = re.search(r"(lib[A-Za-z]+)[-.\d]*\.so", text)
     remedy = "install it with: pip install gmsh"

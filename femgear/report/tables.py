@@ -234,7 +234,9 @@ def describe_response(data: xr.Dataset) -> Block:
     def dte(i: int) -> str:
         of_speed = data.isel(speed=i)
         doubts = response_doubts(of_speed) if marks.raised(*RESPONSE_DOUBTS) else ()
-        return marks(f"{fluctuation(stored_harmonics(of_speed, 'dte')).max() * 1e6:.4f}", *doubts, "W-DAMPING")
+        return marks(
+            f"{fluctuation(stored_harmonics(of_speed, 'dte')).max() * 1e6:.4f}", *doubts, "W-DAMPING", "W-FRICTION"
+        )
 
     stable = data.stable.values.astype(bool)
     columns = {

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.contact.cycle import FRICTION
-from femgear.report.tables import chosen
+from femgear.report.tables import Marks, chosen
 
 if TYPE_CHECKING:
     from femgear.contact.loaded_period import LoadedPeriod
@@ -43,11 +43,14 @@ def balanced_source(excitation: MeshExcitation, modes: Modes) -> MeshExcitation:
     return replace(excitation, source=source)
 
 
-def friction_rows(results: Results) -> list[tuple[str, str]]:
+def friction_rows(results: Results, marks: Marks) -> list[tuple[str, str]]:
     """Write what friction adds to a level at some speeds of a run, for the verdict; none where it does not act."""
     if "dynamics" not in results.stages or "friction_change" not in results.dynamics:
         return []
     change = results.dynamics["friction_change"]
     largest = change.max(dim=[dim for dim in change.dims if dim != "speed"])
-    shown = [f"{float(largest[i]):+.1f} dB at {float(largest.speed[i]):g} rpm" for i in chosen(len(largest))]
+    shown = [
+        f"{marks(f'{float(largest[i]):+.1f} dB', 'W-FRICTION')} at {float(largest.speed[i]):g} rpm"
+        for i in chosen(len(largest))
+    ]
     return [(str(change.attrs["long_name"]), ", ".join(shown))]

@@ -108,7 +108,7 @@ def least_of(rating: Rating) -> tuple[Least | None, Least | None]:
         if not flanks:
             return None
         value, flank = min(flanks, key=lambda pair: pair[0])
-        return Least(value, f"{part} of {flank.name if flank.name.startswith('gear') else f'the {flank.name}'}")
+        return Least(value, f"{part} of {flank.words}")
 
     roots, contacts = ([flank.root_safety for flank in rating.flanks], [f.contact_safety for f in rating.flanks])
     return least(roots, "root"), least(contacts, "flank")
@@ -133,6 +133,11 @@ def least_over_life(data: Any, kind: str, of_load: Least | None) -> Least | None
     return over_life if of_load is None or over_life.value < of_load.value else of_load
 
 
+def stresses_text(root: np.ndarray, pressure: np.ndarray) -> str:
+    """Write the largest of some root stresses and contact pressures [Pa]."""
+    return f"root {1e-6 * float(np.nanmax(root)):.0f} MPa, pressure {1e-6 * float(np.nanmax(pressure)):.0f} MPa"
+
+
 def judge_strength(
     root: Least | None,
     flank: Least | None,
@@ -141,6 +146,7 @@ def judge_strength(
     findings: Iterable[Finding] = (),
     doubts: Sequence[str] = (),
     open_factors: str = "",
+    remedy: str = "give material.treatment and material.hardness for safeties",
 ) -> Judgement:
     """Judge safeties against those that the case asks for.
 
@@ -158,6 +164,8 @@ def judge_strength(
         Codes of the findings that concern the safeties.
     open_factors : str
         Load factors that were taken as 1, in words.
+    remedy : str
+        What gives safeties where there are none.
     """
     raised = {finding.code for finding in findings if finding.severity != NOTE}
     beyond = sorted(raised & _BEYOND)
@@ -174,8 +182,7 @@ def judge_strength(
         how = "; ".join(f"{code}: {CATALOGUE[code][1].rstrip('.')}" for code in beyond)
         return Judgement(STRONG, "bad", answer, how, f"Not strong enough ({', '.join(beyond)})")
     if not rated:
-        how = "give material.treatment and material.hardness for safeties"
-        return Judgement(STRONG, "open", stresses or "not rated", how, "Its strength is not rated")
+        return Judgement(STRONG, "open", stresses or "not rated", remedy, "Its strength is not rated")
     low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
     answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated)
     limit = (
@@ -206,7 +213,7 @@ def judge_lives(parts: Iterable[tuple[str, float, str]], required: float | None)
         return
     answer = ", ".join(f"{name} {_hours(hours)}" for name, hours, _ in lives)
     _, shortest, where = min(lives, key=lambda life: life[1])
-    words = f"{where} {'fails' if required is not None and shortest < required else 'lives'} first"
+    words = f"{where} fails first"
     if math.isinf(shortest):
         sentence = "No tooth and no bearing fails under these loads"
     else:

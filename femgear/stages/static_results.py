@@ -22,6 +22,7 @@ from femgear.case.gear_set import planetary_set, set_deviations, shaft_lines
 from femgear.case.quantities import RPM
 from femgear.case.sections import face_width, gear_material
 from femgear.case.teeth import case_overlap
+from femgear.case.tooth_friction import friction_findings
 from femgear.contact.bodies import flank_widths
 from femgear.contact.peaks import FEWEST, peak_doubt
 from femgear.contact.root_stress import BACK, LOADED, NOTCH_REACH, RootCycle
@@ -1155,6 +1156,7 @@ def load_warnings(case: Any) -> Iterator[Finding]:
     """List what deserves a look in the deviations and the torque of a case."""
     yield from check_deviations(set_deviations(case), planetary_set(case))
     yield from width_warnings(case)
+    yield from friction_findings(case, planetary_set(case))
     yield from steep_helix("set.helix_angle", case.set.helix_angle)
     if case.operation.torque <= 0:
         nothing = "without torque no tooth touches; only static results exist"

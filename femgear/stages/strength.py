@@ -194,6 +194,11 @@ class RatedFlank:
     reversed_bending: bool
 
     @property
+    def words(self) -> str:
+        """Name in a sentence: "the sun", "gear 1"."""
+        return self.name if self.gear.startswith("gear_") else f"the {self.name}"
+
+    @property
     def root_safety(self) -> float:
         """S_F; NaN without a limit or a load."""
         if self.root_limit is None or self.root_stress == 0.0:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.gear_set import planetary_set
-from femgear.report.response import stored_harmonics
+from femgear.report.response import some_at_a_time, stored_harmonics
 from femgear.report.style import family
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.friction_source import friction_rows
@@ -50,7 +50,7 @@ def strength_verdict(results: Results) -> Iterator[Block]:
     """
     marks, stages = Marks(results.findings), results.stages
     reasons = list(reason_row(results.stress)) if "stress" in stages else []
-    rows = [*reasons, *friction_rows(results), *_lives(results, marks)]
+    rows = [*reasons, *friction_rows(results, marks), *_lives(results, marks)]
     rows += [*efficiency_rows(results, marks), *heat_rows(results, marks)]
     rated = rate_results(results)
     if rated is None:
@@ -131,12 +131,17 @@ def computed_dynamic_factor(dynamics: xr.Dataset, kinds: int) -> np.ndarray:
     """Find K_v (kinds,) of dynamics.nc: the largest over the mean force of a mesh, at any speed."""
     if "dynamic_factor" in dynamics:
         return np.full(kinds, float(dynamics["dynamic_factor"].max()))
+    return dynamic_factors(dynamics, kinds).max(axis=0)
+
+
+def dynamic_factors(dynamics: xr.Dataset, kinds: int) -> np.ndarray:
+    """Find K_v (n_speeds, kinds) of dynamics.nc: the largest force of a mesh of the kind over its mean."""
     factors = []
-    for i in range(dynamics.sizes["speed"]):
-        force = stored_harmonics(dynamics.isel(speed=i), "mesh_force")
-        mean, peak = np.real(force[:, 0]), sample(force, 4 * force.shape[-1]).max(axis=-1)
-        factors.append((peak / mean).reshape(kinds, -1).max(axis=1))
-    return np.max(factors, axis=0)
+    for block in some_at_a_time(dynamics):
+        force = stored_harmonics(block, "mesh_force")
+        over_mean = sample(force, 4 * force.shape[-1]).max(axis=-1) / np.real(force[..., 0])
+        factors.append(over_mean.reshape(len(force), kinds, -1).max(axis=-1))
+    return np.concatenate(factors)
 
 
 def _largest_of_kinds(values: np.ndarray, kinds: Sequence[Any]) -> np.ndarray:
@@ -174,13 +179,9 @@ def smallest_safety(flanks: Sequence[RatedFlank]) -> str:
     if symbol == "S_F":
         both = "bent both ways, " if flank.reversed_bending else ""
         cause = f"{both}sigma_F0 {1e-6 * flank.root_stress:.1f} MPa, product of K {flank.root_factor:.3f}"
-        return f"{symbol} {value:.2f}, root of {_of(flank)}: {cause}"
+        return f"{symbol} {value:.2f}, root of {flank.words}: {cause}"
     cause = f"Z sigma_H0 {1e-6 * flank.contact_stress:.1f} MPa, product of K {flank.contact_factor:.3f}"
-    return f"{symbol} {value:.2f}, flank of {_of(flank)}: {cause}"
-
-
-def _of(flank: RatedFlank) -> str:
-    return flank.name if flank.name.startswith("gear") else f"the {flank.name}"
+    return f"{symbol} {value:.2f}, flank of {flank.words}: {cause}"
 
 
 def safety_notes(rating: Rating) -> Iterator[str]:
@@ -201,12 +202,19 @@ def safety_notes(rating: Rating) -> Iterator[str]:
             f"S_H = sigma_Hlim/(Z sigma_H0{f' sqrt({over})' * bool(over)}): sigma_Hlim = {limits} of ISO 6336-5, not "
             "the permissible sigma_HP; Z: Z_B or Z_D of the flank"
         )
-    if missing := _missing_limits(flanks):
-        yield missing
     if any(flank.root_limit or flank.contact_limit for flank in flanks):
         wide = "; K_Hβ stands for K_Fβ too, on the safe side" if "face" in factors.sources else ""
         transverse = "; roots have K_Fα in the place of K_Hα" if "transverse" in factors.sources else ""
         yield f"long life, every other factor of ISO 6336-2 and -3 is 1{wide}{transverse}"
+    yield from missing_notes(rating)
+
+
+def missing_notes(rating: Rating) -> Iterator[str]:
+    """Write which entries of the case would give the limits and load factors that safeties have not."""
+    flanks, factors = rating.flanks, rating.factors
+    if missing := _missing_limits(flanks):
+        yield missing
+    if any(flank.root_limit or flank.contact_limit for flank in flanks):
         yield from _missing_factors(factors, planets=any(flank.gear == "planet" for flank in flanks))
     if factors.message:
         yield f"no load factors of part 1: {factors.message}"

@@ -91,13 +91,13 @@ def run_data(train: Train, results: Any) -> dict[str, Any]:
     }
 
 
-def check_data(train: Train, case: Any, refusal: FemgearError | None) -> dict[str, Any]:
-    """Collect what is said of a case before it is run, by `CHECK_SCHEMA`."""
+def check_data(train: Train | None, case: Any, refusal: FemgearError | None) -> dict[str, Any]:
+    """Collect what is said of a case before it is run, by `CHECK_SCHEMA`; without train one that cannot be read."""
     return {
         "version": VERSION,
-        "title": case.title,
-        "kind": train.name,
+        "title": "" if train is None else case.title,
+        "kind": "" if train is None else train.name,
         "accepted": refusal is None,
         "refusal": "" if refusal is None else str(refusal),
-        "findings": as_data(by_severity(train.case_warnings(case))),
+        "findings": [] if train is None else as_data(by_severity(train.case_warnings(case))),
     }

@@ -21,6 +21,7 @@ from femgear.stages.judgements import (
     least_over_life,
     lives_of_bearings,
     lives_of_teeth,
+    stresses_text,
 )
 from femgear.stages.static_results import peak_to_peak
 from femgear.stages.strength import Rating
@@ -46,7 +47,7 @@ def set_judgements(results: Any) -> Iterator[Judgement]:
     yield judge_numbers(results.findings, results.manifest.complete)
 
 
-def judge_teeth(results: Any, rating: Rating | None) -> Iterator[Judgement]:
+def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None = None) -> Iterator[Judgement]:
     """Judge strength, lives, heat and smoothness of a pair or a set.
 
     Parameters
@@ -54,6 +55,8 @@ def judge_teeth(results: Any, rating: Rating | None) -> Iterator[Judgement]:
     results : Results
     rating : Rating or None
         Of its teeth; None where the case asks for no safeties.
+    dynamic : (kinds,) array, optional
+        K_v of the kinds of mesh, by default those of dynamics.nc.
     """
     case, stages, findings = results.case, results.stages, results.findings
     root, flank = (None, None) if rating is None else least_of(rating)
@@ -68,19 +71,17 @@ def judge_teeth(results: Any, rating: Rating | None) -> Iterator[Judgement]:
         parts = (*lives_of_teeth(results.life), *lives_of_bearings(results.life))
         yield from judge_lives(parts, required_life(case.operation))
     yield from judge_heat(results)
-    yield judge_smoothness(_motion(results), results, _RESPONSES)
+    yield judge_smoothness(_motion(results, dynamic), results, _RESPONSES)
 
 
 def _stresses(results: Any) -> str:
     """Write the largest stresses of a run, empty where there are none."""
     if "stress" not in results.stages:
         return ""
-    root = float(np.nanmax(results.stress["root_worst"].values))
-    pressure = float(np.nanmax(largest_pressure(results.stress)))
-    return f"root {1e-6 * root:.0f} MPa, pressure {1e-6 * pressure:.0f} MPa"
+    return stresses_text(results.stress["root_worst"].values, largest_pressure(results.stress))
 
 
-def _motion(results: Any) -> str:
+def _motion(results: Any, dynamic: np.ndarray | None) -> str:
     """Write transmission errors and dynamic factors of a run by kind of mesh."""
     parts = []
     errors = _transmission_error(results)
@@ -88,9 +89,10 @@ def _motion(results: Any) -> str:
         names, error = errors
         of_kinds = 1e6 * error.reshape(len(kind_names([str(name) for name in names])), -1).max(axis=1)
         parts.append(f"transmission error {_joined(of_kinds, 2)} µm")
-    if "dynamics" in results.stages:
-        kinds = kind_names(results.dynamics["mesh"].values)
-        parts.append(f"K_v {_joined(computed_dynamic_factor(results.dynamics, len(kinds)), 2)}")
+    if dynamic is None and "dynamics" in results.stages:
+        dynamic = computed_dynamic_factor(results.dynamics, len(kind_names(results.dynamics["mesh"].values)))
+    if dynamic is not None:
+        parts.append(f"K_v {_joined(dynamic, 2)}")
     return ", ".join(parts) or "-"
 
 

@@ -145,6 +145,8 @@ def test_nothing_of_the_first_screen_is_cut(opened, width):
     assert tab.evaluate(cut) == []
     box = tab.locator("#solid-place canvas").bounding_box()
     # on a phone the answers come first
+    cards = [card.bounding_box() for card in tab.locator(".card").all()[:3]]
+    assert all(card["y"] + card["height"] < 900 for card in cards)
     assert (
         box["y"] + box["height"] < (900 if width > 500 else 1300)
         and box["width"] > 0.35 * min(width, 1152)
@@ -203,6 +205,40 @@ def test_bodies_of_a_gearbox_move_as_their_stations_do(opened, report):
         at = stations.index(member)
         wanted = 1e3 * motion[at, :3] + np.cross(motion[at, 3:], rest - place[at])
         assert field == pytest.approx(wanted.tolist(), rel=0.01, abs=2e-3 * largest), member
+
+
+def test_shafts_bend_between_their_stations(opened, report):
+    """Every vertex moves as the line through the two stations that are next to it along z, of modes.nc."""
+    name = "own_chain"
+    modes, model = (
+        open_results(report(name).parent)["modes"],
+        json.loads((report(name).parent / "space.json").read_text()),
+    )
+    tab = opened(name)
+    moved = """(choice) => { const chooser = document.getElementById('solid-view');
+        chooser.value = String(choice); chooser.dispatchEvent(new Event('change'));
+        const { bodies, state } = document.getElementById('solid-place').space;
+        return bodies.map((body, k) => [body.member, Array.from(body.rest), Array.from(state.fields[k])]); }"""
+    choice = max(i for i, motion in enumerate(model["motions"], start=1) if motion["swings"])
+    number = int(model["motions"][choice - 1]["title"].split(":")[0].split()[1]) - 1
+    motion, place = modes["motion"].values[:, :, number], 1e3 * modes["place"].values
+    bent = 0
+    for member, rest, field in tab.evaluate(moved, choice):
+        rows = model["members"][member]["rows"]
+        if len(rows) == 1:
+            continue
+        points, z = np.reshape(rest, (-1, 3)), place[rows, 2]
+        assert (np.diff(z) > 0.0).all()
+        at = np.array([np.interp(points[:, 2], z, motion[rows, way]) for way in range(6)]).T
+        arm = points - place[rows[0]] * [1.0, 1.0, 0.0]
+        arm[:, 2] = points[:, 2] - np.clip(points[:, 2], z[0], z[-1])
+        wanted = 1e3 * at[:, :3] + np.cross(at[:, 3:], arm)
+        found = np.reshape(field, (-1, 3))
+        assert np.abs(found - wanted).max() < 0.01 * np.abs(wanted).max() + 1e-3 * 1e3 * np.abs(motion[:, :3]).max(), (
+            member
+        )
+        bent += len(rows)
+    assert bent >= 3
 
 
 def outer_surface(mode):

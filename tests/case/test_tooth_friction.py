@@ -7,7 +7,7 @@ import pytest
 
 from femgear.case.dependencies import modal_entries, static_entries
 from femgear.case.gear_set import planetary_set
-from femgear.case.tooth_friction import acting_friction, friction_coefficient, no_acting_friction
+from femgear.case.tooth_friction import acting_friction, friction_coefficient, friction_findings, no_acting_friction
 from femgear.errors import CaseError
 from femgear.gears.friction import path_speeds, schlenk_friction
 from femgear.trains.reading import read_case, with_values
@@ -96,3 +96,21 @@ def test_dynamics_that_know_no_friction_refuse_it(planetary):
     with pytest.raises(CaseError, match="no place for it") as refused:
         no_acting_friction(with_values(planetary, {"losses": ACTS}), "here is no place for it")
     assert (refused.value.code, refused.value.key) == ("E-FRICTION", "losses.excites")
+
+
+def test_a_coefficient_that_other_speeds_would_not_have_is_told():
+    """Schlenk's mu goes with the sum of speeds to the power of -0.2: (250/3100)^0.2 - 1 = -40 %."""
+    case = with_values(
+        read_case(CASES / "spur_pair.toml"),
+        {
+            "lubricant": {"viscosity": "20 mm^2/s", "density": "850 kg/m^3"},
+            "losses": {"friction": "schlenk", "roughness": "0.4 um", "excites": True},
+            "operation.speeds": ["250 rpm", "1000 rpm", "3100 rpm"],
+        },
+    )
+    (finding,) = friction_findings(case, planetary_set(case))
+    assert finding.code == "W-FRICTION" and finding.severity == "doubt"
+    assert f"{(250 / 3100) ** 0.2 - 1:+.0%}" in finding.text and "3100 rpm" in finding.text
+    for change in ({"operation.speeds": ["250 rpm", "260 rpm"]}, {"losses": ACTS}, {"operation.torque": "0 N m"}):
+        other = with_values(case, change)
+        assert not list(friction_findings(other, planetary_set(other)))

@@ -22,9 +22,9 @@ TORQUE = 100.0
 micrometres = st.floats(-4.0, 4.0)
 pins = st.lists(st.tuples(micrometres, micrometres), min_size=3, max_size=3)
 supports = st.sampled_from([Supports(), Supports(sun=0.0), Supports(sun=5e7, carrier=2e8, planet=3e8)])
-few = settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+few = settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 # bodies of their own for every example
-fewer = settings(few, max_examples=2)
+fewer = settings(few, max_examples=4)
 
 
 @pytest.fixture(scope="module")

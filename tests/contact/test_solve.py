@@ -86,10 +86,10 @@ def assert_contact_conditions(state, H, gap, G, load):
 
 
 @pytest.mark.parametrize("floating", [False, True])
-def test_random_positions_agree_with_daqp(floating):
+def test_200_random_positions_agree_with_daqp(floating):
     rng = np.random.default_rng(11 if floating else 12)
     unloaded = 0
-    for _ in range(40):
+    for _ in range(100):
         n_planets = int(rng.integers(3, 6))
         H, gap, G, mesh = random_planetary(
             rng,
@@ -113,7 +113,7 @@ def test_random_positions_agree_with_daqp(floating):
         again = solve_contact(H, gap, G, load, start=rng.random(len(gap)) < 0.3)
         np.testing.assert_allclose(again.loads, state.loads, rtol=0, atol=1e-10 * state.loads.max())
         np.testing.assert_allclose(again.motions, state.motions, rtol=0, atol=1e-9 * np.abs(state.motions).max())
-    assert unloaded > 8
+    assert unloaded > 20
 
 
 def test_warm_start_takes_few_steps_and_changes_nothing():

@@ -51,8 +51,8 @@ def test_a_unit_becomes_the_gearbox_of_the_page(tmp_path, monkeypatch, capsys):
         assert cli.main(command) == 0
     assert "Power flow" in capsys.readouterr().out
     coarsen(Path("box.toml"))
-    assert cli.main([*commands[2], "--no-pictures", "--verbose"]) == 0
-    assert "K_Hbeta" in capsys.readouterr().out
+    assert cli.main([*commands[2], "--no-pictures"]) == 0
+    assert "K_Hβ" in capsys.readouterr().out
 
 
 def test_a_unit_with_the_casing_of_the_page_has_a_sound(tmp_path, monkeypatch):

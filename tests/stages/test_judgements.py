@@ -75,8 +75,8 @@ def test_the_safety_over_the_life_counts_where_it_is_smaller():
 
 def test_the_smallest_safety_is_that_of_its_flank():
     flanks = [
-        SimpleNamespace(name="sun", root_safety=2.0, contact_safety=math.nan),
-        SimpleNamespace(name="gear 2", root_safety=1.5, contact_safety=math.nan),
+        SimpleNamespace(words="the sun", root_safety=2.0, contact_safety=math.nan),
+        SimpleNamespace(words="gear 2", root_safety=1.5, contact_safety=math.nan),
     ]
     root, flank = least_of(SimpleNamespace(flanks=flanks))
     assert root == Least(1.5, "root of gear 2") and flank is None
@@ -85,8 +85,8 @@ def test_the_smallest_safety_is_that_of_its_flank():
 @pytest.mark.parametrize(
     ("required", "state", "words"),
     (
-        (None, "open", "It lives 7,605 h (bearing C lives first)"),
-        (5000.0, "good", "It lives 7,605 h of the 5,000 h asked for (bearing C lives first)"),
+        (None, "open", "It lives 7,605 h (bearing C fails first)"),
+        (5000.0, "good", "It lives 7,605 h of the 5,000 h asked for (bearing C fails first)"),
         (20000.0, "bad", "It lives 7,605 h of the 20,000 h asked for (bearing C fails first)"),
     ),
 )

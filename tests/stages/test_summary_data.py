@@ -79,3 +79,7 @@ def test_data_of_a_case_have_its_refusal(tmp_path, capsys):
     code = main(["check", str(tmp_path / "case.toml"), "--json"])
     printed = json.loads(capsys.readouterr().out)
     assert mismatches(printed, CHECK_SCHEMA) == [] and printed["accepted"] == (code == 0)
+    (tmp_path / "case.toml").write_text("model = 'pair'\nteeth = 3\n", encoding="utf-8")
+    assert main(["check", str(tmp_path / "case.toml"), "--json"]) == 2
+    printed = json.loads(capsys.readouterr().out)
+    assert mismatches(printed, CHECK_SCHEMA) == [] and not printed["accepted"] and "case.toml" in printed["refusal"]

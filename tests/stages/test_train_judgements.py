@@ -37,6 +37,8 @@ def test_the_error_of_either_kind_of_mesh_is_the_largest(static):
     assert (strength.question, strength.state) == (STRONG, "open")
     assert (smooth.question, smooth.answer) == (SMOOTH, "transmission error 1.50 and 0.25 µm")
     assert smooth.state == "open"  # without motion
+    *_, in_housing = judge_teeth(Files(case, static=static), None, np.array([1.092, 1.065]))
+    assert in_housing.answer.endswith(", K_v 1.09 and 1.06") or in_housing.answer.endswith(", K_v 1.09 and 1.07")
 
 
 def test_a_pair_with_limits_is_rated_and_has_no_level():

@@ -117,7 +117,7 @@ page.solid = () => {
   };
 
   const chooser = document.getElementById("solid-view"), bar = document.getElementById("solid-bar");
-  const button = document.getElementById("solid-play"), scale = document.getElementById("solid-scale");
+  const scale = document.getElementById("solid-scale");
   ["von Mises stress, static, position 0", "displacement, static, position 0", ...model.modes.map((mode) => "mode " + mode.title)]
     .forEach((text, i) => chooser.add(new Option(text, String(i))));
   const state = { fields: [], factor: 1, moving: false, wave: false };
@@ -149,17 +149,7 @@ page.solid = () => {
     bodies.forEach((body, i) => move(body, state.fields[i], state.factor * Number(scale.value) * swing));
     render();
   };
-  const run = (time) => { if (state.moving) { draw(time); requestAnimationFrame(run); } };
-  const play = (moving) => {
-    state.moving = moving;
-    button.textContent = moving ? "Pause" : "Move";
-    button.setAttribute("aria-pressed", String(moving));
-    if (moving) requestAnimationFrame(run); else draw(0);
-  };
-  button.addEventListener("click", () => play(!state.moving));
-  chooser.addEventListener("change", choose);
-  scale.addEventListener("input", () => draw(0));
-  document.getElementById("solid-reset").addEventListener("click", view.reset);
+  page.controls(view, state, { draw, choose });
   choose();
   place.solid = { bodies, state };
 };

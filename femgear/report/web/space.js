@@ -104,7 +104,7 @@ page.space = () => {
   const sizes = (field) => Float32Array.from({ length: field.length / 3 }, (_, i) => Math.hypot(field[3 * i], field[3 * i + 1], field[3 * i + 2]));
 
   const chooser = document.getElementById("solid-view"), bar = document.getElementById("solid-bar");
-  const button = document.getElementById("solid-play"), scale = document.getElementById("solid-scale");
+  const scale = document.getElementById("solid-scale");
   ["at rest", ...model.motions.map(({ title }) => title)].forEach((text, i) => chooser.add(new Option(text, String(i))));
   const state = { fields: [], factor: 0, moving: false, swings: false, unit: "" };
   const paint = (body, tintOf) => {
@@ -140,17 +140,7 @@ page.space = () => {
     });
     render();
   };
-  const run = (time) => { if (state.moving) { draw(time); requestAnimationFrame(run); } };
-  const play = (moving) => {
-    state.moving = moving;
-    button.textContent = moving ? "Pause" : "Move";
-    button.setAttribute("aria-pressed", String(moving));
-    if (moving) requestAnimationFrame(run); else draw(0);
-  };
-  button.addEventListener("click", () => play(!state.moving));
-  chooser.addEventListener("change", choose);
-  scale.addEventListener("input", () => draw(0));
-  document.getElementById("solid-reset").addEventListener("click", view.reset);
+  page.controls(view, state, { draw, choose });
 
   // what is under the pointer: the nearest vertex to the eye within some pixels of it
   const tip = document.createElement("output");

@@ -78,3 +78,19 @@ page.view = (place, radius, from) => {
   });
   return { group, camera, render, reset, canvas: renderer.domElement };
 };
+
+// choice, motion, magnification and reset of a view, whose state tells whether it is moving
+page.controls = (view, state, { draw, choose }) => {
+  const part = (name) => document.getElementById(`solid-${name}`), button = part("play");
+  const run = (time) => { if (state.moving) { draw(time); requestAnimationFrame(run); } };
+  const play = (moving) => {
+    state.moving = moving;
+    button.textContent = moving ? "Pause" : "Move";
+    button.setAttribute("aria-pressed", String(moving));
+    if (moving) requestAnimationFrame(run); else draw(0);
+  };
+  button.addEventListener("click", () => play(!state.moving));
+  part("view").addEventListener("change", choose);
+  part("scale").addEventListener("input", () => draw(0));
+  part("reset").addEventListener("click", view.reset);
+};

@@ -9,7 +9,7 @@ import numpy as np
 
 from femgear.stages.judgements import Judgement, judge_noise, judge_numbers
 from femgear.stages.train_judgements import judge_teeth
-from femgear.trains.elastic.results import rate_set
+from femgear.trains.elastic.results import known_factors, rate_set
 
 _MAKES = 0.5
 """Share of the level from which on one resonance makes it."""
@@ -19,7 +19,7 @@ _NEAR = 10.0
 
 def set_with_ring_judgements(results: Any) -> Iterator[Judgement]:
     """Judge a planetary set with an elastic ring."""
-    yield from judge_teeth(results, rate_set(results))
+    yield from judge_teeth(results, rate_set(results), known_factors(results).get("K_v"))
     if "housing" in results.stages:
         yield _noise(results)
     yield judge_numbers(results.findings, results.manifest.complete)

@@ -78,7 +78,7 @@ from femgear.stages.static_results import (
     shares,
 )
 from femgear.stages.strength import Rating, rate_case, rating_wanted
-from femgear.stages.strength_results import safety_notes, safety_rows, strength_block
+from femgear.stages.strength_results import dynamic_factors, safety_notes, safety_rows, strength_block
 from femgear.stages.stress_reasons import largest_pressure, reason_row
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
@@ -88,7 +88,6 @@ from femgear.storage.results import (
     mode_entries,
     response_variables,
 )
-from femgear.system.fourier import sample
 from femgear.trains.elastic.checks import checked_speeds, dynamics_warnings, housing_warnings
 from femgear.trains.elastic.model import RADIAL, TANGENTIAL, ElasticSet, RingModel, ring_field
 from femgear.trains.elastic.runup import KINDS, LEVEL_CHANGE, largest_factors, loudest, meeting_columns
@@ -611,23 +610,19 @@ def verdict(results: Results) -> Iterator[Block]:
         shown = [f"{significant(value, 3)} um" for value in map(float, error)]
         text = _kinds("{}", shown, lambda text: marks(text, *LARGE, "W-POSITIONS", of=("static",)))
         rows.append((f"transmission error, peak to peak{_where(static, '')}", text))
-    factors, computed, doubts = np.ones((1, 2)), dict[str, np.ndarray](), dict[int, tuple[str, ...]]()
+    factors, computed, doubts = factors_of_speeds(results), known_factors(results), dict[int, tuple[str, ...]]()
     if "dynamics" in stages:
-        factors, sharing = _load_factors(results.dynamics)
         if "housing" in stages and "dynamic_factor" in results.housing:
-            factors = results.housing["dynamic_factor"].values[[*chosen(results.dynamics.sizes["speed"])]]
             notes.append("K_v: of the set in the housing that stands still")
-        doubts = level_doubts(results)
-        rows.append(("planet load factor K_gamma", _kinds("{:.3f}", sharing)))
-        rows += _unequal(results, sharing, notes)
+        doubts = level_doubts(results, factors.argmax(axis=0).tolist())
+        rows.append(("planet load factor K_gamma", _kinds("{:.3f}", computed["K_gamma"])))
+        rows += _unequal(results, computed["K_gamma"], notes)
         codes = _all_of(doubts)
-        text = _kinds("{:.3f}", factors.max(axis=0), lambda text: marks(text, *codes, of=_OF_LEVEL))
+        text = _kinds("{:.3f}", computed["K_v"], lambda text: marks(text, *codes, of=_OF_LEVEL))
         rows.append(("largest dynamic factor K_v, at operating speeds", text))
-        computed = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
-        rows += friction_rows(results)
+        rows += friction_rows(results, marks)
     rated = rating_wanted(results.case)
-    if "static" in stages and "face_load_factor" in (static := results.static):
-        computed["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+    if "K_Hβ" in computed:
         text = _kinds("{:.3f}", computed["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
         rows.append(("face load factor K_Hβ", text))
     if "stress" in stages:
@@ -651,14 +646,14 @@ def verdict(results: Results) -> Iterator[Block]:
         yield _near_resonances(results.runup, Marks(results.findings))
 
 
-def level_doubts(results: Results) -> dict[int, tuple[str, ...]]:
-    """Codes of findings that concern dynamic factors and levels, by number of the speeds that tables show."""
+def level_doubts(results: Results, more: Iterable[int] = ()) -> dict[int, tuple[str, ...]]:
+    """Codes of findings that concern dynamic factors and levels, by number of the speeds that tables show, and more."""
     if "dynamics" not in results.stages:
         return {}
     dynamics, changes = results.dynamics, level_changes(results)
     return {
-        i: (*doubtful_excitation(changes[i]), *response_doubts(dynamics.isel(speed=i)), "W-DAMPING")
-        for i in chosen(dynamics.sizes["speed"])
+        i: (*doubtful_excitation(changes[i]), *response_doubts(dynamics.isel(speed=i)), "W-DAMPING", "W-FRICTION")
+        for i in dict.fromkeys((*chosen(dynamics.sizes["speed"]), *more))
     }
 
 
@@ -714,19 +709,30 @@ def _kinds(form: str, values, marked: Callable[[str], str] = str) -> str:
     return ", ".join(f"{kind} {marked(form.format(value))}" for kind, value in zip(KINDS, values))
 
 
-def _load_factors(dynamics: xr.Dataset) -> tuple[np.ndarray, np.ndarray]:
-    """K_v (n, 2) at the first and last speeds, as tables show them, and K_gamma (2,), ISO 6336-1.
+def factors_of_speeds(results: Results) -> np.ndarray:
+    """K_v (n_speeds, 2) at all operating speeds, of the set in a housing that stands still; ones without any."""
+    if "dynamics" not in results.stages:
+        return np.ones((1, 2))
+    if "housing" in results.stages and "dynamic_factor" in results.housing:
+        return results.housing["dynamic_factor"].values
+    return dynamic_factors(results.dynamics, len(KINDS))
 
-    Largest over mean force of a mesh, and largest mean force of a mesh over that of all of its kind.
+
+def known_factors(results: Results) -> dict[str, np.ndarray]:
+    """Load factors (2,) of both kinds of mesh by their symbols, as far as they were computed, ISO 6336-1.
+
+    K_v is the largest at any operating speed, K_gamma the largest mean force of a mesh over that of all of its kind.
     """
-    names, factors, sharing = dynamics["mesh"].values, list[np.ndarray](), np.ones(2)
-    for i in chosen(dynamics.sizes["speed"]):
-        force = stored_harmonics(dynamics.isel(speed=i), "mesh_force")
-        mean, peak = np.real(force[:, 0]), sample(force, 4 * force.shape[-1]).max(axis=-1)
-        factors.append(_by_kind(names, peak / mean))
-        of_all = [mean[len(mean) // 2 * k :][: len(mean) // 2].mean() for k in range(2)]
-        sharing = np.maximum(sharing, _by_kind(names, mean) / of_all)
-    return np.array(factors), sharing
+    factors = dict[str, np.ndarray]()
+    if "dynamics" in results.stages:
+        mean = results.dynamics["mesh_force_real"].isel(harmonic=0).values
+        of_kinds = mean.reshape(len(mean), len(KINDS), -1)
+        sharing = (of_kinds.max(axis=2) / of_kinds.mean(axis=2)).max(axis=0)
+        factors = {"K_gamma": np.maximum(sharing, 1.0), "K_v": factors_of_speeds(results).max(axis=0)}
+    if "static" in results.stages and "face_load_factor" in results.static:
+        static = results.static
+        factors["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+    return factors
 
 
 def _stresses(results: Results, marks: Marks) -> Iterator[tuple[str, str]]:
@@ -767,16 +773,7 @@ def rate_set(results: Results) -> Rating | None:
     """Rate the teeth of a run with the load factors that it has; None where the case asks for no safeties."""
     if not rating_wanted(results.case):
         return None
-    stages, computed = results.stages, dict[str, np.ndarray]()
-    if "dynamics" in stages:
-        factors, sharing = _load_factors(results.dynamics)
-        if "housing" in stages and "dynamic_factor" in results.housing:
-            factors = results.housing["dynamic_factor"].values[[*chosen(results.dynamics.sizes["speed"])]]
-        computed = {"K_gamma": sharing, "K_v": factors.max(axis=0)}
-    if "static" in stages and "face_load_factor" in results.static:
-        static = results.static
-        computed["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
-    return _rated(results.case, computed)
+    return _rated(results.case, known_factors(results))
 
 
 def _rated(case: Case, computed: Mapping[str, np.ndarray]) -> Rating:
@@ -786,7 +783,7 @@ def _rated(case: Case, computed: Mapping[str, np.ndarray]) -> Rating:
 
 
 def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int, tuple[str, ...]]) -> Block:
-    """Tabulate dynamic factors (n, 2) and level at the operating speeds, with what they assume.
+    """Tabulate dynamic factors (n_speeds, 2) and level at the operating speeds, with what they assume.
 
     ``doubts`` are codes of the findings that concern them, by number of the speed.
     """
@@ -805,9 +802,7 @@ def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int
 
     columns = {
         "speed [rpm]": lambda i: f"{speeds[i]:.6g}",
-        **{
-            f"K_v {kind}": lambda i, k=k: marked(f"{factors[shown.index(i), k]:.3f}", i) for k, kind in enumerate(KINDS)
-        },
+        **{f"K_v {kind}": lambda i, k=k: marked(f"{factors[i, k]:.3f}", i) for k, kind in enumerate(KINDS)},
         "level [m/s²]": lambda i: level(i) if housing else "-",
     }
     ring, limit, notes = case.ring, dynamics, list[str]()
@@ -890,7 +885,7 @@ def describe_housing(
 
     def codes(i: int) -> tuple[str, ...]:
         unstable = "turn_multiplier" in data and float(data["turn_multiplier"][i]) > 1.0 + CIRCLE
-        return (*doubts.get(i, ()), *(["W-UNSTABLE"] if unstable else []), "W-DAMPING")
+        return (*doubts.get(i, ()), *(["W-UNSTABLE"] if unstable else []), "W-DAMPING", "W-FRICTION")
 
     def level(value: Any, i: int) -> str:
         return shown_level(float(value[i]), changes[i], marks, *codes(i), "W-POINTS", of=_OF_LEVEL)

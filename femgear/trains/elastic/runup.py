@@ -46,7 +46,7 @@ KINDS = ("sun-planet", "planet-ring")
 _SILENT = 1e-6
 """Lines below this share of the largest one of all speeds are left out."""
 LEVEL_CHANGE = "change of the housing level with excitation up to the frequency compared_to"
-_RUN_UP_DOUBTS = "W-PULL", "W-DAMPING"
+_RUN_UP_DOUBTS = "W-PULL", "W-DAMPING", "W-FRICTION"
 """Findings that concern every number of a run-up."""
 _SHOWN = 12
 """Rows of the table of resonances."""

@@ -814,7 +814,7 @@ ELASTIC = Train(
             verdict=lambda result: {"speeds": len(result.input_speed)},
             describe=lambda results: describe_runup(results.runup),
             warnings=RunupResult.warnings,
-            concerned_by={"": ("W-DAMPING",)},
+            concerned_by={"": ("W-DAMPING", "W-FRICTION")},
             unavailable=no_runup,
         ),
         Stage(
@@ -828,7 +828,7 @@ ELASTIC = Train(
             verdict=response_verdict,
             describe=lambda results: describe_response(results.dynamics),
             warnings=DynamicsResult.warnings,
-            concerned_by={"": ("W-DAMPING",)},
+            concerned_by={"": ("W-DAMPING", "W-FRICTION")},
         ),
         Stage(
             name="housing",
@@ -842,7 +842,7 @@ ELASTIC = Train(
             ),
             tables=lambda results: (mesh_bands(results),),
             warnings=HousingResult.warnings,
-            concerned_by={"": ("W-DAMPING", "W-POINTS"), "dynamics": ("W-EXCITATION", *RESPONSE_DOUBTS)},
+            concerned_by={"": ("W-DAMPING", "W-FRICTION", "W-POINTS"), "dynamics": ("W-EXCITATION", *RESPONSE_DOUBTS)},
         ),
     ),
     describe=describe_set,

@@ -21,6 +21,7 @@ from femgear.stages.judgements import (
     least_over_life,
     lives_of_bearings,
     lives_of_teeth,
+    stresses_text,
 )
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
@@ -43,7 +44,11 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
         # deflection.nc has no response
         missing = {*str(data.attrs.get("iso_missing", "")).split()} - ({"dynamic"} if response is not None else set())
         open_factors = taken_as_one(name for name in SYMBOLS if name in missing)
-        yield judge_strength(root, flank, case.strength, _stresses(results), findings, OF_TEETH, open_factors)
+        with_teeth = [stage.name for stage in (*case.pair, *case.planetary) if stage.teeth]
+        remedy = "no stage has teeth of its own, which safeties are of"
+        if with_teeth:
+            remedy = f"give treatment and hardness in the material of the teeth of {', '.join(with_teeth)}"
+        yield judge_strength(root, flank, case.strength, _stresses(results), findings, OF_TEETH, open_factors, remedy)
         yield from judge_lives((*lives_of_teeth(data), *lives_of_bearings(data)), required_life(case.operation))
     yield from judge_heat(results)
     yield judge_smoothness(_motion(results), results, _RESPONSES)
@@ -64,8 +69,7 @@ def _least(safety: tuple[float, tuple[int, int, int]] | None, data: Any) -> Leas
 def _stresses(results: Any) -> str:
     if "stress" not in results.stages:
         return ""
-    root, pressure = (float(np.nanmax(results.stress[name].values)) for name in ("root_worst", "largest_pressure"))
-    return f"root {1e-6 * root:.0f} MPa, pressure {1e-6 * pressure:.0f} MPa"
+    return stresses_text(*(results.stress[name].values for name in ("root_worst", "largest_pressure")))
 
 
 def _motion(results: Any) -> str:

@@ -17,7 +17,7 @@ from femgear.case import text as case_text
 from femgear.case.sections import StrengthSection
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.strength import Rating, rate_case, rating_wanted
-from femgear.stages.strength_results import factor_names, kind_names, missing_factors, safety_notes
+from femgear.stages.strength_results import factor_names, kind_names, missing_factors, missing_notes
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
 from femgear.trains.gearbox.contact import StageContact, loaded_tables
 from femgear.trains.gearbox.deflection import Deflection
@@ -158,7 +158,7 @@ def _places(stage: Any, rating: Rating | None) -> Iterator[tuple[int, int, Any, 
 def _notes(rating: Rating) -> Iterator[str]:
     """Load factors that the safeties have, and what is missing."""
     yield f"load factors {' '.join(factor_names(rating.factors)) or 'none'}"
-    yield from (note for note in safety_notes(rating) if note.startswith(("give ", "taken as 1", "no load factors")))
+    yield from missing_notes(rating)
 
 
 def describe_strength(data: Any, load_case: int, name: str) -> tuple[Block, ...]:

@@ -340,6 +340,7 @@ HELICAL = Train(
             describe=lambda results: describe_response(results.dynamics),
             unavailable=lambda case: _NOTHING_EXCITES if _given(case) else "",
             warnings=HelicalDynamicsResult.warnings,
+            concerned_by={"": ("W-FRICTION",)},
         ),
     ),
     describe=lambda case: (*describe_set(case), *describe_helical(case, planetary_set(case))),

@@ -465,6 +465,7 @@ PAIR = Train(
             describe=lambda results: describe_dynamics(results.dynamics),
             unavailable=_no_speeds,
             warnings=PairDynamicsResult.warnings,
+            concerned_by={"": ("W-FRICTION",)},
         ),
         Stage(
             name="runup",
@@ -476,6 +477,7 @@ PAIR = Train(
             wanted=lambda case: case.runup.count > 1,
             unavailable=lambda case: _no_speeds(case) or ("" if case.runup.count > 1 else "runup.count leaves it out"),
             warnings=PairRunupResult.warnings,
+            concerned_by={"": ("W-FRICTION",)},
         ),
     ),
     describe=_describe_case,

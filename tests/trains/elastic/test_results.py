@@ -1,9 +1,14 @@
 """Tables of the results of an elastic set."""
 
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import xarray as xr
 from report.test_figures import synthetic
 
 from femgear.stages import static_figures as static_figures
-from femgear.trains.elastic.results import describe_housing
+from femgear.trains.elastic.results import describe_housing, factors_of_speeds, known_factors
 
 
 def test_the_table_of_the_housing_has_both_sensors():
@@ -11,3 +16,23 @@ def test_the_table_of_the_housing_has_both_sensors():
     column = block.header.index("microphone [dB(A)]")
     assert [row[column] for row in block.rows] == ["50.9", "87.7"]
     assert "1 m from the ring" in block.notes[-1] and "over its face width" in block.notes[-1]
+
+
+def test_load_factors_are_the_largest_of_all_speeds_also_of_those_that_tables_leave_out():
+    """Forces 2 + a cos at twelve speeds, a = 0.5 and 1.5 at the seventh of them; one mesh has more than its share."""
+    speeds, lines = 12, np.zeros((12, 4, 3), complex)
+    lines[..., 0], lines[..., 1] = 2.0, 0.5
+    lines[6, 2, 1] = 1.5
+    lines[5, 0, 0] = 3.0
+    dims = "speed", "mesh", "harmonic"
+    parts = {"mesh_force_real": (dims, lines.real), "mesh_force_imag": (dims, lines.imag)}
+    meshes = ["sun-planet 1", "sun-planet 2", "planet 1-ring", "planet 2-ring"]
+    dynamics = xr.Dataset(parts, {"speed": np.arange(speeds), "mesh": meshes})
+    results = SimpleNamespace(stages=("dynamics",), dynamics=dynamics)
+    assert factors_of_speeds(results).shape == (speeds, 2)
+    factors = known_factors(results)
+    assert factors["K_v"] == pytest.approx([1.25, 1.75], rel=1e-12)
+    assert factors["K_gamma"] == pytest.approx([3.0 / 2.5, 1.0], rel=1e-12)
+    housing = xr.Dataset({"dynamic_factor": (("speed", "mesh_kind"), np.full((speeds, 2), 1.9))})
+    fixed = SimpleNamespace(stages=("dynamics", "housing"), dynamics=dynamics, housing=housing)
+    assert known_factors(fixed)["K_v"] == pytest.approx([1.9, 1.9])

@@ -33,6 +33,7 @@ def test_the_questions_of_a_gearbox_in_a_casing(results):
         SURE,
     ]
     assert judged[STRONG].state == "open" and judged[SURE].state == "good"
+    assert judged[STRONG].limit == "give treatment and hardness in the material of the teeth of stage"
     data = results.dynamics
     size = np.hypot(data["lines_real"].values, data["lines_imag"].values)
     sensor = int(data["level"].values[0].argmax())
