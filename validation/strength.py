@@ -53,6 +53,7 @@ STAGE_1 = "KISSsoft report, NREL 5 MW gearbox, planetary stage 1"
 STAGE_3 = "KISSsoft report, NREL 5 MW gearbox, stage 3 (24/95, 10 deg)"
 EXAMPLE = "ISO/TR 6336-30:2017, worked example 1 (17/103, m_n 8, 15.8 deg)"
 FZG_C = "FZG test gear C, 16/24, m 4.5, 200 N m, ISO 6336:2006 evaluated by hand"
+FZG_H_ISO = "FZG test gear H501, 20/30, m_n 3.5, 15 deg, 100 N m, ISO 6336:2006 evaluated by hand"
 FZG_H = "GEARpie, report of FZG gear H501, 20/30, m_n 3.5, 15 deg, 100 N m, DIN 3990"
 EDITION_2019 = "KISSsoft reports by ISO 6336:2019 of planetary stages, m_n 40, 15 deg"
 TOLERANCES = "ISO 1328-1:2013, eq. 5 to 12 with the rounding of 5.2.3, 40 teeth, m 3, b 30, class 6"
@@ -298,7 +299,7 @@ def technical_report() -> tuple[Row, ...]:
 
 
 def fzg_gears() -> tuple[Row, ...]:
-    """FZG gear C by the edition of 2006."""
+    """FZG gears C and H501 by the edition of 2006."""
     rack, rows = BasicRack(1.0, 1.25, 0.375), []
     shape = (4.5e-3, ALPHA)
     spur = GearPair(
@@ -306,12 +307,20 @@ def fzg_gears() -> tuple[Row, ...]:
         Gear(24, *shape, 0.1715, 0.014, 0.01, rack=rack, tip_diameter=118.544e-3),
         91.5e-3,
     )
-    force = 200.0 / spur.gears[0].reference_radius
-    for gear, value, root in zip(("pinion", "wheel"), (275.70, 267.54), root_stresses(spur, force), strict=True):
-        quantity = f"{gear}: nominal root stress sigma_F0 [MPa]"
-        rows.append(within("C", FZG_C, quantity, value, 1e-6 * root.stress, HALF_PERCENT))
-    contact = "nominal contact stress sigma_H0 [MPa]"
-    return (*rows, within("C", FZG_C, contact, 1239.07, contact_stress(spur, force), HALF_PERCENT))
+    note = (
+        "with a rounding of 0.30 modules, which its Y_F 1.479, 1.490 and Y_S 2.047, 2.036 have; 0.38 gives 90.7, 91.1"
+    )
+    for case, source, pair, torque, values, remark in (
+        ("C", FZG_C, spur, 200.0, (275.70, 267.54, 1239.07), ""),
+        ("H501", FZG_H_ISO, helical_test_gear(0.30), 100.0, (96.7, 96.9, 652.5), note),
+    ):
+        force = torque / pair.gears[0].reference_radius
+        for gear, value, root in zip(("pinion", "wheel"), values, root_stresses(pair, force), strict=False):
+            quantity = f"{gear}: nominal root stress sigma_F0 [MPa]"
+            rows.append(within(case, source, quantity, value, 1e-6 * root.stress, HALF_PERCENT, note=remark))
+        ours = contact_stress(pair, force)
+        rows.append(within(case, source, "nominal contact stress sigma_H0 [MPa]", values[2], ours, HALF_PERCENT))
+    return tuple(rows)
 
 
 def helical_fzg_gear() -> tuple[Row, ...]:
@@ -331,7 +340,7 @@ def helical_fzg_gear() -> tuple[Row, ...]:
     degrees = math.radians(15.0)
     ours = contact_stress(pair, force) * math.cos(degrees)
     note = "without 1/cos(beta) = Z_beta^2 of ISO over that of DIN 3990"
-    rows.append(printed("H501", FZG_H, "nominal contact stress sigma_H0 [MPa]", "627.27", ours, note=note))
+    rows.append(printed("H501", FZG_H, "sigma_H0 of DIN 3990 [MPa]", "627.27", ours, note=note))
     own, generated = reported_test_gear(0.38), "fillet that the rack generates, point by point"
     for gear, root in zip(own.gears, root_stresses(own, force), strict=True):
         chord, radius, _ = generated_section(gear)
