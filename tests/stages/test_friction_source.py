@@ -10,8 +10,10 @@ import pytest
 import xarray as xr
 from scipy.integrate import solve_ivp
 
+from femgear.findings import Finding
 from femgear.gears.friction import sliding_per_path
 from femgear.housing.orders import order_level
+from femgear.report.tables import Marks
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.stages.friction_source import friction_rows
 from femgear.stages.losses import solve_losses
@@ -282,9 +284,11 @@ def test_the_verdict_says_what_friction_adds():
     speeds = np.array([250.0, 3100.0])
     change = xr.DataArray([24.2, 2.94], dims="speed", coords={"speed": speeds}, attrs={"long_name": "added"})
     run = SimpleNamespace(stages=("dynamics",), dynamics=xr.Dataset({"friction_change": change}))
-    assert friction_rows(run) == [("added", "+24.2 dB at 250 rpm, +2.9 dB at 3100 rpm")]
-    assert friction_rows(SimpleNamespace(stages=("dynamics",), dynamics=xr.Dataset())) == []
-    assert friction_rows(SimpleNamespace(stages=())) == []
+    assert friction_rows(run, Marks([])) == [("added", "+24.2 dB at 250 rpm, +2.9 dB at 3100 rpm")]
+    assert friction_rows(SimpleNamespace(stages=("dynamics",), dynamics=xr.Dataset()), Marks([])) == []
+    assert friction_rows(SimpleNamespace(stages=()), Marks([])) == []
+    ((_, marked),) = friction_rows(run, Marks([Finding("W-FRICTION", "losses.friction", "coefficient of the first speed")]))
+    assert marked.count("†") == 2, "every figure carries the mark of the finding"
 
 
 def test_files_have_friction_where_it_acts_alone():
