@@ -165,8 +165,8 @@ class RunningStage(ReadOnlyArrays):
         N, loss = self.paths.symmetry, self.loss.max(initial=0.0)
         member = group == np.arange(len(leaders))[:, None]
         phase = np.exp(2j * np.pi * ((self.sense * turn * (np.asarray(whole)[..., None] % N)) % N) / N)
-        found = np.einsum("...j,hj,gcjd->...gchd", phase, member, self.flexibility[leaders], optimize=True)
-        return found / (1.0 + 1j * loss * np.sign(np.asarray(omega)))[..., None, None, None, None]
+        compliance = np.einsum("...j,hj,gcjd->...gchd", phase, member, self.flexibility[leaders], optimize=True)
+        return compliance / (1.0 + 1j * loss * np.sign(np.asarray(omega)))[..., None, None, None, None]
 
 
 @dataclass(frozen=True)
@@ -223,10 +223,10 @@ class RunningResponse(ReadOnlyArrays):
 
     def one_sided(self, values: np.ndarray) -> np.ndarray:
         """Amplitudes of two-sided values (Q + 1, S, k), see `lines`."""
-        found = 2.0 * values
-        found[0, self.band < 0] = 0.0
-        found[0, self.band == 0] *= 0.5
-        return found
+        amplitudes = 2.0 * values
+        amplitudes[0, self.band < 0] = 0.0
+        amplitudes[0, self.band == 0] *= 0.5
+        return amplitudes
 
 
 def solve_running(
@@ -272,7 +272,7 @@ class _Part:
         Their numbers.
     bands : (b,) int array
         Places of the side bands.
-    met : (s,) int array
+    structure_bands : (s,) int array
         Side bands of the structure between them.
     answer : (k, b G C, b M G) complex array
         Forces of the contact points by the forces e beyond k0 [1].
@@ -280,7 +280,7 @@ class _Part:
 
     blocks: np.ndarray
     bands: np.ndarray
-    met: np.ndarray
+    structure_bands: np.ndarray
     answer: np.ndarray
 
 
@@ -300,14 +300,14 @@ def forces_on_structure(stage: RunningStage, response: RunningResponse, vectors:
     orders, N, n = response.orders, stage.paths.symmetry, stage.waves
     psi = np.asarray(stage.paths.planet_angles)[stage.groups[0]]
     padded = np.concatenate([response.force, np.zeros((*response.force.shape[:3], 1))], axis=3)
-    found = np.zeros((len(orders.base), len(response.band), vectors.shape[2]), complex)
+    forces = np.zeros((len(orders.base), len(response.band), vectors.shape[2]), complex)
     for w, wave in enumerate(n):
         place = orders.place(response.band + stage.sense * wave)
         around = np.exp(-1j * wave * psi)
-        found -= N * np.einsum("g,gcbs,ck->bsk", around, padded[..., place], vectors[:, w].conj(), optimize=True)
+        forces -= N * np.einsum("g,gcbs,ck->bsk", around, padded[..., place], vectors[:, w].conj(), optimize=True)
     moved = (orders.base[:, None] + orders.pattern[:, None] + response.band) % N == 0
-    found[~moved] = 0.0
-    return found.reshape(orders.patterns, -1, *found.shape[1:]).sum(axis=0)
+    forces[~moved] = 0.0
+    return forces.reshape(orders.patterns, -1, *forces.shape[1:]).sum(axis=0)
 
 
 def ring_lines(stage: RunningStage, response: RunningResponse, angles, directions) -> np.ndarray:
@@ -327,8 +327,8 @@ def ring_lines(stage: RunningStage, response: RunningResponse, angles, direction
         return np.zeros((*response.modal.shape[:2], len(angles)), complex)
     psi = np.asarray(stage.paths.planet_angles)[stage.groups[0]]
     speeds, places = (response.mesh_frequency, response.carrier_speed), (angles, directions)
-    heard = ring_motion(stage.ring, response.orders, response.force[:, RING], psi, speeds, places, response.band)
-    return response.one_sided(heard)
+    displacement = ring_motion(stage.ring, response.orders, response.force[:, RING], psi, speeds, places, response.band)
+    return response.one_sided(displacement)
 
 
 class _Problem:
@@ -405,8 +405,8 @@ class _Problem:
     def _groups_of_bands(self, residue: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Side bands that the structure connects, and the bands of the structure between them, by residue."""
         orders, waves = self.orders, self.stage.sense * self.stage.waves
-        met = orders.structure_bands(residue)
-        reached = [orders.place(band + waves) for band in met]
+        structure_bands = orders.structure_bands(residue)
+        reached = [orders.place(band + waves) for band in structure_bands]
         owner = np.arange(len(orders.bands))
         for places in reached:
             inside = places[places < len(owner)]
@@ -415,7 +415,7 @@ class _Problem:
         for first in np.unique(owner):
             bands = np.flatnonzero(owner == first)
             used = [k for k, places in enumerate(reached) if np.isin(places, bands).any()]
-            yield bands, met[used]
+            yield bands, structure_bands[used]
 
     def _parts(self, mesh_frequency: float, speed: float) -> Iterator[_Part]:
         """Solve all blocks for unit forces e beyond k0."""
@@ -425,16 +425,16 @@ class _Problem:
             blocks = orders.blocks(residue)
             if not len(blocks):
                 continue
-            for bands, met in self._groups_of_bands(residue):
+            for bands, structure_bands in self._groups_of_bands(residue):
                 size = 16.0 * (len(bands) * G * (C + p)) ** 2
-                for some in np.array_split(blocks, int(np.ceil(len(blocks) * size / _ROOM))):
-                    still = some[orders.base[some] + orders.seed[some] == 0]
-                    for chosen in (np.setdiff1d(some, still), still):
+                for portion in np.array_split(blocks, int(np.ceil(len(blocks) * size / _ROOM))):
+                    still = portion[orders.base[portion] + orders.seed[portion] == 0]
+                    for chosen in (np.setdiff1d(portion, still), still):
                         if len(chosen):
-                            answer = self._answer(chosen, bands, met, mesh_frequency, speed)
-                            yield _Part(chosen, bands, met, answer)
+                            answer = self._answer(chosen, bands, structure_bands, mesh_frequency, speed)
+                            yield _Part(chosen, bands, structure_bands, answer)
 
-    def _answer(self, blocks, bands, met, mesh_frequency: float, speed: float) -> np.ndarray:
+    def _answer(self, blocks, bands, structure_bands, mesh_frequency: float, speed: float) -> np.ndarray:
         """Forces (blocks, b G C, b G M) of the contact points by unit forces e of the meshes."""
         stage, orders, kinds = self.stage, self.orders, self.stage.kinds
         G, C, p = len(self.leaders), len(stage.stiffness), len(stage.mass)
@@ -446,7 +446,7 @@ class _Problem:
         system = np.zeros((len(blocks), points + planets, points + planets), complex)
         inner = np.zeros((len(blocks), b, G, C, b, G, C), complex)
         free = list[np.ndarray]()
-        for band in met:
+        for band in structure_bands:
             free += self._add_structure(inner, band, bands, line * mesh_frequency + band * speed)
         every = np.arange(b)[:, None, None], np.arange(G)[:, None], np.arange(C)
         inner[:, every[0], every[1], every[2], every[0], every[1], every[2]] += c[:, :, None, :]
@@ -463,11 +463,11 @@ class _Problem:
         system[:, :points, :points] = inner.reshape(len(blocks), points, points)
         A = np.kron(np.eye(b * G), stage.approach)
         system[:, points:, :points], system[:, :points, points:] = A, -A.T
-        own = stage.planet_stiffness(omega, mesh_frequency, speed)
+        planet_stiffness = stage.planet_stiffness(omega, mesh_frequency, speed)
         for k in range(b):
             for g in range(G):
                 at = points + (k * G + g) * p + np.arange(p)
-                system[:, at[:, None], at] = own[:, k]
+                system[:, at[:, None], at] = planet_stiffness[:, k]
         if free:  # motions that nothing holds take up no mean force
             border = np.zeros((len(free), points + planets), complex)
             border[:, :points] = free
@@ -483,12 +483,12 @@ class _Problem:
         # columns in the order of the meshes of all leaders, band by band
         right = right.reshape(len(blocks), system.shape[1], -1)
         if free:
-            return np.stack([_consistent(one, points, of) for one, of in zip(system, right, strict=True)])
+            return np.stack([_consistent(*equations, points) for equations in zip(system, right, strict=True)])
         # planets have units of their own
         rows = 1.0 / np.maximum(np.abs(system).max(axis=2), np.finfo(float).tiny)
         columns = 1.0 / np.maximum(np.abs(system * rows[:, :, None]).max(axis=1), np.finfo(float).tiny)
-        found = np.linalg.solve(system * rows[:, :, None] * columns[:, None], right * rows[:, :, None])
-        return (found * columns[:, :, None])[:, :points]
+        scaled_forces = np.linalg.solve(system * rows[:, :, None] * columns[:, None], right * rows[:, :, None])
+        return (scaled_forces * columns[:, :, None])[:, :points]
 
     def _add_structure(self, inner: np.ndarray, band: int, bands: np.ndarray, omega: np.ndarray) -> list[np.ndarray]:
         """Add compliances of the structure at one of its bands; approaches of the motions that are free there."""
@@ -496,49 +496,49 @@ class _Problem:
         n, C, W = stage.waves, stage.shape.shape[0], stage.shape.shape[1]
         number = {int(place): k for k, place in enumerate(bands)}
         places = orders.place(band + stage.sense * n)
-        met = [(w, number[int(place)]) for w, place in enumerate(places) if int(place) in number]
+        connected = [(w, number[int(place)]) for w, place in enumerate(places) if int(place) in number]
         omega = np.where(np.abs(omega) < _STILL * max(np.abs(omega).max(), 1.0), 0.0, omega)
         both = (stage.receptance(omega) @ stage.products).reshape(len(omega), C, W, C, W)
         psi = np.asarray(stage.paths.planet_angles)[self.leaders]
         N = stage.paths.symmetry
-        for w, k in met:
-            for v, m in met:
+        for w, k in connected:
+            for v, m in connected:
                 phase = N * np.exp(1j * n[w] * psi)[:, None] * np.exp(-1j * n[v] * psi)
                 inner[:, k, :, :, m] += phase[None, :, None, :, None] * both[:, None, :, w, None, :, v]
         if not (omega == 0.0).any():
             return []
-        found = []
+        free_motions = []
         for mode in np.flatnonzero(stage.natural_frequency == 0.0):
             row = np.zeros(inner.shape[1:4], complex)
-            for w, k in met:
+            for w, k in connected:
                 row[k] += np.exp(1j * n[w] * psi)[:, None] * stage.shape[:, w, mode]
             if np.abs(row).max() > 1e-9 * np.abs(stage.shape[:, :, mode]).max(initial=0.0) > 0.0:
-                found.append(row.ravel())
-        return found
+                free_motions.append(row.ravel())
+        return free_motions
 
     def _sub(self, part: _Part, extra: np.ndarray) -> np.ndarray:
         """Forces e (blocks, b G M, 1) of a part of those of all (J, B, R)."""
-        some = extra[:, part.blocks[:, None], part.bands]
-        return some.transpose(1, 2, 0).reshape(len(part.blocks), -1, 1)
+        of_part = extra[:, part.blocks[:, None], part.bands]
+        return of_part.transpose(1, 2, 0).reshape(len(part.blocks), -1, 1)
 
     def _mesh_forces(self, parts, extra: np.ndarray) -> np.ndarray:
         """Forces (J, B, R) of the leading meshes by forces e beyond k0."""
-        kinds, found = self.stage.kinds, np.zeros_like(extra)
+        kinds, mesh_forces = self.stage.kinds, np.zeros_like(extra)
         G, C = len(self.leaders), len(self.stage.stiffness)
         for part in parts:
             b = len(part.bands)
             force = (part.answer @ self._sub(part, extra)).reshape(-1, b, G, C)[..., :kinds]
-            found[:, part.blocks[:, None], part.bands] = force.transpose(3, 2, 0, 1).reshape(-1, len(force), b)
-        return found
+            mesh_forces[:, part.blocks[:, None], part.bands] = force.transpose(3, 2, 0, 1).reshape(-1, len(force), b)
+        return mesh_forces
 
     def _forces(self, parts, extra: np.ndarray) -> np.ndarray:
         """Forces (G, C, B, R) of all contact points of the leaders by forces e beyond k0."""
         G, C = len(self.leaders), len(self.stage.stiffness)
-        found = np.zeros((G, C, *extra.shape[1:]), complex)
+        contact_forces = np.zeros((G, C, *extra.shape[1:]), complex)
         for part in parts:
             force = (part.answer @ self._sub(part, extra)).reshape(len(part.blocks), len(part.bands), G, C)
-            found[:, :, part.blocks[:, None], part.bands] = force.transpose(2, 3, 0, 1)
-        return found
+            contact_forces[:, :, part.blocks[:, None], part.bands] = force.transpose(2, 3, 0, 1)
+        return contact_forces
 
     def _modal(self, parts, extra: np.ndarray, mesh_frequency: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Side bands (S,) of the structure, and the coordinates (Q + 1, S, m) of its modes."""
@@ -546,22 +546,22 @@ class _Problem:
         N, n, G, C = stage.paths.symmetry, stage.waves, len(self.leaders), len(stage.stiffness)
         reach = int(orders.bands[-1]) + max(int(n[-1]), 0 if stage.ring is None else int(stage.ring.diameter.max()))
         every = np.arange(-reach, reach + 1)
-        found = np.zeros((orders.lines + 1, len(every), len(stage.natural_frequency)), complex)
+        coordinates = np.zeros((orders.lines + 1, len(every), len(stage.natural_frequency)), complex)
         psi = np.asarray(stage.paths.planet_angles)[self.leaders]
         for part in parts:
             force = (part.answer @ self._sub(part, extra)).reshape(len(part.blocks), len(part.bands), G, C)
             line = (orders.base[part.blocks] + orders.seed[part.blocks]) / orders.paths.z_ring
             number = {int(place): k for k, place in enumerate(part.bands)}
-            for band in part.met:
-                total = np.zeros((len(part.blocks), found.shape[2]), complex)
+            for band in part.structure_bands:
+                total = np.zeros((len(part.blocks), coordinates.shape[2]), complex)
                 for w, place in enumerate(orders.place(band + stage.sense * n)):
                     if int(place) in number:
                         at = force[:, number[int(place)]] * np.exp(-1j * n[w] * psi)[:, None]
                         total += at.sum(axis=1) @ stage.shape[:, w].conj()
                 omega = line * mesh_frequency + band * speed
                 omega[np.abs(omega) < _STILL * mesh_frequency] = 0.0
-                found[part.blocks % (orders.lines + 1), band + reach] -= N * stage.receptance(omega) * total
-        return every, found
+                coordinates[part.blocks % (orders.lines + 1), band + reach] -= N * stage.receptance(omega) * total
+        return every, coordinates
 
     def _tail(self, force: np.ndarray) -> tuple[float, float]:
         """Shares of the mesh forces (G, M, B, R) in the upper half of the harmonics, and at the outer bands."""
@@ -573,16 +573,16 @@ class _Problem:
         return float(np.sqrt(upper / whole)), float(np.sqrt(outer / whole))
 
 
-def _consistent(system: np.ndarray, points: int, right: np.ndarray) -> np.ndarray:
+def _consistent(system: np.ndarray, right: np.ndarray, points: int) -> np.ndarray:
     """Forces (points, k) of a system of the means, in which the whole may move: forces do not hang on that.
 
     Of the first ``points`` rows and columns are forces and approaches, of the others motions and balances.
     """
-    own = np.abs(np.diag(system))[:points]
+    diagonal = np.abs(np.diag(system))[:points]
     scale = np.ones(len(system))
-    scale[:points] = 1.0 / np.sqrt(np.where(own > 0.0, own, own.max(initial=0.0) or 1.0))
+    scale[:points] = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, diagonal.max(initial=0.0) or 1.0))
     effect = np.abs(system[points:, :points] * scale[:points]).max(axis=1, initial=0.0)
     scale[points:] = 1.0 / np.where(effect > 0.0, effect, 1.0)
     scaled = scale[:, None] * system * scale
-    found = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=_SINGULAR)[0]
-    return (scale[:, None] * found)[:points]
+    solution = np.linalg.lstsq(scaled, scale[:, None] * right, rcond=_SINGULAR)[0]
+    return (scale[:, None] * solution)[:points]
