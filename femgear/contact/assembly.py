@@ -173,7 +173,7 @@ class MeshWindows(Windows):
         return np.concatenate(mesh), np.concatenate(image)
 
     def kind(self, mesh: np.ndarray) -> np.ndarray:
-        """Kinds of meshes (...)."""
+        """Kinds (...) of meshes with the numbers (...), those on the back side included."""
         return self.gears.mesh_kind[mesh % self.meshes]
 
     def with_planet_gaps(self, planet_gaps) -> MeshWindows:
@@ -221,20 +221,23 @@ class ContactProblem:
 
     @property
     def compliance(self) -> np.ndarray:
-        """Compliance of gears and supports between all candidates [m/N]."""
+        """Compliance (n, n) of gears and supports between all candidates [m/N]."""
         if not self.supports.any():
             return self.H
         return self.H + self.supports[np.ix_(self.mesh, self.mesh)]
 
     def warm_start(self, other: ContactProblem, active: np.ndarray) -> np.ndarray:
-        """Active candidates of another position, matched by mesh, pair and cell; what follows them stays."""
+        """Active candidates (n + k,), matched by mesh, pair and cell with those (n' + k,) of another position.
+
+        The last k, which are no candidates, stay.
+        """
         key = (self.mesh * 1000 + self.pair) * 1000 + self.cell
         other_key = (other.mesh * 1000 + other.pair) * 1000 + other.cell
         cells = len(other_key)
         return np.concatenate([np.isin(key, other_key[active[:cells]]), active[cells:]])
 
     def touches_window_end(self, active: np.ndarray, setup: MeshWindows) -> bool:
-        """Whether a contact ends where its window ends, other than at an end of a flank."""
+        """Whether a contact, active candidates (n,), ends where its window ends, other than at an end of a flank."""
         low, high = setup.at_edge[:, self.mesh, self.position, self.pair]
         last = setup.cells - 1
         return bool(np.any(active & (((self.cell == 0) & ~low) | ((self.cell == last) & ~high))))
@@ -316,7 +319,7 @@ class Candidates:
         return np.moveaxis(values_of_pairs, 0, -1)
 
     def images_of(self, bodies: Bodies) -> np.ndarray:
-        """`images` of other bodies with the same flanks: what differs, of which little is computed anew."""
+        """`images`, of the same shape, of other bodies with the same flanks: what differs is computed anew."""
         parts = [
             None if compliance is other else replace(other, regular=other.regular - compliance.regular)
             for compliance, other in zip(self.bodies.gears, bodies.gears, strict=True)
@@ -527,7 +530,7 @@ def windows(
         Only pairs on the theoretical path of contact, as for rigid gears.
     form : callable, optional
         Separation that deviations of both profiles add, from the roll lengths on flank 1 and 2 [m].
-    shift : array, broadcast with `zeta`
+    shift : float or (...) array, broadcast with `zeta`
         Separation that errors of position add to a whole pair [m].
     """
     zeta = np.asarray(zeta, float)
@@ -660,7 +663,10 @@ def assemble_contact(
 
 
 def body_compliance(setup: MeshWindows, bodies: Bodies, positions, mesh, pair) -> np.ndarray:
-    """Regular compliance between the nodes of all windows, as `Candidates.images` has it."""
+    """Regular compliance (I, P, W, 3, W, 3) between the nodes of all windows, as of `Candidates.images` [m/N].
+
+    At positions (P,), of meshes (W,) and pairs (P, W).
+    """
     (P, W), nodes = pair.shape, setup.roll.shape[-1]
     smooth = np.zeros((setup.images, P, W, nodes, W, nodes))
     for number, members, gear, side in windows_of_bodies(setup.gears, mesh):

@@ -641,7 +641,7 @@ class PairLaws:
         return interval, x - interval * step
 
     def approaches(self, force: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Approach [m] under forces (t, W) [N] at some positions (t,), and its slope [m/N]."""
+        """Approach (t, W) [m] under forces (t, W) [N] at the numbers (t,) of some positions, and its slope [m/N]."""
         interval, x = self._between(force)
         a, b, c, d = np.moveaxis(self.cubics[interval, position[:, None], np.arange(force.shape[1])], -1, 0)
         yields, inside = ((a * x + b) * x + c) * x + d, (self.force[0] < force) & (force < self.force[-1])

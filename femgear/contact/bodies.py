@@ -186,7 +186,7 @@ class Bodies:
         return replace(self, gears=(*self.gears[:number], flanks, *self.gears[number + 1 :]))
 
     def of_kinds(self, kind) -> np.ndarray:
-        """Look up `helical` of kinds of mesh (...)."""
+        """Look up `helical` (...) of kinds of mesh (...)."""
         return np.asarray(self.helical)[kind]
 
     def normal_pressure(self, kind) -> np.ndarray:
@@ -204,7 +204,7 @@ class Bodies:
 
     @property
     def contact_moduli(self) -> np.ndarray:
-        """Contact modulus E* of every kind of mesh [Pa], ``1/E*`` the sum of ``(1 - nu) / (2 mu)``."""
+        """Contact modulus E* of every kind of mesh (kinds,) [Pa], ``1/E*`` the sum of ``(1 - nu) / (2 mu)``."""
         yielding = [
             sum((1.0 - body.corner.poisson_ratio) / (2.0 * body.corner.shear_modulus) for body in pair)
             for pair in self.mates
@@ -532,7 +532,7 @@ def _without_half_plane(gear, material, stations, depths, compliance, nodes, wid
 
 
 def regular_compliance(compliance: np.ndarray, local: np.ndarray) -> np.ndarray:
-    """Compliance (teeth, 2n, 2n) without the local part (2, n, n) on each flank, made reciprocal [m/N]."""
+    """Compliance (teeth, 2n, 2n) [m/N] without the local part (2, n, n) [m/N] on each flank, made reciprocal."""
     regular, n = compliance.copy(), local.shape[-1]
     for side in (LEFT, RIGHT):
         block = slice(side * n, (side + 1) * n)

@@ -330,7 +330,7 @@ class MeshCycle:
         return low, high
 
     def peak_to_peak(self, name: str = "deflection") -> np.ndarray:
-        """Compute the difference of the `extremes`: of a static transmission error by default."""
+        """Compute the difference of the `extremes`, of their shape: by default of transmission errors (M,) [m]."""
         low, high = self.extremes(name)
         return np.asarray(high - low)
 
@@ -346,7 +346,7 @@ class MeshCycle:
     def mean_with(
         self, values: np.ndarray, between: np.ndarray | None, position: np.ndarray | None = None
     ) -> np.ndarray:
-        """Compute the mean over the record of values of the meshes (M, P) with those at positions between (M, E).
+        """Compute the mean (M,) over the record of values of the meshes (M, P) with those at positions between (M, E).
 
         Parameters
         ----------
@@ -569,7 +569,7 @@ def cycle_without_load(
 ) -> MeshCycle:
     """Make the defined result without load: nothing touches, nothing is stiff, no pressure has a place.
 
-    ``position``, ``periods`` and ``contact`` are those of `MeshCycle`; the options say whether there are
+    ``position`` (P,), ``periods`` and ``contact`` are those of `MeshCycle`; the options say whether there are
     pressures, and in how many cells.
     """
     options, N, P = options or CycleOptions(), gears.n_planets, len(position)

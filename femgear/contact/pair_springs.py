@@ -101,7 +101,10 @@ class PairSprings:
         np.put_along_axis(self.slot, window, np.arange(U)[None], axis=1)
 
     def intervals(self, force: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Find the places in the tables of forces (U, N) at positions (N,), and how far beyond they lie."""
+        """Find the places (U, N) in the tables of forces (U, N) [N], and how far beyond they lie (U, N).
+
+        ``place`` (N,) are the numbers of the positions.
+        """
         count = len(self.forces) - 1
         # what is no number, of a problem that will not be solved, lies in the first interval
         within = np.fmin(np.fmax(force, self.forces[0]), self.forces[-1])
@@ -112,14 +115,14 @@ class PairSprings:
         return interval, x
 
     def approaches(self, force: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute approach and slope (U, N) under forces at positions (N,)."""
+        """Compute approach [m] and slope [m/N], (U, N) each, under forces (U, N) [N] at positions (N,)."""
         interval, x = self.intervals(force, place)
         a, b, c, d = (part.take(interval) for part in self.cubics)
         yields, inside = ((a * x + b) * x + c) * x + d, (self.forces[0] < force) & (force < self.forces[-1])
         return force * yields, yields + np.where(inside, (3.0 * a * x + 2.0 * b) * x + c, 0.0)
 
     def moments_under(self, force: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Compute the moments ``mu`` (U, 3, N) under forces at positions (N,)."""
+        """Compute the moments ``mu`` (U, 3, N) under forces (U, N) [N] at positions (N,)."""
         interval, x = self.intervals(force, place)
         moments = np.empty((len(force), 3, force.shape[1]))
         for node, (low, rise) in enumerate(zip(self.moments, self.rises, strict=True)):
@@ -127,7 +130,7 @@ class PairSprings:
         return moments
 
     def between(self, moments: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Compute what every slot yields under a force on another (U, U, N), moments (U, 3, N) given."""
+        """Compute what every slot yields under a force on another (U, U, N), by moments (U, 3, N) at positions (N,)."""
         U, N, P = self.count, moments.shape[-1], len(self.window)
         whole = N % P == 0 and np.array_equal(place, np.repeat(np.arange(P), N // P))
         compliance = np.empty((U, U, N))
@@ -332,7 +335,10 @@ class _Problems:
         moved[:, problems] = -solution[size:]
 
     def mesh_stiffness(self, force: np.ndarray, ended: np.ndarray) -> np.ndarray:
-        """Tangent stiffness (meshes, n) of every mesh at constant loads of the others; forces (U, n)."""
+        """Tangent stiffness (meshes, n) of every mesh at constant loads of the others.
+
+        Of the problems that have ended, numbers (n,), with forces (U, n).
+        """
         springs, place, N = self.springs, self.place[ended], self.between.shape[-1]
         slope = springs.approaches(force, place)[1]
         # of every mesh its pairs, (pairs, meshes, n)
@@ -356,7 +362,7 @@ class _Problems:
 
 
 def solved_side_by_side(system: np.ndarray) -> np.ndarray:
-    """Solve symmetric systems (k, k + 1, n) with their right sides, of which the upper halves are used.
+    """Solve symmetric systems (k, k + 1, n), right sides last, for (k, n); their upper halves are used.
 
     Without exchange of rows, as quasi-definite matrices allow (R. J. Vanderbei, Symmetric quasidefinite
     matrices, SIAM J. Optim. 5 (1995) 100). The systems are overwritten.

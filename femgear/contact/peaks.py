@@ -37,8 +37,8 @@ def mean_weights(position: np.ndarray, periods: int) -> np.ndarray:
 def tooth_pair_codes(path: np.ndarray, load: np.ndarray, position: np.ndarray, base_pitch: float) -> np.ndarray:
     """Find numbers (M, P) that are equal at positions where the same tooth pairs of a mesh carry.
 
-    From path coordinates (M, T, P) [m] and loads, (M, T, P), or (M, T, S, P) in slices: then the same slices
-    carry too. A tooth pair is known by its place on the path at zero.
+    From positions (P,) [mesh periods], path coordinates (M, T, P) [m] and loads, (M, T, P), or (M, T, S, P) in
+    slices: then the same slices carry too. A tooth pair is known by its place on the path at zero.
     """
     place = np.rint((path / base_pitch - position) * 1e6).astype(np.int64)
     if load.ndim == 4:
@@ -97,7 +97,10 @@ def open_places(
 
 
 def pitch_passages(path: np.ndarray, position: np.ndarray, base_pitch: float) -> np.ndarray:
-    """Count the tooth pairs of every mesh (M, P) that have passed the pitch point, from paths (M, T, P) [m]."""
+    """Count the tooth pairs of every mesh (M, P) that have passed the pitch point.
+
+    From path coordinates (M, T, P) [m] at positions (P,) [mesh periods].
+    """
     place = np.floor(np.rint((path[:, 0] / base_pitch - position) * 1e6) * 1e-6)
     return np.floor(path[:, 0] / base_pitch - place).astype(np.int64)
 
@@ -105,7 +108,8 @@ def pitch_passages(path: np.ndarray, position: np.ndarray, base_pitch: float) ->
 def peak_doubt(position: np.ndarray, values: np.ndarray, least: np.ndarray, periods: int) -> float:
     """Find the largest share of a peak to peak that curves may rise beyond their positions.
 
-    Parameters are those of `open_places`, of curves whose tooth pairs are not looked at.
+    Positions (P,), values (K, P) and least sizes (K,) are those of `open_places`, of curves whose tooth pairs are not
+    looked at.
     """
     none = np.zeros(values.shape, bool)
     beyond, _ = _beyond(position, values, none, none, least, periods)

@@ -127,7 +127,7 @@ class SliceSprings:
         self.tables = np.moveaxis(CubicSpline(stations, conductance, axis=-1).c, 1, -1).copy()
 
     def forces(self, x: np.ndarray, at: int, slots: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute forces [N] and their slopes at approaches (u, n, S) of some slots (u,) at a position."""
+        """Compute forces and their slopes, (u, n, S) each, at approaches x (u, n, S) of slots (u,) at a position."""
         low, high = self.ends
         within = np.minimum(np.maximum(x, low), high)
         y = np.log(within * (1.0 / low))

@@ -94,7 +94,7 @@ class SliceState:
 
 
 def largest_mean(load, *, axis: int) -> np.ndarray:
-    """Find the largest mean over a 25th of the width of the loads in equal slices.
+    """Find the largest mean over a 25th of the width of the loads in equal slices, which lie along ``axis`` (...).
 
     Towards an end at which the flanks stand askew the load grows without limit, as the logarithm of the
     slices' number: the mirror plane of the end makes a ridge of them. What a part of the width carries does
@@ -252,14 +252,14 @@ class _SliceNewton:
         return laws.moments_under(of_rows).swapaxes(0, 1).reshape(P, N, W, 3)
 
     def by_laws(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Separations by what each slice carries by itself, and their slope, (P, N, W), over the unit."""
+        """Separations by what each slice carries by itself, and their slope, (P, N, W) as the force, over the unit."""
         W = self.shape[2]
         value, slope = self.laws.approaches(force.reshape(-1, W), np.repeat(self.rows.ravel(), self.each))
         gap = self.bent + value.reshape(self.shape) / self.unit + (self.between @ force[..., None])[..., 0]
         return gap, slope.reshape(self.shape) / self.unit
 
     def gaps(self, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Separations that are left, and their slope over the own force, (P, N, W) each, over the unit."""
+        """Separations that are left under forces, and their slope over the own force, (P, N, W) each, over the unit."""
         P = self.shape[0]
         gap, slope = self.by_laws(force)
         gap += (self.across.reshape(P, self.size, -1) @ force.reshape(P, -1, 1)).reshape(self.shape)
@@ -386,7 +386,7 @@ class _SliceNewton:
         block[p, i, j] += between[p, other_window, window, w]
 
     def step(self, todo: np.ndarray, *, single: bool) -> np.ndarray:
-        """Take a step where one is to do; how much forces change at most [N], endless while sides change."""
+        """Take a step at positions ``todo`` (P,); the largest changes of forces (P,) [N], endless while sides change."""
         (P, N, W), n, m = self.shape, self.size, len(self.load)
         gap, slope = self.gaps(self.force)
         wrong = np.where(self.closed, self.force < 0.0, gap < 0.0).reshape(P, n)
@@ -486,7 +486,7 @@ class _Carrying:
 
     @classmethod
     def of(cls, carries: np.ndarray, windows: int) -> _Carrying:
-        """Find them, (P, n), of so many windows a slice."""
+        """Find them among all slices of windows (P, n), of so many windows a slice."""
         on, at = _first(carries)
         (P, n), c = carries.shape, at.shape[1]
         p, i = np.arange(P)[:, None], np.arange(c)

@@ -70,10 +70,10 @@ def has_corners(element: Element) -> TypeGuard[CorneredElement]:
 
 
 def positive_part(x, smoothing: float | np.ndarray = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Compute ``max(x, 0)`` and its slope, arrays of the shape and unit of x.
+    """Compute ``max(x, 0)``, in the unit of x, and its slope [1]: arrays of the shape of x.
 
-    With a smoothing length s ``(x + sqrt(x^2 + s^2)) / 2``. The smooth form differs by at most s / 2, at the
-    corner (NREL/CP-5000-55355 smooths its contacts so).
+    With a smoothing length s, one value or of the shape of x, ``(x + sqrt(x^2 + s^2)) / 2``. The smooth form differs
+    by at most s / 2, at the corner (NREL/CP-5000-55355 smooths its contacts so).
     """
     if not np.any(smoothing):
         closed = x > 0.0

@@ -226,7 +226,10 @@ class StepSeries:
 
 
 def phase_of(theta, orders) -> np.ndarray:
-    """Compute the phase ``orders . theta`` (...) [rad]; a base that theta lacks must have order zero."""
+    """Compute the phase ``orders . theta`` (...) [rad] of phases theta (..., n_bases) [rad] and orders (n,).
+
+    A base that theta lacks must have order zero.
+    """
     theta = np.asarray(theta, float)
     given = theta.shape[-1]
     if any(orders[given:]):

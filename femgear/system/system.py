@@ -111,7 +111,7 @@ class MeshExcitation:
 
     @cached_property
     def every_harmonic(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """All harmonics of stiffness, deflection and force that the record holds, see `mesh_harmonics`."""
+        """All harmonics (n_meshes, L) of stiffness, deflection and force that the record holds, see `mesh_harmonics`."""
         most = (self.stiffness.shape[1] - 1) // 2
         stiffness, deflection, force = (
             harmonics_of(array, most) for array in (self.stiffness, self.deflection, self.force)
@@ -313,7 +313,7 @@ def mesh_harmonics(excitation: MeshExcitation, count: int) -> tuple[np.ndarray, 
 
 
 def source_harmonics(excitation: MeshExcitation, count: int) -> np.ndarray | None:
-    """Compute ``count`` mesh harmonics of the loads along the sources, as `mesh_harmonics`; None without any."""
+    """Compute ``count`` mesh harmonics (c, count periods + 1) of the loads along the sources; None without any."""
     return None if excitation.source is None else harmonics_of(excitation.source, count * excitation.periods)
 
 

@@ -287,7 +287,8 @@ def test_the_verdict_says_what_friction_adds():
     assert friction_rows(run, Marks([])) == [("added", "+24.2 dB at 250 rpm, +2.9 dB at 3100 rpm")]
     assert friction_rows(SimpleNamespace(stages=("dynamics",), dynamics=xr.Dataset()), Marks([])) == []
     assert friction_rows(SimpleNamespace(stages=()), Marks([])) == []
-    ((_, marked),) = friction_rows(run, Marks([Finding("W-FRICTION", "losses.friction", "coefficient of the first speed")]))
+    marks = Marks([Finding("W-FRICTION", "losses.friction", "coefficient of the first speed")])
+    ((_, marked),) = friction_rows(run, marks)
     assert marked.count("†") == 2, "every figure carries the mark of the finding"
 
 

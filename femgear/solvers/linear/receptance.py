@@ -311,7 +311,10 @@ class DirectReduction:
         return (columns.T @ motions).reshape(*omega.shape, *self.static.shape)
 
     def at(self, omega) -> tuple[np.ndarray, np.ndarray]:
-        """Compute `value` and its derivative ``-W^T Z^-1 (i C - 2 omega M) Z^-1 [W, loads]`` by omega."""
+        """Compute `value` and its derivative ``-W^T Z^-1 (i C - 2 omega M) Z^-1 [W, loads]`` by omega.
+
+        Both are (..., n_columns, n_columns + n_loads) [m/N, m s/N] at angular frequencies (...) [rad/s].
+        """
         omega = np.asarray(omega, float)
         motions, resolved = self._motions(omega.ravel())
         if not resolved:

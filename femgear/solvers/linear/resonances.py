@@ -145,8 +145,16 @@ def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray,
     """Add speeds at resonances (c,) whose peaks are narrower than the steps between speeds (s,), ascending.
 
     A peak of damping ratio z at speed w falls to half its power at ``w (1 - z)`` and ``w (1 + z)``. The
-    resonances of the highest expected levels, from `ModalForces.heard`, get these three speeds; undamped
-    ones, which have no largest level, none.
+    resonances of the highest expected levels get these three speeds; undamped ones, which have no largest level, none.
+
+    Parameters
+    ----------
+    speeds : (s,) array
+        Ascending, in the unit of the resonances.
+    resonance, damping : (c,) arrays
+        Speed and damping ratio of every resonance.
+    heard : (c,) array
+        Its level times its damping ratio, as of `ModalForces.heard`.
     """
     step = np.diff(speeds).max(initial=0.0) if len(speeds) > 1 else np.inf
     narrow = np.flatnonzero((damping > 0.0) & (damping * resonance < step))

@@ -196,8 +196,9 @@ class HarmonicBalance:
     def spectral_radius(self, y, frequency, products: np.ndarray | None = None) -> float:
         """Compute the spectral radius of the fixed point ``X <- T_load S - T (F - reference X)`` at y (n_y,).
 
-        Largest modulus of the eigenvalues of ``T d(F - reference X)/dX``, the Jacobian of the residual less
-        one; all are computed up to 600 unknowns. Beyond, Arnoldi's method finds it to 1 %.
+        ``products`` are those of `forces` at y, where they are known. Largest modulus of the eigenvalues of ``T d(F -
+        reference X)/dX``, the Jacobian of the residual less one; all are computed up to 600 unknowns. Beyond, Arnoldi's
+        method finds it to 1 %.
         """
         receptance = self.receptance_at(frequency)
         if self.size > MANY:
@@ -218,7 +219,7 @@ class HarmonicBalance:
         return self.unknowns(-self._respond(value, self.forces(mean)[0]))
 
     def crossed_start(self, frequency) -> np.ndarray | None:
-        """Compute `linear_start` with meshes that the mean load pulls apart on their back flanks.
+        """Compute `linear_start` (n_y,) [m] with meshes that the mean load pulls apart on their back flanks.
 
         None where there is no such mesh: between both flanks nothing tells Newton's method the way.
         """

@@ -29,7 +29,7 @@ class _GridSeries:
     orders: tuple[int, ...]
 
     def at(self, theta) -> np.ndarray:
-        """The stored values; theta must be the grid."""
+        """The stored values (N, n); theta (N, n_bases) must be the grid."""
         return self.values
 
 
@@ -92,8 +92,8 @@ class PhaseGrid:
     def products(self, coefficients: np.ndarray) -> np.ndarray:
         """Make matrices (n, L, 2 L - 1) from ``Re X_0, Re X_1, Im X_1, ...`` to the lines of a product.
 
-        Toeplitz and Hankel parts as in `fourier.Product`; they are the exact derivatives of the
-        sampled transform, aliasing included.
+        Coefficients (n, M) are those of `transform`. Toeplitz and Hankel parts as in `fourier.Product`; they are the
+        exact derivatives of the sampled transform, aliasing included.
         """
         toeplitz, hankel = _pick(coefficients, self.differences), _pick(coefficients, self.sums)
         out = np.empty((*toeplitz.shape[:2], 2 * toeplitz.shape[2] - 1), complex)

@@ -210,7 +210,10 @@ def compliance(modes: Modes, omega: np.ndarray, chosen: Any = slice(None)) -> np
 
 
 def transfer(receptances: np.ndarray, force: np.ndarray) -> np.ndarray:
-    """Compute ``T_h f_h`` (n, n_speeds, H + 1) [m] of receptances (n, n, n_speeds, H + 1) and forces [N]."""
+    """Compute ``T_h f_h`` (n, n_speeds, H + 1) [m].
+
+    Of receptances (n, n, n_speeds, H + 1) [m/N] and forces (n, n_speeds, H + 1) [N].
+    """
     n, speeds, size = force.shape
     # in memory as `_rows` has it
     out = np.empty((speeds, n, size), np.result_type(receptances, force)).transpose(1, 0, 2)

@@ -549,7 +549,7 @@ class _Record:
         self.steps += len(force)
 
     def columns(self, step: float) -> dict[str, np.ndarray]:
-        """Arrays of a `MarchedRun`."""
+        """Fields of a `MarchedRun` by their names, with the shapes that stand there."""
         *tables, angle, speed = np.split(self.table, self.cuts, axis=1)
         names = ("motion", "velocity", "approach", "force")
         return {

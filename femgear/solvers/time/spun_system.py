@@ -164,7 +164,11 @@ class SpunSystem:
         return (1.0 - part) * table[low, column] + part * table[low + 1, column]
 
     def mesh_forces(self, approach: np.ndarray, stiffness: np.ndarray, gap: np.ndarray, *, parts: bool) -> np.ndarray:
-        """Compute forces (..., M) [N], drive less back flank, from values (..., c) of the contacts."""
+        """Compute forces (..., M) [N] of the meshes, drive less back flank.
+
+        From approach [m], stiffness [N/m] and gap [m] of the contacts, (..., c) each. Without ``parts`` flanks may
+        pull, and there are no back flanks.
+        """
         force = stiffness * (approach - gap)
         if not parts:
             return force[..., self.drives]
@@ -175,7 +179,7 @@ class SpunSystem:
         return total
 
     def touching(self, approach: np.ndarray, gap: np.ndarray) -> np.ndarray:
-        """Tell of meshes (..., M) whether one of their flanks touches."""
+        """Tell of meshes (..., M) whether one of their flanks touches; of contacts approach and gap (..., c) [m]."""
         overlap = approach - gap >= 0.0
         touched = overlap[..., self.drives].copy()
         behind = np.flatnonzero(self.side == BACK)

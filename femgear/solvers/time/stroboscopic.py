@@ -202,7 +202,7 @@ class SweepResponse:
     velocity: np.ndarray
 
     def jumps(self, share: float = 0.2) -> np.ndarray:
-        """Find the indices i from which to i + 1 some amplitude changes by over ``share`` of the largest."""
+        """Find the indices i, (j,), from which to i + 1 some amplitude changes by over ``share`` of the largest."""
         change = np.abs(np.diff(self.amplitude, axis=0)) / self.amplitude.max(axis=0, initial=1e-300)
         return np.flatnonzero(np.any(change > share, axis=1))
 
