@@ -386,7 +386,7 @@ class _SliceNewton:
         block[p, i, j] += between[p, other_window, window, w]
 
     def step(self, todo: np.ndarray, *, single: bool) -> np.ndarray:
-        """Take a step at positions ``todo`` (P,); the largest changes of forces (P,) [N], endless while sides change."""
+        """Take a step at positions ``todo`` (P,); the largest changes of forces (P,) [N], inf while sides change."""
         (P, N, W), n, m = self.shape, self.size, len(self.load)
         gap, slope = self.gaps(self.force)
         wrong = np.where(self.closed, self.force < 0.0, gap < 0.0).reshape(P, n)

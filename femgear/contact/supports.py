@@ -117,7 +117,7 @@ class BearingSprings:
     arms: np.ndarray
 
     def joined(self, H, gap, G) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Compliance (k, k), separations (k,) and arms (k, m) of pressure cells and all springs, see `solve_contact`."""
+        """Compliance (k, k), gaps (k,) and arms (k, m) of pressure cells and all springs, see `solve_contact`."""
         cells, count = len(gap), len(self.arms)
         whole = np.zeros((cells + count, cells + count))
         whole[:cells, :cells] = H

@@ -164,7 +164,7 @@ def node_dofs(nodes, components: int = 2) -> np.ndarray:
 
 
 def boundary_nodes(grid: Grid, name: str) -> np.ndarray:
-    """Sorted unique node numbers of a named boundary."""
+    """Sorted unique node numbers (k,) of a named boundary."""
     return np.unique(grid.boundaries[name])
 
 
@@ -282,7 +282,8 @@ def condense_sums(
 ) -> list[FreeSector]:
     """Condense a sector, as `condense_sector` does, for stiffnesses that are sums of the same parts.
 
-    ``parts`` (k) are sparse matrices, ``factors`` (m, k) those of each of the m sums.
+    ``parts`` are k sparse matrices (2n, 2n), ``factors`` (m, k) those of each of the m sums; loads (2n, ml) and
+    observations (2n, mo) are common to all.
     """
     cut = np.concatenate([boundary_nodes(grid, f"cut_{side}") for side in ("right", "left")])
     components = parts[0].shape[0] // grid.n_nodes

@@ -69,12 +69,12 @@ class CyclicModes:
 
     @property
     def norm(self) -> np.ndarray:
-        """Factor of every mode that makes its coordinates have unit modal mass."""
+        """Factor (m,) of every mode that makes its coordinates have unit modal mass."""
         return np.sqrt(np.where(self.paired, 2.0, 1.0) / self.count)
 
     @property
     def paired(self) -> np.ndarray:
-        """Whether a mode has a cosine and a sine coordinate."""
+        """Whether modes (m,) have a cosine and a sine coordinate."""
         return (self.nodal_diameter != 0) & (2 * self.nodal_diameter != self.count)
 
 

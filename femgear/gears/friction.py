@@ -32,11 +32,11 @@ class PathSpeeds:
 
     Parameters
     ----------
-    path : array
+    path : (...) array
         Path coordinate from the pitch point in the direction of motion [m].
-    rolling_1, rolling_2 : array
+    rolling_1, rolling_2 : (...) arrays
         Speeds of both surfaces along the common tangent, against the point of contact [m/s].
-    radius : array
+    radius : (...) array
         Radius of relative curvature in the normal section [m].
     """
 
@@ -47,17 +47,17 @@ class PathSpeeds:
 
     @property
     def sliding(self) -> np.ndarray:
-        """Speed with which flank 1 slides on flank 2 [m/s], negative before the pitch point."""
+        """Speed (...) with which flank 1 slides on flank 2 [m/s], negative before the pitch point."""
         return self.rolling_1 - self.rolling_2
 
     @property
     def sum_speed(self) -> np.ndarray:
-        """Sum of the speeds of both surfaces [m/s]."""
+        """Sum (...) of the speeds of both surfaces [m/s]."""
         return self.rolling_1 + self.rolling_2
 
     @property
     def specific_sliding(self) -> tuple[np.ndarray, np.ndarray]:
-        """Sliding over the speed of the own surface of flank 1 and flank 2 [1]; infinite at a base circle."""
+        """Sliding over the speed of the own surface (...) of flank 1 and flank 2 [1]; infinite at a base circle."""
         with np.errstate(divide="ignore", invalid="ignore"):
             return 1.0 - self.rolling_2 / self.rolling_1, 1.0 - self.rolling_1 / self.rolling_2
 

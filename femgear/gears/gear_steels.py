@@ -86,7 +86,7 @@ class LifeLine:
         return self.factors[-1]
 
     def cycles_at(self, ratio: np.ndarray) -> np.ndarray:
-        """Compute the load cycles that stresses stand, given over those of long life.
+        """Compute the load cycles (...) that stresses stand, given as ratios (...) to those of long life.
 
         None above the first factor, which is the static strength; any number of them, infinite, below the last.
         """

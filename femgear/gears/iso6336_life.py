@@ -119,7 +119,8 @@ def miner_damage(ratio: Sequence[float] | np.ndarray, cycles: Sequence[float] | 
 def spectrum_safety(ratio: np.ndarray, cycles: np.ndarray, line: LifeLine) -> float:
     """Compute the factor on all stresses with which the damage is 1 (ISO 6336-6, iterated); infinite without load.
 
-    Where the damage leaps over 1, at the static strength and at that of 1e10 cycles, it is the factor of the leap.
+    Of stresses (n,), over those of long life, and their load cycles (n,). Where the damage leaps over 1, at the static
+    strength and at that of 1e10 cycles, it is the factor of the leap.
     """
     largest = float(np.max(np.where(np.asarray(cycles) > 0.0, ratio, 0.0), initial=0.0))
     if largest == 0.0:

@@ -42,7 +42,7 @@ class OilState:
 
 
 def kinematic_viscosity(at_40: float, at_100: float, temperature: Any) -> np.ndarray:
-    """Compute kinematic viscosities [m^2/s] at temperatures [K] from those at 40 and 100 degrees Celsius.
+    """Compute kinematic viscosities (...) [m^2/s] at temperatures (...) [K] from those at 40 and 100 degrees Celsius.
 
     ``lg lg (nu + 0.7) = A - B lg T`` [mm^2/s, K] (ASTM D341).
     """
@@ -73,7 +73,7 @@ def oil_state(at_40: float, at_100: float, density_15: float, kind: str, tempera
 def film_thickness(
     radius: Any, modulus: float, sum_speed: Any, pressure: Any, bodies: OilState, contact: OilState
 ) -> np.ndarray:
-    """Compute the film thickness h_Y [m].
+    """Compute the film thickness h_Y [m], of the shape that all arrays broadcast to.
 
     ``h = 1600 rho G_M^0.6 U^0.7 W^-0.13 S_GF^0.22`` in um and mm, with ``G_M = alpha E_r``, ``U = eta v_sum / (2 E_r
     rho)``, ``W = 2 pi p^2 / E_r^2`` and ``S_GF = alpha_B eta_B / (alpha_M eta_M)``.

@@ -176,7 +176,7 @@ class FlankForm:
 
 
 def lead_deviation(form: FlankForm, width: float, place, height: Any = 0.0) -> np.ndarray:
-    """Compute the material removed from a flank [m] at places from the middle of its width [m], any shape.
+    """Compute the material (...) removed from a flank [m] at places (...) from the middle of its width [m].
 
     And at heights on the profile that broadcast with them, from -0.5 at the form circle to 0.5 at the tip.
     """
@@ -198,7 +198,7 @@ def lead_deviation(form: FlankForm, width: float, place, height: Any = 0.0) -> n
 
 
 def profile_height(gear: Gear, roll) -> np.ndarray:
-    """Find heights on the profile from -0.5 at the form circle to 0.5 at the tip, of roll lengths [m]."""
+    """Find heights (...) on the profile from -0.5 at the form circle to 0.5 at the tip, of roll lengths (...) [m]."""
     return np.clip((np.asarray(roll) - gear.form_roll) / (gear.tip_roll - gear.form_roll), 0.0, 1.0) - 0.5
 
 

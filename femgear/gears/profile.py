@@ -198,7 +198,7 @@ class RackTip:
         return self.centre_offset
 
     def fillet_point(self, theta) -> tuple[np.ndarray, np.ndarray]:
-        """Compute radius [m] and angle [rad] of fillet points at theta [rad], as `CutterTip.fillet_point`."""
+        """Compute radius [m] and angle [rad] (...) of fillet points at theta (...) [rad]: `CutterTip.fillet_point`."""
         theta = np.asarray(theta, dtype=float)
         rounded = normal_of_ellipse(theta, 1.0 / self.stretch)
         depth = self.centre_depth + self.rounding * np.cos(rounded)

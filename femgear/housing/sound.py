@@ -317,7 +317,7 @@ def levels_of(acceleration, frequency, form: str) -> np.ndarray:
 
 
 def a_weighting(frequency) -> np.ndarray:
-    """Compute the factor of A-weighting by which amplitudes at frequencies [Hz] count, 1 at 1 kHz.
+    """Compute the factor (...) of A-weighting by which amplitudes at frequencies (...) [Hz] count, 1 at 1 kHz.
 
     Source: IEC 61672-1:2013, annex E, whose four frequencies are rounded to those of its design goal.
     """
@@ -345,7 +345,7 @@ def _decibels(power: np.ndarray, reference: float) -> np.ndarray:
 
 
 def stored_sound(housing: Any) -> tuple[SensorLines, np.ndarray]:
-    """Read the exact lines of the sensor from housing.nc, and compute those of the microphone [Pa].
+    """Read the exact lines of the sensor from housing.nc, and compute those of the microphone, (..., lines) [Pa].
 
     CaseError: a casing of a file that does not tell the areas of its surface (E-CHOICE).
     """
@@ -360,7 +360,7 @@ def stored_sound(housing: Any) -> tuple[SensorLines, np.ndarray]:
 
 
 def microphone_lines(lines: SensorLines, attributes: Mapping[str, Any]) -> np.ndarray:
-    """Compute the lines of the sound pressure [Pa] by the attributes of housing.nc, as `sound_pressure`."""
+    """Compute the lines (..., lines) of the pressure [Pa] by the attributes of housing.nc, as `sound_pressure`."""
     air = attributes["air_density"], attributes["sound_speed"]
     cylinder = Cylinder(attributes["outer_radius"], attributes["face_width"], *air)
     microphone = Microphone(attributes["microphone_distance"], attributes["microphone_angle"])

@@ -134,7 +134,7 @@ def least_over_life(data: Any, kind: str, of_load: Least | None) -> Least | None
 
 
 def stresses_text(root: np.ndarray, pressure: np.ndarray) -> str:
-    """Write the largest of some root stresses and contact pressures [Pa]."""
+    """Write the largest of root stresses (...) and contact pressures (...) [Pa]."""
     return f"root {1e-6 * float(np.nanmax(root)):.0f} MPa, pressure {1e-6 * float(np.nanmax(pressure)):.0f} MPa"
 
 

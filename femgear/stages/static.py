@@ -624,7 +624,7 @@ def _influences(case: Case, static: StaticResult, progress: Progress = silent) -
 
 
 def slices_ahead(overlap: float, slices: int) -> np.ndarray:
-    """Find by how much slices run ahead of mid-width at an overlap ratio, signed as `_overlap` [periods]."""
+    """Find by how much slices (S,) run ahead of mid-width at an overlap ratio, signed as `_overlap` [periods]."""
     return overlap * ((np.arange(slices) + 0.5) / slices - 0.5)
 
 

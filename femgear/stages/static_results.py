@@ -930,13 +930,13 @@ def _peak_doubt(data: xr.Dataset) -> float:
 
 
 def peak_to_peak(data: xr.Dataset, name: str) -> np.ndarray:
-    """Find the peak to peak of a variable of static.nc, positions between included where there are any."""
+    """Find the peak to peak (M,) of a variable (M, P) of static.nc, positions between included where there are any."""
     stored = data.get(f"{name}_peak_to_peak")
     return np.ptp(data[name].values, axis=-1) if stored is None else stored.values
 
 
 def mean_over_period(data: xr.Dataset, name: str) -> np.ndarray:
-    """Find the mean of a variable of static.nc, positions between included where there are any."""
+    """Find the mean (M,) of a variable (M, P) of static.nc, positions between included where there are any."""
     stored = data.get(f"{name}_mean")
     return data[name].values.mean(axis=-1) if stored is None else stored.values
 

@@ -92,14 +92,14 @@ def reason_values(gears: GearSet, nominal: NominalStresses) -> dict[str, np.ndar
 
 
 def largest_pressure(data: xr.Dataset) -> np.ndarray:
-    """Find the largest contact pressures of the meshes in static.nc or stress.nc [Pa]."""
+    """Find the largest contact pressures (M,) of the meshes in static.nc or stress.nc [Pa]."""
     if (stored := data.get("largest_pressure")) is not None:
         return stored.values
     return data["max_pressure" if "max_pressure" in data else "contact_pressure"].values.max(axis=-1)
 
 
 def over_hertz(data: xr.Dataset) -> np.ndarray:
-    """Compute the largest pressure of every mesh over that of Hertz for load and curvature; 0 without sigma_H0."""
+    """Compute the largest pressures (M,) over those of Hertz for load and curvature; 0 without sigma_H0."""
     load, curvature = data["contact_worst_load"].values, data["contact_worst_curvature"].values
     hertz = data["iso_contact_stress"].values / _nominal_over_hertz(data)
     hertz = hertz * np.sqrt(load / data.attrs["nominal_load"] * curvature)

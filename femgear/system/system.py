@@ -111,7 +111,7 @@ class MeshExcitation:
 
     @cached_property
     def every_harmonic(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """All harmonics (n_meshes, L) of stiffness, deflection and force that the record holds, see `mesh_harmonics`."""
+        """All harmonics (n_meshes, L) of stiffness, deflection and force in the record, see `mesh_harmonics`."""
         most = (self.stiffness.shape[1] - 1) // 2
         stiffness, deflection, force = (
             harmonics_of(array, most) for array in (self.stiffness, self.deflection, self.force)

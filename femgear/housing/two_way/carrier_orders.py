@@ -164,12 +164,12 @@ class CarrierOrders:
         return np.where(inside, apart // N, len(in_structure)), self.place(in_structure[:, None] + waves)
 
     def place(self, band: np.ndarray) -> np.ndarray:
-        """Places of side bands r of any shape, their number R where there is none."""
+        """Places (...) of side bands r (...), their number R where there is none."""
         there = (np.abs(band) <= self.bands[-1]) & (band % self.spacing == 0)
         return np.where(there, band // self.spacing + self.middle, len(self.bands))
 
     def blocks(self, residue: int) -> np.ndarray:
-        """Numbers of the blocks of a residue."""
+        """Numbers (b,) of the blocks of a residue."""
         return np.flatnonzero(self.residue == residue)
 
     def numbers(self, turns: int) -> np.ndarray:

@@ -54,7 +54,7 @@ class DampingPasses:
 
     @property
     def moved(self) -> tuple[np.ndarray, np.ndarray]:
-        """Deflections d_0 of the meshes by load and damping, u_0 of the ring by damping [m]."""
+        """Deflections d_0 (J, B, R) of the meshes by load and damping, u_0 (G, B, R) of the ring by damping [m]."""
         return self._load + self.forces.still, self.forces.way
 
     def drag(self) -> np.ndarray:

@@ -78,12 +78,12 @@ class HarmonicBlocks:
         return still + _times(self.compliance[:, G:], mean[G:] * way), way
 
     def part(self, numbers: np.ndarray) -> HarmonicBlocks:
-        """Some of the blocks by their numbers, for deflections and forces."""
+        """Some of the blocks by their numbers (b,), for deflections and forces."""
         compliance, spring = self.compliance[:, :, numbers], self.spring[:, :, numbers]
         return replace(self, compliance=compliance, spring=spring, yielding=self.yielding[numbers])
 
     def forces(self, extra: np.ndarray, deflection: np.ndarray, way: np.ndarray) -> np.ndarray:
-        """Forces f (J, B, R) of the meshes by the forces e beyond k0, deflections and u."""
+        """Forces f (J, B, R) of the meshes by forces e beyond k0 and deflections of that shape, and u (G, B, R)."""
         force = extra + self.gears.mean[:, None, None] * deflection
         force[len(way) :] -= self.gears.mean[len(way) :, None, None] * way
         return force

@@ -116,7 +116,7 @@ class RunningStage(ReadOnlyArrays):
 
     @cached_property
     def groups(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Leaders, group and turns of the planets, see `planet_groups`."""
+        """Leaders (G,), group (N,) and turns (N,) of the planets, see `planet_groups`."""
         return planet_groups(self.paths.planet_angles, self.paths.symmetry)
 
     @property

@@ -138,7 +138,7 @@ class DampingForces:
 
     @property
     def parts(self) -> tuple[np.ndarray, ...]:
-        """The four arrays, in their order."""
+        """The four arrays, in the order and shapes of the class."""
         return self.on_gears, self.on_structure, self.still, self.way
 
     def single(self) -> DampingForces:
@@ -402,12 +402,12 @@ class _Waves:
 
     @cached_property
     def number(self) -> np.ndarray:
-        """Orders s n of the waves."""
+        """Orders s n (w,) of the waves."""
         return self.orders.sense * self.structure.wave_order[self.near]
 
     @cached_property
     def path_number(self) -> np.ndarray:
-        """Orders s n of the path."""
+        """Orders s n (W,) of the path."""
         return self.orders.sense * self.orders.diameters
 
 

@@ -151,7 +151,7 @@ class _Turn:
             self.drag[1:] *= 2.0
 
     def monodromy(self, steps: int) -> np.ndarray:
-        """Transition matrix until all repeats, of displacements and velocities over frequencies."""
+        """Transition matrix (2 m, 2 m) until all repeats, of displacements and velocities over frequencies."""
         m, dt = len(self.natural), self.angle / (self.speed * steps)
         move, half, back = (self._free(part * dt) for part in (1.0, 0.5, -0.5))
         state = _moved(np.eye(2 * m), *half)
