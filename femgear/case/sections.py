@@ -7,6 +7,7 @@ alone is in `femgear.case.checks`.
 from __future__ import annotations
 
 import math
+from dataclasses import MISSING, fields
 from functools import partial
 from itertools import pairwise
 from typing import Annotated, Any, Literal
@@ -43,9 +44,8 @@ from femgear.case.text import described
 from femgear.case.tooth_measures import ToothMeasures
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.gear_steels import Grade, Treatment, stress_limit
+from femgear.gears.modifications import LeadModification, Modification
 
-LARGEST_DEVIATION = 0.2
-"""Largest plausible amount of any modification or error, in modules."""
 MOST_POINTS = 2000
 """Points of a measured profile; machines write some hundreds."""
 ROUNDING = 0.05e-6
@@ -93,7 +93,7 @@ Turning = Annotated[float, Quantity(TORSION, 0.0, 1e13)]
 """Stiffness against tilt or wind-up; 0 leaves it free."""
 End = Literal["front", "back"]
 """Of the face width: the front is at z < 0."""
-OVER_WIDTH = ("lead slope", "lead crowning", "end relief", "flank twist", "measured lead")
+OVER_WIDTH = tuple(kind for kind, law in Modification.kinds.items() if issubclass(law, LeadModification))
 WIDTH_ENTRIES = {
     "sun": ("tilt_stiffness", "misalignment", "torque_end"),
     "carrier": ("tilt_stiffness", "misalignment", "wind_up_stiffness"),
@@ -139,25 +139,26 @@ class ModificationSection(Section):
 
     @model_validator(mode="after")
     def _belongs_together(self):
-        measured = self.kind.startswith("measured")
-        relief, over_width = self.kind in ("tip relief", "root relief"), self.kind in OVER_WIDTH
+        law: Any = Modification.kinds[self.kind]
+        # the fields of the law, and whether each must be given
+        entries = {field.name: field.default is MISSING for field in fields(law)}
         starts, ends = ([f"{end}_{place}" for place in _PLACES] for end in ("start", "end"))
-        unused = self.given("amount", *starts, *ends) if measured else self.given(*_MEASURED)
-        unused += self.given(*starts, *ends) if over_width else []
-        unused += [] if relief else self.given("shape", "power")
-        unused += [] if self.kind == "end relief" else self.given("length")
+        unused = self.given("amount", *starts, *ends) if law.measured else self.given(*_MEASURED)
+        unused += [] if law.measured or "start" in entries else self.given(*starts, *ends)
+        unused += [] if "power" in entries else self.given("shape", "power")
+        unused += [] if "length" in entries else self.given("length")
         if unused:
-            message = f"a {self.kind} has no {' and no '.join(unused)}"
+            message = f"{self.kind} has no {' and no '.join(unused)}"
             raise CaseError(message, code="E-MODIFICATION", remedy=f"leave out {', '.join(unused)}")
-        if measured:
+        if law.measured:
             _check_points(self)
         elif self.amount is None:
-            raise CaseError(f"a {self.kind} needs its amount", code="E-KEY-MISSING", remedy='amount = "10 um"')
-        elif self.kind == "end relief" and self.length is None:
-            raise CaseError("an end relief needs its length", code="E-KEY-MISSING", remedy='length = "3 mm"')
-        elif relief and not self.given(*starts):
+            raise CaseError(f"{self.kind}: the amount is missing", code="E-KEY-MISSING", remedy='amount = "10 um"')
+        elif "length" in entries and self.length is None:
+            raise CaseError(f"{self.kind}: the length is missing", code="E-KEY-MISSING", remedy='length = "3 mm"')
+        elif entries.get("start") and not self.given(*starts):
             remedy = "give start_diameter, start_roll_angle or start_roll_length"
-            raise CaseError(f"a {self.kind} needs its start", code="E-KEY-MISSING", remedy=remedy)
+            raise CaseError(f"{self.kind}: the start is missing", code="E-KEY-MISSING", remedy=remedy)
         for names in (starts, ends, ("shape", "power")):
             if len(given := self.given(*names)) > 1:
                 raise CaseError(f"{' and '.join(given)} say the same", code="E-DUPLICATE", remedy="keep one")

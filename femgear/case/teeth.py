@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
@@ -19,22 +20,7 @@ from femgear.case.tooth_measures import gear_allowances, measured_gear
 from femgear.errors import GeometryError
 from femgear.gears.deviations import Runout, SetDeviations, tooth_displacements
 from femgear.gears.gear import Gear
-from femgear.gears.modifications import (
-    EndRelief,
-    FlankForm,
-    FlankTwist,
-    LeadCrowning,
-    LeadSlope,
-    MeasuredLead,
-    MeasuredProfile,
-    Modification,
-    ProfileCrowning,
-    ProfileSlope,
-    RootRelief,
-    TipRelief,
-    check_form,
-    roll_at,
-)
+from femgear.gears.modifications import FlankForm, MeasuredProfile, Modification, check_form, roll_at
 from femgear.gears.pair import GearSet
 from femgear.gears.profile import BasicRack, PinionCutter, overlap_ratio, transverse_rack, transverse_tool
 
@@ -159,42 +145,36 @@ def flank_form(case: Any, gear: Gear, side: str = "both") -> FlankForm:
 
 def _modification(section: ModificationSection, gear: Gear) -> Modification:
     """Form over the roll length [m]; measured deviations are material, which forms count as taken off."""
-    if section.kind == "measured profile":
-        angles, diameters = section.roll_angles or (), section.diameters or ()
-        rolls = [roll_at(gear, roll_angle=a) or 0.0 for a in angles]
-        rolls += [roll_at(gear, diameter=d) or 0.0 for d in diameters]
-        points = sorted(zip(rolls, section.deviations or (), strict=True))
-        return MeasuredProfile(tuple(r for r, _ in points), tuple(-e for _, e in points))
-    if section.kind == "measured lead":
-        points = sorted(zip(section.places or (), section.deviations or (), strict=True))
-        return MeasuredLead(tuple(z for z, _ in points), tuple(-e for _, e in points))
-    start, end = (
-        roll_at(
-            gear,
-            diameter=getattr(section, f"{name}_diameter"),
-            roll_angle=getattr(section, f"{name}_roll_angle"),
-            length=getattr(section, f"{name}_roll_length"),
-        )
-        for name in ("start", "end")
-    )
-    amount = section.amount or 0.0
-    match section.kind:
-        case "tip relief" | "root relief":
-            # a relief without its start is refused when the case is read
-            relief = TipRelief if section.kind == "tip relief" else RootRelief
-            return relief(amount, start or 0.0, end, section.exponent)
-        case "profile slope":
-            return ProfileSlope(amount, start, end)
-        case "lead slope":
-            return LeadSlope(amount)
-        case "lead crowning":
-            return LeadCrowning(amount)
-        case "flank twist":
-            return FlankTwist(amount)
-        case "end relief":
-            return EndRelief(amount, section.length or 0.0)
+    law: Any = Modification.kinds[section.kind]
+    return law(**{field.name: _entry_of_law(section, gear, field.name) for field in fields(law)})
+
+
+def _entry_of_law(section: ModificationSection, gear: Gear, name: str) -> Any:
+    """What a field of a modification is by the entries of its section, by its name."""
+    match name:
+        case "start" | "end":
+            return roll_at(
+                gear,
+                diameter=getattr(section, f"{name}_diameter"),
+                roll_angle=getattr(section, f"{name}_roll_angle"),
+                length=getattr(section, f"{name}_roll_length"),
+            )
+        case "power":
+            return section.exponent
+        case "roll" | "place":
+            return tuple(place for place, _ in _points(section, gear))
+        case "removed":
+            return tuple(-deviation for _, deviation in _points(section, gear))
         case _:
-            return ProfileCrowning(amount, start, end)
+            return getattr(section, name)
+
+
+def _points(section: ModificationSection, gear: Gear) -> list[tuple[float, float]]:
+    """Places over the width or roll lengths [m] of a measured flank with their deviations [m], ascending."""
+    places = [*(section.places or ())]
+    places += [roll_at(gear, roll_angle=angle) or 0.0 for angle in section.roll_angles or ()]
+    places += [roll_at(gear, diameter=diameter) or 0.0 for diameter in section.diameters or ()]
+    return sorted(zip(places, section.deviations or (), strict=True))
 
 
 def _check_reach(profile: MeasuredProfile, gear: Gear, key: str) -> None:

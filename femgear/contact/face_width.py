@@ -19,7 +19,6 @@ from femgear.contact.supports import MovingMembers, TiltingMembers
 from femgear.contact.width_waves import WidthWaves
 from femgear.errors import LESS_TORQUE, ContactError
 from femgear.gears.deviations import SetDeviations, lead_separation
-from femgear.gears.modifications import FlankTwist
 
 _FORCES, _LEAST, _MOST = 32, 1e-4, 4.0
 """Of the curves of tooth pairs: their number, and the shares of the torque at which they begin and end."""
@@ -224,7 +223,7 @@ def lead_separations(
         lead = lead_separation(d, candidates.setup.gears, S)
     apart, every = np.broadcast_to(lead[mesh].T, (P, S, len(mesh))), lead[:, None, None]
     forms = () if d is None else (d.sun, d.planet_sun_side, d.planet_ring_side, d.ring)
-    if d is not None and any(isinstance(modification, FlankTwist) for form in forms for modification in form.lead):
+    if d is not None and any(modification.varies_along_profile for form in forms for modification in form.lead):
         # a twist by the places of the pairs on the flanks, of helical teeth a row a slice
         listed = candidates.setup.listed
         every = lead_separation(d, candidates.setup.gears, S, listed.roll[:, : len(lead), candidates.position])

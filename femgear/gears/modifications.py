@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -26,7 +26,111 @@ LEAST_OF_WIDTH, OVER_ENDS = 0.9, 1.01
 
 
 @dataclass(frozen=True)
-class _Relief:
+class ModificationProblem:
+    """What is wrong with a modification on a gear.
+
+    ``message`` names it, ``value`` is what the modification has, ``limit`` what is allowed, ``remedy`` what to do.
+    """
+
+    message: str
+    value: str
+    limit: str
+    remedy: str
+
+
+class Modification:
+    """One change of a flank; ``kinds`` has every class by the name that case files give it.
+
+    A new one derives from `ProfileModification` or `LeadModification`, with its ``kind``. Its fields are entries of the
+    case file: ``start``, ``end``, ``power``, points of measured flanks, and others by their names.
+    """
+
+    kinds: ClassVar[dict[str, type[Modification]]] = {}
+    measured: ClassVar[bool] = False
+    """Whether it is given by points."""
+
+    def __init_subclass__(cls, kind: str | None = None, **options):
+        super().__init_subclass__(**options)
+        if kind is not None:
+            Modification.kinds[kind] = cls
+
+    def problem(self, gear: Gear) -> ModificationProblem | None:
+        """Tell what makes it impossible on a gear, if anything does."""
+        return None
+
+
+class ProfileModification(Modification):
+    """A change of the profile, the same over the width."""
+
+    def removed_at(self, gear: Gear, roll: np.ndarray) -> np.ndarray:
+        """Material removed [m] at roll lengths (...) on the flank [m]."""
+        raise NotImplementedError
+
+    def knots(self, gear: Gear) -> tuple[float, ...]:
+        """Roll lengths [m] between which it is monotonic or a parabola."""
+        raise NotImplementedError
+
+
+class LeadModification(Modification):
+    """A change over the width, the same all over the profile but where it ``varies_along_profile``."""
+
+    varies_along_profile: ClassVar[bool] = False
+
+    def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
+        """Material removed [m] at places (...) from the middle of a width [m].
+
+        Heights on the profile that broadcast with the places are -0.5 at the form circle and 0.5 at the tip.
+        """
+        raise NotImplementedError
+
+
+class _Law(ProfileModification):
+    """A formula between two roll lengths, by default those of form and tip circle."""
+
+    start: float | None
+    end: float | None
+    towards: ClassVar[str] = "tip"
+    """Circle that the law leads to."""
+
+    def knots(self, gear: Gear) -> tuple[float, float]:
+        """Roll lengths [m] of start and end."""
+        default_end = gear.tip_roll if self.towards == "tip" else gear.form_roll
+        start = gear.form_roll if self.start is None else self.start
+        return start, default_end if self.end is None else self.end
+
+    def removed_at(self, gear: Gear, roll: np.ndarray) -> np.ndarray:
+        """Material removed [m] at roll lengths (...) on the flank [m]."""
+        start, end = self.knots(gear)
+        return self._removed((roll - start) / (end - start))
+
+    def _removed(self, along: np.ndarray) -> np.ndarray:
+        """Material removed [m] at places from 0 at the start to 1 at the end."""
+        raise NotImplementedError
+
+    def problem(self, gear: Gear) -> ModificationProblem | None:
+        """Tell whether the law starts or ends beside the flank, or runs the wrong way."""
+        start, end = self.knots(gear)
+        low, high = sorted((gear.form_roll, gear.tip_roll))
+        tolerance = 1e-6 * gear.module
+        remedy = "diameters, roll angles and roll lengths are those of the involute of this gear"
+        for name, value in (("start", start), ("end", end)):
+            if not low - tolerance <= value <= high + tolerance:
+                flank = f"{_place(gear, gear.form_roll)} (form circle) to {_place(gear, gear.tip_roll)} (tip circle)"
+                message = f"the modification {name}s outside the involute flank"
+                return ModificationProblem(message, _place(gear, value), flank, remedy)
+        outwards = (end > start) == (gear.tip_roll > gear.form_roll)
+        if abs(end - start) < 1e-3 * (high - low) or outwards != (self.towards == "tip"):
+            return ModificationProblem(
+                "start and end coincide or are exchanged",
+                f"from {_place(gear, start)} to {_place(gear, end)}",
+                f"from the start towards the {self.towards}",
+                remedy,
+            )
+        return None
+
+
+@dataclass(frozen=True)
+class _Relief(_Law):
     """Material taken off: ``amount ((s - start)/(end - start))^power`` beyond the start.
 
     Parameters
@@ -46,22 +150,27 @@ class _Relief:
     end: float | None = None
     power: float = 1.0
 
+    def _removed(self, along: np.ndarray) -> np.ndarray:
+        return self.amount * np.maximum(along, 0.0) ** self.power
+
 
 @dataclass(frozen=True)
-class TipRelief(_Relief):
+class TipRelief(_Relief, kind="tip relief"):
     """Material taken off towards the tip; the end is the tip circle or given."""
 
 
 @dataclass(frozen=True)
-class RootRelief(_Relief):
+class RootRelief(_Relief, kind="root relief"):
     """Material taken off towards the root; the end is the form circle or given.
 
     An end at the start of active profile gives the amount there.
     """
 
+    towards = "root"
+
 
 @dataclass(frozen=True)
-class _WholeProfile:
+class _WholeProfile(_Law):
     """A change of the evaluated part of a profile by an ``amount`` [m].
 
     ``start`` and ``end`` are roll lengths [m] at the root end and the tip end of that part, by default those
@@ -74,21 +183,27 @@ class _WholeProfile:
 
 
 @dataclass(frozen=True)
-class ProfileSlope(_WholeProfile):
+class ProfileSlope(_WholeProfile, kind="profile slope"):
     """Straight profile turned about its middle.
 
     The amount is the rise of the profile from start to end, positive where the tip has more material (the
     sign of f_H-alpha in ISO 1328-1), zero halfway.
     """
 
+    def _removed(self, along: np.ndarray) -> np.ndarray:
+        return self.amount * (0.5 - along)
+
 
 @dataclass(frozen=True)
-class ProfileCrowning(_WholeProfile):
+class ProfileCrowning(_WholeProfile, kind="profile crowning"):
     """Barrelling: a parabola that takes the amount C_alpha (ISO 21771-1) off at both ends, none halfway."""
 
+    def _removed(self, along: np.ndarray) -> np.ndarray:
+        return self.amount * (2.0 * along - 1.0) ** 2
+
 
 @dataclass(frozen=True)
-class MeasuredProfile:
+class MeasuredProfile(ProfileModification, kind="measured profile"):
     """Any profile from its points, straight between them and constant beyond the first and the last.
 
     ``roll`` are ascending roll lengths [m], ``removed`` is the material missing there [m]; measuring machines
@@ -98,9 +213,19 @@ class MeasuredProfile:
     roll: tuple[float, ...]
     removed: tuple[float, ...]
 
+    measured = True
+
+    def removed_at(self, gear: Gear, roll: np.ndarray) -> np.ndarray:
+        """Material removed [m] at roll lengths (...) on the flank [m]."""
+        return np.interp(roll, self.roll, self.removed)
+
+    def knots(self, gear: Gear) -> tuple[float, ...]:
+        """Roll lengths [m] of the points."""
+        return self.roll
+
 
 @dataclass(frozen=True)
-class LeadSlope:
+class LeadSlope(LeadModification, kind="lead slope"):
     """Flank turned about the middle of its width.
 
     The ``amount`` [m] is the rise from one end to the other, positive where the end z > 0 has more material (the
@@ -109,16 +234,24 @@ class LeadSlope:
 
     amount: float
 
+    def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
+        """Material removed [m] at places (...) from the middle of a width [m]."""
+        return -0.5 * self.amount * (2.0 * place / width)
+
 
 @dataclass(frozen=True)
-class LeadCrowning:
+class LeadCrowning(LeadModification, kind="lead crowning"):
     """Barrelling over the width: a parabola that takes the ``amount`` [m], C_beta of ISO 21771-1, off at both ends."""
 
     amount: float
 
+    def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
+        """Material removed [m] at places (...) from the middle of a width [m]."""
+        return self.amount * (2.0 * place / width) ** 2
+
 
 @dataclass(frozen=True)
-class EndRelief:
+class EndRelief(LeadModification, kind="end relief"):
     """Material taken off at both ends of the width: ``amount (1 - e/length)^2`` at a distance e from them.
 
     Amount at the ends [m], and length of either relief [m] (ISO 21771-1).
@@ -127,9 +260,22 @@ class EndRelief:
     amount: float
     length: float
 
+    def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
+        """Material removed [m] at places (...) from the middle of a width [m]."""
+        inside = (0.5 * width - np.abs(place)) / self.length
+        return self.amount * np.maximum(1.0 - inside, 0.0) ** 2
+
+    def problem(self, gear: Gear) -> ModificationProblem | None:
+        """Tell whether the reliefs of both ends overlap."""
+        if 2 * self.length <= gear.face_width:
+            return None
+        limit = f"at most half the face width, {gear.face_width * 500:.4g} mm"
+        remedy = "a crowning takes off more than that over the whole width"
+        return ModificationProblem("both end reliefs overlap", f"{self.length * 1e3:.4g} mm", limit, remedy)
+
 
 @dataclass(frozen=True)
-class FlankTwist:
+class FlankTwist(LeadModification, kind="flank twist"):
     """Lead slope that varies along the profile, linearly in the roll length.
 
     The ``amount`` [m] is the lead slope (see `LeadSlope`) at the tip circle less that at the form circle, zero
@@ -138,9 +284,15 @@ class FlankTwist:
 
     amount: float
 
+    varies_along_profile = True
+
+    def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
+        """Material removed [m] at places (...) from the middle of a width [m], and heights on the profile."""
+        return -0.5 * self.amount * (2.0 * place / width) * height
+
 
 @dataclass(frozen=True)
-class MeasuredLead:
+class MeasuredLead(LeadModification, kind="measured lead"):
     """Any lead from its points, straight between them and constant beyond the first and the last.
 
     ``place`` are ascending places from the middle of the width [m], ``removed`` is the material missing there
@@ -150,10 +302,23 @@ class MeasuredLead:
     place: tuple[float, ...]
     removed: tuple[float, ...]
 
+    measured = True
 
-ProfileModification = TipRelief | RootRelief | ProfileSlope | ProfileCrowning | MeasuredProfile
-LeadModification = LeadSlope | LeadCrowning | EndRelief | FlankTwist | MeasuredLead
-Modification = ProfileModification | LeadModification
+    def removed_over(self, width: float, place: np.ndarray, height: Any) -> np.ndarray:
+        """Material removed [m] at places (...) from the middle of a width [m]."""
+        return np.interp(place, self.place, self.removed)
+
+    def problem(self, gear: Gear) -> ModificationProblem | None:
+        """Tell whether points lie beside the width."""
+        half, furthest = 0.5 * gear.face_width, max(self.place, key=abs)
+        if abs(furthest) <= OVER_ENDS * half:
+            return None
+        return ModificationProblem(
+            "places of a measured lead lie beside the face width",
+            f"{furthest * 1e3:.6g} mm",
+            f"-{half * 1e3:.6g} to {half * 1e3:.6g} mm, half the face width to either side",
+            "count places from the middle of the width, not from an end of it",
+        )
 
 
 @dataclass(frozen=True)
@@ -181,19 +346,9 @@ def lead_deviation(form: FlankForm, width: float, place, height: Any = 0.0) -> n
     And at heights on the profile that broadcast with them, from -0.5 at the form circle to 0.5 at the tip.
     """
     place = np.asarray(place, float)
-    total, along = np.zeros(np.broadcast(place, height).shape), 2.0 * place / width
+    total = np.zeros(np.broadcast(place, height).shape)
     for modification in form.lead:
-        if isinstance(modification, LeadSlope):
-            total = total - 0.5 * modification.amount * along
-        elif isinstance(modification, LeadCrowning):
-            total = total + modification.amount * along**2
-        elif isinstance(modification, FlankTwist):
-            total = total - 0.5 * modification.amount * along * height
-        elif isinstance(modification, MeasuredLead):
-            total = total + np.interp(place, modification.place, modification.removed)
-        else:
-            inside = (0.5 * width - np.abs(place)) / modification.length
-            total = total + modification.amount * np.maximum(1.0 - inside, 0.0) ** 2
+        total = total + modification.removed_over(width, place, height)
     return total
 
 
@@ -212,31 +367,8 @@ def form_deviation(form: FlankForm, gear: Gear, roll):
     roll = np.clip(np.asarray(roll, float), low, high)
     total = np.zeros(roll.shape)
     for modification in form.profile:
-        total = total + _removed(modification, gear, roll)
+        total = total + modification.removed_at(gear, roll)
     return total
-
-
-def _removed(modification: ProfileModification, gear: Gear, roll: np.ndarray) -> np.ndarray:
-    """Material removed by one modification [m] at roll lengths on the flank [m]."""
-    if isinstance(modification, MeasuredProfile):
-        return np.interp(roll, modification.roll, modification.removed)
-    start, end = _modification_range(modification, gear)
-    t = (roll - start) / (end - start)
-    if isinstance(modification, ProfileSlope):
-        return modification.amount * (0.5 - t)
-    if isinstance(modification, ProfileCrowning):
-        return modification.amount * (2.0 * t - 1.0) ** 2
-    return modification.amount * np.maximum(t, 0.0) ** modification.power
-
-
-def _modification_range(modification: ProfileModification, gear: Gear) -> tuple[float, float]:
-    """Roll lengths [m] of start and end of a law, of the first and the last point of a measured profile."""
-    if isinstance(modification, MeasuredProfile):
-        return modification.roll[0], modification.roll[-1]
-    root, tip = gear.form_roll, gear.tip_roll
-    default_end = root if isinstance(modification, RootRelief) else tip
-    start = root if modification.start is None else modification.start
-    return start, default_end if modification.end is None else modification.end
 
 
 def roll_at(
@@ -266,58 +398,17 @@ def roll_at(
 
 
 def check_form(form: FlankForm, gear: Gear) -> None:
-    """Refuse (E-MODIFICATION) laws that start or end beside the flank or run the wrong way."""
+    """Refuse (E-MODIFICATION) modifications that are impossible on the gear."""
     for number, modification in enumerate(form.modifications):
-        laws = (TipRelief, RootRelief, ProfileSlope, ProfileCrowning)
-        problem = _problem(modification, gear) if isinstance(modification, laws) else None
-        if isinstance(modification, EndRelief) and 2 * modification.length > gear.face_width:
+        if (problem := modification.problem(gear)) is not None:
             raise GeometryError(
-                f"{gear.name}: both end reliefs overlap",
+                f"{gear.name}: {problem.message}",
                 code="E-MODIFICATION",
                 key=f"{gear.name}.modifications[{number}]",
-                value=f"{modification.length * 1e3:.4g} mm",
-                limit=f"at most half the face width, {gear.face_width * 500:.4g} mm",
-                remedy="a crowning takes off more than that over the whole width",
+                value=problem.value,
+                limit=problem.limit,
+                remedy=problem.remedy,
             )
-        half = 0.5 * gear.face_width
-        places = modification.place if isinstance(modification, MeasuredLead) else (0.0,)
-        furthest = max(places, key=abs)
-        if abs(furthest) > OVER_ENDS * half:
-            raise GeometryError(
-                f"{gear.name}: places of a measured lead lie beside the face width",
-                code="E-MODIFICATION",
-                key=f"{gear.name}.modifications[{number}]",
-                value=f"{furthest * 1e3:.6g} mm",
-                limit=f"-{half * 1e3:.6g} to {half * 1e3:.6g} mm, half the face width to either side",
-                remedy="count places from the middle of the width, not from an end of it",
-            )
-        if problem is not None:
-            message, value, limit = problem
-            raise GeometryError(
-                f"{gear.name}: {message}",
-                code="E-MODIFICATION",
-                key=f"{gear.name}.modifications[{number}]",
-                value=value,
-                limit=limit,
-                remedy="diameters, roll angles and roll lengths are those of the involute of this gear",
-            )
-
-
-def _problem(modification: ProfileModification, gear: Gear):
-    """Message, value and limit of what is wrong with the ends of a law, or None."""
-    start, end = _modification_range(modification, gear)
-    low, high = sorted((gear.form_roll, gear.tip_roll))
-    tolerance = 1e-6 * gear.module
-    for name, value in (("start", start), ("end", end)):
-        if not low - tolerance <= value <= high + tolerance:
-            flank = f"{_place(gear, gear.form_roll)} (form circle) to {_place(gear, gear.tip_roll)} (tip circle)"
-            return f"the modification {name}s outside the involute flank", _place(gear, value), flank
-    outwards = (end > start) == (gear.tip_roll > gear.form_roll)
-    if abs(end - start) < 1e-3 * (high - low) or outwards == isinstance(modification, RootRelief):
-        wanted = "root" if isinstance(modification, RootRelief) else "tip"
-        range_given = f"from {_place(gear, start)} to {_place(gear, end)}"
-        return "start and end coincide or are exchanged", range_given, f"from the start towards the {wanted}"
-    return None
 
 
 def _place(gear: Gear, roll: float) -> str:
@@ -363,7 +454,7 @@ def _check_sum(flank: str, form: FlankForm, gear: Gear) -> None:
     most = LARGEST_DEVIATION * gear.module
     rolls = [np.linspace(gear.form_roll, gear.tip_roll, 1001)]
     # laws are monotonic or parabolas between their ends, profiles straight between their points
-    rolls += [m.roll if isinstance(m, MeasuredProfile) else _modification_range(m, gear) for m in form.profile]
+    rolls += [modification.knots(gear) for modification in form.profile]
     roll = np.concatenate(rolls)
     removed = form_deviation(form, gear, roll)
     i = int(np.abs(removed).argmax())

@@ -12,8 +12,8 @@ import numpy as np
 from femgear.case.gear_set import planetary_set
 from femgear.case.planetary import Case
 from femgear.case.quantities import LENGTH, TORQUE, to_si
-from femgear.case.sections import LARGEST_DEVIATION
 from femgear.errors import CaseError
+from femgear.gears.modifications import LARGEST_DEVIATION
 from femgear.report.style import family, save_figure
 from femgear.report.tables import Block
 from femgear.stages.protocol import Progress, one_blas_thread, silent

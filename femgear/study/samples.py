@@ -33,7 +33,7 @@ from femgear.case.gear_set import need_set, planetary_set
 from femgear.case.messages import combine, translate
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, Count, Quantity, Section
-from femgear.case.sections import LARGEST_DEVIATION, LARGEST_SLOPE, Amplitude, Deviation, Slope
+from femgear.case.sections import LARGEST_SLOPE, Amplitude, Deviation, Slope
 from femgear.contact.assembly import (
     MOST_ENLARGEMENTS,
     Candidates,
@@ -68,7 +68,7 @@ from femgear.gears.deviations import (
     profile_separation,
 )
 from femgear.gears.gear import Gear
-from femgear.gears.modifications import FlankForm, LeadCrowning, LeadSlope, ProfileSlope
+from femgear.gears.modifications import LARGEST_DEVIATION, FlankForm, LeadCrowning, LeadSlope, ProfileSlope
 from femgear.gears.tolerances import CLASSES
 from femgear.stages.protocol import one_blas_thread
 from femgear.stages.static_results import SLICES
