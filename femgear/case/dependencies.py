@@ -69,12 +69,19 @@ _HELIX = {"helical.helix_angle"}
 
 def friction_entries(case: Any) -> Entries:
     """List the entries that decide the friction that acts on the gears; none where none does."""
+    of_friction = _rubbing_entries(case)
+    speed = {"operation.speeds": f"{case.operation.speeds[0]:.9g} rad/s of the input"} if of_friction else {}
+    return {**of_friction, **speed}
+
+
+def _rubbing_entries(case: Any) -> Entries:
+    """Entries of oil and losses that decide the friction that acts; none where none does."""
     if getattr(case, "losses", None) is None or not case.losses.excites:
         return {}
     of_friction = {key: value for key, value in every_entry(case).items() if key.split(".")[0] in _OIL}
     for name in ("bearings", "torque_shares", "speed_shares"):
         of_friction.pop(f"losses.{name}", None)
-    return {**of_friction, "operation.speeds": f"{case.operation.speeds[0]:.9g} rad/s of the input"}
+    return of_friction
 
 
 def static_entries(case: Any) -> Entries:
@@ -145,7 +152,8 @@ def runup_entries(case: Case) -> Entries:
 def box_entries(stage: str, case: ReadCase) -> Entries:
     """List the entries of a gearbox that decide a stage, which goes on from the deflection alone."""
     kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup", "balance", "transient") else frozenset()
-    return _entries(case, {"format", "title"} | _OIL | _BESIDE[stage], kept=kept)
+    rubbing = _rubbing_entries(case) if stage in ("modes", "dynamics", "runup") else {}
+    return {**_entries(case, {"format", "title"} | _OIL | _BESIDE[stage], kept=kept), **rubbing}
 
 
 def load_case_entries(case: ReadCase, load_case: BaseModel) -> Entries:

@@ -24,7 +24,7 @@ from femgear.gears.profile import base_helix_angle
 if TYPE_CHECKING:
     from femgear.gears.pair import GearPair, GearSet
 
-_NOTICEABLE = 0.05
+NOTICEABLE_CHANGE = 0.05
 """Share by which a coefficient may differ at other speeds without a word."""
 
 
@@ -118,14 +118,14 @@ def friction_findings(case: Any, gears: GearSet) -> Iterator[Finding]:
     coefficients = np.abs([_friction_at(case, gears, speed) for speed in speeds_of_operation])
     change = coefficients / coefficients[0] - 1.0
     at, kind = np.unravel_index(int(np.abs(change).argmax()), change.shape)
-    if abs(change[at, kind]) > _NOTICEABLE:
+    if abs(change[at, kind]) > NOTICEABLE_CHANGE:
         first, other = (f"{speed / RPM:.5g} rpm" for speed in speeds_of_operation[[0, at]])
         text = (
             f"friction acts at all speeds with the coefficient {coefficients[0, kind]:.3g} of {first}; at {other} it "
             f"would be {coefficients[at, kind]:.3g}, {change[at, kind]:+.0%}"
         )
         remedy = "put the speed that matters first, or compute speeds by themselves"
-        yield Finding("W-FRICTION", "losses.friction", text, remedy=remedy, limit=f"within {_NOTICEABLE:.0%}")
+        yield Finding("W-FRICTION", "losses.friction", text, remedy=remedy, limit=f"within {NOTICEABLE_CHANGE:.0%}")
 
 
 def _friction_at(case: Any, gears: GearSet, speed: float) -> tuple[float, ...]:
@@ -133,11 +133,31 @@ def _friction_at(case: Any, gears: GearSet, speed: float) -> tuple[float, ...]:
     turning, frequency = shaft_turning(case, gears, speed)
     first = turning["sun"] - turning["carrier"] if gears.members else next(iter(turning.values()))
     torque = case.torque_on_first_gear()
-    drives = 1.0 if torque * first >= 0.0 else -1.0
     base = abs(base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
+    return rubbing_coefficients(case, gears, torque, frequency, base, drives=torque * first >= 0.0)
+
+
+def rubbing_coefficients(
+    rules: Any, gears: GearSet, torque: float, mesh_frequency: float, base_helix: float, *, drives: bool
+) -> tuple[float, ...]:
+    """Compute the coefficients of friction of every kind of mesh, as of `acting_friction`, by equal loads on planets.
+
+    Parameters
+    ----------
+    rules : case
+        With the sections ``losses`` and ``lubricant``.
+    torque : float
+        On gear 1, or the sun [N m].
+    mesh_frequency : float
+        [Hz]
+    base_helix : float
+        [rad]
+    drives : bool
+        Whether gear 1, or the sun against the carrier, drives.
+    """
     force = np.array([abs(torque) / gears.gears[0].base_radius / gears.n_planets])
-    coefficients = (friction_coefficient(case, pair, force, frequency, base)[0] for pair in gears.kinds)
-    return tuple(drives * float(coefficient) / math.cos(base) for coefficient in coefficients)
+    every = (friction_coefficient(rules, pair, force, mesh_frequency, base_helix)[0] for pair in gears.kinds)
+    return tuple((1.0 if drives else -1.0) * float(coefficient) / math.cos(base_helix) for coefficient in every)
 
 
 _WITHOUT_FRICTION = (
@@ -155,12 +175,13 @@ def refuse_friction(case: Any) -> None:
             raise _no_friction(case, f"{section}.{name}", message)
 
 
-def no_acting_friction(case: Any, message: str) -> None:
+def no_acting_friction(case: Any, message: str, otherwise: str = "") -> None:
     """Refuse friction that acts in a case whose dynamics have no place for it (CaseError, E-FRICTION)."""
     if friction_acts(case):
-        raise _no_friction(case, "losses.excites", message)
+        raise _no_friction(case, "losses.excites", message, otherwise)
 
 
-def _no_friction(case: Any, key: str, message: str) -> CaseError:
+def _no_friction(case: Any, key: str, message: str, otherwise: str = "") -> CaseError:
     remedy = "leave losses.excites out" + ("" if key == "losses.excites" else f", or {key}")
+    remedy += f", or {otherwise}" if otherwise else ""
     return CaseError(message, code="E-FRICTION", key=key, file=case.location(key), remedy=remedy)

@@ -27,10 +27,15 @@ def friction_source(state: LoadedPeriod, count: int) -> np.ndarray | None:
 
     Along the columns of `femgear.system.assembly.Assembly.sliding_columns` [N, N m]; None without friction.
     """
+    loads = friction_on_meshes(state, count)
+    return None if loads is None else np.concatenate([loads, np.zeros((1, count))])
+
+
+def friction_on_meshes(state: LoadedPeriod, count: int) -> np.ndarray | None:
+    """Loads (2M, count) of `friction_source` without what takes its mean."""
     if state.friction_force is None:
         return None
-    force, moment = (state.resampled(name, count) for name in FRICTION)
-    return np.concatenate([-force, -moment, np.zeros((1, count))])
+    return -np.concatenate([state.resampled(name, count) for name in FRICTION])
 
 
 def balanced_source(excitation: MeshExcitation, modes: Modes) -> MeshExcitation:

@@ -27,6 +27,8 @@ _MACHINES = "motor", "brake"
 _STAYS = ("title", "set", "rack", "material", "sun", "planet", "ring", "carrier", "gear_1", "gear_2", "static")
 _TEETH = (*_STAYS, "strength", "helical", "planar", "model", "format")
 """Sections of a case that the teeth of a stage have."""
+_OF_GEARBOX = "runup", "lubricant", "losses"
+"""Sections that the gearbox has as the case does."""
 _NO_NAME = re.compile(r"[^A-Za-z0-9_.-]+")
 """What names of parts do not have."""
 _MACHINE_MASS = "1 kg"
@@ -90,8 +92,10 @@ def gearbox_of_case(case: Any) -> WrittenAsGearbox:
     up_to = case.dynamics.up_to
     dynamics = {"mesh_harmonics": _mesh_harmonics(case), "up_to": None if up_to is None else quantity(up_to, "Hz")}
     tables["dynamics"] = {key: value for key, value in dynamics.items() if value is not None}
-    if "runup" in given:
-        tables["runup"] = given["runup"]
+    tables |= {name: given[name] for name in _OF_GEARBOX if name in given}
+    if seals := given.get("losses", {}).get("seal"):
+        seals = [seal | {"shaft": seal["shaft"].replace("_", " ")} for seal in seals]
+        tables["losses"] = given["losses"] | {"seal": seals}
     kept = {key: value for key, value in tables.items() if value not in ([], {})}
     return WrittenAsGearbox(kept, tuple(_left_out(case, given)))
 

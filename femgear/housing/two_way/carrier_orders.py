@@ -238,21 +238,23 @@ def mean_excitation(excitation: MeshExcitation, paths: MeshPaths, sense: int) ->
 
     ``sense`` is that of the carrier, 1 or -1. Of errors that turn what they do on an average remains.
     """
-    turn, owner = _meshes(planet_groups(paths.planet_angles, paths.symmetry))
-    count = excitation.stiffness.shape[1] // excitation.periods
-    whole = sense * turn[:, None] * np.arange(count // 2 + 1) * (paths.z_ring % paths.symmetry)
-    phase = np.exp(2j * np.pi * (whole % paths.symmetry) / paths.symmetry)
-    alike, averaged = owner[:, None] == owner, list[np.ndarray]()
-    for values in (excitation.stiffness, excitation.deflection, excitation.force):
+    groups = planet_groups(paths.planet_angles, paths.symmetry)
+    count, averaged = excitation.stiffness.shape[1] // excitation.periods, dict[str, np.ndarray]()
+    for name in ("stiffness", "deflection", "force", "source"):
+        if (values := getattr(excitation, name)) is None:
+            continue
+        turn, owner = _meshes(groups, len(values) // len(groups[1]))
+        alike, whole = owner[:, None] == owner, sense * turn[:, None] * np.arange(count // 2 + 1)
+        phase = np.exp(2j * np.pi * (whole * (paths.z_ring % paths.symmetry) % paths.symmetry) / paths.symmetry)
         lines = np.fft.rfft(values.reshape(len(values), -1, count).mean(axis=1)) / phase
-        averaged.append(np.fft.irfft(phase * (alike @ lines) / alike.sum(axis=1)[:, None], count))
-    return replace(excitation, stiffness=averaged[0], deflection=averaged[1], force=averaged[2], periods=1)
+        averaged[name] = np.fft.irfft(phase * (alike @ lines) / alike.sum(axis=1)[:, None], count)
+    return replace(excitation, **averaged, periods=1)
 
 
-def _meshes(groups) -> tuple[np.ndarray, np.ndarray]:
-    """Turns (2N,) of all meshes from their leaders, and the numbers (2N,) of these."""
+def _meshes(groups, kinds: int) -> tuple[np.ndarray, np.ndarray]:
+    """Turns (kinds N,) of all meshes from their leaders, and the numbers (kinds N,) of these."""
     leaders, group, turn = groups
-    return np.tile(turn, 2), np.concatenate([group, len(leaders) + group])
+    return np.tile(turn, kinds), np.concatenate([kind * len(leaders) + group for kind in range(kinds)])
 
 
 def receptance(structure: FixedStructure, omega: np.ndarray) -> np.ndarray:

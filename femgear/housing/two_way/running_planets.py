@@ -18,6 +18,9 @@ state, which statics give: motions that nothing holds take up no mean force.
 N equal planets move the structure at ``K = 0, N, 2 N, ...`` alone. Where no wave beyond n = +-1 exists and N is 3
 or more, the side bands fall into groups of three that know nothing of one another but for kappa.
 
+Friction of the flanks acts at points of its own, along the tangents and as couples: forces g that are given, as they
+do not follow the forces of the motion.
+
 A pair is the case without planets: one mesh, n = 0.
 """
 
@@ -36,7 +39,7 @@ from femgear.housing.two_way.mesh_fluctuation import CYCLES, MeshFluctuation, gm
 from femgear.housing.two_way.response import check_repeated
 from femgear.housing.two_way.running_ring import RunningRing, ring_compliance, ring_motion
 from femgear.system.fourier import Product, pad
-from femgear.system.system import MeshExcitation, mesh_harmonics
+from femgear.system.system import MeshExcitation, mesh_harmonics, source_harmonics
 
 RING = 1
 """Contact point of a planet with the ring."""
@@ -48,6 +51,25 @@ _SINGULAR = 1e-11
 """Singular value of a scaled system of the means, over the largest, of a motion of the whole that nothing holds."""
 _ROOM = 64e6
 """Size of the systems that are in memory together [bytes]."""
+
+
+@dataclass(frozen=True)
+class RubbingPoints(ReadOnlyArrays):
+    """Where friction of the flanks acts: F = 2 kinds points, along the tangent of each kind of mesh, then as a couple.
+
+    Parameters
+    ----------
+    shape : (F, W, m) complex array
+        Sliding of flank 1 on flank 2, and its turning against it, as `RunningStage.shape` [kg^-1/2, rad m^-1 kg^-1/2].
+    approach : (p, F) array
+        The same per unit of the motions of a planet [1, m].
+    """
+
+    shape: np.ndarray
+    approach: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.shape)
 
 
 @dataclass(frozen=True)
@@ -75,7 +97,8 @@ class RunningStage(ReadOnlyArrays):
     loss : (C,) array
         Loss factor of the springs, twice the damping ratio that they alone would give a mode [1].
     excitation : MeshExcitation
-        Of the meshes kind by kind (sun, ring), planet by planet.
+        Of the meshes kind by kind (sun, ring), planet by planet; its sources those of friction on all of them, point
+        by point and planet by planet.
     paths : MeshPaths
         Teeth of the ring, negative where planets follow one another against the sense of the carrier, angles and
         symmetry of the planets.
@@ -90,6 +113,8 @@ class RunningStage(ReadOnlyArrays):
         carrier, in series with the springs [m/N]. A turn from planet to planet maps it on itself.
     ring : RunningRing, optional
         Elastic ring in series with the meshes planet-ring.
+    rubbing : RubbingPoints, optional
+        Where the sources of the excitation act; without it there is no friction.
     """
 
     natural_frequency: np.ndarray
@@ -108,6 +133,7 @@ class RunningStage(ReadOnlyArrays):
     viscous: np.ndarray | None = None
     flexibility: np.ndarray | None = None
     ring: RunningRing | None = None
+    rubbing: RubbingPoints | None = None
 
     @property
     def waves(self) -> np.ndarray:
@@ -125,10 +151,26 @@ class RunningStage(ReadOnlyArrays):
         return len(self.excitation.stiffness) // len(self.paths.planet_angles)
 
     @cached_property
+    def every_shape(self) -> np.ndarray:
+        """Shapes (C + F, W, m) of the contact points, and of those of friction."""
+        return self.shape if self.rubbing is None else np.concatenate([self.shape, self.rubbing.shape])
+
+    @cached_property
     def products(self) -> np.ndarray:
-        """Products (m, (C W)^2) of the shapes of two contact points."""
-        P = self.shape.reshape(-1, self.shape.shape[2])
-        return (P[:, None] * P.conj()).reshape(-1, P.shape[1]).T
+        """Products (m, (C W) ((C + F) W)) of the shapes of contact points with those of all points."""
+        P, pushed = (shape.reshape(-1, shape.shape[2]) for shape in (self.shape, self.every_shape))
+        return (P[:, None] * pushed.conj()).reshape(-1, P.shape[1]).T
+
+    @property
+    def ring_points(self) -> dict[int, np.ndarray]:
+        """Points at which the meshes push the elastic ring, each with what it moves by unit waves (r,)."""
+        assert self.ring is not None
+        pushed = {RING: self.ring.approach}
+        if self.rubbing is not None:
+            assert self.ring.sliding is not None
+            # the second kind of mesh, its friction and its couple
+            pushed |= dict(zip(len(self.stiffness) + np.array([RING, self.kinds + RING]), self.ring.sliding))
+        return pushed
 
     def receptance(self, omega: np.ndarray) -> np.ndarray:
         """Receptances (..., m) [s^2] of the modes at angular frequencies (...); free motions have none at rest."""
@@ -177,8 +219,9 @@ class RunningResponse(ReadOnlyArrays):
     ----------
     mesh_frequency, carrier_speed : float
         [rad/s], both positive or zero.
-    force : (G, C, B, R) complex array
-        Forces beyond their means on the contact points of the leading planets [N, N m], by harmonics and side bands.
+    force : (G, C + F, B, R) complex array
+        Forces beyond their means on the contact points of the leading planets, and friction [N, N m], by harmonics and
+        side bands.
     approach : (J, B, R) complex array
         Approaches of the leading meshes beyond their means [m].
     band : (S,) int array
@@ -276,12 +319,15 @@ class _Part:
         Side bands of the structure between them.
     answer : (k, b G C, b M G) complex array
         Forces of the contact points by the forces e beyond k0 [1].
+    rubbed : (k, b G C, b F G) complex array
+        The same by friction [1, 1/m].
     """
 
     blocks: np.ndarray
     bands: np.ndarray
     structure_bands: np.ndarray
     answer: np.ndarray
+    rubbed: np.ndarray
 
 
 def forces_on_structure(stage: RunningStage, response: RunningResponse, vectors: np.ndarray) -> np.ndarray:
@@ -294,8 +340,8 @@ def forces_on_structure(stage: RunningStage, response: RunningResponse, vectors:
     stage : RunningStage
     response : RunningResponse
         Of that stage.
-    vectors : (C, W, k) complex array
-        Approach of the contact points of a planet at angle 0 by every motion, wave by wave [1, m].
+    vectors : (C + F, W, k) complex array
+        Approach of the contact points of a planet at angle 0, and sliding, by every motion, wave by wave [1, m].
     """
     orders, N, n = response.orders, stage.paths.symmetry, stage.waves
     psi = np.asarray(stage.paths.planet_angles)[stage.groups[0]]
@@ -327,8 +373,14 @@ def ring_lines(stage: RunningStage, response: RunningResponse, angles, direction
         return np.zeros((*response.modal.shape[:2], len(angles)), complex)
     psi = np.asarray(stage.paths.planet_angles)[stage.groups[0]]
     speeds, places = (response.mesh_frequency, response.carrier_speed), (angles, directions)
-    displacement = ring_motion(stage.ring, response.orders, response.force[:, RING], psi, speeds, places, response.band)
-    return response.one_sided(displacement)
+    heard = np.sum(
+        [
+            ring_motion(stage.ring, response.orders, response.force[:, at], psi, speeds, places, response.band, pushed)
+            for at, pushed in stage.ring_points.items()
+        ],
+        axis=0,
+    )
+    return response.one_sided(heard)
 
 
 class _Problem:
@@ -353,6 +405,7 @@ class _Problem:
             owner, turns = np.arange(len(leading)), np.zeros(len(leading), int)
         self.mean = np.repeat(stage.stiffness[:kinds], len(self.leaders))
         self.source, self.fluctuation = self._source(signals, owner, turns)
+        self.rubbing = self._rubbing(excited, group, turn)
 
     def _source(self, signals, owner, turns) -> tuple[np.ndarray, MeshFluctuation]:
         """Static part of the forces beyond k0 (J, B, R), and the fluctuation of the stiffness."""
@@ -368,6 +421,21 @@ class _Problem:
         source[..., orders.middle] = 0.5 * forcing
         source[:, 0, orders.middle] = np.real(forcing[:, 0])
         return fluctuation.of_leaders(source), fluctuation
+
+    def _rubbing(self, excited: int, group: np.ndarray, turn: np.ndarray) -> np.ndarray:
+        """Friction beyond its mean at the points of the leading planets (F G, B, R) [N, N m]."""
+        orders, lines = self.orders, source_harmonics(self.stage.excitation, excited)
+        points, N, G = 0 if self.stage.rubbing is None else len(self.stage.rubbing), len(group), len(self.leaders)
+        friction = np.zeros((points * N, orders.lines + 1, len(orders.bands)), complex)
+        if points and lines is not None:
+            # sources push along the sliding, forces at points against it
+            friction[..., orders.middle] = -0.5 * pad(lines, orders.lines)
+            friction[:, 0] = 0.0
+        if orders.patterns == 1 and orders.periods == 1:
+            return friction.reshape(points, N, *friction.shape[1:])[:, self.leaders].reshape(-1, *friction.shape[1:])
+        alone, turns = np.zeros((max(points, 1) * N, 1)), np.tile(turn, max(points, 1))
+        owner = np.concatenate([point * G + group for point in range(max(points, 1))])
+        return MeshFluctuation(alone, orders, owner, turns).of_leaders(friction) if points else friction
 
     def solve(self, mesh_frequency: float, speed: float, tolerance: float, cycles: int) -> RunningResponse:
         """Solve at a mesh frequency and a speed of the carrier [rad/s]."""
@@ -385,7 +453,11 @@ class _Problem:
         def answer(flat: np.ndarray) -> np.ndarray:
             return self.fluctuation(approach(flat.view(complex).reshape(shape))).ravel().view(float)
 
-        right = self.source.ravel().view(float)
+        source, rubbed = self.source, 0.0
+        if self.stage.rubbing is not None:
+            rubbed = springs * self._mesh_forces(parts, self.rubbing, by_friction=True)
+            source = source + self.fluctuation(rubbed)
+        right = source.ravel().view(float)
         size = max(float(np.linalg.norm(right)), np.finfo(float).tiny)
         flat, residual, radius, products = gmres(answer, right, size, None, tolerance, cycles)
         if not residual < _RESIDUAL:
@@ -399,7 +471,7 @@ class _Problem:
         extra = flat.view(complex).reshape(shape)
         force, (band, modal) = self._forces(parts, extra), self._modal(parts, extra, mesh_frequency, speed)
         tail = self._tail(force[:, : self.stage.kinds])
-        figures = approach(extra), band, modal, orders, residual, radius, products, tail
+        figures = approach(extra) + rubbed, band, modal, orders, residual, radius, products, tail
         return RunningResponse(mesh_frequency, speed, force, *figures)
 
     def _groups_of_bands(self, residue: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -431,36 +503,22 @@ class _Problem:
                     still = portion[orders.base[portion] + orders.seed[portion] == 0]
                     for chosen in (np.setdiff1d(portion, still), still):
                         if len(chosen):
-                            answer = self._answer(chosen, bands, structure_bands, mesh_frequency, speed)
-                            yield _Part(chosen, bands, structure_bands, answer)
+                            answers = self._answer(chosen, bands, structure_bands, mesh_frequency, speed)
+                            yield _Part(chosen, bands, structure_bands, *answers)
 
-    def _answer(self, blocks, bands, structure_bands, mesh_frequency: float, speed: float) -> np.ndarray:
-        """Forces (blocks, b G C, b G M) of the contact points by unit forces e of the meshes."""
-        stage, orders, kinds = self.stage, self.orders, self.stage.kinds
+    def _answer(
+        self, blocks, bands, structure_bands, mesh_frequency: float, speed: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Forces of the contact points by unit forces e of the meshes, (blocks, b G C, b G M), and by unit friction."""
+        stage, orders = self.stage, self.orders
         G, C, p = len(self.leaders), len(stage.stiffness), len(stage.mass)
         b, line = len(bands), (orders.base[blocks] + orders.seed[blocks]) / orders.paths.z_ring
         omega = line[:, None] * mesh_frequency + orders.bands[bands] * speed
         omega[np.abs(omega) < _STILL * mesh_frequency] = 0.0
         points, planets = b * G * C, b * G * p
-        c = stage.compliance(omega)
         system = np.zeros((len(blocks), points + planets, points + planets), complex)
-        inner = np.zeros((len(blocks), b, G, C, b, G, C), complex)
-        free = list[np.ndarray]()
-        for band in structure_bands:
-            free += self._add_structure(inner, band, bands, line * mesh_frequency + band * speed)
-        every = np.arange(b)[:, None, None], np.arange(G)[:, None], np.arange(C)
-        inner[:, every[0], every[1], every[2], every[0], every[1], every[2]] += c[:, :, None, :]
-        if stage.flexibility is not None:
-            whole = (orders.base + orders.pattern)[blocks][:, None] + orders.bands[bands]
-            shared = stage.shared(whole, omega)
-            for k in range(b):
-                inner[:, k, :, :, k] += shared[:, k]
-        if stage.ring is not None:
-            angles = np.asarray(stage.paths.planet_angles)[self.leaders]
-            ring = ring_compliance(stage.ring, orders, blocks, orders.bands[bands], angles, (mesh_frequency, speed))
-            for k in range(b):
-                inner[:, k, :, RING, k, :, RING] += ring[:, k]
-        system[:, :points, :points] = inner.reshape(len(blocks), points, points)
+        inner, free = self._compliance(blocks, bands, structure_bands, omega, (mesh_frequency, speed))
+        system[:, :points, :points] = inner[..., :C].reshape(len(blocks), points, points)
         A = np.kron(np.eye(b * G), stage.approach)
         system[:, points:, :points], system[:, :points, points:] = A, -A.T
         planet_stiffness = stage.planet_stiffness(omega, mesh_frequency, speed)
@@ -474,31 +532,79 @@ class _Problem:
             border = np.broadcast_to(border, (len(blocks), *border.shape))
             corner = np.zeros((len(blocks), len(free), len(free)))
             system = np.block([[system, -border.swapaxes(1, 2)], [border.conj(), corner]])
-        meshes = np.zeros((system.shape[1], b, kinds, G), complex)
-        right = np.broadcast_to(meshes[None], (len(blocks), *meshes.shape)).copy()
-        for k in range(b):
-            for g in range(G):
-                for kind in range(kinds):
-                    right[:, (k * G + g) * C + kind, k, kind, g] = c[:, k, kind]
-        # columns in the order of the meshes of all leaders, band by band
-        right = right.reshape(len(blocks), system.shape[1], -1)
+        right = self._unit_forces(inner, stage.compliance(omega), system.shape[1])
+        ends = np.array([b * G * stage.kinds])
         if free:
-            return np.stack([_consistent(*equations, points) for equations in zip(system, right, strict=True)])
+            answers = [_consistent(*equations, points) for equations in zip(system, right, strict=True)]
+            by_meshes, by_friction = np.split(np.stack(answers), ends, axis=2)
+            return by_meshes, by_friction
         # planets have units of their own
         rows = 1.0 / np.maximum(np.abs(system).max(axis=2), np.finfo(float).tiny)
         columns = 1.0 / np.maximum(np.abs(system * rows[:, :, None]).max(axis=1), np.finfo(float).tiny)
         scaled_forces = np.linalg.solve(system * rows[:, :, None] * columns[:, None], right * rows[:, :, None])
-        return (scaled_forces * columns[:, :, None])[:, :points]
+        by_meshes, by_friction = np.split((scaled_forces * columns[:, :, None])[:, :points], ends, axis=2)
+        return by_meshes, by_friction
+
+    def _compliance(
+        self, blocks, bands, structure_bands, omega, speeds: tuple[float, float]
+    ) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Compliance (blocks, b, G, C, b, G, C + F) between the points at angular frequencies (blocks, b).
+
+        And approaches of motions that nothing holds, at rest.
+        """
+        stage, orders, (mesh_frequency, speed) = self.stage, self.orders, speeds
+        b, G, C = len(bands), len(self.leaders), len(stage.stiffness)
+        line = (orders.base[blocks] + orders.seed[blocks]) / orders.paths.z_ring
+        inner, free = np.zeros((len(blocks), b, G, C, b, G, len(stage.every_shape)), complex), list[np.ndarray]()
+        for band in structure_bands:
+            free += self._add_structure(inner, band, bands, line * mesh_frequency + band * speed)
+        every = np.arange(b)[:, None, None], np.arange(G)[:, None], np.arange(C)
+        inner[:, every[0], every[1], every[2], every[0], every[1], every[2]] += stage.compliance(omega)[:, :, None, :]
+        if stage.flexibility is not None:
+            whole = (orders.base + orders.pattern)[blocks][:, None] + orders.bands[bands]
+            shared = stage.shared(whole, omega)
+            for k in range(b):
+                inner[:, k, :, :, k, :, :C] += shared[:, k]
+        if stage.ring is not None:
+            angles = np.asarray(stage.paths.planet_angles)[self.leaders]
+            for at, pushed in stage.ring_points.items():
+                ring = ring_compliance(stage.ring, orders, blocks, orders.bands[bands], angles, speeds, pushed)
+                for k in range(b):
+                    inner[:, k, :, RING, k, :, at] += ring[:, k]
+        return inner, free
+
+    def _unit_forces(self, inner: np.ndarray, compliance: np.ndarray, size: int) -> np.ndarray:
+        """Right-hand sides (blocks, size, b G (M + F)) of unit forces e of all leading meshes, then of friction.
+
+        Band by band, by the compliances of the points and (blocks, b, C) of the springs.
+        """
+        stage, kinds, G, C = self.stage, self.stage.kinds, len(self.leaders), len(self.stage.stiffness)
+        count, b, p = len(inner), inner.shape[1], len(stage.mass)
+        right = np.zeros((count, size, b, kinds, G), complex)
+        for k in range(b):
+            for g in range(G):
+                for kind in range(kinds):
+                    right[:, (k * G + g) * C + kind, k, kind, g] = compliance[:, k, kind]
+        if stage.rubbing is None:
+            return right.reshape(count, size, -1)
+        points, F = b * G * C, len(stage.rubbing)
+        rubbing = np.zeros((count, size, b, F, G), complex)
+        rubbing[:, :points] = -inner[..., C:].swapaxes(-1, -2).reshape(count, points, b, F, G)
+        for k in range(b):
+            for g in range(G):
+                at = points + (k * G + g) * p
+                rubbing[:, at : at + p, k, :, g] = -stage.rubbing.approach
+        return np.concatenate([right.reshape(count, size, -1), rubbing.reshape(count, size, -1)], axis=2)
 
     def _add_structure(self, inner: np.ndarray, band: int, bands: np.ndarray, omega: np.ndarray) -> list[np.ndarray]:
         """Add compliances of the structure at one of its bands; approaches of the motions that are free there."""
         stage, orders = self.stage, self.orders
-        n, C, W = stage.waves, stage.shape.shape[0], stage.shape.shape[1]
+        n, (C, W, _) = stage.waves, stage.shape.shape
         number = {int(place): k for k, place in enumerate(bands)}
         places = orders.place(band + stage.sense * n)
         connected = [(w, number[int(place)]) for w, place in enumerate(places) if int(place) in number]
         omega = np.where(np.abs(omega) < _STILL * max(np.abs(omega).max(), 1.0), 0.0, omega)
-        both = (stage.receptance(omega) @ stage.products).reshape(len(omega), C, W, C, W)
+        both = (stage.receptance(omega) @ stage.products).reshape(len(omega), C, W, -1, W)
         psi = np.asarray(stage.paths.planet_angles)[self.leaders]
         N = stage.paths.symmetry
         for w, k in connected:
@@ -521,35 +627,45 @@ class _Problem:
         of_part = extra[:, part.blocks[:, None], part.bands]
         return of_part.transpose(1, 2, 0).reshape(len(part.blocks), -1, 1)
 
-    def _mesh_forces(self, parts, extra: np.ndarray) -> np.ndarray:
-        """Forces (J, B, R) of the leading meshes by forces e beyond k0."""
-        kinds, mesh_forces = self.stage.kinds, np.zeros_like(extra)
+    def _mesh_forces(self, parts, extra: np.ndarray, *, by_friction: bool = False) -> np.ndarray:
+        """Forces (J, B, R) of the leading meshes by forces e beyond k0, or by friction."""
+        kinds, mesh_forces = self.stage.kinds, np.zeros(self.source.shape, complex)
         G, C = len(self.leaders), len(self.stage.stiffness)
         for part in parts:
-            b = len(part.bands)
-            force = (part.answer @ self._sub(part, extra)).reshape(-1, b, G, C)[..., :kinds]
+            b, answer = len(part.bands), part.rubbed if by_friction else part.answer
+            force = (answer @ self._sub(part, extra)).reshape(-1, b, G, C)[..., :kinds]
             mesh_forces[:, part.blocks[:, None], part.bands] = force.transpose(3, 2, 0, 1).reshape(-1, len(force), b)
         return mesh_forces
 
-    def _forces(self, parts, extra: np.ndarray) -> np.ndarray:
-        """Forces (G, C, B, R) of all contact points of the leaders by forces e beyond k0."""
+    def _part_forces(self, part: _Part, extra: np.ndarray) -> np.ndarray:
+        """Forces (blocks, b, G, C + F) of all points of the leaders in a part by forces e beyond k0 and friction."""
         G, C = len(self.leaders), len(self.stage.stiffness)
-        contact_forces = np.zeros((G, C, *extra.shape[1:]), complex)
+        size, rubbing = (len(part.blocks), len(part.bands), G), self.stage.rubbing
+        force = (part.answer @ self._sub(part, extra)).reshape(*size, C)
+        if rubbing is None:
+            return force
+        given = self._sub(part, self.rubbing)
+        force = force + (part.rubbed @ given).reshape(force.shape)
+        return np.concatenate([force, given.reshape(*size[:2], len(rubbing), G).swapaxes(2, 3)], axis=3)
+
+    def _forces(self, parts, extra: np.ndarray) -> np.ndarray:
+        """Forces (G, C + F, B, R) of all points of the leaders by forces e beyond k0 and friction."""
+        G, points = len(self.leaders), len(self.stage.every_shape)
+        forces = np.zeros((G, points, *extra.shape[1:]), complex)
         for part in parts:
-            force = (part.answer @ self._sub(part, extra)).reshape(len(part.blocks), len(part.bands), G, C)
-            contact_forces[:, :, part.blocks[:, None], part.bands] = force.transpose(2, 3, 0, 1)
-        return contact_forces
+            forces[:, :, part.blocks[:, None], part.bands] = self._part_forces(part, extra).transpose(2, 3, 0, 1)
+        return forces
 
     def _modal(self, parts, extra: np.ndarray, mesh_frequency: float, speed: float) -> tuple[np.ndarray, np.ndarray]:
         """Side bands (S,) of the structure, and the coordinates (Q + 1, S, m) of its modes."""
-        stage, orders = self.stage, self.orders
-        N, n, G, C = stage.paths.symmetry, stage.waves, len(self.leaders), len(stage.stiffness)
+        stage, orders, shape = self.stage, self.orders, self.stage.every_shape
+        N, n = stage.paths.symmetry, stage.waves
         reach = int(orders.bands[-1]) + max(int(n[-1]), 0 if stage.ring is None else int(stage.ring.diameter.max()))
         every = np.arange(-reach, reach + 1)
         coordinates = np.zeros((orders.lines + 1, len(every), len(stage.natural_frequency)), complex)
         psi = np.asarray(stage.paths.planet_angles)[self.leaders]
         for part in parts:
-            force = (part.answer @ self._sub(part, extra)).reshape(len(part.blocks), len(part.bands), G, C)
+            force = self._part_forces(part, extra)
             line = (orders.base[part.blocks] + orders.seed[part.blocks]) / orders.paths.z_ring
             number = {int(place): k for k, place in enumerate(part.bands)}
             for band in part.structure_bands:
@@ -557,7 +673,7 @@ class _Problem:
                 for w, place in enumerate(orders.place(band + stage.sense * n)):
                     if int(place) in number:
                         at = force[:, number[int(place)]] * np.exp(-1j * n[w] * psi)[:, None]
-                        total += at.sum(axis=1) @ stage.shape[:, w].conj()
+                        total += at.sum(axis=1) @ shape[:, w].conj()
                 omega = line * mesh_frequency + band * speed
                 omega[np.abs(omega) < _STILL * mesh_frequency] = 0.0
                 coordinates[part.blocks % (orders.lines + 1), band + reach] -= N * stage.receptance(omega) * total

@@ -35,6 +35,9 @@ class RunningRing(ReadOnlyArrays):
         Radial (outwards) and tangential displacement b_n of the outer surface at angle 0 by a unit wave [kg^-1/2].
     loss : float
         Loss factor of the ring [1].
+    sliding : (2, r) complex array, optional
+        What friction of a planet at angle 0 moves by a unit wave: sliding along the tangent [kg^-1/2], and turning
+        [rad m^-1 kg^-1/2].
     """
 
     natural_frequency: np.ndarray
@@ -42,6 +45,7 @@ class RunningRing(ReadOnlyArrays):
     approach: np.ndarray
     surface: np.ndarray
     loss: float = 0.0
+    sliding: np.ndarray | None = None
 
     @property
     def waves(self) -> tuple[np.ndarray, np.ndarray]:
@@ -72,9 +76,15 @@ def _met(ring: RunningRing, orders: CarrierOrders, blocks, band: np.ndarray) -> 
 
 
 def ring_compliance(
-    ring: RunningRing, orders: CarrierOrders, blocks, band: np.ndarray, angles: np.ndarray, speeds: tuple[float, float]
+    ring: RunningRing,
+    orders: CarrierOrders,
+    blocks,
+    band: np.ndarray,
+    angles: np.ndarray,
+    speeds: tuple[float, float],
+    pushed: np.ndarray,
 ) -> np.ndarray:
-    """Compute compliances (B, b, G, G) of a ring between the meshes of leading planets [m/N].
+    """Compute compliances (B, b, G, G) of a ring at the meshes of leading planets by forces at these [m/N].
 
     Parameters
     ----------
@@ -89,9 +99,11 @@ def ring_compliance(
         Of the leading planets [rad].
     speeds : two floats
         Mesh frequency and speed of the carrier [rad/s].
+    pushed : (r,) complex array
+        What the forces move by a unit wave of every mode: ``approach`` of those of the meshes, ``sliding`` of friction.
     """
     omega, order = _angular(ring, orders, blocks, band, speeds), ring.waves[0]
-    amplitude = np.abs(ring.of_waves(ring.approach)) ** 2
+    amplitude = ring.of_waves(ring.approach) * ring.of_waves(pushed).conj()
     weight = np.where(_met(ring, orders, blocks, band), ring.receptance(omega) * amplitude, 0.0)
     around = np.exp(1j * np.outer(order, angles))
     return orders.paths.symmetry * np.einsum("kbw,wg,wh->kbgh", weight, around, around.conj(), optimize=True)
@@ -113,6 +125,7 @@ def ring_motion(
     speeds: tuple[float, float],
     places: tuple[np.ndarray, np.ndarray],
     heard: np.ndarray,
+    pushed: np.ndarray,
 ) -> np.ndarray:
     """Compute two-sided displacements (Q + 1, S, k) of fixed places of the outer surface [m].
 
@@ -126,11 +139,13 @@ def ring_motion(
         Angles (k,) of the places [rad], and their directions (k, 2): shares of radial and tangential displacement.
     heard : (S,) int array
         Side bands to give; those of waves beyond are left out.
+    pushed : (r,) complex array
+        As for `ring_compliance`.
     """
     order, every = ring.waves[0], np.arange(len(orders.base))
     omega = _angular(ring, orders, every, orders.bands, speeds)
     push = orders.paths.symmetry * np.einsum("wg,gbr->brw", np.exp(-1j * np.outer(order, angles)), force)
-    wave = -ring.receptance(omega) * ring.of_waves(ring.approach).conj() * push
+    wave = -ring.receptance(omega) * ring.of_waves(pushed).conj() * push
     wave = np.where(_met(ring, orders, every, orders.bands), wave, 0.0)
     theta, direction = places
     seen = (ring.of_waves(ring.surface) @ np.asarray(direction).T) * np.exp(1j * np.outer(order, theta))

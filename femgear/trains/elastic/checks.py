@@ -83,7 +83,11 @@ def check_dynamic_case(case: Case, gears: PlanetarySet) -> None:
         check_one_period(case, gears, takes, key="housing.form", remedy=remedy)
     record_periods(case, gears)
     if case.housing.stands_still:
-        no_acting_friction(case, "a housing that stands still has no place for friction along the flanks")
+        no_acting_friction(
+            case,
+            "a housing that stands still has no place for friction along the flanks",
+            "write the set as a gearbox, whose [casing] has: femgear gearbox CASE",
+        )
     _check_housing_supports(case)
     if case.housing.structure:
         imported_casing(case, gears)

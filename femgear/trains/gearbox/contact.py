@@ -229,7 +229,7 @@ def loaded_tables(
 
     What holds the gears is left out: shafts and bearings of the gearbox do.
     """
-    tables = copy.deepcopy(stage.teeth or {})
+    tables = {name: table for name, table in copy.deepcopy(stage.teeth or {}).items() if name != "losses"}
     operation, static = tables.setdefault("operation", {}), tables.setdefault("static", {})
     operation["torque"] = f"{torque:.15g} N m"
     if isinstance(stage, BoxPlanetarySection):

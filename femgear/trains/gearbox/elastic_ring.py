@@ -22,6 +22,7 @@ from femgear.system.assembly import GROUND, Assembly, with_modal_body
 from femgear.system.system import MechanicalSystem, MeshExcitation
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, stage_case_of
 from femgear.trains.gearbox.contact import loaded_tables
+from femgear.trains.gearbox.friction import rubbing_tables
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.sensors import BoxSensor
 from femgear.trains.registry import train_of
@@ -45,6 +46,9 @@ class ElasticRing:
         Approach of the flanks of every mesh per unit of a mode, planets at the standing carrier [kg^-1/2].
     wave : (m,) complex array
         V of the approach ``Re V exp(i n phi)`` of the flanks at a planet at angle phi [kg^-1/2].
+    sliding : (m, 2) complex array
+        The same of sliding along the tangent, and of turning, on which friction works [kg^-1/2, rad m^-1 kg^-1/2]; zero
+        without friction.
     surface : (m, 2) complex array
         The same of radial (outwards) and tangential displacement of the outer surface at an angle phi [kg^-1/2].
     participation : (m, 3) array
@@ -62,6 +66,7 @@ class ElasticRing:
     diameter: np.ndarray
     approach: np.ndarray
     wave: np.ndarray
+    sliding: np.ndarray
     surface: np.ndarray
     participation: np.ndarray
     excitation: MeshExcitation
@@ -79,7 +84,7 @@ class ElasticRing:
 
     def part(self, chosen: np.ndarray) -> ElasticRing:
         """Take some of the coordinates (m,)."""
-        arrays = "stiffness", "diameter", "approach", "wave", "surface", "participation"
+        arrays = "stiffness", "diameter", "approach", "wave", "sliding", "surface", "participation"
         return replace(self, **{name: getattr(self, name)[chosen] for name in arrays})
 
     @property
@@ -98,6 +103,7 @@ class ElasticRing:
             scale * alone.wave[first],
             scale[:, None] * alone.surface[first],
             loss,
+            (scale[:, None] * alone.sliding[first]).T,
         )
 
     def mass_coupling(self, assembly: Assembly) -> np.ndarray:
@@ -117,13 +123,14 @@ class ElasticRing:
         return rows
 
 
-def elastic_rings(model: GearboxModel, *, steps: Steps | None = None) -> tuple[ElasticRing, ...]:
+def elastic_rings(model: GearboxModel, *, steps: Steps | None = None, friction: bool = True) -> tuple[ElasticRing, ...]:
     """Compute the elastic rings of all stages that have one, at the torque of the load case.
 
-    FemgearError: what the modes of the set of their teeth are refused for.
+    Without ``friction`` that of their teeth excites nothing. FemgearError: what the modes of the set of their teeth are
+    refused for.
     """
-    steps = steps or Steps()
-    return tuple(elastic_ring(model, stage, steps=steps) for stage in model.stages if has_elastic_ring(stage))
+    steps, stages = steps or Steps(), [stage for stage in model.stages if has_elastic_ring(stage)]
+    return tuple(elastic_ring(model, stage, steps=steps, friction=friction) for stage in stages)
 
 
 def has_elastic_ring(stage: StageModel) -> bool:
@@ -131,7 +138,9 @@ def has_elastic_ring(stage: StageModel) -> bool:
     return isinstance(stage.section, BoxPlanetarySection) and stage.section.elastic_ring
 
 
-def elastic_ring(model: GearboxModel, stage: StageModel, *, steps: Steps | None = None) -> ElasticRing:
+def elastic_ring(
+    model: GearboxModel, stage: StageModel, *, steps: Steps | None = None, friction: bool = True
+) -> ElasticRing:
     """Compute the elastic ring of a stage, as `elastic_rings`.
 
     Its modes reach as far as the excitation of its teeth does, or of the gearbox where the teeth say nothing.
@@ -140,8 +149,10 @@ def elastic_ring(model: GearboxModel, stage: StageModel, *, steps: Steps | None 
     assert isinstance(section, BoxPlanetarySection)
     tables = loaded_tables(section, -model.flow.first_torque(section), 0)
     tables.setdefault("dynamics", {}).setdefault("up_to", f"{model.case.dynamics.up_to:.15g} Hz")
+    tables = rubbing_tables(model, stage, tables)
     solved = _set_modes(stage_case_of(case_text.write(tables)), steps)
     model_of_set, springs = solved.model, (len(stage.meshes),) * 2
+    excitation = solved.excitation if friction or solved.frictionless is None else solved.frictionless
     flexibility = model_of_set.system.flexibility
     mode, sine = model_of_set.ring_mode, model_of_set.ring_phase == 1
     ring, modes = solved.ring, solved.ring.modes
@@ -152,19 +163,26 @@ def elastic_ring(model: GearboxModel, stage: StageModel, *, steps: Steps | None 
     # along the normal the approach is cos(beta_b) of that in the transverse section, the force 1/cos(beta_b) of it
     cosine = math.cos(stage.sizes.base_helix)
     # flanks approach where the ring does not give way
-    wave = -cosine * factor * modes.load[mode, 0] * np.exp(1j * diameter * ring.load_angle)
+    pushed = -factor[:, None] * modes.load[mode] * np.exp(1j * diameter * ring.load_angle)[:, None]
+    sliding = pushed[:, 1:] if pushed.shape[1] > 1 else np.zeros((len(diameter), 2), complex)
     return ElasticRing(
         f"ring of {stage.name}",
         stage,
         np.diag(model_of_set.system.K)[model_of_set.ring_slice],
         diameter,
         cosine * model_of_set.system.W[model_of_set.ring_slice],
-        wave,
+        cosine * pushed[:, 0],
+        sliding,
         factor[:, None] * modes.output[mode],
         _participation(diameter, factor.conj() * ring.participation[mode], modes.count),
-        solved.excitation.along_normal(cosine),
+        _on_meshes(excitation).along_normal(cosine),
         np.zeros(springs) if flexibility is None else cosine**2 * flexibility,
     )
+
+
+def _on_meshes(excitation: MeshExcitation) -> MeshExcitation:
+    """Leave out the last source, which takes the mean of what friction loses: means are those of the statics."""
+    return excitation if excitation.source is None else replace(excitation, source=excitation.source[:-1])
 
 
 def _set_modes(case: Any, steps: Steps) -> Any:

@@ -20,6 +20,7 @@ from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.case_file import BoxMeshSection, PairSection
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.elastic_ring import ElasticRing
+from femgear.trains.gearbox.friction import stage_friction
 from femgear.trains.gearbox.geometry import StageSizes
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.stage_structure import stage_excitation
@@ -39,7 +40,12 @@ def exciting_stages(found: Deflection) -> list[StageModel]:
 
 
 def excitation_of(
-    found: Deflection, stage: StageModel, rings: Sequence[ElasticRing] = (), *, steps: Steps | None = None
+    found: Deflection,
+    stage: StageModel,
+    rings: Sequence[ElasticRing] = (),
+    *,
+    steps: Steps | None = None,
+    friction: bool = False,
 ) -> MeshExcitation:
     """Compute the excitation of one of the `exciting_stages`, see `femgear.trains.gearbox.stage_structure`.
 
@@ -52,12 +58,16 @@ def excitation_of(
         Of the gearbox: the meshes of their stages have what the ring leaves.
     steps : Steps, optional
         What other computations of the stage have left.
+    friction : bool
+        Whether friction acts where the case asks for it; of stages with an elastic ring the rings say so.
     """
     for ring in rings:
         if ring.stage is stage:
             return ring.excitation
     if stage.name in found.contacts:
-        return stage_excitation(found.contacts[stage.name], steps=steps)
+        contact = found.contacts[stage.name]
+        rubs = stage_friction(found.model, stage, contact.result.planetary_set) if friction else None
+        return stage_excitation(contact, rubs, steps=steps)
     return pair_count_excitation(found.model, stage)
 
 

@@ -642,6 +642,11 @@ def replace_stiffness(springs: StationSprings, stiffness: Sequence[float]) -> St
     return replace(springs, rows=springs.rows[values > 0.0], stiffness=values[values > 0.0])
 
 
+def reference_shaft(model: GearboxModel) -> str:
+    """Name the shaft whose speed counts: the first one that is given."""
+    return model.flow.independent[0] if model.flow.independent else model.case.shaft[0].name
+
+
 def member_of_stations(model: GearboxModel) -> list[str]:
     """Name the shaft, the planets, the elastic carrier or the casing that every station belongs to."""
     owner = [CASING] * len(model.assembly.names)

@@ -185,7 +185,7 @@ def forces_on_casing(
             forces[:, :, names.index(name)] += response.frequency[..., None] ** 2 * pushed
     assembly, casing = model.assembly, model.casing
     assert casing is not None
-    of_meshes = np.arange(len(structured.rows)) < structured.meshes
+    of_meshes = structured.of_meshes
     for station in {*casing.stations, *casing.own.values()}:
         waves = np.array([row_waves(row, stage, station, assembly.places) for row in structured.rows])
         if not waves.any():

@@ -4,6 +4,8 @@ Each stage is solved with its own stiffness k(t) in the structure of all the res
 mean stiffness (`femgear.trains.gearbox.stage_structure`). Lines of all stages add at sensors, feet and bearings. What
 that leaves out, k(t) of one stage on the motion that another one makes, is estimated (`cross_excitation`).
 
+Friction of the teeth, where it acts, is a source of every stage (`femgear.trains.gearbox.friction`).
+
 Damping is structural: springs and structure have the loss factor ``2 zeta``, with which a mode has the damping ratio
 zeta at its own frequency, wherever its energy lies (L. Cremer, M. Heckl, B. Petersson, Structure-Borne Sound, 2005).
 Torques and loads are those of one load case at all speeds; speeds are in proportion to one another. Gyroscopic terms
@@ -27,7 +29,7 @@ from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection
 from femgear.trains.gearbox.deflection import Deflection, spread_rows
 from femgear.trains.gearbox.elastic_ring import elastic_rings
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
-from femgear.trains.gearbox.model import GearboxModel, StageModel
+from femgear.trains.gearbox.model import GearboxModel, StageModel, reference_shaft
 from femgear.trains.gearbox.paths import CasingPaths, casing_paths, forces_on_casing
 from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage
@@ -170,11 +172,6 @@ class GearboxResponse:
         return found
 
 
-def reference_shaft(model: GearboxModel) -> str:
-    """Name the shaft whose speed counts: the first one that is given."""
-    return model.flow.independent[0] if model.flow.independent else model.case.shaft[0].name
-
-
 def output_rows(found: Deflection) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Make rows of all motions for sensors (s, 6n), bearings (3b, 6n) and feet (3f, 6n).
 
@@ -207,6 +204,7 @@ def solve_gearbox_response(
     progress: Progress = silent,
     stage: str = "dynamics",
     by_path: bool = False,
+    friction: bool = True,
 ) -> GearboxResponse:
     """Solve for the response of a gearbox to all its stages.
 
@@ -224,6 +222,8 @@ def solve_gearbox_response(
         Name for it.
     by_path : bool
         Find what sensors hear by every way into the casing.
+    friction : bool
+        Whether friction of the teeth acts where the case asks for it.
 
     Raises
     ------
@@ -231,7 +231,7 @@ def solve_gearbox_response(
         A mesh that opens (E-CONTACT-OPEN), equations that are nearly singular (E-RESONANCE).
     """
     model, steps = found.model, steps or Steps()
-    rings = elastic_rings(model, steps=steps)
+    rings = elastic_rings(model, steps=steps, friction=friction)
     case, reference = model.case, reference_shaft(model)
     nominal, speeds = abs(model.flow.speed[reference]), np.asarray(speed, float)
     up_to = case.dynamics.up_to
@@ -240,7 +240,8 @@ def solve_gearbox_response(
     lines, done = list[StageLines](), 0
     staged = exciting_stages(found)
     for one in staged:
-        structured = running_stage(found, one, excitation_of(found, one, rings, steps=steps), rings)
+        excitation = excitation_of(found, one, rings, steps=steps, friction=friction)
+        structured = running_stage(found, one, excitation, rings)
         forces = np.vstack([rows[len(sensors) :], mesh_rows(model, one)])
         outputs = np.vstack([structured.at_sensors(rows[: len(sensors)], sensors), forces @ structured.motion])
         lines.append(_stage_lines(found, one, structured, outputs, speeds / nominal, paths))

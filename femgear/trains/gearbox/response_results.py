@@ -38,13 +38,15 @@ class GearboxResponseResult(StageResult):
     """Response of a gearbox at some speeds.
 
     ``found`` is the response; ``whole`` keeps the lines of bearings too; ``unresolved`` counts the resonances of a
-    run-up whose peaks its speeds miss, ``resonances`` are all of them.
+    run-up whose peaks its speeds miss, ``resonances`` are all of them. ``frictionless`` is the response without the
+    friction of the teeth, where that acts.
     """
 
     found: GearboxResponse
     whole: bool
     unresolved: int = 0
     resonances: GearboxResonances | None = None
+    frictionless: GearboxResponse | None = None
 
     @property
     def residual(self) -> float:
@@ -88,6 +90,7 @@ class GearboxResponseResult(StageResult):
             lines = np.concatenate(list(of_bearings.values()), axis=2)
             lines = lines.reshape(len(found.speed), bearings, 3, -1)
             variables |= _complex("bearing_force", "speed bearing axis line", lines, "N", text)
+        variables |= {} if self.frictionless is None else _by_friction(found, self.frictionless, sensors, bearings)
         variables |= _of_several(found)
         names = [stage.name for stage in found.stages]
         coords: dict[str, Any] = {
@@ -130,6 +133,39 @@ def _at_sensors(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[st
         **_of_paths(found, moved),
         **_complex("lines", "speed sensor line", lines, "m/s^2", "acceleration, amplitude of the line"),
     }
+
+
+def _by_friction(found: GearboxResponse, without: GearboxResponse, sensors: int, bearings: int) -> dict[str, tuple]:
+    """Change of the levels at sensors by friction, of a gearbox without any of the forces of its bearings [dB]."""
+    every, forces = (found, without), slice(sensors, sensors + 3 * bearings)
+    if not sensors:
+        text = "added by friction to the fluctuation of the bearing force; NaN of rigid bearings"
+        each = (level(response, {one.name: one.motion[:, forces] for one in response.stages}) for response in every)
+        sizes = (np.sqrt((size.reshape(-1, bearings, 3) ** 2).sum(axis=2)) for size in each)
+        return {"friction_change": ("speed bearing", _decibels(*sizes), "dB", text)}
+    moved = [accelerations(response, sensors) for response in every]
+    sizes = (level(response, lines) for response, lines in zip(every, moved, strict=True))
+    quiet = {
+        (stage.name, harmonic, band): np.abs(moved[1][stage.name][..., at])
+        for stage in without.stages
+        for at, (harmonic, band) in enumerate(zip(stage.harmonic, stage.side_band, strict=True))
+    }
+    none = np.zeros((len(found.speed), sensors))
+    lines = [
+        quiet.get((stage.name, harmonic, band), none)
+        for stage in found.stages
+        for harmonic, band in zip(stage.harmonic, stage.side_band, strict=True)
+    ]
+    text = "amplitude of the line without friction"
+    return {
+        "friction_change": ("speed sensor", _decibels(*sizes), "dB", "added by friction to the level"),
+        "line_without_friction": ("speed sensor line", np.stack(lines, axis=-1), "m/s^2", text),
+    }
+
+
+def _decibels(level_with: np.ndarray, level_without: np.ndarray) -> np.ndarray:
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return 20.0 * np.log10(level_with / level_without)
 
 
 def _of_several(found: GearboxResponse) -> dict[str, tuple]:
@@ -407,6 +443,9 @@ def _lines(data: xr.Dataset, at: int, sensor: int) -> Block:
         "amplitude [m/s^2]": lambda i: f"{size[i]:.4g}",
         "origin": lambda i: line_origin(data, i),
     }
+    if "line_without_friction" in data:
+        quiet = data["line_without_friction"].values[at, sensor]
+        columns["without friction [m/s^2]"] = lambda i: f"{quiet[i]:.4g}"
     return tabulate(f"Largest lines at {data['sensor'].values[sensor]}", chosen, columns)
 
 

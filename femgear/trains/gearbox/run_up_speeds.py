@@ -20,9 +20,8 @@ from femgear.system.system import Modes
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
-from femgear.trains.gearbox.model import StageModel
+from femgear.trains.gearbox.model import StageModel, reference_shaft
 from femgear.trains.gearbox.modes import linear_system
-from femgear.trains.gearbox.response import reference_shaft
 from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 
 _MOST = 1000

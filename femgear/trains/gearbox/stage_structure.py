@@ -23,8 +23,9 @@ from femgear.fe.beam import rigid_link
 from femgear.gears.deviations import rotational_symmetry
 from femgear.gears.profile import base_helix_angle
 from femgear.housing.two_way.carrier_orders import MeshPaths, mean_excitation
-from femgear.housing.two_way.running_planets import RING, RunningStage
+from femgear.housing.two_way.running_planets import RING, RubbingPoints, RunningStage
 from femgear.solvers.linear.modal import undamped_modes
+from femgear.stages.friction_source import friction_on_meshes
 from femgear.stages.static import over_width, record_positions, static_supports
 from femgear.system.assembly import GROUND, Assembly, Inertia
 from femgear.system.system import MechanicalSystem, MeshExcitation
@@ -45,7 +46,9 @@ Row = list[tuple[int, np.ndarray]]
 _TURNING = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
 
 
-def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> MeshExcitation:
+def stage_excitation(
+    contact: StageContact, friction: tuple[float, ...] | None = None, *, steps: Steps | None = None
+) -> MeshExcitation:
     """Compute mesh stiffness, deflection and force of the teeth of a stage along their normals over a mesh period.
 
     As time goes on where gear 1, or the sun against its carrier, turns counter-clockwise.
@@ -54,12 +57,15 @@ def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> Me
     ----------
     contact : StageContact
         Of the loaded state.
+    friction : tuple of float, optional
+        Coefficients of friction, see `femgear.trains.gearbox.friction.stage_friction`; its forces are the sources.
     steps : Steps, optional
         What other computations of the stage have left.
     """
     case, static, steps = contact.case, contact.result, steps or Steps()
     moved = contact.deviations.planet_misalignment, contact.deviations.pin_errors
     known = {"teeth": case.source, "moved": tuple(np.concatenate([one.ravel() for one in moved]).tolist())}
+    known |= {"friction": friction}
     if (kept := steps.kept("excitation of a stage", known)) is not None:
         return kept
     gears = static.planetary_set
@@ -75,13 +81,13 @@ def stage_excitation(contact: StageContact, *, steps: Steps | None = None) -> Me
         contact=case.static.contact,
         deviations=None if contact.deviations.ideal else contact.deviations,
         supports=static_supports(case),
-        options=CycleOptions(**slices),
+        options=CycleOptions(friction=friction, **slices),
     )
     count = gears.n_planets * -(-_RECORD // gears.n_planets) * state.periods
     cosine = math.cos(base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
     stiffness, deflection, force = (state.resampled(name, count) for name in ("stiffness", "deflection", "force"))
     play = np.zeros(len(force))
-    transverse = MeshExcitation(stiffness, deflection, force, play, state.periods)
+    transverse = MeshExcitation(stiffness, deflection, force, play, state.periods, friction_on_meshes(state, count))
     return steps.keep("excitation of a stage", known, transverse.along_normal(cosine))
 
 
@@ -115,9 +121,9 @@ class StructuredStage:
     motion : (6n, m) array
         Motions of all stations by these modes [kg^-1/2].
     rows : tuple of Row
-        Of every contact point of the first planet: what it does to the structure.
-    meshes : int
-        Number of these that belong to meshes; those of its pin follow.
+        Of every contact point of the first planet, then of those of its friction: what it does to the structure.
+    of_meshes : (C + F,) bool array
+        Whether these belong to meshes; the others are those of its pin.
     rings : tuple of RingInStructure
         Elastic rings in the structure: of other stages, and of its own ring what moves with the casing.
     """
@@ -125,7 +131,7 @@ class StructuredStage:
     running: RunningStage
     motion: np.ndarray
     rows: tuple[Row, ...]
-    meshes: int
+    of_meshes: np.ndarray
     rings: tuple[RingInStructure, ...] = ()
 
     def at_sensors(self, rows: np.ndarray, sensors: Sequence[BoxSensor]) -> np.ndarray:
@@ -171,22 +177,31 @@ def running_stage(
     kinds = len(mean) // max(len(stage.planets), 1)
     stiffness[:kinds] = mean.reshape(kinds, -1).mean(axis=1)
     mass, gyroscopic, turning = np.zeros((3, 6, 6))
-    flexibility, free, meshes = None, np.zeros(0, int), len(rows)
+    flexibility, free, of_meshes = None, np.zeros(0, int), [True] * len(rows)
     if planetary:
         first = 6 * stage.planets[0]
         free = np.flatnonzero(~found.model.assembly.held[first : first + 6])
         used = free[planet_bearing(section)[free] > 0.0]
-        pins, springs, flexibility = _pin_rows(found.model, stage, used, meshes)
-        rows, stiffness = [*rows, *pins], np.append(stiffness, springs)
+        pins, springs, flexibility = _pin_rows(found.model, stage, used, len(rows))
+        rows, stiffness, of_meshes = [*rows, *pins], np.append(stiffness, springs), of_meshes + [False] * len(pins)
         points = np.vstack([points, np.eye(6)[used]])
         mass, gyroscopic, turning = _planet(found.model, stage)
     shape = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rows])
-    waves = None
+    waves, rubbing = None, None
+    if excitation.source is not None:
+        rubbed, sliding = _rubbing_rows(found, stage)
+        of_friction = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rubbed])
+        rows, of_meshes = [*rows, *rubbed], of_meshes + [True] * len(rubbed)
+        rubbing = RubbingPoints(of_friction, sliding.T[free])
     if ring is not None:
-        flexibility = _with_bodies(flexibility, ring.flexibility, len(stage.planets), len(rows))
+        flexibility = _with_bodies(flexibility, ring.flexibility, len(stage.planets), len(stiffness))
         waves = ring.running(2.0 * damping)
         own = next(part for part in inner if part.ring.stage is stage)
-        shape[RING] += _ring_waves(own.ring, own.coordinates)
+        shape[RING] += _ring_waves(own.ring, own.ring.wave, own.coordinates)
+        if rubbing is not None:
+            for at, sliding in zip((RING, kinds + RING), own.ring.sliding.T, strict=True):
+                of_friction[at] += _ring_waves(own.ring, sliding, own.coordinates)
+            rubbing = RubbingPoints(of_friction, rubbing.approach)
     running = RunningStage(
         2.0 * math.pi * modes.frequency,
         np.zeros(len(modes.frequency)),
@@ -203,19 +218,23 @@ def running_stage(
         structure_loss=2.0 * damping,
         flexibility=flexibility,
         ring=waves,
+        rubbing=rubbing,
     )
-    return StructuredStage(running, motion, tuple(rows), meshes, tuple(inner))
+    return StructuredStage(running, motion, tuple(rows), np.array(of_meshes), tuple(inner))
 
 
-def _ring_waves(ring: ElasticRing, inner: np.ndarray) -> np.ndarray:
-    """Approach (3, m) of the flanks of the ring by modes with these coordinates (r, m), wave by wave from -1 to 1."""
+def _ring_waves(ring: ElasticRing, wave: np.ndarray, inner: np.ndarray) -> np.ndarray:
+    """Approach or sliding (3, m), ``wave`` (r,) by the coordinates of the ring, by modes that have these (r, m).
+
+    Wave by wave from -1 to 1.
+    """
     waves = np.zeros((3, inner.shape[1]), complex)
     for n in (0, 1):
-        found = ring.wave[ring.diameter == n] @ inner[ring.diameter == n]
+        found = wave[ring.diameter == n] @ inner[ring.diameter == n]
         waves[1 + n] += found if n == 0 else 0.5 * found
         if n:
             # the coordinates are real
-            waves[1 - n] += 0.5 * ring.wave[ring.diameter == n].conj() @ inner[ring.diameter == n]
+            waves[1 - n] += 0.5 * wave[ring.diameter == n].conj() @ inner[ring.diameter == n]
     return waves
 
 
@@ -301,6 +320,25 @@ def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndar
         points.append(axes @ planet[0] if planet else np.zeros(6))
         springs.append(value)
     return rows, np.array(springs), np.array(points)
+
+
+def _rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray]:
+    """Points at which friction of the leading meshes acts, along their tangents, then as couples.
+
+    What they do to the structure, and sliding (F, 6) of the planet along its radial, tangential and z axes: that of all
+    slices by their stiffness.
+    """
+    assembly, _, stiffness = linear_system(found)
+    axes = np.kron(np.eye(2), pin_axes(stage.angles[0])) if stage.planets else np.eye(6)
+    rows, of_planet = list[Row](), list[np.ndarray]()
+    for kind in (0, 1):
+        for mesh in stage.meshes[:: max(len(stage.planets), 1)]:
+            contact, k = assembly.contacts[mesh], stiffness[assembly.slices[mesh]]
+            sliding = np.einsum("s,gsm->gm", k / k.sum(), contact.sliding[kind])
+            parts = [(station, row) for station, row in zip(contact.stations, sliding, strict=True)]
+            rows.append([(at, row) for at, row in parts if at != GROUND and at not in stage.planets])
+            of_planet += [sum((axes @ row for at, row in parts if at in stage.planets), np.zeros(6))]
+    return rows, np.array(of_planet)
 
 
 def _pin_rows(
@@ -418,7 +456,6 @@ def _reversed(excitation: MeshExcitation, *, back: bool) -> MeshExcitation:
     """Excitation of gears that turn the other way round."""
     if not back:
         return excitation
-    arrays = {
-        name: np.roll(getattr(excitation, name)[:, ::-1], 1, axis=1) for name in ("stiffness", "deflection", "force")
-    }
-    return replace(excitation, **arrays)
+    arrays = {name: getattr(excitation, name) for name in ("stiffness", "deflection", "force", "source")}
+    turned = {name: np.roll(record[:, ::-1], 1, axis=1) for name, record in arrays.items() if record is not None}
+    return replace(excitation, **turned)

@@ -11,7 +11,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
-from femgear.case.tooth_friction import no_acting_friction
+from femgear.case.tooth_friction import friction_acts
 from femgear.report.tables import Block, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
@@ -25,13 +25,15 @@ from femgear.trains.gearbox.balance import (
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection, teeth_of
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
+from femgear.trains.gearbox.friction import box_friction_findings
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries
+from femgear.trains.gearbox.model import reference_shaft
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
 from femgear.trains.gearbox.resonance_table import describe_resonances
-from femgear.trains.gearbox.response import reference_shaft, solve_gearbox_response
+from femgear.trains.gearbox.response import solve_gearbox_response
 from femgear.trains.gearbox.response_results import (
     GearboxResponseResult,
     describe_gearbox_response,
@@ -113,9 +115,9 @@ def solve_box_dynamics(
     """Solve for the response to all stages at the speeds of the chosen load case."""
     state = deflection.of(case).state
     speed = [abs(state.model.flow.speed[reference_shaft(state.model)])]
-    return GearboxResponseResult(
-        solve_gearbox_response(state, speed, steps=steps, progress=progress, by_path=True), whole=True
-    )
+    response = solve_gearbox_response(state, speed, steps=steps, progress=progress, by_path=True)
+    without = solve_gearbox_response(state, speed, steps=steps, friction=False) if friction_acts(case) else None
+    return GearboxResponseResult(response, whole=True, frictionless=without)
 
 
 @one_blas_thread()
@@ -161,8 +163,6 @@ def _no_runup(case: GearboxCase) -> str:
 
 def check_before_run(case: GearboxCase) -> None:
     """Refuse files of a casing that are none of this case, shafts that the model leaves loose, and idle sensors."""
-    for teeth in (case, *(teeth for stage in (*case.pair, *case.planetary) if (teeth := teeth_of(stage)) is not None)):
-        no_acting_friction(teeth, "gearboxes have no place for friction along the flanks")
     check_casing_file(case)
     check_held(case)
     check_sensors(case)
@@ -330,7 +330,7 @@ GEARBOX = Train(
         ),
     ),
     describe=describe_gearbox,
-    warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case)),
+    warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case), *box_friction_findings(case)),
     bodies=lambda case: gearbox_bodies(case, {}),
     judgements=gearbox_judgements,
     front=(

@@ -24,8 +24,8 @@ from femgear.system.system import MeshExcitation
 from femgear.system.turning_meshes import TurningMeshes
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
 from femgear.trains.gearbox.excitation import constant_excitation, excitation_of, exciting_stages
+from femgear.trains.gearbox.model import reference_shaft
 from femgear.trains.gearbox.nonlinear import NonlinearGearbox, NonlinearStage, nonlinear_gearbox
-from femgear.trains.gearbox.response import reference_shaft
 from femgear.trains.gearbox.transient_case import TorqueOverTimeSection, TransientSection, torque_histories
 
 ALL_MOTIONS, TORSIONAL = "all motions", "torsional"

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from femgear.report.tables import Block, Marks, doubtful_excitation
+from femgear.stages.friction_source import friction_rows
 from femgear.stages.heat_results import heat_rows
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
 from femgear.stages.life_results import life_rows
@@ -50,6 +51,7 @@ def gearbox_verdict(results: Any) -> Iterator[Block]:
         rows += _nearest_mode(modes)
     if "dynamics" in results.stages:
         rows += _heard(results.dynamics, modes, marks)
+        rows += friction_rows(results, marks)
     if "runup" in results.stages:
         rows += _over_speeds(results.runup, marks)
     if rows:

@@ -8,10 +8,48 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from running_twin import TURN, Twin, running, twin
+from running_twin import POSITIONS, TURN, Twin, running, twin
 
 from femgear.errors import CaseError, ConvergenceError
-from femgear.housing.two_way.running_planets import RunningStage, solve_running
+from femgear.housing.two_way.running_planets import RubbingPoints, RunningStage, solve_running
+
+SLIDING = np.array([[0.9, -0.4, 0.1, 0.0], [-0.4, -0.9, 0.0, 0.2], [0.05, 0.03, 1.0, -1.0]])
+"""Sliding of planets at points of friction: two tangents and two couples."""
+
+
+def sliding_rows(phi: float) -> np.ndarray:
+    """Sliding (4, 11) at the points of friction of a planet at an angle by the structure."""
+    radial, around = np.array([np.cos(phi), np.sin(phi)]), np.array([-np.sin(phi), np.cos(phi)])
+    found = np.zeros((4, 11))
+    found[0, :2], found[0, 2] = np.cos(0.4) * radial - np.sin(0.4) * around, 0.3
+    found[1, 6:8], found[1, 8] = np.cos(0.4) * radial + np.sin(0.4) * around, 0.5
+    found[2, 2], found[3, 8] = 1.0, -1.0
+    return found
+
+
+def rubbing(system: Twin) -> tuple[Twin, RubbingPoints]:
+    """Give a twin loads along the sliding of all its planets, which turn round within the period."""
+    theta, count = 2.0 * np.pi * np.arange(POSITIONS) / POSITIONS, len(system.angles)
+    source = np.zeros((4, count, POSITIONS))
+    for planet, psi in enumerate(system.angles):
+        at = theta + system.sense * system.teeth * psi
+        source[:, planet] = 40.0 * np.cos(at + np.arange(4)[:, None]) + 15.0 * np.sin(2.0 * at) + 7.0
+    samples = np.array([sliding_rows(phi) @ system.modes()[1] for phi in 2.0 * np.pi * np.arange(3) / 3])
+    waves = np.fft.fft(samples, axis=0) / 3
+    excitation = replace(system.excitation, source=source.reshape(4 * count, -1))
+    return replace(system, excitation=excitation), RubbingPoints(
+        np.stack([waves[2], waves[0], waves[1]], axis=1), SLIDING
+    )
+
+
+def whole_sliding(system: Twin, turn: float) -> np.ndarray:
+    """Sliding (4 N, 11 + 3 N) at all points of friction by structure and planets, as `Twin.whole_rows`."""
+    swapped = replace(system, points=SLIDING)
+    count = len(system.angles)
+    rows = swapped.whole_rows(turn).reshape(4, count, -1)
+    for planet, psi in enumerate(system.angles):
+        rows[:, planet, :11] = sliding_rows(psi + system.sense * turn)
+    return rows.reshape(4 * count, -1)
 
 
 def direct(system: Twin, harmonics: int, reach: int) -> tuple[np.ndarray, np.ndarray]:
@@ -60,6 +98,14 @@ def direct(system: Twin, harmonics: int, reach: int) -> tuple[np.ndarray, np.nda
     pressed = np.einsum("ijm,jmkq->imkq", springs, approach).reshape(flat.shape)
     matrix = flat.conj().T @ pressed
     load = -flat.conj().T @ given.ravel()
+    if system.excitation.source is not None:
+        sliding = np.fft.fft([whole_sliding(system, turn) for turn in theta], axis=0) / samples
+        lines = spectra(system.excitation.source)
+        for h in set(range(-harmonics, harmonics + 1)) - {0}:
+            for wave in (-1, 0, 1):
+                at = reach + h * system.teeth - wave
+                if abs(h * system.teeth) <= reach and 0 <= at < width:
+                    load[at * n : at * n + n] += sliding[wave].conj().T @ lines[:, h + harmonics]
     for i, order in enumerate(orders):
         own = slice(i * n, i * n + n)
         matrix[own, own] -= np.diag((order * TURN) ** 2 * system.whole_mass)
@@ -115,6 +161,45 @@ def test_lines_are_those_of_one_linear_system(name):
     assert np.abs(met - wanted)[moving].max() < 1e-5 * size
     laterals = [0, 1, 3, 4, 6, 7, 9, 10]
     assert np.abs(met - wanted)[np.abs(orders) < teeth // 2][:, laterals].max() < 1e-5 * size
+
+
+@pytest.mark.parametrize(
+    ("count", "teeth", "sense", "symmetry", "angles"),
+    [
+        (3, 10, 1, 3, None),
+        (3, 10, -1, 3, None),
+        (3, 9, 1, 1, None),
+        pytest.param(4, 10, 1, 2, (0.0, 1.4, np.pi, np.pi + 1.4), marks=pytest.mark.slow),
+    ],
+)
+def test_friction_moves_what_it_moves_in_one_linear_system(count, teeth, sense, symmetry, angles):
+    plain = twin(count, teeth, sense, angles=angles)
+    system, points = rubbing(plain)
+    orders, wanted = direct(system, 1, 3 * teeth + 4)
+    stage = replace(running(system, symmetry=symmetry), rubbing=points)
+    met = of_orders(system, stage, orders, 1, 4)
+    moving = (np.abs(orders) <= teeth + 4) & (orders != 0)
+    size = np.abs(wanted[moving]).max()
+    assert np.abs(met - wanted)[moving].max() < 1e-5 * size
+    without = of_orders(system, replace(stage, rubbing=None), orders, 1, 4)
+    assert np.abs(met - without)[moving].max() > 0.01 * size
+
+
+def test_friction_of_patterns_is_that_of_all_planets():
+    """Three periods as one, of which each is another: only errors that turn make such, here all planets are alike."""
+    system, points = rubbing(twin(3, 13))
+    thrice = {
+        name: np.tile(getattr(system.excitation, name), 3) for name in ("stiffness", "deflection", "force", "source")
+    }
+    # the first planet rubs more in the first period
+    thrice["source"][::3, :POSITIONS] *= 1.5
+    system = replace(system, excitation=replace(system.excitation, **thrice, periods=3))
+    known = {"harmonics": (2, 3), "side_bands": 5, "tolerance": 1e-13}
+    few, every = (
+        solve_running(replace(running(system, symmetry=symmetry), rubbing=points), 13 * TURN, TURN, **known)
+        for symmetry in (3, 1)
+    )
+    assert np.abs(few.modal - every.modal).max() < 1e-10 * np.abs(every.modal).max()
 
 
 def test_equal_planets_move_nothing_at_orders_that_are_no_multiples():
