@@ -86,6 +86,11 @@ def test_a_file_reads_as_one_that_xarray_has_written(tmp_path):
     assert [*ours.data_vars, *ours.sizes] == [*theirs.data_vars, *theirs.sizes]
     for name, one in theirs.variables.items():
         assert ours[name].dtype == one.dtype, name
+    with xr.open_dataset(tmp_path / "ours.nc", engine="h5netcdf", decode_times=False) as by_xarray:
+        xr.testing.assert_identical(ours, by_xarray.load())
+        assert [(name, one.dtype) for name, one in by_xarray.variables.items()] == [
+            (name, one.dtype) for name, one in ours.variables.items()
+        ]
     with h5py.File(tmp_path / "ours.nc") as file:
         assert {scale.name for axis in file["moved"].dims for scale in axis.values()} == {
             "/member",
