@@ -132,6 +132,21 @@ def everything_is_done_here():
 
 
 @pytest.fixture(scope="module")
+def pictures_undrawn():
+    """Figures are made, and their files written, but nothing is drawn, for files whose tests look at no picture."""
+    from PIL import Image
+
+    from femgear.report import page, style
+
+    stream = io.BytesIO()
+    Image.new("L", (1, 1)).save(stream, "png")
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (style, page):
+            patch.setattr(module, "png_bytes", lambda figure: stream.getvalue())
+        yield
+
+
+@pytest.fixture(scope="module")
 def coarse_states():
     """Loaded states of few positions, for files whose tests compare runs, whatever the numbers."""
     from femgear.contact import loaded_period

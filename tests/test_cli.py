@@ -28,6 +28,8 @@ from femgear.storage.files import write_dataset, write_text
 from femgear.trains.elastic.stages import ELASTIC
 from femgear.trains.reading import open_results, parse_case, read_case, to_toml, with_value, with_values
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
 STAGES = ("static", "stress", "modes", "runup", "dynamics", "housing")

@@ -24,6 +24,8 @@ from femgear.stages.static_results import describe_stress
 from femgear.trains.reading import open_results, read_case, with_values
 from femgear.trains.registry import train_of, trains
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 PACKAGE = Path(__file__).parents[1] / "femgear"
 CASES = Path(__file__).parents[1] / "cases"
 

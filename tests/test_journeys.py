@@ -21,6 +21,8 @@ from femgear.gears.modifications import LeadModification, Modification, lead_dev
 from femgear.trains import registry
 from femgear.trains.reading import open_results, parse_case
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 ROOT = Path(__file__).parents[1]
 CASE = """model = "oscillator"
 title = "A mass on a spring"

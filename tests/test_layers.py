@@ -4,10 +4,10 @@ import ast
 import subprocess
 import sys
 from collections import Counter, defaultdict
+from collections.abc import Iterator
 from functools import cache
+from itertools import chain
 from pathlib import Path
-
-import pytest
 
 PACKAGE = Path(__file__).parents[1] / "femgear"
 LAYERS = (
@@ -57,9 +57,17 @@ def tree(path: Path) -> ast.Module:
 
 
 @cache
-def walked(path: Path) -> tuple[ast.AST, ...]:
-    """All nodes of a file, the outer ones first."""
-    return tuple(ast.walk(tree(path)))
+def walked(path: Path) -> dict[type, list[ast.AST]]:
+    """All nodes of a file by their kind, the outer ones first."""
+    kinds = defaultdict(list)
+    for node in ast.walk(tree(path)):
+        kinds[type(node)].append(node)
+    return kinds
+
+
+def of_kinds(path: Path, *kinds: type) -> Iterator[ast.AST]:
+    """All nodes of some kinds in a file."""
+    return chain.from_iterable(walked(path)[kind] for kind in kinds)
 
 
 @cache
@@ -177,29 +185,31 @@ def test_every_module_has_the_test_file_of_its_name():
     assert without == WITHOUT_TEST_FILE.keys()
 
 
-def heavy_after(code: str, heavy: set[str] = HEAVY) -> set[str]:
-    script = f"import sys\n{code}\nprint()\nprint('|'.join({heavy!r} & sys.modules.keys()))"
+def loaded_after(*steps: str) -> list[set[str]]:
+    """Names of the modules that a process has loaded after each of some steps, which follow one another."""
+    told = "print('\\0', *sys.modules, sep='|')"
+    script = "\n".join(["import sys", *(f"{step}\n{told}" for step in steps)])
     run = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=True)
-    return set(filter(None, run.stdout.splitlines()[-1].split("|")))
+    return [set(line.split("|")) for line in run.stdout.splitlines() if line.startswith("\0")]
 
 
-@pytest.mark.parametrize(
-    "code",
-    [
-        "import femgear",
-        "import femgear.case.gear_set",
-        "import femgear.storage.results",
-        "from femgear.cli import main; main(['--help'])",
-        "from femgear.cli import main; main(['--version'])",
-    ],
-)
-def test_heavy_libraries_are_imported_late(code):
-    assert heavy_after(code) == set()
+CASE = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
+STEPS = {
+    "import femgear": HEAVY,
+    "from femgear.cli import main; main(['--version'])": HEAVY,
+    "main(['--help'])": HEAVY | {"scipy.linalg", "scipy.sparse", "scipy.special", "scipy.interpolate"},
+    "import femgear.case.gear_set": HEAVY,
+    "import femgear.storage.results": HEAVY,
+    f"femgear.read_case({str(CASE)!r})": HEAVY | SOLVING,
+    f"main(['check', {str(CASE)!r}])": HEAVY,
+}
+"""What a user does, and what is not loaded then: libraries that draw or solve, of stages none to read a case."""
 
 
-def test_help_loads_no_part_of_scipy():
-    code = "from femgear.cli import main; main(['--help'])"
-    assert heavy_after(code, {"scipy.linalg", "scipy.sparse", "scipy.special", "scipy.interpolate"}) == set()
+def test_heavy_libraries_are_imported_late():
+    loaded = loaded_after(*STEPS)
+    assert len(loaded) == len(STEPS)
+    assert {step: late & names for (step, late), names in zip(STEPS.items(), loaded) if late & names} == {}
 
 
 def test_a_run_loads_xarray_without_dask_and_pint():
@@ -213,24 +223,15 @@ def test_a_run_loads_xarray_without_dask_and_pint():
     subprocess.run([sys.executable, "-c", code], check=True, timeout=60)
 
 
-def test_checking_a_case_loads_no_library_that_draws_or_solves():
-    case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
-    assert heavy_after(f"from femgear.cli import main; main(['check', {str(case)!r}])") == set()
-
-
 def test_a_run_without_pictures_loads_neither_xarray_nor_what_draws(tmp_path):
-    case, wanted = tmp_path / "case.toml", HEAVY - {"skfem"} | DRAWING
-    text = (PACKAGE.parent / "cases" / "planetary_27_40_108.toml").read_text(encoding="utf-8")
-    coarse = text.replace("positions = 64", "positions = 14\nflank_elements = 6", 1)
-    assert coarse != text
-    case.write_text(coarse, encoding="utf-8")
+    from femgear.trains.reading import read_case, with_values
+
+    case, quick = tmp_path / "case.toml", {"static.positions": 8, "static.flank_elements": 6, "runup.count": 2}
+    quick |= {"dynamics.mesh_harmonics": 2, "operation.speeds": ["250 rpm"]}
+    case.write_text(with_values(read_case(CASE), quick).source, encoding="utf-8")
     arguments = ["run", str(case), "-o", str(tmp_path / "out"), "--no-pictures"]
-    assert heavy_after(f"from femgear.cli import main; main({arguments!r})", wanted) == set()
-
-
-def test_reading_a_case_loads_no_stage():
-    case = PACKAGE.parent / "cases" / "planetary_27_40_108.toml"
-    assert heavy_after(f"import femgear; femgear.read_case({str(case)!r})", HEAVY | SOLVING) == set()
+    (loaded,) = loaded_after(f"from femgear.cli import main; main({arguments!r})")
+    assert (HEAVY - {"skfem"} | DRAWING) & loaded == set()
 
 
 def test_no_function_is_longer_than_70_lines():
@@ -238,12 +239,11 @@ def test_no_function_is_longer_than_70_lines():
     functions = ast.FunctionDef, ast.AsyncFunctionDef
     long = {}
     for path in MODULES:
-        for node in walked(path):
-            if isinstance(node, functions):
-                described = ast.get_docstring(node) is not None
-                first = node.body[0].end_lineno if described else node.lineno
-                if node.end_lineno - first >= 70:
-                    long[f"{place(path)}:{node.name}"] = node.end_lineno - first
+        for node in of_kinds(path, *functions):
+            described = ast.get_docstring(node) is not None
+            first = node.body[0].end_lineno if described else node.lineno
+            if node.end_lineno - first >= 70:
+                long[f"{place(path)}:{node.name}"] = node.end_lineno - first
     assert not long
 
 
@@ -259,16 +259,15 @@ def read_texts(path: Path) -> list[ast.expr]:
     reading = {"startswith", "endswith", "removesuffix", "removeprefix", "replace", "partition", "rpartition"}
     reading |= {"split", "rsplit", "find", "index", "count"}
     texts = []
-    for node in walked(path):
-        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in reading:
-            if node.func.attr == "split" and not node.args:  # puts a text on one line
-                continue
+    for node in of_kinds(path, ast.Call):
+        if not isinstance(node.func, ast.Attribute):
+            continue
+        if node.func.attr in reading and (node.func.attr != "split" or node.args):  # which puts a text on one line
             texts.append(node.func.value)
-        elif isinstance(node, ast.Call) and ast.unparse(node.func) in ("re.match", "re.search", "re.fullmatch"):
+        elif node.func.attr in ("match", "search", "fullmatch") and ast.unparse(node.func.value) == "re":
             texts.append(node.args[1])
-        elif isinstance(node, ast.Compare) and isinstance(node.ops[0], ast.In | ast.NotIn):
-            texts.append(node.comparators[0])
-    return texts
+    comparisons = of_kinds(path, ast.Compare)
+    return texts + [node.comparators[0] for node in comparisons if isinstance(node.ops[0], ast.In | ast.NotIn)]
 
 
 def is_prose(text: ast.expr, remedies: set[str]) -> bool:
@@ -286,7 +285,7 @@ def test_no_module_reads_prose():
     """Refusals and findings are data: no condition hangs on words of a message, a remedy or a limit."""
     wrong = defaultdict(list)
     for path in MODULES:
-        loops = (node for node in walked(path) if isinstance(node, ast.For | ast.comprehension))
+        loops = of_kinds(path, ast.For, ast.comprehension)
         of_remedies = (loop.target for loop in loops if ast.unparse(loop.iter).endswith("remedies"))
         remedies = {target.id for target in of_remedies if isinstance(target, ast.Name)}
         for text in read_texts(path):
@@ -324,11 +323,9 @@ def test_local_variables_say_what_they_hold():
     for path in MODULES:
         if place(path).startswith(STILL_SO):
             continue
-        classes = (node for node in walked(path) if isinstance(node, ast.ClassDef))
+        classes, meant = of_kinds(path, ast.ClassDef), MEANT.get(place(path), set())
         fields = {line.target for node in classes for line in node.body if isinstance(line, ast.AnnAssign)}
-        for node in walked(path):
-            held = isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and node not in fields
-            name = node.id if held else getattr(node, "arg", None) if isinstance(node, ast.arg) else None
-            if name in SAYS_NOTHING - MEANT.get(place(path), set()):
-                wrong.append(f"{place(path)}:{node.lineno}: {name}")
+        stored = (node for node in of_kinds(path, ast.Name) if isinstance(node.ctx, ast.Store) and node not in fields)
+        names = chain(((node.id, node) for node in stored), ((node.arg, node) for node in of_kinds(path, ast.arg)))
+        wrong += [f"{place(path)}:{node.lineno}: {name}" for name, node in names if name in SAYS_NOTHING - meant]
     assert wrong == []

@@ -22,6 +22,8 @@ from femgear.report.tables import Block, merged
 from femgear.storage.files import checked_name
 from femgear.trains.reading import open_results, read_case
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
 TITLE = "Prüfstand 3: Ω ≈ 2 µm ½"

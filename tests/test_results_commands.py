@@ -25,6 +25,8 @@ from femgear.storage.results import (
 )
 from femgear.trains.reading import read_case
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 CASE = Path(__file__).parents[1] / "cases" / "planetary_27_40_108.toml"
 
 

@@ -24,7 +24,7 @@ from femgear.trains.reading import read_case, with_values
 
 SPEEDS = [f"{speed} rpm" for speed in range(1000, 3000, 150)]
 CASES = Path(__file__).parents[1] / "cases"
-pytestmark = pytest.mark.usefixtures("coarse_states")
+pytestmark = pytest.mark.usefixtures("coarse_states", "pictures_undrawn")
 QUICK = {
     "planetary_27_40_108": {
         "static.positions": 14,

@@ -18,6 +18,8 @@ from page_examples import ROOT, read_page, run_examples
 from femgear import cli, open_results, read_case, solve, with_values
 from femgear.trains import registry
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 PAGES = ("pin_errors", "faq", "api", "live", pytest.param("silent_without_load", marks=pytest.mark.slow))
 TUTORIAL = ("drawing_to_ste",)
 HOW_TO = (

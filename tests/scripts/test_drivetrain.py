@@ -3,6 +3,8 @@
 import pytest
 from script_runs import run_script
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 
 def run(path, output):
     return run_script("drivetrain.py", path, "-o", output, folder=path.parent)

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from script_runs import run_script
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 FOLDER = Path(__file__).resolve().parents[2] / "scripts" / "examples"
 # what each one prints: closed forms, published orders, neighbouring rows of docs, or the effect that it shows
 ANSWERS = {

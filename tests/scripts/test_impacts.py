@@ -5,6 +5,8 @@ import csv
 import pytest
 from script_runs import run_script
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 
 def run(*arguments, folder):
     return run_script("impacts.py", *arguments, folder=folder)

@@ -14,6 +14,8 @@ from femgear.errors import CaseError
 from validation.soak import __main__ as program
 from validation.soak import case_text, damage, faults, kills, page, programs, state, supply, trials
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):

@@ -12,6 +12,8 @@ from femgear import cli, open_results, read_case, solve, with_value
 from femgear.errors import CaseError
 from femgear.trains import registry
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 TEXT = """model = "oscillator"
 title = "A mass on a spring"
 

@@ -18,6 +18,8 @@ from femgear.study.objectives import named_quantity
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 TOLERANCES = """
 [[tolerance]]
 key = "bearing[0].position"

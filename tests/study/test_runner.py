@@ -25,6 +25,8 @@ from femgear.study.sweep import sweep
 from femgear.trains.reading import read_case, to_toml, with_values
 from validation.soak import programs
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 RATIO = "dynamics.damping_ratio"
 

@@ -43,6 +43,8 @@ from femgear.study.samples import (
 from femgear.trains.reading import read_case, with_value, with_values
 from validation.soak import programs
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 CASES = Path(__file__).resolve().parents[2] / "cases"
 CASE, TOLERANCES = CASES / "planetary_27_40_108.toml", CASES / "tolerances/3um.toml"
 TORQUE = 100.0

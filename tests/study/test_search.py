@@ -33,6 +33,8 @@ from femgear.study.sweep import describe_sweep, parse_over, sweep, sweep_into
 from femgear.trains.live import Live
 from femgear.trains.reading import read_case, with_value, with_values
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 # entries without consequences for the gears: numbers from 0 to 1 and masses
 X, Y = Variable("dynamics.damping_ratio", 0.05, 0.95), Variable("carrier.mass", "0.1 kg", "3 kg")

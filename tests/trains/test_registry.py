@@ -9,6 +9,8 @@ import pytest
 from femgear import cli, read_case
 from femgear.trains import registry
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 TEXT = """model = "oscillator"
 title = "A mass on a spring"
 

@@ -22,6 +22,8 @@ from femgear.trains.elastic.runup import describe_runup
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes, solve_runup
 from femgear.trains.reading import parse_case, read_case, with_values
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 FEET = [
     {"angle": f"{angle} deg", "radial_stiffness": "4e8 N/m", "tangential_stiffness": "2e8 N/m"}

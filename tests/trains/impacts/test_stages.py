@@ -13,6 +13,8 @@ from femgear.trains.impacts.stages import solve_sweep
 from femgear.trains.reading import case_schema, read_case, to_toml, with_values
 from femgear.trains.registry import stages_of
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 QUICK = {
     "response.from": 1.05,
     "response.to": 0.65,

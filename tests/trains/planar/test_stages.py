@@ -38,6 +38,8 @@ from femgear.trains.planar.stages import PLANAR, solve_branch, solve_planar_mode
 from femgear.trains.reading import open_results, read_case, to_toml, with_value
 from femgear.trains.registry import stages_of as stages_of_case
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 ROOT = Path(__file__).parents[3]
 FIGURES = ("weight_response", "carrier_orbit", "planet_bearing_forces", "tooth_contact", "wedged_teeth")
 
