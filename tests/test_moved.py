@@ -8,27 +8,26 @@ import pytest
 
 from femgear.moved import MOVED, former_names
 
+FORMER = """
+femgear.trains.protocol femgear.stages.protocol StageResult
+femgear.trains.static.stages femgear.stages.static solve_static
+femgear.trains.gear_pair.model femgear.trains.impacts.model ImpactPair
+femgear.housing.casing_files femgear.exchange.casing_files read_casing
+"""
 
-@pytest.mark.parametrize(
-    ("former", "new", "name"),
-    [
-        ("femgear.trains.protocol", "femgear.stages.protocol", "StageResult"),
-        ("femgear.trains.static.stages", "femgear.stages.static", "solve_static"),
-        ("femgear.trains.gear_pair.model", "femgear.trains.impacts.model", "ImpactPair"),
-        ("femgear.housing.casing_files", "femgear.exchange.casing_files", "read_casing"),
-    ],
-)
-def test_former_names_are_the_modules_by_their_new_ones(former, new, name):
+
+def test_former_names_are_the_modules_by_their_new_ones():
     """In a process of its own, where nothing is imported yet."""
     script = f"""
-import warnings
-with warnings.catch_warnings(record=True) as told:
-    warnings.simplefilter("always")
-    from {former} import {name} as former
-import {new}
-assert former is {new}.{name}
-messages = [str(one.message) for one in told if one.category is DeprecationWarning]
-assert messages[-1] == "{former} is called {new} now"
+import importlib, warnings
+for line in {FORMER.strip().splitlines()!r}:
+    former, new, name = line.split()
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        old = importlib.import_module(former)
+    assert getattr(old, name) is getattr(importlib.import_module(new), name), line
+    messages = [str(one.message) for one in told if one.category is DeprecationWarning]
+    assert messages[-1] == f"{{former}} is called {{new}} now", line
 """
     subprocess.run([sys.executable, "-c", script], check=True, timeout=60)
 

@@ -99,24 +99,26 @@ def started(*arguments, shell: str = "") -> subprocess.CompletedProcess:
     )
 
 
+FULL = r"\[E-DISK-FULL\] standard output: (?s:.*)remedy:  free some space where it goes, or send it elsewhere\n"
+
+
 @pytest.mark.parametrize(
     ("redirected", "arguments", "code", "words"),
     [
         (">&-", ["schema"], 0, ""),
         (">&- 2>&-", ["check", "absent.toml"], 2, ""),
-        (">/dev/full", ["schema"], 4, "[E-DISK-FULL] standard output: "),
-        (">/dev/full", ["schema"], 4, "remedy:  free some space where it goes, or send it elsewhere\n"),
+        (">/dev/full", ["schema"], 4, FULL),
         (">/dev/full", ["check", "absent.toml"], 2, "E-FILE"),
         ("2>/dev/full", ["check", "absent.toml"], 2, ""),
         ("| true", ["schema"], 0, ""),
-        ("| true", ["--help"], 0, ""),
+        pytest.param("| true", ["--help"], 0, "", marks=pytest.mark.slow),
         ("2>&1 | true", ["check", "absent.toml"], 2, ""),
     ],
 )
 def test_streams_that_cannot_be_written(redirected, arguments, code, words):
     """A reader that has gone is no failure; a full disk is, unless the program has one of its own."""
     run = started(*arguments, shell=redirected)
-    assert f"code {code}\n" in run.stderr and words in run.stderr
+    assert f"code {code}\n" in run.stderr and re.search(words, run.stderr)
     assert not any(word in run.stderr for word in ("Traceback", "Exception ignored", "Error:"))
 
 

@@ -20,7 +20,7 @@ from validation.reference.plane_elasticity import edge_load, to_skfem
 
 if TYPE_CHECKING:
     from femgear.contact.bodies import Sector
-    from femgear.contact.cycle import MeshCycle
+    from femgear.contact.mesh_cycle import MeshCycle
     from femgear.fe.elasticity import Material
     from femgear.fe.grid import Grid
     from femgear.gears.gear import Gear

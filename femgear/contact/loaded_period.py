@@ -19,16 +19,10 @@ from functools import cached_property
 import numpy as np
 
 from femgear.contact.bodies import Bodies
-from femgear.contact.cycle import (
-    FRICTION,
-    CycleOptions,
-    MeshCycle,
-    loaded_image,
-    planet_symmetry,
-    walk_mesh_cycle,
-)
+from femgear.contact.cycle import FRICTION, CycleOptions, loaded_image, planet_symmetry, walk_mesh_cycle
 from femgear.contact.face_width import over_slices
 from femgear.contact.flank_friction import path_sense
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.supports import RIGID, Supports
 from femgear.curves import parabolas
 from femgear.gears.deviations import SetDeviations, common_period, planet_shift, without_turning

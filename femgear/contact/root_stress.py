@@ -41,8 +41,8 @@ from femgear.contact.bodies import (
     root_functionals,
     station_weights,
 )
-from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import LEFT, RIGHT, acting_flanks
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.tooth_loads import LoadedTeeth, loaded_teeth
 from femgear.contact.width_waves import cosines
 from femgear.curves import not_a_knot

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.contact.bodies import Sector, Sectors, flank_load_columns, flank_stations
-from femgear.contact.cycle import MeshCycle
 from femgear.contact.flank_pairs import acting_flanks, mesh_pairs, tooth_steps
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.fe.compliance import cyclic_displacement, mirror_nodes, mirrored_columns
 from femgear.gears.kinematics import orientations
 from femgear.gears.pair import GearSet

@@ -39,7 +39,7 @@ from femgear.stages.protocol import Stage, one_blas_thread
 from femgear.stages.static import slices_ahead
 
 if TYPE_CHECKING:
-    from femgear.contact.cycle import MeshCycle
+    from femgear.contact.mesh_cycle import MeshCycle
     from femgear.gears.pair import GearPair
     from femgear.stages.losses_results import LossesResult
     from femgear.stages.static_results import StaticResult

@@ -24,7 +24,7 @@ from femgear.case.load_spectrum import (
     running_shares,
     without_line,
 )
-from femgear.contact.cycle import MeshCycle
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.errors import LESS_TORQUE, FemgearError
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import BRANCH

@@ -43,7 +43,7 @@ from femgear.system.bearing_friction import seal_torque
 
 if TYPE_CHECKING:
     from femgear.case.dependencies import Steps
-    from femgear.contact.cycle import MeshCycle
+    from femgear.contact.mesh_cycle import MeshCycle
     from femgear.gears.pair import GearSet
     from femgear.gears.shaft_graph import SpeedCondition
     from femgear.stages.static_results import StaticResult

@@ -46,7 +46,8 @@ from femgear.contact.bodies import (
     make_bodies,
     make_sectors,
 )
-from femgear.contact.cycle import CycleOptions, MeshCycle, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.root_stress import (
     RootStresses,
     computed_waves,
@@ -127,7 +128,7 @@ def solve_static(
     -------
     StaticResult
         ``cycle`` holds transmission error [m], mesh forces [N] and mesh stiffness [N/m], see
-        `femgear.contact.cycle.MeshCycle`.
+        `femgear.contact.mesh_cycle.MeshCycle`.
 
     Raises
     ------

@@ -18,7 +18,8 @@ import numpy as np
 from femgear.case.gear_set import materials_of, planetary_set, set_deviations
 from femgear.case.planetary import Case
 from femgear.contact.bodies import Sector, Sectors, make_sectors
-from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, loaded_image, walk_mesh_cycle
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.tooth_loads import DeformedBody, deformed_set
 from femgear.fe.compliance import mirror_nodes
 from femgear.fe.grid import copy_nodes, rotated_copies

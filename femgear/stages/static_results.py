@@ -53,7 +53,7 @@ if TYPE_CHECKING:
     from femgear.case.planetary import Case
     from femgear.case.teeth import GearCase
     from femgear.contact.bodies import Bodies, Sectors
-    from femgear.contact.cycle import MeshCycle
+    from femgear.contact.mesh_cycle import MeshCycle
     from femgear.contact.root_stress import RootRange, RootStresses
     from femgear.contact.tooth_loads import LoadSpectrum
     from femgear.contact.width_waves import WidthWaves

@@ -21,8 +21,9 @@ import numpy as np
 from femgear.case.dependencies import Steps
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.tooth_friction import no_acting_friction
-from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, loaded_image, walk_mesh_cycle
 from femgear.contact.flank_pairs import mesh_pairs
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.supports import RIGID, Supports
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.deviations import SetDeviations, common_period, no_deviations

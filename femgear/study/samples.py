@@ -51,9 +51,10 @@ from femgear.contact.batch import (
     pair_laws,
     solve_batch,
 )
-from femgear.contact.cycle import CycleOptions, MeshCycle
+from femgear.contact.cycle import CycleOptions
 from femgear.contact.face_width import contacts_are_lines, curve_forces, lead_separations
 from femgear.contact.flank_pairs import pair_separations
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.pair_springs import PairSprings, solve_laws
 from femgear.contact.peaks import mean_weights
 from femgear.contact.slice_springs import SliceSolutions, SliceSprings, solve_slice_springs

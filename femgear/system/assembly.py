@@ -139,7 +139,7 @@ class Contact:
 
         Per unit of the motions of either station, second axis [1, m] and [1]: along the tangent of the transverse
         section, at the pitch point, positive as gear 1 moves while it drives; see
-        `femgear.contact.cycle.MeshCycle.friction_force`.
+        `femgear.contact.mesh_cycle.MeshCycle.friction_force`.
         """
         effect, drives = np.zeros((2, 2, len(self.heights), 6)), np.sign(self.approach[0, 0, 5])
         for station, (normal, points) in enumerate(zip(self.normals, self.points, strict=True)):

@@ -13,8 +13,9 @@ from femgear.contact import batch, cycle
 from femgear.contact.assembly import contact_candidates, mesh_windows
 from femgear.contact.batch import ContactTangents, solve_batch
 from femgear.contact.bodies import make_bodies, make_sectors
-from femgear.contact.cycle import CycleOptions, MeshCycle, loaded_image, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, loaded_image, walk_mesh_cycle
 from femgear.contact.local_compliance import surface_displacement
+from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, bearing_springs, moving_members
 from femgear.contact.width_waves import width_waves

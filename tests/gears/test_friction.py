@@ -21,9 +21,8 @@ GEAR_A = spur_test_gear((0.8532, -0.5), (88.77, 112.5))
 RING = unshifted_set()[1]
 
 
-@pytest.mark.parametrize("row", fzg_gears(), ids=lambda row: f"{row.case} {row.quantity}")
-def test_rows_of_test_gears_pass(row):
-    assert row.verdict == "passes"
+def test_rows_of_test_gears_pass():
+    assert {row.verdict for row in fzg_gears()} == {"passes"}
 
 
 @pytest.mark.slow

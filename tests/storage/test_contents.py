@@ -11,7 +11,7 @@ from femgear.run import solve
 from femgear.storage.contents import Contents, Datasets, Labelled, as_dataset
 from femgear.storage.files import read_dataset, write_dataset
 
-CASES = ["planetary_27_40_108", "four_stage_reducer"]
+CASES = ["planetary_27_40_108"]
 
 
 def contents():

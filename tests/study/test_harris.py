@@ -10,8 +10,6 @@ from script_runs import run_femgear
 from femgear.stages.static import solve_static
 from femgear.trains.reading import read_case, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
-
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 PAIR = ROOT / "cases" / "spur_pair.toml"

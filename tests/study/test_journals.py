@@ -28,8 +28,6 @@ from femgear.study.sweep import sweep_into
 from femgear.trains.reading import read_case, to_toml, with_value, with_values
 from validation.soak import programs
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
-
 ROOT = Path(__file__).resolve().parents[2]
 CASE = ROOT / "cases" / "planetary_27_40_108.toml"
 PLACES = [[x] for x in (0.1, 0.25, 0.4, 0.55, 0.7, 0.9)]

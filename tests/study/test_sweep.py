@@ -15,8 +15,6 @@ from femgear.study.sweep import parse_over, sweep, sweep_into
 from femgear.trains.live import Answer
 from femgear.trains.reading import read_case, with_values
 
-pytestmark = pytest.mark.usefixtures("pictures_undrawn")
-
 CASE = Path(__file__).resolve().parents[2] / "cases" / "planetary_27_40_108.toml"
 TEETH = "sun.teeth", "planet.teeth", "ring.teeth"
 FREE = {

@@ -370,10 +370,11 @@ def test_answers_are_mappings_of_the_stages(coarse):
 @pytest.mark.parametrize(
     ("name", "kept", "anew"),
     [
-        (
+        pytest.param(
             "helical_30_20_70",
             {"helical.hand": "left"},
             {"helical.helix_angle": "21 deg"},
+            marks=pytest.mark.slow,
         ),
         ("nrel_pgb_static", {"planar.torsion.sun": "3e6 N m/rad"}, {"operation.torque": "170000 N m"}),
         ("spur_pair", {"dynamics.damping_ratio": 0.03}, {"operation.torque": "150 N m"}),

@@ -53,7 +53,7 @@ from femgear.system.system import MeshExcitation
 from femgear.trains.helical.section import HelicalCase
 
 if TYPE_CHECKING:
-    from femgear.contact.cycle import MeshCycle
+    from femgear.contact.mesh_cycle import MeshCycle
     from femgear.gears.planetary import PlanetarySet
 
 # Rounded numbers miss each other by less than 1 %, other distances or angles than those of the gears by more.

@@ -86,7 +86,7 @@ from femgear.trains.helical.results import (
 from femgear.trains.helical.section import HelicalCase
 
 if TYPE_CHECKING:
-    from femgear.contact.cycle import MeshCycle
+    from femgear.contact.mesh_cycle import MeshCycle
     from femgear.storage.results import Results
 
 _NOTHING_EXCITES = "a given helical.mesh_stiffness does not vary: nothing excites the set"

@@ -143,7 +143,7 @@ CASES = {
 }
 
 
-LONG = ("five planets", "opposed pairs of planets")
+LONG = ("three planets in phase", "five planets", "opposed pairs of planets")
 
 
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow if name in LONG else ()) for name in CASES])

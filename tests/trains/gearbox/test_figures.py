@@ -34,7 +34,10 @@ def test_shafts_that_stay_where_they_are_have_no_picture(data):
     assert deflected_shafts(still) is None
 
 
-@pytest.mark.parametrize("forces", ["alike", "near one another", "one of them small"])
+SLOW = [pytest.param(forces, marks=pytest.mark.slow) for forces in ("alike", "one of them small")]
+
+
+@pytest.mark.parametrize("forces", ["near one another", *SLOW])
 def test_no_name_of_a_bearing_lies_on_another_or_on_an_arrow(data, forces):
     near = data[0].copy(deep=True)
     near["bearing_displacement"][:] = 0.0
