@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -332,18 +333,34 @@ def _largest(what: str) -> str:
 def loose_chain(
     duration: float, rate: float, *, play: str = "100 um", contact_ratio: float | None = None, harmonics: int = 1
 ) -> GearboxInTime:
-    """Make the five-megawatt chain with play in its bearings ready for time, its flanks parting."""
+    """Make the five-megawatt chain with play in its bearings ready for time, its flanks parting, its casing held."""
+    tables = chain_tables(play, ())
+    del tables["casing"], tables["sensor"]
+    if contact_ratio:
+        for mesh in ("sun_mesh", "ring_mesh"):
+            tables["planetary"][1][mesh]["contact_ratio"] = contact_ratio
+    return chain_in_time(tables, duration, rate, harmonics)
+
+
+def chain_tables(play: str, exciting: Sequence[str]) -> dict[str, Any]:
+    """Tables of the five-megawatt chain with play in its bearings, of which some stages alone excite."""
     with open("cases/five_megawatt_chain.toml", "rb") as file:
         tables = tomllib.load(file)
     for bearing in tables["bearing"]:
         if bearing["name"] in LOOSE:
             bearing["clearance"] = play
-    if contact_ratio:
-        for mesh in ("sun_mesh", "ring_mesh"):
-            tables["planetary"][1][mesh]["contact_ratio"] = contact_ratio
+    for stage in (*tables["pair"], *tables["planetary"]):
+        for mesh in ("mesh", "sun_mesh", "ring_mesh"):
+            if mesh in stage and stage["name"] not in exciting:
+                del stage[mesh]["contact_ratio"]
+    return tables
+
+
+def chain_in_time(tables: dict[str, Any], duration: float, rate: float, harmonics: int = 1) -> GearboxInTime:
+    """Make a chain ready for time, its flanks parting."""
     entries = {"harmonics": harmonics, "contact_loss": True, "duration": f"{duration} s", "rate": f"{rate} Hz"}
     case = read_case(tables | {"transient": entries})
-    return gearbox_in_time(solve_deflection(case), case.transient)
+    return gearbox_in_time(solve_deflection(case), case.transient, mean_damping=True)
 
 
 def chain_balance(model: GearboxInTime, carriers: dict[str, int], meshes: dict[str, int]) -> PeriodicSolution:
@@ -364,22 +381,8 @@ def chain_balance(model: GearboxInTime, carriers: dict[str, int], meshes: dict[s
 
 def chain_apart(model: GearboxInTime, solution: PeriodicSolution) -> tuple[MarchedRun, dict[str, float]]:
     """Integrate from the state of a balance on: the run, largest differences of forces over the largest."""
-    box, spun = model.box, model.spun
-    transient = box.deflection.model.case.transient
-    assert transient is not None
-    lines, omega = displacements(box.problem, solution), solution.line_frequency
-    place, velocity = lines.sum(axis=1).real, (1j * omega * lines).sum(axis=1).real
-    place = place - spun.spin * (spun.carried @ place) / spun.inertia
-    run = march_flanks(
-        spun,
-        [(torque, model.rotation(torque.body)) for torque in model.torques],
-        duration=transient.duration,
-        step=1.0 / transient.rate,
-        speed=model.speed,
-        start=(place, velocity),
-        outputs=spun.basic.T,
-        contact_loss=True,
-    )
+    box = model.box
+    run = marched_from(model, solution, model.spun.basic.T)
     x, theta = solution.at(run.time), run.time[:, None] * box.frequency
     meshes = np.hstack(
         [_drive_forces(front, x, theta) for front, _ in box.flanks],
@@ -393,6 +396,26 @@ def chain_apart(model: GearboxInTime, solution: PeriodicSolution) -> tuple[March
     if pressed:
         apart["play"] = float(max(one for one, _ in pressed) / max(size for _, size in pressed))
     return run, apart
+
+
+def marched_from(model: GearboxInTime, solution: PeriodicSolution, outputs: np.ndarray) -> MarchedRun:
+    """Integrate from the state of a balance on, with motions (k, n) per unit of the coordinates as outputs."""
+    box, spun = model.box, model.spun
+    transient = box.deflection.model.case.transient
+    assert transient is not None
+    lines, omega = displacements(box.problem, solution), solution.line_frequency
+    place, velocity = lines.sum(axis=1).real, (1j * omega * lines).sum(axis=1).real
+    place = place - spun.spin * (spun.carried @ place) / spun.inertia
+    return march_flanks(
+        spun,
+        [(torque, model.rotation(torque.body)) for torque in model.torques],
+        duration=transient.duration,
+        step=1.0 / transient.rate,
+        speed=model.speed,
+        start=(place, velocity),
+        outputs=outputs,
+        contact_loss=True,
+    )
 
 
 def _drive_forces(element: Any, x: np.ndarray, theta: np.ndarray) -> np.ndarray:

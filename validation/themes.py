@@ -15,6 +15,7 @@ from validation import (
     calculix_shafts,
     calculix_solid,
     casings,
+    chain_in_casing,
     contact,
     drawing,
     drivetrain,
@@ -450,13 +451,15 @@ THEMES = (
         "one assembled system. "
         "Compared with: the trains of a pair and of a planar set, by harmonic balance; the linear response; the "
         "same bodies in axes at rest, integrated by DOP853. "
-        "Gates: 1e-9; 1e-8 of the linear response; 1e-6 in time and with play.",
+        "Gates: 1e-9; 1e-8 of the linear response; 1e-6 in time and with play; of the chain 1e-10 and 1e-4.",
         (gearbox_nonlinear.pairs, gearbox_nonlinear.linear_meshes),
         (
             gearbox_nonlinear.planar_sets,
             gearbox_nonlinear.turning_in_time,
             gearbox_nonlinear.loose_carrier,
             gearbox_nonlinear.loose_pair,
+            chain_in_casing.off_the_planets,
+            chain_in_casing.lines_of_weight,
         ),
     ),
     Theme(

@@ -10,7 +10,7 @@ play that are given by their stiffness keep it.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from itertools import product
 from typing import TYPE_CHECKING, Any
@@ -51,6 +51,8 @@ _SAMPLES = (4, 16), (8, 64)
 """Samples for an order, and at least, of carriers and of the mesh that excites, of several stages together."""
 _EMBEDDED = 4000
 """Unknowns up to which a balance that fails is followed from its linear springs on."""
+_SHOWN, _BY_STAGE = 1e-9, 6
+"""Amplitude over the largest from which lines are tabled, and lines of a stage at most."""
 _TAIL = 0.05
 """Share of the amplitude in the upper half of the lines that is told."""
 
@@ -76,9 +78,10 @@ class StageBalance:
         Sizes of their forces [N].
     acceleration : (s, L) complex array
         Of the lines of the solution at all sensors [m/s^2].
-    harmonic, side_band : (L,) arrays
-        Of the lines of the solution: multiple of the mesh frequency, turns of the carrier beside it; none where the
-        stage does not excite.
+    harmonic : (L,) array
+        Multiple of the mesh frequency of every line; none where the stage does not excite.
+    turns : mapping of str to (L,) array
+        By stage turns of its carrier in every line.
     """
 
     name: str
@@ -90,7 +93,7 @@ class StageBalance:
     bearing_force: np.ndarray = field(default_factory=lambda: np.zeros((1, _INSTANTS, 0)))
     acceleration: np.ndarray = field(default_factory=lambda: np.zeros((0, 0), complex))
     harmonic: np.ndarray = field(default_factory=lambda: np.zeros(0))
-    side_band: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    turns: Mapping[str, np.ndarray] = field(default_factory=dict)
 
     @property
     def uneven(self) -> np.ndarray:
@@ -145,9 +148,8 @@ def _moving(box: NonlinearGearbox, solution: PeriodicSolution, place: int, *, ex
     forces = *forces_of_flanks(box, solution, place), tuple(box.bearings), forces_of_bearings(box, solution, place)
     lines = accelerations_at_sensors(box, solution)[:, : len(orders)]
     harmonic = orders[:, stage.mesh_base] / stage.excitation.periods
-    return StageBalance(
-        stage.name, stage.meshes, solution, *forces, lines, harmonic, orders[:, stage.turn_base] * stage.turns
-    )
+    turns = {one.name: orders[:, one.turn_base] for one in box.stages if one.turns}
+    return StageBalance(stage.name, stage.meshes, solution, *forces, lines, harmonic, turns)
 
 
 def _solved(box: NonlinearGearbox, wanted: BoxBalanceSection, place: int) -> PeriodicSolution:
@@ -396,28 +398,39 @@ class GearboxBalanceResult(StageResult):
         if stages and len(stages[0].acceleration):
             variables |= _at_sensors(stages)
             coords["sensor"] = (("sensor",), list(self.sensors), "1", "sensor")
+            if carriers := carriers_that_turn(stages):
+                coords["carrier"] = (("carrier",), carriers, "1", "stage whose carrier turns")
         attrs: dict[str, Any] = {"title": "teeth that part, by harmonic balance", "rigid": ", ".join(self.rigid)}
         attrs["together"] = int(self.together)
         return Contents(variables, coords, attrs)
 
 
 def _at_sensors(stages: tuple[StageBalance, ...]) -> dict[str, Any]:
-    """Lines at the sensors, one stage after the other, and their levels."""
+    """Lines at the sensors, one stage after the other, and their levels; frequencies are positive."""
     lines = np.concatenate([stage.acceleration for stage in stages], axis=1)
     level = [np.sqrt(0.5 * (np.abs(stage.acceleration) ** 2).sum(axis=1)) for stage in stages]
-    harmonic, bands = [stage.harmonic for stage in stages], [stage.side_band for stage in stages]
+    harmonic = np.concatenate([stage.harmonic for stage in stages])
     omega = np.concatenate([stage.solution.line_frequency[: len(stage.harmonic)] for stage in stages])
-    frequency = omega / (2.0 * np.pi)
+    sense = np.where(omega < 0.0, -1.0, 1.0)
     origin = [stage.name for stage in stages for _ in stage.harmonic]
-    return {
+    variables = {
         "level_of_stage": ("sensor stage", np.transpose(level), "m/s^2", "root mean square of the acceleration"),
         "lines_real": ("sensor line", np.real(lines), "m/s^2", "acceleration, amplitude of the line"),
-        "lines_imag": ("sensor line", np.imag(lines), "m/s^2", "acceleration, amplitude of the line"),
-        "line_frequency": ("line", frequency, "Hz", "frequency of the line"),
+        "lines_imag": ("sensor line", sense * np.imag(lines), "m/s^2", "acceleration, amplitude of the line"),
+        "line_frequency": ("line", np.abs(omega) / (2.0 * np.pi), "Hz", "frequency of the line"),
         "origin": ("line", origin, "1", "stage that excites"),
-        "harmonic": ("line", np.concatenate(harmonic), "1", "multiple of the mesh frequency"),
-        "side_band": ("line", np.concatenate(bands), "1", "turns of the carrier beside it"),
+        "harmonic": ("line", sense * harmonic, "1", "multiple of the mesh frequency"),
     }
+    if carriers := carriers_that_turn(stages):
+        none = {stage.name: np.zeros(len(stage.harmonic)) for stage in stages}
+        turns = [np.concatenate([one.turns.get(name, none[one.name]) for one in stages]) for name in carriers]
+        variables["turns"] = ("line carrier", (sense * turns).T, "1", "turns of the carrier of a stage in the line")
+    return variables
+
+
+def carriers_that_turn(stages: tuple[StageBalance, ...]) -> list[str]:
+    """Name the stages whose carriers turn while any of the stages excites."""
+    return list(dict.fromkeys(name for stage in stages if len(stage.harmonic) for name in stage.turns))
 
 
 def _of_bearings(stages: tuple[StageBalance, ...]) -> dict[str, Any]:
@@ -477,3 +490,31 @@ def describe_balance(data: xr.Dataset) -> Block:
         level = np.sqrt((data["level_of_stage"].values ** 2).sum(axis=1))
         notes += [f"sensor {name}: {value:.4g} m/s^2" for name, value in zip(data["sensor"].values, level, strict=True)]
     return tabulate("Teeth that part, harmonic balance", range(data.sizes["mesh"]), columns, tuple(notes))
+
+
+def balance_tables(data: xr.Dataset) -> Iterator[Block]:
+    """Tabulate the largest lines of every sensor that each stage makes, and what stands still, with their origin."""
+    if "sensor" not in data.sizes:
+        return
+    size, hertz = np.hypot(data["lines_real"].values, data["lines_imag"].values), data["line_frequency"].values
+    makers = np.where(data["harmonic"].values == 0.0, "", data["origin"].values)
+    for sensor, lines in zip(data["sensor"].values, size, strict=True):
+        ordered = np.argsort(-lines, kind="stable")
+        shown = [ordered[makers[ordered] == maker][:_BY_STAGE] for maker in dict.fromkeys(makers)]
+        chosen = [i for i in ordered.tolist() if i in np.concatenate(shown) and lines[i] > _SHOWN * lines.max()]
+        columns = {
+            "frequency [Hz]": lambda i: f"{hertz[i]:.2f}",
+            "amplitude [m/s^2]": lambda i, lines=lines: f"{lines[i]:.4g}",
+            "origin": lambda i: balance_line_origin(data, i),
+        }
+        yield tabulate(f"Largest lines at {sensor} while teeth part", chosen, columns)
+
+
+def balance_line_origin(data: xr.Dataset, line: int) -> str:
+    """Write where a line comes from: stage and mesh harmonic, or what stands still, and turns of carriers beside it."""
+    harmonic, words = float(data["harmonic"].values[line]), []
+    words.append(f"{data['origin'].values[line]}, mesh harmonic {harmonic:g}" if harmonic else "weight, torque:")
+    if "turns" in data:
+        turns = zip(data["carrier"].values, data["turns"].values[line], strict=True)
+        words += [f"{turn:{'+' if harmonic else ''}g} x carrier of {name}" for name, turn in turns if turn]
+    return " ".join(words)

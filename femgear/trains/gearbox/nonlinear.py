@@ -46,7 +46,7 @@ from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, PairSe
 from femgear.trains.gearbox.deflection import Deflection, laws_of, spread_rows
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.modes import linear_system
-from femgear.trains.gearbox.stage_structure import in_time
+from femgear.trains.gearbox.stage_structure import equal_planets, in_time
 
 _TURNING = np.kron(np.eye(2), np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
 """Time derivative of the axes of a planet at unit speed of its carrier, ``e_r' = e_t``."""
@@ -260,6 +260,7 @@ def _stage(
     """Take a stage with the approaches of its flanks per unit of the coordinates, and its excitation."""
     model, (assembly, _, tangents) = found.model, linear_system(found)
     T, kinds = assembly.motions, len(stage.meshes) // max(len(stage.planets), 1)
+    tangents = equal_planets(assembly, stage, tangents)
     excitation, _, _ = in_time(model, stage, excitation)
     play = excitation.backlash if np.any(excitation.backlash) else normal_backlash(stage)
     deflection = excitation.deflection + _mean_approach(found, stage, excitation)[:, None]

@@ -35,6 +35,7 @@ from femgear.trains.gearbox.contact import StageContact
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.elastic_carrier import pin_flexibility
 from femgear.trains.gearbox.elastic_ring import ElasticRing, stage_centre, with_rings
+from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.model import GearboxModel, StageModel, planet_bearing
 from femgear.trains.gearbox.modes import linear_system, spring_forces
 from femgear.trains.gearbox.sensors import BoxSensor
@@ -297,7 +298,8 @@ def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndar
     First the approach of the flanks along the normal, then the slope of the approach along the width, of each mesh
     that has slices. The former is that of all slices by their stiffness. Axes of the planet are radial, tangential, z.
     """
-    assembly, _, stiffness = linear_system(found)
+    assembly, _, tangents = linear_system(found)
+    stiffness = equal_planets(assembly, stage, tangents)
     count = max(len(stage.planets), 1)
     approach, slope = [], []
     axes = np.kron(np.eye(2), pin_axes(stage.angles[0])) if stage.planets else np.eye(6)
@@ -328,7 +330,8 @@ def _rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.n
     What they do to the structure, and sliding (F, 6) of the planet along its radial, tangential and z axes: that of all
     slices by their stiffness.
     """
-    assembly, _, stiffness = linear_system(found)
+    assembly, _, tangents = linear_system(found)
+    stiffness = equal_planets(assembly, stage, tangents)
     axes = np.kron(np.eye(2), pin_axes(stage.angles[0])) if stage.planets else np.eye(6)
     rows, of_planet = list[Row](), list[np.ndarray]()
     for kind in (0, 1):
@@ -339,6 +342,20 @@ def _rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.n
             rows.append([(at, row) for at, row in parts if at != GROUND and at not in stage.planets])
             of_planet += [sum((axes @ row for at, row in parts if at in stage.planets), np.zeros(6))]
     return rows, np.array(of_planet)
+
+
+def equal_planets(assembly: Assembly, stage: StageModel, stiffness: np.ndarray) -> np.ndarray:
+    """Give every slice (g,) of a set the mean of the planets [N/m], one after the other of which stands there.
+
+    Where planets stand, some slices may carry nothing, as weight and bending shafts have it.
+    """
+    averaged = stiffness.copy()
+    for meshes in np.reshape(stage.meshes, (-1, max(len(stage.planets), 1))):
+        slices = [assembly.slices[mesh] for mesh in meshes]
+        mean = np.mean([stiffness[part] for part in slices], axis=0)
+        for part in slices:
+            averaged[part] = mean
+    return averaged
 
 
 def _pin_rows(
@@ -447,8 +464,13 @@ def _alike(section: BoxPlanetarySection, angles: Sequence[float]) -> int:
     case = teeth_of(section)
     if case is not None:
         return rotational_symmetry(set_deviations(case), planetary_set(case))
-    places = np.exp(1j * np.asarray(angles))
-    turned = {count: places[:, None] * np.exp(2j * np.pi / count) for count in range(1, len(places) + 1)}
+    places, sizes = np.exp(1j * np.asarray(angles)), set_sizes(section)
+    # planets that do not assemble have phases of their own
+    turned = {
+        count: places[:, None] * np.exp(2j * np.pi / count)
+        for count in range(1, len(places) + 1)
+        if (sizes.teeth[0] + sizes.teeth[2]) % count == 0
+    }
     return max(count for count, one in turned.items() if np.abs(one - places).min(axis=1).max() < 1e-6)
 
 

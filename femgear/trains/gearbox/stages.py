@@ -17,6 +17,7 @@ from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
+    balance_tables,
     balance_warnings,
     check_balance,
     describe_balance,
@@ -300,6 +301,7 @@ GEARBOX = Train(
             unavailable=_no_balance,
             verdict=lambda result: {"stages": [stage.name for stage in result.stages]},
             describe=lambda results: describe_balance(results.balance),
+            tables=lambda results: balance_tables(results.balance),
             warnings=balance_warnings,
         ),
         Stage(

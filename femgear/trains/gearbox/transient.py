@@ -102,8 +102,12 @@ class GearboxInTime:
         return torque_histories(list(given.items()), self.port_ratio)
 
 
-def gearbox_in_time(found: Deflection, transient: TransientSection, *, steps: Steps | None = None) -> GearboxInTime:
+def gearbox_in_time(
+    found: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = False
+) -> GearboxInTime:
     """Make a gearbox ready for integration in time about its loaded state.
+
+    ``mean_damping`` is that of `femgear.trains.gearbox.nonlinear.nonlinear_gearbox`.
 
     CaseError: planets that are not equally spaced on a carrier that turns (E-TURNING), several motions that nothing
     holds (E-MECHANISM), a stiffness that is not positive (E-STIFFNESS).
@@ -111,6 +115,7 @@ def gearbox_in_time(found: Deflection, transient: TransientSection, *, steps: St
     model = found.model
     excitations = all_excitations(found, steps=steps)
     known: dict[str, Any] = {"harmonics": transient.harmonics, "separates": transient.contact_loss}
+    known["mean_damping"] = mean_damping
     box = nonlinear_gearbox(found, excitations, **known, back_flanks=transient.back_flanks, turning=transient.turning)
     shaft = reference_shaft(model)
     system = box.problem.system

@@ -15,6 +15,8 @@ from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.balance import (
     GearboxBalanceResult,
     StageBalance,
+    balance_line_origin,
+    balance_tables,
     check_balance,
     describe_balance,
     forces_of_bearings,
@@ -80,12 +82,17 @@ def test_the_casing_feels_lines_at_multiples_of_the_planets_passing():
     assert data["converged"].item() == 1.0 and 0.0 < data["bearing_largest"].max()
     lines = np.hypot(data["lines_real"], data["lines_imag"]).values[0]
     # three equal planets, wherever they stand, come round thrice a turn
-    mesh = int(np.flatnonzero((data["harmonic"] == 1) & (data["side_band"] == 0))[0])
+    mesh = int(np.flatnonzero((data["harmonic"] == 1) & (data["turns"][:, 0] == 0))[0])
     order = np.rint(61.0 * data["line_frequency"].values / data["line_frequency"].values[mesh]).astype(int)
     assert lines[order % 3 != 0].max() < 1e-9 * lines.max()
     assert lines[(order % 3 == 0) & (order > 4)].min() > 1e-6 * lines.max()
     assert data["level_of_stage"].item() == pytest.approx(np.sqrt(0.5 * (lines**2).sum()), rel=1e-12)
     assert any(note.startswith("sensor top: ") for note in describe_balance(data).notes)
+    (table,) = balance_tables(data)
+    assert table.rows[0][1] == f"{lines.max():.4g}" and table.rows[0][2].startswith("set, mesh harmonic ")
+    # what weight does thrice a turn, with no mesh in it
+    assert any(row[2] == "weight, torque: 3 x carrier of set" for row in table.rows)
+    assert balance_line_origin(data, mesh) == "set, mesh harmonic 1"
 
 
 def two_sets(**balance) -> Deflection:

@@ -17,9 +17,16 @@ from femgear.case.dependencies import Steps
 from femgear.housing.two_way.running_planets import solve_running
 from femgear.system.system import MeshExcitation
 from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.excitation import excitation_of
 from femgear.trains.gearbox.model import StageModel
 from femgear.trains.gearbox.modes import linear_system, solve_gearbox_modes
-from femgear.trains.gearbox.stage_structure import running_stage, stage_excitation, structure_without
+from femgear.trains.gearbox.stage_structure import (
+    equal_planets,
+    in_time,
+    running_stage,
+    stage_excitation,
+    structure_without,
+)
 from femgear.trains.reading import read_case
 
 POSITIONS = 32
@@ -117,6 +124,33 @@ def test_the_structure_has_no_planets_and_no_meshes_of_the_stage():
     assert not rest.contacts
     assert not len(stiffness)
     assert not any("planet" in name for name in system.dofs)
+
+
+def test_planets_whose_slices_are_pressed_unequally_count_with_their_mean():
+    found = solve_deflection(read_case(set_on_shafts() | {"deflection": {"contact": False}}))
+    stage, (assembly, _, stiffness) = found.model.stages[0], linear_system(found)
+    first = assembly.slices[stage.meshes[0]]
+    stiffness[first.start] = 0.0
+    mean = equal_planets(assembly, stage, stiffness)
+    assert mean[first.start] == pytest.approx(2.0 / 3.0 * stiffness[first.start + 1], rel=1e-12)
+    of_planets = [mean[assembly.slices[mesh]] for mesh in stage.meshes[:3]]
+    assert all(np.array_equal(values, of_planets[0]) for values in of_planets)
+    assert mean.sum() == pytest.approx(stiffness.sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize(("planets", "symmetry"), [(3, 3), (4, 1)])
+def test_planets_that_do_not_assemble_are_none_like_another(planets, symmetry):
+    """19 and 56 teeth have room for three planets at equal angles, four miss by half a tooth."""
+    mesh = {"stiffness": "3e8 N/m", "contact_ratio": 1.6}
+    tables = planetary_tables(sun_mesh=mesh, ring_mesh=mesh)
+    tables["planetary"][0]["gears"] |= {"teeth": [19, 17, 56], "planets": planets}
+    found = solve_deflection(read_case(tables))
+    stage = found.model.stages[0]
+    drive = excitation_of(found, stage)
+    excitation, paths, _ = in_time(found.model, stage, drive)
+    assert paths.symmetry == symmetry
+    # the mean of planets out of phase would excite nothing
+    assert excitation.stiffness.std(axis=1) == pytest.approx(drive.stiffness.std(axis=1), rel=1e-6)
 
 
 @pytest.mark.slow
