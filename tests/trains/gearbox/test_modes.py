@@ -51,7 +51,10 @@ def test_lines_of_turns_and_meshes(found):
 
 
 def test_the_wind_turbine_twists_as_its_rotor_and_generator_on_one_spring():
-    modes = solve_gearbox_modes(solve_deflection(read_case("cases/five_megawatt_chain.toml"))).modes
+    case = read_case("cases/five_megawatt_chain.toml")
+    # the reference turbine is one whose casing stands still
+    case = case.model_copy(update={"casing": None, "sensor": ()})
+    modes = solve_gearbox_modes(solve_deflection(case)).modes
     torsional = [hertz for hertz, kind in zip(modes.frequency, modes.kind, strict=True) if kind == "torsional"]
     # 2.18 Hz without the inertia of the gears (NREL/TP-500-38060)
     assert torsional[0] == pytest.approx(2.18, rel=0.03)
