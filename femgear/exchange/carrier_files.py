@@ -24,7 +24,8 @@ import numpy as np
 from scipy.linalg import eigh
 
 from femgear.errors import CaseError, several
-from femgear.exchange.casing_files import Node, check_array_size, file_in_refusals, foreign_refusals
+from femgear.exchange.casing_files import check_array_size
+from femgear.exchange.node_tables import Node, file_in_refusals, foreign_refusals
 from femgear.exchange.superelement import (
     Superelement,
     read_superelement,

@@ -23,16 +23,9 @@ import xarray as xr
 from scipy import linalg
 
 from femgear.errors import CaseError
-from femgear.exchange.casing_files import (
-    UNITS,
-    Node,
-    check_array_size,
-    dmig_matrices,
-    file_in_refusals,
-    foreign_refusals,
-    op4_matrices,
-    read_nodes,
-)
+from femgear.exchange.casing_files import UNITS, check_array_size
+from femgear.exchange.nastran_matrices import dmig_matrices, op4_matrices
+from femgear.exchange.node_tables import Node, file_in_refusals, foreign_refusals, read_nodes
 from femgear.fe.beam import rigid_link
 
 SUPERELEMENT_ROLES = {"seat": True, "foot": True, "sensor": True}

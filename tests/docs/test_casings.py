@@ -6,7 +6,7 @@ import pytest
 from page_examples import read_page, run_examples
 from script_runs import run_script
 
-from femgear.exchange.casing_files import read_nodes
+from femgear.exchange.node_tables import read_nodes
 
 PAGE, EXAMPLES, PRINTED = read_page("casings.md")
 

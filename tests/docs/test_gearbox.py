@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from small_gearbox import pair_tables
 
-from femgear.exchange.casing_files import read_nodes
+from femgear.exchange.node_tables import read_nodes
 from femgear.exchange.superelement import SUPERELEMENT_ROLES
 from femgear.trains.gearbox.case_file import BoxBearingSection, BoxCasingSection, embed_stages
 from femgear.trains.gearbox.deflection import solve_deflection

@@ -3,28 +3,19 @@
 import shutil
 import tracemalloc
 import zipfile
-from pathlib import Path
 
 import numpy as np
 import pytest
 import pyuff
 from casing import NU, RHO, Casing, E, assembled, card, parts_of_surface, punch, write_casing
 from pyNastran.op4.op4 import OP4
-from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
 from femgear.errors import CaseError
-from femgear.exchange.casing_files import (
-    dmig_matrices,
-    mean_compliance,
-    missing_compliance,
-    output_names,
-    read_casing,
-    read_nodes,
-)
+from femgear.exchange.casing_files import mean_compliance, missing_compliance, output_names, read_casing
+from femgear.exchange.nastran_matrices import dmig_matrices
 from femgear.fe.elasticity import Material
 from femgear.housing.two_way.response import MeshPaths, structure_lines
-from femgear.storage.files import write_csv
 from validation.fixed_housing import EQUAL, solved
 from validation.reference.annulus import annulus_frequencies
 
@@ -195,15 +186,6 @@ def test_punch_of_an_external_superelement(tmp_path):
     assert mean_compliance(arrays) == pytest.approx(5 / (K0 * POINTS))
     place = dmig_matrices(tmp_path / "ring.pch")[2]
     np.testing.assert_allclose(place[1], [0.0, R, 0.0], atol=1e-12)
-
-
-def test_eigenvalues_that_nastran_printed():
-    """A beam by MSC Nastran 2013: PARAM,EXTOUT,matrixpch, and the table of its .f06 (MIT, see the file)."""
-    (K, M), row, _ = dmig_matrices(Path(__file__).with_name("nastran_beam.pch"))
-    assert sorted(row) == [(n, c) for n in range(1, 6) for c in (3, 4)]
-    printed = "1.764385E+04 1.800475E+04 6.542455E+05 6.645972E+05 7.545368E+06 7.580662E+06 6.257528E+07"
-    found = eigh(K.real, M.real, eigvals_only=True)[2:]
-    assert [f"{one:.6E}" for one in found] == [*printed.split(), "6.263273E+07"]
 
 
 def test_units_and_centre(tmp_path):
@@ -462,27 +444,6 @@ def test_reduced_matrices_by_the_names_of_nastran(tmp_path):
     np.testing.assert_allclose(one.natural_frequency / (2 * np.pi), 3183.0989, rtol=1e-6)
 
 
-def test_coordinates_without_mass_are_those_of_vanishing_mass(tmp_path):
-    """Points of the ring on springs to masses on springs to the ground, against masses of 1e-9 kg on them."""
-    angle = 2 * np.pi * np.arange(8) / 8
-    K = np.kron([[1.0, -1.0], [-1.0, 3.0]], K0 * I16)
-    lines = [f"{n},ring,{x},{y},{z},12" for n, (x, y, z) in enumerate(around(angle).tolist(), 1)]
-    lines.append("1,sensor top,,,,12")
-    (tmp_path / "nodes.csv").write_text("node,role,x,y,z,dofs\n" + "\n".join(lines))
-    known = []
-    for name, mass in (("none", 0.0), ("little", 1e-9)):
-        M = np.kron(np.diag([0.0, 1.0]), M0 * I16) + np.kron(np.diag([1.0, 0.0]), mass * I16)
-        path = tmp_path / f"{name}.op4"
-        OP4(debug=False).write_op4(str(path), {"K": (6, K), "M": (6, M)}, is_binary=False)
-        known.append(read_ring(tmp_path, path.name, damping_ratio=0.0))
-    none, little = known
-    assert len(none.natural_frequency) == 16 and len(little.natural_frequency) == 32
-    np.testing.assert_allclose(mean_compliance(none), mean_compliance(little), rtol=1e-9)
-    for hertz in (0.0, 700.0, 4000.0):
-        for a, b in zip(transfer(none, hertz), transfer(little, hertz)):
-            np.testing.assert_allclose(a, b, atol=1e-6 * np.abs(b).max())
-
-
 def test_modes_of_dataset_2414(folder, tmp_path):
     """The casing's modes as analysis data, with a binary dataset of another measurement before them."""
 
@@ -556,13 +517,22 @@ def test_parts_of_the_surface(folder):
     assert (area[:2] == 0).all() and (area[2:] > 0).all() and shape.shape[1] == len(area)
 
 
-def test_table_of_nodes_is_read_as_it_was_written(tmp_path):
-    header = ("node", "role", "x", "y", "z", "direction", "dofs")
-    rows = [(1, "seat A", -0.1, 0.0, -2e-3, "", "123456"), (2, "sensor top", "-.5", 0, 0, "-z", "123")]
-    write_csv(tmp_path / "nodes.csv", header, rows)
-    seat, sensor = read_nodes(tmp_path / "nodes.csv", {"seat": True, "sensor": True, "foot": True})
-    assert sensor.direction == "-z" and seat.position.tolist() == [-0.1, 0.0, -2e-3] and sensor.position[0] == -0.5
-    # tables that former versions wrote have an apostrophe before it
-    text = (tmp_path / "nodes.csv").read_text()
-    (tmp_path / "former.csv").write_text(text.replace(",-z,", ",'-z,"))
-    assert read_nodes(tmp_path / "former.csv", {"seat": True, "sensor": True})[1].direction == "-z"
+def test_coordinates_without_mass_are_those_of_vanishing_mass(tmp_path):
+    """Points of the ring on springs to masses on springs to the ground, against masses of 1e-9 kg on them."""
+    angle = 2 * np.pi * np.arange(8) / 8
+    K = np.kron([[1.0, -1.0], [-1.0, 3.0]], K0 * I16)
+    lines = [f"{n},ring,{x},{y},{z},12" for n, (x, y, z) in enumerate(around(angle).tolist(), 1)]
+    lines.append("1,sensor top,,,,12")
+    (tmp_path / "nodes.csv").write_text("node,role,x,y,z,dofs\n" + "\n".join(lines))
+    known = []
+    for name, mass in (("none", 0.0), ("little", 1e-9)):
+        M = np.kron(np.diag([0.0, 1.0]), M0 * I16) + np.kron(np.diag([1.0, 0.0]), mass * I16)
+        path = tmp_path / f"{name}.op4"
+        OP4(debug=False).write_op4(str(path), {"K": (6, K), "M": (6, M)}, is_binary=False)
+        known.append(read_ring(tmp_path, path.name, damping_ratio=0.0))
+    none, little = known
+    assert len(none.natural_frequency) == 16 and len(little.natural_frequency) == 32
+    np.testing.assert_allclose(mean_compliance(none), mean_compliance(little), rtol=1e-9)
+    for hertz in (0.0, 700.0, 4000.0):
+        for a, b in zip(transfer(none, hertz), transfer(little, hertz)):
+            np.testing.assert_allclose(a, b, atol=1e-6 * np.abs(b).max())
