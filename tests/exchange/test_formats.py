@@ -37,7 +37,7 @@ QUICK = {
     "static.positions": 8,
     "static.flank_elements": 6,
     "static.stresses": False,
-    "dynamics.mesh_harmonics": 6,
+    "dynamics.mesh_harmonics": 3,
     "runup.count": 4,
     "housing.published": [],
     "housing.microphone": {"distance": "0.5 m", "angle": "30 deg"},
