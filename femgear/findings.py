@@ -55,6 +55,7 @@ CATALOGUE = {
     "W-LIFTED": (NOTE, "Parts of the face width never carry."),
     "W-LOAD": (NOTE, "Without load nothing keeps the flanks on one side."),
     "W-LOSSES": (NOTE, "Losses of a part are left out, or rest on a simpler model."),
+    "W-MATERIAL": (DOUBT, "Safeties and lives rest on an estimated treatment of the gears."),
     "W-MOTION": (DOUBT, "A member moves far enough to change contact points and arms."),
     "W-NEIGHBOURS": (NOTE, "Neighbouring planets come close to one another."),
     "W-OIL": (DOUBT, "The viscosity of the oil is extrapolated beyond the temperatures at which its law holds."),

@@ -441,6 +441,10 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-FORMER": former_file,
     "W-HELIX": lambda: of_case(HELICAL, {"helical.helix_angle": "31 deg", "helical.mesh_stiffness": None}),
     "W-LOAD": lambda: of_case("gear_pair", {"operation.torque": "0 N m"}),
+    "W-MATERIAL": lambda: of_case(
+        PLANETARY,
+        {"material.treatment": "case hardened steel", "material.hardness": 720, "material.estimated": True},
+    ),
     "W-NEIGHBOURS": lambda: of_case(PLANETARY, {"set.planet_angles": CLOSE}),
     "W-OVERLAP": lambda: of_case("e_axle", {"shaft[0].part[1].outer_diameter": "40 mm"}),
     "W-PLANETS": lambda: of_case(PLANETARY, {"set.planets": 1}),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case.dependencies import Steps
 from femgear.case.quantities import RPM
 from femgear.exchange.rexs import read_model
 from femgear.gears.gear_steels import GEAR_STEELS, LifeLine
@@ -180,23 +181,34 @@ def reversed_set() -> tuple[Row, ...]:
     return tuple(rows)
 
 
-@lru_cache(maxsize=1)
-def _unit() -> tuple[Any, Any, tuple[RatedSpectrum, ...]]:
-    """Case, deflection.nc and spectra of the gearbox of the file, of case hardened steel under twice its torques."""
-    from femgear.trains.gearbox.tooth_life import stage_spectra
-
+def _unit_tables() -> dict[str, Any]:
+    """Tables of the gearbox of the file as they are imported, for the life that is asked for."""
     (draft,) = case_drafts(read_model(FILE), "two_stages.toml")
     tables = tomllib.loads(draft.text)
-    for stage in tables["pair"]:
-        stage["teeth"]["material"] |= STEEL
     for bearing in tables["bearing"]:
         bearing.pop("estimated", None)
-    tables["strength"] = {"quality": 6, "application_factor": 3.5}
     tables["deflection"] = {"slices": 7}
     tables["operation"]["required_hours"] = HOURS
+    return tables
+
+
+def _solved_unit(tables: dict[str, Any], steps: Steps) -> tuple[Any, Any, tuple[RatedSpectrum, ...]]:
+    """Case, deflection.nc and spectra of a gearbox."""
+    from femgear.trains.gearbox.tooth_life import stage_spectra
+
     case = read_case(tables)
-    result = solve_deflections(case)
+    result = solve_deflections(case, steps=steps)
     return case, result.contents(), stage_spectra(result.states)
+
+
+@lru_cache(maxsize=1)
+def _unit() -> tuple[Any, Any, tuple[RatedSpectrum, ...]]:
+    """The gearbox of case hardened steel, with an application factor under which it wears."""
+    tables = _unit_tables()
+    for stage in tables["pair"]:
+        stage["teeth"]["material"] |= STEEL | {"estimated": False}
+    tables["strength"] = {"quality": 6, "application_factor": 3.5}
+    return _solved_unit(tables, Steps())
 
 
 def spectrum_of_a_file() -> tuple[Row, ...]:
@@ -210,6 +222,42 @@ def spectrum_of_a_file() -> tuple[Row, ...]:
         ours = float(data[f"{kind}_equivalent_torque"].values[0])
         quantity = f"{kind} of gear 1, first stage: equivalent torque [N m]"
         rows.append(within("two stages", UNIT, quantity, reference, ours, 1e-9))
+    return (*rows, *_safeties(case, data, spectra, hours, "two stages", "K_A 3.5, 720 HV"))
+
+
+def spectrum_as_imported() -> tuple[Row, ...]:
+    """The same gearbox with nothing but what its file and the import give: steel by its tensile strength, K_A 1."""
+    steps, share = Steps(), np.array([0.2, 0.3, 0.35, 0.15])
+    tables = _unit_tables()
+    case, data, spectra = _solved_unit(tables, steps)
+    material = case.pair[0].teeth["material"]
+    hours = HOURS * 60.0 * share * np.array([543.0, 3456.0, 1234.0, 789.0])
+    name, note = (
+        "two stages as imported",
+        f"{material['treatment']}, {material['hardness']:g} HV, as the import estimates",
+    )
+    rows = list(_safeties(case, data, spectra, hours, name, note))
+    whole = {(rated.kind, rated.name): rated.spectrum.damage for rated in spectra}
+    load_cases = tables["operation"]["load_case"]
+    halves = [{**load_cases[3], "name": name, "share": 0.5 * load_cases[3]["share"]} for name in ("half", "other half")]
+    for words, chosen, parts in (
+        ("load case 4 in two equal halves over the whole", [*load_cases[:3], *halves], share.size * (1.0,)),
+        ("load case 4 alone over its bin", [{**load_cases[3], "share": 1.0}], (0.0, 0.0, 0.0, 1.0 / share[3])),
+    ):
+        other = _solved_unit({**tables, "operation": {**tables["operation"], "load_case": chosen}}, steps)[2]
+        apart = [
+            abs(rated.spectrum.damage.sum() / (whole[rated.kind, rated.name] @ parts) - 1.0)
+            for rated in other
+            if whole[rated.kind, rated.name] @ parts
+        ]
+        rows.append(
+            at_most(name, "the same gearbox", f"damage of {len(apart)} flanks and roots, {words}", ROUNDED, max(apart))
+        )
+    return tuple(rows)
+
+
+def _safeties(case, data, spectra, hours: np.ndarray, name: str, note: str) -> Iterator[Row]:
+    """Safeties of all roots and flanks over load cases (n,) by hand, in which the first gear turns so often."""
     flanks = data["iso_flank"].values
     for rated in spectra:
         kind, stage = rated.kind, rated.name.rpartition(" gear ")[0]
@@ -219,14 +267,13 @@ def spectrum_of_a_file() -> tuple[Row, ...]:
         first = case.pair[0].teeth
         turns = 1.0 if stage == case.pair[0].name else first["gear_1"]["teeth"] / first["gear_2"]["teeth"]
         turns *= 1.0 if gear == 0 else wheels["gear_1"]["teeth"] / wheels["gear_2"]["teeth"]
-        steel = GEAR_STEELS["case hardened steel"]
+        steel = GEAR_STEELS[wheels["material"]["treatment"]]
         line = steel.root_life if kind == "root" else steel.contact_life
         reference = _safety_by_hand(1.0 / safety, hours * turns, line)
         place = [str(name) for name in data[kind].values].index(rated.name)
         ours = float(data[f"{kind}_spectrum_safety"].values[place])
         quantity = f"{kind} of {rated.name}: S over {HOURS:g} h"
-        rows.append(within("two stages", UNIT, quantity, reference, ours, 1e-9, note="K_A 3.5, 720 HV"))
-    return tuple(rows)
+        yield within(name, UNIT, quantity, reference, ours, 1e-9, note=note)
 
 
 def _safety_by_hand(ratio: np.ndarray, cycles: np.ndarray, line: LifeLine) -> float:

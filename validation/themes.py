@@ -328,7 +328,7 @@ THEMES = (
             life.single_runs,
             life.reversed_set,
         ),
-        (life.spectrum_of_a_file,),
+        (life.spectrum_of_a_file, life.spectrum_as_imported),
     ),
     Theme(
         "rims",

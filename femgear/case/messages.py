@@ -21,7 +21,7 @@ from femgear.case.load_spectrum import spectrum_notices, without_line
 from femgear.case.lubrication import oil_doubts
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, wrong_length
-from femgear.case.sections import RackSection
+from femgear.case.sections import RackSection, gear_material
 from femgear.case.tooth_measures import MEASURES
 from femgear.errors import CaseError, GeometryError, several
 from femgear.findings import Finding, remark
@@ -320,6 +320,20 @@ def idle_materials_and_oil(case: Any) -> Iterator[Finding]:
     yield from oil_notices(case)
 
 
+def estimated_materials(case: Any) -> Iterator[Finding]:
+    """Tell gears whose limits rest on an estimated treatment (W-MATERIAL)."""
+    keys = set[str]()
+    for gear in case.gear_names:
+        material, section = gear_material(case, gear), getattr(case, gear).material
+        given = section is not None and section.treatment is not None
+        key = f"{gear}.material.treatment" if given else "material.treatment"
+        if material.estimated and material.treatment is not None and key not in keys:
+            keys.add(key)
+            text = f"safeties and lives rest on an estimate: {material.treatment}, hardness {material.hardness:g}"
+            remedy = "give treatment, grade and hardness of the drawing, and leave estimated out"
+            yield Finding("W-MATERIAL", key, text, remedy=remedy)
+
+
 def oil_notices(case: Any) -> Iterator[Finding]:
     """Tell an oil of a case without losses, which nothing asks for (W-UNUSED), and one extrapolated (W-OIL)."""
     if case.lubricant is not None and case.losses is None:
@@ -338,6 +352,7 @@ def notices(data: dict, case: Case) -> Iterator[Finding]:
         )
     yield from spectrum_notices(case)
     yield from idle_materials_and_oil(case)
+    yield from estimated_materials(case)
     if not case.rigid and "bearing_clearance" in data["planet"] and case.static.members == "fixed":
         text = 'has no effect while static.members is "fixed"'
         remedy = 'write static.members = "elastic"'

@@ -322,7 +322,8 @@ class MaterialSection(Section):
     """Isotropic elastic material of all gears; its strength, where it is known, gives safeties.
 
     ``root_stress_limit`` and ``contact_stress_limit`` are sigma_Flim and sigma_Hlim of ISO 6336-5; where they are left
-    out they follow from ``treatment``, ``grade`` and ``hardness``.
+    out they follow from ``treatment``, ``grade`` and ``hardness``. ``estimated`` tells that these are no more than a
+    guess.
     """
 
     youngs_modulus: _YoungsModulus
@@ -333,6 +334,7 @@ class MaterialSection(Section):
     treatment: Treatment | None = None
     grade: Grade = "MQ"
     hardness: _Hardness | None = None
+    estimated: StrictBool = False
 
 
 class GearMaterialSection(Section):
@@ -346,6 +348,7 @@ class GearMaterialSection(Section):
     treatment: Treatment | None = None
     grade: Grade | None = None
     hardness: _Hardness | None = None
+    estimated: StrictBool | None = None
 
 
 class StrengthSection(Section):
@@ -708,7 +711,9 @@ def gear_material(case: Any, gear: str) -> MaterialSection:
     if material.treatment is None:
         return material
     own_treatment = any(name in given for name in ("treatment", "grade", "hardness"))
-    limits: dict[str, float] = {}
+    limits: dict[str, Any] = {}
+    if own_treatment:
+        limits["estimated"] = bool(given.get("estimated"))
     for kind in ("root", "contact"):
         name = f"{kind}_stress_limit"
         if name in given or (not own_treatment and getattr(material, name) is not None):

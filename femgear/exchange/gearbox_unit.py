@@ -15,6 +15,7 @@ from typing import Any
 from femgear.case.estimates import SUPPORT_SHARE, USUAL_STIFFNESS
 from femgear.case.quantities import ACCELERATION, ANGLE, LENGTH, SPEED, STIFFNESS, to_si
 from femgear.errors import CaseError
+from femgear.exchange.gear_strength import common_strength
 from femgear.exchange.gear_unit import gears_of, plain_ids, shaft_of, stage_components
 from femgear.exchange.planetary_stage import is_bearing, with_unit
 from femgear.exchange.rexs import Component, Model
@@ -45,6 +46,8 @@ _NAME = re.compile(r"(?=.{1,40}$)[A-Za-z][A-Za-z0-9_.-]*( [A-Za-z0-9_.-]+)*")
 _PARTS = ("assembly", "ordered_assembly")
 _SIDES = ("inner_part", "outer_part")
 _SUPPORT = "support of "
+_OF_GEARBOX = "dynamics", "runup", "strength"
+"""Sections that the gearbox has in place of its stages."""
 _SUPPORTS = ("bearing_stiffness", "support_stiffness")
 # Parts beyond the end of a shaft by more make it longer, sections longer than this one [m].
 _EDGE, _SHORTEST = 1e-9, 1e-5
@@ -90,6 +93,9 @@ def gearbox_tables(
     tables["operation"] = operation
     if (weight := _gravity(model)) is not None:
         tables["gravity"] = weight
+    of_stages: list[Any] = [stages[stage.id].get("strength", {}) for stage in components]
+    if strength := common_strength(model, of_stages):
+        tables["strength"] = strength
     if oil := unit.lubrication.table():
         tables["lubricant"] = oil
     casings = (part for part in model.components.values() if part.type == "gear_casing")
@@ -647,7 +653,7 @@ class _Unit:
 
     def _teeth(self, stage: Component) -> dict[str, Any]:
         """Tables of the teeth of a stage, without its supports and load cases, which the gearbox has."""
-        tables = {key: value for key, value in self.teeth[stage.id].items() if key not in ("dynamics", "runup")}
+        tables = {key: value for key, value in self.teeth[stage.id].items() if key not in _OF_GEARBOX}
         for name in ("gear_1", "gear_2", "sun", "carrier", "ring"):
             if name in tables:
                 tables[name] = {key: value for key, value in tables[name].items() if key not in _SUPPORTS}

@@ -36,6 +36,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import OVER_WIDTH, gear_material
 from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
+from femgear.exchange.gear_strength import add_treatments, strength_table
 from femgear.exchange.gear_unit import gears_of, loads_on, stage_components, unit_flow, with_load_case
 from femgear.exchange.rexs import Component, Model, Relation
 from femgear.exchange.unit_spectrum import load_case_shares, load_duration, spectrum_tables, tell_life_left_out
@@ -141,6 +142,8 @@ def gear_tables(s: _Stage, remarks: dict[str, str]) -> dict[str, Any]:
     _racks(s, tables, remarks)
     for name in s.gears:
         _rim(s, name, tables, remarks)
+    if strength := strength_table(s.model, s.meshes, [gear for gears in s.gears.values() for gear in gears]):
+        tables["strength"] = strength
     return tables
 
 
@@ -371,6 +374,13 @@ def _materials(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> No
             common = next(iter(given.values()))
             tables["material"][f"{key}_stress_limit"] = with_unit(common, STRESS)
         _differing(tables, f"{key}_stress_limit", STRESS, common, given)
+    add_treatments(s.model, tables, {name: parts[0] for name, parts in s.gears.items()}, made)
+    for section in ("material", *s.gears):
+        material = tables["material"] if section == "material" else tables[section].get("material", {})
+        if material.get("estimated"):
+            key = "material" if section == "material" else f"{section}.material"
+            remarks[f"{key}.treatment"] = "assumed: by the tensile strength of the file"
+            remarks[f"{key}.hardness"] = "assumed"
 
 
 def _made_of(model: Model, *parts: Component) -> list[Component]:

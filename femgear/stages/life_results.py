@@ -82,6 +82,7 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
             hours = marks(hours, "W-STRENGTH", of=of)
         elif data[f"{shortest}_damage"].values[at] > 1.0:
             hours = marks(hours, "W-LIFE", of=of)
+        hours = marks(hours, "W-MATERIAL")
         what = f"{shortest} of {data[shortest].values[at]}"
         yield "shortest life of the teeth, ISO 6336-6", f"{hours}, {what}: {_most_damage(data, shortest, at)}"
     for kind in kinds:
@@ -92,6 +93,7 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
         life, damage = float(data[f"{kind}_life"].values[at]), float(data[f"{kind}_damage"].values[at])
         text = f"{safety[at]:.2f}"
         text = marks(text, "W-STRENGTH" if life == 0.0 else "W-LIFE", of=of) if damage > 1.0 else text
+        text = marks(text, "W-MATERIAL")
         cause = _most_damage(data, kind, at)
         if life > 0.0:
             cause = f"damage {_number(damage)}{f', {cause}' if math.isfinite(life) else ''}"

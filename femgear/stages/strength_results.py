@@ -58,7 +58,7 @@ def strength_verdict(results: Results) -> Iterator[Block]:
             yield Block("Verdict", rows=tuple(rows), notes=marks.notes)
         return
     rating, kinds = rated
-    doubts = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
+    doubts = "W-MATERIAL", "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
     rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *rows]
     yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
     yield strength_block(rating, kinds)

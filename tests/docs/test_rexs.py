@@ -75,7 +75,9 @@ def test_a_unit_with_the_casing_of_the_page_has_a_sound(tmp_path, monkeypatch):
 
 def test_attributes_of_the_page_are_those_that_are_read():
     page, folder = (DOCS / "rexs.md").read_text(encoding="utf-8"), DOCS.parent / "femgear" / "exchange"
-    files = (folder / f"{name}.py" for name in ("planetary_stage", "unit_spectrum", "flank_modifications"))
+    files = (
+        folder / f"{name}.py" for name in ("planetary_stage", "unit_spectrum", "flank_modifications", "gear_strength")
+    )
     code = "".join(one.read_text(encoding="utf-8") for one in files)
     named = re.findall(r"`(\w+)`", "".join(line for line in page.splitlines() if line.startswith("| ")))
     assert len(named) > 20 and not [name for name in named if f'"{name}"' not in code]

@@ -52,7 +52,12 @@ CHANGES: tuple[dict[str, object], ...] = (
         "operation.load_case": [{"torque": "30 N m", "speed": "500 rpm", "hours": 100}],
         "operation.required_hours": 200,
     },
-    {"material.treatment": "case hardened steel", "material.grade": "ME", "material.hardness": 720},
+    {
+        "material.treatment": "case hardened steel",
+        "material.grade": "ME",
+        "material.hardness": 720,
+        "material.estimated": True,
+    },
     {
         "strength.edition": 2006,
         "strength.application_factor": 1.25,

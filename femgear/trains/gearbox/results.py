@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.load_spectrum import running_shares
+from femgear.case.messages import estimated_materials
 from femgear.case.quantities import RPM
 from femgear.errors import GeometryError
 from femgear.findings import DOUBT, FAULT, Finding
@@ -21,7 +22,7 @@ from femgear.stages.protocol import StageResult
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
 from femgear.system.assembly import MOTIONS
-from femgear.trains.gearbox.case_file import GearboxCase, named_load_case
+from femgear.trains.gearbox.case_file import GearboxCase, named_load_case, teeth_of
 from femgear.trains.gearbox.casing_file import casing_notices
 from femgear.trains.gearbox.casing_results import (
     casing_coordinates,
@@ -569,6 +570,9 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
             if given:
                 text = f"{', '.join(given)} of these teeth have no effect: shafts and bearings of the gearbox hold them"
                 yield Finding("W-UNUSED", f"{kind}[{i}].teeth", text)
+            if (teeth := teeth_of(stage)) is not None:
+                for finding in estimated_materials(teeth):
+                    yield replace(finding, key=f"{kind}[{i}].teeth.{finding.key}")
 
 
 def _given_planets(case: GearboxCase) -> Iterator[Finding]:

@@ -24,7 +24,7 @@ from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.power import BoxFlow
 from femgear.trains.gearbox.shared_gears import bent_both_ways, shared_gears
 
-OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN"
+OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN", "W-MATERIAL"
 _SAFETIES = {"iso_root_safety": "S_F", "iso_contact_safety": "S_H"}
 _STRESSES = {"S_F": "sigma_F0", "S_H": "Z sigma_H0"}
 _WORDS = {

@@ -20,7 +20,7 @@ from femgear.case.checks import (
 from femgear.case.csv_columns import embed_profiles
 from femgear.case.load_spectrum import spectrum_notices
 from femgear.case.lubrication import LossesSection, LubricantSection
-from femgear.case.messages import added_material, idle_materials_and_oil
+from femgear.case.messages import added_material, estimated_materials, idle_materials_and_oil
 from femgear.case.quantities import ANGLE, LENGTH, TORQUE, Count, Quantity, Section, Title, Values
 from femgear.case.sections import (
     FORMAT,
@@ -254,6 +254,7 @@ def pair_notices(_data: dict, case: PairCase) -> Iterator[Finding]:
     yield from added_material(case)
     yield from spectrum_notices(case)
     yield from idle_materials_and_oil(case)
+    yield from estimated_materials(case)
 
 
 FILE = CaseFile(PairCase, check_pair_entries, notices=pair_notices, embed=embed_profiles)
