@@ -100,19 +100,19 @@ def add_treatments(
     made : mapping of str to sequence of Component
         Materials of the gears.
     """
-    known: dict[str, dict[str, Any]] = {}
+    treatments: dict[str, dict[str, Any]] = {}
     for name, part in gears.items():
         if not made[name]:
             continue
         limits = {**tables["material"], **tables[name].get("material", {})}
-        known[name] = treatment_of(model, made[name][0])
-        if not known[name] and not {"root_stress_limit", "contact_stress_limit"} & limits.keys():
-            known[name] = estimated_treatment(model, name, part, made[name][0])
-    common = next(iter(known.values()), {})
-    if len(known) == len(gears) and all(treatment == common for treatment in known.values()):
+        treatments[name] = treatment_of(model, made[name][0])
+        if not treatments[name] and not {"root_stress_limit", "contact_stress_limit"} & limits.keys():
+            treatments[name] = estimated_treatment(model, name, part, made[name][0])
+    common = next(iter(treatments.values()), {})
+    if len(treatments) == len(gears) and all(treatment == common for treatment in treatments.values()):
         tables["material"] |= common
         return
-    for name, treatment in known.items():
+    for name, treatment in treatments.items():
         if treatment:
             tables[name]["material"] = tables[name].get("material", {}) | treatment
 
