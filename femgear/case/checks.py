@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case.flank_sections import CarrierErrors, GearErrors
 from femgear.case.load_spectrum import check_load_spectrum
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, LENGTH, SPEED
-from femgear.case.sections import ROUNDING, CarrierErrors, GearErrors, face_width, gear_material
+from femgear.case.sections import ROUNDING, face_width, gear_material
 from femgear.case.tooth_measures import check_allowances, shift_open
 from femgear.errors import CaseError
 from femgear.findings import Finding, remark

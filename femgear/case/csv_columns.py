@@ -20,8 +20,8 @@ from pathlib import PurePath
 from typing import Any
 
 from femgear.case import text
+from femgear.case.flank_sections import MOST_POINTS
 from femgear.case.quantities import ANGLE, LENGTH, Dimension, to_si
-from femgear.case.sections import MOST_POINTS
 from femgear.errors import CaseError
 
 _HEADING = re.compile(r"\s*(?P<name>[A-Za-z_ ]+?)[\s_]*[\[(](?P<unit>[^\])]+)[\])]\s*")

@@ -9,21 +9,19 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
+from femgear.case.flank_sections import CarrierErrors, GearErrors, RingErrors
 from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.quantities import Count, Title
 from femgear.case.sections import (
     FORMAT,
-    CarrierErrors,
     CarrierSection,
     DynamicsSection,
-    GearErrors,
     HousingSection,
     MachineSection,
     MaterialSection,
     OperationSection,
     PlanetSection,
     RackSection,
-    RingErrors,
     RingSection,
     RunupSection,
     SetSection,

@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from femgear.case.flank_sections import CarrierErrors, GearErrors
 from femgear.case.quantities import FREE, Section
-from femgear.case.sections import CarrierErrors, GearErrors, face_width
+from femgear.case.sections import face_width
 from femgear.case.text import ReadCase
 from femgear.case.tooth_measures import gear_allowances, measured_gear
 from femgear.errors import GeometryError
@@ -25,7 +26,7 @@ from femgear.gears.pair import GearSet
 from femgear.gears.profile import BasicRack, PinionCutter, overlap_ratio, transverse_rack, transverse_tool
 
 if TYPE_CHECKING:
-    from femgear.case.sections import ModificationSection
+    from femgear.case.flank_sections import ModificationSection
 
 
 class GearCase(Section, ReadCase):

@@ -18,6 +18,7 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 from femgear.case.estimates import USUAL_STIFFNESS, estimates, usual_rim, usual_torque
+from femgear.case.flank_sections import OVER_WIDTH
 from femgear.case.gear_set import planetary_set, support_stiffness
 from femgear.case.load_spectrum import running_shares
 from femgear.case.planetary import Case
@@ -33,7 +34,7 @@ from femgear.case.quantities import (
     Dimension,
     to_si,
 )
-from femgear.case.sections import OVER_WIDTH, gear_material
+from femgear.case.sections import gear_material
 from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
 from femgear.exchange.gear_strength import add_treatments, strength_table

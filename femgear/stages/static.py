@@ -26,6 +26,7 @@ from femgear.case.dependencies import (
     static_entries,
     stress_entries,
 )
+from femgear.case.flank_sections import OVER_WIDTH
 from femgear.case.gear_set import (
     material_of,
     materials_of,
@@ -34,7 +35,7 @@ from femgear.case.gear_set import (
     support_stiffness,
 )
 from femgear.case.planetary import Case
-from femgear.case.sections import OVER_WIDTH, WIDTH_ENTRIES
+from femgear.case.sections import WIDTH_ENTRIES
 from femgear.case.teeth import case_overlap
 from femgear.case.tooth_friction import acting_friction
 from femgear.contact.bodies import (

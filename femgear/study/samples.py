@@ -29,11 +29,11 @@ from scipy.sparse import csr_array
 
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
+from femgear.case.flank_sections import LARGEST_SLOPE, Amplitude, Deviation, Slope
 from femgear.case.gear_set import need_set, planetary_set
 from femgear.case.messages import combine, translate
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, Count, Quantity, Section
-from femgear.case.sections import LARGEST_SLOPE, Amplitude, Deviation, Slope
 from femgear.contact.assembly import (
     MOST_ENLARGEMENTS,
     Candidates,

@@ -5,8 +5,8 @@ from typing import Any, ClassVar
 
 import pytest
 
+from femgear.case.flank_sections import GearErrors
 from femgear.case.gear_set import need_set, planetary_set, set_deviations
-from femgear.case.sections import GearErrors
 from femgear.case.teeth import GearCase, runout_of
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.deviations import no_deviations

@@ -18,6 +18,7 @@ from femgear.case.checks import (
     check_torque,
 )
 from femgear.case.csv_columns import embed_profiles
+from femgear.case.flank_sections import GearErrors, ModificationSection
 from femgear.case.load_spectrum import spectrum_notices
 from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.messages import added_material, estimated_materials, idle_materials_and_oil
@@ -29,7 +30,6 @@ from femgear.case.sections import (
     LEFT_OUT,
     DynamicsSection,
     FaceWidth,
-    GearErrors,
     GearMaterialSection,
     Hours,
     Inertia,
@@ -37,7 +37,6 @@ from femgear.case.sections import (
     MachineSection,
     Mass,
     MaterialSection,
-    ModificationSection,
     Module,
     PressureAngle,
     RackSection,
