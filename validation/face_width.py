@@ -13,7 +13,6 @@ from scipy.interpolate import CubicSpline
 
 from femgear.case.gear_set import planetary_set
 from femgear.contact import slices
-from femgear.contact.batch import PairLaws
 from femgear.contact.bodies import (
     make_bodies,
     make_sectors,
@@ -23,6 +22,7 @@ from femgear.contact.bodies import (
 )
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.local_compliance import hertz_half_width
+from femgear.contact.pair_laws import PairLaws
 from femgear.contact.root_stress import (
     _between_slices,
     _station_forces,

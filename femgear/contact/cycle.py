@@ -28,13 +28,7 @@ from femgear.contact.assembly import (
     mesh_windows,
     pair_paths,
 )
-from femgear.contact.batch import (
-    BatchState,
-    ContactTangents,
-    check_definite,
-    check_residual,
-    solve_batch,
-)
+from femgear.contact.batch import BatchState, ContactTangents, check_definite, check_residual, solve_batch
 from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
 from femgear.contact.flank_friction import friction_of_record

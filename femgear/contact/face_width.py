@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from femgear.contact.assembly import Candidates
-from femgear.contact.batch import BatchState, PairLaws, pair_laws
+from femgear.contact.batch import BatchState
 from femgear.contact.bodies import Bodies
+from femgear.contact.pair_laws import PairLaws, pair_laws
 from femgear.contact.slices import SliceState, solve_slices
 from femgear.contact.supports import MovingMembers, TiltingMembers
 from femgear.contact.width_waves import WidthWaves

@@ -1,6 +1,6 @@
 """The contact of many sets whose tooth pairs are springs: Newton's method on positions and sets together.
 
-The springs are those of `femgear.contact.batch.PairLaws`. The last axis of all arrays are the problems, one
+The springs are those of `femgear.contact.pair_laws.PairLaws`. The last axis of all arrays are the problems, one
 for every position of every set, so that each operation runs over thousands of them, and systems of so few
 unknowns are eliminated side by side. What comes out for one of them depends on no other.
 """
@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from femgear.contact.batch import FAINT, PairLaws
+from femgear.contact.batch import FAINT
+from femgear.contact.pair_laws import PairLaws
 
 _REFRESHED = 3
 """Steps of Newton's method for which the moments of tooth pairs follow their forces."""

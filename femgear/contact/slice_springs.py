@@ -25,7 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.contact.assembly import Candidates
-from femgear.contact.batch import FAINT, PairLaws
+from femgear.contact.batch import FAINT
+from femgear.contact.pair_laws import PairLaws
 from femgear.contact.pair_springs import PairSprings
 from femgear.contact.supports import TiltingMembers
 from femgear.contact.width_waves import WidthWaves, cosines, slice_compliance

@@ -13,7 +13,8 @@ import numpy as np
 from scipy.linalg import get_lapack_funcs
 
 from femgear.contact.assembly import Candidates
-from femgear.contact.batch import PairLaws, cyclic_harmonics
+from femgear.contact.batch import cyclic_harmonics
+from femgear.contact.pair_laws import PairLaws
 from femgear.contact.supports import TiltingMembers
 from femgear.contact.width_waves import WidthWaves, slice_compliance
 from femgear.errors import ContactError
@@ -127,7 +128,7 @@ def solve_slices(
 ) -> SliceState:
     """Solve the contact of all tooth pairs in all slices, which share their motions.
 
-    Newton's method on the pairs as springs (`femgear.contact.batch.PairLaws`). Without separations spur teeth
+    Newton's method on the pairs as springs (`femgear.contact.pair_laws.PairLaws`). Without separations spur teeth
     have the plane solution that the laws were made of.
 
     ContactError: E-CONTACT: the iteration does not end.

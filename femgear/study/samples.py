@@ -44,17 +44,12 @@ from femgear.contact.assembly import (
     mesh_windows,
     not_contained,
 )
-from femgear.contact.batch import (
-    ContactTangents,
-    PairLaws,
-    check_residual,
-    pair_laws,
-    solve_batch,
-)
+from femgear.contact.batch import ContactTangents, check_residual, solve_batch
 from femgear.contact.cycle import CycleOptions
 from femgear.contact.face_width import contacts_are_lines, curve_forces, lead_separations
 from femgear.contact.flank_pairs import pair_separations
 from femgear.contact.mesh_cycle import MeshCycle
+from femgear.contact.pair_laws import PairLaws, pair_laws
 from femgear.contact.pair_springs import PairSprings, solve_laws
 from femgear.contact.peaks import mean_weights
 from femgear.contact.slice_springs import SliceSolutions, SliceSprings, solve_slice_springs

@@ -144,7 +144,7 @@ def test_positions_by_themselves_agree(uneven, monkeypatch):
     for supports in SUPPORTS[2:]:
         together = rubbed(gears, bodies, supports=supports, places=PLACES[::4])
         with monkeypatch.context() as patch:
-            patch.setattr(batch, "_MOST_STEPS", 1)
+            patch.setattr(batch, "MOST_STEPS", 1)
             alone = rubbed(gears, bodies, supports=supports, places=PLACES[::4])
         assert alone.force == pytest.approx(together.force, rel=1e-9)
         assert alone.iterations.sum() != together.iterations.sum()

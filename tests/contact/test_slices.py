@@ -140,7 +140,7 @@ def test_cosines_are_orthonormal():
 
 def spring_newton(separation, *, stiffness, load, slices, tilting=None):
     """Slices of one linear spring, not coupled across the width."""
-    from femgear.contact.batch import PairLaws
+    from femgear.contact.pair_laws import PairLaws
 
     force = np.geomspace(1.0, 1e5, 8)
     laws = PairLaws(

@@ -14,8 +14,8 @@ from script_runs import wait_for_lines
 
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.cli import main
-from femgear.contact.batch import PairLaws
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.pair_laws import PairLaws
 from femgear.contact.pair_springs import PairSprings, solve_laws
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import RIGID, Supports
