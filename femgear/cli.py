@@ -51,7 +51,7 @@ try:
     from cyclopts import App, CycloptsError, MissingArgumentError, Parameter
 
     import femgear
-    from femgear.errors import CaseError, FemgearError, StorageError, printable
+    from femgear.errors import CaseError, FemgearError, StorageError, nvh_library, printable
     from femgear.exchange.formats import Sampling
     from femgear.findings import FindingWarning
     from femgear.storage.files import noted_interrupts, storage_error
@@ -451,6 +451,31 @@ def mcp(folder: Path = Path(), /) -> int:
     if not folder.is_dir():
         raise CaseError("there is no such folder", code="E-FILE", key="folder", value=str(folder), limit="a folder")
     make_server(folder.resolve()).run()
+    return 0
+
+
+@app.command(name="app")
+def open_app(folder: Path = Path(), /, *, port: int = 0, browser: bool = True) -> int:
+    """Open the app: a window in the browser with form, sliders, answers while one drags, runs and their reports.
+
+    It serves this machine alone, and reads and writes case files and results of one folder.
+
+    Parameters
+    ----------
+    folder
+        Folder of case files and results.
+    port
+        Of this machine. Default: a free one.
+    browser
+        Open it in the browser; else the address is printed alone.
+    """
+    from femgear.run import grid_cache
+
+    if not folder.is_dir():
+        raise CaseError("there is no such folder", code="E-FILE", key="folder", value=str(folder), limit="a folder")
+    with nvh_library("the app", "app"):
+        from femgear.app.server import serve
+    serve(folder.resolve(), grid_cache(), port=port, browser=browser)
     return 0
 
 

@@ -25,6 +25,7 @@ LAYERS = (
     ("study",),
     ("run",),
     ("assistant",),
+    ("app",),
     ("cli",),
     ("__main__",),
 )
@@ -38,6 +39,8 @@ DRAWING = {
 SOLVING = {"scipy.linalg", "scipy.sparse", "femgear.stages.protocol"}
 MODULES = sorted(PACKAGE.rglob("*.py"))
 WITHOUT_TEST_FILE = {
+    "app/fields.py": "the form of a window, in a browser: tests/browser/test_app.py",
+    "app/window.py": "a window, in a browser: tests/browser/test_app.py",
     "__main__.py": "calls the command line and nothing else: tests/test_cli.py",
     "exchange/_cad_worker.py": "a process of its own, which test_cad.py starts",
     "fe/_gmsh_worker.py": "a process of its own, which test_meshing.py starts",

@@ -49,9 +49,9 @@ def imported():
 
 def test_what_is_imported_is_declared_and_what_is_declared_is_imported():
     core, extras = names(PROJECT["dependencies"]), PROJECT["optional-dependencies"]
-    optional = set().union(*(names(extras[extra]) for extra in ("assistant", "cad", "cluster", "nvh")))
-    # by pyvista, xarray, h5netcdf, dask and pydantic
-    brought = {"vtk", "pandas", "h5py", "distributed", "pydantic-core"}
+    optional = set().union(*(names(extras[extra]) for extra in ("app", "assistant", "cad", "cluster", "nvh")))
+    # by pyvista, xarray, h5netcdf, dask, pydantic and nicegui
+    brought = {"vtk", "pandas", "h5py", "distributed", "pydantic-core", "fastapi", "uvicorn"}
     assert imported() - brought <= core | optional
     # h5netcdf is the engine that xarray is told by name
     assert core - imported() == {"h5netcdf"} and not core & optional

@@ -332,6 +332,9 @@ def Quantity(dimension: Dimension, low: float, high: float, *, remedy: str | Non
     schema = {
         "type": "string",
         "description": f"{dimension.name} with its unit, {dimension.window(low, high)}",
+        "x-unit": dimension.shown,
+        "x-scale": dimension.scale,
+        "x-window": [low / dimension.scale, high / dimension.scale],
     }
     return _Reader(read, schema)
 

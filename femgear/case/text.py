@@ -8,7 +8,7 @@ import os
 import re
 import stat
 import tomllib
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, time
 from functools import lru_cache
@@ -208,7 +208,7 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
     elif "octal" in message or re.search(r"=\s*0\d", bare):
         remedy = "a number has no leading zeros"
     elif "(at end of document)" in message:
-        started = max((number for _, number in _entries(text)), default=1)
+        started = max((number for _, number in keys_with_lines(text)), default=1)
         remedy = f"close the brackets and quotation marks of the entry in line {started}, or complete it"
     return CaseError(f"not TOML: {message}", code="E-TOML", file=name, remedy=remedy)
 
@@ -216,7 +216,7 @@ def _syntax_error(text: str, message: str, name: str) -> CaseError:
 def _duplicate(text: str, line: int) -> tuple[str | None, list[int]]:
     """Key that is given a second time at or before ``line``, and the lines that give it."""
     seen: dict[str, list[int]] = {}
-    for key, number in _entries(text):
+    for key, number in keys_with_lines(text):
         if number <= line:
             seen.setdefault(key, []).append(number)
     repeated = [(numbers[-1], key) for key, numbers in seen.items() if len(numbers) > 1]
@@ -244,11 +244,11 @@ def line_of(text: str, key: str) -> int | None:
 @lru_cache(maxsize=2)
 def _lines(text: str) -> dict[str, int]:
     """First line of every key."""
-    return {key: number for key, number in reversed(list(_entries(text)))}
+    return {key: number for key, number in reversed(list(keys_with_lines(text)))}
 
 
-def _entries(text: str):
-    """Dotted key and line number of every table header and every key that starts a line.
+def keys_with_lines(text: str) -> Iterator[tuple[str, int]]:
+    """Give dotted key and line number of every table header and every key that starts a line.
 
     Tables of a list are numbered, and with them the tables inside: ``sun.modifications[0].amount``,
     ``stage[1].gears.module``.

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 from femgear.errors import GeometryError
 from femgear.gears.gear import Gear, half_thickness_angle
@@ -221,6 +222,7 @@ def ball_range(gear: Gear, helix: float = 0.0) -> tuple[float, float] | None:
     return (low, high) if 0.0 < low < high else None
 
 
+@lru_cache(maxsize=64)
 def usual_ball(gear: Gear, helix: float = 0.0) -> float | None:
     """Choose a ball [m] that touches near the circle ``d + 2 x m``, in steps; None where none can be measured."""
     ends = ball_range(gear, helix)

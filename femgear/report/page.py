@@ -180,9 +180,10 @@ def page(train: Train, results: Results, *, static: bool = False) -> str:
     return document(case.title, main, {"charts": charts} | data if data else None)
 
 
-def document(title: str, main: str, data: dict[str, Any] | None) -> str:
-    """Make an HTML file of its title, its contents and what scripts draw; none where it is None."""
+def document(title: str, main: str, data: dict[str, Any] | None, *, script: str = "") -> str:
+    """Make an HTML file of its title, its contents and what scripts draw, none where it is None, and a script more."""
     scripts = "" if data is None else _scripts(data)
+    scripts += f"<script>{script}</script>\n" if script else ""
     main, title = (_CONTROLS.sub(lambda match: printable(match[0]), text) for text in (main, escape(title)))
     return (
         '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'

@@ -5,7 +5,8 @@ They draw datasets of results, of whatever train; helpers for figures over the m
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -22,6 +23,7 @@ from femgear.report.style import (
     SIZE,
     SMALL,
     VERMILION,
+    Drawings,
     digits,
     drawn_lines,
     family,
@@ -402,12 +404,12 @@ def speed_sweep(dynamics: xr.Dataset) -> Figure:
     return figure
 
 
-def response_figures(dynamics: xr.Dataset, **others: Figure) -> dict[str, Figure]:
+def response_figures(dynamics: xr.Dataset, **others: Callable[[], Figure]) -> Drawings:
     """Draw the spectrum of the transmission error, `others`, and over many speeds its sweep."""
-    figures = {"dynamic_spectrum": transmission_error_spectrum(dynamics), **others}
+    figures = {"dynamic_spectrum": partial(transmission_error_spectrum, dynamics), **others}
     if dynamics.sizes["speed"] > _MANY_SPEEDS:
-        figures["speed_sweep"] = speed_sweep(dynamics)
-    return figures
+        figures["speed_sweep"] = partial(speed_sweep, dynamics)
+    return Drawings(figures)
 
 
 def some_at_a_time(dynamics: xr.Dataset) -> Iterator[xr.Dataset]:

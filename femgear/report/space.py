@@ -56,6 +56,8 @@ class SpaceBody:
         Number of the stage of a gear, which gives its colour.
     gear : Gear, optional
         That has the teeth, in its transverse section.
+    turns : float
+        By how much it turns while the first body turns by one, about its own axis; 0 of what is not turned.
     """
 
     name: str
@@ -71,6 +73,7 @@ class SpaceBody:
     angle: float = 0.0
     stage: int = 0
     gear: Gear | None = None
+    turns: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -161,6 +164,8 @@ def _body(body: SpaceBody) -> dict[str, Any]:
         "radii": _lengths(body.radii),
         "stage": body.stage,
     }
+    if body.turns:
+        data["turns"] = round(body.turns, 9)
     if body.section is not None:
         data |= {"section": _lengths(body.section), "teeth": body.teeth, "internal": body.internal}
         data |= {"twist": round(body.twist, 6), "angle": round(math.remainder(body.angle, 2.0 * math.pi), 6)}

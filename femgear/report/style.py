@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import TYPE_CHECKING, Literal, cast
 
@@ -36,6 +37,28 @@ _DPI = 120
 PNG_LEVEL = 3  # of zlib: a third faster than 6, files a fifteenth larger
 _LEGEND_ROW = 0.21
 """Height of a row of the legend [in]."""
+
+
+class Drawings(Mapping[str, "Figure"]):
+    """Figures by name, each of which is drawn when it is asked for: an app shows few of many.
+
+    Parameters
+    ----------
+    drawn : mapping of str to callable
+        ``() -> Figure`` by the name of the figure, in their order.
+    """
+
+    def __init__(self, drawn: Mapping[str, Callable[[], Figure]]) -> None:
+        self._drawn = dict(drawn)
+
+    def __getitem__(self, name: str) -> Figure:
+        return self._drawn[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._drawn)
+
+    def __len__(self) -> int:
+        return len(self._drawn)
 
 
 def new_figure(

@@ -5,6 +5,7 @@ Colours tell kinds of modes and of meshes; everything else is labelled where it 
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,6 +21,7 @@ from femgear.report.style import (
     SIZE,
     SMALL,
     VERMILION,
+    Drawings,
     label,
     legend_below,
     name_curves,
@@ -313,11 +315,13 @@ def _name_resonances(ax, runup: xr.Dataset) -> None:
         )
 
 
-def runup_figures(runup: xr.Dataset, modes: xr.Dataset) -> dict[str, Figure]:
+def runup_figures(runup: xr.Dataset, modes: xr.Dataset) -> Drawings:
     """Draw the figures of a run-up by the names of their files."""
-    return {
-        "run_up_levels": runup_levels(runup),
-        "campbell": campbell_diagram(runup, modes),
-        "waterfall": waterfall(runup),
-        "order_cuts": draw_order_cuts(runup),
-    }
+    return Drawings(
+        {
+            "run_up_levels": partial(runup_levels, runup),
+            "campbell": partial(campbell_diagram, runup, modes),
+            "waterfall": partial(waterfall, runup),
+            "order_cuts": partial(draw_order_cuts, runup),
+        }
+    )

@@ -57,6 +57,15 @@ def gear_hands(gears: GearSet) -> tuple[float, ...]:
     return tuple(hands)
 
 
+def gear_turns(gears: GearSet) -> tuple[float, ...]:
+    """Turns of every gear over those of the first, all axes at rest: mates roll on one another."""
+    turns = [1.0] * len(gears.gears)
+    for first, second in gears.mates:
+        same = 1.0 if gears.gears[second].internal else -1.0
+        turns[second] = same * turns[first] * gears.gears[first].teeth / gears.gears[second].teeth
+    return tuple(turns)
+
+
 def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
     """List the gears of a pair or a set, their axes along z.
 
@@ -67,7 +76,7 @@ def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
     base_helix : float
         Base helix angle of the first gear [rad], positive of a right-handed one.
     """
-    hands, angles = gear_hands(gears), tooth_angles(gears)
+    hands, angles, turns = gear_hands(gears), tooth_angles(gears), gear_turns(gears)
     for number, gear in enumerate(gears.gears):
         section, half = tooth_section(gear), 0.5 * gear.face_width
         twist = hands[number] * 2.0 * half * math.tan(base_helix) / gear.base_radius
@@ -89,6 +98,7 @@ def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
                 angle - 0.5 * twist,
                 stage=number,
                 gear=gear,
+                turns=turns[number],
             )
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +38,7 @@ from femgear.report.style import (
     GREY,
     SIZE,
     VERMILION,
+    Drawings,
     drawn_lines,
     family,
     label,
@@ -612,19 +614,23 @@ def _degrees(gear: Gear, roll):
     return np.degrees(np.asarray(roll) / gear.base_radius)
 
 
-def _static_figures(drawn: Drawn) -> dict[str, Figure]:
+def _static_figures(drawn: Drawn) -> Drawings:
     """Draw the figures of static.nc."""
     static = drawn.data["static"]
     over_width = {}
     if "slice_load" in static:
-        over_width = {"face_load": face_load(static), "contact_pattern": contact_pattern(static)}
-    sharing = {"load_sharing": load_sharing(static)} if len(_kinds(static)) > 1 else {}
-    return over_width | {
-        "static_transmission_error": static_transmission_error(static),
-        "mesh_stiffness": draw_mesh_stiffness(static, face_width=_one_width(planetary_set(drawn.case))),
-        **sharing,
-        "tooth_loads": tooth_loads(static),
-    }
+        over_width = {"face_load": partial(face_load, static), "contact_pattern": partial(contact_pattern, static)}
+    sharing = {"load_sharing": partial(load_sharing, static)} if len(_kinds(static)) > 1 else {}
+    width = _one_width(planetary_set(drawn.case))
+    return Drawings(
+        over_width
+        | {
+            "static_transmission_error": partial(static_transmission_error, static),
+            "mesh_stiffness": partial(draw_mesh_stiffness, static, face_width=width),
+            **sharing,
+            "tooth_loads": partial(tooth_loads, static),
+        }
+    )
 
 
 def _one_width(gears: GearSet) -> float | None:
@@ -633,21 +639,21 @@ def _one_width(gears: GearSet) -> float | None:
     return least if least == max(gears.mesh_widths) else None
 
 
-def _stress_figures(drawn: Drawn) -> dict[str, Figure]:
+def _stress_figures(drawn: Drawn) -> Drawings:
     """Draw the figures of stress.nc; distributions and turns are not in records of several mesh periods."""
     stress = drawn.data["stress"]
     figures = {
-        "root_stress": root_stress_history(stress),
-        "root_profile": root_stress_profile(stress),
-        "load_spectrum": draw_load_spectrum(stress),
+        "root_stress": partial(root_stress_history, stress),
+        "root_profile": partial(root_stress_profile, stress),
+        "load_spectrum": partial(draw_load_spectrum, stress),
     }
     if "root_over_width" in stress:
-        figures["root_over_width"] = root_stress_over_width(stress)
+        figures["root_over_width"] = partial(root_stress_over_width, stress)
     if "pressure_distribution" in stress:
-        figures["contact_pressure"] = draw_contact_pressure(stress)
+        figures["contact_pressure"] = partial(draw_contact_pressure, stress)
     if "planet_root_stress" in stress:
-        figures["planet_bending"] = planet_bending(stress)
-    return figures
+        figures["planet_bending"] = partial(planet_bending, stress)
+    return Drawings(figures)
 
 
 def _deviation_figures(drawn: Drawn) -> dict[str, Figure]:

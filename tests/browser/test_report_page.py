@@ -2,7 +2,6 @@
 
 import json
 import math
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +12,7 @@ from femgear.run import open_results
 from femgear.trains.reading import read_case, to_toml, with_value
 
 pytest.importorskip("playwright", reason="make test-browser installs it")
-CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-pytestmark = [pytest.mark.browser, pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed")]
+pytestmark = pytest.mark.browser
 CASES = Path(__file__).parents[2] / "cases"
 DEMO = "planetary_27_40_108"
 TRAINS = (DEMO, "nrel_pgb", "helical_30_20_70", "four_stage_reducer", "grc_like_drivetrain", "gear_pair")
@@ -54,19 +52,6 @@ def report(tmp_path_factory):
         return found[name]
 
     return run
-
-
-@pytest.fixture(scope="session")
-def chromium():
-    from playwright.sync_api import sync_playwright
-
-    options = ("--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
-    with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(
-            executable_path=CHROMIUM, args=[*options, "--autoplay-policy=no-user-gesture-required"]
-        )
-        yield browser
-        browser.close()
 
 
 @pytest.fixture

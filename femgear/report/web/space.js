@@ -105,7 +105,9 @@ page.space = () => {
 
   const chooser = document.getElementById("solid-view"), bar = document.getElementById("solid-bar");
   const scale = document.getElementById("solid-scale");
+  const turning = model.bodies.some(({ turns }) => turns);
   ["at rest", ...model.motions.map(({ title }) => title)].forEach((text, i) => chooser.add(new Option(text, String(i))));
+  if (turning) chooser.add(new Option("turning", "turning"));
   const state = { fields: [], factor: 0, moving: false, swings: false, unit: "" };
   const paint = (body, tintOf) => {
     for (let i = 0; i < body.points; i++) body.colour.set(tintOf(i).map(page.linear), 3 * i);
@@ -113,6 +115,8 @@ page.space = () => {
   };
   const choose = () => {
     const motion = model.motions[Number(chooser.value) - 1];
+    state.turning = chooser.value === "turning";
+    scale.disabled = state.turning || !motion;
     if (!motion) {
       state.fields = bodies.map((body) => new Float32Array(3 * body.points));
       state.factor = 0;
@@ -131,7 +135,22 @@ page.space = () => {
     state.swings = Boolean(motion && motion.swings);
     draw(0);
   };
+  // every body about its own axis, as fast as its teeth let it
+  const turn = (time) => {
+    bodies.forEach((body) => {
+      const angle = (body.turns || 0) * (time / 4000), c = Math.cos(angle), s = Math.sin(angle);
+      for (let i = 0; i < 3 * body.points; i += 3) {
+        const x = body.rest[i] - body.axis[0], y = body.rest[i + 1] - body.axis[1];
+        body.at[i] = body.axis[0] + c * x - s * y - middle[0];
+        body.at[i + 1] = body.axis[1] + s * x + c * y - middle[1];
+        body.at[i + 2] = body.rest[i + 2] - middle[2];
+      }
+      body.shape.attributes.position.needsUpdate = true;
+    });
+    render();
+  };
   const draw = (time) => {
+    if (state.turning) { turn(time); return; }
     const swing = state.swings ? Math.cos(time / 350) : state.moving ? 0.5 - 0.5 * Math.cos(time / 700) : 1, factor = state.factor * Number(scale.value) * swing;
     bodies.forEach((body, k) => {
       const field = state.fields[k];
@@ -176,6 +195,6 @@ page.space = () => {
   });
   canvas.addEventListener("pointerleave", () => { tip.hidden = true; });
   choose();
-  place.space = { bodies, state };
+  place.space = { bodies, state, view };
 };
 page.parts.push(page.space);

@@ -76,7 +76,9 @@ page.view = (place, radius, from) => {
     renderer.domElement.style.display = "";
     setTimeout(fit);
   });
-  return { group, camera, render, reset, canvas: renderer.domElement };
+  // a browser has few of these, so one that is not needed any more is given back
+  const dispose = () => { renderer.dispose(); renderer.forceContextLoss(); renderer.domElement.remove(); };
+  return { group, camera, orbit, render, reset, dispose, canvas: renderer.domElement };
 };
 
 // choice, motion, magnification and reset of a view, whose state tells whether it is moving

@@ -14,7 +14,8 @@ By stage:
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -50,6 +51,7 @@ from femgear.report.style import (
     SMALL,
     VERMILION,
     WIDTH,
+    Drawings,
     excited_to,
     label,
     legend_below,
@@ -437,12 +439,14 @@ def _draw_sensors(ax, lines: SensorLines, amplitudes: Mapping[str, np.ndarray], 
     label(ax, "carrier order [1]", "level [dB re\nlargest line]", title)
 
 
-def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
+def _modes_figures(drawn: Drawn) -> Drawings:
     modes = drawn.data["modes"]
-    return {
-        "mode_shapes": mode_shapes(modes, planetary_set(drawn.case)),
-        "natural_frequencies": natural_frequencies(modes),
-    }
+    return Drawings(
+        {
+            "mode_shapes": lambda: mode_shapes(modes, planetary_set(drawn.case)),
+            "natural_frequencies": lambda: natural_frequencies(modes),
+        }
+    )
 
 
 def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
@@ -478,16 +482,18 @@ def _write_ring_modes(drawn: Drawn, folder: Path) -> list[str]:
     return ["ring_modes.vtu", "ring_mode.png"]
 
 
-def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
+def _dynamics_figures(drawn: Drawn) -> Drawings:
     dynamics, modes = drawn.data["dynamics"], drawn.data.get("modes")
     rest = None
     if modes is not None and "supported_force" in modes:
         rest = modes["supported_position"].values, modes["supported_force"].values
     return response_figures(
         dynamics,
-        dynamic_transmission_error=transmission_error_period(dynamics, _on_supports(modes, drawn.data.get("static"))),
-        mesh_forces=mesh_force_period(dynamics, rest),
-        ring_static_deflection=ring_mean_deflection(dynamics, planetary_set(drawn.case)),
+        dynamic_transmission_error=lambda: transmission_error_period(
+            dynamics, _on_supports(modes, drawn.data.get("static"))
+        ),
+        mesh_forces=lambda: mesh_force_period(dynamics, rest),
+        ring_static_deflection=lambda: ring_mean_deflection(dynamics, planetary_set(drawn.case)),
     )
 
 
@@ -507,22 +513,27 @@ def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
     return [EXPLORER]
 
 
-def _housing_figures(drawn: Drawn) -> dict[str, Figure]:
-    figures, housing, dynamics = {}, drawn.data["housing"], drawn.data.get("dynamics")
+def _housing_figures(drawn: Drawn) -> Drawings:
+    housing, dynamics = drawn.data["housing"], drawn.data.get("dynamics")
+    figures: dict[str, Callable[[], Figure]] = {}
     angles, supports = planetary_set(drawn.case).planet_angles, housing_supports(drawn.case)
     for s in shown_speeds(housing):
         at_speed, speed = housing.isel(speed=[s]), f"{round(float(housing['speed'][s]))}_rpm"
         if dynamics is not None and "level_change" in dynamics:
             at_speed = at_speed.assign(level_change=("speed", dynamics["level_change"].values[[s]]))
-        model = None if dynamics is None else hanning_spectrum(dynamics, housing, angles, s)
+
+        def modulation(at_speed=at_speed, s=s) -> Figure:
+            model = None if dynamics is None else hanning_spectrum(dynamics, housing, angles, s)
+            return modulation_polar(at_speed, angles, windowed=model, supports=supports)
+
         figures |= {
-            f"housing_signal_{speed}": housing_signal(at_speed),
-            f"order_spectrum_{speed}": draw_order_spectrum(at_speed),
-            f"modulation_{speed}": modulation_polar(at_speed, angles, windowed=model, supports=supports),
+            f"housing_signal_{speed}": partial(housing_signal, at_speed),
+            f"order_spectrum_{speed}": partial(draw_order_spectrum, at_speed),
+            f"modulation_{speed}": modulation,
         }
         if "pressure_level" in at_speed:
-            figures[f"microphone_spectrum_{speed}"] = microphone_spectrum(at_speed)
-    return figures
+            figures[f"microphone_spectrum_{speed}"] = partial(microphone_spectrum, at_speed)
+    return Drawings(figures)
 
 
 FIGURES = STATIC | {

@@ -7,6 +7,7 @@ They read modes.nc and dynamics.nc; `phase_diagram` shows the phases of the mesh
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from types import SimpleNamespace
 from typing import TYPE_CHECKING
 
@@ -32,6 +33,7 @@ from femgear.report.style import (
     ORANGE,
     SIZE,
     VERMILION,
+    Drawings,
     label,
     legend_below,
     line_style,
@@ -353,14 +355,15 @@ def _modes_figures(drawn: Drawn) -> dict[str, Figure]:
     return figures
 
 
-def _dynamics_figures(drawn: Drawn) -> dict[str, Figure]:
+def _dynamics_figures(drawn: Drawn) -> Drawings:
     dynamics, modes = drawn.data["dynamics"], drawn.data["modes"]
-    slices = {"slice_forces": _slice_forces(dynamics)} if dynamics.sizes["slice"] > 1 else {}
-    return slices | response_figures(
+    slices = {"slice_forces": partial(_slice_forces, dynamics)} if dynamics.sizes["slice"] > 1 else {}
+    return response_figures(
         dynamics,
-        dynamic_transmission_error=transmission_errors(dynamics, modes),
-        mesh_force_spectra=_mesh_force_spectra(dynamics, modes),
-        pin_forces=_pin_forces(dynamics),
+        **slices,
+        dynamic_transmission_error=partial(transmission_errors, dynamics, modes),
+        mesh_force_spectra=partial(_mesh_force_spectra, dynamics, modes),
+        pin_forces=partial(_pin_forces, dynamics),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,7 @@ from femgear.report.style import (
     BLUE,
     GREY,
     VERMILION,
+    Drawings,
     label,
     legend_below,
     new_figure,
@@ -82,13 +84,13 @@ def _curves(values: np.ndarray) -> np.ndarray:
     return rows[:1] if np.allclose(rows[-1], rows[0], rtol=1e-3) else rows
 
 
-def _dynamics(drawn: Drawn) -> dict[str, Figure]:
+def _dynamics(drawn: Drawn) -> Drawings:
     dynamics, static = drawn.data["dynamics"], drawn.data.get("static")
     curve = None if static is None else (static["position"].values, static["mesh_force"].values)
     return response_figures(
         dynamics,
-        dynamic_transmission_error=transmission_error_period(dynamics, static),
-        mesh_forces=mesh_force_period(dynamics, curve),
+        dynamic_transmission_error=partial(transmission_error_period, dynamics, static),
+        mesh_forces=partial(mesh_force_period, dynamics, curve),
     )
 
 
@@ -110,8 +112,10 @@ RUNUP = Figures(
         ),
         "campbell": RUNUP_CAPTIONS["campbell"],
     },
-    lambda drawn: {
-        "run_up_levels": pair_levels(drawn.data["runup"]),
-        "campbell": _campbell(drawn.data["runup"], drawn.data["modes"]),
-    },
+    lambda drawn: Drawings(
+        {
+            "run_up_levels": partial(pair_levels, drawn.data["runup"]),
+            "campbell": lambda: _campbell(drawn.data["runup"], drawn.data["modes"]),
+        }
+    ),
 )

@@ -1,0 +1,290 @@
+"""What the app computes of a case while one types and drags: reading, gears in space, stages, charts, sound.
+
+It works in a process of its own (`femgear.app.worker`), which gives up an answer as soon as a newer text waits.
+"""
+
+from __future__ import annotations
+
+import base64
+import io
+import math
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from femgear.app.document import tables_of_text
+from femgear.case.dependencies import Steps
+from femgear.errors import CaseError, FemgearError, StorageError
+from femgear.exchange.formats import Sampling
+from femgear.findings import as_data, by_severity, once
+from femgear.report.charts import chart
+from femgear.report.space import space
+from femgear.report.style import png_bytes
+from femgear.stages.protocol import Drawn, Stage, Train, one_blas_thread
+from femgear.storage.contents import as_dataset
+from femgear.storage.results import Manifest, Results
+from femgear.trains.live import Answer
+from femgear.trains.reading import parse_case, read_case
+from femgear.trains.registry import check_case, stages_of, train_of
+
+LISTENED = 2.0
+"""Duration of the sound [s], whose end goes on with its beginning as well as whole turns let it."""
+_MOST_SENSORS = 6
+_HEADROOM = 4.0
+"""Full scale of the sound over the largest sample of the first one: later ones may be louder."""
+
+
+class Superseded(Exception):
+    """A newer text waits: the answer to this one is not wanted any more."""
+
+
+class Bench:
+    """A case that answers texts; what a change leaves as it was is kept.
+
+    Parameters
+    ----------
+    folder : path
+        Of the case file, in which files are that it names.
+    cache : path, optional
+        Folder of generated grids.
+    waiting : callable
+        Whether a newer text waits, which ends the answer that is being computed.
+    """
+
+    def __init__(self, folder: Path, *, cache: Path | None = None, waiting: Callable[[], bool] = lambda: False):
+        self.folder, self._cache, self._waiting = folder, cache, waiting
+        self._steps, self._seconds = Steps(), dict[str, float]()
+        self._told = dict[str, tuple[int, list[str]]]()
+        self._full_scale = 0.0
+
+    def look(self, text: str, name: str) -> dict[str, Any]:
+        """Read a text, and say what is wrong with it or worth a look, by entry.
+
+        Parameters
+        ----------
+        text : str
+            Of a case file.
+        name : str
+            Of the file, for messages.
+
+        Returns
+        -------
+        dict
+            ``train`` and ``words`` of the case, its ``model`` if its files name one, ``title``, ``problems`` and
+            ``findings`` as tables of text, ``values`` in SI units by the key of the entry, ``stages`` of a whole run,
+            each with the names of its ``charts``, and ``front``, the names of those of page one.
+        """
+        seen: dict[str, Any] = {
+            **{"train": "", "words": "", "model": _model_of(text), "title": ""},
+            **{"problems": [], "findings": [], "values": {}, "stages": [], "front": []},
+        }
+        try:
+            case = parse_case(text, name=str(self.folder / name))
+        except (FemgearError, OSError) as error:
+            return seen | {"problems": _problems(error)}
+        train = train_of(case)
+        seen |= {"train": train.name, "words": train.words, "title": case.title}
+        seen["values"] = dict(_values(case.model_dump()))
+        try:
+            check_case(case)
+            seen["findings"] = as_data(by_severity(train.case_warnings(case)))
+            seen["front"] = [name for name, _ in train.front]
+            captions = {name: list(figures.captions) for name, figures in train.figures.items()}
+            seen["stages"] = [
+                {"name": stage.name, "title": stage.title, "charts": captions.get(stage.name, [])}
+                for stage in stages_of(case)
+            ]
+        except FemgearError as error:
+            seen["problems"] = _problems(error)
+        return seen
+
+    def tables(self, text: str, name: str) -> list[dict[str, Any]]:
+        """Describe a case in tables, as ``femgear check`` does."""
+        case = parse_case(text, name=str(self.folder / name))
+        return [asdict(block) for block in train_of(case).describe(case)]
+
+    def gears(self, text: str, name: str) -> dict[str, Any] | None:
+        """Draw the bodies of a case in space, as `femgear.report.space` does; None where there is nothing to draw."""
+        case = parse_case(text, name=str(self.folder / name))
+        bodies = train_of(case).bodies
+        drawn = [] if bodies is None else list(bodies(case))
+        if not drawn:
+            return None
+        members = [body.member for body in drawn]
+        place = np.array([[*body.axis, 0.5 * sum(body.ends)] for body in drawn])
+        return space(drawn, members, place, ())
+
+    @one_blas_thread()
+    def answer(self, text: str, name: str, shown: Sequence[str], stages: Sequence[str]) -> Iterator[dict[str, Any]]:
+        """Compute stages of a case, the quickest ones first, and yield what is known after each.
+
+        Parameters
+        ----------
+        text, name : str
+            Of the case file.
+        shown : sequence of str
+            Charts that are wanted, by the beginning of their names.
+        stages : sequence of str
+            Names of the stages that are wanted.
+
+        Yields
+        ------
+        dict
+            ``stage``, ``seconds`` that it took, ``same``, whether nothing of it changed since it was last drawn,
+            ``charts`` and ``captions`` by name, ``names`` of all that it has, None where that is not known,
+            ``sentence`` and ``judgements`` of page one as far as they are known, and ``findings``.
+
+        Raises
+        ------
+        FemgearError
+            A case that is refused, or cannot be computed.
+        Superseded
+            A newer text waits.
+        """
+        case = parse_case(text, name=str(self.folder / name))
+        check_case(case)
+        train, known = train_of(case), {stage.name: stage for stage in stages_of(case)}
+        answer = Answer(case, self._steps, cache=self._cache, progress=self._go_on)
+        computed = dict[str, Any]()
+        wanted = [known[key] for key in known if key in stages]
+        taken = {name for stage in wanted for name in stage.before(case)}
+        # first what others go on from, then the quickest
+        seconds = {stage.name: 0.0 if stage.name in taken else self._seconds.get(stage.name, 1.0) for stage in wanted}
+        for stage in sorted(wanted, key=lambda stage: seconds[stage.name]):
+            self._go_on()
+            start = time.perf_counter()
+            computed[stage.name] = answer[stage.name]
+            results = _results(case, train, computed, self.folder)
+            same = self._told.get(stage.name) == (id(computed[stage.name]), sorted(shown))
+            drawings = self._drawings(train, stage, results, computed, () if same else shown)
+            self._told[stage.name] = id(computed[stage.name]), sorted(shown)
+            sentence, judgements = train.summary(results)
+            self._seconds[stage.name] = max(self._seconds.get(stage.name, 0.0), time.perf_counter() - start)
+            yield {
+                "stage": stage.name,
+                "seconds": time.perf_counter() - start,
+                "same": same,
+                **drawings,
+                "sentence": sentence,
+                "judgements": [asdict(judgement) | {"words": judgement.words} for judgement in judgements],
+                "findings": as_data(by_severity(results.findings)),
+            }
+
+    def sound(self, text: str, name: str) -> dict[str, Any] | None:
+        """Sample what the first sensor of a case hears at its first speed; None where there is nothing to hear.
+
+        Returns
+        -------
+        dict
+            ``name`` and ``unit`` of the signal, its ``largest`` value, and ``wav``, whose full scale stays that of the
+            first sound, so that louder is heard as louder.
+        """
+        from scipy.io import wavfile
+
+        case = parse_case(text, name=str(self.folder / name))
+        train = train_of(case)
+        if train.recorded is None:
+            return None
+        answer, computed = Answer(case, self._steps, cache=self._cache, progress=self._go_on), dict[str, Any]()
+        with one_blas_thread():
+            for stage in train.recorded.needs["wav"]:
+                if train.stage(stage) is None or train.stage(stage).unavailable(case):
+                    return None
+                computed[stage] = answer[stage]
+        results = _results(case, train, computed, self.folder)
+        signal = next((s for s in train.recorded.signals(results, Sampling(duration=LISTENED)) if s.steady), None)
+        if signal is None:
+            return None
+        largest = float(np.abs(signal.values).max(initial=0.0))
+        self._full_scale = self._full_scale or _HEADROOM * largest or 1.0
+        stream = io.BytesIO()
+        share = np.clip(signal.values / self._full_scale, -1.0, 1.0)
+        wavfile.write(stream, signal.rate, np.round(32767 * share).astype(np.int16))
+        wav = base64.b64encode(stream.getvalue()).decode("ascii")
+        return {"name": signal.name, "unit": signal.unit, "largest": largest, "wav": wav}
+
+    def _go_on(self, *_: object) -> None:
+        """Give up where a newer text waits."""
+        if self._waiting():
+            raise Superseded
+
+    def _drawings(
+        self, train: Train, stage: Stage, results: Results, computed: Mapping[str, Any], shown: Sequence[str]
+    ) -> dict[str, Any]:
+        """Draw the charts of a stage that are wanted, and name all of them."""
+        from femgear.report.page import caption_of
+
+        figures = train.figures.get(stage.name)
+        if figures is None:
+            return {"charts": {}, "names": None, "captions": {}}
+        names = list(figures.captions)
+        wanted = [name for name in names if name in shown]
+        if not wanted:
+            return {"charts": {}, "names": None, "captions": {}}
+        data = {key: results[key] for key in computed}
+        drawn = figures.draw(Drawn(results.case, data, computed, self._cache))
+        chosen = [key for key in drawn if any(key == name or key.startswith(f"{name}_") for name in wanted)]
+        figures_of = {key: drawn[key] for key in chosen}
+        # what a browser's chart cannot hold is a picture
+        charts = {key: chart(figure) or {"png": _picture(figure)} for key, figure in figures_of.items()}
+        there = [name for name in names if any(key == name or key.startswith(f"{name}_") for key in drawn)]
+        return {"charts": charts, "names": there, "captions": {key: caption_of(train, key)[2] for key in charts}}
+
+
+def _results(case: Any, train: Train, computed: Mapping[str, Any], folder: Path) -> Results:
+    """Results in memory, as those of a run that came to its end."""
+    contents = {name: as_dataset(result.contents()) for name, result in computed.items()}
+    findings = {"": train.case_warnings(case)}
+    for name, data in contents.items():
+        stage = train.stage(name)
+        if stage is not None:
+            findings[name] = stage.findings(data)
+    everything = once(finding for of_stage in findings.values() for finding in of_stage)
+    manifest = Manifest(complete=True, files={f"{name}.nc": "" for name in contents}, findings=everything)
+    return Results(folder, manifest, read_case).with_known({"case": case} | contents)
+
+
+def _picture(figure: Any) -> str:
+    """Draw a figure as PNG, in base64."""
+    return base64.b64encode(png_bytes(figure)).decode("ascii")
+
+
+def _model_of(text: str) -> str | None:
+    """Model that a text names, whatever else is wrong with it; None of planetary sets, and where it is no TOML."""
+    try:
+        model = tables_of_text(text).get("model")
+    except CaseError:
+        return None
+    return model if isinstance(model, str) else None
+
+
+def _problems(error: Exception) -> list[dict[str, str]]:
+    """Tables of text of all that a case is refused for."""
+    parts = getattr(error, "problems", ()) or (error,)
+    return [
+        {
+            "key": str(getattr(part, "key", None) or ""),
+            "code": str(getattr(part, "code", StorageError.default_code)),
+            "text": str(getattr(part, "message", part)),
+            "limit": str(getattr(part, "limit", None) or ""),
+            "remedy": str(getattr(part, "remedy", None) or ""),
+        }
+        for part in parts
+    ]
+
+
+def _values(section: Any, key: str = "") -> Iterator[tuple[str, Any]]:
+    """Numbers and words of a case by the keys of their entries, in SI units."""
+    if isinstance(section, Mapping):
+        for name, value in section.items():
+            yield from _values(value, f"{key}.{name}".lstrip("."))
+    elif isinstance(section, (bool, str)) or (isinstance(section, (int, float)) and math.isfinite(section)):
+        yield key, section
+    elif isinstance(section, (tuple, list)):
+        for number, value in enumerate(section):
+            if isinstance(value, Mapping):
+                yield from _values(value, f"{key}[{number}]")

@@ -1,0 +1,217 @@
+"""What a form shows of a case file: its tables and entries, from the JSON schema of its kind."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+Kind = Literal["quantity", "integer", "number", "choice", "switch", "text", "list", "other"]
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+_PLAIN: dict[str, Kind] = {"integer": "integer", "number": "number", "boolean": "switch", "string": "text"}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An entry of a table.
+
+    Parameters
+    ----------
+    name : str
+    kind : str
+        What it holds; of kind "other" it is written as in the file.
+    choices : tuple of str
+        Of kind "choice".
+    hint : str
+        What is allowed.
+    default : object
+        None where there is none.
+    needed : bool
+        Whether the table must have it.
+    unit : str
+        Of a quantity, in which it is shown.
+    scale : float
+        SI value of that unit.
+    window : (float, float), optional
+        Smallest and largest value that is plausible, in that unit.
+    """
+
+    name: str
+    kind: Kind
+    choices: tuple[str, ...] = ()
+    hint: str = ""
+    default: Any = None
+    needed: bool = False
+    unit: str = ""
+    scale: float = 1.0
+    window: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of a case file.
+
+    Parameters
+    ----------
+    name : str
+    hint : str
+        What the table is.
+    listed : bool
+        Whether there may be several of it.
+    needed : bool
+        Whether the table above must have it.
+    schema, definitions : mapping
+        JSON schema of the table, and what it refers to.
+    """
+
+    name: str
+    hint: str
+    listed: bool
+    needed: bool
+    schema: Mapping[str, Any]
+    definitions: Mapping[str, Any]
+
+    @cached_property
+    def parts(self) -> tuple[Entry | Table, ...]:
+        """Entries and tables of it, in the order of the schema."""
+        needed = self.schema.get("required", ())
+        return tuple(
+            _part(name, schema, name in needed, self.definitions)
+            for name, schema in self.schema.get("properties", {}).items()
+        )
+
+    def part(self, name: str) -> Entry | Table | None:
+        """Find an entry or table by its name, None where there is none."""
+        return next((part for part in self.parts if part.name == name), None)
+
+
+def table_of_schema(schema: Mapping[str, Any]) -> Table:
+    """Read the JSON schema of a kind of case, as of `femgear.trains.reading.case_schema`."""
+    return Table("", schema.get("description", ""), False, True, schema, schema.get("$defs", {}))
+
+
+def _part(name: str, schema: Mapping[str, Any], needed: bool, definitions: Mapping[str, Any]) -> Entry | Table:
+    """Read what a table says of one entry: a table, a list of tables, or a value."""
+    forms = [form for form in schema.get("anyOf", [schema]) if form.get("type") != "null"]
+    resolved = [_resolved(form, definitions) for form in forms]
+    hint = schema.get("description", "")
+    for form in resolved:
+        if "properties" in form:
+            return Table(name, hint or form.get("description", ""), False, needed, form, definitions)
+        rows = _resolved(form.get("items", {}), definitions)
+        if "properties" in rows:
+            return Table(name, hint or rows.get("description", ""), True, needed, rows, definitions)
+    return _entry(name, resolved, schema, needed)
+
+
+def _resolved(schema: Any, definitions: Mapping[str, Any]) -> Mapping[str, Any]:
+    """Follow a reference to a definition."""
+    if not isinstance(schema, Mapping):
+        return {}
+    reference = schema.get("$ref")
+    return definitions.get(reference.rpartition("/")[2], {}) if reference else schema
+
+
+def _entry(name: str, forms: list[Mapping[str, Any]], schema: Mapping[str, Any], needed: bool) -> Entry:
+    """Read what a value may be."""
+    hints = [text for form in [schema, *forms] if (text := form.get("description"))]
+    hint, default = "; ".join(dict.fromkeys(hints)), schema.get("default")
+    words_of = (form.get("enum", [form["const"]] if "const" in form else ()) for form in forms)
+    choices = tuple(str(word) for words in words_of for word in words)
+    given = {"hint": hint, "default": default, "needed": needed}
+    if len(forms) != 1:
+        return Entry(name, "other", **given)
+    (form,) = forms
+    if choices and all(isinstance(word, str) for word in form.get("enum", [form.get("const")])):
+        return Entry(name, "choice", choices, **given)
+    if "x-unit" in form:
+        low, high = form["x-window"]
+        return Entry(name, "quantity", **given, unit=form["x-unit"], scale=form["x-scale"], window=(low, high))
+    if form.get("type") == "array":
+        return Entry(name, "list", **given)
+    kind = _PLAIN.get(form.get("type", ""), "other") if isinstance(form.get("type"), str) else "other"
+    bounds = form.get("minimum", form.get("exclusiveMinimum")), form.get("maximum", form.get("exclusiveMaximum"))
+    window = None if None in bounds else (float(bounds[0]), float(bounds[1]))
+    if window and not hint:
+        given["hint"] = f"{window[0]:g} to {window[1]:g}"
+    return Entry(name, kind, **given, window=window)
+
+
+def shown_value(value: Any) -> str:
+    """Write the value of an entry as a form shows it."""
+    if value is None:
+        return ""
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, list) and not any(isinstance(part, (list, dict)) for part in value):
+        return ", ".join(map(shown_value, value))
+    if isinstance(value, list):
+        return f"[{', '.join(shown_inner(part) for part in value)}]"
+    return shown_inner(value) if isinstance(value, dict) else str(value)
+
+
+def shown_inner(value: Any) -> str:
+    """Write a value within a list or table as TOML does."""
+    if isinstance(value, dict):
+        names = (key if _BARE.fullmatch(key) else shown_inner(key) for key in value)
+        parts = (f"{name} = {shown_inner(part)}" for name, part in zip(names, value.values(), strict=True))
+        return "{ " + ", ".join(parts) + " }"
+    if isinstance(value, list):
+        return f"[{', '.join(map(shown_inner, value))}]"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    return shown_value(value)
+
+
+def typed_value(entry: Entry, text: str) -> Any:
+    """Turn what was typed into a field into the value of the entry; None of an empty field.
+
+    What cannot be read as its kind stays text, which the reader of the case refuses in its own words.
+    """
+    text = text.strip()
+    if not text:
+        return None
+    if entry.kind in ("quantity", "text", "choice"):
+        return text
+    if entry.kind == "switch":
+        return {"true": True, "false": False}.get(text, text)
+    if entry.kind == "list":
+        if text[0] in "[{":
+            return _as_toml(text)
+        return [_number(part.strip()) for part in text.split(",") if part.strip()]
+    return _as_toml(text) if text[0] in "[{" else _number(text)
+
+
+def _number(text: str) -> int | float | str:
+    """Read a number, or leave the text as it is."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _as_toml(text: str) -> Any:
+    """Read a list or table as the file writes it, or leave the text as it is."""
+    try:
+        return tomllib.loads(f"value = {text}")["value"]
+    except (tomllib.TOMLDecodeError, RecursionError):
+        return text
+
+
+def keys_of(table: Table, tables: Any, key: str = "") -> Iterator[str]:
+    """List the keys of all entries that a case file gives, by a form of its kind."""
+    for name, value in tables.items() if isinstance(tables, dict) else ():
+        inner, part = f"{key}.{name}".lstrip("."), table.part(name)
+        if isinstance(part, Table) and part.listed and isinstance(value, list):
+            for number, row in enumerate(value):
+                yield from keys_of(part, row, f"{inner}[{number}]")
+        elif isinstance(part, Table):
+            yield from keys_of(part, value, inner)
+        else:
+            yield inner

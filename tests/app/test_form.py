@@ -1,0 +1,103 @@
+"""The form of a case: from its schema, with the values of its file."""
+
+import tomllib
+from pathlib import Path
+
+import pytest
+
+from femgear.app.document import entry_of
+from femgear.app.form import Entry, Table, keys_of, shown_value, table_of_schema, typed_value
+from femgear.trains.reading import case_schema
+
+CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.toml"))
+SET = table_of_schema(case_schema())
+
+
+def part(key: str):
+    found = SET
+    for name in key.split("."):
+        found = found.part(name)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("key", "kind"),
+    (
+        ("sun.teeth", "integer"),
+        ("sun.module", "quantity"),
+        ("sun.profile_shift", "number"),
+        ("operation.input", "choice"),
+        ("static.stresses", "switch"),
+        ("title", "text"),
+        ("set.planet_angles", "list"),
+        ("sun.span", "other"),
+    ),
+)
+def test_entries_have_their_kinds(key, kind):
+    assert part(key).kind == kind
+
+
+def test_a_quantity_has_unit_and_window():
+    face_width = part("set.face_width")
+    assert (face_width.unit, face_width.scale, face_width.window) == ("mm", 1e-3, (0.1, 5000.0))
+    assert part("operation").needed and part("sun.teeth").needed and not part("strength").needed
+    assert part("operation.input").choices == ("sun", "ring", "carrier")
+
+
+def test_lists_of_tables_are_tables():
+    assert part("sun.modifications").listed and isinstance(part("sun.modifications").part("kind"), Entry)
+    assert isinstance(part("sun.rack"), Table) and not part("sun.rack").listed
+    assert part("nothing") is None
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_every_entry_of_a_shipped_case_has_a_field_that_gives_it_back(path):
+    tables = tomllib.loads(path.read_text("utf-8"))
+    form = table_of_schema(case_schema(tables.get("model"))) if tables.get("model") not in FORMER else None
+    if form is None:
+        pytest.skip("a file of a former model is read as another one")
+    keys = list(keys_of(form, tables))
+    assert keys
+    for key in keys:
+        entry = form
+        for name in key.replace("]", "").replace("[", ".").split("."):
+            entry = entry if name.isdigit() else entry.part(name)
+        assert isinstance(entry, Entry), key
+        value = entry_of(tables, key)
+        assert typed_value(entry, shown_value(value)) == value, key
+
+
+FORMER = ("drivetrain", "multistage")
+
+
+@pytest.mark.parametrize(
+    ("key", "typed", "value"),
+    (
+        ("sun.teeth", "27", 27),
+        ("sun.teeth", "many", "many"),
+        ("sun.profile_shift", "0.5", 0.5),
+        ("sun.profile_shift", " ", None),
+        ("static.stresses", "true", True),
+        ("set.planet_angles", "0 deg, 120 deg", ["0 deg", "120 deg"]),
+        ("set.planet_angles", '["0 deg"]', ["0 deg"]),
+        ("set.planet_angles", "[broken", "[broken"),
+        ("operation.torque", "5 N m", "5 N m"),
+        ("sun.tooth_thickness_allowance", "cd 25", "cd 25"),
+    ),
+)
+def test_what_is_typed_is_read(key, typed, value):
+    assert typed_value(part(key), typed) == value
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    (
+        (None, ""),
+        (True, "true"),
+        ([1, 2], "1, 2"),
+        ([[1.0, 2.0]], "[[1.0, 2.0]]"),
+        ({"from": "1 rpm"}, '{ from = "1 rpm" }'),
+    ),
+)
+def test_values_are_shown_as_they_are_typed(value, text):
+    assert shown_value(value) == text

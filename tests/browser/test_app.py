@@ -1,0 +1,347 @@
+"""The app in Chromium, with mouse and keyboard."""
+
+import re
+import signal
+import socket
+import subprocess
+import sys
+import tomllib
+import urllib.error
+import urllib.request
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("playwright", reason="make test-browser installs it")
+pytest.importorskip("nicegui", reason="an extra of the package")
+pytestmark = pytest.mark.browser
+CASES = Path(__file__).parents[2] / "cases"
+WAIT = 60_000
+"""Longest wait on a slow machine [ms]."""
+HOSTILE = '"><img src=x onerror=window.broken=1> 5\\u202e N m'
+
+
+def coarse_case() -> str:
+    """The reference set on coarse grids, at one speed and without published lines."""
+    text = (CASES / "planetary_27_40_108.toml").read_text()
+    text = text[: text.index("# What the paper reports")]
+    text = text.replace('speeds = ["250 rpm", "3100 rpm"]', 'speeds = ["1000 rpm"]')
+    for name, value in {"flank_elements": "4", "positions": "8", "up_to": '"6 kHz"'}.items():
+        text = re.sub(rf"^(# )?{name} = .*$", f"{name} = {value}", text, flags=re.MULTILINE)
+    return text
+
+
+class Served:
+    """A server of the app in a folder, and its address."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        command = [sys.executable, "-m", "femgear", "app", str(folder), "--no-browser"]
+        self.process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+        self.address = re.search(r"http://127\.0\.0\.1:\d+/\?token=\S+", self.process.stdout.readline())[0]
+
+    def end(self, signal_sent: signal.Signals = signal.SIGINT) -> None:
+        """End it as a user or as the system does."""
+        self.process.send_signal(signal_sent)
+        self.process.wait(20)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    (tmp_path / "set.toml").write_text(coarse_case())
+    return tmp_path
+
+
+@pytest.fixture
+def serve():
+    """Start servers, which end with the test."""
+    servers = []
+
+    def start(place: Path) -> Served:
+        servers.append(Served(place))
+        return servers[-1]
+
+    yield start
+    for server in servers:
+        if server.process.poll() is None:
+            server.end()
+
+
+@pytest.fixture
+def window(chromium):
+    """Open windows of the app; nothing fails in them, and nothing is asked of another machine."""
+    contexts, faults = [], []
+
+    def show(server: Served, **options):
+        context = chromium.new_context(viewport={"width": 1500, "height": 950}, reduced_motion="reduce", **options)
+        contexts.append(context)
+        tab = context.new_page()
+        tab.set_default_timeout(WAIT)
+        tab.on("pageerror", lambda error: faults.append(str(error)))
+        tab.on("request", lambda asked: faults.append(asked.url) if not asked.url.startswith(allowed(server)) else None)
+        tab.goto(server.address)
+        return tab
+
+    yield show
+    for context in contexts:
+        context.close()
+    assert faults == []
+
+
+def allowed(server: Served) -> tuple[str, ...]:
+    place = server.address.split("//")[1].split("/")[0]
+    return f"http://{place}/", f"ws://{place}/", "data:", "blob:"
+
+
+def answers(tab):
+    return tab.frame_locator("iframe.answers")
+
+
+def answer_to(tab, act=None) -> str:
+    """Do something, wait for the answer to it, and give the first line of every card."""
+    frame = next(frame for frame in tab.frames if frame.url.endswith("/answers")) if act else None
+    if act:
+        frame.evaluate("document.getElementById('state').textContent = 'waits'")
+        act()
+    answers(tab).locator("#state", has_text=re.compile("^computed")).wait_for()
+    return "\n".join(answers(tab).locator(".card .answer").all_inner_texts())
+
+
+def unfold(tab, name: str) -> None:
+    tab.locator(".q-expansion-item .q-item__label", has_text=re.compile(rf"^{name}( \(\d+\))?$")).first.click()
+
+
+def field(tab, key: str):
+    return tab.locator(f'input[data-key="{key}"], [data-key="{key}"] input').first
+
+
+def said(tab):
+    return tab.locator(".said")
+
+
+def press(tab, name: str) -> None:
+    tab.get_by_role("button", name=name, exact=True).click()
+
+
+def saved(tab, folder: Path) -> dict:
+    press(tab, "Save")
+    tab.get_by_text("saved", exact=True).wait_for()
+    return tomllib.loads((folder / "set.toml").read_text())
+
+
+def test_a_field_changes_the_answers_and_the_file_alone(window, serve, folder):
+    tab = window(serve(folder))
+    before = answer_to(tab)
+    unfold(tab, "operation")
+    after = answer_to(tab, lambda: field(tab, "operation.torque").fill("150 N m"))
+    assert before != after and "transmission error" in after
+    assert (folder / "set.toml").read_text() == coarse_case(), "the file changes when it is saved"
+    assert saved(tab, folder)["operation"]["torque"] == "150 N m"
+    assert (folder / "set.toml").read_text() == coarse_case().replace('torque = "100 N m"', 'torque = "150 N m"')
+    answer_to(tab, lambda: press(tab, "Undo"))
+    assert saved(tab, folder)["operation"]["torque"] == "100 N m"
+
+
+@pytest.mark.parametrize("typed", (HOSTILE, "1e999 N m", "[[]]", "100 Nm; rm", "5 mm"))
+def test_what_cannot_be_is_refused_beside_its_field(window, serve, folder, typed):
+    tab = window(serve(folder))
+    answer_to(tab)
+    unfold(tab, "operation")
+    field(tab, "operation.torque").fill(typed)
+    tab.locator(".q-field--error", has_text=re.compile("E-")).first.wait_for()
+    assert said(tab).filter(has_text="operation.torque").count() == 1
+    assert tab.evaluate("window.broken") is None
+    answer_to(tab, lambda: field(tab, "operation.torque").fill("100 N m"))
+    assert tab.locator(".q-field--error").count() == 0 and said(tab).filter(has_text="operation.torque").count() == 0
+
+
+def test_sliders_move_with_mouse_and_keys(window, serve, folder):
+    tab = window(serve(folder))
+    before = answer_to(tab)
+    slider = tab.locator('[data-slider="operation.torque"]')
+    box = slider.bounding_box()
+    x, y = box["x"] + 0.5 * box["width"], box["y"] + 0.5 * box["height"]
+
+    def drag():
+        tab.mouse.move(x, y)
+        tab.mouse.down()
+        for step in range(1, 11):
+            tab.mouse.move(x + 0.02 * step * box["width"], y)
+            tab.wait_for_timeout(30)
+        tab.mouse.up()
+
+    dragged = answer_to(tab, drag)
+    assert dragged != before
+    torque = saved(tab, folder)["operation"]["torque"]
+    assert torque.endswith(" N m") and 125 < float(torque.split()[0]) < 155
+    slider = tab.locator('[data-slider="operation.torque"]')
+    slider.locator(".q-slider__focus-ring, [tabindex='0']").first.focus() if False else slider.focus()
+    answer_to(tab, lambda: tab.keyboard.press("ArrowLeft"))
+    assert float(saved(tab, folder)["operation"]["torque"].split()[0]) < float(torque.split()[0])
+
+
+def test_a_list_grows_and_shrinks(window, serve, folder):
+    tab = window(serve(folder))
+    answer_to(tab)
+    unfold(tab, "sun")
+    unfold(tab, "modifications")
+    press(tab, "Add modifications")
+    field(tab, "sun.modifications[0].kind").wait_for()
+    tab.locator(".more .q-item__label").last.click()
+    field(tab, "sun.modifications[0].amount").fill("8 um")
+    answer = answer_to(tab, lambda: field(tab, "sun.modifications[0].start_diameter").fill("43 mm"))
+    assert "transmission error" in answer
+    assert saved(tab, folder)["sun"]["modifications"][0]["amount"] == "8 um"
+    tab.locator('[data-slider="sun.modifications[0].amount"]').wait_for(state="detached")
+    tab.get_by_role("button", name="Remove modifications 1").click()
+    field(tab, "sun.modifications[0].kind").wait_for(state="detached")
+    assert "modifications" not in saved(tab, folder)["sun"]
+
+
+def test_text_and_form_are_one(window, serve, folder):
+    tab = window(serve(folder))
+    answer_to(tab)
+    tab.get_by_role("tab", name="Text").click()
+    editor = tab.locator(".cm-content")
+    editor.click()
+    tab.keyboard.press("Control+End")
+    tab.keyboard.type("\n[strength]\nquality = ")
+    said(tab).filter(has_text="E-TOML").wait_for()
+    answer_to(tab, lambda: tab.keyboard.type("6\n"))
+    tab.get_by_role("tab", name="Form").click()
+    unfold(tab, "strength")
+    assert field(tab, "strength.quality").input_value() == "6"
+    assert saved(tab, folder)["strength"] == {"quality": 6}
+
+
+def test_a_new_set_is_made_without_a_file(window, serve, tmp_path):
+    tab = window(serve(tmp_path))
+    tab.get_by_text("New case", exact=True).wait_for()
+    tab.get_by_label("Module").fill("2 mm")
+    tab.get_by_label("Torque of sun or pinion").fill("200 N m")
+    tab.get_by_label("Teeth").fill("17 37 91")
+    press(tab, "Begin")
+    answers(tab).locator(".card", has_text="S_F").wait_for()
+    assert not (tmp_path / "planetary.toml").exists()
+    press(tab, "Save")
+    tab.get_by_text("saved", exact=True).wait_for()
+    tables = tomllib.loads((tmp_path / "planetary.toml").read_text())
+    assert tables["sun"]["teeth"] == 17 and tables["material"]["treatment"] == "case hardened steel"
+    assert not list(tmp_path.glob(".*.draft"))
+
+
+def test_a_run_is_computed_shown_and_compared(window, serve, folder):
+    tab = window(serve(folder))
+    answer_to(tab)
+    for torque in ("100 N m", "80 N m"):
+        tab.get_by_role("tab", name="Answers").click()
+        unfold(tab, "operation")
+        field(tab, "operation.torque").fill(torque)
+        tab.wait_for_timeout(600)
+        unfold(tab, "operation")
+        press(tab, "Run")
+        tab.get_by_role("dialog").get_by_role("button", name="Run").click()
+        name = f"set_{1 if torque == '100 N m' else 2}"
+        report = tab.frame_locator(f"iframe.report[src='/results/{name}/report.html']")
+        report.locator(".sentence").wait_for(timeout=3 * WAIT)
+        assert (folder / name / "manifest.json").exists()
+    tab.get_by_label("Compared with").click()
+    tab.get_by_role("option", name="set_1").click()
+    press(tab, "Compare")
+    tab.frame_locator("iframe.report[src*='compare']").locator("table").first.wait_for()
+
+
+def test_a_run_is_cancelled(window, serve, folder):
+    tab = window(serve(folder))
+    answer_to(tab)
+    press(tab, "Run")
+    tab.get_by_role("dialog").get_by_role("button", name="Run").click()
+    press(tab, "Cancel")
+    tab.get_by_role("button", name="Cancel", exact=True).wait_for(state="hidden")
+    assert not (folder / "set_1" / "report.html").exists()
+
+
+def test_it_is_heard(window, serve, folder):
+    tab = window(serve(folder))
+    answer_to(tab)
+    tab.get_by_label("Listen").click()
+    audio = tab.locator("audio")
+    audio.wait_for(state="attached")
+    tab.wait_for_function("() => document.querySelector('audio').currentTime > 0.1")
+    assert audio.evaluate("(sound) => sound.loop && !sound.paused && sound.duration > 1")
+
+
+def test_windows_do_not_mix(window, serve, folder):
+    (folder / "other.toml").write_text(coarse_case().replace("100 N m", "60 N m"))
+    server = serve(folder)
+    first, second = window(server), window(server)
+    answer_to(first), answer_to(second)
+    unfold(first, "operation")
+    second.get_by_label("Case").click()
+    second.get_by_role("option", name="set.toml").click()
+    assert field(first, "operation.torque").input_value() == "60 N m"
+    changed = answer_to(first, lambda: field(first, "operation.torque").fill("70 N m"))
+    assert answer_to(second) != changed
+    unfold(second, "operation")
+    assert field(second, "operation.torque").input_value() == "100 N m"
+
+
+def test_nothing_is_lost_with_the_server(window, serve, folder):
+    server = serve(folder)
+    tab = window(server)
+    answer_to(tab)
+    unfold(tab, "operation")
+    answer_to(tab, lambda: field(tab, "operation.torque").fill("123 N m"))
+    tab.wait_for_timeout(1500)
+    server.end(signal.SIGKILL)
+    assert (folder / "set.toml").read_text() == coarse_case()
+    again = window(serve(folder))
+    again.get_by_text("changes that were not saved are back").wait_for()
+    assert saved(again, folder)["operation"]["torque"] == "123 N m"
+
+
+def test_others_are_not_let_in(serve, folder):
+    server = serve(folder)
+    place = server.address.split("?")[0]
+
+    def status(address: str, **headers: str) -> int:
+        try:
+            with urllib.request.urlopen(urllib.request.Request(address, headers=headers)) as answered:
+                return answered.status
+        except urllib.error.HTTPError as error:
+            return error.code
+
+    token = server.address.split("token=")[1]
+    assert status(place) == status(place + "answers") == status(place + "results/set_1/report.html") == 403
+    assert status(f"{place}?token=x") == 403
+    assert status(place, Cookie=f"femgear={token}") == 200
+    assert status(place, Cookie=f"femgear={token}", Host="attacker.example") == 403
+    assert status(place, Cookie=f"femgear={token}", Origin="https://attacker.example") == 403
+    for name in ("../secret.html", "%2e%2e/secret.html", "set.toml", ".set.toml.draft"):
+        assert status(f"{place}results/{name}", Cookie=f"femgear={token}") == 404
+    port = int(place.split(":")[2].strip("/"))
+    with socket.socket() as elsewhere, pytest.raises(OSError):
+        elsewhere.connect((socket.gethostbyname(socket.gethostname()), port)) if _own_address() else _refuse()
+
+
+def _own_address() -> bool:
+    return not socket.gethostbyname(socket.gethostname()).startswith("127.")
+
+
+def _refuse():
+    raise OSError
+
+
+@pytest.mark.parametrize("scheme", ("light", "dark"))
+def test_it_is_accessible(window, serve, folder, scheme):
+    from axe_playwright_python.sync_playwright import Axe
+
+    tab = window(serve(folder), color_scheme=scheme)
+    answer_to(tab)
+    unfold(tab, "operation")
+    serious = [
+        (violation["id"], [node["html"][:200] for node in violation["nodes"]][:3])
+        for violation in Axe().run(tab).response["violations"]
+        if violation["impact"] in ("serious", "critical")
+    ]
+    assert serious == []

@@ -1,0 +1,56 @@
+"""Write femgear/app/help.json, what the form of the app says of entries, from the tables of docs/case_file.md."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+SOURCE, TARGET = ROOT / "docs" / "case_file.md", ROOT / "femgear" / "app" / "help.json"
+_LISTS = {"modifications": "modifications", "errors": "errors", "load": "load_case"}
+"""Entries whose tables have a heading of their own, by the first word of that."""
+
+
+def help_texts(text: str) -> Iterator[tuple[str, str]]:
+    """Read names of entries, with their tables where a heading names these, and what is said of them."""
+    tables: list[str] = []
+    header: list[str] = []
+    for line in text.splitlines():
+        if heading := re.match(r"#+ ([^:]+)", line):
+            names = [name.strip() for name in heading[1].split(",")]
+            first = names[0].split()[0].lower()
+            tables = [_LISTS[first]] if first in _LISTS else [n for n in names if re.fullmatch(r"[a-z_0-9]+", n)]
+        elif line.startswith("|"):
+            cells = [cell.strip() for cell in re.split(r"(?<!\\)\|", line)[1:-1]]
+            if cells[0].split(" ")[0] == "key":
+                header, of = cells, re.findall(r"`\[(\w+)\]`", cells[0])
+                tables = of or tables
+            elif header and not set(cells[0]) <= set("-: "):
+                told = plain(cells[header.index("value")]) if "value" in header else ""
+                default = plain(cells[header.index("default")]) if "default" in header else ""
+                words = f"{told}{'. Default: ' if told and default else 'Default: ' if default else ''}{default}"
+                within = cells[header.index("of")] if "of" in header else "all"
+                for name in re.findall(r"`([a-z_0-9.]+)`", cells[0]) if words else ():
+                    for table in tables or [""]:
+                        if (table in within) != within.startswith("all"):
+                            yield f"{table}.{name}".lstrip("."), words
+        else:
+            header = header if line.strip() else []
+
+
+def plain(cell: str) -> str:
+    """Take the marks of Markdown out of a cell."""
+    text = re.sub(r"\[([^\]]+)\]\([^)]*\)", r"\1", cell)
+    return re.sub(r"\s+", " ", text.replace("`", "").replace("\\|", "|").replace("**", "")).strip()
+
+
+def main() -> None:
+    """Write the file."""
+    texts = dict(sorted(help_texts(SOURCE.read_text("utf-8")), reverse=True))
+    TARGET.write_text(json.dumps(dict(sorted(texts.items())), ensure_ascii=False, indent=1) + "\n", "utf-8")
+
+
+if __name__ == "__main__":
+    main()
