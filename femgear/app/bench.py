@@ -58,7 +58,7 @@ class Bench:
     def __init__(self, folder: Path, *, cache: Path | None = None, waiting: Callable[[], bool] = lambda: False):
         self.folder, self._cache, self._waiting = folder, cache, waiting
         self._steps, self._seconds = Steps(), dict[str, float]()
-        self._told = dict[str, tuple[int, list[str]]]()
+        self._latest = dict[str, tuple[Any, int]]()
         self._full_scale = 0.0
 
     def look(self, text: str, name: str) -> dict[str, Any]:
@@ -119,7 +119,9 @@ class Bench:
         return space(drawn, members, place, ())
 
     @one_blas_thread()
-    def answer(self, text: str, name: str, shown: Sequence[str], stages: Sequence[str]) -> Iterator[dict[str, Any]]:
+    def answer(
+        self, text: str, name: str, shown: Sequence[str], stages: Sequence[str], seen: Mapping[str, int] = {}
+    ) -> Iterator[dict[str, Any]]:
         """Compute stages of a case, the quickest ones first, and yield what is known after each.
 
         Parameters
@@ -130,11 +132,13 @@ class Bench:
             Charts that are wanted, by the beginning of their names.
         stages : sequence of str
             Names of the stages that are wanted.
+        seen : mapping of str to int
+            Numbers of the results whose charts are there already, by stage: they are not drawn again.
 
         Yields
         ------
         dict
-            ``stage``, ``seconds`` that it took, ``same``, whether nothing of it changed since it was last drawn,
+            ``stage``, ``number`` of its result, ``same``, whether that is there already, ``seconds`` that it took,
             ``charts`` and ``captions`` by name, ``names`` of all that it has, None where that is not known,
             ``sentence`` and ``judgements`` of page one as far as they are known, and ``findings``.
 
@@ -159,14 +163,15 @@ class Bench:
             start = time.perf_counter()
             computed[stage.name] = answer[stage.name]
             results = _results(case, train, computed, self.folder)
-            same = self._told.get(stage.name) == (id(computed[stage.name]), sorted(shown))
+            number = self._number(stage.name, computed[stage.name])
+            same = seen.get(stage.name) == number
             drawings = self._drawings(train, stage, results, computed, () if same else shown)
-            self._told[stage.name] = id(computed[stage.name]), sorted(shown)
             sentence, judgements = train.summary(results)
             self._seconds[stage.name] = max(self._seconds.get(stage.name, 0.0), time.perf_counter() - start)
             yield {
                 "stage": stage.name,
                 "seconds": time.perf_counter() - start,
+                "number": number,
                 "same": same,
                 **drawings,
                 "sentence": sentence,
@@ -174,7 +179,7 @@ class Bench:
                 "findings": as_data(by_severity(results.findings)),
             }
 
-    def sound(self, text: str, name: str) -> dict[str, Any] | None:
+    def sound(self, text: str, file: str) -> dict[str, Any] | None:
         """Sample what the first sensor of a case hears at its first speed; None where there is nothing to hear.
 
         Returns
@@ -185,16 +190,17 @@ class Bench:
         """
         from scipy.io import wavfile
 
-        case = parse_case(text, name=str(self.folder / name))
+        case = parse_case(text, name=str(self.folder / file))
         train = train_of(case)
         if train.recorded is None:
             return None
         answer, computed = Answer(case, self._steps, cache=self._cache, progress=self._go_on), dict[str, Any]()
         with one_blas_thread():
-            for stage in train.recorded.needs["wav"]:
-                if train.stage(stage) is None or train.stage(stage).unavailable(case):
+            for name in train.recorded.needs["wav"]:
+                stage = train.stage(name)
+                if stage is None or stage.unavailable(case):
                     return None
-                computed[stage] = answer[stage]
+                computed[name] = answer[name]
         results = _results(case, train, computed, self.folder)
         signal = next((s for s in train.recorded.signals(results, Sampling(duration=LISTENED)) if s.steady), None)
         if signal is None:
@@ -206,6 +212,14 @@ class Bench:
         wavfile.write(stream, signal.rate, np.round(32767 * share).astype(np.int16))
         wav = base64.b64encode(stream.getvalue()).decode("ascii")
         return {"name": signal.name, "unit": signal.unit, "largest": largest, "wav": wav}
+
+    def _number(self, stage: str, result: Any) -> int:
+        """Number of a result of a stage, another one for every other result."""
+        latest, number = self._latest.get(stage, (None, 0))
+        if result is not latest:
+            number += 1
+            self._latest[stage] = result, number
+        return number
 
     def _go_on(self, *_: object) -> None:
         """Give up where a newer text waits."""

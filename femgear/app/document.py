@@ -90,7 +90,7 @@ def _filled(tables: Any, key: str, value: Any) -> Any:
     try:
         for number, (part, following) in enumerate(zip(above, parts[1:], strict=True)):
             name = int(part[1:-1]) if part.startswith("[") else part
-            if isinstance(name, int) and name == len(inside):
+            if isinstance(inside, list) and name == len(inside):
                 inside.append({})
             elif isinstance(inside, dict) and name not in inside:
                 if value is None:

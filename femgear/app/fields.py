@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -132,7 +132,7 @@ class Form:
             with ui.row().classes("w-full items-center no-wrap"):
                 ui.label(f"{words(table.name)} {number + 1}").classes("grow font-bold")
                 removed = f"{key}[{number}]"
-                button = ui.button(icon="delete", on_click=lambda removed=removed: self._changed_list(removed, None))
+                button = ui.button(icon="delete", on_click=partial(self._changed_list, removed, None))
                 button.props(f'flat dense round size=sm aria-label="Remove {words(table.name)} {number + 1}"')
             self._inside(table, f"{key}[{number}]", row if isinstance(row, dict) else {})
         needed = [part for part in table.parts if isinstance(part, Entry) and part.needed]

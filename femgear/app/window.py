@@ -9,11 +9,13 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
+from itertools import count
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any
 
 from nicegui import background_tasks, events, ui
 
+from femgear.app.dialogs import NewCase, ask_import, ask_name, ask_new, file_name
 from femgear.app.document import entry_of, tables_of_text
 from femgear.app.fields import Form, label_of, words
 from femgear.app.form import Entry, Table, keys_of, shown_value, table_of_schema
@@ -22,8 +24,6 @@ from femgear.app.session import SUFFIX, Session, case_files, result_folders
 from femgear.app.sliders import Slider, slider_of, usual_keys
 from femgear.app.worker import Worker, WorkerError, serve_bench
 from femgear.errors import FemgearError
-from femgear.gears.gear_steels import Treatment
-from femgear.trains.drafts import KINDS
 from femgear.trains.reading import case_schema
 
 _CSS = """
@@ -88,8 +88,10 @@ class Window:
         self._pins = dict[str, Slider]()
         # charts that each stage can draw, those that the user chose, and those that were chosen for him
         self._drawable = dict[str, list[str]]()
-        self._charts_chosen: list[str] | None = None
-        self._charts_offered: list[str] = []
+        # numbers of the results whose charts are drawn, by stage
+        self._drawn = dict[str, int]()
+        self._charts_chosen = list[str]()
+        self._charts_offered = list[str]()
         self._ready = False
         self._outbox: list[dict[str, Any]] = []
 
@@ -114,7 +116,7 @@ class Window:
         if files:
             self._open(files[0])
         else:
-            self._new_dialog()
+            self._new()
 
     def _head(self) -> None:
         """The bar above: which case, and what can be done with it."""
@@ -123,10 +125,10 @@ class Window:
             self._files = ui.select([], label="Case", on_change=lambda event: self._open(event.value))
             self._files.props("dense dark options-dense outlined").classes("min-w-60")
             for text, icon, act in (
-                ("New", "add", self._new_dialog),
-                ("Import", "file_upload", self._import_dialog),
+                ("New", "add", self._new),
+                ("Import", "file_upload", lambda: ask_import(self._import)),
                 ("Save", "save", self._save),
-                ("Save as", "save_as", self._save_as_dialog),
+                ("Save as", "save_as", self._save_as),
             ):
                 ui.button(text, icon=icon, on_click=act).props("flat dense no-caps color=white")
             for text, icon, act in (("Undo", "undo", self._undo), ("Redo", "redo", self._redo)):
@@ -135,9 +137,7 @@ class Window:
                 )
             self._state = ui.label().classes("text-sm")
             ui.space()
-            ui.button("Run", icon="play_arrow", on_click=self._run_dialog).props(
-                "unelevated dense no-caps color=accent"
-            )
+            ui.button("Run", icon="play_arrow", on_click=self._run_all).props("unelevated dense no-caps color=accent")
 
     def _editor(self) -> None:
         """The left side: form and text of the case, and what is wrong with it."""
@@ -203,7 +203,7 @@ class Window:
     def _begin(self, said: str) -> None:
         """Show another case from its beginning."""
         self._shown_form, self._gears, self._pins = None, "", dict[str, Slider]()
-        self._drawable, self._charts_chosen = {}, None
+        self._drawable, self._drawn, self._charts_chosen = {}, {}, list[str]()
         self._send([{"what": "clear"}])
         self._list_files()
         self._text_changed()
@@ -367,9 +367,10 @@ class Window:
 
     def _chosen_charts(self) -> None:
         """Draw the charts that were chosen, by the user or at first."""
-        chosen = list(self._charts.value or ())
+        chosen: list[str] = list(self._charts.value or ())
         if chosen != self._charts_offered:
             self._charts_chosen = chosen
+        self._drawn.clear()
         self._send([{"what": "keep", "names": chosen}])
         self._changed.set()
 
@@ -385,6 +386,7 @@ class Window:
                 try:
                     await self._answer(text, name)
                 except WorkerError as error:
+                    self._drawn.clear()  # another process numbers its results anew
                     self._send([{"what": "end", "text": str(error)}])
 
     async def _answer(self, text: str, name: str) -> None:
@@ -401,7 +403,7 @@ class Window:
                 self._gears = drawing
                 self._send([{"what": "space", "model": model}])
         shown, stages = list(self._charts.value or ()), [stage["name"] for stage in self._seen["stages"]]
-        parts = self._bench.ask("answer", text, name, shown, stages)
+        parts = self._bench.ask("answer", text, name, shown, stages, dict(self._drawn))
         drawn = False
         while True:
             part = await self._next(parts, interrupt=drawn and time.perf_counter() - start > _DRAGGED)
@@ -459,9 +461,9 @@ class Window:
     def _offer_charts(self) -> None:
         """Offer the charts of all stages, and choose some where nobody has chosen."""
         stages = self._seen["stages"]
-        names = [name for stage in stages for name in self._drawable.get(stage["name"], stage["charts"])]
+        names = [name for stage in stages for name in self._drawable.get(stage["name"]) or stage["charts"]]
         usual = [name for name in (*_CHARTS_AT_FIRST, *self._seen["front"]) if name in names]
-        kept = [name for name in self._charts_chosen or () if name in names]
+        kept = [name for name in self._charts_chosen if name in names]
         chosen = kept or list(dict.fromkeys(usual))[:_MOST_AT_FIRST]
         options = {name: words(name) for name in names}
         if self._charts.options != options or self._charts.value != chosen:
@@ -487,6 +489,7 @@ class Window:
             given = {name: part[name] for name in ("stage", "charts", "captions")}
             messages.append({"what": "draw"} | given)
         self._send(messages)
+        self._drawn[part["stage"]] = part["number"]
         if part["names"] is not None and self._drawable.get(part["stage"]) != part["names"]:
             self._drawable[part["stage"]] = part["names"]
             self._offer_charts()
@@ -507,51 +510,15 @@ class Window:
 
     # new cases, runs
 
-    def _new_dialog(self) -> None:
-        """Ask for the few numbers that a case begins with."""
-        with ui.dialog(value=True) as dialog, ui.card().classes("w-96"):
-            ui.label("New case").classes("text-lg")
-            kind = ui.select(list(KINDS), value="planetary", label="Kind").classes("w-full")
-            name = ui.input("Name of the file", value=self._free_name("planetary")).classes("w-full")
-            kind.on_value_change(lambda: name.set_value(self._free_name(kind.value)))
-            teeth = ui.input("Teeth", value="27 40 108", placeholder="sun planet ring, or both gears").classes("w-full")
-            kind.on_value_change(
-                lambda: teeth.set_value("17 40" if kind.value in ("pair", "drivetrain", "gearbox") else "27 40 108")
-            )
-            numbers = {
-                "module": ui.input("Module", value="2 mm").classes("w-full"),
-                "face_width": ui.input("Face width", placeholder="twelve modules").classes("w-full"),
-                "torque": ui.input("Torque of sun or pinion", placeholder="usual for this size").classes("w-full"),
-                "speed": ui.input("Speed of sun or pinion", value="1000 rpm").classes("w-full"),
-                "helix": ui.input("Helix angle", placeholder="0 deg").classes("w-full"),
-            }
-            steel = ui.select(["", *_steels()], value="case hardened steel", label="Material, for its safeties")
-            hardness = ui.input("Hardness of the surface, HV or HBW", value="720").classes("w-full")
-            steel.classes("w-full")
-            with ui.row().classes("w-full justify-end"):
-                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
+    def _new(self) -> None:
+        ask_new(self._free_name, self._make)
 
-                async def make() -> None:
-                    given: dict[str, Any] = {key: field.value for key, field in numbers.items() if field.value}
-                    rating = {"material.treatment": steel.value, "material.hardness": hardness.value}
-                    if await self._make(kind.value, name.value, teeth.value, given, rating if steel.value else {}):
-                        dialog.close()
-
-                ui.button("Begin", on_click=make).props("no-caps")
-
-    async def _make(self, kind: str, name: str, teeth: str, given: dict[str, Any], rating: dict[str, Any]) -> bool:
+    async def _make(self, case: NewCase) -> bool:
         """Make a new case and show it; tells whether that was possible."""
         try:
-            counts = tuple(int(part) for part in teeth.replace(",", " ").replace("/", " ").split())
-            if rating:
-                rating["material.hardness"] = float(rating["material.hardness"])
-        except ValueError:
-            self._notify("teeth and hardness are numbers", "negative")
-            return False
-        try:
-            async for text in self._runs.ask("new", kind, given | {"teeth": counts}):
-                self.session.begin(name if name.endswith(SUFFIX) else f"{name}{SUFFIX}", text)
-                self.session.change_all(rating)
+            async for text in self._runs.ask("new", case.kind, case.numbers | {"teeth": case.teeth}):
+                self.session.begin(case.name, text)
+                self.session.change_all(case.rating)
         except (WorkerError, FemgearError) as error:
             self._notify(str(error), "negative")
             return False
@@ -565,69 +532,47 @@ class Window:
             number += 1
         return name
 
-    def _import_dialog(self) -> None:
-        """Ask for a REXS file."""
-        with ui.dialog(value=True) as dialog, ui.card():
-            ui.label("Gearbox of a REXS file").classes("text-lg")
-
-            async def taken(event: events.UploadEventArguments) -> None:
-                if await self._take_import(event):
-                    dialog.close()
-
-            upload = ui.upload(on_upload=taken, auto_upload=True, max_file_size=20_000_000, max_files=1)
-            upload.props('accept=".rexs,.xml,.rexsj,.rexsz,.zip"').classes("w-96")
-
-    async def _take_import(self, event: events.UploadEventArguments) -> bool:
-        """Make cases of a REXS file, and open the first one."""
-        stem = "".join(letter if letter.isalnum() or letter in "_-" else "_" for letter in Path(event.file.name).stem)
-        stem = self._free_name(stem or "imported").removesuffix(SUFFIX)
+    async def _import(self, event: events.UploadEventArguments) -> bool:
+        """Make cases of a REXS file, and open the first one; tells whether that was possible."""
+        given = Path(event.file.name)
+        stem = "".join(letter if letter.isalnum() or letter in "_-" else "_" for letter in given.stem)
+        stem, said = self._free_name(stem or "imported").removesuffix(SUFFIX), list[str]()
         with tempfile.TemporaryDirectory() as place:
-            path = Path(place) / f"model{Path(event.file.name).suffix.lower()}"
+            path = Path(place) / f"model{given.suffix.lower()}"
             await event.file.save(path)
             try:
                 async for drafts in self._runs.ask("imported", str(path), stem):
                     for draft in reversed(drafts):
                         self.session.begin(draft["name"], draft["text"])
-                    said = [one["text"] for one in drafts[0]["findings"]]
+                    said = [finding["text"] for finding in drafts[0]["findings"]]
             except (WorkerError, FemgearError) as error:
                 self._notify(str(error), "negative")
                 return False
-        self._begin("; ".join(said)[:600] if said else "")
+        self._begin("; ".join(said)[:600])
         return True
 
-    def _save_as_dialog(self) -> None:
-        with ui.dialog(value=True) as dialog, ui.card():
-            name = ui.input("Name of the file", value=self._free_name(self.session.name.removesuffix(SUFFIX)))
+    def _save_as(self) -> None:
+        offered = self._free_name(self.session.name.removesuffix(SUFFIX))
+        ask_name("Save under another name", "Name of the file", offered, "Save", self._saved_as)
 
-            def save() -> None:
-                try:
-                    self.session.save_as(name.value if name.value.endswith(SUFFIX) else f"{name.value}{SUFFIX}")
-                except (FemgearError, OSError) as error:
-                    self._notify(str(error), "negative")
-                    return
-                dialog.close()
-                self._list_files()
-                self._show_state()
+    def _saved_as(self, name: str) -> bool:
+        """Save under another name; tells whether that was possible."""
+        try:
+            self.session.save_as(file_name(name))
+        except (FemgearError, OSError) as error:
+            self._notify(str(error), "negative")
+            return False
+        self._list_files()
+        self._show_state()
+        return True
 
-            ui.button("Save", on_click=save).props("no-caps")
-
-    def _run_dialog(self) -> None:
-        """Ask where the results of a run go."""
-        if not self.session.name:
-            return
-        stem, taken = self.session.name.removesuffix(SUFFIX), set(result_folders(self.session.folder))
-        number = next(n for n in range(1, 10_000) if f"{stem}_{n}" not in taken)
-        with ui.dialog(value=True) as dialog, ui.card():
-            ui.label("Compute everything, with pictures and report").classes("text-lg")
-            output = ui.input("Folder of the results", value=f"{stem}_{number}").classes("w-full")
-            with ui.row().classes("w-full justify-end"):
-                ui.button("Cancel", on_click=dialog.close).props("flat no-caps")
-
-                async def start() -> None:
-                    dialog.close()
-                    await self._compute(output.value)
-
-                ui.button("Run", on_click=start).props("no-caps")
+    def _run_all(self) -> None:
+        """Ask where the results of a run go, and compute it."""
+        if self.session.name:
+            stem, taken = self.session.name.removesuffix(SUFFIX), set(result_folders(self.session.folder))
+            free = next(name for number in count(1) if (name := f"{stem}_{number}") not in taken)
+            title = "Compute everything, with pictures and report"
+            ask_name(title, "Folder of the results", free, "Run", self._compute)
 
     async def _compute(self, output: str) -> None:
         """Run the case, show how far it is, and then its report."""
@@ -685,8 +630,3 @@ def _in_list(key: str, form: Any) -> bool:
     if form is None or "]" not in key:
         return False
     return entry_of(form[1], key.rpartition("]")[0] + "]") is None
-
-
-def _steels() -> list[str]:
-    """Materials of ISO 6336-5."""
-    return [str(name) for name in get_args(Treatment)]

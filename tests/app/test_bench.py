@@ -87,7 +87,7 @@ def test_a_case_is_described(answered):
 
 
 def test_answers_are_those_of_a_run(answered):
-    bench, _, parts = answered
+    _, _, parts = answered
     case = parse_case(TEXT)
     result = solve(case)
     train = train_of(case)
@@ -103,13 +103,16 @@ def test_answers_are_those_of_a_run(answered):
 
 
 def test_what_did_not_change_is_neither_computed_nor_drawn_again(answered):
-    bench, seen, _ = answered
-    stages = [stage["name"] for stage in seen["stages"]]
+    bench, looked, parts = answered
+    stages = [stage["name"] for stage in looked["stages"]]
     shown = ["static_transmission_error", "contact_pressure"]
-    same = list(bench.answer(TEXT + "# a remark\n", "a.toml", shown, stages))
-    assert all(part["same"] and not part["charts"] for part in same)
+    seen = {part["stage"]: part["number"] for part in parts}
+    same = list(bench.answer(TEXT + "# a remark\n", "a.toml", shown, stages, seen))
+    assert len(same) == len(stages) and all(part["same"] and not part["charts"] for part in same)
+    drawn = list(bench.answer(TEXT, "a.toml", shown, stages))
+    assert {name for part in drawn for name in part["charts"]} == {*shown}, "who has seen nothing gets all"
     damped = TEXT.replace("[dynamics]\n", "[dynamics]\ndamping_ratio = 0.03\n")
-    parts = {part["stage"]: part for part in bench.answer(damped, "a.toml", shown, stages)}
+    parts = {part["stage"]: part for part in bench.answer(damped, "a.toml", shown, stages, seen)}
     assert parts["static"]["same"] and not parts["dynamics"]["same"]
     assert next(iter(parts)) == "static", "what others go on from comes first"
     again = next(bench.answer(damped, "a.toml", ["mesh_stiffness"], ["static"]))

@@ -68,7 +68,13 @@ def test_requests_tell_what_they_know_on_the_way():
         raise CaseError("it cannot be", code="E-CASE", key="a.b", remedy="do this")
 
     functions = {"tells": tells, "up": gives_up, "refuses": refuses}
-    Thread(target=lambda: pytest.raises((EOFError, OSError), requests.answer, functions)).start()
+
+    def serve():
+        with pytest.raises((EOFError, OSError)):
+            requests.answer(functions)
+
+    serving = Thread(target=serve)
+    serving.start()
     mine.send((1, "tells", ()))
     assert [mine.recv() for _ in range(3)] == [(1, "value", "begins"), (1, "value", "ends"), (1, END, None)]
     mine.send((2, "up", ()))
@@ -77,3 +83,5 @@ def test_requests_tell_what_they_know_on_the_way():
     number, kind, words = mine.recv()
     assert (number, kind) == (3, "failed") and "E-CASE" in words and "do this" in words
     mine.close()
+    serving.join(5.0)
+    assert not serving.is_alive()
