@@ -123,7 +123,7 @@ class Form:
         """Draw the fields of a table, or the tables of a list with a button for one more."""
         value = entry_of(self._tables, key)
         if table.hint:
-            ui.label(table.hint).classes("hint")
+            ui.label(table.hint.replace("`", "")).classes("hint")
         if not table.listed:
             self._inside(table, key, value if isinstance(value, dict) else {})
             return

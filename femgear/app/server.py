@@ -116,9 +116,8 @@ def make_app(folder: Path, cache: Path | None) -> FastAPI:
     async def window() -> None:
         await Window(folder, cache).build()
 
-    ui.run_with(
-        application, root=window, title="femgear", dark=None, show_welcome_message=False, reconnect_timeout=30.0
-    )
+    settings: Any = {"title": "femgear", "language": "en-US", "dark": None, "show_welcome_message": False}
+    ui.run_with(application, root=window, reconnect_timeout=30.0, **settings)
     return application
 
 

@@ -28,6 +28,7 @@ from femgear.trains.reading import case_schema
 
 _CSS = """
 .nicegui-content { padding: 0; gap: 0; }
+.q-header .q-field__label { color: #fff; opacity: 1; }
 .hint { font-size: 0.75rem; opacity: 0.7; }
 .absent > .q-expansion-item__container > .q-item { opacity: 0.6; }
 .fold { font-weight: 600; padding-left: 4px; }
@@ -100,10 +101,11 @@ class Window:
     async def build(self) -> None:
         """Build the page, and begin to answer."""
         ui.add_css(_CSS)
+        ui.colors(primary="#005a9c", accent="#8a4b00", negative="#b00020", warning="#8a4b00")
         ui.add_head_html(_SCRIPT)
         ui.on("femgear-ready", self._answers_ready)
         self._head()
-        with ui.splitter(value=30).classes("w-full").style("height: calc(100vh - 52px)") as splitter:
+        with ui.splitter(value=30).classes("w-full").style("height: calc(100vh - 60px)") as splitter:
             with splitter.before, ui.column().classes("w-full h-full no-wrap gap-0"):
                 self._editor()
             with splitter.after, ui.column().classes("w-full h-full no-wrap gap-0"):
@@ -120,7 +122,7 @@ class Window:
 
     def _head(self) -> None:
         """The bar above: which case, and what can be done with it."""
-        with ui.header().classes("items-center q-py-xs gap-2"):
+        with ui.header().classes("items-center no-wrap q-py-none gap-2").style("height: 60px"):
             ui.label("femgear").classes("text-lg font-bold")
             self._files = ui.select([], label="Case", on_change=lambda event: self._open(event.value))
             self._files.props("dense dark options-dense outlined").classes("min-w-60")
