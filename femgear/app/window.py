@@ -18,10 +18,9 @@ from nicegui import background_tasks, events, ui
 from femgear.app.dialogs import NewCase, ask_import, ask_name, ask_new, file_name
 from femgear.app.document import entry_of, tables_of_text
 from femgear.app.fields import Form, label_of, words
-from femgear.app.form import Entry, Table, keys_of, shown_value, table_of_schema
+from femgear.app.form import Entry, Slider, Table, keys_of, shown_value, slider_of, table_of_schema, usual_keys
 from femgear.app.runs import serve_runs
 from femgear.app.session import SUFFIX, Session, case_files, result_folders
-from femgear.app.sliders import Slider, slider_of, usual_keys
 from femgear.app.worker import Worker, WorkerError, serve_bench
 from femgear.errors import FemgearError
 from femgear.trains.reading import case_schema
