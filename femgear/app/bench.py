@@ -151,10 +151,10 @@ class Bench:
         """
         case = parse_case(text, name=str(self.folder / name))
         check_case(case)
-        train, known = train_of(case), {stage.name: stage for stage in stages_of(case)}
+        train, of_run = train_of(case), {stage.name: stage for stage in stages_of(case)}
         answer = Answer(case, self._steps, cache=self._cache, progress=self._go_on)
         computed = dict[str, Any]()
-        wanted = [known[key] for key in known if key in stages]
+        wanted = [of_run[key] for key in of_run if key in stages]
         taken = {name for stage in wanted for name in stage.before(case)}
         # first what others go on from, then the quickest
         seconds = {stage.name: 0.0 if stage.name in taken else self._seconds.get(stage.name, 1.0) for stage in wanted}

@@ -122,7 +122,14 @@ def _put(table: Any, name: Any, value: Any) -> None:
 
 @dataclass(frozen=True)
 class _Block:
-    """A table of the file: its key, and the lines from its header to before what belongs to the next one."""
+    """A table of the file.
+
+    Parameters
+    ----------
+    key : str
+    start, end : int
+        Lines from its header to before what belongs to the next one.
+    """
 
     key: str
     start: int
@@ -134,12 +141,12 @@ class _Lines:
 
     def __init__(self, text: str) -> None:
         self._lines = text.splitlines()
-        known = [(key, number - 1) for key, number in keys_with_lines(text)]
-        headers = [(key, at) for key, at in known if _HEADER.match(self._lines[at])]
+        keys_at = [(key, number - 1) for key, number in keys_with_lines(text)]
+        headers = [(key, at) for key, at in keys_at if _HEADER.match(self._lines[at])]
         starts = [*(at for _, at in headers), len(self._lines)]
         self._blocks = [_Block("", 0, self._end(0, starts[0]))] if not headers or starts[0] else []
         self._blocks += [_Block(key, at, self._end(at + 1, starts[i + 1])) for i, (key, at) in enumerate(headers)]
-        self._entries = {key: at for key, at in reversed(known) if not _HEADER.match(self._lines[at])}
+        self._entries = {key: at for key, at in reversed(keys_at) if not _HEADER.match(self._lines[at])}
 
     def changed(self, key: str, value: Any) -> str:
         """Text with one entry changed, added or taken out."""

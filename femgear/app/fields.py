@@ -81,8 +81,8 @@ class Form:
     ) -> None:
         """Show what is said of the entries beside their fields, and what was estimated for those left out."""
         self._values = values
-        self._said = {one["key"]: ("look", _sentence(one)) for one in findings if one["key"]}
-        self._said |= {one["key"]: ("bad", _sentence(one)) for one in problems if one["key"]}
+        self._said = {finding["key"]: ("look", _sentence(finding)) for finding in findings if finding["key"]}
+        self._said |= {problem["key"]: ("bad", _sentence(problem)) for problem in problems if problem["key"]}
         for key, (entry, field) in self._fields.items():
             self._mark(key, entry, field)
         for key, fold in self._folds.items():
@@ -196,10 +196,10 @@ class Form:
             if entry.kind in ("quantity", "number", "list") and value not in (None, "", []):
                 pin = ui.button(icon="tune", on_click=lambda: self._pin(key))
                 pin.props(f'flat dense round size=sm tabindex=-1 aria-label="Slider of {words(entry.name)}"')
-            told = ". ".join(text for text in (help_of(key), entry.hint) if text)
-            if told:
+            explained = ". ".join(text for text in (help_of(key), entry.hint) if text)
+            if explained:
                 with field:
-                    ui.tooltip(told).classes("told").props("delay=500")
+                    ui.tooltip(explained).classes("explained").props("delay=500")
         self._fields[key] = entry, field
         self._mark(key, entry, field)
 

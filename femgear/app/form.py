@@ -292,6 +292,6 @@ def slider_of(key: str, value: Any, entry: Entry | None) -> Slider | None:
 
 def usual_keys(keys: Iterable[str]) -> list[str]:
     """Choose of the keys of a case file those that are dragged most."""
-    known = list(keys)
-    chosen = [key for pattern in _USUAL for key in known if re.fullmatch(pattern, key)]
+    given = list(keys)
+    chosen = [key for pattern in _USUAL for key in given if re.fullmatch(pattern, key)]
     return chosen[:_MOST]

@@ -32,7 +32,7 @@ _CSS = """
 .absent > .q-expansion-item__container > .q-item { opacity: 0.6; }
 .fold { font-weight: 600; padding-left: 4px; }
 .more { font-size: 0.8rem; }
-.told { font-size: 0.8rem; max-width: 26rem; }
+.explained { font-size: 0.8rem; max-width: 26rem; }
 .said { font-size: 0.8rem; white-space: pre-wrap; overflow-wrap: anywhere; }
 iframe { border: 0; width: 100%; flex: 1 1 auto; }
 .q-field__messages { white-space: normal; line-height: 1.2; }
@@ -311,7 +311,7 @@ class Window:
         tables = tables_of_text(self.session.text)
         value = entry_of(tables, key)
         keys = [f"{key}[{number}]" for number in range(len(value))] if isinstance(value, list) else [key]
-        sliders = {one: slider for one in keys if (slider := self._slider(one, tables)) is not None}
+        sliders = {of_value: slider for of_value in keys if (slider := self._slider(of_value, tables)) is not None}
         if not sliders:
             self._notify("only a single number can be dragged")
         self._pins |= sliders
@@ -451,10 +451,10 @@ class Window:
         self._form.say(seen["problems"], seen["findings"], seen["values"])
         self._said.clear()
         with self._said:
-            for one in seen["problems"]:
-                self._line("error", "negative", one)
-            for one in seen["findings"]:
-                self._line("warning", "warning", one)
+            for problem in seen["problems"]:
+                self._line("error", "negative", problem)
+            for finding in seen["findings"]:
+                self._line("warning", "warning", finding)
         if seen["problems"]:
             return
         self._offer_charts()
@@ -583,10 +583,10 @@ class Window:
         self._tabs.value = "Results"
         self._progress_row.visible, self._progress.value, self._progress_text.text = True, 0.0, "begins"
         try:
-            async for told in self._runs.ask("run", self.session.text, self.session.name, output, True):
-                if "done" in told:
-                    share = told["done"] / told["total"] if told["total"] else 0.0
-                    self._progress.value, self._progress_text.text = share, f"{words(told['stage'])}"
+            async for progress in self._runs.ask("run", self.session.text, self.session.name, output, True):
+                if "done" in progress:
+                    share = progress["done"] / progress["total"] if progress["total"] else 0.0
+                    self._progress.value, self._progress_text.text = share, f"{words(progress['stage'])}"
                 else:
                     self._list_files()
                     self._run.value = output
