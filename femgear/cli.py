@@ -920,6 +920,44 @@ def gearbox(
 
 
 @app.command
+def casing(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Give a gearbox a rigid casing on feet, three sensors and a run-up, all estimated, so that a run has its sound.
+
+    Parameters
+    ----------
+    case
+        TOML case file of a gearbox without a casing.
+    output
+        Case file to write, in the folder of the case if that names other files. Default: NAME_in_casing.toml.
+    force
+        Replace the file.
+    """
+    from femgear.case import text as case_text
+    from femgear.trains.reading import parse_case, read_case
+    from femgear.trains.registry import train_of
+
+    read = read_case(case)
+    train = train_of(read)
+    if train.draft_casing is None:
+        limit, remedy = 'model = "gearbox"', f"femgear gearbox {shlex.quote(str(case))} makes one of a set or a pair"
+        raise CaseError(f"{train.words} has no casing of its own", code="E-MODEL", limit=limit, remedy=remedy)
+    tables, findings = train.draft_casing(read)
+    output = output or case.with_name(f"{case.stem}_in_casing.toml")
+    text = f"{case_text.read_text(case).rstrip()}\n\n{tables}"
+    parse_case(text, name=str(output))  # what is no case is refused before a file is written
+    _warn(findings)
+    _write_case(text, output, force=force)
+    _say(f"next:    femgear run {shlex.quote(str(output))}")
+    return 0
+
+
+@app.command
 def rexs(
     case: Path,
     /,

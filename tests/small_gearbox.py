@@ -63,6 +63,16 @@ def pair_tables(*, teeth: bool = False, helix: str = "0 deg") -> dict[str, Any]:
     return tables
 
 
+def split_pair_tables(second: str = "4e8 N/m", *, position: str = "60 mm", teeth: bool = False) -> dict[str, Any]:
+    """Tables of two equal pairs side by side between the same shafts, of which the second has its own stiffness."""
+    tables = pair_tables(teeth=teeth)
+    pair = copy.deepcopy(tables["pair"][0]) | {"name": "second", "positions": [position, position]}
+    if not teeth:
+        pair["mesh"] = {"stiffness": second}
+    tables["pair"].append(pair)
+    return tables
+
+
 def loose_pair_tables(play: str, *, weight: str = "50 kg") -> dict[str, Any]:
     """Tables of a pair of two rigid bodies in the plane under weight, the second one in a bearing with play."""
     tables = pair_tables() | {"motions": "plane", "gravity": {}}

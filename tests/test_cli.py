@@ -268,6 +268,17 @@ def test_new_refuses_a_centre_distance_at_which_nothing_closes(tmp_path, capsys)
     assert "--centre-distance: no profile shifts close" in capsys.readouterr().err
 
 
+def test_a_gearbox_gets_a_casing_and_a_set_is_told_how_to(tmp_path, capsys):
+    box = tmp_path / "box.toml"
+    assert cli.main(["new", "gearbox", "-o", str(box)]) == 0
+    assert cli.main(["casing", str(box)]) == 0
+    assert "W-ESTIMATED" in capsys.readouterr().err
+    case = read_case(tmp_path / "box_in_casing.toml")
+    assert len(case.casing.foot) == 4 and len(case.sensor) == 3 and case.runup.count
+    assert cli.main(["casing", str(CASE), "-o", str(tmp_path / "set.toml")]) == 2
+    assert "femgear gearbox" in capsys.readouterr().err
+
+
 def test_an_argument_that_is_missing_is_named(capsys):
     cli.main(["compare", "x", "y"])
     assert "--output is required" in capsys.readouterr().err

@@ -13,10 +13,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from itertools import pairwise
 from numbers import Integral, Rational, Real
+
+import numpy as np
 
 from femgear.errors import CaseError, GeometryError, several
 from femgear.gears.exact_linear import ExactSolution, reduce_rows
@@ -45,6 +47,9 @@ class PowerFlow:
         By shaft: exact share of every given speed in its speed [1].
     torque_ratio : mapping
         By shaft: exact share of every given torque in its external torque [1].
+    side_by_side : tuple of tuples of str
+        Stages that share a torque as the balance leaves open, set by set; their torques have the least squares of
+        power, by which equal stages have equal shares.
     """
 
     speed: Mapping[str, float]
@@ -52,6 +57,7 @@ class PowerFlow:
     stage_torque: Mapping[str, Mapping[str, float]]
     speed_ratio: Ratios
     torque_ratio: Ratios
+    side_by_side: tuple[tuple[str, ...], ...] = ()
 
     @property
     def power(self) -> dict[str, float]:
@@ -174,6 +180,7 @@ def power_flow(
     held: Sequence[str] = (),
     outputs: Sequence[str] = (),
     joined: Sequence[Sequence[str]] = (),
+    share: bool = False,
 ) -> PowerFlow:
     """Compute the speeds and torques of all shafts.
 
@@ -193,6 +200,9 @@ def power_flow(
         Shafts whose external torque is found.
     joined : sequence of sequences of str
         Shafts that couplings join rigidly.
+    share : bool
+        Stages side by side, whose shares of a torque follow from their stiffness, get equal ones; without it they are
+        refused.
 
     Raises
     ------
@@ -214,12 +224,39 @@ def power_flow(
         *locks,
         *_free(graph, turning),
         *_contradictions(graph, turning, speeds, locked),
-        *_undetermined(graph, balance, held, outputs, locked),
+        *_undetermined(graph, balance, held, outputs, locked, share=share),
         *_unbalanced(graph, balance, torques, len(unknown), locked),
     ]
     if problems:
         raise several(problems)
-    return _flow(graph, turning, balance, speeds, torques, unknown)
+    flow = _flow(graph, turning, balance, speeds, torques, unknown)
+    return (
+        replace(flow, stage_torque={**flow.stage_torque, **_side_by_side(graph, balance, flow)})
+        if balance.open
+        else flow
+    )
+
+
+def _side_by_side(graph: ShaftGraph, balance: ExactSolution, flow: PowerFlow) -> dict[str, dict[str, float]]:
+    """Torques of stages that the balance leaves open, with the least squares of their powers [N m]."""
+    balanced = np.zeros((graph.count, len(graph.conditions)))
+    for number, row in enumerate(graph.rows):
+        for group, weight in row.items():
+            balanced[group, number] = float(weight)
+    outside = np.zeros(graph.count)
+    for shaft, torque in flow.torque.items():
+        outside[graph.group[shaft]] += torque
+    sizes = np.ones(len(graph.conditions))
+    for number, condition in enumerate(graph.conditions):
+        powers = [abs(float(weight) * flow.speed[shaft]) for shaft, weight in condition.weights.items()]
+        sizes[number] = max(powers) or max(abs(float(weight)) for weight in condition.weights.values())
+    scales = np.linalg.lstsq(balanced / sizes, -outside, rcond=None)[0] / sizes
+    return {
+        graph.conditions[number].name: {
+            shaft: float(weight) * float(scales[number]) for shaft, weight in graph.conditions[number].weights.items()
+        }
+        for number in balance.open
+    }
 
 
 def _flow(
@@ -240,7 +277,8 @@ def _flow(
     given, first_given = [*torques], len(graph.conditions) + len(unknown)
 
     def named(column: int) -> dict[str, Fraction]:
-        return {given[other - first_given]: share for other, share in balance.ratio[column].items()}
+        # an open one is found by what it shares
+        return {given[other - first_given]: share for other, share in balance.ratio.get(column, {}).items()}
 
     torque_ratio: dict[str, dict[str, Fraction]] = {shaft: {} for shaft in graph.shafts}
     for shaft in given:
@@ -258,6 +296,10 @@ def _flow(
         stage_torque,
         speed_ratio,
         torque_ratio,
+        tuple(
+            tuple(graph.conditions[number].name for number in sorted(cluster))
+            for cluster in connected_sets([{column, *others} for column, others in balance.open.items()])
+        ),
     )
 
 
@@ -445,9 +487,15 @@ def _speed_problem(shaft: str, speed: float, fits: float, against: str) -> CaseE
 
 
 def _undetermined(
-    graph: ShaftGraph, balance: ExactSolution, held: Sequence[str], outputs: Sequence[str], locked: Collection[int]
+    graph: ShaftGraph,
+    balance: ExactSolution,
+    held: Sequence[str],
+    outputs: Sequence[str],
+    locked: Collection[int],
+    *,
+    share: bool,
 ) -> list[CaseError]:
-    """Torques that the balance leaves open."""
+    """Torques that the balance leaves open, but those of stages side by side where these ``share`` them."""
     problems, count = [], len(graph.conditions)
     for cluster in connected_sets([{column, *others} for column, others in balance.open.items()]):
         stages = [number for number in sorted(cluster) if number < count]
@@ -461,6 +509,8 @@ def _undetermined(
             remedy = f"give the torque of {_listed(free[-1:])}, which is then no output"
         elif outside:
             text, remedy = f"{_shafts(outside)} are held against the same motion", "hold one shaft less"
+        elif share:
+            continue
         else:
             text = f"{_stages(graph, stages)} carry torque that tooth numbers do not share out"
             remedy = "leave out one of the stages, or the coupling that closes the loop"

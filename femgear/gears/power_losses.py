@@ -112,7 +112,7 @@ def planetary_efficiency(basic: float, ratio: float, *, sun_drives: bool = True)
     return (1.0 + ratio * basic) / (1.0 + ratio) if sun_drives else (1.0 + ratio) / (1.0 + ratio / basic)
 
 
-def lossy_flow(
+def lossy_flow(  # noqa: PLR0913
     shafts: Sequence[str],
     conditions: Sequence[SpeedCondition],
     *,
@@ -123,6 +123,7 @@ def lossy_flow(
     outputs: Sequence[str] = (),
     joined: Sequence[Sequence[str]] = (),
     friction: Sequence[FrictionTorque] = (),
+    lossless: Mapping[str, Mapping[str, float]] | None = None,
 ) -> LossyFlow:
     """Compute the torques of all shafts with losses.
 
@@ -138,6 +139,9 @@ def lossy_flow(
         By stage: eta of its meshes from the first gear to the last; 1 where a stage has none here.
     friction : sequence of FrictionTorque
         Of bearings.
+    lossless : mapping, optional
+        By stage and shaft its torques without losses [N m], by whose shares stages side by side share theirs; by
+        default with the least squares of torques.
 
     Raises
     ------
@@ -151,13 +155,14 @@ def lossy_flow(
         for shaft, sense in zip(loss.shafts, (-1.0, 1.0), strict=True):
             if shaft is not None:
                 given[shaft] = given.get(shaft, 0.0) + sense * math.copysign(loss.torque, relative) * (relative != 0.0)
+    near = np.array([_factor(condition, (lossless or {}).get(condition.name, {})) for condition in conditions])
     drives: list[bool | None] = [None] * len(conditions)
     for _ in range(_ROUNDS):
         members = [
             _member_weights(condition, way, efficiencies.get(condition.name, ()))
             for condition, way in zip(conditions, drives, strict=True)
         ]
-        scale, reactions = _balance(graph, members, given, (*held, *outputs))
+        scale, reactions = _balance(graph, members, given, (*held, *outputs), near)
         rolling = [
             _rolling_power(condition, weights, factor, speeds)
             for condition, weights, factor in zip(conditions, members, scale, strict=True)
@@ -216,8 +221,13 @@ def _rolling_power(condition: SpeedCondition, members, scale: float, speeds: Map
     return -float(scale) * members[0][1] * (_speed(speeds, condition.gears.shafts[first]) - carrier)
 
 
-def _balance(graph: ShaftGraph, members, given: Mapping[str, float], unknown: Sequence[str]):
-    """Solve for the factors of all stages and the unknown external torques."""
+def _factor(condition: SpeedCondition, torques: Mapping[str, float]) -> float:
+    """Torque of a stage on a shaft over its weight there; zero of torques that are not known."""
+    return next((torque / float(condition.weights[shaft]) for shaft, torque in torques.items()), 0.0)
+
+
+def _balance(graph: ShaftGraph, members, given: Mapping[str, float], unknown: Sequence[str], near: np.ndarray):
+    """Solve for the factors of all stages, where they are open those ``near`` others, and the unknown torques."""
     count = len(graph.conditions)
     matrix, right = np.zeros((graph.count, count + len(unknown))), np.zeros(graph.count)
     for stage, weights in enumerate(members):
@@ -231,7 +241,8 @@ def _balance(graph: ShaftGraph, members, given: Mapping[str, float], unknown: Se
     # tooth numbers make columns of stages tens of times as long as those of torques
     length = np.linalg.norm(matrix, axis=0)
     length[length == 0.0] = 1.0
-    solution = np.linalg.lstsq(matrix / length, right, rcond=None)[0] / length
+    first = np.concatenate([near, np.zeros(len(unknown))])
+    solution = first + np.linalg.lstsq(matrix / length, right - matrix @ first, rcond=None)[0] / length
     return solution[:count], dict(zip(unknown, solution[count:].tolist(), strict=True))
 
 

@@ -325,6 +325,8 @@ class Train:
     bodies : callable, optional
         ``(case) -> bodies`` of it in space, as `femgear.report.space.SpaceBody`; None of trains whose gears have no
         teeth.
+    draft_casing : callable, optional
+        ``(case) -> text, findings``: the tables of an estimated casing for a case without one.
     front : tuple of (str, int)
         Charts of page one, the first two of which are there: name of the figure, and number of its panel.
     """
@@ -341,6 +343,7 @@ class Train:
     key_figures: Callable[[Any], tuple[KeyFigure, ...]] = lambda case: ()
     judgements: Callable[[Results], Iterable[Judgement]] = lambda results: ()
     bodies: Callable[[Any], Iterable[SpaceBody]] | None = None
+    draft_casing: Callable[[Any], tuple[str, tuple[Finding, ...]]] | None = None
     front: tuple[tuple[str, int], ...] = ()
 
     def stage(self, name: str) -> Stage | None:

@@ -264,3 +264,16 @@ def test_stepped_planets_of_equal_gears_are_single_ones():
     stepped = stepped_condition("set", "s", "c", "r", 20, 30, 30, 80)
     single = planetary_condition("set", "s", "c", "r", 20, 80)
     assert {shaft: weight / 30 for shaft, weight in stepped.weights.items()} == single.weights
+
+
+def test_stages_side_by_side_share_equally_where_they_may():
+    pairs = [pair_condition(name, "a", "b", 20, 40) for name in ("one", "two", "three")]
+    given = {"speeds": {"a": 10.0}, "torques": {"a": 90.0}, "outputs": ["b"]}
+    flow = power_flow(["a", "b"], pairs, share=True, **given)
+    assert flow.side_by_side == (("one", "two", "three"),)
+    for torques in flow.stage_torque.values():
+        assert torques == pytest.approx({"a": -30.0, "b": -60.0}, rel=1e-12)
+    assert flow.torque["b"] == pytest.approx(180.0, rel=1e-12)
+    with pytest.raises(CaseError) as refused:
+        power_flow(["a", "b"], pairs, **given)
+    assert refused.value.code == "E-TORQUE"

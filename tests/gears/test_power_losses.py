@@ -104,3 +104,14 @@ def test_an_idle_stage_loses_nothing():
     conditions = [pair_condition("first", "a", "b", 20, 61), pair_condition("idle", "b", "c", 30, 31)]
     _, flow = flows(conditions, ["a", "b", "c"], {"a": 1.0}, {"a": 1.0}, ["b"])
     assert flow.mesh_loss["idle"] == pytest.approx((0.0, 0.0), abs=1e-12) and flow.first_drives["idle"] is None
+
+
+def test_stages_side_by_side_lose_by_the_shares_that_they_have():
+    pairs = [pair_condition(name, "a", "b", 20, 40) for name in ("one", "two")]
+    known = {"speeds": {"a": 10.0, "b": -5.0}, "torques": {"a": 90.0}, "outputs": ["b"]}
+    without = {"one": {"a": -60.0, "b": -120.0}, "two": {"a": -30.0, "b": -60.0}}
+    flow = lossy_flow(["a", "b"], pairs, efficiencies={"one": (0.99,), "two": (0.98,)}, lossless=without, **known)
+    # 600 W and 300 W; what the losses change of the shares is small as these are
+    assert flow.mesh_loss["one"][0] == pytest.approx(6.0, rel=0.01)
+    assert flow.mesh_loss["two"][0] == pytest.approx(6.0, rel=0.01)
+    assert flow.imbalance == pytest.approx(0.0, abs=1e-12)

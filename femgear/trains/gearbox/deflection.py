@@ -8,6 +8,7 @@ it shifts the slices, and the system is solved again until slopes and mesh force
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -230,7 +231,7 @@ def solve_deflection(
     model = gearbox_model(case, load_case, estimate=estimate)
     staged = [stage for stage in model.stages if model.flow.touches(stage.section)]
     gap = _first_gaps(model, staged)
-    found = solve_state(model, gap)
+    found = shared_torques(solve_state(model, gap))
     if not (staged and case.deflection.contact):
         return replace(found, slopes=(found.mesh_slope,))
     apart = mesh_separation(model.assembly, found.motion)
@@ -238,12 +239,14 @@ def solve_deflection(
     history, passes = [start.slopes], []
     contacts: dict[str, StageContact] = {}
     settled, coarse = False, True
+    model = found.model
     for _ in range(case.deflection.passes):
         contacts = {stage.name: _contact(model, stage, start, steps, _COARSE if coarse else None) for stage in staged}
         stiffness = {name: contact.stiffness for name, contact in contacts.items()}
-        model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate)
+        model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate, flow=found.model.flow)
         gap = _gaps(model, staged, contacts, start.slopes)
-        found = solve_state(model, gap, start=found)
+        found = shared_torques(solve_state(model, gap, start=found))
+        model = found.model
         end = MeshPositions(found.mesh_slope, mesh_separation(model.assembly, found.motion))
         passes.append(ContactPass(start, end))
         history.append(end.slopes)
@@ -261,6 +264,17 @@ def solve_deflection(
         if alike:
             coarse, passes = False, []
     return replace(found, contacts=contacts, slopes=tuple(history), settled=settled)
+
+
+def shared_torques(found: Deflection) -> Deflection:
+    """Give stages side by side the torques by which shafts, bearings and meshes share them in a loaded state."""
+    model, factors = found.model, dict[str, float]()
+    for stage in model.stages:
+        if any(stage.name in names for names in model.flow.side_by_side):
+            normal = stage.sizes.base_radii[0] * math.cos(stage.sizes.base_helix)
+            force = found.mesh_force[list(stage.meshes[: max(len(stage.planets), 1)])].sum()
+            factors[stage.name] = float(force * normal / abs(model.flow.first_torque(stage.section)))
+    return replace(found, model=replace(model, flow=model.flow.with_factors(factors))) if factors else found
 
 
 def _contact(

@@ -106,6 +106,7 @@ def loss_point(state: Deflection, load_case: LoadCaseSection, speed_share: float
             *seals,
             *(FrictionTorque(name, rings[name], torque) for name, torque in torques.items() if math.isfinite(torque)),
         ],
+        lossless=model.flow.stage_torque,
         **flow_entries(case, load_case),
     )
     sets = {name: contact.result.planetary_set for name, contact in state.contacts.items()}

@@ -173,6 +173,7 @@ def gearbox_model(
     *,
     mesh_stiffness: Mapping[str, Any] | None = None,
     estimate: float = 1.0,
+    flow: BoxFlow | None = None,
 ) -> GearboxModel:
     """Assemble shafts, bearings, stages and loads of a gearbox.
 
@@ -187,6 +188,8 @@ def gearbox_model(
         method B.
     estimate : float
         Factor on the stiffness of bearings that are estimated.
+    flow : BoxFlow, optional
+        Of the load case, with the shares of stages side by side; by default these are equal.
 
     Raises
     ------
@@ -194,7 +197,7 @@ def gearbox_model(
         Shafts whose speed or torque nothing determines, loops that lock: see `gearbox_flow`.
     """
     load_case = load_case or case.load_case
-    flow = gearbox_flow(case, load_case)
+    flow = flow or gearbox_flow(case, load_case)
     build = _Builder(case, flow, dict(mesh_stiffness or {}), estimate)
     return build.model(load_case)
 

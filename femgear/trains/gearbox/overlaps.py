@@ -75,7 +75,7 @@ def overlaps(case: GearboxCase) -> Iterator[Finding]:
             text = f"shafts {first.name} and {second.name} penetrate each other by {LENGTH.show(depth)}"
             remedy = "correct axis, start or diameters of one of them"
             yield Finding("W-OVERLAP", f"shaft[{numbers[second.name]}]", text, remedy=remedy)
-    for gear in _cylinders(case):
+    for gear in gear_outlines(case):
         for shaft in shafts:
             if shaft.name == gear.shafts[0]:
                 yield from _on_its_shaft(gear, shaft)
@@ -146,8 +146,8 @@ def _radius(shaft: BoxShaftSection, low: float, high: float) -> float:
     return float(_bounds(shaft, where)[1].max()) if len(where) > 1 else 0.0
 
 
-def _cylinders(case: GearboxCase) -> Iterator[GearOutline]:
-    """Gears of pairs and of sets whose place and size are known, and the way of the planets."""
+def gear_outlines(case: GearboxCase) -> Iterator[GearOutline]:
+    """List the gears of pairs and of sets whose place and size are known, and the ways of planets."""
     for number, pair in enumerate(case.pair):
         yield from _of_pair(case, pair, f"pair[{number}]")
     for number, stage in enumerate(case.planetary):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from femgear.case.quantities import TORQUE
@@ -42,6 +43,9 @@ class BoxFlow:
         Shafts whose speeds are given, one for every way in which the gearbox turns.
     frequencies : mapping of str to StageFrequencies
         Of every stage.
+    side_by_side : tuple of tuples of str
+        Stages that share a torque by their stiffness, set by set; in a loaded state the shares are those of the elastic
+        gearbox, without one they are equal.
     """
 
     stage_torque: Mapping[str, Mapping[str, float]]
@@ -49,6 +53,31 @@ class BoxFlow:
     port_torque: Mapping[str, float]
     independent: tuple[str, ...]
     frequencies: Mapping[str, StageFrequencies]
+    side_by_side: tuple[tuple[str, ...], ...] = ()
+
+    def with_factors(self, factors: Mapping[str, float]) -> BoxFlow:
+        """Give stages by name so many times their torques."""
+        changed = {
+            name: {shaft: torque * factor for shaft, torque in self.stage_torque[name].items()}
+            for name, factor in factors.items()
+        }
+        return replace(self, stage_torque={**self.stage_torque, **changed})
+
+    @property
+    def torque_shares(self) -> dict[str, float]:
+        """Share of every stage side by side with others in what all of them pass on, by its name [1]."""
+        shares = {}
+        for names in self.side_by_side:
+            passed = [self._passed(name) for name in names]
+            shares |= {name: one / math.fsum(passed) for name, one in zip(names, passed, strict=True) if any(passed)}
+        return shares
+
+    def _passed(self, name: str) -> float:
+        """Largest power of a stage on a shaft [W], its largest torque where nothing turns [N m]."""
+        torques = self.stage_torque[name]
+        powers = [abs(torque * self.speed[shaft]) for shaft, torque in torques.items()]
+        turning = any(self.speed[shaft] for shaft in torques)
+        return max(powers) if turning else max(map(abs, torques.values()))
 
     def first_torque(self, stage: PairSection | BoxPlanetarySection) -> float:
         """Torque that the meshes of a stage put on its gear 1, or on its sun, which may stand in the casing [N m]."""
@@ -105,7 +134,8 @@ def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) ->
     load_case = load_case or case.load_case
     shaft_of, conditions, given = port_shafts(case), stage_conditions(case), flow_entries(case, load_case)
     try:
-        graph = power_flow([shaft.name for shaft in case.shaft], conditions, speeds=load_case.speed, **given)
+        names = [shaft.name for shaft in case.shaft]
+        graph = power_flow(names, conditions, speeds=load_case.speed, share=True, **given)
     except FemgearError as error:
         _locate(error, case, load_case)
         raise
@@ -124,7 +154,8 @@ def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) ->
         for one in conditions
     }
     independent = _independent(case, conditions, given["held"], given["joined"], load_case)
-    return BoxFlow(dict(graph.stage_torque), {**graph.speed, CASING: 0.0}, ports, independent, frequencies)
+    speeds = {**graph.speed, CASING: 0.0}
+    return BoxFlow(dict(graph.stage_torque), speeds, ports, independent, frequencies, graph.side_by_side)
 
 
 def flow_entries(case: GearboxCase, load_case: LoadCaseSection) -> dict[str, Any]:

@@ -133,6 +133,7 @@ class DeflectionResult(StageResult):
                 "1",
                 "K_gamma: largest force of the planets' meshes over their mean; NaN of pairs",
             ),
+            **_shares_side_by_side(every),
             "share": (load_case, running_shares(case.operation.load_case), "1", "share of the running time"),
             "mesh_force": (mesh, [one.mesh_force for one in every], "N", "force along the normal of the flanks"),
             "mesh_slope": (mesh, slopes, "rad", "slope of the approach along the width, closer at z > 0 positive"),
@@ -445,6 +446,16 @@ def _range(data: Any, name: str, mesh: int, how: str, factor: float = 1.0) -> st
     own = data["mesh_misalignment" if name == "misalignment" else name].values[mesh]
     values = factor * np.sort([own, *data[f"estimate_{name}"].values[:, mesh]])
     return "" if np.isnan(values).any() else f" ({values[0]:{how}} to {values[-1]:{how}})"
+
+
+def _shares_side_by_side(states: Sequence[Deflection]) -> dict[str, tuple]:
+    """Shares (load cases, stages) in the torque of stages side by side, where there are such."""
+    if not any(state.model.flow.side_by_side for state in states):
+        return {}
+    names = [stage.name for stage in states[0].model.stages]
+    shares = [[state.model.flow.torque_shares.get(name, math.nan) for name in names] for state in states]
+    text = "share of the stage in what it and those side by side with it pass on; NaN of a stage alone"
+    return {"torque_share": ("load_case stage", shares, "1", text)}
 
 
 def deflection_warnings(data: xr.Dataset) -> Iterator[Finding]:

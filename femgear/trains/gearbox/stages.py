@@ -24,6 +24,7 @@ from femgear.trains.gearbox.balance import (
     solve_balance,
 )
 from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection, teeth_of
+from femgear.trains.gearbox.casing_draft import draft_casing
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
 from femgear.trains.gearbox.friction import box_friction_findings
@@ -200,7 +201,11 @@ def _flow_blocks(case: GearboxCase, load_case: LoadCaseSection) -> Iterator[Bloc
         "planets [rpm]": lambda name: f"{flow.planet_speed[name] / RPM:.6g}" if name in flow.planet_speed else "-",
         "same teeth meet after": lambda name: turns_in_words(flow.frequencies[name]),
     }
-    yield tabulate(f"Stages, {load_case.name}" if many else "Stages", flow.stage_torque, columns)
+    notes = tuple(
+        f"{', '.join(names)} stand side by side: equal shares here, those of their stiffness in deflection"
+        for names in flow.side_by_side
+    )
+    yield tabulate(f"Stages, {load_case.name}" if many else "Stages", flow.stage_torque, columns, notes)
 
 
 def _port_texts(case, flow, power, shaft: str) -> tuple[str, str]:
@@ -334,6 +339,7 @@ GEARBOX = Train(
     describe=describe_gearbox,
     warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case), *box_friction_findings(case)),
     bodies=lambda case: gearbox_bodies(case, {}),
+    draft_casing=draft_casing,
     judgements=gearbox_judgements,
     front=(
         ("run_up_levels", 0),

@@ -83,6 +83,16 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         at = np.unravel_index(int(np.nanargmax(sharing)), sharing.shape)
         text = of_teeth(f"{sharing[at]:.3f}")
         yield "largest planet load factor K_γ", f"{text}, {where(at, data['stage'].values)}"
+    if "torque_share" in data:
+        share = data["torque_share"].values
+        at = int(np.nanargmax(share.max(axis=1, where=np.isfinite(share), initial=0.0)))
+        parts = [
+            f"{name} {value:.1%}"
+            for name, value in zip(data["stage"].values, share[at], strict=True)
+            if np.isfinite(value)
+        ]
+        case = f", {cases[at]}" if len(cases) > 1 else ""
+        yield "torque of stages side by side", f"{of_teeth(', '.join(parts))}{case}"
     if len(bearings):
         force = np.hypot(data["radial_force"].values, data["axial_force"].values)
         at = np.unravel_index(int(force.argmax()), force.shape)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from gearbox_equivalents import elastic_set_tables
 from scipy.optimize import brentq
-from small_gearbox import loose_pair_tables, pair_tables, set_on_shafts
+from small_gearbox import loose_pair_tables, pair_tables, set_on_shafts, split_pair_tables
 
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, FemgearError
@@ -349,3 +349,41 @@ def test_teeth_without_a_torque_touch_nowhere_and_hold_nothing_up():
     assert idle.mesh_force == pytest.approx([0.0])
     assert np.isfinite(idle.motion).all()
     assert not np.abs(idle.motion).any()
+
+
+@pytest.mark.parametrize(("stiffness", "share"), [("4e8 N/m", 0.5), ("2e8 N/m", 1.0 / 3.0), ("1e8 N/m", 0.2)])
+def test_stages_side_by_side_at_one_place_share_by_their_stiffness(stiffness, share):
+    """Two springs between the same two gears."""
+    found = solve_deflection(read_case(split_pair_tables(stiffness, position="30 mm") | {"deflection": {"slices": 1}}))
+    force = found.mesh_force
+    assert force[1] / force.sum() == pytest.approx(share, rel=1e-9)
+    flow = found.model.flow
+    assert flow.torque_shares == pytest.approx({"stage": 1.0 - share, "second": share}, rel=1e-9)
+    assert sum(torques["input"] for torques in flow.stage_torque.values()) == pytest.approx(-100.0, rel=1e-9)
+
+
+def test_shafts_give_more_to_the_stage_that_stands_nearer_to_both_ends():
+    """Torque enters at 0 mm and leaves at 90 mm: what twists between two equal stages goes with them as two springs."""
+    tables = split_pair_tables() | {"motions": "rotation"}
+    found = solve_deflection(read_case(tables))
+    first, second = found.mesh_force * 0.036 * math.cos(math.radians(20.0))
+    # springs at the radius of gear 1: along the shaft of the input, or by the other mesh and that of the output
+    modulus = 206e9 / 2.6
+    input_shaft, output_shaft = (modulus * math.pi / 32.0 * d**4 / 0.03 for d in (0.03, 0.04))
+    mesh = 4e8 * (0.036 * math.cos(math.radians(20.0))) ** 2
+    # T_1 / mesh + (T_1 i) i / output = T_2 / mesh + T_2 / input of the loop through both, with i = 36 / 24
+    ratio = 36.0 / 24.0
+    expected = (1.0 / mesh + 1.0 / input_shaft) / (2.0 / mesh + 1.0 / input_shaft + ratio**2 / output_shaft)
+    assert first / (first + second) == pytest.approx(expected, rel=1e-6)
+    assert first + second == pytest.approx(100.0, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_teeth_side_by_side_settle_at_the_torque_that_each_has():
+    tables = split_pair_tables(teeth=True)
+    found = solve_deflection(read_case(tables))
+    assert found.settled
+    for stage in found.model.stages:
+        torque = -found.model.flow.first_torque(stage.section)
+        assert found.contacts[stage.name].result.sun_torque == pytest.approx(torque, rel=1e-3)
+    assert 0.52 < found.model.flow.torque_shares["stage"] < 0.58

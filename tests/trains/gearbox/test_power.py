@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import pytest
-from small_gearbox import pair_tables
+from small_gearbox import pair_tables, split_pair_tables
 
 from femgear.errors import FemgearError
 from femgear.trains.gearbox.deflection import solve_deflection
@@ -69,3 +69,12 @@ def test_teeth_touch_where_a_torque_beyond_rounding_acts_on_them():
     idle = replace(flow, stage_torque={"stage": {"input": 1e-13, "output": -1e-13}, "other": {"input": 5.0}})
     assert not idle.touches(case.pair[0])
     assert not flow.touches(case.pair[0].model_copy(update={"teeth": None}))
+
+
+def test_stages_side_by_side_begin_with_equal_shares():
+    flow = gearbox_flow(read_case(split_pair_tables()))
+    assert flow.side_by_side == (("stage", "second"),)
+    assert flow.torque_shares == pytest.approx({"stage": 0.5, "second": 0.5}, rel=1e-12)
+    uneven = flow.with_factors({"stage": 1.5, "second": 0.5})
+    assert uneven.torque_shares == pytest.approx({"stage": 0.75, "second": 0.25}, rel=1e-12)
+    assert uneven.stage_torque["stage"] == pytest.approx({"input": -75.0, "output": -112.5}, rel=1e-12)
