@@ -133,7 +133,6 @@ class DeflectionResult(StageResult):
                 "1",
                 "K_gamma: largest force of the planets' meshes over their mean; NaN of pairs",
             ),
-            **_shares_side_by_side(every),
             "share": (load_case, running_shares(case.operation.load_case), "1", "share of the running time"),
             "mesh_force": (mesh, [one.mesh_force for one in every], "N", "force along the normal of the flanks"),
             "mesh_slope": (mesh, slopes, "rad", "slope of the approach along the width, closer at z > 0 positive"),
@@ -164,7 +163,7 @@ class DeflectionResult(StageResult):
             "out_of_balance": (load_case, [one.residual for one in every], "1", "force out of balance, relative"),
         }
         variables |= _of_bearings(every, state) | _distribution(state) | _of_estimates(self.estimates)
-        variables |= casing_variables(every) | static_sensor_variables(every)
+        variables |= casing_variables(every) | static_sensor_variables(every) | _shares_side_by_side(every)
         coords = {
             "load_case": _names("load_case", [one.name for one in case.operation.load_case], "load case"),
             "shaft": _names("shaft", [one.name for one in case.shaft], "shaft"),
