@@ -112,6 +112,6 @@ def test_stages_side_by_side_lose_by_the_shares_that_they_have():
     without = {"one": {"a": -60.0, "b": -120.0}, "two": {"a": -30.0, "b": -60.0}}
     flow = lossy_flow(["a", "b"], pairs, efficiencies={"one": (0.99,), "two": (0.98,)}, lossless=without, **known)
     # 600 W and 300 W; what the losses change of the shares is small as these are
-    assert flow.mesh_loss["one"][0] == pytest.approx(6.0, rel=0.01)
-    assert flow.mesh_loss["two"][0] == pytest.approx(6.0, rel=0.01)
+    assert flow.mesh_loss["one"][0] == pytest.approx(6.0, rel=0.02)
+    assert flow.mesh_loss["two"][0] == pytest.approx(6.0, rel=0.02)
     assert flow.imbalance == pytest.approx(0.0, abs=1e-12)
