@@ -24,6 +24,12 @@ _LEFT_OUT = ("seal", "bearings", "torque_shares", "speed_shares")
 """Entries of the section ``losses`` that say nothing of the teeth."""
 
 
+def friction_excites(case: GearboxCase) -> bool:
+    """Tell whether friction acts on teeth of a gearbox: where contacts of stages are computed."""
+    stages = (*case.pair, *case.planetary)
+    return friction_acts(case) and case.deflection.contact and any(stage.teeth for stage in stages)
+
+
 def first_speed(model: GearboxModel, section: PairSection | BoxPlanetarySection) -> float:
     """Find the speed of gear 1, or of the sun against its carrier [rad/s]."""
     speed = {CASING: 0.0, **model.flow.speed}
@@ -91,8 +97,7 @@ def box_friction_findings(case: GearboxCase) -> Iterator[Finding]:
         if there:
             text = f"has no effect in [{entry}]: friction acts in the response and its run-up alone"
             yield Finding("W-UNUSED", "losses.excites", text)
-    rubbing = [stage for stage in (*case.pair, *case.planetary) if stage.teeth and case.deflection.contact]
-    if not rubbing:
+    if not friction_excites(case):
         text = "has no effect: no stage has teeth whose contact is computed"
         yield Finding("W-UNUSED", "losses.excites", text, remedy="give teeth of a stage, or leave it out")
         return

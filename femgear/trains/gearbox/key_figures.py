@@ -16,7 +16,6 @@ import numpy as np
 from femgear.case.load_spectrum import required_life, without_line
 from femgear.case.lubrication import heat_missing
 from femgear.case.quantities import ACCELERATION, RPM, SPEED, Dimension
-from femgear.case.tooth_friction import friction_acts
 from femgear.gears.planetary import mesh_names
 from femgear.stages.heat_results import HEAT_KEY_FIGURES
 from femgear.stages.key_figures import DECIBEL, HOURS, MICROMETRES, NUMBER, STRESS, KeyFigure, Stored
@@ -25,6 +24,7 @@ from femgear.stages.losses_results import LOSS_FIGURES
 from femgear.stages.tooth_figures import FRICTION_FIGURE
 from femgear.trains.gearbox.case_file import FORCE, BoxPlanetarySection, GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.casing import bearing_name
+from femgear.trains.gearbox.friction import friction_excites
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.mode_words import mode_distance
 from femgear.trains.gearbox.power import gearbox_flow
@@ -154,7 +154,7 @@ def _of_responses(case: GearboxCase) -> Iterator[KeyFigure]:
     sensors = [(sensor.name, (sensor.name,)) for sensor in gearbox_sensors(case)]
     flow = gearbox_flow(case)
     excited = [(stage.name, (stage.name,)) for stage in exciting_sections(case) if flow.carries(stage)]
-    if excited and friction_acts(case):
+    if excited and friction_excites(case):
         yield FRICTION_FIGURE
     for words, stage in _RESPONSES:
         if excited:

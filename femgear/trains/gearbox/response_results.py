@@ -136,13 +136,18 @@ def _at_sensors(found: GearboxResponse, moved: dict[str, np.ndarray]) -> dict[st
 
 
 def _by_friction(found: GearboxResponse, without: GearboxResponse, sensors: int, bearings: int) -> dict[str, tuple]:
-    """Change of the levels at sensors by friction, of a gearbox without any of the forces of its bearings [dB]."""
+    """Change by friction of the levels at sensors, without any of bearing forces, on rigid bearings of meshes [dB]."""
     every, forces = (found, without), slice(sensors, sensors + 3 * bearings)
     if not sensors:
-        text = "added by friction to the fluctuation of the bearing force; NaN of rigid bearings"
         each = (level(response, {one.name: one.motion[:, forces] for one in response.stages}) for response in every)
-        sizes = (np.sqrt((size.reshape(-1, bearings, 3) ** 2).sum(axis=2)) for size in each)
-        return {"friction_change": ("speed bearing", _decibels(*sizes), "dB", text)}
+        change = _decibels(*(np.sqrt((size.reshape(-1, bearings, 3) ** 2).sum(axis=2)) for size in each))
+        if np.isfinite(change).any():
+            text = "added by friction to the fluctuation of the bearing force; NaN of rigid bearings"
+            return {"friction_change": ("speed bearing", change, "dB", text)}
+        change = _decibels(*(np.nanmax(response.dynamic_forces, axis=2) for response in every))
+        return {
+            "friction_change": ("speed stage", change, "dB", "added by friction to the fluctuation of the mesh force")
+        }
     moved = [accelerations(response, sensors) for response in every]
     sizes = (level(response, lines) for response, lines in zip(every, moved, strict=True))
     quiet = {

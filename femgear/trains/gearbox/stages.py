@@ -11,7 +11,6 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
-from femgear.case.tooth_friction import friction_acts
 from femgear.report.tables import Block, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
@@ -27,7 +26,7 @@ from femgear.trains.gearbox.case_file import GearboxCase, LoadCaseSection, teeth
 from femgear.trains.gearbox.casing_draft import draft_casing
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
-from femgear.trains.gearbox.friction import box_friction_findings
+from femgear.trains.gearbox.friction import box_friction_findings, friction_excites
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries
@@ -118,7 +117,7 @@ def solve_box_dynamics(
     state = deflection.of(case).state
     speed = [abs(state.model.flow.speed[reference_shaft(state.model)])]
     response = solve_gearbox_response(state, speed, steps=steps, progress=progress, by_path=True)
-    without = solve_gearbox_response(state, speed, steps=steps, friction=False) if friction_acts(case) else None
+    without = solve_gearbox_response(state, speed, steps=steps, friction=False) if friction_excites(case) else None
     return GearboxResponseResult(response, whole=True, frictionless=without)
 
 
