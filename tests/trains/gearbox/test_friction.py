@@ -20,7 +20,8 @@ from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.elastic_ring import elastic_ring, with_rings
 from femgear.trains.gearbox.excitation import excitation_of
-from femgear.trains.gearbox.friction import box_friction_findings, first_speed, rubbing_tables, stage_friction
+from femgear.trains.gearbox.friction import box_friction_findings,
+    friction_excites, first_speed, rubbing_tables, stage_friction
 from femgear.trains.gearbox.losses import loss_point
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.response import level, solve_gearbox_response
@@ -288,6 +289,8 @@ def test_findings_tell_where_friction_is_another_or_none():
     assert not [*box_friction_findings(read_case(tables))]
     (idle,) = box_friction_findings(read_case(tables | {"deflection": {"contact": False}}))
     assert idle.code == "W-UNUSED"
+    without = read_case(tables | {"deflection": {"contact": False}})
+    assert friction_excites(read_case(tables)) and not friction_excites(without)
 
 
 def test_a_run_tells_what_friction_adds():
@@ -295,3 +298,7 @@ def test_a_run_tells_what_friction_adds():
     results = solve(read_case(tables), only="dynamics")["dynamics"].dataset()
     change = results["friction_change"]
     assert change.dims == ("speed", "bearing") and (change.values > 1.0).all()
+    for bearing in tables["bearing"]:
+        bearing["radial"] = "rigid"
+    change = solve(read_case(tables), only="dynamics")["dynamics"].dataset()["friction_change"]
+    assert change.dims == ("speed", "stage") and (change.values > 1.0).all()
