@@ -20,8 +20,13 @@ from femgear.trains.elastic.outputs import mesh_and_ring_outputs
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.elastic_ring import elastic_ring, with_rings
 from femgear.trains.gearbox.excitation import excitation_of
-from femgear.trains.gearbox.friction import box_friction_findings,
-    friction_excites, first_speed, rubbing_tables, stage_friction
+from femgear.trains.gearbox.friction import (
+    box_friction_findings,
+    first_speed,
+    friction_excites,
+    rubbing_tables,
+    stage_friction,
+)
 from femgear.trains.gearbox.losses import loss_point
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.response import level, solve_gearbox_response
