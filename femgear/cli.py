@@ -649,32 +649,29 @@ class Formats:
 
 
 @app.command
-def compare(first: Path, second: Path, /, *, output: Annotated[Path, Parameter(name=("--output", "-o"))]) -> int:
-    """Compare two runs: entries of the cases and numbers that differ, curves over each other, both sounds.
+def compare(*runs: Path, output: Annotated[Path, Parameter(name=("--output", "-o"))]) -> int:
+    """Compare runs: entries of the cases and numbers that differ, modes of one shape, curves over each other, sounds.
 
     Parameters
     ----------
-    first, second
-        Folders that femgear run wrote, of cases of one kind.
+    runs
+        Two or more folders that femgear run wrote, of cases of one kind; changes are those against the first.
     output
         Folder of the page compare.html.
     """
     from femgear.report.compare import compare_page, compared
     from femgear.storage.files import own_files, write_text
     from femgear.trains.reading import open_results
-    from femgear.trains.registry import train_of
+    from femgear.trains.registry import same_train
 
+    if len(runs) < 2:
+        count = f"{len(runs)} runs"
+        raise CaseError("there is nothing to compare", code="E-ARGUMENTS", value=count, limit="two or more")
     own_files(output, ["compare.html"])
-    runs = [open_results(folder) for folder in (first, second)]
-    train, other = (train_of(run.case) for run in runs)
-    if train.name != other.name:
-        raise CaseError(
-            f"{first} is {train.words}, {second} {other.words}",
-            code="E-CHOICE",
-            remedy="compare runs of cases of one kind",
-        )
-    _print(compared(train, *runs))
-    write_text(compare_page(train, *runs), output / "compare.html")
+    opened = [open_results(folder) for folder in runs]
+    train = same_train(opened)
+    _print(compared(train, *opened))
+    write_text(compare_page(train, *opened), output / "compare.html")
     _say(f"page: {output / 'compare.html'}")
     return 0
 

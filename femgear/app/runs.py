@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from femgear.app.worker import Requests
-from femgear.errors import CaseError
 from femgear.exchange.rexs import read_model
 from femgear.findings import as_data
 from femgear.report.compare import compare_page
@@ -20,9 +19,11 @@ from femgear.storage.results import run_folder
 from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.imports import case_drafts
 from femgear.trains.reading import open_results, parse_case
-from femgear.trains.registry import check_case, train_of
+from femgear.trains.registry import check_case, same_train, train_of
 
 COMPARED = "compare.html"
+_LONGEST = 90
+"""Letters of the name of a folder."""
 _TOLD_EVERY = 0.2
 """Between two words on the progress [s]."""
 
@@ -69,20 +70,17 @@ class Runs:
         results = open_results(self.folder / output)
         return run_data(train_of(results.case), results)
 
-    def compare(self, first: str, second: str) -> str:
-        """Write a page that compares two folders of results, beside those of the second; returns its name.
+    def compare(self, *names: str) -> str:
+        """Write a page that compares folders of results; returns its name.
 
         Raises
         ------
         CaseError
-            E-CHOICE: cases of two kinds.
+            E-CHOICE: cases of several kinds.
         """
-        runs = [open_results(self.folder / name) for name in (first, second)]
-        train, other = (train_of(run.case) for run in runs)
-        if train.name != other.name:
-            message = f"{first} is {train.words}, {second} {other.words}"
-            raise CaseError(message, code="E-CHOICE", remedy="compare runs of cases of one kind")
-        place = self.folder / f"{first}_and_{second}"
+        runs = [open_results(self.folder / name) for name in names]
+        train = same_train(runs)
+        place = self.folder / "_and_".join(names)[:_LONGEST]
         own_files(place, [COMPARED])
         write_text(compare_page(train, *runs), place / COMPARED)
         return f"{place.name}/{COMPARED}"

@@ -177,7 +177,8 @@ class Window:
         with ui.row().classes("w-full items-center gap-2 q-px-sm"):
             self._run = ui.select([], label="Run", on_change=lambda event: self._show_run(event.value))
             self._run.props("dense options-dense").classes("min-w-48")
-            self._other = ui.select([], label="Compared with").props("dense options-dense").classes("min-w-48")
+            self._other = ui.select([], label="Compared with", multiple=True).props("dense options-dense use-chips")
+            self._other.classes("min-w-48")
             ui.button("Compare", on_click=self._compare).props("flat dense no-caps")
         with ui.row().classes("w-full items-center gap-2 q-px-sm") as self._progress_row:
             self._progress_text = ui.label()
@@ -217,7 +218,7 @@ class Window:
         self._files.set_options(names, value=self.session.name or None)
         runs = result_folders(self.session.folder)
         self._run.set_options(runs, value=self._run.value if self._run.value in runs else None)
-        self._other.set_options(runs, value=self._other.value if self._other.value in runs else None)
+        self._other.set_options(runs, value=[name for name in self._other.value or () if name in runs])
 
     def _change_entry(self, key: str, value: Any) -> None:
         """Take a change from a field or a slider."""
@@ -603,12 +604,13 @@ class Window:
             self._report.props(f'src="/results/{name}/report.html"')
 
     async def _compare(self) -> None:
-        """Show two runs beside one another."""
-        if not self._run.value or not self._other.value:
-            self._notify("choose two runs")
+        """Show some runs beside one another."""
+        others = [name for name in self._other.value or () if name != self._run.value]
+        if not self._run.value or not others:
+            self._notify("choose a run, and others that it is compared with")
             return
         try:
-            async for page in self._runs.ask("compare", self._other.value, self._run.value):
+            async for page in self._runs.ask("compare", *others, self._run.value):
                 self._report.props(f'src="/results/{page}"')
         except WorkerError as error:
             self._notify(str(error), "negative")

@@ -1,14 +1,17 @@
-"""Two runs beside one another: what differs in cases and numbers, curves over each other, both sounds."""
+"""Runs beside one another: what differs in cases and numbers, curves over each other, modes matched, sounds."""
 
 from __future__ import annotations
 
 import math
 import re
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from html import escape
+from itertools import chain, product
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from femgear.report.page import chart_figure, document, folded, part_of, shown_data, table
 from femgear.report.tables import MARKS, WARNINGS, Block, is_bound, unmarked
@@ -18,10 +21,14 @@ if TYPE_CHECKING:
     from femgear.stages.protocol import Train
     from femgear.storage.results import Results
 
-ANSWERS = "Page one of both"
+ANSWERS = "Page one of all"
 """Title of the table of what page one answers."""
+MODES = "Modes matched by shape"
+"""Title of the table of modes."""
 OPEN = ANSWERS, "Key figures", "Cases"
 """Titles of the tables that are not folded away."""
+_NUMBERS = ("first", "second", "third")
+"""Names of runs where nothing else tells them apart."""
 _MEETING = ("operating [rpm]", "mode", "kind", "mesh harmonic")
 """Columns that tell which resonance a row is."""
 _EXCITED = "excited up to"
@@ -31,81 +38,203 @@ NO_CHANGE = "-"
 _LEAST_CHANGE = 1e-3
 """Change of the key figure of a part from which on it is listed."""
 _FADED = 0.55
-"""Opacity of the curves of the second run."""
+"""Opacity of the curves of the second run; those of the third have that of the second, and so on."""
+_DASHES = ("dash", "dot", "dashdot", "longdash")
+"""Of the curves of the second run and of those after it."""
+_EQUAL = 1e-6
+"""Relative distance of natural frequencies within which their modes are one space."""
+_LEAST_ALIKE = 0.5
+"""MAC from which on a mode is found again."""
+_MODES_SHOWN = 24
+_CHARTS_FIRST = 3
+"""Charts before the tables that are folded away."""
 
 
-def compared(train: Train, first: Results, second: Results) -> tuple[Block, ...]:
-    """Tabulate two runs of one train: what page one answers of both, then entries and numbers that differ."""
-    cases = [(run.case.source, run.case.model_dump(by_alias=True)) for run in (first, second)]
-    rows = tuple(_entries(*cases))
-    entries = Block("Cases", ("entry", "first", "second") if rows else (), rows, () if rows else ("the same",))
-    blocks = [*_answers(train, first, second), entries, *_key_figures(train, first, second)]
-    others = train.describe_stages(second)
-    verdicts = {block.title: block for block in train.verdict(second)}
-    for block in train.verdict(first):
-        if block.title in verdicts:
-            blocks.append(_differences(block, verdicts[block.title]))
-    for title, block in train.describe_stages(first).items():
-        if title in others:
-            blocks.append(_differences(block, others[title]))
-    return (*blocks, _findings(first, second))
+def names_of(runs: Sequence[Results]) -> list[str]:
+    """Name runs by their folders, or by numbers where two folders are called alike."""
+    names = [run.folder.resolve().name for run in runs]
+    return names if len({*names}) == len(names) else [_name(number) for number in range(len(names))]
 
 
-def _answers(train: Train, first: Results, second: Results) -> Iterator[Block]:
-    """Tabulate what page one answers of both runs, question by question."""
-    both = [{judgement.question: judgement for judgement in train.summary(run)[1]} for run in (first, second)]
-    questions = dict.fromkeys([*both[0], *both[1]])
+def compared(train: Train, *runs: Results) -> tuple[Block, ...]:
+    """Tabulate runs of one train: what page one answers of all, then entries and numbers that differ.
+
+    Changes are those against the first run.
+    """
+    names = names_of(runs)
+    rows = tuple(_entries(*((run.case.source, run.case.model_dump(by_alias=True)) for run in runs)))
+    entries = Block("Cases", ("entry", *names) if rows else (), rows, () if rows else ("the same",))
+    blocks = [*_answers(train, runs, names), *_key_figures(train, runs, names), entries]
+    described = [{block.title: block for block in train.verdict(run)} | train.describe_stages(run) for run in runs]
+    for title in described[0]:
+        if all(title in tables for tables in described):
+            blocks.append(_differences(*(tables[title] for tables in described), names=names))
+    return (*blocks, *_matched_modes(runs, names), _findings(runs, names))
+
+
+def _name(number: int) -> str:
+    return _NUMBERS[number] if number < len(_NUMBERS) else f"{number + 1}th"
+
+
+def _answers(train: Train, runs: Sequence[Results], names: Sequence[str]) -> Iterator[Block]:
+    """Tabulate what page one answers of all runs, question by question."""
+    answers = [{judgement.question: judgement for judgement in train.summary(run)[1]} for run in runs]
     rows = tuple(
-        (question, *(_answer(of_run[question]) if question in of_run else "-" for of_run in both))
-        for question in questions
+        (question, *(_answer(of_run[question]) if question in of_run else "-" for of_run in answers))
+        for question in dict.fromkeys(chain.from_iterable(answers))
     )
     if rows:
-        yield Block(ANSWERS, ("", "first", "second"), rows)
+        yield Block(ANSWERS, ("", *names), rows)
 
 
 def _answer(judgement: Judgement) -> str:
     return f"{judgement.words}: {judgement.answer}"
 
 
-def _key_figures(train: Train, first: Results, second: Results) -> Iterator[Block]:
-    """Tabulate the key figures of both runs with their changes: of the whole, and of parts that change."""
-    runs = [first, second]
-    both = [{figure.name: figure for figure in train.key_figures(run.case)} for run in runs]
-    if not any(both):
+def _key_figures(train: Train, runs: Sequence[Results], names: Sequence[str]) -> Iterator[Block]:
+    """Tabulate the key figures of all runs with their changes: of the whole, and of parts that change."""
+    of_runs = [{figure.name: figure for figure in train.key_figures(run.case)} for run in runs]
+    if not any(of_runs):
         return
     rows, same = [], 0
-    for name, figure in both[0].items():
-        if name not in both[1] or not all(figure.stage in run.stages for run in runs):
+    for name, figure in of_runs[0].items():
+        there = all(name in of_run for of_run in of_runs) and all(figure.stage in run.stages for run in runs)
+        if not there:
             continue
-        x, y = (figure.read(run[figure.stage]) for run in runs)
-        alike = math.isclose(x, y, rel_tol=_LEAST_CHANGE) or (math.isnan(x) and math.isnan(y))
-        if not figure.whole and alike:
+        first, *others = (figure.read(run[figure.stage]) for run in runs)
+        alike = [math.isclose(first, x, rel_tol=_LEAST_CHANGE) or (math.isnan(first) and math.isnan(x)) for x in others]
+        if not figure.whole and all(alike):
             same += 1
             continue
+        changes = ["" if equal else figure.change(first, x) for x, equal in zip(others, alike, strict=True)]
+        shown = chain.from_iterable(zip(map(figure.show, others), changes, strict=True))
         unit = f" [{figure.dimension.shown}]".replace(" [1]", "")
-        rows.append((f"{name}{unit}", figure.show(x), figure.show(y), "" if alike else figure.change(x, y)))
+        rows.append((f"{name}{unit}", figure.show(first), *shown))
     notes = (f"{same} figures of parts change by less than {_LEAST_CHANGE:.1%}",) if same else ()
     if rows or same:
-        yield Block("Key figures", ("figure", "first", "second", "change"), tuple(rows), notes)
+        yield Block("Key figures", ("figure", *_with_changes(names)), tuple(rows), notes)
 
 
-def _findings(first: Results, second: Results) -> Block:
-    """Tabulate the warnings that one of two runs alone has, by code and stage."""
-    a, b = ({(finding.code, finding.stage): finding for finding in run.findings} for run in (first, second))
-    rows = tuple(
-        (f"{value.severity} {value.code}", value.stage or "the case", *(("yes", "-") if key in a else ("-", "yes")))
-        for key, value in (a | b).items()
-        if (key in a) != (key in b)
+def _with_changes(names: Sequence[str]) -> tuple[str, ...]:
+    """Header of the numbers of all runs, with the changes of those after the first."""
+    return names[0], *chain.from_iterable((name, "change") for name in names[1:])
+
+
+def _matched_modes(runs: Sequence[Results], names: Sequence[str]) -> Iterator[Block]:
+    """Tabulate which modes of the other runs have the shapes of those of the first one."""
+    data = [run["modes"] for run in runs if "modes" in run.stages]
+    if len(data) < len(runs) or any(_shapes(modes) is None for modes in data):
+        return
+    first, *others = data
+    matches = [match_modes(first, modes) for modes in others]
+    rows = []
+    for mode in np.flatnonzero(first["frequency"].values > 0.0)[:_MODES_SHOWN]:
+        row = [_mode(first, mode), _hertz(first, mode)]
+        for modes, again in zip(others, matches, strict=True):
+            number, alike = again.get(int(mode), (None, 0.0))
+            row += ("-", "-", "") if number is None else (_mode(modes, number), _hertz(modes, number), f"{alike:.2f}")
+        rows.append(tuple(row))
+    header = ("mode", f"{names[0]} [Hz]", *chain.from_iterable(("mode", f"{n} [Hz]", "MAC") for n in names[1:]))
+    note = f"MAC: 1 for equal shapes; below {_LEAST_ALIKE:g} none is taken as found again"
+    if rows:
+        yield Block(MODES, header, tuple(rows), (note,))
+
+
+def _mode(modes: Any, number: int) -> str:
+    """Number of a mode, as its run counts them."""
+    return str(int(modes["mode"].values[number]) + (1 if int(modes["mode"].values[0]) == 0 else 0))
+
+
+def _hertz(modes: Any, number: int) -> str:
+    return f"{float(modes['frequency'].values[number]):.5g}"
+
+
+def _shapes(modes: Any) -> dict[str, np.ndarray] | None:
+    """Motions (mode,) by the names of the coordinates; None where modes.nc has none."""
+    shape = next((modes[name] for name in ("shape", "motion") if name in modes), None)
+    if shape is None:
+        return None
+    others = [dim for dim in shape.dims if dim != "mode"]
+    if any(dim not in modes.coords for dim in others):
+        return None
+    values = shape.transpose(*others, "mode").values.reshape(-1, shape.sizes["mode"])
+    names = product(*(map(str, modes[dim].values) for dim in others))
+    return {" ".join(name): row for name, row in zip(names, values, strict=True)}
+
+
+def match_modes(first: Any, second: Any) -> dict[int, tuple[int, float]]:
+    """Match modes by the shapes of the motions that both runs have.
+
+    The modal assurance criterion is that of R. J. Allemang and D. L. Brown, A correlation coefficient for modal
+    vector analysis (1982), |a b|^2/(a a)(b b), of modes of one frequency its mean over their space. Motions of several
+    units count alike. Pairs are taken from the largest one down, each mode once.
+
+    Parameters
+    ----------
+    first, second : Dataset
+        Of modes.nc, with ``frequency`` (mode,) [Hz], and ``shape`` (dof, mode) or ``motion`` (station, way, mode).
+
+    Returns
+    -------
+    dict of int to (int, float)
+        Place of the mode of the second run and MAC, by the place of that of the first one, where it is found again.
+    """
+    shapes = [_shapes(modes) or {} for modes in (first, second)]
+    shared = [name for name in shapes[0] if name in shapes[1]]
+    if not shared or 2 * len(shared) < max(map(len, shapes)):
+        return {}
+    spaces = [
+        _mode_spaces(modes["frequency"].values, np.array([of_run[name] for name in shared]))
+        for modes, of_run in zip((first, second), shapes, strict=True)
+    ]
+    alike = np.array(
+        [[np.sum((a.T @ b) ** 2) / max(a.shape[1], b.shape[1]) for _, b in spaces[1]] for _, a in spaces[0]]
     )
-    return Block(WARNINGS, ("", "of", "first", "second") if rows else (), rows, () if rows else ("the same",))
+    matched, free = dict[int, tuple[int, float]](), np.ones(alike.shape, bool)
+    for place in np.argsort(-alike, axis=None) if alike.size else ():
+        i, j = np.unravel_index(place, alike.shape)
+        if alike[i, j] >= _LEAST_ALIKE and free[i, j]:
+            matched |= {a: (b, float(alike[i, j])) for a, b in zip(spaces[0][i][0], spaces[1][j][0])}
+            free[i], free[:, j] = False, False
+    return matched
 
 
-def _entries(*cases: tuple[str, Any]) -> Iterator[tuple[str, str, str]]:
-    """Entries of two cases, texts and values, of which the values differ: "120 N m" is "120 Nm"."""
-    a, b = (dict(_flat(tomllib.loads(text))) for text, _ in cases)
-    for key in sorted(a.keys() | b.keys()):
-        if a.get(key) != b.get(key) and not _alike(*(_value(case, key) for _, case in cases)):
-            yield key, str(a.get(key, "not given")), str(b.get(key, "not given"))
+def _mode_spaces(hertz: np.ndarray, shape: np.ndarray) -> list[tuple[list[int], np.ndarray]]:
+    """Modes of one frequency each, with an orthonormal basis of their shapes (dof, modes of it)."""
+    shape = shape / np.maximum(np.sqrt(np.mean(shape**2, axis=1, keepdims=True)), 1e-300)
+    together = list[list[int]]()
+    for mode in map(int, np.flatnonzero(hertz > 0.0)):
+        if together and hertz[mode] - hertz[together[-1][-1]] <= _EQUAL * hertz[mode]:
+            together[-1].append(mode)
+        else:
+            together.append([mode])
+    return [(numbers, np.linalg.qr(shape[:, numbers])[0]) for numbers in together]
+
+
+def _findings(runs: Sequence[Results], names: Sequence[str]) -> Block:
+    """Tabulate the warnings that some of the runs have, by code and stage."""
+    of_runs = [{(finding.code, finding.stage): finding for finding in run.findings} for run in runs]
+    every = {key: finding for of_run in of_runs for key, finding in of_run.items()}
+    rows = tuple(
+        (
+            f"{finding.severity} {finding.code}",
+            finding.stage or "the case",
+            *("yes" if key in of_run else "-" for of_run in of_runs),
+        )
+        for key, finding in every.items()
+        if not all(key in of_run for of_run in of_runs)
+    )
+    return Block(WARNINGS, ("", "of", *names) if rows else (), rows, () if rows else ("the same",))
+
+
+def _entries(*cases: tuple[str, Any]) -> Iterator[tuple[str, ...]]:
+    """Entries of cases, texts and values, of which the values differ: "120 N m" is "120 Nm"."""
+    given = [dict(_flat(tomllib.loads(text))) for text, _ in cases]
+    for key in sorted({key for entries in given for key in entries}):
+        first, *others = (entries.get(key) for entries in given)
+        value, *values = (_value(case, key) for _, case in cases)
+        if any(first != text and not _alike(value, x) for text, x in zip(others, values, strict=True)):
+            yield key, *(str(entries.get(key, "not given")) for entries in given)
 
 
 def _value(case: Any, key: str) -> Any:
@@ -141,41 +270,54 @@ def _flat(entries: object, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, entries
 
 
-def _differences(first: Block, second: Block) -> Block:
-    """Cells of two tables that differ, with the change where both are numbers."""
-    if first.header != second.header:  # as of a set with supports and one without
-        first, second = _shared(first, second.header), _shared(second, first.header)
-    names = [name for name in _MEETING if "mesh harmonic" in first.header and name in first.header]
-    key_columns = [first.header.index(name) for name in names] or [0]
-    a, b = ({tuple(row[i] for i in key_columns): row for row in block.rows} for block in (first, second))
-    alone = [key for key in [*a, *b] if (key in a) != (key in b)]
-    whole = (len(a), len(b)) == (len(first.rows), len(second.rows))
-    if first.header != second.header or not whole or (alone and not names):
-        return Block(first.title, notes=("the tables have other rows; see the reports",))
-    rows, columns = [], first.header or [""] * max(map(len, first.rows), default=0)
-    for key in dict.fromkeys([*a, *b]):
+def _differences(*blocks: Block, names: Sequence[str] = ()) -> Block:
+    """Cells of tables that differ, with the change against the first where both are numbers."""
+    names = names or [_name(number) for number in range(len(blocks))]
+    title = blocks[0].title
+    headers = [block.header for block in blocks]
+    if any(header != headers[0] for header in headers):  # as of a set with supports and one without
+        common = tuple(name for name in headers[0] if all(name in header for header in headers))
+        blocks = tuple(_shared(block, common) for block in blocks)
+    header = blocks[0].header
+    meeting = [name for name in _MEETING if "mesh harmonic" in header and name in header]
+    key_columns = [header.index(name) for name in meeting] or [0]
+    tables = [{tuple(row[i] for i in key_columns): row for row in block.rows} for block in blocks]
+    keys = dict.fromkeys(chain.from_iterable(tables))
+    alone = {key for key in keys if not all(key in table_of_run for table_of_run in tables)}
+    whole = all(len(rows_of) == len(block.rows) for rows_of, block in zip(tables, blocks, strict=True))
+    if any(block.header != header for block in blocks) or not whole or (alone and not meeting):
+        return Block(title, notes=("the tables have other rows; see the reports",))
+    rows, columns = [], header or [""] * max(map(len, blocks[0].rows), default=0)
+    for key in keys:
         what = ", ".join(f"{columns[i]} {text}".strip() for i, text in zip(key_columns, key))
         if key in alone:
-            rows.append((what, "", *(("listed", "-") if key in a else ("-", "listed")), ""))
+            listed = ["listed" if key in table_of_run else "-" for table_of_run in tables]
+            rows.append((what, "", listed[0], *chain.from_iterable((text, "") for text in listed[1:])))
             continue
-        for i, (x, y) in enumerate(zip(a[key], b[key])):
-            if x != y and i not in key_columns:
-                unit = f"{first.title} {what} {columns[i]}"
-                rows.append((what, columns[i], x, y, _change(x, y, decibels="dB" in unit)))
-    header = ("row", "column", "first", "second", "change") if rows else ()
-    notes = () if rows else ("the same",)
-    ends = [(float(x), float(y)) for _, column, x, y, _ in rows if column.startswith(_EXCITED)]
-    if any(abs(y - x) > 0.05 * x for x, y in ends):
-        notes = (
-            "NO LIKE LEVELS: their excitation ends at different frequencies; give both cases the same "
-            "dynamics.up_to or dynamics.mesh_harmonics",
+        for i, cells in enumerate(zip(*(table_of_run[key] for table_of_run in tables))):
+            if i not in key_columns and any(cell != cells[0] for cell in cells):
+                decibels = "dB" in f"{title} {what} {columns[i]}"
+                others = ((cell, _change(cells[0], cell, decibels=decibels)) for cell in cells[1:])
+                rows.append((what, columns[i], cells[0], *chain.from_iterable(others)))
+    shown_header = ("row", "column", *_with_changes(names)) if rows else ()
+    return Block(title, shown_header, tuple(rows), tuple(_notes(rows, blocks, names)))
+
+
+def _notes(rows: Sequence[tuple[str, ...]], blocks: Sequence[Block], names: Sequence[str]) -> Iterator[str]:
+    """Say under a table of differences what its numbers cannot."""
+    if not rows:
+        yield "the same"
+    ends = [list(map(float, row[2:3] + row[3::2])) for row in rows if row[1].startswith(_EXCITED)]
+    if any(max(values) - min(values) > 0.05 * values[0] for values in ends):
+        yield (
+            "NO LIKE LEVELS: their excitation ends at different frequencies; give the cases the same "
+            "dynamics.up_to or dynamics.mesh_harmonics"
         )
-    if any(change == NO_CHANGE for *_, change in rows):
-        notes += (f"{NO_CHANGE}: one of both is a bound (>), of which nothing tells how far it is away",)
-    for which, block, column in (("first", first, 2), ("second", second, 3)):
-        shown = "".join(row[column] for row in rows)
-        notes += tuple(f"{which}: {note}" for note in block.notes if note[0] in MARKS and note[0] in shown)
-    return Block(first.title, header, tuple(rows), notes)
+    if any(NO_CHANGE in row[4::2] for row in rows if row[1]):
+        yield f"{NO_CHANGE}: one of both is a bound (>), of which nothing tells how far it is away"
+    for number, (name, block) in enumerate(zip(names, blocks, strict=True)):
+        shown = "".join(row[2 if not number else 2 * number + 1] for row in rows)
+        yield from (f"{name}: {note}" for note in block.notes if note[0] in MARKS and note[0] in shown)
 
 
 def _shared(block: Block, header: tuple[str, ...]) -> Block:
@@ -198,51 +340,74 @@ def _change(first: str, second: str, *, decibels: bool) -> str:
     return f"{100.0 * (y / x - 1.0):+.3g} %" if x else ""
 
 
-def compare_page(train: Train, first: Results, second: Results) -> str:
-    """Make the page of two runs as HTML text; see `compared`."""
-    data = [shown_data(run) for run in (first, second)]
+def compare_page(train: Train, *runs: Results) -> str:
+    """Make the page of some runs as HTML text; see `compared`."""
+    names, data = names_of(runs), [shown_data(run) for run in runs]
+    drawn = [of_run.get("charts", {}) for of_run in data]
     charts = {
-        name: both
-        for name, value in data[0].get("charts", {}).items()
-        if name in data[1].get("charts", {}) and (both := _overlaid(value, data[1]["charts"][name])) is not None
+        name: overlaid
+        for name in drawn[0]
+        if all(name in of_run for of_run in drawn)
+        and (overlaid := _overlaid(*(of_run[name] for of_run in drawn), names=names)) is not None
     }
-    title = f"{first.folder.name} and {second.folder.name}"
-    runs = {f"runup {i}": run_data["runup"] for i, run_data in enumerate(data, 1) if "runup" in run_data}
-    main = [f"<h1>{escape(title)}</h1>\n"]
-    for number, block in enumerate(compared(train, first, second)):
+    first = [name for name, _ in train.front if name in charts]
+    charts = {name: charts[name] for name in dict.fromkeys([*first, *charts])}
+    main = [f"<h1>{escape(' and '.join(names))}</h1>\n"]
+    tables = compared(train, *runs)
+    shown = sum(block.title in OPEN for block in tables)
+    for number, block in enumerate(tables):
+        if number == shown:
+            main += _curves([*charts][:_CHARTS_FIRST])
         content = f'<div class="compare">{table(block, heading=False)}</div>'
         main.append(folded(f"difference-{number}", block.title, content, block.title in OPEN))
-    for run, key in zip((first, second), runs):
+    runups = {f"runup {i}": of_run["runup"] for i, of_run in enumerate(data, 1) if "runup" in of_run}
+    for name, key in zip((name for name, of_run in zip(names, data) if "runup" in of_run), runups, strict=True):
         place = part_of("runup").replace('data-run="runup"', f'data-run="{key}"')
-        main.append(f"<h2>Run-up of {escape(run.folder.name)}</h2>\n{place}")
-    main.append('<h2>Curves</h2>\n<p class="note">Pale: the second run.</p>\n')
-    main += [chart_figure(name, name.replace("_", " ")) for name in charts]
-    return document(title, "".join(main), {"charts": charts} | runs)
+        main.append(f"<h2>Run-up of {escape(name)}</h2>\n{place}")
+    main += _curves([*charts][_CHARTS_FIRST:])
+    return document(" and ".join(names), "".join(main), {"charts": charts} | runups)
 
 
-def _overlaid(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any] | None:
-    """Draw the curves of two charts over each other; None where their panels differ, or have areas in place of them."""
-    if len(first["panels"]) != len(second["panels"]):
+def _curves(names: Iterable[str]) -> list[str]:
+    """Places of charts."""
+    places = [chart_figure(name, name.replace("_", " ")) for name in names]
+    return ['<p class="note">Dashed and pale: the runs after the first.</p>\n', *places] if places else []
+
+
+def _overlaid(*charts: dict[str, Any], names: Sequence[str] = ()) -> dict[str, Any] | None:
+    """Draw the curves of charts over each other; None where their panels differ, or have areas in place of them."""
+    names = names or [_name(number) for number in range(len(charts))]
+    first, *others = charts
+    if any(len(other["panels"]) != len(first["panels"]) for other in others):
         return None
     panels = []
-    for panel, other in zip(first["panels"], second["panels"]):
-        if any(trace.get("type") == "heatmap" for trace in panel["traces"]):
+    for panel, *same in zip(*(chart["panels"] for chart in charts)):
+        if any(trace.get("type") == "heatmap" for each in (panel, *same) for trace in each["traces"]):
             return None
-        faded = [
-            trace | {"name": f"{trace['name']}, second" if trace.get("name") else "", "opacity": _FADED}
-            for trace in other["traces"]
-            if trace.get("hoverinfo") != "skip"
-        ]
+        later = enumerate(zip(same, names[1:], strict=True))
+        faded = [_faded(trace, name, number) for number, (other, name) in later for trace in _drawn(other)]
         if not faded:
             return None
-        ranges = {axis: panel[axis] | _joint(panel[axis], other[axis]) for axis in ("x", "y")}
+        ranges = {axis: panel[axis] | _joint(*(each[axis] for each in (panel, *same))) for axis in ("x", "y")}
         panels.append(panel | ranges | {"traces": [*panel["traces"], *faded], "words": []})
     return first | {"panels": panels}
 
 
-def _joint(first: dict[str, Any], second: dict[str, Any]) -> dict[str, Any]:
-    """Limits that hold both axes."""
-    if "range" not in first or "range" not in second:
+def _drawn(panel: dict[str, Any]) -> list[dict[str, Any]]:
+    """Curves of a panel."""
+    return [trace for trace in panel["traces"] if trace.get("hoverinfo") != "skip"]
+
+
+def _faded(trace: dict[str, Any], name: str, number: int) -> dict[str, Any]:
+    """Curve of a run after the first: pale, dashed and named after its run."""
+    line = {"line": trace["line"] | {"dash": _DASHES[number % len(_DASHES)]}} if "line" in trace else {}
+    label = f"{trace['name']}, {name}" if trace.get("name") else ""
+    return trace | line | {"name": label, "opacity": _FADED}
+
+
+def _joint(*axes: dict[str, Any]) -> dict[str, Any]:
+    """Limits that hold all axes."""
+    if any("range" not in axis for axis in axes):
         return {}
-    ends = [*first["range"], *second["range"]]
+    ends = [end for axis in axes for end in axis["range"]]
     return {"range": [min(ends), max(ends)]}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
@@ -15,6 +15,7 @@ from femgear.findings import Finding, tell
 
 if TYPE_CHECKING:
     from femgear.stages.protocol import Stage, Train
+    from femgear.storage.results import Results
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,23 @@ def train_of(case) -> Train:
         if train.name == getattr(case, "train", None):
             return train.train
     raise CaseError(f"a case is needed, not {described(case)}", code="E-TYPE", remedy="femgear.read_case reads one")
+
+
+def same_train(runs: Sequence[Results]) -> Train:
+    """Find the train that all runs are of.
+
+    Raises
+    ------
+    CaseError
+        E-CHOICE: they are of several.
+    """
+    first, *others = runs
+    train = train_of(first.case)
+    for run in others:
+        if (other := train_of(run.case)).name != train.name:
+            message = f"{first.folder} is {train.words}, {run.folder} {other.words}"
+            raise CaseError(message, code="E-CHOICE", remedy="compare runs of cases of one kind")
+    return train
 
 
 def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:

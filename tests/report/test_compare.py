@@ -1,10 +1,11 @@
-"""Two runs compared: entries and numbers that differ, and the page with both."""
+"""Runs compared: entries and numbers that differ, modes of one shape, and the page with all."""
 
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 from small_gearbox import pair_tables
 
 from femgear.report import compare
@@ -144,7 +145,57 @@ def test_key_figures_of_two_runs_are_compared_by_name(tmp_path):
     # the mesh force follows the torque: of the whole it stays, of parts it is left out
     assert rows["mesh force [N]"][2] == "" and "mesh force stage [N]" not in rows
     # both tables of stages, each with its own of the other run
-    assert {"Meshes", "Modes"} <= blocks.keys()
+    assert {"Meshes", "Modes", compare.MODES} <= blocks.keys()
+    matched = blocks[compare.MODES].rows
+    assert matched[0][0] and all(row[4] == "" or 0.5 <= float(row[4]) <= 1.0 for row in matched)
+    three = {block.title: block for block in compare.compared(train_of(case), *runs, runs[0])}
+    again = {row[0]: row[1:] for row in three["Key figures"].rows}
+    assert again["misalignment [um]"] == (shown, other, change, shown, "")
+    assert compare.compare_page(train_of(case), *runs).count("<table>") >= 4
+
+
+def test_three_tables_are_compared_with_the_first():
+    tables = [Block("Static", ("mesh", "STE"), (("a", value),)) for value in ("2.0", "2.5", "> 1")]
+    found = compare._differences(*tables, names=("x", "y", "z"))
+    assert found.header == ("row", "column", "x", "y", "change", "z", "change")
+    assert found.rows == (("mesh a", "STE", "2.0", "2.5", "+25 %", "> 1", "-"),) and "bound" in found.notes[0]
+    same = [Block("Static", ("mesh", "STE"), (("a", value),)) for value in ("2.0", "2.0", "3.0")]
+    assert compare._differences(*same).rows == (("mesh a", "STE", "2.0", "2.0", "+0 %", "3.0", "+50 %"),)
+
+
+def modes(frequency, shape, dof=("sun: x", "sun: y", "ring: x")):
+    """Contents of modes.nc, as far as shapes are matched."""
+    variables = {"frequency": ("mode", frequency), "shape": (("dof", "mode"), np.array(shape, float))}
+    return xr.Dataset(variables, coords={"dof": list(dof)})
+
+
+def test_modes_are_matched_by_their_shapes():
+    """Modes that change places are found again, and a pair of one frequency whatever its directions."""
+    first = modes([0.0, 10.0, 10.0, 30.0], [[1, 1, 0, 0], [1, 0, 1, 0], [1, 0, 0, 1]])
+    c, s = np.cos(0.7), np.sin(0.7)
+    turned = modes([0.0, 20.0, 40.0, 40.0], [[1, 0, c, -s], [1, 0, s, c], [1, 1, 0, 0]])
+    found = compare.match_modes(first, turned)
+    assert {mode: other for mode, (other, _) in found.items()} == {1: 2, 2: 3, 3: 1}
+    assert [alike for _, alike in found.values()] == pytest.approx([1.0] * 3)
+    # units of the coordinates do not matter, as a ring in mm beside a sun in m
+    scaled = turned.assign(shape=turned["shape"] * np.array([[1.0], [1.0], [1e3]]))
+    assert compare.match_modes(first, scaled).keys() == {1, 2, 3}
+    other = modes([10.0], [[1.0], [1.0], [1.0]])
+    assert compare.match_modes(modes([10.0], [[1.0], [-1.0], [0.0]]), other) == {}
+    assert compare.match_modes(first, modes([10.0], [[1.0]] * 3, ("a", "b", "c"))) == {}, "nothing in common"
+
+
+def test_curves_of_three_runs_are_told_apart():
+    def drawn(level):
+        line = {"color": "#000000", "dash": "solid"}
+        traces = [{"name": "level", "y": [level], "line": line}]
+        axis = {"range": [level, level + 1.0]}
+        return {"panels": [{"x": {"range": [0, 1]}, "y": axis, "traces": traces, "words": []}]}
+
+    panel = compare._overlaid(*map(drawn, (1.0, 2.0, 3.0)), names=("x", "y", "z"))["panels"][0]
+    assert [trace["name"] for trace in panel["traces"]] == ["level", "level, y", "level, z"]
+    assert [trace["line"]["dash"] for trace in panel["traces"]] == ["solid", "dash", "dot"]
+    assert panel["y"]["range"] == [1.0, 4.0]
 
 
 def test_charts_of_areas_are_not_laid_over_each_other():
