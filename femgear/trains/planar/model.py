@@ -18,6 +18,7 @@ from femgear.case.gear_set import support_stiffness
 from femgear.case.planetary import pin_errors
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
+from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.linear.receptance import Reduction, reduce_problem
 from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.phase_grid import equidistant_phases
@@ -39,12 +40,19 @@ from femgear.stages.lumped_set import (
 from femgear.stages.static import mesh_backlash
 from femgear.stages.static_results import StaticResult
 from femgear.system.force_laws import GearMeshes
-from femgear.system.fourier import constant, fluctuation, line_tail, orders_of
-from femgear.system.mesh_directions import free_motions, mesh_elements, pin_directions
+from femgear.system.fourier import constant, fluctuation, harmonics_of, line_tail, orders_of
+from femgear.system.mesh_directions import free_motions, gear_set_system, mesh_elements, pin_directions
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarSet, planar_from_set
-from femgear.system.system import MeshExcitation, NonlinearSystem, element_forces
+from femgear.system.system import (
+    HarmonicForce,
+    MechanicalSystem,
+    MeshExcitation,
+    NonlinearSystem,
+    element_forces,
+)
 
 if TYPE_CHECKING:
+    from femgear.contact.cycle import MeshCycle
     from femgear.gears.planetary import PlanetarySet
     from femgear.trains.planar.section import PlanarCase
 
@@ -147,22 +155,60 @@ def planar_model(
     """
     if static is not None:
         check_entries(static, StaticResult, static_entries(case), "static solution")
-    planar = case.planar
+    planar, torque = case.planar, driving_torque(case, reacts=case.planar.reaction == "output")
     data, bearing = planar_data(case, gears, static), planar.carrier_bearing
+    # positions of the record run with the sun against the carrier
+    orders = (0, rotation_sense(case, gears))
     members = (MemberBearing(bearing.stiffness, bearing.clearance, "carrier", bearing.on),) if bearing else ()
     bearings = Bearings(case.planet.bearing_clearance or None, members)
     problem = gear_set_problem(
         data,
-        meshes=_meshes(case, gears, data, static, mesh_frequency),
+        meshes=_meshes(case, gears, data, static, mesh_frequency, orders),
         back_flanks=planar.back_flanks,
-        torque=driving_torque(case, reacts=planar.reaction == "output"),
+        torque=torque,
         bearings=bearings,
         gravity=_gravity(case, gears, mesh_frequency),
         pin_errors=pin_errors(case, gears) if planar.mesh_stiffness else None,
         carrier_speed=carrier_speed,
         damping=planar_ratios(case),
     )
+    if static is not None and static.cycle.friction_force is not None:
+        count = case.mesh_harmonics if mesh_frequency else 0
+        problem = _rubbing(problem, gear_set_system(data, torque=torque, friction=True), static.cycle, count, orders)
     return PlanarModel(data, problem, planar.back_flanks, bearings)
+
+
+def _rubbing(
+    problem: NonlinearSystem, rubbed: MechanicalSystem, cycle: MeshCycle, count: int, orders: tuple[int, ...]
+) -> NonlinearSystem:
+    """Add the friction of the drive flanks at rest as loads: its mean, and so many mesh harmonics.
+
+    The output takes what is lost, which turns the whole set else.
+
+    Parameters
+    ----------
+    problem : NonlinearSystem
+        Of the set.
+    rubbed : MechanicalSystem
+        The same coordinates with sources, see `femgear.system.mesh_directions.gear_set_system`.
+    cycle : MeshCycle
+        Of the statics with friction.
+    count : int
+        Mesh harmonics.
+    orders : tuple of int
+        Of the mesh frequency.
+    """
+    assert cycle.friction_force is not None and cycle.friction_moment is not None and rubbed.sources is not None
+    record = -np.concatenate([cycle.friction_force, cycle.friction_moment])
+    acting = rubbed.sources[:, :-1] @ harmonics_of(record, count)
+    modes = undamped_modes(replace(rubbed, gyroscopic=None, sources=None), cycle.stiffness.mean(axis=1))
+    turning, mean = modes.shape[:, modes.frequency == 0.0].T, np.real(acting[:, 0])
+    if len(turning):
+        taken = np.linalg.lstsq(turning @ rubbed.sources[:, -1:], turning @ mean, rcond=None)[0]
+        mean = mean - rubbed.sources[:, -1] * taken[0]
+    forces = [HarmonicForce(acting[:, h], tuple(h * order for order in orders)) for h in range(1, count + 1)]
+    system = replace(problem.system, load=problem.system.load + mean)
+    return replace(problem, system=system, forces=(*problem.forces, *forces))
 
 
 def carrier_sense(case: PlanarCase, gears: PlanetarySet) -> int:
@@ -175,7 +221,7 @@ def planar_ratios(case: PlanarCase) -> float | tuple[float, ...]:
     return case.planar.damping_ratios or case.dynamics.damping_ratio
 
 
-def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
+def _meshes(case, gears, data, static, varying: bool, orders: tuple[int, ...]) -> GearMeshes:
     """Mesh elements: constant, or along the static record over the mesh phase."""
     planar, N = case.planar, gears.n_planets
     backlash = planar.line_backlash
@@ -193,8 +239,6 @@ def _meshes(case, gears, data, static, varying: bool) -> GearMeshes:
         unloaded = constant(deflection - force / stiffness)
         return GearMeshes(np.arange(2 * N), constant(stiffness), unloaded, **options)
     record = MeshExcitation(cycle.stiffness, cycle.deflection, cycle.force, np.zeros(2 * N))
-    # positions of the record run with the sun against the carrier
-    orders = (0, rotation_sense(case, gears))
     return mesh_elements(data, stiffness=record, harmonics=case.mesh_harmonics, orders=orders, **options)
 
 

@@ -39,7 +39,7 @@ from femgear.stages.protocol import (
 from femgear.stages.static import LARGEST_APPROACH, LARGEST_MOTION, STATIC, STRESS, mesh_backlash
 from femgear.stages.static_results import StaticResult, describe_set
 from femgear.stages.strength_results import strength_verdict
-from femgear.stages.tooth_figures import tooth_key_figures
+from femgear.stages.tooth_figures import FRICTION_FIGURE, tooth_key_figures
 from femgear.stages.train_judgements import set_judgements
 from femgear.system.fourier import side_bands
 from femgear.trains.planar.model import (
@@ -84,7 +84,8 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
 
     CaseError: E-BACKLASH: back flanks without play. E-PERIODS: a static record of several mesh periods.
     """
-    no_acting_friction(case, "rigid planar sets have no place for friction along the flanks")
+    if case.planar.mesh_stiffness is not None:
+        no_acting_friction(case, "a given planar.mesh_stiffness has no tooth loads, and so no friction")
     planar, play = case.planar, _least_play(case, gears)
     if planar.back_flanks and planar.line_backlash is None and not play > _NO_PLAY:
         raise CaseError(
@@ -447,6 +448,6 @@ PLANAR = Train(
     front=(("weight_response", 0), ("tooth_contact", 0), ("response_mesh_forces", 0)),
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
     verdict=strength_verdict,
-    key_figures=tooth_key_figures,
+    key_figures=lambda case: tuple(figure for figure in tooth_key_figures(case) if figure != FRICTION_FIGURE),
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
 )

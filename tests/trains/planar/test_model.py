@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -9,10 +10,14 @@ from published.planetary_sets import lin_parker_set, torsional_set
 from scipy.linalg import eig, eigh
 from uneven_set import ANGLES, UNEVEN
 
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.solvers.linear.modal import undamped_modes
+from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.stages.lumped_set import Bearings
+from femgear.stages.static import solve_static
+from femgear.system.fourier import harmonics_of
 from femgear.system.mesh_directions import (
     dof_names,
     free_motions,
@@ -21,6 +26,8 @@ from femgear.system.mesh_directions import (
     pin_directions,
 )
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarTorque, planar_from_set, torque_shares
+from femgear.trains.planar.model import planar_model
+from femgear.trains.reading import read_case, with_values
 from validation.planetary import nrel_set
 
 
@@ -348,3 +355,25 @@ def test_impossible_requests_are_refused():
     held = uneven(sun=replace(uneven().sun, torsional_support=math.inf))
     with pytest.raises(CaseError, match="which is held"):
         gear_set_system(held, torque=PlanarTorque(1.0))
+
+
+@pytest.mark.slow
+def test_friction_loads_the_planets_as_the_statics_have_it():
+    """A planet turns freely at rest: its meshes differ by the couple of its friction, harmonic by harmonic."""
+    acts = {"friction": "constant", "coefficient": 0.06, "excites": True}
+    left_out = {"planar.gravity": None, "planar.branch": None, "static.stresses": False, "static.flank_elements": 8}
+    case: Any = with_values(read_case("cases/nrel_pgb_static.toml"), {"losses": acts} | left_out)
+    static, gears = solve_static(case), planetary_set(case)
+    model, count = planar_model(case, gears, static, mesh_frequency=True), case.mesh_harmonics
+    orders = np.array([[0, harmonic] for harmonic in range(count + 1)])
+    frequency = np.array([1e-3, 2.0 * np.pi * 0.05])
+    slow = solve_harmonic_balance(
+        model.problem, frequency, orders=orders, reduction=model.reduction, radius=False
+    ).force[model.groups["meshes"]]
+    moving, still = (
+        first - second for first, second in (np.split(slow, 2), np.split(harmonics_of(static.cycle.force, count), 2))
+    )
+    assert slow.shape[0] == 2 * gears.n_planets
+    assert np.abs(moving - still).max() < 1e-3 * np.abs(still).max()
+    assert np.abs(still[:, 1:]).max() > 1000.0
+    assert len(planar_model(case, gears, static).problem.forces) == 0
