@@ -27,6 +27,7 @@ from validation import (
     gearbox,
     gearbox_carriers,
     gearbox_cross,
+    gearbox_friction,
     gearbox_in_time,
     gearbox_nonlinear,
     gearbox_power,
@@ -426,14 +427,16 @@ THEMES = (
         "the same bodies in axes at rest, integrated over a turn by DOP853; the solution for gear sets, on pairs and "
         "on planets whose carrier stands still; symmetry; power put in and lost; inertia and forces of the casing; "
         "two stages whose stiffness fluctuates at once; elastic rings: the set on its foundation at full band, all "
-        "nodes of a ring in a casing. Gates: 1e-6 in time; 1e-10 of lines that symmetry forbids; 1e-9, of elastic "
-        "rings 1e-8 and 1e-4 of frequencies; a factor of two for the estimate of what one stage after the other "
-        "leaves out.",
+        "nodes of a ring in a casing; friction: pair and set by their own trains, planets at rest by statics. Gates: "
+        "1e-6 in time; 1e-10 of lines that symmetry forbids; 1e-9, of elastic rings and friction 1e-8, of planets at "
+        "rest 1e-3, of the power of friction 5 %, 1e-4 of frequencies; a factor of two for the estimate of what one "
+        "stage after the other leaves out.",
         (
             gearbox_rings.on_foundation,
             gearbox_response.equal_planets,
             gearbox_response.pair_on_bearings,
             gearbox_response.carrier_at_rest,
+            gearbox_friction.friction_of_stages,
             gearbox_power.input_and_losses,
         ),
         (

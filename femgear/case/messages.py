@@ -307,12 +307,12 @@ def added_material(case: Any) -> Iterator[Finding]:
 
 
 def idle_materials_and_oil(case: Any) -> Iterator[Finding]:
-    """List grades and hardnesses without a treatment, and an oil whose losses nobody asks for (W-UNUSED)."""
+    """List grades, hardnesses and estimates without a treatment, and an oil whose losses nobody asks for (W-UNUSED)."""
     sections = {f"{gear}.material": getattr(case, gear).material for gear in without_line(case)}
     if len(sections) == len(case.gear_names):
         sections = {"material": case.material} | sections
     for key, section in sections.items():
-        for name in ("grade", "hardness"):
+        for name in ("grade", "hardness", "estimated"):
             if section is not None and name in section.model_fields_set:
                 text = "has no effect: limits follow from it where the material has a treatment"
                 remedy = f'give {key}.treatment = "case hardened steel" or the like'
