@@ -395,13 +395,16 @@ class Window:
         """Look at a text, and compute what it can answer."""
         start = time.perf_counter()
         async for seen in self._bench.ask("look", text, name):
-            self._show_seen(seen)
+            if name == self.session.name:
+                self._show_seen(seen)
+        if name != self.session.name:
+            return
         if self._seen["problems"]:
             self._send([{"what": "end", "text": "The case is refused: see what is wrong below the form."}])
             return
         self._send([{"what": "begin"}])
         async for model in self._bench.ask("gears", text, name):
-            if (drawing := json.dumps(model)) != self._gears:
+            if name == self.session.name and (drawing := json.dumps(model)) != self._gears:
                 self._gears = drawing
                 self._send([{"what": "space", "model": model}])
         shown, stages = list(self._charts.value or ()), [stage["name"] for stage in self._seen["stages"]]
@@ -411,7 +414,7 @@ class Window:
             part = await self._next(parts, interrupt=drawn and time.perf_counter() - start > _DRAGGED)
             if part is None:
                 break
-            if part is _NEWER:
+            if part is _NEWER or name != self.session.name:
                 return
             self._show_part(part)
             drawn = drawn or bool(part["charts"]) or not part["same"]

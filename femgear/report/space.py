@@ -57,7 +57,9 @@ class SpaceBody:
     gear : Gear, optional
         That has the teeth, in its transverse section.
     turns : float
-        By how much it turns while the first body turns by one, about its own axis; 0 of what is not turned.
+        By how much it turns about its own axis, over what turns fastest or the first body; 0 of what stands.
+    orbit : (float, float, float), optional
+        x and y [m] of the axis that its own one runs around, and turns of that.
     """
 
     name: str
@@ -74,6 +76,7 @@ class SpaceBody:
     stage: int = 0
     gear: Gear | None = None
     turns: float = 0.0
+    orbit: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -166,6 +169,8 @@ def _body(body: SpaceBody) -> dict[str, Any]:
     }
     if body.turns:
         data["turns"] = round(body.turns, 9)
+    if body.orbit is not None:
+        data["orbit"] = [*_lengths(body.orbit[:2]), round(body.orbit[2], 9)]
     if body.section is not None:
         data |= {"section": _lengths(body.section), "teeth": body.teeth, "internal": body.internal}
         data |= {"twist": round(body.twist, 6), "angle": round(math.remainder(body.angle, 2.0 * math.pi), 6)}

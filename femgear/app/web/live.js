@@ -80,8 +80,10 @@ live.keep = ({ names }) => {
 // gears are drawn anew where teeth or places changed, seen from where the eye was
 live.space = ({ model }) => {
   const former = live.at("solid-place"), seen = former && former.space ? former.space.view : null;
-  const chosen = former && former.space ? { view: live.at("solid-view").value, moving: former.space.state.moving } : null;
-  const eye = seen ? [seen.camera.position.clone(), seen.orbit.target.clone()] : null;
+  const bodies = model ? model.bodies.map(({ name }) => name).join() : "", same = bodies === live.bodies;
+  live.bodies = bodies;
+  const chosen = same && seen ? { view: live.at("solid-view").value, moving: former.space.state.moving } : null;
+  const eye = same && seen ? [seen.camera.position.clone(), seen.orbit.target.clone()] : null;
   if (former && former.space) { former.space.state.moving = false; seen.dispose(); }
   live.gears.hidden = !model;
   live.gears.innerHTML = model ? live.part : "";

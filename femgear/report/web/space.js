@@ -135,14 +135,17 @@ page.space = () => {
     state.swings = Boolean(motion && motion.swings);
     draw(0);
   };
-  // every body about its own axis, as fast as its teeth let it
+  // every body about its own axis, as fast as its teeth let it, and planets around that of their carrier
   const turn = (time) => {
     bodies.forEach((body) => {
       const angle = (body.turns || 0) * (time / 4000), c = Math.cos(angle), s = Math.sin(angle);
+      const [ox, oy, rate] = body.orbit || [...body.axis, 0], around = rate * (time / 4000);
+      const [dx, dy] = [body.axis[0] - ox, body.axis[1] - oy];
+      const ax = ox + Math.cos(around) * dx - Math.sin(around) * dy, ay = oy + Math.sin(around) * dx + Math.cos(around) * dy;
       for (let i = 0; i < 3 * body.points; i += 3) {
         const x = body.rest[i] - body.axis[0], y = body.rest[i + 1] - body.axis[1];
-        body.at[i] = body.axis[0] + c * x - s * y - middle[0];
-        body.at[i + 1] = body.axis[1] + s * x + c * y - middle[1];
+        body.at[i] = ax + c * x - s * y - middle[0];
+        body.at[i + 1] = ay + s * x + c * y - middle[1];
         body.at[i + 2] = body.rest[i + 2] - middle[2];
       }
       body.shape.attributes.position.needsUpdate = true;

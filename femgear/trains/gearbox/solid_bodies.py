@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from femgear.case.gear_set import planetary_set
+from femgear.errors import FemgearError
 from femgear.gears.gear import Gear
 from femgear.report.space import SPACE, Motion, SpaceBody, space, tooth_section
 from femgear.stages.gears_in_space import MODES_SHOWN, tooth_angles
@@ -30,6 +32,7 @@ from femgear.trains.gearbox.case_file import (
 )
 from femgear.trains.gearbox.casing import bearing_name
 from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, planet_radius, set_sizes
+from femgear.trains.gearbox.power import gearbox_flow
 
 _DISC, _RIM, _BORE = 0.3, 1.15, 0.45
 """Width of a disc, radius of a rim and of a bore that are not given, over the pitch radius."""
@@ -81,12 +84,38 @@ def gearbox_bodies(case: GearboxCase, places: dict[str, np.ndarray]) -> Iterator
     places : mapping of str to (3,) array
         Of the stations by name, as those of planets [m].
     """
+    turns, planets = _turns(case)
     for number, stage in enumerate((*case.pair, *case.planetary)):
         bodies = _of_pair(case, stage) if isinstance(stage, PairSection) else _of_set(case, stage, places)
-        yield from (replace(body, stage=number) for body in bodies)
+        spin, orbit = planets.get(stage.name, (0.0, None))
+        for body in bodies:
+            runs_around = body.name.startswith(f"{stage.name} planet")
+            turning = {"turns": spin, "orbit": orbit} if runs_around else {"turns": turns.get(body.member, 0.0)}
+            yield replace(body, stage=number, **turning)
     for shaft in case.shaft:
-        yield from _of_shaft(shaft)
+        yield from (replace(part, turns=turns.get(shaft.name, 0.0)) for part in _of_shaft(shaft))
     yield from _of_bearings(case)
+
+
+def _turns(case: GearboxCase) -> tuple[dict[str, float], dict[str, tuple[float, tuple[float, float, float]]]]:
+    """Speeds of the shafts over the largest, and of the planets of every set with the axis that they run around.
+
+    They are those of the first load case; nothing where no speed follows from it. Planets roll on the sun, as
+    seen from the carrier: H. W. Müller, Epicyclic Drive Trains (1982), equation of Willis.
+    """
+    with suppress(FemgearError):
+        speed = {CASING: 0.0, **gearbox_flow(case).speed}
+        largest = max(map(abs, speed.values())) or 1.0
+        turns, planets = {name: value / largest for name, value in speed.items()}, {}
+        for stage in case.planetary:
+            sizes = set_sizes(stage)
+            holder = next(name for name in (stage.sun, stage.carrier, stage.ring) if name != CASING)
+            sun, carrier = turns[stage.sun], turns[stage.carrier]
+            spin = carrier - (sun - carrier) * sizes.base_radii[0] / sizes.base_radii[1]
+            x, y = case.shaft_named(holder).axis
+            planets[stage.name] = (spin, (x, y, carrier))
+        return turns, planets
+    return {}, {}
 
 
 def _marks(data: Any) -> Iterator[SpaceBody]:

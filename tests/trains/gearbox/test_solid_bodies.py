@@ -83,3 +83,18 @@ def test_motions_are_deflections_and_modes_of_the_run(tmp_path):
     movers = {body["member"] for body in model["bodies"]}
     assert movers <= model["members"].keys()
     assert write_space(Drawn(answer.case, {}), tmp_path) == []
+
+
+def test_teeth_roll_on_one_another(axle):
+    """Where two gears touch both move alike: seen from the carrier of planets, and from the casing of a pair."""
+    bodies = {body.name: body for body in gearbox_bodies(axle, {}) if body.kind == "gear"}
+    pinion, wheel = bodies["gear 1 of first stage"], bodies["gear 2 of first stage"]
+    assert wheel.turns == pytest.approx(-pinion.turns * pinion.teeth / wheel.teeth) and abs(pinion.turns) == 1.0
+    sun, planet, ring = (
+        bodies[f"{name}second stage{end}"] for name, end in (("sun of ", ""), ("", " planet 1"), ("ring of ", ""))
+    )
+    x, y, carrier = planet.orbit
+    assert (x, y) == sun.axis and carrier != 0.0
+    relative = [body.turns - carrier for body in (sun, planet, ring)]
+    assert relative[1] == pytest.approx(-relative[0] * sun.teeth / planet.teeth)
+    assert relative[2] == pytest.approx(relative[1] * planet.teeth / ring.teeth)
