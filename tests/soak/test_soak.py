@@ -47,11 +47,13 @@ def test_a_case_file_of_ten_megabytes_is_refused(tmp_path):
         case_text.read_case(path)
 
 
-# every kind of file; of the long ones the results of one are read by a program too
-@pytest.mark.parametrize("numbers", [[5, 6, 7, *range(11, 24)], pytest.param([*range(28), 52], marks=pytest.mark.slow)])
+# one of every kind of file; of the long ones the results of one are read by a program too
+@pytest.mark.parametrize(
+    "numbers", [[6, 11, 12, 15, 16, 17, 19, 20, 23], pytest.param([*range(28), 52], marks=pytest.mark.slow)]
+)
 def test_damaged_files(numbers, folder):
     tally = passed(trials.run_trials("damage", numbers, folder))
-    assert sum(count for said, count in tally.said.items() if "refused" in said) > 8
+    assert 2 * sum(count for said, count in tally.said.items() if "refused" in said) > len(numbers)
 
 
 @pytest.mark.slow
