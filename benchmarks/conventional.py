@@ -99,7 +99,8 @@ def modal_harmonic_balance(modes, excitation, frequency, *, excitation_harmonics
 
 def contact_problems(gears, bodies, *, sun_torque: float, positions: int):
     """The contact problems of some positions, as `femgear.contact.solve.solve_contact` takes them."""
-    from femgear.contact.assembly import assemble_contact, mesh_windows
+    from femgear.contact.assembly import assemble_contact
+    from femgear.contact.windows import mesh_windows
 
     n = gears.n_planets
     share = sun_torque / (gears.sun.base_radius * n)

@@ -7,10 +7,11 @@ from functools import cache
 
 import numpy as np
 
-from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.assembly import assemble_contact
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.solve import solve_contact
+from femgear.contact.windows import mesh_windows
 from femgear.gears.iso6336_stiffness import mesh_stiffness_method_b
 from validation.cases import reference_material, reference_static
 from validation.reference.closed_form import share_load

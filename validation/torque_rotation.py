@@ -13,7 +13,7 @@ from functools import cache
 
 import numpy as np
 
-from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.assembly import assemble_contact
 from femgear.contact.bodies import (
     RING_STATE,
     Bodies,
@@ -24,6 +24,7 @@ from femgear.contact.bodies import (
     make_sectors,
 )
 from femgear.contact.solve import solve_contact
+from femgear.contact.windows import mesh_windows
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
 from femgear.gears.planetary import PlanetarySet, close_set, equal_planet_angles

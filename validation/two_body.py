@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.assembly import assemble_contact
 from femgear.contact.bodies import Bodies
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.contact.solve import solve_contact
+from femgear.contact.windows import mesh_windows
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror
 from femgear.fe.meshing import Outline, mesh_outlines

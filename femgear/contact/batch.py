@@ -20,9 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from femgear.contact.active_set import NULL, RIGID, ROUNDING, factor, settle
-from femgear.contact.assembly import ROUGH_STIFFNESS, Candidates
+from femgear.contact.assembly import Candidates
 from femgear.contact.solve import ContactState, solve_contact
 from femgear.contact.supports import BearingSprings
+from femgear.contact.windows import ROUGH_STIFFNESS
 from femgear.errors import ContactError
 
 LARGEST_RESIDUAL = 1e-9

@@ -16,18 +16,7 @@ from typing import Any
 import numpy as np
 
 from femgear import second_process
-from femgear.contact.assembly import (
-    Candidates,
-    MeshWindows,
-    contact_candidates,
-    cycle_positions,
-    enlarged,
-    first_windows,
-    in_windows,
-    kept_pairs,
-    mesh_windows,
-    pair_paths,
-)
+from femgear.contact.assembly import Candidates, contact_candidates
 from femgear.contact.batch import BatchState, ContactTangents, check_definite, check_residual, solve_batch
 from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
@@ -55,6 +44,16 @@ from femgear.contact.supports import (
     tilting_members,
 )
 from femgear.contact.width_waves import WidthWaves
+from femgear.contact.windows import (
+    MeshWindows,
+    cycle_positions,
+    enlarged,
+    first_windows,
+    in_windows,
+    kept_pairs,
+    mesh_windows,
+    pair_paths,
+)
 from femgear.gears.deviations import SetDeviations, mirrored_deviations
 from femgear.gears.pair import GearSet
 from femgear.gears.planetary import mirrored_set

@@ -34,16 +34,7 @@ from femgear.case.gear_set import need_set, planetary_set
 from femgear.case.messages import combine, translate
 from femgear.case.planetary import Case
 from femgear.case.quantities import ANGLE, Count, Quantity, Section
-from femgear.contact.assembly import (
-    MOST_ENLARGEMENTS,
-    Candidates,
-    contact_candidates,
-    cycle_positions,
-    first_windows,
-    in_windows,
-    mesh_windows,
-    not_contained,
-)
+from femgear.contact.assembly import Candidates, contact_candidates
 from femgear.contact.batch import ContactTangents, check_residual, solve_batch
 from femgear.contact.cycle import CycleOptions
 from femgear.contact.face_width import contacts_are_lines, curve_forces, lead_separations
@@ -54,6 +45,14 @@ from femgear.contact.pair_springs import PairSprings, solve_laws
 from femgear.contact.peaks import mean_weights
 from femgear.contact.slice_springs import SliceSolutions, SliceSprings, solve_slice_springs
 from femgear.contact.supports import MovingMembers, TiltingMembers, moving_members, tilting_members
+from femgear.contact.windows import (
+    MOST_ENLARGEMENTS,
+    cycle_positions,
+    first_windows,
+    in_windows,
+    mesh_windows,
+    not_contained,
+)
 from femgear.errors import CaseError
 from femgear.gears.deviations import (
     Runout,

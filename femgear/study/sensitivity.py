@@ -27,18 +27,12 @@ import numpy as np
 from scipy.linalg import cho_solve
 
 from femgear.contact.active_set import factor
-from femgear.contact.assembly import (
-    ROUGH_STIFFNESS,
-    cell_centres,
-    contact_candidates,
-    cycle_positions,
-    in_windows,
-    mesh_windows,
-)
+from femgear.contact.assembly import contact_candidates
 from femgear.contact.flank_pairs import mesh_pairs, separation, tooth_steps
 from femgear.contact.omitted_pairs import needed_nearest
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import moving_members
+from femgear.contact.windows import ROUGH_STIFFNESS, cell_centres, cycle_positions, in_windows, mesh_windows
 from femgear.errors import CaseError
 from femgear.gears.deviations import (
     SetDeviations,

@@ -10,7 +10,7 @@ from random_sets import random_set
 
 from femgear.case.gear_set import material_of, planetary_set
 from femgear.contact import batch, cycle
-from femgear.contact.assembly import contact_candidates, mesh_windows
+from femgear.contact.assembly import contact_candidates
 from femgear.contact.batch import ContactTangents, solve_batch
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, loaded_image, walk_mesh_cycle
@@ -18,6 +18,7 @@ from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, bearing_springs, moving_members
 from femgear.contact.width_waves import width_waves
+from femgear.contact.windows import mesh_windows
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import FlankForm, Runout, no_deviations
 from femgear.gears.modifications import FlankTwist, LeadCrowning, LeadSlope, ProfileSlope

@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from femgear.contact.assembly import contact_candidates, mesh_windows
+from femgear.contact.assembly import contact_candidates
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.flank_pairs import BACK_SIDE, DRIVE_SIDE, flank_side, mesh_pairs, side_teeth
 from femgear.contact.supports import Supports
+from femgear.contact.windows import mesh_windows
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import no_deviations
 from femgear.gears.gear import half_thickness_angle

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from femgear.contact import cycle as cycle_module
-from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.assembly import assemble_contact
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports
+from femgear.contact.windows import mesh_windows
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
 from femgear.gears.iso6336_stiffness import mesh_stiffness_method_b

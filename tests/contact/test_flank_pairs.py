@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from femgear.contact.assembly import windows
 from femgear.contact.flank_pairs import admissible_arcs, flank_pair, separation
+from femgear.contact.windows import windows
 from femgear.gears.gear import Gear
 
 ALPHA = np.deg2rad(20)

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from femgear.contact.assembly import assemble_contact, mesh_windows
+from femgear.contact.assembly import assemble_contact
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import walk_mesh_cycle
 from femgear.contact.solve import solve_contact
 from femgear.contact.supports import Supports, bearing_springs, moving_members
+from femgear.contact.windows import mesh_windows
 from femgear.fe.elasticity import Material
 from femgear.gears.deviations import mirrored_deviations, no_deviations
 from femgear.gears.planetary import mirrored_set

@@ -5,8 +5,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.linalg import toeplitz
 
-from femgear.contact.assembly import _window_compliance
 from femgear.contact.local_compliance import depth_displacement, surface_displacement
+from femgear.contact.windows import _window_compliance
 from validation.reference.hertz import (
     cell_influence,
     contact_modulus,

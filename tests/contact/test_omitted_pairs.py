@@ -8,9 +8,10 @@ from contact.test_cycle import STEEL, TORQUE, reference_set
 from random_sets import random_set
 
 from femgear.contact import cycle
-from femgear.contact.assembly import body_compliance, contact_candidates, mesh_windows
+from femgear.contact.assembly import body_compliance, contact_candidates
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.omitted_pairs import needed_nearest, yielding
+from femgear.contact.windows import mesh_windows
 from femgear.stages.static import solve_static
 from femgear.trains.reading import parse_case, with_values
 

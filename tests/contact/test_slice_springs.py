@@ -7,13 +7,14 @@ import pytest
 from contact.test_cycle import STEEL, TORQUE, reference_set
 from contact.test_misalignment import set_of
 
-from femgear.contact.assembly import contact_candidates, first_windows, mesh_windows
+from femgear.contact.assembly import contact_candidates
 from femgear.contact.batch import solve_batch
 from femgear.contact.face_width import curve_forces
 from femgear.contact.pair_laws import pair_laws
 from femgear.contact.slice_springs import SliceSprings, solve_slice_springs
 from femgear.contact.slices import solve_slices
 from femgear.contact.supports import RIGID, WidthSupports, moving_members, tilting_members
+from femgear.contact.windows import first_windows, mesh_windows
 from femgear.gears.deviations import lead_separation, no_deviations
 
 SLICES, SETS = 9, 6

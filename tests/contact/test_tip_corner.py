@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from femgear.contact.assembly import cell_centres, cell_edges, equal_cells
 from femgear.contact.bodies import station_weights
 from femgear.contact.local_compliance import TipCorner, _excess, apex_excess, surface_displacement, tip_corner
+from femgear.contact.windows import cell_centres, cell_edges, equal_cells
 from femgear.fe.compliance import symmetric_factor
 from femgear.fe.elasticity import Material, stiffness
 from femgear.fe.grid import mirror, ordered_nodes

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from femgear.contact.assembly import _contact_half_width, windows
 from femgear.contact.flank_pairs import flank_pair
+from femgear.contact.windows import _contact_half_width, windows
 from femgear.fe.elasticity import Material
 from femgear.gears.gear import Gear
 
