@@ -505,9 +505,9 @@ def _export_sound(signals: Iterable[Signal], folder: Path, formats: Collection[s
             files.append(checked_name(f"{signal.name}.wav"))
             write_wav(signal, folder / files[-1], full_scale=scales[signal.unit])
         if "quality" in formats and signal.unit == "Pa" and signal.steady:
-            heard = sound_quality(signal.values, signal.rate)
-            tones = " ".join(f"{tone:g}" for tone in heard.tones)
-            rows.append([signal.name, heard.loudness, heard.tone_to_noise, heard.prominence, tones])
+            quality = sound_quality(signal.values, signal.rate)
+            tones = " ".join(f"{tone:g}" for tone in quality.tones)
+            rows.append([signal.name, quality.loudness, quality.tone_to_noise, quality.prominence, tones])
     for unit in [unit for unit, peak in peaks.items() if peak > scales[unit]]:
         text = f"samples reach {peaks[unit]:.4g} {unit}, the full scale is {scales[unit]:g}: most players clip"
         remedy = f"raise --{SCALES[unit].replace('_', '-')} to hear it"

@@ -85,24 +85,24 @@ def _send(work: Callable[[], object], connection: Connection, parent: int) -> No
     ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
     if os.getppid() != parent:
         return
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as raised:
         try:
             value = work()
         except Exception as error:
             value = error
     connection.send(
-        (value, [(str(warning.message), warning.category, warning.filename, warning.lineno) for warning in said])
+        (value, [(str(warning.message), warning.category, warning.filename, warning.lineno) for warning in raised])
     )
 
 
 def _received(connection: Connection) -> dict:
     """Receive what `_send` sends: value or error, and warnings."""
     try:
-        value, said = connection.recv()
+        value, raised = connection.recv()
     except EOFError:
         message, remedy = "the second process, which draws or solves, was ended", "give it more memory"
         raise FemgearError(message, code="E-WORKER", remedy=remedy) from None
-    for warning in said:
+    for warning in raised:
         warnings.warn_explicit(*warning)
     if isinstance(value, BaseException):
         raise value

@@ -129,8 +129,8 @@ def modal_entries(case: Any) -> Entries:
 def dynamic_entries(case: Case) -> Entries:
     """List the entries that decide the periodic response: all but the sensor of the level and microphone."""
     # a casing is known by the checksum of its files
-    heard = ("form", "points", "sensor_angle", "microphone", "published", "structure.file", "structure.nodes")
-    left_out = (_DYNAMIC - {"housing"}) | {f"housing.{name}" for name in heard}
+    sensor_entries = ("form", "points", "sensor_angle", "microphone", "published", "structure.file", "structure.nodes")
+    left_out = (_DYNAMIC - {"housing"}) | {f"housing.{name}" for name in sensor_entries}
     return {**friction_entries(case), **_entries(case, left_out)}
 
 

@@ -236,15 +236,15 @@ def _arrays(modes: CasingModes, table, direction, pitch_radius, max_diameter, un
     ways = [_directions(a) for a in angle]
     shape = [[motion(o.number, w[word]) for word in ("radial", "tangential")] for o, w in zip(ring, ways)]
     shape, across = np.array(shape), [np.arctan2(*place[sensor.number][1::-1]) for sensor in sensors]
-    heard = [motion(sensor.number, _directions(a)[sensor.direction]) for sensor, a in zip(sensors, across)]
-    heard = np.array(heard).reshape(len(sensors), modes.shape.shape[1])
+    sensor_rows = [motion(sensor.number, _directions(a)[sensor.direction]) for sensor, a in zip(sensors, across)]
+    sensor_rows = np.array(sensor_rows).reshape(len(sensors), modes.shape.shape[1])
     path = np.asarray(direction, float) @ shape
-    outputs = np.hstack([modes.shape @ heard.T, modes.foot_force])
-    direct = np.vstack([np.zeros_like(heard), modes.foot_direct])
+    outputs = np.hstack([modes.shape @ sensor_rows.T, modes.foot_force])
+    direct = np.vstack([np.zeros_like(sensor_rows), modes.foot_direct])
     others = {} if modes.damping is None else {"damping_ratio": modes.damping}
     if modes.compliance is not None:
         others["ring_compliance"] = path @ modes.compliance @ path.T
-        direct[: len(heard)] += heard @ modes.compliance
+        direct[: len(sensor_rows)] += sensor_rows @ modes.compliance
     return others | {
         "natural_frequency": modes.frequency,
         "ring_angle": angle,

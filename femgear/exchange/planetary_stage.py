@@ -438,20 +438,20 @@ def _racks(s: _Stage, tables: dict[str, Any], remarks: dict[str, str]) -> None:
     """Basic racks from flanks and tools: that of the sun for all, of others where they differ."""
     module, number = to_si(tables["sun"]["module"], LENGTH), s.model.number
     for name in s.gears:
-        said = {"addendum": s.common(s.flanks[name], "addendum_coefficient_basic_profile")}
+        common_entries = {"addendum": s.common(s.flanks[name], "addendum_coefficient_basic_profile")}
         for tool in _tools(s, name)[:1]:
             radius = number(tool, "tip_radius", LENGTH)
-            said["dedendum"] = number(tool, "addendum_coefficient_reference_profile")
-            said["root_radius"] = radius / module if radius else number(tool, "tip_radius_factor")
+            common_entries["dedendum"] = number(tool, "addendum_coefficient_reference_profile")
+            common_entries["root_radius"] = radius / module if radius else number(tool, "tip_radius_factor")
             if tool.type == "cutter_wheel_tool" and (teeth := number(tool, "number_of_teeth")):
                 tables[name]["cutter_teeth"] = round(teeth)
                 if shift := number(tool, "addendum_modification_coefficient"):
                     tables[name]["cutter_profile_shift"] = shift
-        rack = _RACK | {key: value for key, value in said.items() if value is not None}
+        rack = _RACK | {key: value for key, value in common_entries.items() if value is not None}
         if name == "sun" or rack != tables["rack"]:
             (tables if name == "sun" else tables[name])["rack"] = rack
             where = "rack" if name == "sun" else f"{name}.rack"
-            missing = [key for key in rack if said.get(key) is None]
+            missing = [key for key in rack if common_entries.get(key) is None]
             remarks |= {f"{where}.{key}": "assumed: ISO 53 profile C" for key in missing}
 
 
@@ -673,9 +673,9 @@ def _operation(s: _Stage, tables: dict[str, Any], remarks: dict[str, str], wante
     fixed = held[0] if len(held) == 1 else "ring"
     remarks |= {} if len(held) == 1 else {"operation.fixed": "assumed"}
     number, given = s.model.chosen_case(wanted)
-    said = [_state(s, fixed, given), *(_state(s, fixed, load_case) for load_case in s.model.load_cases)]
-    stands, idle = (0.0 in values.values() for values in said[0])
-    states = [tuple({name: v for name, v in state.items() if v} for state in pair) for pair in said]
+    state_list = [_state(s, fixed, given), *(_state(s, fixed, load_case) for load_case in s.model.load_cases)]
+    stands, idle = (0.0 in values.values() for values in state_list[0])
+    states = [tuple({name: v for name, v in state.items() if v} for state in pair) for pair in state_list]
     turning, loaded = states[0]
     usual = "carrier" if fixed == "sun" else "sun"
     member = next(iter([*(name for name in turning if name in loaded), *turning, *loaded]), usual)

@@ -108,15 +108,15 @@ def share_shifts(
                 continue
             try:
                 gears = _closed(teeth, pressure_angle, (rack, rack, ring_rack), a, shift, backlash)
-                said = [finding.code for finding in check_meshes(gears) if finding.code not in ("W-TIP", "W-RIM")]
+                codes = [finding.code for finding in check_meshes(gears) if finding.code not in ("W-TIP", "W-RIM")]
             except GeometryError as error:
                 fault = fault or error
                 if error.code == "E-ROOT-RADIUS" and error.gear == "ring":
                     no_room = float(shifts[2])
                 continue
-            if fewest is None or len(said) < len(fewest):
-                best, fewest = gears, said
-            if not said:
+            if fewest is None or len(codes) < len(fewest):
+                best, fewest = gears, codes
+            if not codes:
                 return _shared(gears)
     if best is not None and fewest is not None:
         return _shared(best, tuple(dict.fromkeys(fewest)))

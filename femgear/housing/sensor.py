@@ -163,9 +163,9 @@ def fixed_sensor_lines(field, z_ring: int, carrier_speed, sensor_angle: float) -
     sensor_angle : float
         Angle of the sensor on the housing [rad], where the carrier frame is at time zero.
     """
-    heard = component_lines(field, z_ring, carrier_speed, sensor_angle)
+    reached = component_lines(field, z_ring, carrier_speed, sensor_angle)
     every = np.arange(_top_order(np.asarray(field), z_ring) + 1)
-    return replace(heard, order=every, displacement=_spread(heard.displacement, heard.order, every.size))
+    return replace(reached, order=every, displacement=_spread(reached.displacement, reached.order, every.size))
 
 
 def component_lines(
@@ -179,8 +179,8 @@ def component_lines(
     angle = _checked_angle(sensor_angle)
     number, n, waves = carrier_components(field, z_ring, carrier_speed, symmetry=symmetry, periods=periods)
     number, first = np.unique(number, return_index=True)
-    heard = waves * np.exp(1j * n * angle)
-    lines = heard if len(number) == len(n) else np.add.reduceat(heard, first, axis=-1)
+    turned_waves = waves * np.exp(1j * n * angle)
+    lines = turned_waves if len(number) == len(n) else np.add.reduceat(turned_waves, first, axis=-1)
     lines = np.where(number == 0, np.real(lines), lines)
     turns, method = carrier_turns(z_ring, periods), "exact"
     order = number if turns == 1 else number / turns

@@ -252,11 +252,11 @@ def surface_sound(
     efficiency one [W], all (..., n_orders). Waves of different n radiate independently.
     """
     waves, frequency = np.asarray(waves), np.asarray(frequency, float)[..., None]
-    heard = pressure_transfer(n, frequency, cylinder, microphone.distance) * np.exp(1j * n * microphone.angle)
+    transfer = pressure_transfer(n, frequency, cylinder, microphone.distance) * np.exp(1j * n * microphone.angle)
     around, speed = 2 * np.pi * cylinder.radius, cylinder.sound_speed
     power = 0.5 * cylinder.density * speed * around * cylinder.length * np.abs(waves) ** 2
     efficiency = radiation_efficiency(n, around / speed * frequency, cylinder.length / cylinder.radius)
-    return (heard * waves).sum(axis=-1), (efficiency * power).sum(axis=-1), power.sum(axis=-1)
+    return (transfer * waves).sum(axis=-1), (efficiency * power).sum(axis=-1), power.sum(axis=-1)
 
 
 def equivalent_sound(
@@ -448,14 +448,14 @@ def run_up_signal(order, values, speeds, *, duration: float, start=None, stop=No
             limit=f"two speeds or more, {nodes[0]} to {nodes[-1]} rad/s, a duration above zero",
             remedy="compute the lines at the first and the last speed of the run, too",
         )
-    heard, count = _heard(order, values, nodes, rate), int(np.ceil(duration * rate * (1 - 1e-15)))
+    audible, count = _heard(order, values, nodes, rate), int(np.ceil(duration * rate * (1 - 1e-15)))
     slope, times, pressure = (ends[1] - ends[0]) / duration, np.arange(count) / rate, np.empty(count)
     speed, turns = ends[0] + slope * times, (ends[0] + 0.5 * slope * times) * times / (2 * np.pi)
     place = np.clip(np.searchsorted(nodes, speed, side="right") - 1, 0, len(nodes) - 2)
     # between them the speed passes none of those of the lines
     for first, last in pairwise(np.flatnonzero(np.diff(place, prepend=-1, append=-1)).tolist()):
         low, samples = int(place[first]), slice(first, last)
-        below, above = _values_after(order, heard[low : low + 2], turns[samples])
+        below, above = _values_after(order, audible[low : low + 2], turns[samples])
         share = (speed[samples] - nodes[low]) / (nodes[low + 1] - nodes[low])
         pressure[samples] = below + share * (above - below)
     return pressure

@@ -249,8 +249,12 @@ class Stage:
 
     def convergence(self, result: StageResult) -> dict[str, Any]:
         """Tell how a result was found, and what its verdict is, for the manifest."""
-        said = result if isinstance(result, StageResult) else StageResult()  # of trains without the base
-        told_of_run = {"converged": said.converged, "residual": said.residual, "message": said.message}
+        stage_result = result if isinstance(result, StageResult) else StageResult()  # of trains without the base
+        told_of_run = {
+            "converged": stage_result.converged,
+            "residual": stage_result.residual,
+            "message": stage_result.message,
+        }
         return told_of_run | self.verdict(result)
 
     def findings(self, data: Any) -> tuple[Finding, ...]:

@@ -82,8 +82,8 @@ class Runner(AbstractContextManager):
                     tried.add(index)
                     suspects.append((index, item))
                     continue
-                outcome, said = reply or (_deadly(), ())
-                for warning_told in {*said} - self._told:
+                outcome, raised = reply or (_deadly(), ())
+                for warning_told in {*raised} - self._told:
                     self._told.add(warning_told)
                     warnings.warn_explicit(*warning_told)
                 yield index, outcome
@@ -110,12 +110,12 @@ class Runner(AbstractContextManager):
 
 def _call(function: Callable, item: object) -> tuple[Any, list[tuple]]:
     """Value of a task, and its warnings."""
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as raised:
         warnings.simplefilter("always")
         value = function(item)
     return value, [
         (str(warning_told.message), warning_told.category, warning_told.filename, warning_told.lineno)
-        for warning_told in said
+        for warning_told in raised
     ]
 
 

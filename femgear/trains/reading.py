@@ -112,9 +112,9 @@ def parse_case(text: str, *, name: str = "", numbered: bool = True) -> Any:
         problems = [error]
     if problems:
         raise combine(problems, lines, name)
-    said = (*former, *file.notices(data, case))
-    said = (*notices(data, case), *said, *added_material(case)) if of_set else said
-    case.read_from(text, lines, name, notices=said, profile_files=files)
+    case_notices = (*former, *file.notices(data, case))
+    case_notices = (*notices(data, case), *case_notices, *added_material(case)) if of_set else case_notices
+    case.read_from(text, lines, name, notices=case_notices, profile_files=files)
     if hasattr(case, "gear_names"):
         if of_set:
             check_shafts(case)
@@ -278,16 +278,16 @@ def with_values(case: Case, values: Mapping[str, object]) -> Case:
     except CaseError as error:
         error.key, error.file = ", ".join(values), case.name or None
         raise
-    said: tuple[Finding, ...] = ()
+    case_notices: tuple[Finding, ...] = ()
     try:
         changed = parse_case(text, name=case.name, numbered=False)
     except CaseError as error:
         published = any(key.startswith("housing") for key in values)
         if published or not (notice := without_uncomputed(data, error)):
             raise
-        said, text = (notice,), case_text.write(data)
+        case_notices, text = (notice,), case_text.write(data)
         changed = parse_case(text, name=case.name, numbered=False)
-    changed._notices += said
+    changed._notices += case_notices
     changed._profile_files = {
         k: file
         for k, file in case.profile_files.items()

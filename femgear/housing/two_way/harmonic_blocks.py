@@ -177,8 +177,8 @@ def _ring(
         alone += np.real(structure.residual[far, far])
         for i, wave_number in enumerate(far):
             r = orders.place(in_structure[here] + orders.sense * n[wave_number])
-            met = np.flatnonzero(r < bands)
-            add((r[met], wave_number), (r[met], wave_number), alone[:, met, i])
+            within = np.flatnonzero(r < bands)
+            add((r[within], wave_number), (r[within], wave_number), alone[:, within, i])
     return ring
 
 
@@ -200,9 +200,9 @@ def _add_coupled(add, structure: FixedStructure, orders: CarrierOrders, in_struc
     every += structure.residual[np.ix_(waves, waves)]
     for k, band in enumerate(in_structure):
         r = orders.place(band + orders.sense * n)
-        met = np.flatnonzero(r < len(orders.bands))
-        r, there = r[met], waves[met]
-        add((r[:, None], there[:, None]), (r, there), every[:, k, met[:, None], met])
+        inside = np.flatnonzero(r < len(orders.bands))
+        r, there = r[inside], waves[inside]
+        add((r[:, None], there[:, None]), (r, there), every[:, k, inside[:, None], inside])
 
 
 def _times(matrix: np.ndarray, values: np.ndarray) -> np.ndarray:

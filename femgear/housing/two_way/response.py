@@ -444,15 +444,15 @@ def structure_lines(structure: FixedStructure, response: TwoWayResponse) -> tupl
     n = np.arange(-structure.max_diameter, structure.max_diameter + 1)
     number = np.rint(response.order * turns).astype(int)
     across = turns * int(np.sign(response.carrier_speed[0])) * n
-    heard = structure_numbers(number, across, paths.symmetry * turns if paths.symmetry > 1 else 1)
+    numbers = structure_numbers(number, across, paths.symmetry * turns if paths.symmetry > 1 else 1)
     both = np.concatenate([-number[:0:-1], number])
-    met = heard[:, None] + across
-    back = np.minimum(np.searchsorted(both, met), len(both) - 1)
-    back = np.where(both[back] == met, back, len(both))
+    reaching = numbers[:, None] + across
+    back = np.minimum(np.searchsorted(both, reaching), len(both) - 1)
+    back = np.where(both[back] == reaching, back, len(both))
     place = np.array(paths.planet_angles)[leaders] + paths.load_angle
     half = response.force[:, len(place) :] * np.where(number == 0, 1.0, 0.5)
     ring = np.concatenate([half[..., :0:-1].conj(), half], axis=-1)
-    order = heard if turns == 1 else heard / turns
+    order = numbers if turns == 1 else numbers / turns
     lines = np.empty((len(speed), len(order), structure.sensor_shape.shape[1]), complex)
     for i in range(len(speed)):  # one by one: modes at all orders of all speeds would fill the memory
         load = ring_load(paths.symmetry, ring[i], place, n, back)
@@ -470,8 +470,8 @@ def structure_numbers(number: np.ndarray, across: np.ndarray, symmetry: int) -> 
 
     All counted in the same whole numbers; multiples of the symmetry alone.
     """
-    met = np.unique(np.concatenate([number, -number])[:, None] - across)
-    return met[(met >= 0) & (met % symmetry == 0)]
+    reached = np.unique(np.concatenate([number, -number])[:, None] - across)
+    return reached[(reached >= 0) & (reached % symmetry == 0)]
 
 
 def _checked_harmonics(harmonics, count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -373,14 +373,14 @@ def ring_lines(stage: RunningStage, response: RunningResponse, angles, direction
         return np.zeros((*response.modal.shape[:2], len(angles)), complex)
     psi = np.asarray(stage.paths.planet_angles)[stage.groups[0]]
     speeds, places = (response.mesh_frequency, response.carrier_speed), (angles, directions)
-    heard = np.sum(
+    displacement = np.sum(
         [
             ring_motion(stage.ring, response.orders, response.force[:, at], psi, speeds, places, response.band, pushed)
             for at, pushed in stage.ring_points.items()
         ],
         axis=0,
     )
-    return response.one_sided(heard)
+    return response.one_sided(displacement)
 
 
 class _Problem:

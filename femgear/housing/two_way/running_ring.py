@@ -124,7 +124,7 @@ def ring_motion(
     angles: np.ndarray,
     speeds: tuple[float, float],
     places: tuple[np.ndarray, np.ndarray],
-    heard: np.ndarray,
+    shown_bands: np.ndarray,
     pushed: np.ndarray,
 ) -> np.ndarray:
     """Compute two-sided displacements (Q + 1, S, k) of fixed places of the outer surface [m].
@@ -137,7 +137,7 @@ def ring_motion(
         Of the leading planets on the ring [N].
     places : two arrays
         Angles (k,) of the places [rad], and their directions (k, 2): shares of radial and tangential displacement.
-    heard : (S,) int array
+    shown_bands : (S,) int array
         Side bands to give; those of waves beyond are left out.
     pushed : (r,) complex array
         As for `ring_compliance`.
@@ -149,8 +149,8 @@ def ring_motion(
     wave = np.where(_met(ring, orders, every, orders.bands), wave, 0.0)
     theta, direction = places
     seen = (ring.of_waves(ring.surface) @ np.asarray(direction).T) * np.exp(1j * np.outer(order, theta))
-    moved = np.zeros((len(every), len(heard), len(theta)), complex)
-    at = {int(band): k for k, band in enumerate(heard)}
+    moved = np.zeros((len(every), len(shown_bands), len(theta)), complex)
+    at = {int(band): k for k, band in enumerate(shown_bands)}
     for r, band in enumerate(orders.bands):
         turns = band - orders.sense * order
         for turn in np.unique(turns):

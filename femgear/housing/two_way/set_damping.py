@@ -434,7 +434,7 @@ def _residue(waves: _Waves, leading: LeadingMeshes, residue: int) -> _Residue:
     )
     in_structure, bands, spacing = orders.structure_bands(residue), orders.bands, orders.spacing
     number, path = waves.number, waves.path_number
-    met = [
+    meeting_bands = [
         [np.flatnonzero(there) for there in ((residue + bands) % N == c, (c - number) % N == 0, (c - path) % N == 0)]
         for c in range(N)
     ]
@@ -452,9 +452,9 @@ def _residue(waves: _Waves, leading: LeadingMeshes, residue: int) -> _Residue:
     S, R, W, n = len(in_structure), len(bands), len(number), len(path)
     at_orders = _table([met_[:2] for met_ in here], (S, W))
     path_at_orders = _table([(met_[0], met_[2]) for met_ in here], (S, n))
-    at_bands = _table([met_[:2] for met_ in met], (R, W))
+    at_bands = _table([met_[:2] for met_ in meeting_bands], (R, W))
     classes, sectors = list[_Class](), list[_Sector]()
-    for c, (rows, waves_there, on_path) in enumerate(met):
+    for c, (rows, waves_there, on_path) in enumerate(meeting_bands):
         kept = np.append(np.arange(modes), modes + waves_there)
         classes.append(
             _Class(

@@ -560,8 +560,8 @@ def supported_ring(  # noqa: PLR0913
             )
         )
     )
-    heard = sensors.moved(radial, tangential) - carried @ _compliance(rest, patches, sensors)
-    waves, sensors = shape.T @ path[:, middle], shape.T @ heard
+    at_sensors = sensors.moved(radial, tangential) - carried @ _compliance(rest, patches, sensors)
+    waves, sensors = shape.T @ path[:, middle], shape.T @ at_sensors
     mode, sine = _coordinates(ring)
     order, n_waves = np.where(sine, -1, 1) * ring.nodal_diameter[mode], waves.shape[1]
     every = FixedStructure(

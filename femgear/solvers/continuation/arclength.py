@@ -326,9 +326,9 @@ def _closing(segment: Segment, first: CurvePoint, events, count: int):
     if np.linalg.norm(offset) > 2.0 * segment.length:
         return events, False
     try:
-        met = segment.at(h)
+        point_there = segment.at(h)
     except LostError:
         return events, False
-    if np.linalg.norm(met.z - first.z) > _CLOSED or met.tangent @ first.tangent < 0.9:
+    if np.linalg.norm(point_there.z - first.z) > _CLOSED or point_there.tangent @ first.tangent < 0.9:
         return events, False
     return [e for e in events if e[0] < h - 1e-9] + [(h, replace(first, kind="regular"))], True

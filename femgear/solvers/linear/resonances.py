@@ -109,8 +109,8 @@ def modal_forces(modes: Modes, excitation: MeshExcitation, count: int, output=No
         )
     _, deflection, force = mesh_harmonics(excitation, count)
     left = force - modes.mesh_stiffness[:, None] * deflection
-    heard = slice(excitation.periods, None, excitation.periods)
-    Q = -modes.mesh_deflection.T @ left[:, heard]
+    whole_harmonics = slice(excitation.periods, None, excitation.periods)
+    Q = -modes.mesh_deflection.T @ left[:, whole_harmonics]
     elastic = np.flatnonzero(modes.frequency > 0.0)
     frequency, damping = modes.frequency[elastic], modes.damping_ratio[elastic]
     first = np.flatnonzero(np.diff(frequency, prepend=0.0) > ONE_FREQUENCY * frequency)
@@ -134,14 +134,14 @@ def crossings(forces: ModalForces, lowest: float, highest: float, up_to: float) 
     """
     harmonic = np.arange(1, forces.force.shape[1] + 1)
     at = forces.frequency[:, None] / harmonic
-    met = forces.excited & (at >= lowest) & (at <= highest) & (forces.frequency[:, None] <= up_to)
-    row, column = np.nonzero(met)
+    crossed = forces.excited & (at >= lowest) & (at <= highest) & (forces.frequency[:, None] <= up_to)
+    row, column = np.nonzero(crossed)
     along = np.argsort(at[row, column], kind="stable")
     row, column = row[along], column[along]
     return Crossings(row, harmonic[column], at[row, column])
 
 
-def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray):
+def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, level_times_damping: np.ndarray, damping: np.ndarray):
     """Add speeds at resonances (c,) whose peaks are narrower than the steps between speeds (s,), ascending.
 
     A peak of damping ratio z at speed w falls to half its power at ``w (1 - z)`` and ``w (1 + z)``. The
@@ -153,12 +153,12 @@ def refined_speeds(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray,
         Ascending, in the unit of the resonances.
     resonance, damping : (c,) arrays
         Speed and damping ratio of every resonance.
-    heard : (c,) array
+    level_times_damping : (c,) array
         Its level times its damping ratio, as of `ModalForces.heard`.
     """
     step = np.diff(speeds).max(initial=0.0) if len(speeds) > 1 else np.inf
     narrow = np.flatnonzero((damping > 0.0) & (damping * resonance < step))
-    strongest = narrow[np.argsort(-heard[narrow] / damping[narrow], kind="stable")[:_REFINED]]
+    strongest = narrow[np.argsort(-level_times_damping[narrow] / damping[narrow], kind="stable")[:_REFINED]]
     around = resonance[strongest, None] * (1.0 + damping[strongest, None] * np.array([-1.0, 0.0, 1.0]))
     inside = (around >= speeds[0]) & (around <= speeds[-1])
     return merged_speeds(speeds, around[inside])
@@ -178,13 +178,13 @@ def merged_speeds(*lists: np.ndarray) -> np.ndarray:
     return merged
 
 
-def unresolved(speeds: np.ndarray, resonance: np.ndarray, heard: np.ndarray, damping: np.ndarray) -> int:
+def unresolved(speeds: np.ndarray, resonance: np.ndarray, level_times_damping: np.ndarray, damping: np.ndarray) -> int:
     """Count the resonances (c,) that matter with no speed (s,) within half the half width of their peaks.
 
     There an amplitude is 11 % below its peak. Those count of which a twentieth of the highest level is
     expected; arguments as of `refined_speeds`.
     """
-    expected = heard / np.where(damping > 0.0, damping, np.inf)
+    expected = level_times_damping / np.where(damping > 0.0, damping, np.inf)
     counted = (expected > 0.05 * expected.max(initial=0.0)) & (resonance >= speeds[0]) & (resonance <= speeds[-1])
     distance = np.abs(speeds[:, None] - resonance[counted]).min(axis=0)
     return int(np.count_nonzero(distance > 0.5 * damping[counted] * resonance[counted]))

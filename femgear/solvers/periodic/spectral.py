@@ -581,19 +581,19 @@ def _solve_batch(modes, data: _Data, part, fundamental, kept, solved: _Solved, h
     excited, answered = kept[:, part]
     lines, leaders, group = np.arange(answered.max() + 1), data.twins.leaders, data.twins.group
     n, size, groups = len(group), len(lines), len(leaders)
-    heard = lines <= answered[:, None]
+    answered_lines = lines <= answered[:, None]
     stiffness, deflection, force = (
         harmonics_[leaders, None, :size] * (lines <= excited[:, None])
         for harmonics_ in (data.stiffness, data.deflection, data.force)
     )
-    forcing = (force - Product(stiffness)(deflection)) * heard
+    forcing = (force - Product(stiffness)(deflection)) * answered_lines
     stiffness[..., 0] -= modes.mesh_stiffness[leaders, None]
     receptance, modal = np.empty((groups, groups, len(part), size), complex), []
     for class_ in data.classes:
         modal.append(compliance(modes, 2.0 * np.pi * fundamental[part, None] * lines[class_.h], class_.used))
         between = np.moveaxis(modal[-1] @ class_.pairs + class_.residual, -1, 0)
         receptance[..., class_.h] = between.reshape(groups, groups, len(part), -1)
-    receptance *= heard
+    receptance *= answered_lines
     source, driven, moved_by = -transfer(receptance, forcing), None, None
     source[..., 0] += modes.load_deflection[leaders, None]
     if data.source is not None:
@@ -607,11 +607,11 @@ def _solve_batch(modes, data: _Data, part, fundamental, kept, solved: _Solved, h
     problem = HarmonicProblem(receptance, Product(stiffness), source)
     solved.radius[part] = spectral_radius(problem) if how.radius else np.nan
     solution, solved.iterations[part], solved.direct[part] = _solve(problem, how)
-    total = (forcing + problem.product(solution)) * heard
+    total = (forcing + problem.product(solution)) * answered_lines
     shift = data.twins.shift[:, None, :size]
     every, deflection = total[group] * shift, solution[group] * shift
     force = every + modes.mesh_stiffness[:, None, None] * deflection
-    predicted = -np.tensordot(modes.residual, every, axes=1) * heard
+    predicted = -np.tensordot(modes.residual, every, axes=1) * answered_lines
     for class_, response in zip(data.classes, modal):
         moved = -(np.moveaxis(total[:, :, class_.h], 0, -1) @ class_.rows) * response
         predicted[:, :, class_.h] += np.moveaxis(moved @ modes.mesh_deflection[:, class_.used].T, -1, 0)

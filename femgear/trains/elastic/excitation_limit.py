@@ -110,7 +110,7 @@ def first_limit(case: Case, modes: ModesResult, frequency: np.ndarray) -> Freque
 def excitation_end(
     case: Case,
     modes: ModesResult,
-    heard: Heard,
+    lines_at: Heard,
     frequency: np.ndarray,
     carrier: np.ndarray,
     level: np.ndarray | None = None,
@@ -124,12 +124,12 @@ def excitation_end(
     given, up_to = case.dynamics.mesh_harmonics, case.dynamics.up_to or modes.reach
     limit = first_limit(case, modes, frequency)
     if level is None:
-        level = order_level(heard(frequency, carrier, limit))
+        level = order_level(lines_at(frequency, carrier, limit))
     while True:
         beyond = max(2.0 * (up_to if given is None else float(limit.frequency.max())), modes.reach)
         limit = limited(case, frequency, beyond)
         try:
-            wider = order_level(heard(frequency, carrier, limit))
+            wider = order_level(lines_at(frequency, carrier, limit))
         except ConvergenceError:
             return up_to, beyond, np.full(len(frequency), np.nan)
         change = 20.0 * np.log10(wider / level)
@@ -140,7 +140,7 @@ def excitation_end(
         up_to, level = beyond, wider  # once: the modal basis carries no more
 
 
-def lost_level(case: Case, heard: Heard, frequency, beyond: float, sense: float) -> np.ndarray:
+def lost_level(case: Case, lines_at: Heard, frequency, beyond: float, sense: float) -> np.ndarray:
     """What the level loses that ends at frequencies (n,) instead of beyond, of the slowest speed [Hz] [dB].
 
     Harmonics of a stiffness that jumps fall as one over their order, so that lines of a slower speed are
@@ -148,7 +148,7 @@ def lost_level(case: Case, heard: Heard, frequency, beyond: float, sense: float)
     speed (within 1 dB from 250 to 60 rpm of the reference set).
     """
     fast = np.array([beyond / HARMONICS * (1.0 + 1e-9)])
-    lines = heard(fast, sense * 2.0 * np.pi * fast / case.ring.teeth, limited(case, fast, beyond))
+    lines = lines_at(fast, sense * 2.0 * np.pi * fast / case.ring.teeth, limited(case, fast, beyond))
     power = np.cumsum(np.abs(lines.acceleration[0]) ** 2)
     place = np.searchsorted(lines.frequency[0], frequency, side="right") - 1
     return -20.0 * np.log10(np.maximum(np.sqrt(power[place] / power[-1]), 1e-10))

@@ -34,10 +34,10 @@ def _noise(results: Any) -> Judgement:
     level, speeds = housing["level"].values, housing["speed"].values
     at = int(level.argmax())
     speed = float(speeds[at])
-    heard = (
+    at_microphone = (
         f" ({float(housing['pressure_level'][at]):.1f} dB(A) at the microphone)" if "pressure_level" in housing else ""
     )
-    answer = f"{level[at]:.3g} m/s²{heard} at {speed:,.4g} rpm"
+    answer = f"{level[at]:.3g} m/s²{at_microphone} at {speed:,.4g} rpm"
     carrier = abs(float(housing["carrier_speed"].values[at]))
     orders = housing["order"].values
     size = np.hypot(housing["lines_real"].values[at], housing["lines_imag"].values[at]) * (orders * carrier) ** 2
@@ -46,7 +46,7 @@ def _noise(results: Any) -> Judgement:
     hertz = order * carrier / (2.0 * np.pi)
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
     main = f"order {order:g} ({hertz:,.0f} Hz{_nearest_mode(results, hertz)}) makes {share:.0%} of the power"
-    sentence = f"At {speed:,.4g} rpm it has {level[at]:.3g} m/s²{heard}: {main}"
+    sentence = f"At {speed:,.4g} rpm it has {level[at]:.3g} m/s²{at_microphone}: {main}"
     if "runup" not in results.stages:
         return judge_noise(answer, sentence)
     runup = results.runup

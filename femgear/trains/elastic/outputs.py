@@ -40,11 +40,11 @@ def mesh_and_ring_outputs(
     model, basis, n_max = result.model, result.modes, result.max_diameter
     ring_rows = np.eye(len(model.system.M))[model.ring_slice]
     field = ring_field(result.ring.modes, np.eye(len(ring_rows)), output, n_max).T
-    heard, n_meshes = np.ones(2 * n_max + 1, bool), model.rigid_directions.shape[1]
+    kept_waves, n_meshes = np.ones(2 * n_max + 1, bool), model.rigid_directions.shape[1]
     if result.ring.modes.count % result.symmetry == 0:
         # planets in phase, of which one follows the other after a turn
-        heard = np.arange(-n_max, n_max + 1) % result.symmetry == 0
-    rows: Any = linalg.block_diag(np.eye(n_meshes), field[heard])
+        kept_waves = np.arange(-n_max, n_max + 1) % result.symmetry == 0
+    rows: Any = linalg.block_diag(np.eye(n_meshes), field[kept_waves])
     outputs = np.vstack([model.rigid_directions.T, ring_rows])
     values = output_response(
         basis,
@@ -54,8 +54,8 @@ def mesh_and_ring_outputs(
         load=rows @ output_load(model.system, basis, outputs),
         source=None if (source := source_output(model.system, basis, outputs)) is None else rows @ source,
     )
-    ring = np.zeros((len(values), values.shape[-1], len(heard)), complex)
-    ring[..., heard] = np.swapaxes(values[:, n_meshes:], 1, 2)
+    ring = np.zeros((len(values), values.shape[-1], len(kept_waves)), complex)
+    ring[..., kept_waves] = np.swapaxes(values[:, n_meshes:], 1, 2)
     return values[:, :n_meshes], ring
 
 

@@ -558,14 +558,15 @@ class HousingResult(StageResult):
             words = "root mean square of the acceleration of the sensor"
             variables["sensor_level"] = ("speed sensor", level, "m/s^2", words)
         if sound is not None:
-            heard, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
-            levels = {"pressure_level": (pressure_level(sound[0], frequency), f"A-weighted {heard}")}
+            pressure_words, power = "sound pressure level at the microphone, re 20 uPa", "sound power level, re 1 pW"
+            levels = {"pressure_level": (pressure_level(sound[0], frequency), f"A-weighted {pressure_words}")}
             if sound[1] is not None:
                 levels["power_level"] = power_level(sound[1], frequency), f"A-weighted {power}"
             words = _EQUIVALENT if sound[1] is not None else f"A-weighted {power}, {_ESTIMATE}"
             levels["equivalent_power_level"] = power_level(sound[2], frequency), words
             variables |= {
-                name: ("speed", values_of_level, "dB(A)", said) for name, (values_of_level, said) in levels.items()
+                name: ("speed", values_of_level, "dB(A)", meaning)
+                for name, (values_of_level, meaning) in levels.items()
             }
         judged = {} if self.judged is None else {"turn_multiplier": self.judged.multiplier}
         supported = {
@@ -910,22 +911,22 @@ def describe_housing(
     }
     form = data.attrs["form"]
     note = f"form of the signal: {form}" + (f", {data.attrs['points']} points" if form == "linear" else "")
-    heard = (
+    sound_words = (
         "microphone: {microphone_distance:g} m from the ring, which radiates over its face width in a rigid "
         "cylinder into air of {air_density:g} kg/m^3 and {sound_speed:g} m/s; "
     ).format(**data.attrs) + _RING_ALONE
     if data.attrs["method"] == "casing":
         place = f"{data.attrs['microphone_distance']:g} m from the casing"
-        heard = f"microphone: {place} in a free field, {_ESTIMATE}"
+        sound_words = f"microphone: {place} in a free field, {_ESTIMATE}"
     if not audible:
-        heard = NO_AREAS
+        sound_words = NO_AREAS
     if both:
-        heard += f"; one way: {_ONE_WAY}, and how far the level is from it"
+        sound_words += f"; one way: {_ONE_WAY}, and how far the level is from it"
         judged = data["turn_multiplier"].values
         judged = judged[np.isfinite(judged)]
-        heard += f"; {int((judged <= 1.0 + CIRCLE).sum())} of {len(judged)} speeds looked at are stable: "
-        heard += "largest Floquet multiplier over a turn of the carrier at most 1"
-    return tabulate("Housing", chosen(count), columns, (note, heard), marks)
+        sound_words += f"; {int((judged <= 1.0 + CIRCLE).sum())} of {len(judged)} speeds looked at are stable: "
+        sound_words += "largest Floquet multiplier over a turn of the carrier at most 1"
+    return tabulate("Housing", chosen(count), columns, (note, sound_words), marks)
 
 
 def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
@@ -939,9 +940,9 @@ def sensor_signals(results: Results, sampling: Sampling) -> Iterator[Signal]:
         yield Signal(name, unit, rate, sampled_signal(order, values, speed, samples=samples, rate=rate))
     if "runup" in results.stages:
         lines, pressure = run_up_lines(results.runup, results.housing.attrs)
-        heard = [("accelerometer_run_up", "m/s^2", lines.acceleration)]
-        heard += [] if pressure is None else [("microphone_run_up", "Pa", pressure)]
-        for name, unit, values in heard:
+        signals = [("accelerometer_run_up", "m/s^2", lines.acceleration)]
+        signals += [] if pressure is None else [("microphone_run_up", "Pa", pressure)]
+        for name, unit, values in signals:
             recorded = run_up_signal(lines.order, values, lines.base_speed, duration=sampling.run_up, rate=rate)
             yield Signal(name, unit, rate, recorded, steady=False)
 
@@ -953,8 +954,8 @@ def run_up_lines(runup: xr.Dataset, attributes: Mapping[str, Any]) -> tuple[Sens
     several nodal diameters a line, and no microphone there.
     """
     order, carrier = runup["order"].values, runup["carrier_speed"].values
-    heard = runup["lines_real"].values + 1j * runup["lines_imag"].values
-    displacement = -heard / (np.maximum(order, 1) * carrier[:, None]) ** 2
+    stored = runup["lines_real"].values + 1j * runup["lines_imag"].values
+    displacement = -stored / (np.maximum(order, 1) * carrier[:, None]) ** 2
     place = float(attributes["sensor_angle"]), int(attributes["ring_teeth"])
     lines = SensorLines(order, displacement, carrier, *place, runup.attrs.get("method", "exact"))
     return lines, microphone_lines(lines, attributes) if lines.method == "exact" else None
@@ -965,8 +966,8 @@ def signal_extent(results: Results, rate: float) -> dict[str, tuple[float, float
     parts = [(unit, order, np.array([speed]), v[None]) for speed, _, unit, order, v in _recordings(results)]
     if "runup" in results.stages:
         lines, pressure = run_up_lines(results.runup, results.housing.attrs)
-        heard = ("m/s^2", lines.acceleration), ("Pa", pressure)
-        parts += [(unit, lines.order, lines.base_speed, signal) for unit, signal in heard if signal is not None]
+        kinds = ("m/s^2", lines.acceleration), ("Pa", pressure)
+        parts += [(unit, lines.order, lines.base_speed, signal) for unit, signal in kinds if signal is not None]
     return line_extent(parts, rate)
 
 
@@ -976,11 +977,11 @@ def order_cuts(results: Results, form: str) -> tuple[list[str], np.ndarray]:
     The last column tells what a longer excitation changes the level of all lines [dB], NaN unknown.
     """
     lines = run_up_lines(results.runup, results.housing.attrs)[0]
-    heard = lines.order > 0
-    levels = levels_of(lines.acceleration[:, heard], lines.frequency[:, heard], form)
-    strongest = np.sort(np.argsort(-np.abs(lines.acceleration[:, heard]).max(axis=0), kind="stable")[:_CUTS])
+    fluctuating = lines.order > 0
+    levels = levels_of(lines.acceleration[:, fluctuating], lines.frequency[:, fluctuating], form)
+    strongest = np.sort(np.argsort(-np.abs(lines.acceleration[:, fluctuating]).max(axis=0), kind="stable")[:_CUTS])
     unit = form.replace("dB", "dB re 1e-6 m/s^2")
-    names = (f"order {order} [{unit}]" for order in lines.order[heard][strongest])
+    names = (f"order {order} [{unit}]" for order in lines.order[fluctuating][strongest])
     header = ["speed [rpm]", f"all lines [{unit.replace('peak', 'peak = sqrt(2) rms')}]", *names]
     speed = results.runup["speed"].values
     change = level_change_at(results.runup, speed)

@@ -119,10 +119,10 @@ def joined_speeds(parts: Sequence[HeardSpeeds]) -> HeardSpeeds:
         lines[first : first + len(part.level), np.searchsorted(order, part.order)] = part.lines
         first += len(part.level)
     largest = np.abs(lines).max(axis=0)
-    heard = largest > _SILENT * largest.max(initial=0.0)
+    audible = largest > _SILENT * largest.max(initial=0.0)
     names = {field_.name for field_ in fields(HeardSpeeds)} - {"order", "lines"}
     rest = {name: np.concatenate([getattr(part, name) for part in parts]) for name in names}
-    return HeardSpeeds(order=order[heard], lines=lines[:, heard], **rest)
+    return HeardSpeeds(order=order[audible], lines=lines[:, audible], **rest)
 
 
 def mode_levels(response: Response, field: np.ndarray, alike, harmonic, heard_speed: np.ndarray, at):
@@ -166,17 +166,17 @@ _RESONANCE = {
 }
 
 
-def resonances(modes: Modes, forces: ModalForces, met: Crossings, speed, operating) -> dict[str, Any]:
+def resonances(modes: Modes, forces: ModalForces, crossed: Crossings, speed, operating) -> dict[str, Any]:
     """Collect what is known of crossings before the run-up; their speeds and those next to them [rad/s]."""
-    mode = forces.mode[met.row]
+    mode = forces.mode[crossed.row]
     return {
         "mode": mode + 1,
         "kind": [modes.kind[i] for i in mode],
         "nodal_diameter": modes.nodal_diameter[mode],
-        "mesh_harmonic": met.harmonic,
-        "frequency": forces.frequency[met.row],
+        "mesh_harmonic": crossed.harmonic,
+        "frequency": forces.frequency[crossed.row],
         "resonance_speed": speed / RPM,
-        "share": forces.share[met.row, met.harmonic - 1],
+        "share": forces.share[crossed.row, crossed.harmonic - 1],
         "operating_speed": as_written(operating / RPM),
         "distance": 100.0 * (speed / operating - 1.0),
     }
@@ -239,24 +239,24 @@ class RunupResult(StageResult):
 
     def contents(self) -> Contents:
         """Collect the contents of runup.nc."""
-        heard, kinds = self.heard, "speed mesh_kind"
+        computed, kinds = self.heard, "speed mesh_kind"
         words = "acceleration at the sensor, single-sided amplitude"
         at = partial(np.interp, self.resonances["resonance_speed"] * RPM, self.input_speed)
         there = {
-            "resonance_level": at(heard.level),
-            "resonance_factor": np.stack([at(factor) for factor in heard.dynamic_factor.T], axis=1),
+            "resonance_level": at(computed.level),
+            "resonance_factor": np.stack([at(factor) for factor in computed.dynamic_factor.T], axis=1),
         }
         variables = {
             "mesh_frequency": ("speed", self.mesh_frequency, "Hz", "mesh frequency"),
             "carrier_speed": ("speed", self.carrier_speed, "rad/s", "speed of the carrier"),
             "excitation_limit": ("speed", self.excitation_limit, "Hz", "highest frequency of the excitation"),
             "level_change": ("speed", self.level_change, "dB", LEVEL_CHANGE),
-            "level": ("speed", heard.level, "m/s^2", "root mean square of the acceleration at the sensor"),
-            "force_rms": (kinds, heard.force_rms, "N", "root mean square of the mesh force about its mean"),
-            "force_peak": (kinds, heard.force_peak, "N", "largest mesh force"),
-            "dynamic_factor": (kinds, heard.dynamic_factor, "1", "largest mesh force over its mean, K_v"),
-            "lowest_force": ("speed", heard.lowest_force, "N", "smallest mesh force; teeth cannot pull"),
-            **complex_entries((("lines", "speed order", heard.lines, "m/s^2", words),), single=True),
+            "level": ("speed", computed.level, "m/s^2", "root mean square of the acceleration at the sensor"),
+            "force_rms": (kinds, computed.force_rms, "N", "root mean square of the mesh force about its mean"),
+            "force_peak": (kinds, computed.force_peak, "N", "largest mesh force"),
+            "dynamic_factor": (kinds, computed.dynamic_factor, "1", "largest mesh force over its mean, K_v"),
+            "lowest_force": ("speed", computed.lowest_force, "N", "smallest mesh force; teeth cannot pull"),
+            **complex_entries((("lines", "speed order", computed.lines, "m/s^2", words),), single=True),
             **declared(_RESONANCE, {**self.resonances, **there}),
         }
         return Contents(
@@ -264,7 +264,7 @@ class RunupResult(StageResult):
             coords=coordinates(speed=self.input_speed / RPM)
             | {
                 "mesh_kind": ("mesh_kind", list(KINDS), "1", "kind of mesh"),
-                "order": ("order", heard.order, "1", "carrier order"),
+                "order": ("order", computed.order, "1", "carrier order"),
             },
             attrs={
                 "title": "run-up: sensor, mesh forces and resonances over the speed",

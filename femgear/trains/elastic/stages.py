@@ -435,7 +435,7 @@ def dynamics_parts(
             response = replace(response, message=joint_message(responses))
         kept = {name: lines[-1:] for name in _LINES if (lines := getattr(response, name)) is not None}
         last = replace(response, **kept)
-        heard = response if any(math.sin(sensor.direction) for sensor in case.housing.sensor) else last
+        kept_response = response if any(math.sin(sensor.direction) for sensor in case.housing.sensor) else last
         yield (
             part,
             DynamicsResult(
@@ -445,7 +445,7 @@ def dynamics_parts(
                 ring_radial=radial,
                 speeds=tuple(member_speeds(case, gears, speed) for speed in part.operation.speeds),
                 judged=Judged(basis, excitation, frequency[numbers], decisive),
-                ring_tangential=mesh_and_ring_outputs(modes, heard, TANGENTIAL)[1],
+                ring_tangential=mesh_and_ring_outputs(modes, kept_response, TANGENTIAL)[1],
                 ring_teeth=gears.ring.teeth,
                 symmetry=modes.symmetry,
                 harmonics=int(limit.response.max()),
@@ -581,8 +581,8 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
     check_entries(dynamics, DynamicsResult, dynamic_entries(case), "dynamic response")
     place = dynamics.ring_teeth, np.array([s.carrier for s in dynamics.speeds]), case.housing.sensor_angle
     options = {"symmetry": dynamics.symmetry, "periods": dynamics.response.periods}
-    heard, width = case.housing.microphone, planetary_set(case).ring.face_width
-    angle = case.housing.sensor_angle if heard.angle is None else heard.angle
+    microphone, width = case.housing.microphone, planetary_set(case).ring.face_width
+    angle = case.housing.sensor_angle if microphone.angle is None else microphone.angle
     housing = HousingResult(
         input_speed=np.array(case.operation.speeds),
         exact=component_lines(dynamics.ring_radial, *place, **options),
@@ -592,7 +592,7 @@ def solve_housing(case: Case, dynamics: DynamicsResult) -> HousingResult:
         symmetry=dynamics.symmetry,
         excitation_limit=dynamics.excitation_limit,
         cylinder=Cylinder(case.ring.outer_radius, width),
-        microphone=Microphone(heard.distance, angle),
+        microphone=Microphone(microphone.distance, angle),
     )
     if case.housing.sensor:
         housing = replace(housing, outputs={"sensor": named_sensors(case, dynamics)})
@@ -624,13 +624,13 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
     motions = basis.shape[modes.model.ring_slice].T
     field = ring_field(modes.ring.modes, motions, RADIAL, modes.max_diameter)
     forces = modal_forces(basis, excitation, count, output=field)
-    met = crossings(forces, slowest, fastest, up_to if given is None else math.inf)
-    resonance = met.mesh_frequency / speed_of.mesh_frequency
-    heard, damping = forces.heard[met.row, met.harmonic - 1], forces.damping_ratio[met.row]
-    speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, heard, damping)
+    crossed = crossings(forces, slowest, fastest, up_to if given is None else math.inf)
+    resonance = crossed.mesh_frequency / speed_of.mesh_frequency
+    expected_level, damping = forces.heard[crossed.row, crossed.harmonic - 1], forces.damping_ratio[crossed.row]
+    speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, expected_level, damping)
     speeds = merged_speeds(operating[checked][(operating[checked] >= first) & (operating[checked] <= last)], speeds)
     beside = operating[np.abs(operating[:, None] - resonance).argmin(axis=0)]
-    resonances_ = resonances(basis, forces, met, resonance, beside)
+    resonances_ = resonances(basis, forces, crossed, resonance, beside)
     alike = np.abs(basis.frequency[:, None] / resonances_["frequency"] - 1.0) <= ONE_FREQUENCY
     nearest = [np.abs(speeds[:, None] - at).argmin(axis=0) for at in (resonance, beside)]
     frequency, carrier, parts = speed_of.mesh_frequency * speeds, speed_of.carrier * speeds, list[HeardSpeeds]()
@@ -640,21 +640,21 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
 
     def followed(numbers: np.ndarray) -> tuple[HeardSpeeds | None, list[np.ndarray]]:
         """What is kept of some speeds, and the levels of single modes at those of their resonances."""
-        response, heard = (
+        response, expected_level = (
             solve_spectral(basis, excitation, frequency[numbers], radius=False, **limit.options(case, numbers)),
             None,
         )
         if not case.housing.stands_still:
             lines = sensor_lines(case, modes, response, carrier[numbers])
-            heard = heard_speeds(response.force, lines, response.lowest_force)
+            expected_level = heard_speeds(response.force, lines, response.lowest_force)
         order = np.arange(response.force.shape[-1])[:, None] * case.ring.teeth - np.sign(speed_of.carrier) * n
         turning, levels = carrier[numbers][:, None, None] * order, []
         for at in nearest:
             inside = np.where((at >= numbers[0]) & (at <= numbers[-1]), at - numbers[0], -1)
-            levels.append(mode_levels(response, field, alike, met.harmonic, turning, inside))
+            levels.append(mode_levels(response, field, alike, crossed.harmonic, turning, inside))
         if not case.housing.stands_still:  # else the speeds in the housing are told
             progress("runup", float(numbers[-1] + 1), float(len(speeds)))  # to nobody from a second process
-        return heard, levels
+        return expected_level, levels
 
     tasks = [partial(followed, numbers) for numbers in np.split(np.arange(len(speeds)), cuts)]
     for heard_part, levels in reversed(second_process.shared(tasks[::-1])):
@@ -676,7 +676,7 @@ def solve_runup(case: Case, modes: ModesResult, *, progress: Progress = silent) 
         ring_teeth=case.ring.teeth,
         sensor_angle=case.housing.sensor_angle,
         operating_speeds=operating,
-        unresolved=unresolved(speeds, resonance, heard, damping),
+        unresolved=unresolved(speeds, resonance, expected_level, damping),
         method=lines_method(case),
     )
 

@@ -358,22 +358,22 @@ def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
     operating, (first, last) = np.array(case.operation.speeds), runup_range(case)
     row, most = modes.model.rotation @ basis.shape, _harmonics(case, basis, np.array([first * per_speed]))
     forces = modal_forces(basis, modes.excitation, int(most[0, 0]), output=row[:, None])
-    met = crossings(forces, first * per_speed, last * per_speed, math.inf)
-    resonance, mode = met.mesh_frequency / per_speed, forces.mode[met.row]
-    heard, damping = forces.heard[met.row, met.harmonic - 1], forces.damping_ratio[met.row]
-    speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, heard, damping)
+    crossed = crossings(forces, first * per_speed, last * per_speed, math.inf)
+    resonance, mode = crossed.mesh_frequency / per_speed, forces.mode[crossed.row]
+    expected_level, damping = forces.heard[crossed.row, crossed.harmonic - 1], forces.damping_ratio[crossed.row]
+    speeds = refined_speeds(np.linspace(first, last, case.runup.count), resonance, expected_level, damping)
     speeds = merged_speeds(operating[(operating >= first) & (operating <= last)], speeds)
     harmonics = _harmonics(case, basis, speeds * per_speed)
     response, motion = _linear(case, modes, speeds * per_speed, harmonics)
     nearest, beside = (np.abs(speeds_there[:, None] - resonance).argmin(axis=0) for speeds_there in (speeds, operating))
-    alone = np.abs(row[mode] * response.modal[nearest, mode, met.harmonic]) / math.sqrt(2.0)
+    alone = np.abs(row[mode] * response.modal[nearest, mode, crossed.harmonic]) / math.sqrt(2.0)
     table = {
         "mode": mode + 1,
         "kind": [basis.kind[i] for i in mode],
-        "mesh_harmonic": met.harmonic,
-        "frequency": forces.frequency[met.row],
+        "mesh_harmonic": crossed.harmonic,
+        "frequency": forces.frequency[crossed.row],
         "resonance_speed": resonance / RPM,
-        "share": forces.share[met.row, met.harmonic - 1],
+        "share": forces.share[crossed.row, crossed.harmonic - 1],
         "resonance_alone": alone,
         "operating_speed": operating[beside] / RPM,
         "distance": 100.0 * (resonance / operating[beside] - 1.0),
@@ -386,7 +386,7 @@ def solve_pair_runup(case: PairCase, modes: PairModesResult) -> PairRunupResult:
         harmonics[0] * speeds * per_speed,
         table,
         operating,
-        unresolved(speeds, resonance, heard, damping),
+        unresolved(speeds, resonance, expected_level, damping),
         *_branch(case, modes, speeds, motion.lowest),
     )
 

@@ -154,10 +154,10 @@ def _check_damping(case: PlanarCase, model: PlanarModel, spans: Iterable[tuple[f
     bare = hertz[(hertz > 0.0) & (mode_ratios(hertz, ratios) == 0.0)]
     key = "planar.damping_ratios" if case.planar.damping_ratios else "dynamics.damping_ratio"
     for lowest, highest, words in spans:
-        met = bare[(bare >= lowest) & (bare <= highest)]
-        if len(met):
+        inside = bare[(bare >= lowest) & (bare <= highest)]
+        if len(inside):
             raise CaseError(
-                f"the natural frequency {met[0]:.6g} Hz has no damping and {words}: the response has no bound there",
+                f"the natural frequency {inside[0]:.6g} Hz has no damping and {words}: the response has no bound there",
                 code="E-RESONANCE",
                 key=key,
                 value="0",
