@@ -86,7 +86,7 @@ def test_a_mutant_follows_from_its_number_and_every_case_is_cut_everywhere():
     ],
 )
 def test_what_must_not_come_out_of_a_case_file_is_a_failure(happens, words, folder, monkeypatch):
-    monkeypatch.setattr(case_text, "_STOP", 0.2)
+    monkeypatch.setattr(case_text, "_STOP", 0.5)
     monkeypatch.setattr(case_text, "MEGABYTES", 50.0)
     number = 4  # a mutant of a case without teeth, which is read at once
     case_text._warm(folder, number)
