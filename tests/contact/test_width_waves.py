@@ -120,6 +120,7 @@ def test_loads_balance_the_torque_and_go_over_the_width(gears, whole_overlap):
     assert found.helical and found.residual.max() < 1e-12
 
 
+@pytest.mark.slow
 def test_softer_teeth_are_those_of_a_softer_material(gears, bodies, waves):
     """Young's modulus and section factor scale all separations of one load alike."""
     soft = helical_stiffness(np.radians(18.75), internal=False)

@@ -62,6 +62,7 @@ def test_killed_programs_go_on(folder):
     assert tally.counts["kills"] >= 3
 
 
+@pytest.mark.slow
 def test_faults(folder):
     tally = passed(trials.run_trials("faults", faults.SHORT, folder))
     assert any(said.endswith(": 4") for said in tally.said)

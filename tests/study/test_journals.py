@@ -518,6 +518,7 @@ def test_what_a_killed_process_left_half_written_is_removed_by_the_next_sweep(fr
 POINTS = 60
 
 
+@pytest.mark.slow
 def test_a_sweep_that_is_killed_goes_on_with_the_same_command(free, tmp_path):
     """By Ctrl-C, SIGTERM and kill -9 in turn, at random lines: the same table, nothing computed twice."""
     chance = random.Random(SEED)

@@ -715,6 +715,7 @@ def test_samples_without_springs_are_those_of_runs(values, case, tmp_path):
         assert longer > 0.0 and 1 / 3 <= share <= 1.0
 
 
+@pytest.mark.slow
 def test_the_command_solves_helical_samples_as_runs(tmp_path, capsys):
     """Without a method they are exact; springs and axes askew, which they have not, are refused with a way out."""
     own = read_case(CASE.with_name("helical_23_24_73.toml"))
