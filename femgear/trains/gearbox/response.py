@@ -38,6 +38,8 @@ _MOST = 2000
 """Mesh harmonics at most."""
 _TOGETHER = 16
 """Speeds whose levels are computed at once."""
+_MANY = 64
+"""Speeds beyond which lines are kept in single precision: those of a run-up of a large gearbox fill a gigabyte."""
 _INSTANTS, _TURNS = 256, 16
 """Instants of a mesh period, and angles of the carrier, at which mesh forces are looked at."""
 
@@ -55,7 +57,8 @@ class StageLines:
     order : (L,) array
         Frequency over that of the reference shaft [1].
     motion : (v, k, L) complex array
-        Displacements of the outputs [m], see `output_rows`; NaN-free, zero beyond the harmonics of a speed.
+        Displacements of the outputs [m], see `output_rows`; NaN-free, zero beyond the harmonics of a speed. Of many
+        speeds in single precision.
     force : (v, kinds, 3) array
         Mean, largest and smallest force of a mesh of every kind (with the sun, with the ring) [N].
     mean_stiffness, spread : (kinds,) arrays
@@ -290,7 +293,8 @@ def _stage_lines(
     on_own_ring = [number for number, sensor in enumerate(sensors) if sensor.ring == stage.name]
     places = np.array([sensors[i].angle for i in on_own_ring]), np.array([sensors[i].on_ring for i in on_own_ring])
     harmonic, band, at = _line_numbers(widest, running.paths.symmetry, ring_lines(running, widest, *places))
-    motion = np.zeros((len(factors), measured, len(harmonic)), complex)
+    precision = np.complex64 if len(factors) > _MANY else np.complex128
+    motion = np.zeros((len(factors), measured, len(harmonic)), precision)
     kinds, count = running.kinds, max(len(stage.planets), 1)
     force, dynamic = np.zeros((len(factors), kinds, 3)), np.zeros((len(factors), kinds))
     approach, figures = np.full((len(factors), len(outputs) - measured), np.nan), np.zeros((5, len(factors)))
@@ -382,7 +386,7 @@ def level(response: GearboxResponse, lines: Mapping[str, np.ndarray]) -> np.ndar
 
 def accelerations(response: GearboxResponse, count: int) -> dict[str, np.ndarray]:
     """Accelerations (v, s, L) of the sensors, the first ``count`` outputs, by every stage [m/s^2]."""
-    return {
-        stage.name: -((stage.order * response.speed[:, None])[:, None] ** 2) * stage.motion[:, :count]
-        for stage in response.stages
-    }
+    moved = {stage.name: stage.motion[:, :count] for stage in response.stages}
+    squares = {stage.name: -((stage.order * response.speed[:, None])[:, None] ** 2) for stage in response.stages}
+    # of their precision
+    return {name: squares[name].astype(lines.real.dtype) * lines for name, lines in moved.items()}
