@@ -270,10 +270,11 @@ def shared_torques(found: Deflection) -> Deflection:
     """Give stages side by side the torques by which shafts, bearings and meshes share them in a loaded state."""
     model, factors = found.model, dict[str, float]()
     for stage in model.stages:
-        if any(stage.name in names for names in model.flow.side_by_side):
+        torque = abs(model.flow.first_torque(stage.section))
+        if torque and any(stage.name in names for names in model.flow.side_by_side):
             normal = stage.sizes.base_radii[0] * math.cos(stage.sizes.base_helix)
             force = found.mesh_force[list(stage.meshes[: max(len(stage.planets), 1)])].sum()
-            factors[stage.name] = float(force * normal / abs(model.flow.first_torque(stage.section)))
+            factors[stage.name] = float(force * normal / torque)
     return replace(found, model=replace(model, flow=model.flow.with_factors(factors))) if factors else found
 
 

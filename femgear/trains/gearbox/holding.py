@@ -28,6 +28,8 @@ _PART = 1e-3
 """Share of the largest motion from which on a shaft takes part in it."""
 _FREE = 0.5
 """Share of a way that free motions have of it, from which on it is one of them."""
+_ROUNDING = 1e-12
+"""Thrust of a shaft over the largest of a stage that is none."""
 _UNTAKEN = 1e-6
 """Thrust that nothing takes, over the largest one, that is rounding."""
 LARGEST_CLEARANCE = 0.1
@@ -156,17 +158,22 @@ def untaken_thrust(case: GearboxCase, flow: BoxFlow, number: int) -> Iterator[Ca
     from scipy.optimize import linprog
 
     thrust = shaft_thrusts(case, flow, number)
-    count, size = len(names), max(np.abs(thrust).max(initial=0.0), 1e-300)
+    count, size = len(names), np.abs(thrust).max(initial=0.0)
+    if not size:
+        return
     balance = np.zeros((count, len(ends)))
     for column, (inner, outer) in enumerate(ends):
         for name, sign in ((inner, 1.0), (outer, -1.0)):
             if name in names:
                 balance[names.index(name), column] += sign
     # slack of either sign at every shaft, as little as there need be
-    matrix = np.hstack([balance, np.eye(count), -np.eye(count)])
-    cost = np.concatenate([np.zeros(len(ends)), np.ones(2 * count)])
-    solved = linprog(cost, A_eq=matrix, b_eq=-thrust / size, bounds=[*bounds, *[(0.0, None)] * (2 * count)])
-    slack = solved.x[len(ends) : len(ends) + count] - solved.x[len(ends) + count :]
+    shifts = np.array(list(_shifted_thrusts(case, flow))).reshape(-1, count).T
+    matrix = np.hstack([balance, shifts / size, np.eye(count), -np.eye(count)])
+    free = len(ends) + shifts.shape[1]
+    cost = np.concatenate([np.zeros(free), np.ones(2 * count)])
+    bounds = [*bounds, *[(None, None)] * shifts.shape[1], *[(0.0, None)] * (2 * count)]
+    solved = linprog(cost, A_eq=matrix, b_eq=-thrust / size, bounds=bounds)
+    slack = solved.x[free : free + count] - solved.x[free + count :]
     for i in np.flatnonzero(np.abs(slack) > _UNTAKEN):
         yield _untaken(case, int(i), -float(slack[i]) * size, case.operation.load_case[number].name)
 
@@ -177,25 +184,39 @@ def shaft_thrusts(case: GearboxCase, flow: BoxFlow, number: int) -> np.ndarray:
     ``F tan(beta_b) / r_b`` of gear 1 with the sense of its torque and hand, the opposite of gear 2 or the ring; both
     meshes of a planet balance.
     """
+    pushes = stage_thrusts(case, flow)
+    thrust = np.sum(list(pushes.values()), axis=0) if pushes else np.zeros(len(case.shaft))
+    largest = max((np.abs(push).max(initial=0.0) for push in pushes.values()), default=0.0)
+    # hands that balance one another
+    thrust[np.abs(thrust) < _ROUNDING * largest] = 0.0
+    given = case.operation.load_case[number].force
+    for load in case.load:
+        place = [shaft.name for shaft in case.shaft].index(load.shaft)
+        thrust[place] += load.force[2] + (given[load.name][2] if load.name in given else 0.0)
+    return thrust
+
+
+def stage_thrusts(case: GearboxCase, flow: BoxFlow) -> dict[str, np.ndarray]:
+    """Compute the thrusts (n,) of every stage on all shafts [N], by its name."""
     names = [shaft.name for shaft in case.shaft]
-    thrust = np.zeros(len(names))
-
-    def add(name: str, value: float) -> None:
-        if name in names:
-            thrust[names.index(name)] += value
-
+    pushes = dict[str, np.ndarray]()
     for stage in (*case.pair, *case.planetary):
         if isinstance(stage, PairSection):
             sizes, (first, last) = pair_sizes(stage), stage.shafts
         else:
             sizes, first, last = set_sizes(stage), stage.sun, stage.ring
         push = -flow.first_torque(stage) * math.tan(sizes.base_helix) / sizes.base_radii[0]
-        add(first, push)
-        add(last, -push)
-    given = case.operation.load_case[number].force
-    for load in case.load:
-        add(load.shaft, load.force[2] + (given[load.name][2] if load.name in given else 0.0))
-    return thrust
+        pushes[stage.name] = np.array([push * ((name == first) - (name == last)) for name in names])
+    return pushes
+
+
+def _shifted_thrusts(case: GearboxCase, flow: BoxFlow) -> Iterator[np.ndarray]:
+    """Thrusts (n,) [N] where of stages side by side another one takes all that the first one would."""
+    shares, pushes = flow.torque_shares, stage_thrusts(case, flow)
+    for names in flow.side_by_side:
+        first, *others = [name for name in names if shares.get(name)] or [""]
+        for name in others:
+            yield pushes[name] / shares[name] - pushes[first] / shares[first]
 
 
 def _holders(case: GearboxCase) -> tuple[list[tuple[str, str]], list[tuple[float | None, float | None]]]:

@@ -387,3 +387,29 @@ def test_teeth_side_by_side_settle_at_the_torque_that_each_has():
         torque = -found.model.flow.first_torque(stage.section)
         assert found.contacts[stage.name].result.sun_torque == pytest.approx(torque, rel=1e-3)
     assert 0.52 < found.model.flow.torque_shares["stage"] < 0.58
+
+
+@pytest.mark.parametrize("angles", [(15, -15), (15, -10)])
+def test_herringbone_teeth_hold_a_shaft_that_floats(angles):
+    """Thrusts of both hands balance, whatever share of the torque that takes."""
+    tables = split_pair_tables()
+    for pair, helix in zip(tables["pair"], angles, strict=True):
+        pair["gears"]["helix_angle"] = f"{helix} deg"
+    del tables["bearing"][2]["axial"]
+    found = solve_deflection(read_case(tables))
+    assert np.abs(found.bearing_force[:, 2]).max() < 1e-6 * found.mesh_force.max()
+    first, second = (torques["input"] for torques in found.model.flow.stage_torque.values())
+    tangents = [math.tan(math.radians(helix)) for helix in angles]
+    assert first * tangents[0] == pytest.approx(-second * tangents[1], rel=1e-6)
+    # each alone would push it away
+    tables["pair"] = tables["pair"][:1]
+    with pytest.raises(CaseError) as refused:
+        read_case(tables)
+    assert refused.value.code == "E-MECHANISM"
+
+
+def test_stages_side_by_side_without_torque_stay_idle():
+    tables = split_pair_tables()
+    tables["operation"]["load_case"][0]["torque"] = {"motor": "0 N m"}
+    found = solve_deflection(read_case(tables))
+    assert not found.model.flow.torque_shares and not found.mesh_force.any()
