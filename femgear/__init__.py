@@ -16,12 +16,15 @@ if TYPE_CHECKING:
     from femgear.stages.static import solve_static, solve_stress
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
     from femgear.trains.reading import open_results, read_case, with_value, with_values
+    from femgear.views import figures, mesh_stiffness, summary, tables
 
 __all__ = [
     "Case",
     "FemgearError",
     "__version__",
+    "figures",
     "live",
+    "mesh_stiffness",
     "open_results",
     "planetary_set",
     "read_case",
@@ -31,6 +34,8 @@ __all__ = [
     "solve_modes",
     "solve_static",
     "solve_stress",
+    "summary",
+    "tables",
     "with_value",
     "with_values",
 ]
@@ -40,7 +45,9 @@ sys.meta_path.insert(0, FormerNames)  # type: ignore[arg-type]
 _HOME = {
     "Case": "case.planetary",
     "FemgearError": "errors",
+    "figures": "views",
     "live": "run",
+    "mesh_stiffness": "views",
     "open_results": "trains.reading",
     "planetary_set": "case.gear_set",
     "read_case": "trains.reading",
@@ -50,6 +57,8 @@ _HOME = {
     "solve_modes": "trains.elastic.stages",
     "solve_static": "stages.static",
     "solve_stress": "stages.static",
+    "summary": "views",
+    "tables": "views",
     "with_value": "trains.reading",
     "with_values": "trains.reading",
 }

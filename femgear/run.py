@@ -90,7 +90,11 @@ def grid_cache() -> Path:
 
 
 class Solution(dict[str, Any]):
-    """Results of the computed stages by name, in order."""
+    """Results of the computed stages by name, in order, and the ``case`` that they are of."""
+
+    def __init__(self, case: Any) -> None:
+        super().__init__()
+        self.case = case
 
     def __repr__(self) -> str:
         return f"<Solution: {', '.join(self) or 'no stage'}>"
@@ -122,7 +126,7 @@ def solve(case: ReadCase, only: str | None = None, *, progress: Progress = silen
         Before anything is computed: what the stages cannot represent; no such stage (E-STAGE).
     """
     case, stages = _asked(case, only)
-    results = Solution()
+    results = Solution(case)
     with one_blas_thread():
         for stage in stages:
             progress(stage.name, 0, 1)

@@ -24,6 +24,7 @@ LAYERS = (
     ("trains",),
     ("study",),
     ("run",),
+    ("views",),
     ("assistant",),
     ("app",),
     ("cli",),

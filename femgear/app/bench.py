@@ -20,16 +20,16 @@ from femgear.app.document import tables_of_text
 from femgear.case.dependencies import Steps
 from femgear.errors import CaseError, FemgearError, StorageError
 from femgear.exchange.formats import Sampling
-from femgear.findings import as_data, by_severity, once
+from femgear.findings import as_data, by_severity
 from femgear.report.charts import chart
 from femgear.report.space import space
 from femgear.report.style import png_bytes
 from femgear.stages.protocol import Drawn, Stage, Train, one_blas_thread
-from femgear.storage.contents import as_dataset
-from femgear.storage.results import Manifest, Results
+from femgear.storage.results import Results
 from femgear.trains.live import Answer
-from femgear.trains.reading import parse_case, read_case
+from femgear.trains.reading import parse_case
 from femgear.trains.registry import check_case, stages_of, train_of
+from femgear.views import results_in_memory
 
 LISTENED = 2.0
 """Duration of the sound [s], whose end goes on with its beginning as well as whole turns let it."""
@@ -162,7 +162,7 @@ class Bench:
             self._go_on()
             start = time.perf_counter()
             computed[stage.name] = answer[stage.name]
-            results = _results(case, train, computed, self.folder)
+            results = results_in_memory(case, computed, self.folder)
             number = self._number(stage.name, computed[stage.name])
             same = seen.get(stage.name) == number
             drawings = self._drawings(train, stage, results, computed, () if same else shown)
@@ -201,7 +201,7 @@ class Bench:
                 if stage is None or stage.unavailable(case):
                     return None
                 computed[name] = answer[name]
-        results = _results(case, train, computed, self.folder)
+        results = results_in_memory(case, computed, self.folder)
         signal = next((s for s in train.recorded.signals(results, Sampling(duration=LISTENED)) if s.steady), None)
         if signal is None:
             return None
@@ -247,19 +247,6 @@ class Bench:
         charts = {key: chart(figure) or {"png": _picture(figure)} for key, figure in figures_of.items()}
         there = [name for name in names if any(key == name or key.startswith(f"{name}_") for key in drawn)]
         return {"charts": charts, "names": there, "captions": {key: caption_of(train, key)[2] for key in charts}}
-
-
-def _results(case: Any, train: Train, computed: Mapping[str, Any], folder: Path) -> Results:
-    """Results in memory, as those of a run that came to its end."""
-    contents = {name: as_dataset(result.contents()) for name, result in computed.items()}
-    findings = {"": train.case_warnings(case)}
-    for name, data in contents.items():
-        stage = train.stage(name)
-        if stage is not None:
-            findings[name] = stage.findings(data)
-    everything = once(finding for of_stage in findings.values() for finding in of_stage)
-    manifest = Manifest(complete=True, files={f"{name}.nc": "" for name in contents}, findings=everything)
-    return Results(folder, manifest, read_case).with_known({"case": case} | contents)
 
 
 def _picture(figure: Any) -> str:

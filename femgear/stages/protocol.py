@@ -76,11 +76,27 @@ def blaming_start(case: Any, key: str) -> Iterator[None]:
         raise
 
 
+_SHOWN = 6
+"""Parts of a result that its short text names."""
+
+
 class StageResult:
     """What the result of every stage has beside its numbers; base of their dataclasses.
 
     A class overrides what it knows better: results of direct solutions converge, and have no residual.
     """
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Keep the short text of results, in place of which a dataclass would print megabytes of numbers."""
+        super().__init_subclass__(**options)
+        cls.__repr__ = StageResult.__repr__
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {', '.join(list(vars(self))[:_SHOWN])}; {self.message}>"
+
+    def _repr_html_(self) -> str:
+        """Tables of the result, for notebooks."""
+        return self.dataset()._repr_html_()
 
     @property
     def converged(self) -> bool:
