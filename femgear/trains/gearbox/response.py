@@ -389,4 +389,4 @@ def accelerations(response: GearboxResponse, count: int) -> dict[str, np.ndarray
     moved = {stage.name: stage.motion[:, :count] for stage in response.stages}
     squares = {stage.name: -((stage.order * response.speed[:, None])[:, None] ** 2) for stage in response.stages}
     # of their precision
-    return {name: squares[name].astype(lines.real.dtype) * lines for name, lines in moved.items()}
+    return {name: squares[name].astype(np.finfo(lines.dtype).dtype) * lines for name, lines in moved.items()}
