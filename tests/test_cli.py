@@ -286,6 +286,16 @@ def test_an_argument_that_is_missing_is_named(capsys):
     assert "-o requires an argument" in capsys.readouterr().err
 
 
+def test_the_app_says_what_it_needs(tmp_path, capsys, monkeypatch):
+    assert cli.main(["app", str(tmp_path / "none"), "--no-browser"]) == 2
+    assert "there is no such folder" in capsys.readouterr().err
+    monkeypatch.delitem(sys.modules, "femgear.app.server", raising=False)
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    assert cli.main(["app", str(tmp_path), "--no-browser"]) != 0
+    err = capsys.readouterr().err
+    assert "[E-LIBRARY]" in err and 'pip install "femgear[app]"' in err
+
+
 def test_no_arguments_and_version(capsys):
     assert cli.main([]) == 0
     assert "Usage" in capsys.readouterr().out

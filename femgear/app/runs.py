@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
 from femgear.app.worker import Requests
+from femgear.exchange.formats import Sampling
 from femgear.exchange.rexs import read_model
 from femgear.findings import as_data
 from femgear.report.compare import compare_page
-from femgear.run import run_case
+from femgear.run import export_results, run_case
 from femgear.stages.summary_data import run_data
-from femgear.storage.files import own_files, write_text
-from femgear.storage.results import run_folder
+from femgear.storage.files import list_own, own_files, write_text
+from femgear.storage.results import EXPORTED, additions, folder_lock, run_folder
 from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.imports import case_drafts
 from femgear.trains.reading import open_results, parse_case
@@ -85,6 +86,20 @@ class Runs:
         write_text(compare_page(train, *runs), place / COMPARED)
         return f"{place.name}/{COMPARED}"
 
+    def export(self, name: str, formats: Sequence[str]) -> list[str]:
+        """Write a run as files that other programs read, into its folder; returns their names.
+
+        Raises
+        ------
+        FemgearError
+            What the command ``femgear export`` refuses.
+        """
+        folder = self.folder / name
+        with folder_lock(folder), additions(folder) as new:
+            list_own(new / EXPORTED)
+            results = open_results(folder)
+            return export_results(results, new / EXPORTED, formats, Sampling(), progress=self._progress)
+
     def new(self, kind: str, given: Mapping[str, Any]) -> str:
         """Write a commented case from a few numbers, see `femgear.trains.drafts.new_case`."""
         numbers = dict(given)
@@ -116,7 +131,8 @@ class Runs:
 
 
 def serve_runs(pipe: Connection, folder: Path) -> None:
-    """Answer for a folder: `Runs.run`, `compare`, `new` and `imported`; the progress of a run comes before its end."""
+    """Answer for a folder by the functions of `Runs`; the progress of a run comes before its end."""
     requests = Requests(pipe)
     runs = Runs(folder, tell=requests.tell)
-    requests.answer({"run": runs.run, "compare": runs.compare, "new": runs.new, "imported": runs.imported})
+    names = "run", "compare", "export", "new", "imported"
+    requests.answer({name: getattr(runs, name) for name in names})

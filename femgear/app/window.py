@@ -8,7 +8,7 @@ import tempfile
 import time
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import cache
+from functools import cache, partial
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -58,6 +58,14 @@ _CHARTS_AT_FIRST = (
 )
 """What is drawn before anybody chose: the first ones that there are."""
 _MOST_AT_FIRST = 5
+_FORMATS = {
+    "csv": "tables, CSV",
+    "xlsx": "tables, a workbook",
+    "mat": "tables, MATLAB",
+    "wav": "signals, WAV",
+    "uff": "signals and modes, UFF",
+}
+"""Formats of an export, and what they are."""
 
 
 @cache
@@ -180,6 +188,9 @@ class Window:
             self._other = ui.select([], label="Compared with", multiple=True).props("dense options-dense use-chips")
             self._other.classes("min-w-48")
             ui.button("Compare", on_click=self._compare).props("flat dense no-caps")
+            with ui.button("Export", icon="download").props("flat dense no-caps"), ui.menu():
+                for form, words_of_form in _FORMATS.items():
+                    ui.menu_item(words_of_form, on_click=partial(self._export, form))
         with ui.row().classes("w-full items-center gap-2 q-px-sm") as self._progress_row:
             self._progress_text = ui.label()
             self._progress = ui.linear_progress(value=0.0, show_value=False).classes("grow").props("instant-feedback")
@@ -615,6 +626,18 @@ class Window:
         try:
             async for page in self._runs.ask("compare", *others, self._run.value):
                 self._report.props(f'src="/results/{page}"')
+        except WorkerError as error:
+            self._notify(str(error), "negative")
+
+    async def _export(self, form: str) -> None:
+        """Write the run that is shown as files of a format."""
+        if not self._run.value:
+            self._notify("choose a run")
+            return
+        try:
+            async for written in self._runs.ask("export", self._run.value, [form]):
+                if isinstance(written, list):
+                    self._notify(f"in {self._run.value}/exported: {', '.join(written)[:400]}")
         except WorkerError as error:
             self._notify(str(error), "negative")
 

@@ -34,6 +34,9 @@ def test_runs_are_those_of_the_command_and_tell_how_far_they_are(folder, text):
     assert told[-1]["done"] == told[-1]["total"] and {"stage", "done", "total"} == {*told[0]}
     with pytest.raises(FemgearError):
         runs.run(text, "a.toml", "one", False)
+    assert any(name.endswith(".csv") for name in runs.export("one", ["csv"])) and list(
+        folder.glob("one/exported/*.csv")
+    )
     runs.run(text, "a.toml", "two", False)
     assert runs.compare("one", "two") == f"one_and_two/{COMPARED}" and (folder / "one_and_two" / COMPARED).exists()
 

@@ -248,8 +248,13 @@ def test_a_run_is_computed_shown_and_compared(window, serve, tmp_path):
         assert (folder / f"set_{number}" / "manifest.json").exists()
     tab.get_by_label("Compared with").click()
     tab.get_by_role("option", name="set_1").click()
+    tab.keyboard.press("Escape")
     press(tab, "Compare")
     tab.frame_locator("iframe.report[src*='compare']").locator("table").first.wait_for()
+    press(tab, "Export")
+    tab.get_by_text("tables, CSV").click()
+    tab.get_by_text("in set_2/exported").wait_for()
+    assert list((folder / "set_2" / "exported").glob("*.csv"))
 
 
 def test_a_run_is_cancelled(window, serve, folder):
