@@ -152,7 +152,7 @@ def runup_entries(case: Case) -> Entries:
 def box_entries(stage: str, case: ReadCase) -> Entries:
     """List the entries of a gearbox that decide a stage, which goes on from the deflection alone."""
     kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup", "balance", "transient") else frozenset()
-    rubbing = _rubbing_entries(case) if stage in ("modes", "dynamics", "runup") else {}
+    rubbing = _rubbing_entries(case) if stage in ("modes", "dynamics", "runup", "balance") else {}
     return {**_entries(case, {"format", "title"} | _OIL | _BESIDE[stage], kept=kept), **rubbing}
 
 

@@ -126,7 +126,13 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
     stages = exciting_stages(found)
     for number, stage in enumerate(stages):
         progress("balance", number, len(stages))
-        drives = {stage.name: excitation_of(found, stage, steps=steps)}
+        rubs = isinstance(stage.section, PairSection)
+        drive = excitation_of(found, stage, steps=steps, friction=rubs)
+        if drive.source is not None:
+            # friction acts about its mean, which the torques of the gearbox do not know
+            mean = found.contacts[stage.name].normal_force[:, None]
+            drive = replace(drive, force=drive.force - drive.force.mean(axis=1, keepdims=True) + mean)
+        drives = {stage.name: drive}
         if wanted.together:
             others = (one for one in found.model.stages if one is not stage)
             drives |= {one.name: constant_excitation(found, one, steps=steps) for one in others}

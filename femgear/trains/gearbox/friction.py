@@ -93,9 +93,12 @@ def box_friction_findings(case: GearboxCase) -> Iterator[Finding]:
     """Tell friction that has another coefficient at speeds of the run-up (W-FRICTION), or acts nowhere (W-UNUSED)."""
     if not friction_acts(case):
         return
-    for entry, there in (("balance", case.balance.harmonics), ("transient", case.transient is not None)):
+    for entry, there, of in (
+        ("balance", case.balance.harmonics and any(stage.teeth for stage in case.planetary), " of planetary stages"),
+        ("transient", case.transient is not None, ""),
+    ):
         if there:
-            text = f"has no effect in [{entry}]: friction acts in the response and its run-up alone"
+            text = f"has no effect in [{entry}]{of}: friction acts there in the response and its run-up alone"
             yield Finding("W-UNUSED", "losses.excites", text)
     if not friction_excites(case):
         text = "has no effect: no stage has teeth whose contact is computed"

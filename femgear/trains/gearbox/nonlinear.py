@@ -18,7 +18,7 @@ which turns with the carrier: a carrier that turns or tilts as a whole feels not
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -32,7 +32,7 @@ from femgear.stages.static import mesh_backlash
 from femgear.system.assembly import GROUND, Assembly, Contact, assemble, point_approach
 from femgear.system.force_laws import Element, GearMeshes, RadialBearings, turning_wave
 from femgear.system.fourier import FourierSeries, harmonics_of, orders_of
-from femgear.system.system import MechanicalSystem, MeshExcitation, NonlinearSystem
+from femgear.system.system import HarmonicForce, MechanicalSystem, MeshExcitation, NonlinearSystem
 from femgear.system.turning_meshes import (
     TurningDirections,
     TurningMeshes,
@@ -46,7 +46,7 @@ from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, PairSe
 from femgear.trains.gearbox.deflection import Deflection, laws_of, spread_rows
 from femgear.trains.gearbox.model import GearboxModel, StageModel
 from femgear.trains.gearbox.modes import linear_system
-from femgear.trains.gearbox.stage_structure import equal_planets, in_time
+from femgear.trains.gearbox.stage_structure import equal_planets, in_time, rubbing_rows
 
 _TURNING = np.kron(np.eye(2), np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]]))
 """Time derivative of the axes of a planet at unit speed of its carrier, ``e_r' = e_t``."""
@@ -207,8 +207,28 @@ def nonlinear_gearbox(
         place = columns.shape[1] + np.array([[0, 1]])
         columns, bearings[name] = np.hstack([columns, across]), replace(ring, columns=place)
     system = replace(system, C=damping + T.T @ coriolis @ T, W=columns, load=balanced)
-    problem = NonlinearSystem(system, (*elements, *bearings.values()))
+    forces = [
+        force
+        for stage, made in zip(chosen, staged, strict=True)
+        for force in _friction_forces(found, stage, made, T, harmonics, len(bases))
+    ]
+    problem = NonlinearSystem(system, (*elements, *bearings.values()), tuple(forces))
     return NonlinearGearbox(found, problem, T, tuple(bases), np.array(frequency), tuple(staged), flanks, bearings)
+
+
+def _friction_forces(
+    found: Deflection, stage: StageModel, made: NonlinearStage, T: np.ndarray, harmonics: int, bases: int
+) -> Iterator[HarmonicForce]:
+    """Friction of a pair about its mean, as with flanks in contact, by motions (6n, m) per unit of the coordinates."""
+    if made.excitation.source is None or stage.planets:
+        return
+    columns = np.zeros((len(T), len(made.excitation.source)))
+    for column, row in zip(columns.T, rubbing_rows(found, stage)[0], strict=True):
+        for station, effect in row:
+            column[6 * station : 6 * station + 6] += effect
+    lines = harmonics_of(made.excitation.source, harmonics * made.excitation.periods)
+    for harmonic in range(1, lines.shape[1]):
+        yield HarmonicForce(T.T @ columns @ lines[:, harmonic], orders_of(made.mesh_base, bases, harmonic))
 
 
 def _rings(found: Deflection, assembly: Assembly) -> dict[str, tuple[RadialBearings, np.ndarray]]:

@@ -190,7 +190,7 @@ def running_stage(
     shape = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rows])
     waves, rubbing = None, None
     if excitation.source is not None:
-        rubbed, sliding = _rubbing_rows(found, stage)
+        rubbed, sliding = rubbing_rows(found, stage)
         of_friction = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rubbed])
         rows, of_meshes = [*rows, *rubbed], of_meshes + [True] * len(rubbed)
         rubbing = RubbingPoints(of_friction, sliding.T[free])
@@ -324,8 +324,8 @@ def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndar
     return rows, np.array(springs), np.array(points)
 
 
-def _rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray]:
-    """Points at which friction of the leading meshes acts, along their tangents, then as couples.
+def rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray]:
+    """Find the points at which friction of the leading meshes acts, along their tangents, then as couples.
 
     What they do to the structure, and sliding (F, 6) of the planet along its radial, tangential and z axes: that of all
     slices by their stiffness.

@@ -17,6 +17,7 @@ from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.stages.friction_source import balanced_source
 from femgear.system.assembly import ROTATION
 from femgear.trains.elastic.outputs import mesh_and_ring_outputs
+from femgear.trains.gearbox.balance import solve_balance
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.elastic_ring import elastic_ring, with_rings
 from femgear.trains.gearbox.excitation import excitation_of
@@ -288,9 +289,12 @@ def test_findings_tell_where_friction_is_another_or_none():
     oil = {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s", "temperature": "70 degC"}
     schlenk = {"friction": "schlenk", "roughness": "0.4 um", "excites": True}
     case = read_case(tables | {"lubricant": oil, "losses": schlenk, "runup": {"count": 3}, "balance": {"harmonics": 4}})
-    first, second = box_friction_findings(case)
-    assert (first.code, first.key) == ("W-UNUSED", "losses.excites") and "[balance]" in first.text
-    assert second.code == "W-FRICTION" and "pair" in second.text
+    (finding,) = box_friction_findings(case)
+    assert finding.code == "W-FRICTION" and "pair" in finding.text
+    planets = with_values(read_case("cases/planetary_27_40_108.toml"), {"losses": ACTS})
+    tables_of_set = gearbox_of_case(planets).tables | {"balance": {"harmonics": 4}}
+    (idle,) = box_friction_findings(read_case(tables_of_set))
+    assert (idle.code, idle.key) == ("W-UNUSED", "losses.excites") and "[balance]" in idle.text
     assert not [*box_friction_findings(read_case(tables))]
     (idle,) = box_friction_findings(read_case(tables | {"deflection": {"contact": False}}))
     assert idle.code == "W-UNUSED"
@@ -307,3 +311,21 @@ def test_a_run_tells_what_friction_adds():
         bearing["radial"] = "rigid"
     change = solve(read_case(tables), only="dynamics")["dynamics"].dataset()["friction_change"]
     assert change.dims == ("speed", "stage") and (change.values > 1.0).all()
+
+
+def test_teeth_that_might_part_have_the_friction_of_the_response():
+    """A pair that stays in contact: harmonic balance with viscous damping that is next to none, and the response."""
+    tables = case_text.parse(pair()[0].model.case.source, "")
+    tables |= {"balance": {"harmonics": 6}, "modes": {"damping_ratio": 1e-7}}
+    tables["operation"]["load_case"][0]["speed"] = {"gear 1": "450 rpm"}
+    found = solve_deflection(read_case(tables))
+    (solved,) = solve_balance(found)
+    stage = found.model.stages[0]
+    running = running_stage(found, stage, excitation_of(found, stage, friction=True)).running
+    omega = 2.0 * np.pi * found.model.flow.mesh_frequency["pair"]
+    forces = solve_running(without_loss(running), omega, 0.0, harmonics=(6, 6), tolerance=1e-13).force[0, 0, 1:, 0]
+    assert (solved.drive > 0.0).all() and solved.solution.converged
+    lines = np.fft.rfft(solved.drive[0, :, 0])[1:7] / solved.drive.shape[1]
+    assert np.abs(lines - forces).max() < 1e-5 * np.abs(forces).max()
+    quiet = solve_running(replace(without_loss(running), rubbing=None), omega, 0.0, harmonics=(6, 6)).force[0, 0, 1:, 0]
+    assert np.abs(quiet - forces).max() > 0.01 * np.abs(forces).max()
