@@ -11,6 +11,8 @@ from femgear.assistant import MOST_TEXT, SKILL, check_text, command, make_server
 from femgear.cli import main
 from femgear.errors import CaseError
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 pytest.importorskip("mcp", reason='pip install "femgear[assistant]"')
 CASE = Path(__file__).parents[1] / "cases" / "spur_pair.toml"
 TOOLS = ["list_files", "read_case", "write_case", "new", "check", "run", "results", "compare", "explain"]

@@ -15,6 +15,8 @@ from femgear.trains.gearbox.verdict import gearbox_verdict
 from femgear.trains.live import Answer, Live
 from femgear.trains.reading import open_results, read_case
 
+pytestmark = pytest.mark.usefixtures("pictures_undrawn")
+
 
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
