@@ -53,12 +53,15 @@ def draft_casing(case: GearboxCase) -> tuple[str, tuple[Finding, ...]]:
     feet, remarks = list[dict[str, Any]](), dict[str, str]()
     stiffness = [0.5 * _FOOT_SHARE * MODULUS * wall] * 3
     stiffness[down] *= 2.0
-    for number, (first, last) in enumerate(((low, low), (high, low), (low, high), (high, high))):
+    for name, first, last in (
+        ("left front", low, low),
+        ("right front", high, low),
+        ("left rear", low, high),
+        ("right rear", high, high),
+    ):
         place = np.array([0.0, 0.0, last[2]])
         place[down], place[side] = bottom[down], first[side]
-        feet.append(
-            {"name": f"foot {number + 1}", "position": _lengths(place), "stiffness": [*map(_stiffness, stiffness)]}
-        )
+        feet.append({"name": name, "position": _lengths(place), "stiffness": [*map(_stiffness, stiffness)]})
     for number in range(len(feet)):
         remarks[f"casing.foot[{number}].stiffness"] = "estimated: a strip of the lower wall"
     remarks["casing.mass"] = f"estimated: walls of {LENGTH.show(wall)} cast iron around all shafts and gears"
