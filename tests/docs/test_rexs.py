@@ -58,18 +58,19 @@ def test_a_unit_becomes_the_gearbox_of_the_page(tmp_path, monkeypatch, capsys):
 def test_a_unit_with_the_casing_of_the_page_has_a_sound(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     ParallelUnit().write(Path("unit.rexs"))
-    assert cli.main(["import", "unit.rexs", "-o", "box.toml"]) == 0
-    case = Path("box.toml")
-    coarsen(case)
-    casing = next(block for block in blocks("rexs.md") if block.startswith("[casing]"))
-    casing = casing.replace("count = 100", "count = 2")
-    case.write_text(f"{case.read_text(encoding='utf-8')}\n{casing}", encoding="utf-8")
-    (commands,) = [one.splitlines() for one in blocks("rexs.md", "sh") if "--wav" in one]
-    run, export = (line.split()[1:] for line in commands)
+    (commands,) = [block.splitlines() for block in blocks("rexs.md", "sh") if "--wav" in block]
+    imported, casing, run, export = (line.split("#")[0].split()[1:] for line in commands)
+    assert cli.main(imported) == 0
+    coarsen(Path("unit.toml"))
+    assert cli.main(casing) == 0
+    case = Path("unit_in_casing.toml")
+    text, count = re.subn(r"(?m)^count = \d+", "count = 2", case.read_text(encoding="utf-8"))
+    assert count == 1
+    case.write_text(text, encoding="utf-8")
     assert cli.main([*run, "--no-pictures"]) == 0
     assert cli.main([*export, "--duration", "0.1", "--run-up", "0.2"]) == 0
-    names = {path.name for path in Path("out/box/exported").glob("*.wav")}
-    assert len(names) == 2
+    names = {path.name for path in Path("out/unit/exported").glob("*.wav")}
+    assert len(names) == 6
     assert "sensor_top_run_up.wav" in names
 
 
