@@ -389,7 +389,8 @@ def _overlaid(*charts: dict[str, Any], names: Sequence[str] = ()) -> dict[str, A
         if not faded:
             return None
         ranges = {axis: panel[axis] | _joint(*(each[axis] for each in (panel, *same))) for axis in ("x", "y")}
-        panels.append(panel | ranges | {"traces": [*panel["traces"], *faded], "words": []})
+        traces = [_named(trace, names[0]) for trace in panel["traces"]]
+        panels.append(panel | ranges | {"traces": [*traces, *faded], "words": []})
     return first | {"panels": panels}
 
 
@@ -398,10 +399,15 @@ def _drawn(panel: dict[str, Any]) -> list[dict[str, Any]]:
     return [trace for trace in panel["traces"] if trace.get("hoverinfo") != "skip"]
 
 
+def _named(trace: dict[str, Any], name: str) -> dict[str, Any]:
+    """Curve of the first run, named after it where it has no name."""
+    return trace if trace.get("name") or trace.get("hoverinfo") == "skip" else trace | {"name": name}
+
+
 def _faded(trace: dict[str, Any], name: str, number: int) -> dict[str, Any]:
     """Curve of a run after the first: pale, dashed and named after its run."""
     line = {"line": trace["line"] | {"dash": _DASHES[number % len(_DASHES)]}} if "line" in trace else {}
-    label = f"{trace['name']}, {name}" if trace.get("name") else ""
+    label = f"{trace['name']}, {name}" if trace.get("name") else name
     return trace | line | {"name": label, "opacity": _FADED}
 
 

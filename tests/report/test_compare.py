@@ -196,6 +196,11 @@ def test_curves_of_three_runs_are_told_apart():
     assert [trace["name"] for trace in panel["traces"]] == ["level", "level, y", "level, z"]
     assert [trace["line"]["dash"] for trace in panel["traces"]] == ["solid", "dash", "dot"]
     assert panel["y"]["range"] == [1.0, 4.0]
+    unnamed = [drawn(level) for level in (1.0, 2.0)]
+    for chart in unnamed:
+        chart["panels"][0]["traces"][0]["name"] = ""
+    panel = compare._overlaid(*unnamed, names=("x", "y"))["panels"][0]
+    assert [trace["name"] for trace in panel["traces"]] == ["x", "y"]
 
 
 def test_charts_of_areas_are_not_laid_over_each_other():
