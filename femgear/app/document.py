@@ -61,7 +61,7 @@ def with_entry(text: str, key: str, value: Any) -> str:
     Raises
     ------
     CaseError
-        E-TOML: the text is no TOML. E-KEY: the key leads through something that is no table.
+        E-TOML: the text is no TOML. E-TYPE: the key leads through something that is no table.
     """
     tables = tables_of_text(text)
     if entry_of(tables, key) == value and type(entry_of(tables, key)) is type(value):
@@ -101,7 +101,7 @@ def _filled(tables: Any, key: str, value: Any) -> Any:
                 raise TypeError
         _put(inside, int(last[1:-1]) if last.startswith("[") else last, value)
     except (TOMLKitError, LookupError, TypeError, AttributeError, ValueError) as error:
-        raise CaseError("there is no place for such an entry", code="E-KEY", key=key) from error
+        raise CaseError("there is no place for such an entry", code="E-TYPE", key=key) from error
     if value is None and last.startswith("[") and not inside:
         return _filled(tables, key.removesuffix(last), None)
     return tables

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,7 @@ from typing import Any
 from nicegui import ui
 
 from femgear.app.document import entry_of
-from femgear.app.form import Entry, Table, shown_value, typed_value
+from femgear.app.form import Embedded, Entry, Table, shown_value, typed_value
 
 _HELP = Path(__file__).with_name("help.json")
 _EMPTY = ""
@@ -51,10 +52,14 @@ class Form:
         ``(key, value)``, called when a field was changed.
     pin : callable
         ``(key)``, called when an entry is wanted as a slider.
+    embedded : callable
+        Gives the form of a case within the case.
     """
 
-    def __init__(self, change: Callable[[str, Any], None], pin: Callable[[str], None]) -> None:
-        self._change, self._pin = change, pin
+    def __init__(
+        self, change: Callable[[str, Any], None], pin: Callable[[str], None], embedded: Embedded = lambda value: None
+    ) -> None:
+        self._change, self._pin, self._embedded = change, pin, embedded
         self._fields = dict[str, tuple[Entry, Any]]()
         self._folds = dict[str, Any]()
         self._open = set[str]()
@@ -153,7 +158,11 @@ class Form:
         shown = [entry for entry in entries if entry.needed or entry.name in value]
         others = [entry for entry in entries if entry not in shown]
         for entry in shown:
-            self._field(entry, prefix + entry.name, value.get(entry.name))
+            inner = self._embedded(value.get(entry.name))
+            if inner is not None:
+                self._fold(replace(inner, name=entry.name), prefix + entry.name, value.get(entry.name))
+            else:
+                self._field(entry, prefix + entry.name, value.get(entry.name))
         if not others:
             return
         key = f"{prefix}*"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import tomllib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
@@ -218,15 +218,19 @@ def _as_toml(text: str) -> Any:
         return text
 
 
-def keys_of(table: Table, tables: Any, key: str = "") -> Iterator[str]:
+Embedded = Callable[[Any], "Table | None"]
+"""Gives the form of a case within a case, as the teeth of a stage; None of any other value."""
+
+
+def keys_of(table: Table, tables: Any, key: str = "", embedded: Embedded = lambda value: None) -> Iterator[str]:
     """List the keys of all entries that a case file gives, by a form of its kind."""
     for name, value in tables.items() if isinstance(tables, dict) else ():
         inner, part = f"{key}.{name}".lstrip("."), table.part(name)
         if isinstance(part, Table) and part.listed and isinstance(value, list):
             for number, row in enumerate(value):
-                yield from keys_of(part, row, f"{inner}[{number}]")
-        elif isinstance(part, Table):
-            yield from keys_of(part, value, inner)
+                yield from keys_of(part, row, f"{inner}[{number}]", embedded)
+        elif isinstance(part, Table) or (part := embedded(value)) is not None:
+            yield from keys_of(part, value, inner, embedded)
         else:
             yield inner
 

@@ -74,6 +74,16 @@ def _form_table(model: str | None) -> Table:
     return table_of_schema(case_schema(model))
 
 
+def _embedded(value: Any) -> Table | None:
+    """Form of a case within a case, as the teeth of a stage; None of any other value."""
+    if not isinstance(value, dict) or not isinstance(value.get("set"), dict):
+        return None
+    try:
+        return _form_table(value.get("model"))
+    except (FemgearError, TypeError):
+        return None
+
+
 class Window:
     """One window, of one browser: what it edits and computes is its own.
 
@@ -155,7 +165,7 @@ class Window:
         with ui.tab_panels(tabs, value=form).classes("w-full grow") as panels:
             panels.props("keep-alive")
             with ui.tab_panel(form).classes("p-2"):
-                self._form = Form(self._change_entry, self._pin)
+                self._form = Form(self._change_entry, self._pin, _embedded)
             with ui.tab_panel(text).classes("p-0 h-full"):
                 self._text = ui.codemirror(language="TOML", on_change=self._typed, line_wrapping=True)
                 self._text.classes("w-full h-full")
@@ -309,9 +319,12 @@ class Window:
     def _slider(self, key: str, tables: Any) -> Slider | None:
         """Slider of an entry of the tables of the case; as it was, where it still reaches."""
         part: Any = _form_table(tables.get("model"))
+        value: Any = tables
         for name in key.replace("]", "").replace("[", ".").split("."):
+            value = entry_of(value, f"[{name}]" if name.isdigit() else name)
             if not name.isdigit() and isinstance(part, Table):
                 part = part.part(name)
+                part = part if isinstance(part, Table) else _embedded(value) or part
         slider = slider_of(key, entry_of(tables, key), part if isinstance(part, Entry) else None)
         former = self._pins.get(key)
         if slider is None or former is None or former.unit != slider.unit:
@@ -332,7 +345,7 @@ class Window:
     def _show_sliders(self, tables: Any) -> None:
         """Draw the sliders anew, those of the usual entries where there are none."""
         if not self._pins:
-            keys = list(keys_of(_form_table(tables.get("model")), tables))
+            keys = list(keys_of(_form_table(tables.get("model")), tables, embedded=_embedded))
             listed = {key: row for key in keys if isinstance(row := entry_of(tables, key), list)}
             keys += [f"{key}[{number}]" for key, row in listed.items() for number in range(len(row))]
             self._pins = {key: slider for key in usual_keys(keys) if (slider := self._slider(key, tables)) is not None}

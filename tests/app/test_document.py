@@ -80,7 +80,7 @@ def test_an_entry_is_taken_out():
 def test_there_is_no_place_for_it(key):
     with pytest.raises(CaseError) as refused:
         with_entry(TEXT, key, 1)
-    assert refused.value.code == "E-KEY" and refused.value.key == key
+    assert refused.value.code == "E-TYPE" and refused.value.key == key
 
 
 @pytest.mark.parametrize("text", ("a = ", "[a", "a = 1\na = 2", "a = " + 2000 * "["))

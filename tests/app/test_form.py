@@ -152,3 +152,16 @@ def test_what_is_dragged_most_comes_first():
     ]
     assert usual_keys(keys) == [keys[3], keys[2], keys[4], keys[1]]
     assert len(usual_keys(f"ring.modifications[{i}].amount" for i in range(20))) == 6
+
+
+def test_cases_within_a_case_have_forms_of_their_own():
+    tables = tomllib.loads((CASES[0].parent / "e_axle.toml").read_text("utf-8"))
+    box = table_of_schema(case_schema("gearbox"))
+    pair = table_of_schema(case_schema("pair"))
+
+    def embedded(value):
+        return pair if isinstance(value, dict) and value.get("model") == "pair" else None
+
+    keys = [*keys_of(box, tables, embedded=embedded)]
+    assert "pair[0].teeth.gear_1.teeth" in keys and "pair[0].teeth" not in keys
+    assert "pair[0].teeth" in [*keys_of(box, tables)]
