@@ -58,6 +58,7 @@ class Bench:
     def __init__(self, folder: Path, *, cache: Path | None = None, waiting: Callable[[], bool] = lambda: False):
         self.folder, self._cache, self._waiting = folder, cache, waiting
         self._steps, self._seconds = Steps(), dict[str, float]()
+        self._read: tuple[tuple[str, str], Any] | None = None
         self._latest = dict[str, tuple[Any, int]]()
         self._full_scale = 0.0
 
@@ -83,7 +84,7 @@ class Bench:
             **{"problems": [], "findings": [], "values": {}, "stages": [], "front": []},
         }
         try:
-            case = parse_case(text, name=str(self.folder / name))
+            case = self._case(text, name)
         except (FemgearError, OSError) as error:
             return seen | {"problems": _problems(error)}
         train = train_of(case)
@@ -104,12 +105,12 @@ class Bench:
 
     def tables(self, text: str, name: str) -> list[dict[str, Any]]:
         """Describe a case in tables, as ``femgear check`` does."""
-        case = parse_case(text, name=str(self.folder / name))
+        case = self._case(text, name)
         return [asdict(block) for block in train_of(case).describe(case)]
 
     def gears(self, text: str, name: str) -> dict[str, Any] | None:
         """Draw the bodies of a case in space, as `femgear.report.space` does; None where there is nothing to draw."""
-        case = parse_case(text, name=str(self.folder / name))
+        case = self._case(text, name)
         bodies = train_of(case).bodies
         drawn = [] if bodies is None else list(bodies(case))
         if not drawn:
@@ -149,7 +150,7 @@ class Bench:
         Superseded
             A newer text waits.
         """
-        case = parse_case(text, name=str(self.folder / name))
+        case = self._case(text, name)
         check_case(case)
         train, of_run = train_of(case), {stage.name: stage for stage in stages_of(case)}
         answer = Answer(case, self._steps, cache=self._cache, progress=self._go_on)
@@ -190,7 +191,7 @@ class Bench:
         """
         from scipy.io import wavfile
 
-        case = parse_case(text, name=str(self.folder / file))
+        case = self._case(text, file)
         train = train_of(case)
         if train.recorded is None:
             return None
@@ -212,6 +213,12 @@ class Bench:
         wavfile.write(stream, signal.rate, np.round(32767 * share).astype(np.int16))
         wav = base64.b64encode(stream.getvalue()).decode("ascii")
         return {"name": signal.name, "unit": signal.unit, "largest": largest, "wav": wav}
+
+    def _case(self, text: str, name: str) -> Any:
+        """Read a case, which several questions are asked about."""
+        if self._read is None or self._read[0] != (text, name):
+            self._read = (text, name), parse_case(text, name=str(self.folder / name))
+        return self._read[1]
 
     def _number(self, stage: str, result: Any) -> int:
         """Number of a result of a stage, another one for every other result."""

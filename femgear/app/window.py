@@ -427,10 +427,8 @@ class Window:
             self._send([{"what": "end", "text": "The case is refused: see what is wrong below the form."}])
             return
         self._send([{"what": "begin"}])
-        async for model in self._bench.ask("gears", text, name):
-            if name == self.session.name and (drawing := json.dumps(model)) != self._gears:
-                self._gears = drawing
-                self._send([{"what": "space", "model": model}])
+        if not self._gears:
+            await self._show_gears(text, name)
         shown, stages = list(self._charts.value or ()), [stage["name"] for stage in self._seen["stages"]]
         parts = self._bench.ask("answer", text, name, shown, stages, dict(self._drawn))
         drawn = False
@@ -451,6 +449,7 @@ class Window:
     async def _rest(self, text: str, name: str, start: float) -> None:
         """Let the case be heard and describe it, once all numbers are there."""
         self._send([{"what": "end", "seconds": time.perf_counter() - start}])
+        await self._show_gears(text, name)
         async for blocks in self._bench.ask("tables", text, name):
             self._send([{"what": "tables", "blocks": blocks}])
         if self._listen.value and not self._changed.is_set():
@@ -458,6 +457,13 @@ class Window:
                 self._show_sound(sound)
         elif not self._listen.value:
             self._sound.clear()
+
+    async def _show_gears(self, text: str, name: str) -> None:
+        """Show the gears in space where they have changed."""
+        async for model in self._bench.ask("gears", text, name):
+            if name == self.session.name and (drawing := json.dumps(model)) != self._gears:
+                self._gears = drawing
+                self._send([{"what": "space", "model": model}])
 
     async def _next(self, parts: Any, *, interrupt: bool) -> Any:
         """Next part of an answer; None at its end, `_NEWER` where something changed and it may be interrupted."""
