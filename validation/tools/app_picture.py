@@ -1,4 +1,4 @@
-"""Draw docs/images/app.png, the window of the app on the reference set, with Chromium::
+"""Draw docs/front/app.png, the window of the app on the reference set, with Chromium::
 
 python validation/tools/app_picture.py
 """
@@ -32,18 +32,19 @@ def main() -> None:
             assert address is not None
             options = ["--no-sandbox", "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
             browser = playwright.chromium.launch(executable_path=CHROMIUM, args=options)
-            tab = browser.new_page(viewport={"width": 1500, "height": 950}, reduced_motion="reduce")
+            tab = browser.new_page(viewport={"width": 1080, "height": 660}, reduced_motion="reduce")
             tab.goto(address[0])
             answers = tab.frame_locator("iframe.answers")
             answers.locator("#state", has_text=re.compile("^computed")).wait_for(timeout=WAIT)
-            for name in ("sun", "operation"):
+            for name in ("operation",):
                 tab.locator(".q-item__label", has_text=re.compile(f"^{name}$")).click()
             tab.wait_for_timeout(3000)
             picture = tab.screenshot()
             browser.close()
             server.terminate()
-    image = Image.open(io.BytesIO(picture)).convert("RGB").quantize(128, dither=Image.Dither.NONE)
-    image.save(ROOT / "docs" / "images" / "app.png", optimize=True)
+    image = Image.open(io.BytesIO(picture)).convert("RGB")
+    image = image.quantize(24, method=Image.Quantize.MAXCOVERAGE, kmeans=2, dither=Image.Dither.NONE)
+    image.save(ROOT / "docs" / "front" / "app.png", optimize=True)
 
 
 if __name__ == "__main__":

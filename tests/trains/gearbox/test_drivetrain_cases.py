@@ -56,11 +56,12 @@ def test_a_file_is_read_as_a_gearbox_and_stays_one():
     assert case.load_case.torque["motor"] == pytest.approx((0.5 * 60 + 0.3 * 90 + 1.2 * 120) / 2.0)
 
 
-def test_stages_side_by_side_are_refused_by_their_names():
-    """Tooth numbers do not share out their torques, which the former train did by stiffness."""
-    with pytest.raises(CaseError, match="'a-b' and 'a-b 2'") as refused:
-        read_case(TEXT)
-    assert refused.value.code == "E-TORQUE" and refused.value.remedy
+def test_stages_side_by_side_share_by_their_stiffness():
+    """As the former train did: of springs between the same shafts the stiffer one takes more, in their ratio."""
+    found = solve_deflection(read_case(TEXT))
+    assert found.model.flow.side_by_side == (("a-b", "a-b 2"),)
+    # 3e8 and 1e8 N/m
+    assert found.model.flow.torque_shares == pytest.approx({"a-b": 0.75, "a-b 2": 0.25}, rel=1e-9)
 
 
 def waves(case) -> dict[str, np.ndarray]:
