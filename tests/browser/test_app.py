@@ -262,6 +262,7 @@ def test_a_run_is_cancelled(window, serve, folder):
     answer_to(tab)
     press(tab, "Run")
     tab.get_by_role("dialog").get_by_role("button", name="Run").click()
+    tab.get_by_role("dialog").wait_for(state="hidden")
     press(tab, "Cancel")
     tab.get_by_role("button", name="Cancel", exact=True).wait_for(state="hidden")
     assert not (folder / "set_1" / "report.html").exists()
