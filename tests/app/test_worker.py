@@ -1,9 +1,10 @@
 """A process beside the window: answers in order, ended when it is not wanted."""
 
 import asyncio
+import os
+import socket
 from multiprocessing import Pipe
 from pathlib import Path
-from threading import Thread
 
 import pytest
 
@@ -67,21 +68,14 @@ def test_requests_tell_what_they_know_on_the_way():
     def refuses():
         raise CaseError("it cannot be", code="E-CASE", key="a.b", remedy="do this")
 
-    functions = {"tells": tells, "up": gives_up, "refuses": refuses}
-
-    def serve():
-        with pytest.raises((EOFError, OSError)):
-            requests.answer(functions)
-
-    serving = Thread(target=serve)
-    serving.start()
-    mine.send((1, "tells", ()))
+    for number, name in enumerate(("tells", "gives_up", "refuses"), start=1):
+        mine.send((number, name, ()))
+    # nothing more will be asked, and answers can still be read
+    with socket.socket(fileno=os.dup(mine.fileno())) as asking:
+        asking.shutdown(socket.SHUT_WR)
+    with pytest.raises(EOFError):
+        requests.answer({"tells": tells, "gives_up": gives_up, "refuses": refuses})
     assert [mine.recv() for _ in range(3)] == [(1, "value", "begins"), (1, "value", "ends"), (1, END, None)]
-    mine.send((2, "up", ()))
     assert [mine.recv() for _ in range(2)] == [(2, "value", 1), (2, END, None)]
-    mine.send((3, "refuses", ()))
     number, kind, words = mine.recv()
     assert (number, kind) == (3, "failed") and "E-CASE" in words and "do this" in words
-    mine.close()
-    serving.join(5.0)
-    assert not serving.is_alive()
