@@ -33,7 +33,6 @@ from femgear.views import results_in_memory
 
 LISTENED = 2.0
 """Duration of the sound [s], whose end goes on with its beginning as well as whole turns let it."""
-_MOST_SENSORS = 6
 _HEADROOM = 4.0
 """Full scale of the sound over the largest sample of the first one: later ones may be louder."""
 

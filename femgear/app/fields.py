@@ -137,7 +137,7 @@ class Form:
             with ui.row().classes("w-full items-center no-wrap"):
                 ui.label(f"{words(table.name)} {number + 1}").classes("grow font-bold")
                 removed = f"{key}[{number}]"
-                button = ui.button(icon="delete", on_click=partial(self._changed_list, removed, None))
+                button = ui.button(icon="delete", on_click=partial(self._change, removed, None))
                 button.props(f'flat dense round size=sm aria-label="Remove {words(table.name)} {number + 1}"')
             self._inside(table, f"{key}[{number}]", row if isinstance(row, dict) else {})
         needed = [part for part in table.parts if isinstance(part, Entry) and part.needed]
@@ -228,11 +228,7 @@ class Form:
         first = needed[0] if needed else next(part for part in table.parts if isinstance(part, Entry))
         value = first.choices[0] if first.choices else 1 if first.kind in ("integer", "number") else _EMPTY
         self._open.add(key)
-        self._changed_list(f"{key}[{number}].{first.name}", value)
-
-    def _changed_list(self, key: str, value: Any) -> None:
-        """Change a list of tables, which is drawn anew."""
-        self._change(key, value)
+        self._change(f"{key}[{number}].{first.name}", value)
 
 
 def _sentence(said: Mapping[str, str]) -> str:

@@ -6,7 +6,7 @@ import asyncio
 import json
 import tempfile
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, partial
 from itertools import count
@@ -52,6 +52,10 @@ _KEPT_EVERY = 0.7
 """Between two looks after what is not saved [s]."""
 _DRAGGED = 0.3
 """While one drags, an answer may take so long before the next one begins [s]."""
+_LONGEST = 3.0
+"""So long where nothing of it could be shown yet [s]."""
+_LOOK = 0.05
+"""Between two looks whether something changed [s]."""
 _CHARTS_AT_FIRST = (
     *("static_transmission_error", "load_sharing", "contact_pattern", "order_spectrum", "sensor_spectra"),
     *("dynamic_spectrum", "campbell", "run_up_levels", "load_patterns", "mode_shapes", "spatial_mode_shapes"),
@@ -150,7 +154,11 @@ class Window:
                 ("Save as", "save_as", self._save_as),
             ):
                 ui.button(text, icon=icon, on_click=act).props("flat dense no-caps color=white")
-            for text, icon, act in (("Undo", "undo", self._undo), ("Redo", "redo", self._redo)):
+            for text, icon, act in (
+                ("Undo", "undo", self._undo),
+                ("Redo", "redo", self._redo),
+                ("Back to the file", "history", self._discard),
+            ):
                 ui.button(icon=icon, on_click=act).props(f'flat dense round color=white aria-label="{text}"').tooltip(
                     text
                 )
@@ -299,6 +307,11 @@ class Window:
         if self.session.redo():
             self._text_changed()
 
+    def _discard(self) -> None:
+        """Go back to what is saved; undo brings the changes back."""
+        self.session.discard()
+        self._text_changed()
+
     def _save(self) -> None:
         try:
             self.session.save()
@@ -432,16 +445,17 @@ class Window:
         shown, stages = list(self._charts.value or ()), [stage["name"] for stage in self._seen["stages"]]
         parts = self._bench.ask("answer", text, name, shown, stages, dict(self._drawn))
         drawn = False
-        while True:
-            part = await self._next(parts, interrupt=drawn and time.perf_counter() - start > _DRAGGED)
-            if part is None:
-                break
-            if part is _NEWER or name != self.session.name:
+
+        def superseded() -> bool:
+            """Whether something changed, and this answer has had its time."""
+            patience = _DRAGGED if drawn else _LONGEST
+            return self._changed.is_set() and time.perf_counter() - start > patience
+
+        while (part := await self._next(parts, superseded)) is not None:
+            if name != self.session.name:
                 return
             self._show_part(part)
-            drawn = drawn or bool(part["charts"]) or not part["same"]
-            if self._changed.is_set() and drawn and time.perf_counter() - start > _DRAGGED:
-                return
+            drawn = drawn or not part["same"]
         if self._changed.is_set():
             return
         await self._rest(text, name, start)
@@ -465,19 +479,15 @@ class Window:
                 self._gears = drawing
                 self._send([{"what": "space", "model": model}])
 
-    async def _next(self, parts: Any, *, interrupt: bool) -> Any:
-        """Next part of an answer; None at its end, `_NEWER` where something changed and it may be interrupted."""
+    async def _next(self, parts: Any, superseded: Callable[[], bool]) -> dict[str, Any] | None:
+        """Next part of an answer; None at its end, and where it is superseded."""
         waiting = asyncio.ensure_future(anext(parts, None))
-        deadline = None if interrupt else _DRAGGED
         while not waiting.done():
-            await asyncio.wait({waiting}, timeout=0.05)
-            if not waiting.done() and self._changed.is_set() and interrupt:
+            await asyncio.wait({waiting}, timeout=_LOOK)
+            if not waiting.done() and superseded():
                 waiting.cancel()
-                return _NEWER
-            if deadline is not None and not waiting.done():
-                deadline -= 0.05
-                interrupt = interrupt or deadline < -10 * _DRAGGED
-        return waiting.result()
+                return None
+        return None if superseded() else waiting.result()
 
     def _show_seen(self, seen: dict[str, Any]) -> None:
         """Show what is said of a text, beside its fields and below."""
@@ -668,9 +678,6 @@ class Window:
         finally:
             self._bench.stop()
             self._runs.stop()
-
-
-_NEWER = object()
 
 
 def _in_list(key: str, form: Any) -> bool:

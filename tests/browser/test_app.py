@@ -304,6 +304,9 @@ def test_nothing_is_lost_with_the_server(window, serve, folder):
     assert (folder / "set.toml").read_text() == coarse_case()
     again = window(serve(folder))
     again.get_by_text("changes that were not saved are back").wait_for()
+    press(again, "Back to the file")
+    again.get_by_text("saved", exact=True).wait_for()
+    press(again, "Undo")
     assert saved(again, folder)["operation"]["torque"] == "123 N m"
 
 
