@@ -96,3 +96,33 @@ def solve_exactly(
             ratio[column] = {other: -value for other, value in row.items() if other != column}
     relations, _ = reduce_rows(rest, [*reversed(given)])
     return ExactSolution(ratio, free, tuple(relations.values()))
+
+
+def whole_echelon(rows: Sequence[Sequence[int]]) -> tuple[list[list[int]], list[list[int]]]:
+    """Bring a matrix of whole numbers to echelon form by whole row operations that can be undone (Euclid).
+
+    Returns
+    -------
+    echelon, factors : lists of lists of int
+        ``echelon = factors @ rows``, rows of zeros last. The factors of these are a basis of all whole sums of the
+        rows that vanish.
+    """
+    count = len(rows)
+    echelon = [[int(value) for value in row] for row in rows]
+    factors = [[int(i == j) for j in range(count)] for i in range(count)]
+    top = 0
+    for column in range(len(echelon[0]) if count else 0):
+        while True:
+            filled = [i for i in range(top, count) if echelon[i][column]]
+            if len(filled) < 2:
+                break
+            pivot = min(filled, key=lambda i: abs(echelon[i][column]))
+            for i in (i for i in filled if i != pivot):
+                times = echelon[i][column] // echelon[pivot][column]
+                for matrix in (echelon, factors):
+                    matrix[i] = [value - times * other for value, other in zip(matrix[i], matrix[pivot], strict=True)]
+        if filled:
+            for matrix in (echelon, factors):
+                matrix[top], matrix[filled[0]] = matrix[filled[0]], matrix[top]
+            top += 1
+    return echelon, factors

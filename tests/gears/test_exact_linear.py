@@ -6,7 +6,7 @@ from random import Random
 
 import pytest
 
-from femgear.gears.exact_linear import reduce_rows, solve_exactly
+from femgear.gears.exact_linear import reduce_rows, solve_exactly, whole_echelon
 
 
 def determinant(matrix):
@@ -61,3 +61,15 @@ def test_columns_that_nobody_names_are_zero():
 def test_equations_that_repeat_others_vanish():
     rows = [{0: Fraction(1), 1: Fraction(2)}, {0: Fraction(1, 3), 1: Fraction(2, 3)}]
     assert reduce_rows(rows, [0]) == ({0: {0: 1, 1: 2}}, [])
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whole_operations_leave_an_echelon_and_can_be_undone(seed):
+    random = Random(seed)
+    rows = [[random.randint(-9, 9) for _ in range(3)] for _ in range(random.randint(1, 5))]
+    echelon, factors = whole_echelon(rows)
+    product = [[sum(f * row[j] for f, row in zip(some, rows, strict=True)) for j in range(3)] for some in factors]
+    assert product == echelon
+    assert abs(determinant(factors)) == 1
+    first = [next((n for n, value in enumerate(row) if value), 3 + i) for i, row in enumerate(echelon)]
+    assert first == sorted(set(first))

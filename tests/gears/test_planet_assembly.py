@@ -1,0 +1,217 @@
+"""Tests of the angles at which planets fit, of their marks, and of Willis' equation of any planetary set."""
+
+import itertools
+import math
+import random
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from femgear.errors import GeometryError
+from femgear.gears.planet_assembly import (
+    assembly_places,
+    assembly_step,
+    double_gears,
+    nearest_places,
+    ravigneaux_gears,
+    simple_gears,
+    stepped_gears,
+    timing_marks,
+    tooth_relations,
+    willis_conditions,
+)
+from femgear.gears.power_flow import (
+    planetary_condition,
+    power_flow,
+    ravigneaux_conditions,
+    stepped_condition,
+)
+from femgear.gears.shaft_graph import StageGears
+
+
+def random_set(draw: random.Random, kind: str) -> StageGears:
+    """Gears of a kind of set with teeth that need not run: fits and ratios are matters of numbers alone."""
+    small, large = draw.randint(5, 19), draw.randint(20, 41)
+    first, second, other = draw.randint(5, 19), draw.randint(5, 19), draw.randint(42, 59)
+    return {
+        "simple": lambda: simple_gears(small, first, large),
+        "stepped": lambda: stepped_gears(small, first, second, large),
+        "double": lambda: double_gears(small, first, second, large),
+        "Ravigneaux": lambda: ravigneaux_gears(small, first, second, 7, large),
+        "two rings": lambda: stepped_gears(small, first, second, large, first_ring=other),
+    }[kind]()
+
+
+KINDS = ("simple", "stepped", "double", "Ravigneaux", "two rings")
+
+
+def places_by_trial(gears: StageGears) -> np.ndarray:
+    """All places of a branch in one turn [turns], found by rolling it around the sun after every insertion of teeth.
+
+    A branch whose bodies are put in at every tooth one after the other is rolled around the first central gear until
+    the last mesh is in order, and kept if all others are.
+    """
+    teeth, meshes = gears.teeth, gears.meshes
+    together = dict(gears.bodies) | {b: a for a, b in gears.bodies}
+    free = sorted({g for mesh in meshes for g in mesh[:2]} - {*gears.shafts})
+    bodies = [g for g in free if g not in together or g < together[g]]
+    found = []
+    for inserted in itertools.product(*(range(teeth[body]) for body in bodies)):
+        # turn of every gear as offset + slope * place, seen from the branch: central gears turn back
+        turn = {g: (0.0, -1.0) for g in gears.shafts}
+        waiting, checks = list(meshes), []
+        while waiting:
+            mesh = next(m for m in waiting if m[0] in turn or m[1] in turn)
+            waiting.remove(mesh)
+            first, second, sense = mesh
+            if first in turn and second in turn:
+                checks.append(mesh)
+                continue
+            known, new = (first, second) if first in turn else (second, first)
+            offset, slope = (sense * teeth[known] / teeth[new] * value for value in turn[known])
+            teeth_in = inserted[bodies.index(new if new in bodies else together[new])]
+            turn[new] = offset + teeth_in / teeth[new], slope
+            if new in together:
+                turn[together[new]] = turn[new]
+        rows = [
+            [teeth[a] * x - sense * teeth[b] * y for x, y in zip(turn[a], turn[b], strict=True)]
+            for a, b, sense in checks
+        ]
+        offset, slope = rows[-1]
+        low, high = sorted((offset, offset + slope))
+        at = (np.arange(math.ceil(low - 1e-9), high + 1e-9) - offset) / slope
+        for offset, slope in rows[:-1]:
+            at = at[np.abs(offset + slope * at - np.rint(offset + slope * at)) < 1e-7]
+        found.append(at)
+    places = np.sort(np.concatenate(found))
+    places = places[(places > -1e-9) & (places < 1.0 - 1e-7)]
+    return places[np.diff(places, prepend=-1.0) > 1e-7]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_planets_fit_where_rolling_them_around_with_all_teeth_finds_places(kind):
+    draw = random.Random(kind)
+    for _ in range(100):
+        gears = random_set(draw, kind)
+        step = assembly_step(gears)
+        expected = np.arange(step.denominator) / step.denominator
+        np.testing.assert_allclose(places_by_trial(gears), expected, atol=1e-9, err_msg=str(gears.teeth))
+
+
+@pytest.mark.parametrize(
+    ("gears", "step"),
+    [
+        (simple_gears(27, 40, 108), Fraction(1, 27 + 108)),
+        (stepped_gears(24, 40, 16, 80), Fraction(8, 24 * 16 + 40 * 80)),
+        (double_gears(20, 15, 18, 70), Fraction(1, 70 - 20)),
+        (ravigneaux_gears(30, 36, 18, 20, 72), Fraction(1, math.gcd(72 - 30, 72 + 36))),
+    ],
+)
+def test_the_steps_are_those_of_the_closed_forms(gears, step):
+    assert assembly_step(gears) == step
+
+
+def test_equal_gears_of_a_stepped_planet_make_a_simple_set():
+    assert assembly_step(stepped_gears(27, 40, 40, 108)) == assembly_step(simple_gears(27, 40, 108))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_teeth_stand_in_gaps_where_the_marks_of_the_planets_say(kind):
+    draw = random.Random(f"marks {kind}")
+    for _ in range(40):
+        gears = random_set(draw, kind)
+        turn = assembly_step(gears) * draw.randint(0, 200)
+        turns = {gear: -turn for gear in gears.shafts} | timing_marks(gears, turn)
+        turns |= {second: turns[first] for first, second in gears.bodies}
+        for first, second, sense in gears.meshes:
+            passed = gears.teeth[first] * turns[first] - sense * gears.teeth[second] * turns[second]
+            assert passed.denominator == 1, (gears.teeth, first, second)
+
+
+def test_marks_are_the_smallest_turns_and_say_where_no_planet_fits():
+    # both gears of this planet stand again as they did after an eighth of a turn
+    gears = stepped_gears(24, 40, 16, 80)
+    assert all(0 <= timing_marks(gears, n * assembly_step(gears))["first planet"] < Fraction(1, 8) for n in range(90))
+    with pytest.raises(GeometryError, match="do not fit"):
+        timing_marks(gears, assembly_step(gears) / 2)
+
+
+def test_planets_off_their_places_are_refused_with_the_nearest_angles():
+    gears, third = stepped_gears(23, 41, 17, 81), 2.0 * math.pi / 3.0
+    with pytest.raises(GeometryError, match="do not assemble") as refusal:
+        assembly_places(gears, (0.0, third, 2.0 * third))
+    near = [float(angle) for angle in refusal.value.remedies[0].split(": ")[1].removesuffix(" deg").split(", ")]
+    assert near == pytest.approx([0.0, 120.0, 240.0], abs=0.5 * 360.0 / 3712 + 1e-6)
+    step = 2.0 * math.pi * assembly_step(gears)
+    angles = [0.3 + place * step for place in nearest_places(assembly_step(gears), (0.0, third, 2.0 * third))]
+    assert assembly_places(gears, angles) == (0, 1237, 2475)
+
+
+def free_speeds(gears: StageGears, given: dict[str, Fraction]) -> dict[str, Fraction]:
+    """Speeds of all gears and the carrier from those given, every gear by the teeth that pass in its meshes."""
+    speed = dict(given)
+    twins = dict(gears.bodies) | {b: a for a, b in gears.bodies}
+    while len(speed) < len(gears.teeth) + 1:
+        before = len(speed)
+        for first, second, sense in gears.meshes:
+            for known, new in ((first, second), (second, first)):
+                if known in speed and new not in speed:
+                    passed = (speed[known] - speed["carrier"]) * gears.teeth[known]
+                    speed[new] = speed["carrier"] + sense * passed / gears.teeth[new]
+        speed |= {twins[gear]: value for gear, value in list(speed.items()) if gear in twins}
+        assert len(speed) > before
+    return speed
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_willis_equation_holds_for_the_speeds_that_teeth_pass_on(kind):
+    draw = random.Random(f"speeds {kind}")
+    for _ in range(40):
+        gears = random_set(draw, kind)
+        names = [gear for gear in gears.shafts if gear != "carrier"]
+        start = {"carrier": Fraction(draw.randint(-9, 9)), names[0]: Fraction(draw.randint(-9, 9))}
+        speed = free_speeds(gears, start)
+        conditions = willis_conditions("set", gears)
+        assert len(conditions) == len(names) - 1
+        for condition in conditions:
+            assert sum(weight * speed[shaft] for shaft, weight in condition.weights.items()) == 0
+        flow = power_flow(
+            [*gears.shafts], conditions, speeds={k: float(v) for k, v in start.items()}, torques={}, outputs=names[1:]
+        )
+        shares = flow.speed_ratio[names[-1]]
+        assert sum(share * start[shaft] for shaft, share in shares.items()) == speed[names[-1]]
+
+
+def test_the_relations_are_those_of_the_known_sets():
+    of_simple = planetary_condition("set", "sun", "carrier", "ring", 27, 108)
+    assert willis_conditions("set", simple_gears(27, 40, 108))[0].weights == of_simple.weights
+    of_double = planetary_condition("set", "sun", "carrier", "ring", 20, 70, double=True)
+    assert willis_conditions("set", double_gears(20, 15, 18, 70))[0].weights == of_double.weights
+    of_stepped = stepped_condition("set", "sun", "carrier", "ring", 23, 41, 17, 81)
+    assert willis_conditions("set", stepped_gears(23, 41, 17, 81))[0].weights == of_stepped.weights
+
+
+def gear_of(conditions, held: str, driven: str, out: str) -> Fraction:
+    """Speed of the driven over that of the output shaft."""
+    shafts = ["small sun", "large sun", "carrier", "ring"]
+    flow = power_flow(shafts, conditions, speeds={out: 1.0}, torques={driven: 1.0}, held=[held], outputs=[out])
+    return flow.speed_ratio[driven][out]
+
+
+def test_a_ravigneaux_set_has_its_published_gears():
+    # 30/36/72 teeth: four forward gears of 2.40, 1.47, 1.00, 0.67 and reverse 2.00, as of the Ford AOD transmission
+    any_set = willis_conditions("set", ravigneaux_gears(30, 36, 18, 20, 72))
+    known = ravigneaux_conditions("set", "small sun", "large sun", "carrier", "ring", 30, 36, 72)
+    for conditions in (any_set, known):
+        assert gear_of(conditions, "carrier", "small sun", "ring") == Fraction(72, 30)
+        assert gear_of(conditions, "large sun", "small sun", "ring") == Fraction(22, 15)
+        assert gear_of(conditions, "large sun", "carrier", "ring") == Fraction(2, 3)
+        assert gear_of(conditions, "carrier", "large sun", "ring") == -2
+
+
+def test_gears_without_teeth_or_without_a_ring_of_their_own_are_refused():
+    with pytest.raises(GeometryError, match="0 teeth"):
+        tooth_relations(simple_gears(27, 0, 108))
+    with pytest.raises(GeometryError, match="turn with the carrier"):
+        assembly_step(double_gears(30, 12, 12, 30))
