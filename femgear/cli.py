@@ -54,6 +54,7 @@ try:
     from femgear.errors import CaseError, FemgearError, StorageError, nvh_library, printable
     from femgear.exchange.formats import Sampling
     from femgear.findings import FindingWarning
+    from femgear.measured.requests import LineSearch, Recording
     from femgear.storage.files import noted_interrupts, storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
@@ -673,6 +674,38 @@ def compare(*runs: Path, output: Annotated[Path, Parameter(name=("--output", "-o
     _print(compared(train, *opened))
     write_text(compare_page(train, *opened), output / "compare.html")
     _say(f"page: {output / 'compare.html'}")
+    return 0
+
+
+@app.command
+def measured(
+    case: Path,
+    signal: Path,
+    /,
+    *,
+    recording: Annotated[Recording | None, Parameter(name="*")] = None,
+    search: Annotated[LineSearch | None, Parameter(name="*")] = None,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+) -> int:
+    """Say of every line of a recording whether a healthy set makes it, unequal planets, a fault, or none of these.
+
+    Parameters
+    ----------
+    case
+        TOML case file of a planetary set whose ring stands still.
+    signal
+        Recording of a sensor on the housing: text in columns, WAV or MATLAB file (docs/measured.md).
+    output
+        Folder of lines.csv, order_spectrum.csv and lines.png. Default: none is written.
+    """
+    from femgear.measured.verdict import measured_into
+    from femgear.trains.reading import read_case
+
+    data = read_case(case)
+    blocks, names = measured_into(data, signal, recording or Recording(), search or LineSearch(), output)
+    _print(blocks)
+    if names:
+        _say(f"files in {output}: {', '.join(names)}")
     return 0
 
 

@@ -20,6 +20,7 @@ LAYERS = (
     ("case",),
     ("storage",),
     ("report", "exchange"),
+    ("measured",),
     ("stages",),
     ("trains",),
     ("study",),

@@ -159,12 +159,15 @@ class LineVerdict:
         `NORMAL`, `UNEQUAL` or `FOREIGN`.
     reason : str
         Why, and the turns of sun or planets that give this order.
+    part : str
+        ``"sun"`` or ``"planet"`` where the turns of that part alone give the order, which is no whole one.
     """
 
     nearest: int
     factor: float
     verdict: str
     reason: str
+    part: str = ""
 
 
 def spacing_symmetry(planet_angles) -> int:
@@ -208,15 +211,15 @@ def classify_line(
         shared = "factor zero: by sun and ring, which unequally spaced planets share"
         return LineVerdict(nearest, factor, NORMAL, "" if factor > _ZERO else shared)
     turns = [turn for turn in _turns(order, teeth, g, tolerance) if not (whole and turn[1])]
-    turned = min(turns, key=lambda turn: turn[0] + turn[1])[2] if turns else ""
+    *_, turned, part = min(turns, key=lambda turn: turn[0] + turn[1]) if turns else ("", "")
     if whole:
         words = f"no multiple of {g}" + (f"; {turned}" if turned else "")
         return LineVerdict(nearest, factor, UNEQUAL, words)
-    return LineVerdict(nearest, factor, UNEQUAL if turned else FOREIGN, turned or "no whole carrier order")
+    return LineVerdict(nearest, factor, UNEQUAL if turned else FOREIGN, turned or "no whole carrier order", part)
 
 
-def _turns(order: float, teeth, symmetry: int, tolerance: float) -> Iterator[tuple[int, int, str]]:
-    """Turns of sun and planet that give an order: how many, carrier orders beside a mesh harmonic, words."""
+def _turns(order: float, teeth, symmetry: int, tolerance: float) -> Iterator[tuple[int, int, str, str]]:
+    """Turns of sun and planet that give an order: how many, carrier orders beside a mesh harmonic, words, part."""
     ring, sun, planet = teeth
     parts = (("the sun", sun and sun_ratio(sun, ring), symmetry), ("a planet", planet and ring / planet, 1))
     for (name, rate, step), k in product(parts, [turn for n in range(1, _MOST_TURNS + 1) for turn in (n, -n)]):
@@ -227,7 +230,8 @@ def _turns(order: float, teeth, symmetry: int, tolerance: float) -> Iterator[tup
         if abs(rest - whole) <= tolerance and whole % step == 0:
             n, beside = abs(k), whole - harmonic
             words = f"{harmonic} {'+' if k > 0 else '-'} {n} turn{'s' * (n > 1)} of {name}"
-            yield n, abs(beside), words + (f" {'+' if beside > 0 else '-'} {abs(beside)}" if beside else "")
+            words += f" {'+' if beside > 0 else '-'} {abs(beside)}" if beside else ""
+            yield n, abs(beside), words, name.split()[-1]
 
 
 def find_lines(order, amplitude, *, threshold: float) -> np.ndarray:

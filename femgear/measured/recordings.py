@@ -1,0 +1,90 @@
+"""From the file of a recording to a signal over the angle of the carrier, whatever program wrote it."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from femgear.case.quantities import SPEED, to_si
+from femgear.errors import CaseError
+from femgear.measured.channels import Channel, choose_channel
+from femgear.measured.csv_signals import read_csv_signals
+from femgear.measured.heard_set import HeardSet
+from femgear.measured.requests import Recording
+from femgear.measured.sampled_files import read_matlab_signals, read_wav_signals
+from femgear.measured.turns import AngleSignal, Turns, aligned_speed, constant_turns, resample_turns, turns_of_pulses
+
+_READERS = {".wav": read_wav_signals, ".mat": read_matlab_signals}
+
+
+def read_channels(path: str | os.PathLike, *, rate: float | None = None) -> tuple[Channel, ...]:
+    """Read all channels of a recording: WAV, MATLAB, or text in columns, by the end of its name.
+
+    CaseError: what the reader of the format refuses (E-FILE), with the file and what to do.
+
+    Parameters
+    ----------
+    path : path
+        Of the file.
+    rate : float, optional
+        Samples a second [Hz], where the file does not say so.
+    """
+    reader = _READERS.get(Path(path).suffix.lower(), read_csv_signals)
+    return reader(path, rate=rate)
+
+
+def read_by_turns(path: str | os.PathLike, recording: Recording, shafts: HeardSet) -> AngleSignal:
+    """Read a signal and sample it anew over the angle of the carrier.
+
+    CaseError: what `read_channels`, `turns_of_pulses` and `resample_turns` refuse (E-FILE); neither pulses nor a speed,
+    or both, a member that stands still (E-SPEED).
+    """
+    channels = read_channels(path, rate=recording.rate)
+    others = [channel for channel in channels if recording.pulses not in (None, channel.name)]
+    turns, others = _pulses(channels, recording, shafts) if recording.pulses is not None else (None, others)
+    signal = choose_channel(others if recording.channel is None else channels, recording.channel)
+    if (turns is None) == (recording.speed is None):
+        raise CaseError(
+            "the speed of a recording",
+            code="E-SPEED",
+            key="--speed",
+            value="neither" if turns is None else "both",
+            limit="pulses of a shaft, or a constant speed",
+            remedy="name the channel of the pulses by --pulses, or give --speed of the input",
+        )
+    if turns is None:
+        turns = constant_turns(signal, _carrier_speed(signal, recording, shafts))
+    return resample_turns(signal, turns)
+
+
+def _pulses(channels: Sequence[Channel], recording: Recording, shafts: HeardSet) -> tuple[Turns, list[Channel]]:
+    """Turns of the carrier by pulses of a member, and the other channels."""
+    pulses = choose_channel(channels, recording.pulses, "--pulses")
+    member = recording.pulses_of or shafts.input
+    ratio = shafts.carrier_per_turn.get(member, 0.0)
+    if not ratio or recording.per_turn < 1:
+        raise CaseError(
+            "pulses that tell no angle",
+            code="E-SPEED",
+            key="--pulses-of",
+            value=f"{recording.per_turn} a turn of the {member}",
+            limit=f"1 or more a turn of {' or '.join(shafts.carrier_per_turn)}",
+        )
+    turns = turns_of_pulses(pulses, recording.per_turn).of_shaft(ratio)
+    return turns, [channel for channel in channels if channel.name != pulses.name]
+
+
+def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> float:
+    """Constant speed of the carrier [1/s]."""
+    speed = abs(to_si(recording.speed or "", SPEED)) * shafts.carrier_per_turn[shafts.input] / (2 * np.pi)
+    if speed == 0.0:
+        raise CaseError(
+            "at rest nothing is heard", code="E-SPEED", key="--speed", value=recording.speed, limit="not zero"
+        )
+    if recording.within is None:
+        return speed
+    orders = shafts.symmetric_orders(harmonics=3)
+    return aligned_speed(signal, speed, orders[orders * speed < signal.rate / 3], recording.within)

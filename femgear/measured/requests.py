@@ -1,0 +1,60 @@
+"""What a user says of a recording: its channels, its speed, which lines are looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from femgear.errors import CaseError
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Which signal of a file is looked at, and what tells the angle of a shaft.
+
+    Parameters
+    ----------
+    channel
+        Name or number of the channel of the sensor, where the file has several.
+    rate
+        Samples a second [Hz], where the file does not say so.
+    pulses
+        Name or number of the channel of the pulses.
+    pulses_of
+        Member whose turns they count, sun, ring or carrier. Default: the input.
+    per_turn
+        Pulses in a turn.
+    speed
+        Constant speed of the input with its unit, where there are no pulses.
+    within
+        Share of that speed within which the one is searched at which the lines stand best on orders of the set.
+    """
+
+    channel: str | None = None
+    rate: float | None = None
+    pulses: str | None = None
+    pulses_of: Literal["sun", "ring", "carrier"] | None = None
+    per_turn: int = 1
+    speed: str | None = None
+    within: float | None = None
+
+
+@dataclass(frozen=True)
+class LineSearch:
+    """Which lines are looked at.
+
+    Parameters
+    ----------
+    threshold
+        Level over the strongest line from which on lines are looked at [dB].
+    tolerance
+        Distance of orders that count as one. Default: half the step of the spectrum, 0.02 or more.
+    """
+
+    threshold: float = -30.0
+    tolerance: float | None = None
+
+    def __post_init__(self):
+        if not -200.0 <= self.threshold < 0.0:
+            limit = "-200 dB up to below 0"
+            raise CaseError("no such level", code="E-RANGE", key="--threshold", value=self.threshold, limit=limit)

@@ -1,0 +1,224 @@
+"""The angle of a shaft during a recording, and signals sampled anew over that angle.
+
+A pulse channel tells when a shaft has turned by a part of a turn. Between pulses the time is a cubic spline of the
+angle, and the signal is interpolated at equal steps of the angle: computed order tracking, K. R. Fyfe and E. D. S.
+Munck, Analysis of computed order tracking, Mech. Syst. Signal Process. 11 (1997) 187-205; P. D. McFadden,
+Interpolation techniques for time domain averaging of gear vibration, the same, 3 (1989) 87-97.
+
+Signals are interpolated by quintic splines. Their response is that of M. Unser, A. Aldroubi and M. Eden, B-spline
+signal processing, IEEE Trans. Signal Process. 41 (1993) 821-833: sinc(f/fs)^6 over the samples of the spline, -0.15 dB
+at a third of the rate fs. Orders above that are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from femgear.errors import CaseError
+from femgear.measured.channels import Channel
+
+_HYSTERESIS = 0.1
+"""Share of the height of pulses on either side of the middle that noise may cross."""
+_FEWEST_SMOOTHED = 12
+_NEIGHBOURS = 9
+_LONG, _SHORT = 1.5, 0.6
+"""Interval of pulses over the median of its neighbours that is a lost pulse, or one too many."""
+_FINEST = 4.0
+"""Samples between pulses, at least."""
+_HIGHEST = 1.0 / 3.0
+"""Highest frequency of lines over the samples a second: the interpolation leaves 98 % of it."""
+_MOST_SAMPLES = 100_000_000
+LEAST_TURNS = 4
+"""Turns of a record below which whole orders are not told apart through a Hann window."""
+
+
+@dataclass(frozen=True)
+class Turns:
+    """The angle of a shaft: at the ``time`` (k,) [s], ascending, it has made so many ``turns`` (k,), ascending too."""
+
+    time: np.ndarray
+    turns: np.ndarray
+
+    def times(self, turns: np.ndarray) -> np.ndarray:
+        """Times [s] at which the shaft has made so many turns, by a cubic spline."""
+        from scipy.interpolate import CubicSpline
+
+        if len(self.time) == 2:
+            return np.interp(turns, self.turns, self.time)
+        return CubicSpline(self.turns, self.time)(turns)
+
+    def of_shaft(self, ratio: float) -> Turns:
+        """Turns of a shaft that turns ``ratio`` times as fast."""
+        return Turns(self.time, self.turns * abs(ratio))
+
+    @property
+    def speeds(self) -> tuple[float, float]:
+        """Least and largest speed between pulses [1/s]."""
+        speed = np.diff(self.turns) / np.diff(self.time)
+        return float(speed.min()), float(speed.max())
+
+
+@dataclass(frozen=True)
+class AngleSignal:
+    """A signal at equal steps of the angle of a shaft.
+
+    Parameters
+    ----------
+    name, unit : str
+        Of the channel.
+    values : (turns * per_turn,) array
+        Samples in the unit.
+    turns, per_turn : int
+        Whole turns, and samples in each of them.
+    highest_order : float
+        Highest order of the shaft that the recording holds at its largest speed.
+    speed : float
+        Mean speed of the shaft [1/s].
+    """
+
+    name: str
+    unit: str
+    values: np.ndarray
+    turns: int
+    per_turn: int
+    highest_order: float
+    speed: float
+
+
+def turns_of_pulses(channel: Channel, per_turn: int = 1) -> Turns:
+    """Find the turns of a shaft from its pulses: their rising edges, at the level above the middle.
+
+    CaseError: E-FILE: fewer than three pulses, a lost one, one too many, too few samples between them.
+
+    Parameters
+    ----------
+    channel : Channel
+        Of the pulses, such as the voltage of a tachometer.
+    per_turn : int
+        Pulses in a turn of the shaft.
+    """
+    from scipy.ndimage import median_filter
+
+    values, levels = channel.values, (channel.values.min(), channel.values.max())
+    middle, margin = 0.5 * (levels[0] + levels[1]), _HYSTERESIS * (levels[1] - levels[0])
+    side = np.where(values > middle + margin, 1, np.where(values < middle - margin, -1, 0))
+    decided = np.flatnonzero(side)
+    rising = np.flatnonzero((side[decided][:-1] < 0) & (side[decided][1:] > 0)) + 1
+    edge = decided[rising]
+    before, after = values[edge - 1], values[edge]
+    time = channel.start + (edge - (after - middle - margin) / (after - before)) / channel.rate
+    if len(time) < 3:
+        remedy = "name the channel of the tachometer by --pulses, or record more turns"
+        raise channel.problem(f"{len(time)} pulses", limit="3 or more", remedy=remedy)
+    interval = np.diff(time)
+    ratio = interval / median_filter(interval, min(_NEIGHBOURS, len(interval)), mode="nearest")
+    if np.median(interval) * channel.rate < _FINEST:
+        limit, remedy = f"{_FINEST:g} or more", "take pulses of a slower shaft, or sample them faster"
+        value = f"{np.median(interval) * channel.rate:.3g}"
+        raise channel.problem("too few samples between pulses", value=value, limit=limit, remedy=remedy)
+    wrong = np.flatnonzero((ratio > _LONG) | (ratio < _SHORT))
+    if len(wrong):
+        lost = ratio[wrong[0]] > _LONG
+        raise channel.problem(
+            f"{'a pulse is missing' if lost else 'there is a pulse too many'} at {time[wrong[0]]:.6g} s, "
+            f"and {len(wrong) - 1} other intervals are wrong",
+            value=f"{ratio[wrong[0]]:.3g} times the interval of the neighbours",
+            limit=f"{_SHORT:g} to {_LONG:g} times",
+            remedy="cut the record there, or mend the channel; the angle is not guessed",
+        )
+    time = _unquantised(time, channel.rate)
+    return Turns(time, np.arange(len(time)) / per_turn)
+
+
+def _unquantised(time: np.ndarray, rate: float) -> np.ndarray:
+    """Smooth times [s] of edges, which lie between two samples and may be known to a step alone.
+
+    By the cubic spline whose penalty on curvature is chosen by generalised cross-validation: P. Craven and G. Wahba,
+    Smoothing noisy data with spline functions, Numer. Math. 31 (1979) 377-403. It may move no time by more than a step.
+    """
+    from scipy.interpolate import make_smoothing_spline
+
+    if len(time) < _FEWEST_SMOOTHED:
+        return time
+    number = np.arange(len(time), dtype=float)
+    even = time[0] + number * (time[-1] - time[0]) / (len(time) - 1)
+    smooth = even + make_smoothing_spline(number, (time - even) * rate)(number) / rate
+    return np.clip(smooth, time - 1.0 / rate, time + 1.0 / rate)
+
+
+def constant_turns(channel: Channel, speed: float) -> Turns:
+    """Take the speed of a shaft as constant [1/s] over a recording."""
+    time = np.array([channel.start, channel.start + (len(channel.values) - 1) / channel.rate])
+    return Turns(time, (time - time[0]) * speed)
+
+
+def aligned_speed(channel: Channel, speed: float, orders: np.ndarray, within: float) -> float:
+    """Find the constant speed near a nominal one [1/s] at which lines of a signal stand best at some orders.
+
+    That of the largest sum of squares of the spectrum (Hann window) at the orders. It is a guess as good as the
+    speed was constant; pulses are better. CaseError: E-RANGE: a range within which the next lines would fit as well.
+
+    Parameters
+    ----------
+    orders : (k,) array
+        Orders of the shaft at which lines are expected, two of them apart by g at least.
+    within : float
+        Largest share of the nominal speed that the speed may differ by.
+    """
+    most = 0.4 * float(np.diff(np.unique(orders)).min()) / float(orders.max())
+    if not 0.0 < within <= most:
+        message, remedy = "lines next to one another would fit as well", "measure the speed, or record its pulses"
+        raise CaseError(message, code="E-RANGE", key="--within", value=within, limit=f"{most:.3g}", remedy=remedy)
+    values = (channel.values - channel.values.mean()) * np.hanning(len(channel.values))
+    power = np.abs(np.fft.rfft(values, 2 * len(values))) ** 2  # twice as fine, so that no line lies between
+    step = channel.rate / (2 * len(values))
+    count = int(np.ceil(within * speed * float(orders.max()) / (0.5 * step)))
+    speeds = speed * (1.0 + within * np.arange(-count, count + 1) / count)
+    place = np.rint(np.multiply.outer(speeds, orders) / step).astype(int)
+    score = np.where(place < len(power), power[np.minimum(place, len(power) - 1)], 0.0).sum(axis=1)
+    return float(speeds[score.argmax()])
+
+
+def resample_turns(channel: Channel, turns: Turns) -> AngleSignal:
+    """Sample a signal anew at equal steps of the angle of a shaft, over all whole turns of both records.
+
+    The steps are so fine that no sample of the recording is skipped at the slowest speed. CaseError: E-FILE: fewer
+    than four whole turns, a record of pulses that ends long before the signal; E-MEMORY: too many samples.
+    """
+    from scipy.ndimage import map_coordinates
+
+    end = channel.start + (len(channel.values) - 1) / channel.rate
+    inside = (turns.time >= channel.start) & (turns.time <= end)
+    covered = (turns.time[inside][-1] - turns.time[inside][0]) / (end - channel.start) if inside.sum() > 1 else 0.0
+    kept = Turns(turns.time[inside], turns.turns[inside])
+    whole = int(np.floor(kept.turns[-1] - kept.turns[0] + 1e-9)) if covered else 0
+    if whole < LEAST_TURNS:
+        message, remedy = (
+            f"{whole} whole turns of the carrier",
+            "record more turns: as many as one over the step of orders",
+        )
+        raise channel.problem(message, limit=f"{LEAST_TURNS} or more", remedy=remedy)
+    if covered < 0.5:
+        message, value = "pulses cover a part of the signal alone", f"{covered:.0%} of {channel.duration:.4g} s"
+        remedy = "check the rate of either channel, or cut the signal to the time of the pulses"
+        raise channel.problem(message, value=value, limit="50 % or more", remedy=remedy)
+    slowest, fastest = kept.speeds
+    per_turn = int(np.ceil(channel.rate / slowest))
+    if whole * per_turn > _MOST_SAMPLES:
+        raise CaseError(
+            "the speed changes too much for one spectrum",
+            code="E-MEMORY",
+            file=channel.file,
+            value=f"{slowest * 60:.4g} to {fastest * 60:.4g} rpm: {whole * per_turn:.3g} samples",
+            limit=f"{_MOST_SAMPLES:.3g} samples",
+            remedy="cut the record to a part of its speeds",
+        )
+    times = kept.times(kept.turns[0] + np.arange(whole * per_turn) / per_turn)
+    if not np.all(np.diff(times) > 0):
+        message, remedy = "the angle between pulses does not grow", "use more pulses a turn, or cut the record"
+        raise channel.problem(message, value=f"{slowest * 60:.4g} to {fastest * 60:.4g} rpm", remedy=remedy)
+    values = map_coordinates(channel.values, [(times - channel.start) * channel.rate], order=5, mode="mirror")
+    highest, mean = _HIGHEST * channel.rate / fastest, whole / (times[-1] - times[0])
+    return AngleSignal(channel.name, channel.unit, values, whole, per_turn, float(highest), float(mean))

@@ -1,0 +1,147 @@
+"""The command ``femgear measured``: a recording of a gear set, and what every line of its spectrum says."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from femgear.housing.orders import OrderSpectrum, spacing_symmetry
+from femgear.measured.figures import draw_side_bands
+from femgear.measured.heard_set import HeardSet, heard_set
+from femgear.measured.lines import (
+    VERDICTS,
+    MeasuredLine,
+    chance,
+    judge_lines,
+    order_tolerance,
+    sharpened_lines,
+    windowed_spectrum,
+)
+from femgear.measured.recordings import read_by_turns
+from femgear.measured.requests import LineSearch, Recording
+from femgear.measured.turns import AngleSignal
+from femgear.report.style import save_figure
+from femgear.report.tables import Block
+from femgear.storage.files import own_files, write_csv
+
+_SHOWN = 40
+"""Lines of the printed table."""
+_LINES, _SPECTRUM, _FIGURE = "lines.csv", "order_spectrum.csv", "lines.png"
+_HALF_WIDTH = 12
+_HARMONICS = 3
+
+
+@dataclass(frozen=True)
+class MeasuredVerdict:
+    """What a recording says about a set.
+
+    Parameters
+    ----------
+    heard : HeardSet
+        The set.
+    signal : AngleSignal
+        Over the angle of the carrier.
+    spectrum : OrderSpectrum
+        Through a Hann window.
+    lines : tuple of MeasuredLine
+        Ascending.
+    tolerance : float
+        Distance of orders that count as one.
+    """
+
+    heard: HeardSet
+    signal: AngleSignal
+    spectrum: OrderSpectrum
+    lines: tuple[MeasuredLine, ...]
+    tolerance: float
+
+
+def measured_verdict(
+    case: Any, path: str | os.PathLike, recording: Recording, search: LineSearch | None = None
+) -> MeasuredVerdict:
+    """Compute the order spectrum of a recording and give every line its verdict.
+
+    CaseError: a case or a recording that cannot be used; see `heard_set`, `read_by_turns` and `order_tolerance`.
+    """
+    heard, search = heard_set(case), search or LineSearch()
+    signal = read_by_turns(path, recording, heard)
+    tolerance = order_tolerance(signal.turns, search.tolerance)
+    spectrum = windowed_spectrum(signal)
+    lines = judge_lines(*sharpened_lines(spectrum, search.threshold), heard.angles, heard.teeth, tolerance)
+    return MeasuredVerdict(heard, signal, spectrum, lines, tolerance)
+
+
+def measured_into(
+    case: Any, path: str | os.PathLike, recording: Recording, search: LineSearch, output: Path | None
+) -> tuple[list[Block], list[str]]:
+    """Judge the lines of a recording, and write them, the spectrum and a figure into a folder if there is one.
+
+    Returns the tables to print and the names of the files.
+    """
+    verdict = measured_verdict(case, path, recording, search)
+    names = []
+    if output is not None:
+        names = [_LINES, _SPECTRUM, _FIGURE]
+        own_files(output, names)
+        _write(verdict, search, output)
+    return list(described(verdict, search)), names
+
+
+def described(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[Block]:
+    """Tabulate the recording and its lines."""
+    signal, heard = verdict.signal, verdict.heard
+    symmetry = spacing_symmetry(heard.angles)
+    unit = f" [{signal.unit}]" if signal.unit else ""
+    rows = (
+        ("signal", f"{signal.name}{unit}"),
+        ("whole turns of the carrier", f"{signal.turns}"),
+        ("mean speed of the carrier", f"{signal.speed * 60:.6g} rpm"),
+        ("step of the orders", f"{1 / signal.turns:.4g}, up to order {verdict.spectrum.order[-1]:.5g}"),
+        ("orders of a healthy set", f"multiples of {symmetry}" if symmetry > 1 else "all whole ones"),
+    )
+    yield Block("Recording", rows=rows)
+    strongest = sorted(sorted(verdict.lines, key=lambda line: -line.level)[:_SHOWN], key=lambda line: line.order)
+    table = tuple((f"{line.order:.2f}", f"{line.level:.1f}", line.verdict, line.heard.reason) for line in strongest)
+    title = f"{len(verdict.lines)} lines above {search.threshold:g} dB, out of the noise"
+    title += f", the strongest {_SHOWN}" if len(verdict.lines) > _SHOWN else ""
+    yield Block(
+        title, ("carrier order", "level [dB]", "verdict", "why") if table else (), table, tuple(_notes(verdict))
+    )
+
+
+def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
+    counts = {word: [line for line in verdict.lines if line.verdict == word] for word in VERDICTS}
+    yield ", ".join(f"{len(lines)} {word}" for word, lines in counts.items() if lines) or "no line stands out"
+    for word, lines in list(counts.items())[1:]:
+        if lines:
+            top = max(lines, key=lambda line: line.level)
+            yield f"{word}: strongest {top.level:.1f} dB at order {top.order:.2f}"
+    yield "a fault of a tooth of the ring makes no new places: it shows in the heights of normal lines alone"
+    parts = sum(teeth is not None for teeth in verdict.heard.teeth[1:])
+    likely = chance(verdict.tolerance, parts)
+    yield f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most"
+
+
+def _write(verdict: MeasuredVerdict, search: LineSearch, folder: Path) -> None:
+    """Write lines, spectrum and figure."""
+    unit = f" [{verdict.signal.unit}]" if verdict.signal.unit else ""
+    header = ("order", f"amplitude{unit}", "level [dB]", "whole order", "array factor", "verdict", "why")
+    rows = (
+        (line.order, line.amplitude, line.level, line.heard.nearest, line.heard.factor, line.verdict, line.heard.reason)
+        for line in verdict.lines
+    )
+    write_csv(folder / _LINES, header, rows)
+    spectrum = zip(verdict.spectrum.order.tolist(), verdict.spectrum.amplitude.tolist())
+    write_csv(folder / _SPECTRUM, ("order", f"amplitude{unit}"), spectrum)
+    by_verdict = {
+        word: [(line.order, line.level) for line in verdict.lines if line.verdict == word] for word in VERDICTS
+    }
+    highest = int((verdict.spectrum.order[-1] - _HALF_WIDTH) // verdict.heard.ring)
+    harmonics = int(np.clip(highest, 1, _HARMONICS))
+    drawn = {"threshold": search.threshold, "harmonics": harmonics, "half_width": _HALF_WIDTH}
+    save_figure(draw_side_bands(verdict.heard, by_verdict, **drawn), folder / _FIGURE)

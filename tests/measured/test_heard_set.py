@@ -1,0 +1,28 @@
+"""femgear.measured.heard_set: what a case says of the lines on its housing."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear import read_case
+from femgear.errors import CaseError
+from femgear.measured.heard_set import heard_set
+from femgear.trains.reading import with_values
+
+CASES = Path(__file__).parents[2] / "cases"
+
+
+def test_the_reference_set():
+    heard = heard_set(read_case(CASES / "planetary_27_40_108.toml"))
+    assert heard.teeth == (108, 27, 40) and np.allclose(np.degrees(heard.angles), [0, 120, 240])
+    assert heard.input == "sun" and heard.carrier_per_turn == pytest.approx({"sun": 0.2, "carrier": 1.0})
+    assert heard.symmetric_orders(2).tolist() == [102, 105, 108, 111, 114, 210, 213, 216, 219, 222]
+
+
+def test_other_cases_are_refused():
+    case = read_case(CASES / "planetary_27_40_108.toml")
+    with pytest.raises(CaseError, match="ring stands still"):
+        heard_set(with_values(case, {"operation.fixed": "carrier"}))
+    with pytest.raises(CaseError, match="no planetary set"):
+        heard_set(read_case(CASES / "spur_pair.toml"))

@@ -1,0 +1,60 @@
+"""femgear.measured.recordings: files of all formats by the end of their names, and what tells their angle."""
+
+import numpy as np
+import pytest
+from recorded_signals import HEALTHY, RATE, recording, write_columns
+from scipy.io import savemat, wavfile
+
+from femgear.errors import CaseError
+from femgear.measured.heard_set import HeardSet
+from femgear.measured.recordings import read_by_turns, read_channels
+from femgear.measured.requests import Recording
+
+HEARD = HeardSet(108, 27, 40, np.radians([0, 120, 240]), "sun", {"sun": 0.2, "carrier": 1.0})
+SIGNAL, PULSES, TURNS = recording(HEALTHY, HEALTHY.values(), seconds=4.0)
+
+
+def written(folder, kind):
+    if kind == "csv":
+        columns = np.arange(len(SIGNAL)) / RATE, SIGNAL, PULSES
+        return write_columns(folder / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns)
+    if kind == "wav":
+        wavfile.write(folder / "a.wav", int(RATE), np.stack([SIGNAL, PULSES], 1).astype(np.float32))
+        return folder / "a.wav"
+    savemat(folder / "a.MAT", {"acc": SIGNAL, "tacho": PULSES, "fs": RATE})
+    return folder / "a.MAT"
+
+
+@pytest.mark.parametrize("kind", ["csv", "wav", "mat"])
+def test_formats_give_the_same_signal_over_the_angle(kind, tmp_path):
+    path = written(tmp_path, kind)
+    assert [len(channel.values) for channel in read_channels(path)] == [len(SIGNAL)] * 2
+    over_angle = read_by_turns(path, Recording(channel="1", pulses="2"), HEARD)
+    assert over_angle.turns == 11 and over_angle.speed == pytest.approx(3.0, rel=0.02)
+    alone = read_by_turns(path, Recording(pulses="2"), HEARD)  # the other channel is the signal
+    assert np.array_equal(alone.values, over_angle.values)
+
+
+def test_a_constant_speed_is_that_of_the_input(tmp_path):
+    path = written(tmp_path, "wav")
+    over_angle = read_by_turns(path, Recording(channel="1", speed="900 rpm"), HEARD)
+    assert over_angle.turns == 11 and over_angle.speed == pytest.approx(3.0, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("recorded", "code", "words"),
+    [
+        (Recording(channel="1"), "E-SPEED", "neither"),
+        (Recording(channel="1", pulses="2", speed="900 rpm"), "E-SPEED", "both"),
+        (Recording(channel="1", speed="0 rpm"), "E-SPEED", "at rest nothing is heard"),
+        (Recording(channel="1", pulses="2", pulses_of="ring"), "E-SPEED", "a turn of the ring"),
+        (Recording(channel="1", pulses="2", per_turn=0), "E-SPEED", "0 a turn"),
+        (Recording(pulses="9"), "E-FILE", "choose one by --pulses"),
+        (Recording(speed="900 rpm"), "E-FILE", "choose one by --channel"),
+        (Recording(channel="1", speed="900 rpm", rate=1e3), "E-FILE", "another one than --rate"),
+    ],
+)
+def test_what_is_refused(recorded, code, words, tmp_path):
+    with pytest.raises(CaseError) as refused:
+        read_by_turns(written(tmp_path, "wav"), recorded, HEARD)
+    assert refused.value.code == code and words in str(refused.value)

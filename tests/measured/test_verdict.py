@@ -1,0 +1,62 @@
+"""femgear.measured.verdict: recordings that femgear makes itself come back, healthy and unequal sets are told apart."""
+
+import csv
+
+import numpy as np
+import pytest
+from recorded_signals import CASE, HEALTHY, RATE, computed_lines, recording, write_columns
+
+from femgear import cli, read_case
+from femgear.measured.lines import VERDICTS
+from femgear.measured.requests import LineSearch, Recording
+from femgear.measured.verdict import measured_verdict
+
+NORMAL, UNEQUAL = VERDICTS[:2]
+
+
+def written(folder, order, value, **options):
+    signal, pulses, _ = recording(order, value, **options)
+    columns = np.arange(len(signal)) / RATE, signal, pulses
+    return write_columns(folder / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns, comma=True)
+
+
+def test_the_command_prints_a_verdict_for_every_line_and_writes_files(tmp_path, capsys):
+    lines = HEALTHY | {215: 0.2, 108 + 2.7: 0.1, 216.13: 0.05}
+    path = written(tmp_path, lines, lines.values())
+    assert cli.main(["measured", str(CASE), str(path), "--pulses", "tacho", "-o", str(tmp_path / "out")]) == 0
+    printed = capsys.readouterr().out
+    assert "multiples of 3" in printed and "error or fault of a planet: strongest -20.0 dB at order 110.70" in printed
+    assert "1 needs unequal turning parts, 1 error or fault of a planet, 1 not from this gearbox" in printed
+    with open(tmp_path / "out" / "lines.csv", newline="", encoding="utf-8") as stream:
+        rows = {round(float(row["order"]), 2): row for row in csv.DictReader(stream)}
+    assert (
+        rows.keys() == {round(order, 2) for order in lines if order != 216}
+        and rows[110.7]["why"] == "108 + 1 turn of a planet"
+    )
+    assert {path.name for path in (tmp_path / "out").iterdir()} > {"order_spectrum.csv", "lines.png"}
+    assert cli.main(["measured", str(CASE), str(path)]) == 2
+    assert "[E-FILE]" in capsys.readouterr().err
+
+
+def test_silence_has_no_lines(tmp_path):
+    verdict = measured_verdict(read_case(CASE), written(tmp_path, [3], [1e-6], noise=1e6), Recording(pulses="tacho"))
+    assert verdict.lines == ()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("unequal", [False, True])
+def test_computed_signals_with_noise_and_a_wandering_speed_come_back(unequal, tmp_path):
+    order, value = computed_lines(unequal)
+    path = written(tmp_path, order, value)
+    found = measured_verdict(read_case(CASE), path, Recording(pulses="tacho"), LineSearch(threshold=-30.0))
+    heights = dict(zip(order.tolist(), np.abs(value).tolist()))
+    nearest = {min(heights, key=lambda at: abs(at - line.order)): line for line in found.lines}
+    # all that lie half a decibel above the threshold are there
+    assert {
+        at for at, height in heights.items() if height > 10 ** (-29.5 / 20) * max(heights.values())
+    } <= nearest.keys()
+    for at, line in nearest.items():
+        assert line.order == pytest.approx(at, abs=0.01)
+        assert 20 * np.log10(line.amplitude / heights[at]) == pytest.approx(0.0, abs=0.2)
+    verdicts = {line.verdict for line in found.lines}
+    assert verdicts == ({NORMAL, UNEQUAL} if unequal else {NORMAL})
