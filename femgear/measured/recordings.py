@@ -39,12 +39,25 @@ def read_channels(path: str | os.PathLike, *, rate: float | None = None) -> tupl
 def read_by_turns(path: str | os.PathLike, recording: Recording, shafts: HeardSet) -> AngleSignal:
     """Read a signal and sample it anew over the angle of the carrier.
 
-    CaseError: what `read_channels`, `turns_of_pulses` and `resample_turns` refuse (E-FILE); neither pulses nor a speed,
-    or both, a member that stands still (E-SPEED).
+    Parameters
+    ----------
+    path : path
+        Of the recording.
+    recording : Recording
+        Channels, and what tells the angle.
+    shafts : HeardSet
+        Of the set, whose carrier turns so many times with each member.
+
+    Raises
+    ------
+    CaseError
+        What `read_channels`, `turns_of_pulses` and `resample_turns` refuse (E-FILE); neither pulses nor a speed,
+        or both, a member that stands still (E-SPEED).
     """
     channels = read_channels(path, rate=recording.rate)
-    others = [channel for channel in channels if recording.pulses not in (None, channel.name)]
-    turns, others = _pulses(channels, recording, shafts) if recording.pulses is not None else (None, others)
+    turns, others = None, list(channels)
+    if recording.pulses is not None:
+        turns, others = _pulses(channels, recording, shafts)
     signal = choose_channel(others if recording.channel is None else channels, recording.channel)
     if (turns is None) == (recording.speed is None):
         raise CaseError(
