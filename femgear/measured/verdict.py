@@ -103,10 +103,10 @@ def measured_into(
         names = [_LINES, _SPECTRUM, _FIGURE]
         own_files(output, names)
         _write(verdict, search, output)
-    return list(described(verdict, search)), names
+    return list(describe_verdict(verdict, search)), names
 
 
-def described(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[Block]:
+def describe_verdict(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[Block]:
     """Tabulate the recording and its lines."""
     signal, heard = verdict.signal, verdict.heard
     symmetry = spacing_symmetry(heard.angles)
