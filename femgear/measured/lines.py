@@ -27,14 +27,14 @@ class MeasuredLine:
     """One line of a measured spectrum.
 
     ``order`` of the carrier, ``amplitude`` (peak) in the unit of the signal, ``level`` [dB] over the strongest line,
-    ``verdict`` one of `VERDICTS`, ``heard`` what `classify_line` says of its place.
+    ``verdict`` one of `VERDICTS`, ``place`` what `classify_line` says of its place.
     """
 
     order: float
     amplitude: float
     level: float
     verdict: str
-    heard: LineVerdict
+    place: LineVerdict
 
 
 def windowed_spectrum(signal: AngleSignal) -> OrderSpectrum:
@@ -90,18 +90,18 @@ def judge_lines(
     """
     largest = amplitude.max(initial=0.0)
     lines = []
-    for place, height in zip(np.asarray(order, float).tolist(), np.asarray(amplitude, float).tolist()):
-        heard = classify_line(place, planet_angles, teeth, tolerance=tolerance)
-        lines.append(MeasuredLine(place, height, 20 * float(np.log10(height / largest)), _words(heard), heard))
+    for line_order, height in zip(np.asarray(order, float).tolist(), np.asarray(amplitude, float).tolist()):
+        place = classify_line(line_order, planet_angles, teeth, tolerance=tolerance)
+        lines.append(MeasuredLine(line_order, height, 20 * float(np.log10(height / largest)), _words(place), place))
     return tuple(lines)
 
 
-def _words(heard: LineVerdict) -> str:
-    if heard.verdict == FOREIGN:
+def _words(place: LineVerdict) -> str:
+    if place.verdict == FOREIGN:
         return VERDICTS[4]
-    if heard.part and heard.verdict == UNEQUAL:
-        return VERDICTS[2] if heard.part == "sun" else VERDICTS[3]
-    return heard.verdict
+    if place.part and place.verdict == UNEQUAL:
+        return VERDICTS[2] if place.part == "sun" else VERDICTS[3]
+    return place.verdict
 
 
 def order_tolerance(turns: int, given: float | None = None) -> float:

@@ -56,7 +56,7 @@ class MeasuredVerdict:
 
     Parameters
     ----------
-    heard : HeardSet
+    gear_set : HeardSet
         The set.
     signal : AngleSignal
         Over the angle of the carrier.
@@ -68,7 +68,7 @@ class MeasuredVerdict:
         Distance of orders that count as one.
     """
 
-    heard: HeardSet
+    gear_set: HeardSet
     signal: AngleSignal
     spectrum: OrderSpectrum
     lines: tuple[MeasuredLine, ...]
@@ -82,12 +82,12 @@ def measured_verdict(
 
     CaseError: a case or a recording that cannot be used; see `heard_set`, `read_by_turns` and `order_tolerance`.
     """
-    heard, search = heard_set(case), search or LineSearch()
-    signal = read_by_turns(path, recording, heard)
+    gear_set, search = heard_set(case), search or LineSearch()
+    signal = read_by_turns(path, recording, gear_set)
     tolerance = order_tolerance(signal.turns, search.tolerance)
     spectrum = windowed_spectrum(signal)
-    lines = judge_lines(*sharpened_lines(spectrum, search.threshold), heard.angles, heard.teeth, tolerance)
-    return MeasuredVerdict(heard, signal, spectrum, lines, tolerance)
+    lines = judge_lines(*sharpened_lines(spectrum, search.threshold), gear_set.angles, gear_set.teeth, tolerance)
+    return MeasuredVerdict(gear_set, signal, spectrum, lines, tolerance)
 
 
 def measured_into(
@@ -108,8 +108,8 @@ def measured_into(
 
 def describe_verdict(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[Block]:
     """Tabulate the recording and its lines."""
-    signal, heard = verdict.signal, verdict.heard
-    symmetry = spacing_symmetry(heard.angles)
+    signal, gear_set = verdict.signal, verdict.gear_set
+    symmetry = spacing_symmetry(gear_set.angles)
     unit = f" [{signal.unit}]" if signal.unit else ""
     rows = (
         ("signal", f"{signal.name}{unit}"),
@@ -120,7 +120,7 @@ def describe_verdict(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[B
     )
     yield Block("Recording", rows=rows)
     strongest = sorted(sorted(verdict.lines, key=lambda line: -line.level)[:_SHOWN], key=lambda line: line.order)
-    table = tuple((f"{line.order:.2f}", f"{line.level:.1f}", line.verdict, line.heard.reason) for line in strongest)
+    table = tuple((f"{line.order:.2f}", f"{line.level:.1f}", line.verdict, line.place.reason) for line in strongest)
     title = f"{len(verdict.lines)} lines above {search.threshold:g} dB, out of the noise"
     title += f", the strongest {_SHOWN}" if len(verdict.lines) > _SHOWN else ""
     yield Block(
@@ -136,7 +136,7 @@ def _notes(verdict: MeasuredVerdict) -> Iterator[str]:
             top = max(lines, key=lambda line: line.level)
             yield f"{word}: strongest {top.level:.1f} dB at order {top.order:.2f}"
     yield "a fault of a tooth of the ring makes no new places: it shows in the heights of normal lines alone"
-    parts = sum(teeth is not None for teeth in verdict.heard.teeth[1:])
+    parts = sum(teeth is not None for teeth in verdict.gear_set.teeth[1:])
     likely = chance(verdict.tolerance, parts)
     yield f"an order without meaning fits turns of sun or planet by chance in {likely:.0%} of cases at most"
 
@@ -146,7 +146,7 @@ def _write(verdict: MeasuredVerdict, search: LineSearch, folder: Path) -> None:
     unit = f" [{verdict.signal.unit}]" if verdict.signal.unit else ""
     header = ("order", f"amplitude{unit}", "level [dB]", "whole order", "array factor", "verdict", "why")
     rows = (
-        (line.order, line.amplitude, line.level, line.heard.nearest, line.heard.factor, line.verdict, line.heard.reason)
+        (line.order, line.amplitude, line.level, line.place.nearest, line.place.factor, line.verdict, line.place.reason)
         for line in verdict.lines
     )
     write_csv(folder / _LINES, header, rows)
@@ -155,14 +155,14 @@ def _write(verdict: MeasuredVerdict, search: LineSearch, folder: Path) -> None:
     by_verdict = {
         word: [(line.order, line.level) for line in verdict.lines if line.verdict == word] for word in VERDICTS
     }
-    highest = int((verdict.spectrum.order[-1] - _HALF_WIDTH) // verdict.heard.ring)
+    highest = int((verdict.spectrum.order[-1] - _HALF_WIDTH) // verdict.gear_set.ring)
     harmonics = int(np.clip(highest, 1, _HARMONICS))
     drawn = {"threshold": search.threshold, "harmonics": harmonics, "half_width": _HALF_WIDTH}
-    save_figure(draw_side_bands(verdict.heard, by_verdict, **drawn), folder / _FIGURE)
+    save_figure(draw_side_bands(verdict.gear_set, by_verdict, **drawn), folder / _FIGURE)
 
 
 def draw_side_bands(
-    heard: HeardSet,
+    gear_set: HeardSet,
     lines: Mapping[str, Sequence[tuple[float, float]]],
     *,
     threshold: float,
@@ -173,7 +173,7 @@ def draw_side_bands(
 
     Parameters
     ----------
-    heard : HeardSet
+    gear_set : HeardSet
         The set.
     lines : mapping of str to sequence of (float, float)
         Orders and levels [dB over the strongest line] by their verdict.
@@ -183,13 +183,13 @@ def draw_side_bands(
         Mesh harmonics drawn, and carrier orders on either side of each.
     """
     figure, axes = new_figure(rows=harmonics, width=9.5, height=1.6 + 2.5 * harmonics)
-    symmetry = spacing_symmetry(heard.angles)
+    symmetry = spacing_symmetry(gear_set.angles)
     marks = (("o", BLUE), ("s", VERMILION), ("D", VERMILION), ("v", GREEN), ("^", BLACK))
     styles = dict(zip(lines, marks[: len(lines) - 1] + marks[-1:], strict=True)) if lines else {}
     for h, ax in enumerate(axes, 1):
-        centre = h * heard.ring
+        centre = h * gear_set.ring
         whole = np.arange(max(centre - half_width, 1), centre + half_width + 1)
-        ax.bar(whole, array_factor(heard.angles, whole), width=0.8, color=SKY, alpha=0.5, label="array factor")
+        ax.bar(whole, array_factor(gear_set.angles, whole), width=0.8, color=SKY, alpha=0.5, label="array factor")
         no = whole[whole % symmetry != 0]
         ax.plot(no, np.full(len(no), 0.03), "x", color=GREY, label="forbidden by the symmetry", clip_on=False)
         ax.set_ylim(0, 1.12)
