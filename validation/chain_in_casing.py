@@ -27,7 +27,7 @@ def _box(stage: str, play: str, *, weight: bool) -> NonlinearGearbox:
         del tables["gravity"]
     found = solve_deflection(read_case(tables))
     drive = excitation_of(found, next(one for one in found.model.stages if one.name == stage))
-    return nonlinear_gearbox(found, {stage: drive}, harmonics=3, mean_damping=True)
+    return nonlinear_gearbox(found, {stage: drive}, harmonics=3)
 
 
 def sensor_lines(stage: str, play: str, *, weight: bool) -> tuple[np.ndarray, np.ndarray]:

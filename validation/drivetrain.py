@@ -24,14 +24,24 @@ from femgear.solvers.time.free_turn import TorqueHistory
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.fourier import harmonics_of
 from femgear.trains.gearbox.balance import held_together, lines_together, loaded_lines
+from femgear.trains.gearbox.case_file import GearboxCase
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.excitation import pair_count_excitation
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.model import gearbox_model
 from femgear.trains.gearbox.modes import solve_gearbox_modes
-from femgear.trains.gearbox.spectrum import solve_box_spectrum, solve_box_transient
-from femgear.trains.gearbox.stages import solve_deflections
-from femgear.trains.gearbox.transient import GearboxInTime, GearboxMotion, gearbox_in_time, integrate
+from femgear.trains.gearbox.spectrum import solve_box_spectrum
+from femgear.trains.gearbox.transient import (
+    ALL_MOTIONS,
+    TORSIONAL,
+    GearboxInTime,
+    GearboxMotion,
+    gearbox_in_time,
+    integrate,
+    torsional_state,
+)
+from femgear.trains.gearbox.transient_checks import run_outline
+from femgear.trains.gearbox.transient_results import TransientResult
 from femgear.trains.reading import read_case, with_values
 from validation.reference.drivetrain_train import numbers
 from validation.rows import Row, at_most, counted, information, printed, within
@@ -144,7 +154,8 @@ def former_histories() -> tuple[Row, ...]:
         transient = case.transient.model_copy(update={"duration": time[-1]})
         case = case.model_copy(update={"transient": transient})
         every = round(time[1] * rate)
-        motion = integrate(gearbox_in_time(solve_deflection(case), transient), every=every, lowpass=False)
+        former = gearbox_in_time(solve_deflection(case), transient, mean_damping=False)
+        motion = integrate(former, every=every, lowpass=False)
         columns = [motion.shafts.index(body) for body in wanted["bodies"]]
         moved = np.array(wanted["motion"])
         apart = np.abs(motion.run.motion[:, columns] - moved).max() / np.abs(moved).max()
@@ -171,7 +182,7 @@ def former_spectra() -> tuple[Row, ...]:
         if (wanted := one.get("spectrum")) is None:
             continue
         case = read_case(f"cases/{name}.toml")
-        spectrum = solve_box_spectrum(case, solve_box_transient(case, solve_deflections(case)))
+        spectrum = solve_box_spectrum(case, former_motions(case))
         meshes = [mesh.replace("carrier-sun ", "") for mesh in spectrum.transient.first.run.meshes]
         columns = [meshes.index(mesh.replace(" of carrier", "")) for mesh in wanted["meshes"]]
         orders = np.array([line.order for line in spectrum.lines])
@@ -180,6 +191,16 @@ def former_spectra() -> tuple[Row, ...]:
         error = np.abs(amplitude - wanted["amplitude"]).max() / np.max(wanted["amplitude"])
         rows.append(at_most(name, FORMER, "amplitudes of lines, largest difference over the largest", 1e-8, error))
     return tuple(rows)
+
+
+def former_motions(case: GearboxCase) -> TransientResult:
+    """Motions of a case damped as the former train was: by modes with the planets where they stand at the start."""
+    state, motions = solve_deflection(case), {}
+    for variant in (ALL_MOTIONS, TORSIONAL) if case.transient.torsional else (ALL_MOTIONS,):
+        found = state if variant == ALL_MOTIONS else torsional_state(state)
+        former = gearbox_in_time(found, case.transient, mean_damping=False)
+        motions[variant] = integrate(former, every=run_outline(case).every)
+    return TransientResult(motions, 0.0)
 
 
 def general_integrator() -> tuple[Row, ...]:
@@ -360,7 +381,7 @@ def chain_in_time(tables: dict[str, Any], duration: float, rate: float, harmonic
     """Make a chain ready for time, its flanks parting."""
     entries = {"harmonics": harmonics, "contact_loss": True, "duration": f"{duration} s", "rate": f"{rate} Hz"}
     case = read_case(tables | {"transient": entries})
-    return gearbox_in_time(solve_deflection(case), case.transient, mean_damping=True)
+    return gearbox_in_time(solve_deflection(case), case.transient)
 
 
 def chain_balance(model: GearboxInTime, carriers: dict[str, int], meshes: dict[str, int]) -> PeriodicSolution:

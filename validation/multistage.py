@@ -478,7 +478,7 @@ def balance_running() -> tuple[Row, ...]:
     rows, found, entry = list[Row](), loaded(), stored()["balance"]["1.0"]
     stages = found.model.stages
     excitations = {stage.name: with_pairs(found, number).excitation for number, stage in enumerate(stages, 1)}
-    box = nonlinear_gearbox(found, excitations, harmonics=3, separates=False)
+    box = nonlinear_gearbox(found, excitations, harmonics=3, separates=False, mean_damping=False)
     meshes = [box.bases.index(f"{stage.name} mesh") for stage in stages]
     orders = np.zeros((len(entry["orders"]), len(box.bases)), int)
     orders[:, meshes] = entry["orders"]

@@ -137,7 +137,7 @@ def solve_balance(found: Deflection, *, steps: Steps | None = None, progress: Pr
             others = (one for one in found.model.stages if one is not stage)
             drives |= {one.name: constant_excitation(found, one, steps=steps) for one in others}
         known: dict[str, Any] = {"harmonics": wanted.harmonics, "back_flanks": wanted.back_flanks}
-        box = nonlinear_gearbox(found, drives, **known, mean_damping=True)
+        box = nonlinear_gearbox(found, drives, **known)
         names = [one.name for one in box.stages]
         solution = _solved(box, wanted, names.index(stage.name))
         solved.append(_moving(box, solution, names.index(stage.name)))

@@ -144,7 +144,7 @@ def nonlinear_gearbox(
     gyroscopic: bool = True,
     turning: bool = True,
     damping_ratio: float | None = None,
-    mean_damping: bool = False,
+    mean_damping: bool = True,
 ) -> NonlinearGearbox:
     """Assemble a gearbox with the meshes of some stages as elements.
 
@@ -481,21 +481,19 @@ def _damping(
     Planets are where they stand, or with the mean ``S_0^T k S_0 + (S_c^T k S_c + S_s^T k S_s) / 2`` over the turn of
     their carriers. Free motions (n, r) have a modal mass of one.
     """
-    rows = [np.zeros((0, len(system.M)))]
-    stiffness = [np.zeros(0)]
+    stiffness = system.K.copy()
     for stage in stages:
         for directions, k in (
             (stage.drive, stage.excitation.stiffness.mean(axis=1)),
             (stage.slope, stage.slope_stiffness),
         ):
             if over_the_turn and stage.turns:
-                rows.append(directions.stacked)
-                stiffness.append(np.concatenate([k, 0.5 * k, 0.5 * k]))
+                S, mean = directions.stacked, np.concatenate([k, 0.5 * k, 0.5 * k])
             else:
-                rows.append(directions.at(0.0))
-                stiffness.append(k)
-    unloaded = replace(system, W=np.vstack(rows).T, load=0.0 * system.load)
-    modes = undamped_modes(unloaded, np.concatenate(stiffness), damping_ratio=ratio)
+                S, mean = directions.at(0.0), k
+            stiffness += (S.T * mean) @ S
+    unloaded = replace(system, K=stiffness, W=np.zeros((len(stiffness), 0)), load=0.0 * system.load)
+    modes = undamped_modes(unloaded, np.zeros(0), damping_ratio=ratio)
     carried = system.M @ modes.shape
     damping = (carried * (4.0 * np.pi * modes.damping_ratio * modes.frequency)) @ carried.T
     return damping, modes.shape[:, modes.frequency == 0.0]

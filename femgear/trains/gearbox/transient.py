@@ -103,7 +103,7 @@ class GearboxInTime:
 
 
 def gearbox_in_time(
-    found: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = False
+    found: Deflection, transient: TransientSection, *, steps: Steps | None = None, mean_damping: bool = True
 ) -> GearboxInTime:
     """Make a gearbox ready for integration in time about its loaded state.
 
