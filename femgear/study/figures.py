@@ -11,7 +11,9 @@ from femgear.report.style import (
     BLACK,
     BLUE,
     COLOURS,
+    GREEN,
     GREY,
+    MARKERS,
     VERMILION,
     label,
     legend_below,
@@ -208,5 +210,50 @@ def front_figure(values, dominated, before, *, names: Sequence[str], compromise:
     ax.set_xlim(0, right)
     ax.set_ylim(0, top)
     label(ax, *(fill(name, 44) for name in names))
+    legend_below(figure)
+    return figure
+
+
+def size_and_error(
+    volumes: Sequence[float],
+    errors: Sequence[float],
+    names: Sequence[str],
+    *,
+    left: Sequence[str],
+    front: Sequence[int],
+):
+    """Transmission error of teeth over their size, with the front of both.
+
+    Parameters
+    ----------
+    volumes, errors : sequences of float
+        [cm^3] and peak to peak [µm].
+    names : sequence of str
+        Teeth and planets, written beside those of the front.
+    left : sequence of str
+        What the first mesh harmonic leaves, "" of a pair.
+    front : sequence of int
+        Places of the front, by size.
+    """
+    figure, (ax,) = new_figure(width=8.0, height=5.2)
+    kinds = {"torque": VERMILION, "lateral force": BLUE, "nothing": GREEN, "": BLUE}
+    ax.step([volumes[n] for n in front], [errors[n] for n in front], where="post", color=GREY, linewidth=1.2)
+    for number, kind in enumerate(kind for kind in kinds if kind in left):
+        places = [n for n, of_teeth in enumerate(left) if of_teeth == kind]
+        ax.plot(
+            [volumes[n] for n in places],
+            [errors[n] for n in places],
+            MARKERS[number],
+            color=kinds[kind],
+            label=f"leaves {kind}" if kind else "pairs",
+        )
+    top = 1.15 * max(errors)
+    ax.set_ylim(0.0, top)
+    span = max(volumes) - min(volumes) or max(volumes)
+    ax.set_xlim(min(volumes) - 0.08 * span, max(volumes) + 0.25 * span)
+    for place in front:
+        ax.annotate(names[place], (volumes[place], errors[place]), xytext=(6, 5), textcoords="offset points")
+    title = "what planets leave of the first mesh harmonic" if any(left) else ""
+    label(ax, "volume [cm³]", "transmission error peak to peak [µm]", title)
     legend_below(figure)
     return figure

@@ -14,7 +14,7 @@ def outputs():
 
 
 def test_every_example_has_its_output():
-    assert len(EXAMPLES) == len(PRINTED) == 5
+    assert len(EXAMPLES) == len(PRINTED) == 7
 
 
 @pytest.mark.parametrize("number", range(len(EXAMPLES)))

@@ -1,0 +1,316 @@
+"""Tooth numbers for a ratio: the smallest that assemble, transmission errors of the best, and the front of both."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from femgear.case import text as case_text
+from femgear.case.quantities import LENGTH, STRESS, TORQUE, to_si
+from femgear.errors import CaseError, FemgearError
+from femgear.gears.tooth_search import KINDS, SizedTeeth, ToothDemand, search_teeth
+from femgear.report.style import save_figure
+from femgear.report.tables import Block
+from femgear.stages.protocol import Progress, one_blas_thread, silent
+from femgear.stages.static import solve_static
+from femgear.storage.files import own_files, write_csv, write_text
+from femgear.study.faults import all_faults
+from femgear.study.figures import size_and_error
+from femgear.trains.drafts import new_case
+from femgear.trains.reading import parse_case
+
+_TABLE, _FIGURE = "teeth.csv", "teeth.png"
+_SHOWN = 12
+"""Rows of the smallest teeth that are printed."""
+
+
+@dataclass(frozen=True)
+class TeethRequest:
+    """What teeth are searched for; quantities with their units.
+
+    Parameters
+    ----------
+    ratio, kind, tolerance, fixed, width_ratio, load_factor, contact_safety, root_safety, most
+        As of `femgear.gears.tooth_search.ToothDemand`.
+    planets : sequence of str
+        Numbers of planets, ``"3"`` or from the first to the last one, ``"3..5"``.
+    torque, contact_limit, root_limit : str
+        As of `ToothDemand`.
+    best : int
+        Teeth whose transmission error is computed.
+    positions, flank_elements : int
+        Of these computations, over one mesh period and along a flank.
+    """
+
+    ratio: float
+    kind: str = "planetary"
+    tolerance: float = 0.02
+    planets: Sequence[str] = ("3",)
+    fixed: str = "ring"
+    torque: str = "100 N m"
+    width_ratio: float = 0.8
+    contact_limit: str = "1500 MPa"
+    root_limit: str = "425 MPa"
+    load_factor: float = 1.5
+    contact_safety: float = 1.1
+    root_safety: float = 1.4
+    most: int = 10_000
+    best: int = 12
+    positions: int = 24
+    flank_elements: int = 12
+
+
+@dataclass(frozen=True)
+class ComputedTeeth:
+    """Teeth with the transmission error of their case.
+
+    Parameters
+    ----------
+    choice : SizedTeeth
+        Teeth and size.
+    case : str
+        Text of their case file.
+    error : float
+        Peak to peak of the static transmission error, on the base circle of sun or gear 1 [m].
+    """
+
+    choice: SizedTeeth
+    case: str
+    error: float
+
+
+@one_blas_thread()
+def teeth_into(
+    folder: Path, request: TeethRequest, *, cache: Path | None = None, progress: Progress = silent
+) -> tuple[list[Block], list[str]]:
+    """Search teeth; write the table of all, the cases of the best and a figure, and give tables and names of files.
+
+    ``cache`` is the folder of generated grids. CaseError, GeometryError: a request that no teeth meet. StorageError:
+    files of others (E-OUTPUT).
+    """
+    demand = _demand(request)
+    own_files(folder, (_TABLE, _FIGURE, f"{demand.kind}_*.toml"))
+    sized = search_teeth(demand, progress=lambda done, total: progress("teeth", done, total))
+    write_csv(folder / _TABLE, _header(demand), map(_record, sized))
+    names, blocks = [_TABLE], [_described(demand, sized)]
+    if demand.kind == "stepped":  # no case file holds them yet
+        return blocks, names
+    computed = list(_computed(demand, chosen(sized, request.best), request, cache, progress))
+    for teeth in computed:
+        names.append(f"{_label(teeth.choice, '_')}.toml")
+        write_text(teeth.case, folder / names[-1])
+    if computed:
+        front = front_of(computed)
+        figure = size_and_error(
+            [1e6 * teeth.choice.volume for teeth in computed],
+            [1e6 * teeth.error for teeth in computed],
+            [_label(teeth.choice, "/").partition("_")[2] for teeth in computed],
+            left=[teeth.choice.left[0] if teeth.choice.left else "" for teeth in computed],
+            front=front,
+        )
+        save_figure(figure, folder / _FIGURE)
+        blocks.append(_described_errors(demand, computed, front))
+        names.append(_FIGURE)
+    return blocks, names
+
+
+def chosen(sized: Sequence[SizedTeeth], count: int) -> list[SizedTeeth]:
+    """Choose so many teeth: the smallest of every phasing, hunting or not, then the smallest of the others.
+
+    Else all would be neighbours of the smallest.
+    """
+    first: dict[object, SizedTeeth] = {}
+    for teeth in sized:
+        first.setdefault((teeth.planets, teeth.left, teeth.hunting), teeth)
+    order = [*first.values(), *(teeth for teeth in sized if teeth not in first.values())]
+    return sorted(order[:count], key=lambda teeth: teeth.volume)
+
+
+def front_of(computed: Sequence[ComputedTeeth]) -> list[int]:
+    """Find the places of teeth than which none is smaller and has less error, by size."""
+    order = sorted(range(len(computed)), key=lambda n: (computed[n].choice.volume, computed[n].error))
+    front, least = [], math.inf
+    for place in order:
+        if computed[place].error < least:
+            front.append(place)
+            least = computed[place].error
+    return front
+
+
+def _demand(request: TeethRequest) -> ToothDemand:
+    """Read the quantities of a request."""
+    planets, values = list[int](), {}
+    with all_faults() as part:
+        for text in request.planets:
+            with part("--planets"):
+                planets += _counts(text)
+        for name, dimension in (("torque", TORQUE), ("contact_limit", STRESS), ("root_limit", STRESS)):
+            with part(f"--{name.replace('_', '-')}"):
+                values[name] = to_si(getattr(request, name), dimension)
+        for key, value, low, high in (
+            ("--best", request.best, 1, 200),
+            ("--positions", request.positions, 8, 512),
+            ("--flank-elements", request.flank_elements, 4, 64),
+        ):
+            with part(key):
+                if not low <= value <= high:
+                    raise CaseError("out of range", code="E-RANGE", key=key, value=value, limit=f"{low} to {high}")
+    return ToothDemand(
+        ratio=request.ratio,
+        kind=request.kind,
+        tolerance=request.tolerance,
+        planets=tuple(sorted(set(planets))),
+        fixed=request.fixed,
+        width_ratio=request.width_ratio,
+        load_factor=request.load_factor,
+        contact_safety=request.contact_safety,
+        root_safety=request.root_safety,
+        most=request.most,
+        **values,
+    )
+
+
+def _counts(text: str) -> range:
+    """Numbers of planets of "3" or "3..5"."""
+    first, dots, last = text.partition("..")
+    if not first.isdecimal() or not (last if dots else "1").isdecimal() or max(len(first), len(last)) > 3:
+        remedy = "write --planets 4, or --planets 3..5 for all from 3 to 5"
+        raise CaseError("no numbers of planets", code="E-TYPE", key="--planets", value=text, remedy=remedy)
+    return range(int(first), int(last if dots else first) + 1)
+
+
+def _computed(
+    demand: ToothDemand, teeth: Sequence[SizedTeeth], request: TeethRequest, cache: Path | None, progress: Progress
+) -> Iterator[ComputedTeeth]:
+    """Static transmission errors on a coarse grid, of cases that can be made and solved."""
+    for number, choice in enumerate(teeth):
+        progress("transmission error", number, len(teeth))
+        try:
+            text = case_of(demand, choice)
+            tables = case_text.parse(text, "")
+            grid = {"positions": request.positions, "flank_elements": request.flank_elements, "stresses": False}
+            tables["static"] = tables.get("static", {}) | grid
+            cycle = solve_static(parse_case(case_text.write(tables)), cache=cache).cycle
+        except FemgearError:  # teeth that ISO 6336 rates, and whose grid or contact has no solution
+            continue
+        yield ComputedTeeth(choice, text, float(cycle.peak_to_peak("sun_arc")))
+    progress("transmission error", len(teeth), len(teeth))
+
+
+def case_of(demand: ToothDemand, choice: SizedTeeth) -> str:
+    """Write the case file of teeth of their size, with the torque that was asked for on sun or gear 1."""
+    of_set = choice.kind == "planetary"
+    text = new_case(
+        choice.kind,
+        teeth=choice.teeth,
+        module=f"{math.ceil(1e6 * choice.modules[0]) / 1e3:.10g} mm",
+        torque=f"{demand.torque:.10g} N m",
+        planets=choice.planets if of_set else None,
+        face_width=LENGTH.show(math.ceil(1e4 * choice.widths[0]) / 1e4),
+    )
+    if not of_set or demand.fixed == "ring":
+        return text
+    text = text.replace('fixed = "ring"', f'fixed = "{demand.fixed}"')
+    if demand.fixed == "sun":
+        on_ring = demand.torque * choice.teeth[-1] / choice.teeth[0]
+        text = text.replace('input = "sun"', 'input = "ring"')
+        text = text.replace(f'torque = "{demand.torque:.10g} N m"', f'torque = "{on_ring:.10g} N m"')
+    return text
+
+
+def _label(choice: SizedTeeth, between: str) -> str:
+    """Kind, teeth and number of planets: "planetary_27/40/108 x3", or joined for names of files."""
+    teeth = between.join(map(str, choice.teeth))
+    if choice.kind == "pair":
+        return f"pair_{teeth}"
+    return f"{choice.kind}_{teeth}{f' ×{choice.planets}' if between == '/' else f'_{choice.planets}'}"
+
+
+def _header(demand: ToothDemand) -> tuple[str, ...]:
+    meshes = ("module [m]", "second module [m]", "face width [m]", "second face width [m]")
+    return (
+        *(f"{name} teeth" for name in KINDS[demand.kind]),
+        "planets",
+        "ratio [1]",
+        *(meshes if demand.kind == "stepped" else meshes[::2]),
+        "diameter [m]",
+        "volume [m^3]",
+        "size decided by",
+        *(f"contact ratio {number}" for number in range(1, 2 if demand.kind == "pair" else 3)),
+        "left of the first harmonic",
+        "hunting teeth",
+        "warned of",
+    )
+
+
+def _record(choice: SizedTeeth) -> tuple[object, ...]:
+    return (
+        *choice.teeth,
+        choice.planets,
+        choice.ratio,
+        *choice.modules,
+        *choice.widths,
+        choice.diameter,
+        choice.volume,
+        choice.decides,
+        *choice.contact_ratio,
+        " and ".join(dict.fromkeys(choice.left)) or "-",
+        "yes" if choice.hunting else "no",
+        " ".join(choice.lacks),
+    )
+
+
+def _cells(choice: SizedTeeth) -> tuple[str, ...]:
+    return (
+        "/".join(map(str, choice.teeth)),
+        str(choice.planets) if choice.kind != "pair" else "-",
+        f"{choice.ratio:.4f}",
+        " ".join(f"{1e3 * module:.3f}" for module in choice.modules),
+        " ".join(f"{1e3 * width:.1f}" for width in choice.widths),
+        f"{1e3 * choice.diameter:.1f}",
+        f"{1e6 * choice.volume:.1f}",
+        " and ".join(dict.fromkeys(choice.left)) or "-",
+        "yes" if choice.hunting else "no",
+    )
+
+
+_COLUMNS = (
+    "teeth",
+    "planets",
+    "ratio",
+    "module [mm]",
+    "width [mm]",
+    "diameter [mm]",
+    "volume [cm^3]",
+    "first harmonic leaves",
+    "hunting",
+)
+
+
+def _described(demand: ToothDemand, sized: Sequence[SizedTeeth]) -> Block:
+    """The smallest teeth."""
+    rows = tuple((*_cells(choice), choice.decides) for choice in sized[:_SHOWN])
+    notes = [
+        f"{len(sized)} sets of teeth close and assemble; sizes for {demand.torque:g} N m on "
+        f"{'gear 1' if demand.kind == 'pair' else 'the sun'}, S_H {demand.contact_safety:g} and S_F "
+        f"{demand.root_safety:g} with K = {demand.load_factor:g} (ISO 6336, long life)"
+    ]
+    if demand.kind == "stepped":
+        notes.append("stepped planets: gears without shift, no case file and no transmission error")
+    return Block(f"Smallest {demand.kind} teeth", (*_COLUMNS, "decided by"), rows, tuple(notes))
+
+
+def _described_errors(demand: ToothDemand, computed: Sequence[ComputedTeeth], front: Sequence[int]) -> Block:
+    """Transmission errors of the teeth that were computed."""
+    rows = tuple(
+        (*_cells(teeth.choice), f"{1e6 * teeth.error:.3f}", "*" if place in front else "")
+        for place, teeth in enumerate(computed)
+    )
+    note = "STE: static transmission error peak to peak of unmodified teeth, as an arc on the base circle of " + (
+        "gear 1" if demand.kind == "pair" else "the sun"
+    )
+    return Block(
+        "Transmission error", (*_COLUMNS, "STE p-p [µm]", "front"), rows, (note, "front: none is smaller with less")
+    )

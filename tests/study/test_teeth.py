@@ -1,0 +1,121 @@
+"""femgear teeth: what it writes, that sizes and errors are those of its cases, and what it refuses."""
+
+import csv
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from script_runs import run_femgear
+
+from femgear.gears.iso6336 import contact_safety, root_safety
+from femgear.gears.tooth_search import ToothDemand, size_of
+from femgear.stages.static import solve_static
+from femgear.stages.strength import case_stresses
+from femgear.study.teeth import ComputedTeeth, case_of, chosen, front_of
+from femgear.trains.reading import parse_case, read_case, with_values
+
+QUICK = ("--tolerance", "0.004", "--best", "1", "--positions", "8", "--flank-elements", "6")
+SET = ToothDemand(5.0)
+
+
+def rows(path):
+    with open(path, newline="", encoding="utf-8") as stream:
+        return list(csv.DictReader(stream))
+
+
+def test_the_best_are_listed_solved_and_drawn(tmp_path):
+    done = run_femgear("teeth", "--ratio", "5", "--planets", "3..4", *QUICK, "-o", "out", folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Smallest planetary teeth" in done.stdout and "STE" in done.stdout
+    listed = rows(tmp_path / "out" / "teeth.csv")
+    volumes = [float(row["volume [m^3]"]) for row in listed]
+    assert len(listed) > 20 and volumes == sorted(volumes)
+    assert {row["planets"] for row in listed} == {"3", "4"}
+    (case,) = (tmp_path / "out").glob("planetary_*.toml")
+    assert (tmp_path / "out" / "teeth.png").stat().st_size > 5000
+    changed = {"static.positions": 8, "static.flank_elements": 6, "static.stresses": False}
+    error = solve_static(with_values(read_case(case), changed)).cycle.peak_to_peak("sun_arc")
+    assert f"{1e6 * float(error):.3f}" in done.stdout
+
+
+def test_stepped_sets_have_sizes_alone(tmp_path):
+    arguments = ("--ratio", "9", "--kind", "stepped", "--tolerance", "0.0005", "-o", "out")
+    done = run_femgear("teeth", *arguments, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "no transmission error" in done.stdout
+    assert len(rows(tmp_path / "out" / "teeth.csv")) > 20
+    assert not [*(tmp_path / "out").glob("*.toml")]
+
+
+@pytest.mark.parametrize(
+    ("demand", "teeth", "planets"), [(SET, (27, 40, 108), 3), (ToothDemand(1.5, kind="pair"), (24, 36), 1)]
+)
+def test_the_case_of_a_size_has_the_safety_that_was_asked_for(demand, teeth, planets):
+    choice = size_of(demand, teeth, planets)
+    case = parse_case(case_of(demand, choice))
+    nominal = case_stresses(case, demand.torque)
+    roots = [
+        root_safety(
+            demand.root_limit, stress, demand.load_factor, reversed_bending=teeth[1] == 40 and (kind, j) in BENT
+        )
+        for kind, stresses in enumerate(nominal.root)
+        for j, stress in enumerate(stresses)
+    ]
+    flanks = [
+        contact_safety(demand.contact_limit, stress * max(factors), demand.load_factor)
+        for stress, factors in zip(nominal.contact, nominal.single_pair, strict=True)
+    ]
+    margins = min(roots) / demand.root_safety, (min(flanks) / demand.contact_safety) ** 2
+    # modules and widths are rounded up, backlash and free tips of the case change contact ratios a little
+    assert min(margins) == pytest.approx(1.0, abs=0.03)
+    assert ("root" in choice.decides) == (margins[0] < margins[1])
+
+
+BENT = {(0, 1), (1, 0)}
+"""Places of the planet in both kinds of mesh."""
+
+
+@pytest.mark.parametrize(("fixed", "ratio"), [("carrier", 4.0), ("sun", 1.25)])
+def test_the_case_holds_the_member_that_was_asked_for(fixed, ratio):
+    demand = replace(SET, ratio=ratio, fixed=fixed)
+    case = parse_case(case_of(demand, size_of(demand, (27, 40, 108), 3)))
+    assert case.operation.fixed == fixed
+    assert case.torque_on_first_gear() == pytest.approx(demand.torque)
+
+
+def test_the_smallest_of_every_phasing_are_chosen_first():
+    demand = ToothDemand(4.0, planets=(4,))
+    sizes = [size_of(demand, teeth, 4) for teeth in ((32, 32, 96), (28, 28, 84), (36, 36, 108), (30, 30, 90))]
+    sizes.sort(key=lambda choice: choice.volume)
+    picked = chosen(sizes, 2)
+    assert {choice.left[0] for choice in picked} == {"torque", "nothing"}
+    assert [choice.volume for choice in chosen(sizes, 9)] == [choice.volume for choice in sizes]
+
+
+def test_none_is_smaller_with_less_error_than_the_front():
+    draw = np.random.default_rng(4)
+    choice = size_of(SET, (27, 40, 108), 3)
+    sets = [ComputedTeeth(replace(choice, volume=v), "", e) for v, e in draw.uniform(1.0, 2.0, (40, 2)).tolist()]
+    front = front_of(sets)
+    for place, teeth in enumerate(sets):
+        beaten = any(o.choice.volume <= teeth.choice.volume and o.error < teeth.error for o in sets if o is not teeth)
+        assert (place in front) == (not beaten)
+
+
+def test_words_that_are_no_numbers_are_refused_together(tmp_path):
+    arguments = ("--ratio", "5", "--planets", "many", "--torque", "12 mm", "--best", "0", "-o", "out")
+    done = run_femgear("teeth", *arguments, folder=tmp_path)
+    assert done.returncode == 2
+    assert all(word in done.stderr for word in ("--planets", "--torque", "--best"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_picture_names_the_front_alone():
+    from femgear.study.figures import size_and_error
+
+    figure = size_and_error(
+        [1.0, 2.0, 3.0], [3.0, 1.0, 2.0], ["a", "b", "c"], left=["torque", "nothing", ""], front=[0, 1]
+    )
+    (ax,) = figure.axes
+    assert [text.get_text() for text in ax.texts] == ["a", "b"]
+    assert ax.get_legend_handles_labels()[1] == ["leaves torque", "leaves nothing", "pairs"]
