@@ -97,7 +97,7 @@ def teeth_into(
     names, blocks = [_TABLE], [_described(demand, sized)]
     if demand.kind == "stepped":  # no case file holds them yet
         return blocks, names
-    computed = list(_computed(demand, chosen(sized, request.best), request, cache, progress))
+    computed = list(_computed(demand, best_of_every_phasing(sized, request.best), request, cache, progress))
     for teeth in computed:
         names.append(f"{_label(teeth.choice, '_')}.toml")
         write_text(teeth.case, folder / names[-1])
@@ -116,7 +116,7 @@ def teeth_into(
     return blocks, names
 
 
-def chosen(sized: Sequence[SizedTeeth], count: int) -> list[SizedTeeth]:
+def best_of_every_phasing(sized: Sequence[SizedTeeth], count: int) -> list[SizedTeeth]:
     """Choose so many teeth: the smallest of every phasing, hunting or not, then the smallest of the others.
 
     Else all would be neighbours of the smallest.

@@ -11,7 +11,7 @@ from femgear.gears.iso6336 import contact_safety, root_safety
 from femgear.gears.tooth_search import ToothDemand, size_of
 from femgear.stages.static import solve_static
 from femgear.stages.strength import case_stresses
-from femgear.study.teeth import ComputedTeeth, case_of, chosen, front_of
+from femgear.study.teeth import ComputedTeeth, best_of_every_phasing, case_of, front_of
 from femgear.trains.reading import parse_case, read_case, with_values
 
 QUICK = ("--tolerance", "0.004", "--best", "1", "--positions", "8", "--flank-elements", "6")
@@ -87,9 +87,9 @@ def test_the_smallest_of_every_phasing_are_chosen_first():
     demand = ToothDemand(4.0, planets=(4,))
     sizes = [size_of(demand, teeth, 4) for teeth in ((32, 32, 96), (28, 28, 84), (36, 36, 108), (30, 30, 90))]
     sizes.sort(key=lambda choice: choice.volume)
-    picked = chosen(sizes, 2)
+    picked = best_of_every_phasing(sizes, 2)
     assert {choice.left[0] for choice in picked} == {"torque", "nothing"}
-    assert [choice.volume for choice in chosen(sizes, 9)] == [choice.volume for choice in sizes]
+    assert [choice.volume for choice in best_of_every_phasing(sizes, 9)] == [choice.volume for choice in sizes]
 
 
 def test_none_is_smaller_with_less_error_than_the_front():
