@@ -134,7 +134,17 @@ class SizedTeeth:
 
 @dataclass(frozen=True)
 class _UnitMesh:
-    """A mesh of gears whose first module is 1 mm; torque on gear 1 over that of the driver, of one branch."""
+    """A mesh of gears whose first module is 1 mm.
+
+    Parameters
+    ----------
+    pair : GearPair
+        Both gears.
+    torque : float
+        On gear 1, over that of the driver in one branch [1].
+    names : (str, str)
+        Of both gears in words.
+    """
 
     pair: GearPair
     torque: float
