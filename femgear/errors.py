@@ -38,6 +38,7 @@ CODES = {
     "E-DIVERGED": "The motion grows beyond all bounds.",
     "E-DRIVETRAIN": "The bodies, shafts and stages of a drivetrain make no chain.",
     "E-DUPLICATE": "The same thing is given twice.",
+    "E-FAULT": "A fault that the tooth cannot have, or that a method does not know.",
     "E-FEMGEAR": "A refusal that has no code of its own.",
     "E-FILE": "A file cannot be read: missing, no regular file, too long, or not of its form.",
     "E-FILE-ENC": "A file is not UTF-8.",

@@ -42,6 +42,7 @@ CATALOGUE = {
         "The excitation ends below what levels need, or nothing excites.",
     ),
     "W-FACE-LOAD": (DOUBT, "Slices are too wide for the load distribution over the face width."),
+    "W-FAULT": (DOUBT, "A fault of a tooth has effects that the model leaves out, or none that shows."),
     "W-FILLET": (NOTE, "A tip runs into the root fillet of its mate by a little."),
     "W-FORMER": (NOTE, "A file of a former model is read as one of today."),
     "W-FREE": (DOUBT, "More modes have no stiffness than a gearbox has ways to turn."),

@@ -437,6 +437,7 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-DAMPING": lambda: of_case(PLANETARY, {"dynamics.damping_ratio": 0.0}),
     "W-ESTIMATED": lambda: of_case(PLANETARY, {"sun.mass": None}),
     "W-EXCITATION": lambda: of_case("gear_pair", {"mesh.error": None, "mesh.stiffness_waves": None}),
+    "W-FAULT": lambda: of_case(PLANETARY, {"sun.fault": [{"kind": "missing", "tooth": 3}]}),
     "W-FILLET": lambda: of_case(PLANETARY, {"rack.root_radius": 0.26, "sun.profile_shift": None}),
     "W-FORMER": former_file,
     "W-HELIX": lambda: of_case(HELICAL, {"helical.helix_angle": "31 deg", "helical.mesh_stiffness": None}),

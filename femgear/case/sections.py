@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BeforeValidator, Field, StrictBool, model_validator
 
+from femgear.case.fault_sections import FaultSection, PlanetFaultSection
 from femgear.case.flank_sections import (
     Angle,
     CarrierErrors,
@@ -226,6 +227,7 @@ class SunSection(ToothMeasures):
     rack: RackSection | None = None
     modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
     errors: GearErrors | None = None
+    fault: Annotated[tuple[FaultSection, ...], Field(max_length=100)] = ()
 
 
 class PlanetSection(ToothMeasures):
@@ -251,6 +253,7 @@ class PlanetSection(ToothMeasures):
     rack: RackSection | None = None
     modifications: Annotated[tuple[PlanetModificationSection, ...], Field(max_length=20)] = ()
     errors: GearErrors | None = None
+    fault: Annotated[tuple[PlanetFaultSection, ...], Field(max_length=100)] = ()
     individual: Annotated[tuple[IndividualPlanet, ...], Field(max_length=1000)] = ()
 
 
@@ -271,6 +274,7 @@ class RingSection(ToothMeasures):
     rack: RackSection | None = None
     modifications: Annotated[tuple[ModificationSection, ...], Field(max_length=20)] = ()
     errors: RingErrors | None = None
+    fault: Annotated[tuple[FaultSection, ...], Field(max_length=100)] = ()
 
 
 class CarrierSection(Section):

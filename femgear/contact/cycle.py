@@ -54,7 +54,9 @@ from femgear.contact.windows import (
     mesh_windows,
     pair_paths,
 )
+from femgear.errors import LESS_TORQUE, ContactError
 from femgear.gears.deviations import SetDeviations, mirrored_deviations
+from femgear.gears.faults import BrokenTip, MissingTooth
 from femgear.gears.pair import GearSet
 from femgear.gears.planetary import mirrored_set
 
@@ -62,6 +64,8 @@ _TOGETHER, _ROWS, _SAME_PLACE = 64, 50, 1e-6
 """Positions that are solved at once, and slices of helical teeth; distance of two that count as one [mesh periods]."""
 _PASSAGE = np.int64(1 << 40)
 """What passages of the pitch point add to the numbers of tooth pairs that carry."""
+_MOST_TURNS, _TURNED = 30, 1e-5
+"""Solutions with gears that have turned, and the change of the largest arc that ends them."""
 _MANY_PARTS = 3
 """Parts of a walk above which two processes share them."""
 
@@ -318,7 +322,7 @@ def planet_symmetry(planetary_set: GearSet, deviations: SetDeviations | None = N
     turning = (d.sun_runout, d.ring_runout, d.carrier_runout, d.ovality)
     if d.sun_misalignment.any() or d.carrier_misalignment.any():
         return 1
-    if d.sun_pitch.any() or d.ring_pitch.any() or any(runout.amplitude for runout in turning):
+    if d.faults or d.sun_pitch.any() or d.ring_pitch.any() or any(runout.amplitude for runout in turning):
         return 1
     runouts = np.array([[r.amplitude, r.phase if r.amplitude else 0.0] for r in d.planet_runout])
     pitches = d.planet_pitch, d.planet_ring_side_pitch
@@ -438,7 +442,49 @@ class _Walk:
         return self.planetary_set.n_planets // self.sector.n_planets
 
     def attempt(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
-        """Solve all positions in windows of one size, or up to one that needs more, see `in_windows`."""
+        """Solve all positions in windows of one size, or up to one that needs more, see `in_windows`.
+
+        Where a tooth is missing corners carry far off the path, and the arcs by which gears turn change where flanks
+        are: separations are those of the flanks where the solution before has them, until that is where they stay.
+        """
+        record, wider, further = self._attempt(share, nearest, None)
+        if record is None or not self._far_off:
+            return record, wider, further
+        turned = np.zeros(record.deflection.shape)
+        for _ in range(_MOST_TURNS):
+            before, turned = turned, self._turned(record)
+            if np.abs(turned - before).max() <= _TURNED * np.abs(turned).max():
+                return record, wider, further
+            record, wider, further = self._attempt(share, nearest, turned)
+            if record is None:
+                return record, wider, further
+        raise ContactError(
+            "the gears do not come to rest where a tooth is missing",
+            code="E-CONTACT",
+            limit=f"{_MOST_TURNS} solutions",
+            remedy=LESS_TORQUE,
+        )
+
+    @property
+    def _far_off(self) -> bool:
+        """Whether teeth may carry far off the path of contact."""
+        faults = () if self.deviations is None else self.deviations.faults
+        return any(isinstance(fault, MissingTooth | BrokenTip) for fault in faults)
+
+    def _turned(self, record: MeshCycle) -> np.ndarray:
+        """Arcs (M, P) [m] by which gear 1 of every mesh turns, with its motion along the line of action.
+
+        Of the first kind of mesh it is the driver, of the next one the planets, whose flanks approach a gear that is
+        held.
+        """
+        turned = record.deflection.copy()
+        turned[self.planetary_set.kind_rows[0]] = record.sun_arc
+        return turned
+
+    def _attempt(
+        self, share: float, nearest: float, turned: np.ndarray | None
+    ) -> tuple[MeshCycle | None, float, float]:
+        """Solve all positions as `attempt`, with gears turned by arcs (M, P) [m]."""
         options, empty = self.options, self.empty
         tau, each = empty.position, 1
         if options.ahead is not None:
@@ -454,6 +500,7 @@ class _Walk:
             cells=options.cells,
             deviations=self.deviations,
             both_flanks=options.both_flanks,
+            turned=None if turned is None else np.repeat(turned, each, axis=1),
         )
         setup = replace(setup, images=self.images)
         if options.planet_gaps is not None:

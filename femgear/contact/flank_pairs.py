@@ -30,13 +30,12 @@ from femgear.gears.deviations import (
     profile_separation,
     tooth_separation,
 )
+from femgear.gears.faults import LEFT, RIGHT, fault_form
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import orientations, pitch_tooth
 from femgear.gears.pair import GearSet
 from femgear.gears.planetary import mirrored_set
 
-LEFT, RIGHT = 0, 1
-"""Flanks of a tooth."""
 DRIVE_SIDE, BACK_SIDE = 1.0, -1.0
 """Sides of a mesh: whether the path coordinate grows or falls with the position."""
 
@@ -230,14 +229,44 @@ def side_teeth(planetary_set: GearSet, index: np.ndarray, direction: float):
     return teeth
 
 
-def profile_form(planetary_set: GearSet, deviations: SetDeviations | None, kind: int, back: bool) -> Callable | None:
+def profile_form(
+    planetary_set: GearSet,
+    deviations: SetDeviations | None,
+    kind: int,
+    back: bool,
+    tooth: np.ndarray | None = None,
+    turns: np.ndarray | None = None,
+) -> Callable | None:
     """Separation [m] by deviations of the profiles as a function of both roll lengths [m], or None.
 
-    `kind` is that of the mesh, 0 for sun-planet and 1 for planet-ring.
+    `kind` is that of the mesh, 0 for sun-planet and 1 for planet-ring. With the teeth (2, meshes, pairs) of all
+    meshes in the first mesh period and the periods passed (P,) faults of teeth count; roll lengths then are (meshes of
+    the kind, P, pairs, n).
     """
-    if deviations is None or not any(form.profile for form in deviations.mesh_forms(kind, back)):
+    if deviations is None:
         return None
-    return lambda roll_1, roll_2: profile_separation(deviations, planetary_set, kind, roll_1, roll_2, back=back)
+    forms = []
+    if any(form.profile for form in deviations.mesh_forms(kind, back)):
+        forms.append(
+            lambda roll_1, roll_2: profile_separation(deviations, planetary_set, kind, roll_1, roll_2, back=back)
+        )
+    if deviations.faults and tooth is not None and turns is not None:
+        faulty = _fault_form(planetary_set, deviations, kind, back, tooth, turns)
+        forms += [faulty] if faulty else []
+    if len(forms) < 2:
+        return forms[0] if forms else None
+    return lambda roll_1, roll_2: forms[0](roll_1, roll_2) + forms[1](roll_1, roll_2)
+
+
+def _fault_form(planetary_set: GearSet, deviations: SetDeviations, kind: int, back: bool, tooth, turns):
+    """Separation by faults of teeth as `fault_form` has it; arguments as of `profile_form`."""
+    rows, sides = np.flatnonzero(planetary_set.mesh_kind == kind), np.zeros((2, len(planetary_set.meshes)), int)
+    for _, acting in acting_flanks(planetary_set):
+        for mesh, place, side in acting:
+            sides[place, mesh] = RIGHT - side if back else side
+    steps = np.array([tooth_steps(planetary_set, rows, place) for place in (0, 1)])
+    numbers = tooth[:, rows, None] + steps[:, :, None, None] * turns[:, None]
+    return fault_form(deviations.faults, planetary_set, kind, numbers, sides[:, rows])
 
 
 def pair_separations(

@@ -29,6 +29,7 @@ from femgear.contact.flank_pairs import (
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
 from femgear.errors import LESS_TORQUE, ContactError
 from femgear.gears.deviations import SetDeviations
+from femgear.gears.faults import missing_length
 from femgear.gears.pair import GearSet
 
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
@@ -181,7 +182,7 @@ class MeshWindows(Windows):
         return replace(self, gap=gap, listed=replace(self.listed, gap=listed))
 
 
-def mesh_windows(
+def mesh_windows(  # noqa: PLR0913
     planetary_set: GearSet,
     bodies: Bodies,
     *,
@@ -192,6 +193,7 @@ def mesh_windows(
     cells: int = 36,
     deviations: SetDeviations | None = None,
     both_flanks: bool = False,
+    turned: np.ndarray | None = None,
 ) -> MeshWindows:
     """Place the contact windows of every mesh at every position.
 
@@ -209,6 +211,9 @@ def mesh_windows(
         Pressure cells in a window.
     both_flanks : bool
         Back flanks as well, as the second half of the meshes.
+    turned : (meshes, P) array, optional
+        Arcs by which gear 1 of every mesh has turned on its base circle [m], positive as it drives: separations are
+        those of flanks there, to which approaches by all motions still come. Approaches of gear 2 are exact anyway.
     """
     tau, turns = _in_periods(cycle_positions(positions))
     pairs = mesh_pairs(planetary_set)
@@ -216,23 +221,53 @@ def mesh_windows(
         WIDTH * _contact_half_width(pair, share / width, modulus)
         for pair, width, modulus in zip(pairs, bodies.widths, bodies.contact_moduli, strict=True)
     ]
+    widths, cells = _over_gaps(planetary_set, deviations, pairs, widths, cells, nearest)
+    whole = deviations
+    if deviations is not None and deviations.faults:
+        faults = [fault for fault in deviations.faults if not missing_length(fault, planetary_set)]
+        whole = replace(deviations, faults=tuple(faults))
     windows_of_meshes, teeth = [], []
     for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
         phase, clearance = flank_side(planetary_set, direction)
         zeta, tooth = _tooth_pairs(planetary_set, pairs, phase, direction, tau - turns)
         shift = pair_separations(planetary_set, deviations, tooth, turns, tau, back=direction < 0)
         shift += clearance[:, None, None]
+        moved = None if turned is None else direction * turned[:, :, None]
         for kind, (contact_pair, rows) in enumerate(zip(pairs, planetary_set.kind_rows, strict=True)):
             options = {
                 "width": widths[kind],
                 "cells": cells,
                 "nearest": nearest,
                 "line_of_action": contact == "line_of_action",
-                "form": profile_form(planetary_set, deviations, kind, direction < 0),
+                "form": profile_form(planetary_set, deviations, kind, direction < 0, tooth, turns),
+                "whole": profile_form(planetary_set, whole, kind, direction < 0, tooth, turns),
+                "moved": 0.0 if moved is None else moved[rows],
             }
             windows_of_meshes.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
         teeth.append(tooth)
     return _gathered(windows_of_meshes, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
+
+
+def _over_gaps(
+    planetary_set: GearSet,
+    deviations: SetDeviations | None,
+    pairs: tuple[FlankPair, ...],
+    widths: list[float],
+    cells: int,
+    nearest: float,
+) -> tuple[list[float], int]:
+    """Widen the windows [m] of kinds of mesh whose teeth lack a part of their flank, with more cells.
+
+    A pair may touch on both sides of the part that is missing: as far from the place of the whole flanks as it is long,
+    but no further than where these have come apart by ``nearest`` [m].
+    """
+    faults, wide = () if deviations is None else deviations.faults, list(widths)
+    for kind, (pair, mates) in enumerate(zip(pairs, planetary_set.mates, strict=True)):
+        length = max((missing_length(fault, planetary_set) for fault in faults if fault.gear in mates), default=0.0)
+        if length:
+            wide[kind] += 2.0 * min(length, 0.5 * length + _largest_radius(pair) * nearest / length)
+    most = max(wider / width for wider, width in zip(wide, widths, strict=True))
+    return wide, cells if most == 1.0 else int(np.ceil(cells * np.sqrt(most)))
 
 
 def pair_paths(planetary_set: GearSet, positions, *, both_flanks: bool) -> tuple[np.ndarray, np.ndarray]:
@@ -314,7 +349,7 @@ def cycle_positions(positions, *, periods: int = 1) -> np.ndarray:
     return np.arange(positions * periods) / positions
 
 
-def windows(
+def windows(  # noqa: PLR0913
     pair: FlankPair,
     zeta,
     *,
@@ -323,7 +358,9 @@ def windows(
     nearest: float,
     line_of_action: bool,
     form: Callable | None = None,
+    whole: Callable | None = None,
     shift: float | np.ndarray = 0.0,
+    moved: float | np.ndarray = 0.0,
 ) -> Windows:
     """Place pressure cells around the point of smallest separation of every tooth pair.
 
@@ -342,15 +379,20 @@ def windows(
         Only pairs on the theoretical path of contact, as for rigid gears.
     form : callable, optional
         Separation that deviations of both profiles add, from the roll lengths on flank 1 and 2 [m].
+    whole : callable, optional
+        The same of flanks of which no part is missing: windows lie around the place where these come nearest.
     shift : float or (...) array, broadcast with `zeta`
         Separation that errors of position add to a whole pair [m].
+    moved : float or array, broadcast with `zeta`
+        Path coordinates at which flanks stand beyond those that count the pairs [m].
     """
-    zeta = np.asarray(zeta, float)
+    counted = np.asarray(zeta, float)
+    zeta = counted + moved
     low, high = admissible_arcs(pair, zeta)
     nominal = np.maximum(pair.pitch_roll_1 + zeta, 0.0) ** 2 / (2 * pair.base_radius_1)
     centre = np.clip(nominal, low, np.maximum(low, high))
-    if form is not None:
-        centre = _nearest_arc(pair, zeta, centre, low, high, 6.0 * width, form)
+    if whole is not None:
+        centre = _nearest_arc(pair, zeta, centre, low, high, 6.0 * width, whole)
     start = np.clip(centre - 0.5 * width, low, np.maximum(low, high - width))
     tiny = 1e-9 * width
     at_edge = np.stack([start <= low + tiny, start + width >= high - tiny])
@@ -364,9 +406,11 @@ def windows(
     begin, end = pair.path
     smallest = gap.min(axis=-1)
     on_path = (zeta >= begin) & (zeta <= end)
+    with np.errstate(invalid="ignore"):  # of pairs whose teeth are missing
+        near = smallest - smallest.min(axis=-1, keepdims=True) < nearest
     return Windows(
-        zeta=zeta,
-        near=on_path if line_of_action else smallest - smallest.min(axis=-1, keepdims=True) < nearest,
+        zeta=counted,
+        near=on_path & np.isfinite(smallest) if line_of_action else near,
         gap=gap,
         roll=np.stack([roll_1, roll_2]),
         at_edge=at_edge,
@@ -422,11 +466,15 @@ def _contact_half_width(pair: FlankPair, line_load: float, modulus: float) -> fl
 
     ``modulus`` is the contact modulus of both flanks [Pa].
     """
+    return hertz_half_width(line_load, _largest_radius(pair), modulus)
+
+
+def _largest_radius(pair: FlankPair) -> float:
+    """Largest relative radius of curvature on the path of contact [m]."""
     begin, end = pair.path
     zeta = np.linspace(begin, end, 51)[1:-1]
     rho_1, rho_2 = pair.pitch_roll_1 + zeta, pair.pitch_roll_2 - pair.sign * zeta
-    radius = (rho_1 * rho_2 / (rho_2 + pair.sign * rho_1)).max()
-    return hertz_half_width(line_load, radius, modulus)
+    return float((rho_1 * rho_2 / (rho_2 + pair.sign * rho_1)).max())
 
 
 @lru_cache(maxsize=64)

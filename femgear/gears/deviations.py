@@ -20,6 +20,7 @@ from fractions import Fraction
 
 import numpy as np
 
+from femgear.gears.faults import ToothFault, fault_periods
 from femgear.gears.gear import Gear, GeometryWarning
 from femgear.gears.kinematics import across, body_approach, mesh_normals, orientations, unit_vectors
 from femgear.gears.modifications import FlankForm, check_flank, form_deviation, lead_deviation, profile_height
@@ -107,6 +108,8 @@ class SetDeviations:
         Eccentricity of sun, ring and carrier; that of the carrier moves all planets.
     ovality : Ovality
         Out-of-roundness of the ring.
+    faults : tuple of ToothFault
+        Of single teeth.
     """
 
     sun: FlankForm
@@ -129,6 +132,7 @@ class SetDeviations:
     ovality: Ovality = Ovality()
     sun_thickness: float = 0.0
     ring_thickness: float = 0.0
+    faults: tuple[ToothFault, ...] = ()
 
     def __post_init__(self):
         pitches = ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch")
@@ -159,6 +163,7 @@ class SetDeviations:
             or self.ovality.amplitude
             or np.ptp(self.planet_thickness)
             or self.misaligned
+            or self.faults
         )
 
     @property
@@ -381,14 +386,15 @@ def common_period(deviations: SetDeviations, planetary_set: GearSet, *, limit: i
 def _own_periods(d: SetDeviations, s: GearSet):
     """Name and number of mesh periods after which the deviations of every kind of body repeat."""
     first, each, last = s.gears[0], s.gears[BRANCH], s.gears[-1]
-    yield first.name, math.lcm(_repeat(d.sun_pitch), first.teeth if d.sun_runout.amplitude else 1)
+    faulty = [fault_periods(d.faults, number, gear.teeth) for number, gear in enumerate(s.gears)]
+    yield first.name, math.lcm(_repeat(d.sun_pitch), first.teeth if d.sun_runout.amplitude else 1, faulty[0])
     planets = [
         math.lcm(_repeat(sun_side), _repeat(two), each.teeth if runout.amplitude else 1)
         for sun_side, two, runout in zip(d.planet_pitch, d.planet_ring_side_pitch, d.planet_runout, strict=True)
     ]
-    yield "planets" if s.repeated[BRANCH] else each.name, math.lcm(*planets)
+    yield "planets" if s.repeated[BRANCH] else each.name, math.lcm(*planets, faulty[BRANCH])
     oval = last.teeth // math.gcd(last.teeth, d.ovality.nodal_diameter) if d.ovality.amplitude else 1
-    yield last.name, math.lcm(_repeat(d.ring_pitch), last.teeth if d.ring_runout.amplitude else 1, oval)
+    yield last.name, math.lcm(_repeat(d.ring_pitch), last.teeth if d.ring_runout.amplitude else 1, oval, faulty[-1])
 
 
 def _repeat(values: np.ndarray) -> int:
@@ -403,7 +409,7 @@ def without_turning(d: SetDeviations, s: GearSet) -> SetDeviations:
     """Leave out what belongs to teeth or turns with a gear; the rest stands still in the carrier's frame."""
     even = no_deviations(s)
     pitches = ("sun_pitch", "planet_pitch", "planet_ring_side_pitch", "ring_pitch")
-    names = (*pitches, "sun_runout", "planet_runout", "ring_runout", "ovality")
+    names = (*pitches, "sun_runout", "planet_runout", "ring_runout", "ovality", "faults")
     return replace(d, **{name: getattr(even, name) for name in names})
 
 
@@ -414,6 +420,12 @@ def planet_shift(d: SetDeviations, s: GearSet, symmetry: int, periods: int) -> F
     and ring come with the same tooth after ``z_sun/symmetry`` and ``-z_ring/symmetry`` mesh periods; planets
     must bring errors of their own. None: no such time within the common ``periods`` of the errors.
     """
+    if any(fault.gear == BRANCH for fault in d.faults):
+        return None
+    sun_repeat, ring_repeat = (
+        math.lcm(_repeat(pitch), fault_periods(d.faults, number, len(pitch)))
+        for number, pitch in ((0, d.sun_pitch), (len(s.gears) - 1, d.ring_pitch))
+    )
     ahead, N = s.n_planets // symmetry, s.n_planets
     behind, phases = (np.arange(N) - ahead) % N, np.asarray(s.mesh_phases[:N])
     meshes = s.moved_meshes(behind)
@@ -423,7 +435,7 @@ def planet_shift(d: SetDeviations, s: GearSet, symmetry: int, periods: int) -> F
     first, last = Fraction(s.gears[0].teeth, symmetry), Fraction(s.gears[-1].teeth, symmetry)
     for count in range(periods):
         shift = first % 1 + count
-        if (shift - first) % _repeat(d.sun_pitch) or (shift + last) % _repeat(d.ring_pitch):
+        if (shift - first) % sun_repeat or (shift + last) % ring_repeat:
             continue
         turned = step * np.rint(float(shift) + phases - phases[behind]).astype(int)
         pitches = d.planet_pitch, d.planet_ring_side_pitch
@@ -456,6 +468,12 @@ def mirrored_deviations(deviations: SetDeviations, planetary_set: GearSet, mirro
         for n, angle in zip(order, image.planets, strict=True)
     ]
     runouts = [_reflected(d.planet_runout[n], k * s.gears[BRANCH].pitch_angle) for n, k in zip(order, planets)]
+    first = {(number, 0): (0, 0 if number == 0 else ring) for number in (0, len(s.gears) - 1)}
+    first |= {(BRANCH, n): (copy, k) for copy, (n, k) in enumerate(zip(order, planets))}
+    faults = []
+    for fault in d.faults:
+        copy, tooth = first[fault.gear, fault.copy]
+        faults.append(fault.in_mirror(tooth, s.gears[fault.gear].teeth, copy))
     return replace(
         d,
         planet_sun_side=d.planet_ring_side,
@@ -471,6 +489,7 @@ def mirrored_deviations(deviations: SetDeviations, planetary_set: GearSet, mirro
         ovality=replace(d.ovality, phase=ring * last - d.ovality.phase),
         pin_errors=d.pin_errors[order] * [1.0, -1.0],
         planet_thickness=d.planet_thickness[order],
+        faults=tuple(faults),
         planet_misalignment=d.planet_misalignment[order] * [1.0, -1.0],
         sun_misalignment=_in_mirror(d.sun_misalignment, axis),
         carrier_misalignment=_in_mirror(d.carrier_misalignment, axis),
@@ -584,6 +603,7 @@ def _causes(d: SetDeviations) -> list[str]:
         "tooth thickness": bool(d.sun_thickness or d.ring_thickness or d.planet_thickness.any()),
         "profile modifications": any(form.profile for form in forms),
         "lead modifications such as crowning": any(form.lead for form in forms),
+        "faults of teeth": bool(d.faults),
     }
     return [name for name, there in causes.items() if there]
 

@@ -44,6 +44,7 @@ from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import StageResult
 from femgear.stages.strength import SIDES, NominalStresses
 from femgear.stages.stress_reasons import largest_pressure, over_hertz, reason_values, stress_reasons
+from femgear.stages.tooth_faults import fault_findings
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, declared
 
@@ -1155,6 +1156,7 @@ def set_warnings(case: Case) -> Iterator[Finding]:
 def load_warnings(case: Any) -> Iterator[Finding]:
     """List what deserves a look in the deviations and the torque of a case."""
     yield from check_deviations(set_deviations(case), planetary_set(case))
+    yield from fault_findings(case)
     yield from width_warnings(case)
     yield from friction_findings(case, planetary_set(case))
     yield from steep_helix("set.helix_angle", case.set.helix_angle)

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import Steps
+from femgear.case.fault_sections import no_faults
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.case.tooth_friction import no_acting_friction
 from femgear.contact.cycle import CycleOptions, loaded_image, walk_mesh_cycle
@@ -140,6 +141,7 @@ def design_basis(case: Case, *, cache: Path | None = None, steps: Steps | None =
     CaseError: as `femgear.stages.static.check_slices`.
     """
     no_acting_friction(case, "designs, derivatives and samples know no friction of the teeth")
+    no_faults(case, "designs, derivatives and samples know no faults of single teeth")
     gears, deviations, steps = planetary_set(case), set_deviations(case), steps or Steps()
     over = over_width(case, gears, cache=cache, steps=steps)
     return DesignBasis(

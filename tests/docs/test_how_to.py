@@ -29,6 +29,7 @@ HOW_TO = (
     "choosing_teeth",
     "optimise",
     "side_bands",
+    "faults",
     "pin_errors",
     "misaligned",
     "crowning",

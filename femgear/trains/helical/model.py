@@ -27,6 +27,7 @@ from typing import TYPE_CHECKING, Literal, NoReturn
 
 import numpy as np
 
+from femgear.case.fault_sections import no_faults
 from femgear.case.gear_set import materials_of, support_stiffness
 from femgear.case.tooth_friction import no_acting_friction
 from femgear.contact.bodies import make_bodies, make_sectors
@@ -436,6 +437,7 @@ def check_helical_case(case: HelicalCase, gears: PlanetarySet) -> None:
     """
     _check_supports(case, gears)
     if case.helical.mesh_stiffness is not None:
+        no_faults(case, "with a given mesh stiffness no flank is looked at, and so no fault of a tooth")
         no_acting_friction(case, "a given helical.mesh_stiffness has no tooth loads, and so no friction")
         return
     _check_torque(case, gears)

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.fault_sections import no_faults
 from femgear.case.gear_set import planetary_set
 from femgear.case.lubrication import losses_wanted
 from femgear.case.quantities import RPM
@@ -85,6 +86,7 @@ def check_planar_case(case: PlanarCase, gears: PlanetarySet) -> None:
     CaseError: E-BACKLASH: back flanks without play. E-PERIODS: a static record of several mesh periods.
     """
     if case.planar.mesh_stiffness is not None:
+        no_faults(case, "with a given mesh stiffness no flank is looked at, and so no fault of a tooth")
         no_acting_friction(case, "a given planar.mesh_stiffness has no tooth loads, and so no friction")
     planar, play = case.planar, _least_play(case, gears)
     if planar.back_flanks and planar.line_backlash is None and not play > _NO_PLAY:

@@ -1,0 +1,185 @@
+"""Faults of a tooth: missing, broken off at its tip, pitted or worn.
+
+They take material off a flank, and so add to the separation of the flanks, over the roll length of the gear that has
+them. Teeth are numbered as in `femgear.gears.deviations`; the left flank of a tooth is the one on its counter-clockwise
+side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from femgear.gears.pair import GearSet
+
+LEFT, RIGHT = 0, 1
+"""Flanks of a tooth."""
+
+
+@dataclass(frozen=True)
+class ToothFault:
+    """A fault of one tooth of a gear of a set, or of all its teeth.
+
+    Parameters
+    ----------
+    gear, copy : int
+        Number of the gear in its set, and which of several equal ones, from 0.
+    tooth : int or None
+        Number of the tooth; None stands for all teeth.
+    flank : int or None
+        `LEFT` or `RIGHT`; None stands for both.
+    """
+
+    gear: int
+    copy: int
+    tooth: int | None
+    flank: int | None
+
+    separates: ClassVar[bool] = True
+    """Whether it takes material off the flank."""
+
+    def removed(self, roll: np.ndarray) -> np.ndarray:
+        """Compute what is missing along the flank normal (...) [m] at roll lengths (...) [m]."""
+        raise NotImplementedError
+
+    def in_mirror(self, first: int, teeth: int, copy: int) -> ToothFault:
+        """Find the fault in the mirror image, where tooth ``first`` of the original is tooth 0."""
+        tooth = None if self.tooth is None else (first - self.tooth) % teeth
+        flank = None if self.flank is None else RIGHT - self.flank
+        return replace(self, tooth=tooth, flank=flank, copy=copy)
+
+
+@dataclass(frozen=True)
+class MissingTooth(ToothFault):
+    """A tooth that is broken off at its root: no point of its flanks can touch."""
+
+    def removed(self, roll: np.ndarray) -> np.ndarray:
+        return np.full(np.shape(roll), np.inf)
+
+
+@dataclass(frozen=True)
+class BrokenTip(ToothFault):
+    """A tooth whose tip is broken off over the whole width.
+
+    Parameters
+    ----------
+    roll : float
+        Roll length at which the flank ends [m].
+    internal : bool
+        Whether the tip is at the smaller roll lengths.
+    """
+
+    roll: float
+    internal: bool
+
+    def removed(self, roll: np.ndarray) -> np.ndarray:
+        gone = roll < self.roll if self.internal else roll > self.roll
+        return np.where(gone, np.inf, 0.0)
+
+
+@dataclass(frozen=True)
+class Spall(ToothFault):
+    """A pit across the whole width: a part of the flank that stands back.
+
+    Parameters
+    ----------
+    low, high : float
+        Roll lengths of its ends [m].
+    depth : float
+        Along the normal [m].
+    """
+
+    low: float
+    high: float
+    depth: float
+
+    def removed(self, roll: np.ndarray) -> np.ndarray:
+        return np.where((roll >= self.low) & (roll <= self.high), self.depth, 0.0)
+
+
+@dataclass(frozen=True)
+class Wear(ToothFault):
+    """Material worn off a flank.
+
+    Parameters
+    ----------
+    roll : tuple of float
+        Roll lengths [m], ascending.
+    depth : tuple of float
+        Along the normal there [m]; between them linear, beyond them as at the ends.
+    """
+
+    roll: tuple[float, ...]
+    depth: tuple[float, ...]
+
+    def removed(self, roll: np.ndarray) -> np.ndarray:
+        return np.interp(roll, self.roll, self.depth)
+
+
+def missing_length(fault: ToothFault, gears: GearSet) -> float:
+    """Find the length of the part of a flank that is missing [m], along the flank; zero of others."""
+    gear = gears.gears[fault.gear]
+    low, high = sorted((gear.form_roll, gear.tip_roll))
+    if isinstance(fault, Spall):
+        low, high = max(low, fault.low), min(high, fault.high)
+    elif isinstance(fault, BrokenTip):
+        low, high = (low, fault.roll) if fault.internal else (fault.roll, high)
+    else:
+        return 0.0
+    return max(high**2 - low**2, 0.0) / (2.0 * gear.base_radius)
+
+
+def fault_periods(faults: Sequence[ToothFault], gear: int, teeth: int) -> int:
+    """Count the mesh periods after which a gear of a set repeats with its faults: its teeth, or one."""
+    return teeth if any(fault.gear == gear and fault.tooth is not None for fault in faults) else 1
+
+
+def fault_form(
+    faults: Sequence[ToothFault], gears: GearSet, kind: int, tooth: np.ndarray, sides: np.ndarray
+) -> Callable | None:
+    """Separation [m] by the faults of teeth as a function of both roll lengths [m], or None.
+
+    Parameters
+    ----------
+    faults : sequence of ToothFault
+        Of all gears.
+    kind : int
+        Kind of the meshes.
+    tooth : (2, meshes, P, pairs) int array
+        Numbers of the teeth on gear 1 and gear 2 of the meshes of this kind.
+    sides : (2, meshes) int array
+        Flanks with which both gears touch in these meshes.
+
+    Returns
+    -------
+    callable
+        Of roll lengths (meshes, P, pairs, n) on gear 1 and gear 2.
+    """
+    meshes = [mesh for mesh in gears.meshes if mesh.kind == kind]
+    acting = []
+    for fault in (fault for fault in faults if fault.separates):
+        for place in (0, 1):
+            on = np.zeros(tooth.shape[1:], bool)
+            for row, mesh in enumerate(meshes):
+                body = gears.bodies[mesh.bodies[place]]
+                same = body.gear == fault.gear and body.copy == fault.copy
+                if same and fault.flank in (None, sides[place, row]):
+                    teeth = gears.gears[body.gear].teeth
+                    on[row] = fault.tooth is None or (tooth[place, row] - fault.tooth) % teeth == 0
+            if on.any():
+                acting.append((fault, place, on))
+    if not acting:
+        return None
+
+    def separation(roll_1, roll_2):
+        rolls = np.broadcast_arrays(roll_1, roll_2)
+        apart = np.zeros(rolls[0].shape)
+        for fault, place, on in acting:
+            apart[on] += fault.removed(rolls[place][on])
+        return apart
+
+    return separation

@@ -1,0 +1,79 @@
+"""What deserves a look in a case with faults of teeth: what the model leaves out, and where their lines lie."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.contact.flank_pairs import RIGHT, acting_flanks
+from femgear.findings import Finding
+from femgear.gears.faults import BrokenTip, MissingTooth, Spall, ToothFault
+from femgear.gears.pair import BRANCH
+
+if TYPE_CHECKING:
+    from femgear.gears.pair import GearSet
+
+_LEFT_OUT = {
+    MissingTooth: "the body keeps its compliance: the teeth beside the gap have the rim of a whole gear",
+    BrokenTip: "the tooth that is left keeps the compliance of a whole one, and its new edge has no limit of pressure",
+    Spall: "a pit that only separates flanks leaves out that the tooth has lost material, some per cent of the "
+    "transmission error; pressures at its edges have no limit",
+}
+"""What the model of every kind of fault leaves out."""
+
+
+def fault_findings(case: Any) -> Iterator[Finding]:
+    """List what is left out of the faults of a case, and those that nothing shows."""
+    gears, back = planetary_set(case), case.torque_on_first_gear() < 0.0
+    for key, fault in _keyed(case, set_deviations(case).faults, gears):
+        if (text := _LEFT_OUT.get(type(fault))) is not None:
+            yield Finding("W-FAULT", key, text, remedy="take sizes with that margin; orders and places are exact")
+        if fault.flank is not None and fault.flank not in _carrying(gears, fault, back=back):
+            looked = ", and back flanks are not looked at" if not case.static.back_flanks else ""
+            text = f"this flank carries nothing under this torque{looked}"
+            yield Finding("W-FAULT", key, text, remedy="give the fault to the other flank, or turn the torque round")
+    yield from _unseen(case, gears)
+
+
+def _keyed(case: Any, faults: tuple[ToothFault, ...], gears: GearSet) -> Iterator[tuple[str, ToothFault]]:
+    """Faults with their entries of the case."""
+    keys = (f"{gear.name}.fault[{i}]" for gear in gears.gears for i in range(len(getattr(case, gear.name).fault)))
+    yield from zip(keys, faults, strict=True)
+
+
+def _carrying(gears: GearSet, fault: ToothFault, *, back: bool) -> set[int]:
+    """Flanks of the faulty gear that carry."""
+    sides = {side for number, acting in acting_flanks(gears) if number == fault.gear for *_, side in acting}
+    return {RIGHT - side for side in sides} if back else sides
+
+
+def sun_fault_step(gears: GearSet) -> float:
+    """Find the carrier orders of whose multiples a fault of a sun tooth makes lines, with equal planets.
+
+    A planet that is ahead by ``2 pi n/N`` meets the faulty tooth ``n/N`` turns of the sun against the carrier later.
+    Of what a sensor beside the ring hears of a planet with carrier order q, and with the order m of the sun's turns,
+    all planets together leave what differs in q - m by a multiple of N: lines are ``N q + m (z_s + z_r)/z_s`` with
+    whole q and m, that is multiples of ``N gcd((z_s + z_r)/N, z_s)/z_s``. Of whole sets it is P. D. McFadden and
+    J. D. Smith, Proc. Inst. Mech. Eng. C 199, 1985, 65-70.
+    """
+    sun, ring, N = gears.gears[0].teeth, gears.gears[-1].teeth, gears.n_planets
+    return N * math.gcd((sun + ring) // N, sun) / sun
+
+
+def _unseen(case: Any, gears: GearSet) -> Iterator[Finding]:
+    """Faults whose lines all lie where a whole set has lines."""
+    equal = len(gears.gears) > 2 and gears.n_planets > 1 and gears.rotations == gears.n_planets
+    if not equal:
+        return
+    N, faults = gears.n_planets, set_deviations(case).faults
+    of_sun = any(fault.gear == 0 and fault.tooth is not None for fault in faults)
+    if of_sun and sun_fault_step(gears) % N == 0:
+        text = (
+            f"all lines of a faulty sun tooth lie at multiples of {N} carrier orders, where equal planets have theirs"
+        )
+        yield Finding("W-FAULT", "sun.fault", text, remedy="look at their levels: no line is new")
+    if any(fault.gear > BRANCH and fault.tooth is not None for fault in faults):
+        text = f"a faulty tooth of the ring makes no new lines: all lie at multiples of {N} carrier orders"
+        yield Finding("W-FAULT", "ring.fault", text, remedy="look at their levels: no line is new")

@@ -1,0 +1,114 @@
+"""Faults of teeth in a case file: what belongs together, and places that a tooth has not."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from femgear.case.fault_sections import FaultSection, PlanetFaultSection, no_faults
+from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.errors import CaseError, GeometryError
+from femgear.gears.faults import LEFT, RIGHT, BrokenTip, MissingTooth, Spall, Wear, missing_length
+from femgear.study.relief import design_basis
+from femgear.trains.reading import read_case, with_values
+from femgear.trains.registry import check_case
+
+CASES = Path(__file__).parents[2] / "cases"
+SPALL = {"kind": "spall", "tooth": 3, "flank": "left", "diameter": "42 mm", "length": "0.5 mm", "depth": "40 um"}
+WEAR = {"kind": "wear", "flank": "left", "depth": "5 um"}
+
+
+@pytest.fixture(scope="module")
+def healthy():
+    return read_case(CASES / "planetary_27_40_108.toml")
+
+
+@pytest.mark.parametrize(
+    ("entries", "code", "words"),
+    [
+        ({"kind": "missing", "tooth": 1, "depth": "1 mm"}, "E-FAULT", "'missing' has no depth"),
+        ({"kind": "missing"}, "E-KEY-MISSING", "'missing' needs tooth"),
+        ({"kind": "spall", "tooth": 1, "flank": "left"}, "E-KEY-MISSING", "needs diameter and length and depth"),
+        ({"kind": "wear", "flank": "left"}, "E-FAULT", "one depth, or as many depths as diameters"),
+        (WEAR | {"depths": ["1 um"], "diameters": ["42 mm"]}, "E-FAULT", "one depth"),
+        (
+            {"kind": "wear", "flank": "left", "depths": ["1 um", "2 um"], "diameters": ["43 mm", "42 mm"]},
+            "E-RANGE",
+            "ascending",
+        ),
+    ],
+)
+def test_what_does_not_belong_together_is_refused(entries, code, words):
+    with pytest.raises(ValueError) as error:
+        FaultSection.model_validate(entries)
+    (problem,) = error.value.errors()
+    assert problem["ctx"]["error"].code == code and words in str(problem["ctx"]["error"])
+
+
+def test_flanks_of_a_planet_are_named_by_their_mates():
+    with pytest.raises(ValueError, match="sun side"):
+        PlanetFaultSection.model_validate(WEAR)
+
+
+def test_faults_are_made_of_their_gears(healthy):
+    planet = SPALL | {"planet": 2, "flank": "ring side", "diameter": "60 mm"}
+    case = with_values(
+        healthy,
+        {
+            "sun.fault": [SPALL, {"kind": "missing", "tooth": 26}],
+            "planet.fault": [planet],
+            "ring.fault": [{"kind": "broken corner", "tooth": 107, "length": "1 mm"}],
+        },
+    )
+    spall, missing, of_planet, tip = set_deviations(case).faults
+    gears = planetary_set(case)
+    assert isinstance(spall, Spall) and (spall.gear, spall.tooth, spall.flank) == (0, 3, LEFT)
+    assert missing_length(spall, gears) == pytest.approx(0.5e-3, rel=1e-12)
+    assert isinstance(missing, MissingTooth) and missing.flank is None
+    assert (of_planet.gear, of_planet.copy, of_planet.flank) == (1, 1, RIGHT)
+    assert isinstance(tip, BrokenTip)
+    assert np.hypot(tip.roll, gears.ring.base_radius) == pytest.approx(gears.ring.tip_radius + 1e-3, rel=1e-12)
+
+
+def test_wear_is_given_over_diameters_or_is_even(healthy):
+    worn = {"kind": "wear", "tooth": 2, "flank": "right"}
+    points = {"depths": ["0 um", "8 um"], "diameters": ["41 mm", "43 mm"]}
+    case = with_values(healthy, {"sun.fault": [worn | points, WEAR]})
+    over, even = set_deviations(case).faults
+    sun = planetary_set(case).sun
+    assert isinstance(over, Wear) and over.flank == RIGHT and even.tooth is None
+    middle = np.sqrt(0.0210**2 - sun.base_radius**2)
+    low, high = (np.sqrt(r**2 - sun.base_radius**2) for r in (0.0205, 0.0215))
+    assert over.removed(middle) == pytest.approx(8e-6 * (middle - low) / (high - low))
+    assert even.removed(np.array([0.0, 1.0])) == pytest.approx(5e-6)
+
+
+@pytest.mark.parametrize(
+    ("change", "key", "code"),
+    [
+        ({"sun.fault": [{"kind": "missing", "tooth": 27}]}, "sun.fault[0].tooth", "E-RANGE"),
+        ({"planet.fault": [{"kind": "missing", "tooth": 3, "planet": 4}]}, "planet.fault[0].planet", "E-RANGE"),
+        ({"sun.fault": [SPALL | {"diameter": "60 mm"}]}, "sun.fault[0].diameter", "E-FAULT"),
+        ({"sun.fault": [{"kind": "broken corner", "tooth": 3, "length": "4 mm"}]}, "sun.fault[0].length", "E-FAULT"),
+    ],
+)
+def test_places_that_no_tooth_has_are_refused_where_they_stand(healthy, change, key, code):
+    with pytest.raises(GeometryError) as refused:
+        set_deviations(with_values(healthy, change))
+    assert (refused.value.code, refused.value.key) == (code, key)
+
+
+def test_studies_of_designs_refuse_faults(healthy):
+    case = with_values(healthy, {"sun.fault": [WEAR]})
+    with pytest.raises(CaseError, match="no faults of single teeth") as refused:
+        design_basis(case)
+    assert refused.value.key == "sun.fault[0]"
+    no_faults(healthy, "nothing to refuse")
+
+
+@pytest.mark.parametrize("name", ["nrel_pga", "helical_30_20_70"])
+def test_given_mesh_stiffnesses_and_bodies_of_one_period_refuse_faults_of_a_tooth(name):
+    case = with_values(read_case(CASES / f"{name}.toml"), {"sun.fault": [{"kind": "missing", "tooth": 3}]})
+    with pytest.raises(CaseError) as refused:
+        check_case(case)
+    assert refused.value.code in ("E-FAULT", "E-PERIODS")

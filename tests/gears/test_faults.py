@@ -1,0 +1,86 @@
+"""Faults of teeth by themselves: what they take off, how long a gear with them takes, and where they act."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from femgear.contact.flank_pairs import acting_flanks
+from femgear.gears.deviations import common_period, mirrored_deviations, no_deviations, rotational_symmetry
+from femgear.gears.faults import (
+    LEFT,
+    RIGHT,
+    BrokenTip,
+    MissingTooth,
+    Spall,
+    Wear,
+    fault_form,
+    fault_periods,
+    missing_length,
+)
+from femgear.gears.planetary import mirrored_set
+from validation.planetary import reference_set
+
+SPALL = Spall(0, 0, 3, LEFT, low=5e-3, high=6e-3, depth=40e-6)
+ROLL = np.array([4.9e-3, 5.5e-3, 6.1e-3])
+
+
+@pytest.fixture(scope="module")
+def gears():
+    return reference_set()
+
+
+def test_faults_take_off_what_they_say():
+    assert SPALL.removed(ROLL) == pytest.approx([0.0, 40e-6, 0.0])
+    assert np.isinf(MissingTooth(0, 0, 3, None).removed(ROLL)).all()
+    tip = BrokenTip(0, 0, 3, None, roll=5.2e-3, internal=False)
+    assert tip.removed(ROLL).tolist() == [0.0, np.inf, np.inf]
+    assert replace(tip, internal=True).removed(ROLL).tolist() == [np.inf, 0.0, 0.0]
+    worn = Wear(0, 0, None, LEFT, roll=(5e-3, 6e-3), depth=(0.0, 8e-6))
+    assert worn.removed(ROLL) == pytest.approx([0.0, 4e-6, 8e-6])
+
+
+def test_lengths_of_missing_parts_are_arcs_of_the_involute(gears):
+    sun = gears.sun
+    assert missing_length(SPALL, gears) == pytest.approx((6e-3**2 - 5e-3**2) / (2 * sun.base_radius))
+    assert missing_length(replace(SPALL, high=1.0), gears) < (sun.tip_roll**2) / (2 * sun.base_radius)
+    assert missing_length(MissingTooth(0, 0, 3, None), gears) == 0.0
+
+
+@pytest.mark.parametrize(("gear", "periods"), [(0, 27), (1, 40), (2, 108)])
+def test_a_set_repeats_after_the_teeth_of_its_faulty_gear(gears, gear, periods):
+    faulty = replace(no_deviations(gears), faults=(MissingTooth(gear, 0, 3, None),))
+    assert common_period(faulty, gears)[0] == periods == fault_periods(faulty.faults, gear, gears.gears[gear].teeth)
+    assert not faulty.ideal and rotational_symmetry(faulty, gears) == 1
+
+
+def test_wear_of_all_teeth_repeats_with_the_mesh(gears):
+    worn = replace(no_deviations(gears), faults=(Wear(0, 0, None, LEFT, roll=(0.0, 1.0), depth=(1e-6, 1e-6)),))
+    assert common_period(worn, gears)[0] == 1
+
+
+def test_a_mirror_image_has_the_fault_on_the_other_flank_and_once_again_where_it_was(gears):
+    faults = (SPALL, replace(SPALL, gear=1, copy=1), replace(SPALL, gear=2, flank=RIGHT))
+    given = replace(no_deviations(gears), faults=faults)
+    mirrored, order = mirrored_set(gears)
+    image = mirrored_deviations(given, gears, mirrored, order)
+    assert [fault.flank for fault in image.faults] == [RIGHT, RIGHT, LEFT]
+    assert image.faults[1].copy == list(order).index(1)
+    again = mirrored_deviations(image, mirrored, gears, np.argsort(order))
+    assert again.faults == faults
+
+
+def test_a_fault_acts_on_its_tooth_and_flank_alone(gears):
+    tooth, rolls = np.zeros((2, 3, 1, 2), int), np.full((3, 1, 2, 4), 5.5e-3)
+    tooth[0, :, 0] = [[3, 4], [3 + 27, 5], [2, 1]]
+    sides = np.zeros((2, 3), int)
+    form = fault_form((SPALL,), gears, 0, tooth, sides)
+    assert form is not None
+    assert (form(rolls, rolls) > 0).any(axis=-1)[:, 0].tolist() == [[True, False], [True, False], [False, False]]
+    assert fault_form((replace(SPALL, flank=RIGHT),), gears, 0, tooth, sides) is None
+    assert fault_form((SPALL,), gears, 1, tooth, sides) is None
+
+
+def test_the_sun_drives_with_its_left_flanks(gears):
+    sides = {side for number, acting in acting_flanks(gears) if number == 0 for *_, side in acting}
+    assert sides == {LEFT}
