@@ -44,7 +44,7 @@ from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import StageResult
 from femgear.stages.strength import SIDES, NominalStresses
 from femgear.stages.stress_reasons import largest_pressure, over_hertz, reason_values, stress_reasons
-from femgear.stages.tooth_faults import fault_findings
+from femgear.stages.tooth_faults import describe_faults, fault_findings
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, declared
 
@@ -1143,6 +1143,7 @@ def describe_set(case: Case) -> tuple[Block, ...]:
         _harmonics(planetary),
         _neighbours(planetary),
         _operation(case, planetary),
+        *describe_faults(case, _first_mesh_frequency(case, planetary)),
     )
 
 
@@ -1349,6 +1350,14 @@ def _operation(case: Case, s: PlanetarySet) -> Block:
     if len(operation.speeds) > len(entries):
         notes.append(f"{len(operation.speeds)} speeds, of which the first and the last are shown")
     return tabulate("Operation", entries, columns, (*notes, *shaft_lines(case)))
+
+
+def _first_mesh_frequency(case: Case, s: PlanetarySet) -> float | None:
+    """Mesh frequency [Hz] at the first speed; None without speeds."""
+    operation = case.operation
+    if not operation.speeds:
+        return None
+    return speeds(s, input=operation.input, fixed=operation.fixed, speed=operation.speeds[0]).mesh_frequency
 
 
 def _harmonics(s: PlanetarySet) -> Block:

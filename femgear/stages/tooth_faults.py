@@ -11,6 +11,7 @@ from femgear.contact.flank_pairs import RIGHT, acting_flanks
 from femgear.findings import Finding
 from femgear.gears.faults import BrokenTip, MissingTooth, Spall, ToothFault
 from femgear.gears.pair import BRANCH
+from femgear.report.tables import Block, tabulate
 
 if TYPE_CHECKING:
     from femgear.gears.pair import GearSet
@@ -77,3 +78,40 @@ def _unseen(case: Any, gears: GearSet) -> Iterator[Finding]:
     if any(fault.gear > BRANCH and fault.tooth is not None for fault in faults):
         text = f"a faulty tooth of the ring makes no new lines: all lie at multiples of {N} carrier orders"
         yield Finding("W-FAULT", "ring.fault", text, remedy="look at their levels: no line is new")
+
+
+def fault_frequencies(gears: GearSet, mesh_frequency: float) -> dict[str, float]:
+    """Compute how often a faulty tooth of every gear meets a mate [Hz], by the names of the gears.
+
+    Of sun and ring with any of the planets, of a planet with one flank. The mesh frequency is in Hz.
+    """
+    gears_of_planets = {number for number in range(len(gears.gears)) if gears.repeated[number]}
+    return {
+        gear.name: mesh_frequency / gear.teeth * (1 if number in gears_of_planets else gears.n_planets)
+        for number, gear in enumerate(gears.gears)
+    }
+
+
+def describe_faults(case: Any, mesh_frequency: float | None) -> Iterator[Block]:
+    """Tabulate the faults of a case, and how often their teeth meet mates at a mesh frequency [Hz], if any is known."""
+    gears = planetary_set(case)
+    faults = [*_keyed(case, set_deviations(case).faults, gears)]
+    if not faults:
+        return
+    often = {} if mesh_frequency is None else fault_frequencies(gears, mesh_frequency)
+    names = {(body.gear, body.copy): body.name for body in gears.bodies}
+    sections = {
+        f"{gear.name}.fault[{i}]": section
+        for gear in gears.gears
+        for i, section in enumerate(getattr(case, gear.name).fault)
+    }
+    columns = {
+        "fault": lambda item: sections[item[0]].kind,
+        "gear": lambda item: names[item[1].gear, item[1].copy],
+        "tooth": lambda item: "all" if item[1].tooth is None else str(item[1].tooth),
+        "flank": lambda item: sections[item[0]].flank or "both",
+        "meets a mate [Hz]": lambda item: (
+            f"{often[gears.gears[item[1].gear].name]:.4f}" if often and item[1].tooth is not None else "-"
+        ),
+    }
+    yield tabulate("Faults of teeth", faults, columns)

@@ -1,14 +1,19 @@
 """What is said of faults of teeth."""
 
+import math
 from pathlib import Path
 
 import pytest
 
-from femgear.stages.tooth_faults import fault_findings, sun_fault_step
+from femgear.gears.gear import Gear
+from femgear.gears.kinematics import speeds
+from femgear.gears.planetary import close_set, equal_planet_angles
+from femgear.stages.tooth_faults import describe_faults, fault_findings, fault_frequencies, sun_fault_step
 from femgear.trains.reading import read_case, with_values
 from validation.planetary import reference_set
 
 CASES = Path(__file__).parents[2] / "cases"
+TEETH = (17, 5e-3, "sun"), (37, 10e-3, "planet"), (91, 52e-3, "ring")
 WEAR = {"kind": "wear", "tooth": 3, "depth": "5 um"}
 
 
@@ -54,3 +59,28 @@ def test_lines_of_a_faulty_sun_tooth_lie_at_multiples_of_a_step(sun, planet, rin
 
         gears = SimpleNamespace(gears=[SimpleNamespace(teeth=z) for z in (sun, planet, ring)], n_planets=planets)
     assert sun_fault_step(gears) == pytest.approx(step)
+
+
+def test_characteristic_frequencies_are_those_of_the_teeth():
+    """Set 17/37/91 with three planets, the sun at 800 rpm and the ring held: mesh, sun and planet."""
+    gears = close_set(
+        *(Gear(z, 1e-3, math.radians(20), 0.0, 20e-3, r, internal=z == 91, name=name) for z, r, name in TEETH),
+        planet_angles=equal_planet_angles(3),
+        find=("sun", "ring"),
+    )
+    turning = speeds(gears, input="sun", fixed="ring", speed=800 * math.pi / 30)
+    assert turning.mesh_frequency == pytest.approx(190.99, abs=0.005)
+    often = fault_frequencies(gears, turning.mesh_frequency)
+    assert often["sun"] == pytest.approx(33.70, abs=0.005)
+    assert often["planet"] == pytest.approx(5.16, abs=0.005)
+    assert turning.carrier / (2 * math.pi) == pytest.approx(2.099, abs=0.0005)
+    assert often["ring"] == pytest.approx(3 * 2.099, abs=0.002)
+
+
+def test_a_table_lists_the_faults(healthy):
+    assert not [*describe_faults(healthy, 100.0)]
+    case = with_values(healthy, {"planet.fault": [WEAR | {"flank": "ring side", "planet": 2}]})
+    (block,) = describe_faults(case, 100.0)
+    assert block.rows == (("wear", "planet 2", "3", "ring side", "2.5000"),)
+    (block,) = describe_faults(case, None)
+    assert block.rows[0][-1] == "-"

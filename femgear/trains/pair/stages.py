@@ -74,6 +74,7 @@ from femgear.stages.static_results import (
     mean_over_period,
 )
 from femgear.stages.strength_results import strength_verdict
+from femgear.stages.tooth_faults import describe_faults
 from femgear.stages.tooth_figures import pair_key_figures
 from femgear.stages.train_judgements import set_judgements
 from femgear.system.force_laws import GearMeshes
@@ -162,7 +163,9 @@ def _describe_case(case: PairCase) -> tuple[Block, ...]:
     helix = case.helix_angle
     speeds = tabulate("Operation", shown, columns, notes)
     meshes = describe_meshes(gears, helix)
-    return describe_gears(gears, helix), *describe_drawing(case), *describe_materials(case), meshes, speeds
+    first = shown[0] * case.gear_1.teeth / (2.0 * math.pi) if shown else None
+    blocks = describe_gears(gears, helix), *describe_drawing(case), *describe_materials(case), meshes, speeds
+    return *blocks, *describe_faults(case, first)
 
 
 def _describe_static(results: Results) -> Block:
