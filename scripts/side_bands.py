@@ -16,7 +16,7 @@ from cyclopts import Parameter
 from script_tools import REFERENCE_CASE, print_table, ready_folder, run_script, say_files, write_csv
 
 from femgear.case.quantities import SPEED, to_si
-from femgear.errors import CaseError, nvh_library
+from femgear.errors import CaseError
 from femgear.housing.orders import (
     FOREIGN,
     NORMAL,
@@ -26,6 +26,10 @@ from femgear.housing.orders import (
     find_lines,
     spacing_symmetry,
 )
+from femgear.measured.heard_set import HeardSet, heard_set
+from femgear.measured.universal_functions import FREQUENCY, ORDER, read_universal_functions
+from femgear.measured.verdict import draw_side_bands
+from femgear.report.style import save_figure
 
 PICTURE, FACTORS, LINES = "side_bands.png", "array_factor.csv", "lines.csv"
 HEADER = ("order", "level [dB]", "whole order", "array factor", "verdict", "why")
@@ -38,21 +42,6 @@ KNOWN = {
 }  # function types of dataset 58 that hold amplitudes
 HERTZ = {"Hz": 1.0, "kHz": 1e3}
 REMEDY = "name the columns order or frequency [Hz], and amplitude [m/s^2] or level [dB]"
-
-
-@dataclass(frozen=True)
-class GearSet:
-    """Teeth of ring, sun and planet, the latter None where not known, angles of the planets [rad]."""
-
-    ring: int
-    sun: int | None
-    planet: int | None
-    angles: np.ndarray
-
-    @property
-    def teeth(self) -> tuple[int, int | None, int | None]:
-        """As `classify_line` takes them."""
-        return self.ring, self.sun, self.planet
 
 
 @dataclass(frozen=True)
@@ -144,17 +133,14 @@ def main(
     if spectrum is not None:
         write_csv(folder / LINES, HEADER, rows)
         _print_lines(measured.name, rows, threshold, tolerance, known)
-    figure = _figure(known, order, level, [one.verdict for one in found], threshold, harmonics, half_width)
-    from femgear.report.style import save_figure
-
-    save_figure(figure, folder / PICTURE)
+    lines_of = {word: [(row[0], row[1]) for row in rows if row[4] == word] for word in (NORMAL, UNEQUAL, FOREIGN)}
+    drawn = {"threshold": threshold, "harmonics": harmonics, "half_width": half_width}
+    save_figure(draw_side_bands(known, lines_of if rows else {}, **drawn), folder / PICTURE)
     say_files(folder, files)
 
 
-def _gear_set(case, ring, sun, planet, angle) -> tuple[GearSet, float]:
+def _gear_set(case, ring, sun, planet, angle) -> tuple[HeardSet, float]:
     """The set of a case or of teeth and angles, and the speed of its carrier over that of ``--speed``."""
-    from femgear.case.gear_set import need_set, planetary_set
-    from femgear.stages.lumped_set import member_speeds
     from femgear.trains.reading import read_case
 
     if ring is None and (sun or planet or angle):
@@ -173,15 +159,9 @@ def _gear_set(case, ring, sun, planet, angle) -> tuple[GearSet, float]:
                 value=(*teeth, *angle),
                 limit="5 to 2000 teeth, planets at different finite angles",
             )
-        return GearSet(ring, sun, planet, np.radians(angle)), 1.0
-    data = read_case(case or REFERENCE_CASE)
-    need_set(data)
-    if data.operation.fixed != "ring":
-        message, remedy = "orders are those of a set whose ring stands still", "fix the ring"
-        raise CaseError(message, code="E-FIXED-MEMBER", key="operation.fixed", limit='"ring"', remedy=remedy)
-    gears = planetary_set(data)
-    teeth = gears.ring.teeth, gears.sun.teeth, gears.planet.teeth
-    return GearSet(*teeth, np.asarray(gears.planet_angles)), abs(member_speeds(data, gears).carrier)
+        return HeardSet(ring, sun, planet, np.radians(angle)), 1.0
+    known = heard_set(read_case(case or REFERENCE_CASE))
+    return known, known.carrier_per_turn[known.input]
 
 
 def _read(path: Path, channel: str | None) -> Measured:
@@ -247,58 +227,50 @@ def _read_csv(path: Path, channel: str | None) -> Measured:
 
 def _read_universal(path: Path, channel: str | None) -> Measured:
     """Dataset 58; of complex lines, which femgear exports, the modulus counts."""
-    with nvh_library("universal files"):
-        import pyuff
 
     def problem(message: str, **words) -> CaseError:
         return CaseError(message, code="E-FILE", file=str(path), **words)
 
-    try:
-        sets = pyuff.UFF(str(path)).read_sets() if path.is_file() else None
-    except Exception as error:
-        raise problem(f"no universal file that can be read: {str(error)[:200]}") from error
-    if sets is None:
-        raise problem("no such file", limit="a CSV or universal file (.uff, .unv)")
-    numbered = enumerate(sets if isinstance(sets, list) else [sets], 1)
-    every = [(i, str(one.get("id1", "")).strip(), one) for i, one in numbered if one.get("type") == 58]
-    found = every = [item for item in every if channel in (None, item[1])] or every
+    every = read_universal_functions(path)
+    every = [function for function in every if channel in (None, function.name)] or every
+    spectra = every
     if len(every) > 1:  # a signal may have the name of its spectrum
-        found = [item for item in every if item[2]["func_type"] in KNOWN]
-    if len(found) != 1:
-        listed = "; ".join(f"{name} (dataset {i}, type {one['func_type']})" for i, name, one in found or every)
+        spectra = [function for function in every if function.kind in KNOWN]
+    if len(spectra) != 1:
+        listed = "; ".join(f"{one.name} (dataset {one.number}, type {one.kind})" for one in spectra or every)
         raise problem(
-            f"{len(found)} spectra in the file",
+            f"{len(spectra)} spectra in the file",
             value=listed[:600] or None,
             limit="one dataset 58 of a spectrum",
             remedy="choose one by --channel and its ID line 1",
         )
-    ((number, name, one),) = found
-    where, y = f"dataset {number}: {name}", np.asarray(one["data"])
-    if one["func_type"] not in KNOWN:
+    (function,) = spectra
+    where, x, y = f"dataset {function.number}: {function.name}", function.abscissa, function.values
+    if function.kind not in KNOWN:
         raise problem(
             "a function that is no spectrum of amplitudes",
-            value=f"{where}, type {one['func_type']}",
+            value=f"{where}, type {function.kind}",
             limit=", ".join(f"{number} ({word})" for number, word in KNOWN.items()),
             remedy="export the amplitude spectrum of one sensor",
         )
-    if one["func_type"] == 2 and np.iscomplexobj(y):
+    if function.kind == 2 and np.iscomplexobj(y):
         raise problem("an auto spectrum with complex values", value=where, limit="real numbers")
-    kind = one.get("abscissa_spec_data_type")
-    if kind not in (18, 20):
+    if function.abscissa_kind not in (FREQUENCY, ORDER):
         limit, remedy = "18 (frequency) or 20 (order)", "export the spectrum over frequency or order"
-        raise problem("abscissa of another kind", value=f"{where}, type {kind}", limit=limit, remedy=remedy)
-    x, unit = np.asarray(one["x"], float), str(one.get("abscissa_axis_units_lab", "")).strip()
-    if kind == 18 and unit not in ("", "NONE", *HERTZ):
+        value = f"{where}, type {function.abscissa_kind}"
+        raise problem("abscissa of another kind", value=value, limit=limit, remedy=remedy)
+    unit, hertz = function.abscissa_unit, function.abscissa_kind == FREQUENCY
+    if hertz and unit not in ("", *HERTZ):
         raise problem("a unit of frequency that is none", value=f"{where}: {unit}", limit=" or ".join(HERTZ))
     # six digits of the step would move high orders; femgear tells it in full
-    told = str(one.get("id2", "")).partition("step [Hz]: ")[2]
-    x = float(told) * np.arange(len(y)) if told else x * HERTZ.get(unit, 1.0)
+    step = function.run.partition("step [Hz]: ")[2]
+    x = float(step) * np.arange(len(y)) if step else x * HERTZ.get(unit, 1.0)
     # an auto spectrum has the squares of the amplitudes (universal file, dataset 58, record 6)
-    y = np.sqrt(np.maximum(np.real(y), 0.0)) if one["func_type"] == 2 else np.abs(y)
+    y = np.sqrt(np.maximum(np.real(y), 0.0)) if function.kind == 2 else np.abs(y)
     if len(x) < 2 or not (np.isfinite(x).all() and np.isfinite(y).all() and (np.diff(x) > 0).all()):
         limit = "two lines or more, finite, over an abscissa that ascends"
         raise problem("no spectrum", value=where, limit=limit)
-    return Measured(x, kind == 18, y, f"{path.name}: {name}")
+    return Measured(x, hertz, y, f"{path.name}: {function.name}")
 
 
 def _orders(measured: Measured, speed: str | None, ratio: float, path: Path) -> np.ndarray:
@@ -329,13 +301,13 @@ def _checked_tolerance(tolerance: float, step: float) -> float:
     return tolerance
 
 
-def _print_set(known: GearSet) -> None:
+def _print_set(known: HeardSet) -> None:
     g, angles = spacing_symmetry(known.angles), ", ".join(f"{math.degrees(one):.5g}" for one in known.angles)
     rule = f"alike, they make multiples of {g} alone" if g > 1 else "no order is forbidden"
     print(f"{known.ring} ring teeth, planets at {angles} deg: {rule}")
 
 
-def _write_factors(path: Path, known: GearSet, harmonics: int, half_width: int) -> None:
+def _write_factors(path: Path, known: HeardSet, harmonics: int, half_width: int) -> None:
     g, rows = spacing_symmetry(known.angles), []
     for h in range(1, harmonics + 1):
         orders = np.arange(max(h * known.ring - half_width, 1), h * known.ring + half_width + 1)
@@ -344,7 +316,7 @@ def _write_factors(path: Path, known: GearSet, harmonics: int, half_width: int) 
     write_csv(path, ("mesh harmonic", "carrier order", "array factor", "symmetry"), rows)
 
 
-def _print_lines(name: str, rows, threshold: float, tolerance: float, known: GearSet) -> None:
+def _print_lines(name: str, rows, threshold: float, tolerance: float, known: HeardSet) -> None:
     strongest = sorted(sorted(rows, key=lambda row: -row[1])[:SHOWN])
     shown = [(f"{o:.7g}", f"{v:.1f}", f"{n}", f"{f:.3f}", *words) for o, v, n, f, *words in strongest]
     title = f"{name}: {len(rows)} lines above {threshold:g} dB, orders within {tolerance:.3g} count as one"
@@ -355,42 +327,6 @@ def _print_lines(name: str, rows, threshold: float, tolerance: float, known: Gea
     if parts:
         chance = 1 - (1 - 2 * tolerance) ** (4 * parts)
         print(f"an order without meaning fits turns of sun or planet by chance in {chance:.0%} of cases at most")
-
-
-def _figure(known: GearSet, order, level, verdicts, threshold: float, harmonics: int, half_width: int):
-    """Array factor as bars, forbidden orders crossed, levels of measured lines over it."""
-    from femgear.report.style import BLACK, BLUE, GREY, SKY, VERMILION, label, legend_below, new_figure
-
-    figure, axes = new_figure(rows=harmonics, width=9.5, height=1.6 + 2.5 * harmonics)
-    g, marks = (
-        spacing_symmetry(known.angles),
-        {NORMAL: ("o", BLUE), UNEQUAL: ("s", VERMILION), FOREIGN: ("^", BLACK)},
-    )
-    for h, ax in enumerate(axes, 1):
-        centre = h * known.ring
-        whole = np.arange(max(centre - half_width, 1), centre + half_width + 1)
-        ax.bar(whole, array_factor(known.angles, whole), width=0.8, color=SKY, alpha=0.5, label="array factor")
-        no = whole[whole % g != 0]
-        ax.plot(no, np.full(len(no), 0.03), "x", color=GREY, label="forbidden by the symmetry", clip_on=False)
-        ax.set_ylim(0, 1.12)
-        ax.set_xlim(centre - half_width - 0.8, centre + half_width + 0.8)
-        title = f"mesh harmonic {h} (order {centre})"
-        label(ax, "carrier order [1]" if h == harmonics else "", "array factor [1]", title)
-        if not len(order):
-            continue
-        over, bottom = ax.twinx(), min(10 * math.floor(threshold / 10), -20)
-        over.set_ylim(bottom, -0.12 * bottom)
-        over.grid(False)
-        over.spines["top"].set_visible(False)
-        label(over, y="level [dB re\nstrongest line]")
-        for verdict, (mark, colour) in marks.items():
-            own = np.array([one == verdict for one in verdicts])
-            own &= np.abs(order - centre) <= half_width + 0.5
-            if own.any():
-                over.vlines(order[own], bottom, level[own], color=colour, linewidth=1.5)
-                over.plot(order[own], level[own], mark, color=colour, markersize=6, label=f"measured: {verdict}")
-    legend_below(figure, columns=3)
-    return figure
 
 
 if __name__ == "__main__":

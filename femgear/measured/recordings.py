@@ -16,12 +16,14 @@ from femgear.measured.heard_set import HeardSet
 from femgear.measured.requests import Recording
 from femgear.measured.sampled_files import read_matlab_signals, read_wav_signals
 from femgear.measured.turns import AngleSignal, Turns, aligned_speed, constant_turns, resample_turns, turns_of_pulses
+from femgear.measured.universal_functions import read_universal_signals
 
 _READERS = {".wav": read_wav_signals, ".mat": read_matlab_signals}
+_READERS |= dict.fromkeys((".uff", ".unv", ".bunv", ".uf"), read_universal_signals)
 
 
 def read_channels(path: str | os.PathLike, *, rate: float | None = None) -> tuple[Channel, ...]:
-    """Read all channels of a recording: WAV, MATLAB, or text in columns, by the end of its name.
+    """Read all channels of a recording: WAV, MATLAB, universal file, or text in columns, by the end of its name.
 
     CaseError: what the reader of the format refuses (E-FILE), with the file and what to do.
 

@@ -189,7 +189,7 @@ def test_refused_universal_files(changes, words, tmp_path):
         (["--threshold", 3], "a threshold of"),
         (["--speed", "60 rpm"], "give --spectrum"),
         ([*SET, "--spectrum", "none.csv"], "none.csv"),
-        ([*SET, "--spectrum", "none.uff"], "no such file"),
+        ([*SET, "--spectrum", "none.uff"], "cannot open the file"),
         ([ROOT / "cases/spur_pair.toml"], "E-"),
     ],
 )
