@@ -78,7 +78,7 @@ CODES = {
     "E-OUTPUT": "The folder of the results cannot be used, or holds something else.",
     "E-PERIODS": "The errors span more mesh periods than the method takes.",
     "E-POINTED": "A tooth is pointed below its tip.",
-    "E-PUBLISHED": "A published line cannot be compared: its speed or harmonic is not computed.",
+    "E-PUBLISHED": "A published or measured line cannot be compared: its speed or harmonic is not computed.",
     "E-RANGE": "A value lies outside what is allowed.",
     "E-RATE": "The steps are too few to follow the motion.",
     "E-RESIDUAL": "A solution misses its equations, or truncated modes leave too much behind.",

@@ -1,7 +1,7 @@
 """What must hold between the entries of a case file of a planetary set.
 
-`cross_check` lists what no entry shows alone. Of published lines `check_published` refuses those whose speed or
-harmonic the case does not compute, `without_uncomputed` takes them out.
+`cross_check` lists what no entry shows alone. Of published and measured lines `check_published` refuses those whose
+speed or harmonic the case does not compute, `without_uncomputed` takes them out.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from femgear.findings import Finding, remark
 from femgear.gears.modifications import LARGEST_DEVIATION
 
 _CODE = "E-PUBLISHED"
-"""Of refusals of published lines."""
+"""Of refusals of published and measured lines."""
 LEAST_TORQUE = 1e-6
 """Smallest torque that is told from none [N m]."""
 VALIDATED_HELIX = math.radians(30.0)
@@ -405,25 +405,26 @@ def _largest(value: float | tuple[float, ...] | None) -> float:
 
 
 def check_published(case: Case) -> Iterator[CaseError]:
-    """Refuse published lines that nothing could be compared with."""
+    """Refuse published and measured lines that nothing could be compared with."""
     speeds = np.array(case.operation.speeds)
+    for kind in ("published", "measured"):
+        for i, entry in enumerate(getattr(case.housing, kind)):
+            if not np.isclose(speeds, entry.speed, rtol=1e-9, atol=0.0).any():
+                yield CaseError(
+                    "this speed is not computed",
+                    code=_CODE,
+                    key=f"housing.{kind}[{i}].speed",
+                    value=SPEED.show(entry.speed),
+                    limit=_speeds(case),
+                    remedy=f"add it to operation.speeds, or leave the {kind} lines out",
+                )
     for i, entry in enumerate(case.housing.published):
-        key = f"housing.published[{i}]"
-        if not np.isclose(speeds, entry.speed, rtol=1e-9, atol=0.0).any():
-            yield CaseError(
-                "this speed is not computed",
-                code=_CODE,
-                key=f"{key}.speed",
-                value=SPEED.show(entry.speed),
-                limit=_speeds(case),
-                remedy="add it to operation.speeds, or leave the published lines out",
-            )
         computed = case.response_harmonics
         if computed is not None and entry.harmonic > computed:
             yield CaseError(
                 "this mesh harmonic is not computed",
                 code=_CODE,
-                key=f"{key}.harmonic",
+                key=f"housing.published[{i}].harmonic",
                 value=entry.harmonic,
                 limit=f"1 to {computed}, the harmonics of the response",
                 remedy="raise dynamics.response_harmonics, or leave the published lines out",
@@ -437,17 +438,17 @@ def _speeds(case: Case) -> str:
 
 
 def without_uncomputed(data: dict, error: CaseError) -> Finding | None:
-    """Take those published lines out of the tables of a case to which alone the error of its check objects.
+    """Take those published and measured lines out of a case's tables to which alone the error of its check objects.
 
     Says what was left out; None where the error is about other things too.
     """
     problems = getattr(error, "problems", ())
     if not problems or any(problem.code != _CODE for problem in problems):
         return None
-    numbers = {int(problem.key.split("[")[1].split("]")[0]) for problem in problems}
-    published = data["housing"]["published"]
-    data["housing"]["published"] = [e for i, e in enumerate(published) if i not in numbers]
-    return remark(
-        f"{len(numbers)} of {len(published)} entries housing.published are left out: their speed or harmonic "
-        "is not computed"
-    )
+    places = {tuple(problem.key.removeprefix("housing.").split("]")[0].split("[")) for problem in problems}
+    housing, left_out = data["housing"], []
+    for kind in sorted({kind for kind, _ in places}):
+        count, entries = sum(kind == other for other, _ in places), housing[kind]
+        left_out.append(f"{count} of {len(entries)} entries housing.{kind}")
+        housing[kind] = [entry for i, entry in enumerate(entries) if (kind, str(i)) not in places]
+    return remark(f"{' and '.join(left_out)} are left out: their speed or harmonic is not computed")

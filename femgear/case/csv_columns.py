@@ -28,6 +28,8 @@ _HEADING = re.compile(r"\s*(?P<name>[A-Za-z_ ]+?)[\s_]*[\[(](?P<unit>[^\])]+)[\]
 _LONGEST_TITLE = 200
 _COMMAS = "decimal commas need semicolons or tabs between the columns, or write decimal points"
 
+MEASURED_HEADER = ["order", "amplitude [m/s^2]"]
+"""First columns of measured lines."""
 _PROFILE_ENTRIES = {
     "roll angle": "roll_angles",
     "diameter": "diameters",
@@ -272,6 +274,44 @@ def embed_profiles(data: dict, name: str) -> dict[str, str]:
         options = {"read": read, "units": _PROFILE_UNITS, "plain": partial(plain, kind=kind)}
         files |= embed_points(data, f"{gear}.modifications", name, **options)
     return files
+
+
+def embed_measured_lines(data: dict, name: str) -> dict[str, str]:
+    """Put the lines of every ``file`` of measured lines, as ``femgear measured`` writes them, in its place."""
+    housing: Any = data.get("housing")
+    tables, files = housing.get("measured") if isinstance(housing, dict) else None, {}
+    if not isinstance(tables, list):
+        return files
+    del housing["measured"]  # a file that cannot be read is refused for that alone
+    for i, table in enumerate(tables):
+        if isinstance(table, dict) and isinstance(table.get("file"), str) and "orders" not in table:
+            key, file = f"housing.measured[{i}]", table.pop("file")
+            orders, accelerations = embedded(file, name, f"{key}.file", read_measured_lines)
+            table |= {"orders": orders, "accelerations": [f"{value:.9g} m/s^2" for value in accelerations]}
+            files[key] = text.printable(file)[:200]
+            table.setdefault("source", files[key])
+    housing["measured"] = tables
+    return files
+
+
+def read_measured_lines(path: str | os.PathLike) -> tuple[list[float], list[float]]:
+    """Read orders and peak accelerations [m/s^2] from the first two columns of a lines.csv of ``femgear measured``.
+
+    CaseError: another file, or amplitudes in a unit that is no acceleration (E-FILE).
+    """
+    name = text.printable(os.fsdecode(path))
+    rows = [_cells(line, ",") for line in _text(path).splitlines() if line.strip()]
+    if rows[0][:2] != MEASURED_HEADER:
+        value, limit = ", ".join(rows[0][:2]), ", ".join(MEASURED_HEADER)
+        remedy = "name the lines.csv of femgear measured; --unit tells it the acceleration of a one in the recording"
+        raise _problem(name, 1, "no measured lines in m/s^2", value=value, limit=limit, remedy=remedy)
+    numbers = [
+        [_number(cell, ",", False, partial(_problem, name, i)) for cell in row[:2]] for i, row in enumerate(rows[1:], 2)
+    ]
+    if not numbers or min(map(len, numbers)) < 2:
+        remedy = "lower --threshold of femgear measured"
+        raise _problem(name, None, "no measured lines", limit="one or more", remedy=remedy)
+    return [row[0] for row in numbers], [row[1] for row in numbers]
 
 
 def embed_checksum(data: dict, name: str) -> dict[str, str]:

@@ -51,6 +51,8 @@ _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 _MACHINES = {"dynamics", "motor", "brake", "planar", "operation"}
 _DYNAMIC = _WORDS | {"static.stresses", "static.members"}
 """What decides neither modes nor response."""
+_COMPARED = {"housing.published", "housing.measured"}
+"""What results are compared with."""
 _SOLUTION = {f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")}
 """How the contact is solved, whatever the grids."""
 _BESIDE = {
@@ -129,8 +131,8 @@ def modal_entries(case: Any) -> Entries:
 def dynamic_entries(case: Case) -> Entries:
     """List the entries that decide the periodic response: all but the sensor of the level and microphone."""
     # a casing is known by the checksum of its files
-    sensor_entries = ("form", "points", "sensor_angle", "microphone", "published", "structure.file", "structure.nodes")
-    left_out = (_DYNAMIC - {"housing"}) | {f"housing.{name}" for name in sensor_entries}
+    sensor_entries = ("form", "points", "sensor_angle", "microphone", "structure.file", "structure.nodes")
+    left_out = (_DYNAMIC - {"housing"}) | {f"housing.{name}" for name in sensor_entries} | _COMPARED
     return {**friction_entries(case), **_entries(case, left_out)}
 
 
@@ -140,13 +142,13 @@ def response_entries(case: Case) -> Entries:
 
 
 def heard_entries(case: Case) -> Entries:
-    """List the entries that decide what the housing's sensors and microphone hear: not what is published."""
-    return {**friction_entries(case), **_entries(case, (_DYNAMIC - {"housing"}) | {"housing.published"})}
+    """List the entries that decide what the housing's sensors and microphone hear: not what they are compared with."""
+    return {**friction_entries(case), **_entries(case, (_DYNAMIC - {"housing"}) | _COMPARED)}
 
 
 def runup_entries(case: Case) -> Entries:
     """List the entries that decide the run-up: those of what is heard, and its own."""
-    return {**friction_entries(case), **_entries(case, (_DYNAMIC - {"housing", "runup"}) | {"housing.published"})}
+    return {**friction_entries(case), **_entries(case, (_DYNAMIC - {"housing", "runup"}) | _COMPARED)}
 
 
 def box_entries(stage: str, case: ReadCase) -> Entries:

@@ -27,6 +27,7 @@ from femgear.case.flank_sections import (
     RingErrors,
 )
 from femgear.case.quantities import (
+    ACCELERATION,
     ANGLE,
     DENSITY,
     FORCE,
@@ -410,6 +411,26 @@ class PublishedLines(Section):
     source: Title
 
 
+class MeasuredSection(Section):
+    """Lines that a recording holds at a speed: orders of the carrier and peak accelerations; the report shows them."""
+
+    speed: Speed
+    orders: Annotated[
+        tuple[Annotated[float, Number(0.0, 1e7, open_low=True)], ...], Values(min_length=1, max_length=5000)
+    ]
+    accelerations: Annotated[
+        tuple[Annotated[float, Quantity(ACCELERATION, 0.0, 1e9)], ...], Values(min_length=1, max_length=5000)
+    ]
+    source: Title
+
+    @model_validator(mode="after")
+    def _as_many(self):
+        if len(self.orders) != len(self.accelerations):
+            message, value = "orders and accelerations belong together", (len(self.orders), len(self.accelerations))
+            raise CaseError(message, code="E-COUNT", value=value, limit="as many of both")
+        return self
+
+
 class MicrophoneSection(Section):
     """Where sound is heard: distance from the outer surface of the ring, and angle, that of the sensor."""
 
@@ -475,6 +496,7 @@ class HousingSection(Section):
     sensor_angle: Angle = 0.0
     microphone: MicrophoneSection = MicrophoneSection()
     published: Annotated[tuple[PublishedLines, ...], Field(max_length=100)] = ()
+    measured: Annotated[tuple[MeasuredSection, ...], Field(max_length=100)] = ()
     support: Annotated[tuple[SupportSection, ...], Field(max_length=200)] = ()
     sensor: Annotated[tuple[SensorSection, ...], Field(max_length=100)] = ()
     structure: StructureSection | None = None

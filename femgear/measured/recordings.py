@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,9 @@ from femgear.measured.universal_functions import read_universal_signals
 
 _READERS = {".wav": read_wav_signals, ".mat": read_matlab_signals}
 _READERS |= dict.fromkeys((".uff", ".unv", ".bunv", ".uf"), read_universal_signals)
+
+_ACCELERATIONS = {"m/s^2": 1.0, "m/s2": 1.0, "mm/s^2": 1e-3, "g": 9.80665, "mg": 9.80665e-3}
+"""Accelerations [m/s^2] by their units, in which g is that of free fall (ISO 80000-3)."""
 
 
 def read_channels(path: str | os.PathLike, *, rate: float | None = None) -> tuple[Channel, ...]:
@@ -70,9 +74,26 @@ def read_by_turns(path: str | os.PathLike, recording: Recording, shafts: HeardSe
             limit="pulses of a shaft, or a constant speed",
             remedy="name the channel of the pulses by --pulses, or give --speed of the input",
         )
+    signal = _in_si(signal, recording.unit)
     if turns is None:
         turns = constant_turns(signal, _carrier_speed(signal, recording, shafts))
     return resample_turns(signal, turns)
+
+
+def _in_si(signal: Channel, unit: str | None) -> Channel:
+    """A channel in m/s^2 where its unit is an acceleration, or one is given; else as it is."""
+    factor = _ACCELERATIONS.get(signal.unit.replace("²", "^2").lower())
+    if unit is not None:
+        number, _, name = unit.strip().partition(" ")
+        factor = _ACCELERATIONS.get(name.strip().replace("²", "^2").lower())
+        try:
+            factor = None if factor is None else factor * float(number)
+        except ValueError:
+            factor = None
+        if factor is None or not 0.0 < factor < np.inf:
+            limit = f"a number above zero and {', '.join(_ACCELERATIONS)}"
+            raise CaseError("no acceleration", code="E-UNIT", key="--unit", value=unit, limit=limit)
+    return signal if factor is None else replace(signal, values=factor * signal.values, unit="m/s^2")
 
 
 def _pulses(channels: Sequence[Channel], recording: Recording, shafts: HeardSet) -> tuple[Turns, list[Channel]]:

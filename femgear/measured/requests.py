@@ -26,6 +26,8 @@ class Recording:
         Pulses in a turn.
     speed
         Constant speed of the input with its unit, where there are no pulses.
+    unit
+        Acceleration that a one in the file stands for, as "1 g" or "98.1 m/s^2". Default: the unit that the file names.
     within
         Share of that speed within which the one is searched at which the lines stand best on orders of the set.
     """
@@ -37,6 +39,7 @@ class Recording:
     per_turn: int = 1
     speed: str | None = None
     within: float | None = None
+    unit: str | None = None
 
 
 @dataclass(frozen=True)

@@ -285,8 +285,10 @@ def _left_out(case: Any, given: Mapping[str, Any]) -> Iterator[Finding]:
         "operation.speeds": len(case.operation.speeds) > 1,
         "dynamics.response_harmonics": "response_harmonics" in given.get("dynamics", {}),
         "dynamics.tolerance": "tolerance" in given.get("dynamics", {}),
-        **{f"housing.{key}": key in housing for key in ("form", "points", "microphone", "published", "support")},
-        "housing.structure": "structure" in housing,
+        **{
+            f"housing.{key}": key in housing
+            for key in ("form", "points", "microphone", "published", "measured", "support", "structure")
+        },
         **{f"planar.{key}": key in planar for key in ("branch", "response", "published")},
         "planet.bearing_clearance": bool(given.get("planet", {}).get("bearing_clearance")),
     }

@@ -19,7 +19,7 @@ from pydantic import ValidationError, create_model
 
 from femgear.case import text as case_text
 from femgear.case.checks import cross_check, without_uncomputed
-from femgear.case.csv_columns import embed_checksum, embed_profiles
+from femgear.case.csv_columns import embed_checksum, embed_measured_lines, embed_profiles
 from femgear.case.estimates import with_estimates
 from femgear.case.gear_set import check_shafts
 from femgear.case.messages import added_material, combine, no_such, notices, translate
@@ -186,8 +186,8 @@ def _left_out(tables: Any, path: list[str | int]) -> bool:
 
 
 def _embed_of_set(data: dict, name: str) -> dict[str, str]:
-    """Files of a planetary set: points of profiles and checksums of a casing are put into the tables."""
-    return embed_profiles(data, name) | embed_checksum(data, name)
+    """Files of a planetary set: points of profiles, measured lines, checksums of a casing are put into the tables."""
+    return embed_profiles(data, name) | embed_measured_lines(data, name) | embed_checksum(data, name)
 
 
 def _embedded_files(embed: Callable, data: dict, name: str) -> tuple[dict[str, str], list[CaseError]]:

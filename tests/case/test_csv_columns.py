@@ -267,3 +267,40 @@ def test_files_that_cannot_be_read_hide_no_other_mistake(folder):
     ]
     text = str(caught.value)
     assert "one.csv: sun.mod" in text and f"{path}:{wrong[: wrong.index('../x.csv')].count(chr(10)) + 1}: " in text
+
+
+LINES = "order,amplitude [m/s^2],level [dB],verdict\n105.0001,0.5,-6,normal\n111,1.25,0,normal\n"
+OVER = '\n[[housing.measured]]\nfile = "data/left.csv"\nspeed = "3100 rpm"\n'
+
+
+def test_measured_lines_are_kept_with_the_case(folder, tmp_path):
+    case = read_case(folder(LINES, OVER))
+    (entry,) = case.housing.measured
+    assert entry.orders == (105.0001, 111.0) and entry.accelerations == (0.5, 1.25)
+    assert entry.source == "data/left.csv" and parse_case(to_toml(case)) == case
+    named = read_case(folder(LINES, OVER + 'source = "rig, June"\n'))
+    assert named.housing.measured[0].source == "rig, June"
+
+
+@pytest.mark.parametrize(
+    ("csv", "extra", "code", "words"),
+    [
+        (LINES.replace("m/s^2", "V"), OVER, "E-FILE", "--unit"),
+        (LINES.replace("order", "Hz"), OVER, "E-FILE", "no measured lines in m/s^2"),
+        (LINES.splitlines()[0], OVER, "E-FILE", "lower --threshold"),
+        (LINES.replace("1.25", "nan"), OVER, "E-FILE", "left.csv:3"),
+        (LINES, OVER.replace("3100", "3000"), "E-PUBLISHED", "this speed is not computed"),
+        (LINES, OVER.replace("left", "none"), "E-FILE", "housing.measured[0].file"),
+        (LINES, OVER.replace("speed", "orders = [1, 2]\naccelerations = ['1 m/s^2']\nspeed"), "E-CASE", "unknown key"),
+    ],
+)
+def test_measured_lines_that_are_refused(folder, csv, extra, code, words):
+    with pytest.raises(CaseError) as refused:
+        read_case(folder(csv, extra))
+    assert words in str(refused.value) and refused.value.code == code
+
+
+def test_measured_lines_of_a_speed_that_a_change_leaves_behind_are_dropped_and_said(folder):
+    case = with_value(read_case(folder(LINES, OVER)), "operation.speeds", ["250 rpm"])
+    assert case.housing.measured == ()
+    assert any("1 of 1 entries housing.measured and 2 of 3 entries housing.published" in x.text for x in case.notices)

@@ -41,6 +41,15 @@ def test_a_constant_speed_is_that_of_the_input(tmp_path):
     assert over_angle.turns == 11 and over_angle.speed == pytest.approx(3.0, rel=1e-3)
 
 
+def test_accelerations_come_in_si_units(tmp_path):
+    path = written(tmp_path, "wav")
+    plain, scaled = (
+        read_by_turns(path, Recording(channel="1", speed="900 rpm", unit=unit), HEARD) for unit in (None, "2 g")
+    )
+    assert plain.unit == "" and scaled.unit == "m/s^2"
+    assert np.allclose(scaled.values, 2 * 9.80665 * plain.values)
+
+
 @pytest.mark.parametrize(
     ("recorded", "code", "words"),
     [
@@ -49,6 +58,8 @@ def test_a_constant_speed_is_that_of_the_input(tmp_path):
         (Recording(channel="1", speed="0 rpm"), "E-SPEED", "at rest nothing is heard"),
         (Recording(channel="1", pulses="2", pulses_of="ring"), "E-SPEED", "a turn of the ring"),
         (Recording(channel="1", pulses="2", per_turn=0), "E-SPEED", "0 a turn"),
+        (Recording(channel="1", speed="900 rpm", unit="2 V"), "E-UNIT", "m/s^2, m/s2"),
+        (Recording(channel="1", speed="900 rpm", unit="g"), "E-UNIT", "a number above zero"),
         (Recording(pulses="9"), "E-FILE", "choose one by --pulses"),
         (Recording(speed="900 rpm"), "E-FILE", "choose one by --channel"),
         (Recording(channel="1", speed="900 rpm", rate=1e3), "E-FILE", "another one than --rate"),

@@ -203,6 +203,7 @@ ELSEWHERE = (
     "wind_up_stiffness",
     "housing.structure",
     "housing.published",
+    "housing.measured",
     ".errors",
     ".fault",
     "modifications",

@@ -13,6 +13,7 @@ By stage:
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
@@ -68,12 +69,13 @@ from femgear.stages.static_figures import FIGURES as STATIC
 from femgear.stages.static_figures import picture_sectors
 from femgear.storage.files import write_text
 from femgear.trains.elastic.checks import housing_supports
-from femgear.trains.elastic.results import hanning_spectrum, run_up_lines
+from femgear.trains.elastic.results import hanning_spectrum, measured_at, run_up_lines
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
+    from femgear.case.sections import MeasuredSection
     from femgear.gears.planetary import PlanetarySet
     from femgear.housing.two_way.structure import Support
 
@@ -239,8 +241,8 @@ def housing_signal(housing: xr.Dataset) -> Figure:
     return figure
 
 
-def draw_order_spectrum(housing: xr.Dataset) -> Figure:
-    """Draw the order spectrum of housing.nc at its first speed, mesh harmonics marked.
+def draw_order_spectrum(housing: xr.Dataset, measured: Sequence[MeasuredSection] = ()) -> Figure:
+    """Draw the order spectrum of housing.nc at its first speed, mesh harmonics marked, measured lines over it.
 
     Below are the strongest bands with their lines labelled: one of harmonic ``h`` and nodal diameter ``n``
     stands at order ``h z_ring - n``.
@@ -266,15 +268,28 @@ def draw_order_spectrum(housing: xr.Dataset) -> Figure:
     label(axes[0], "frequency [kHz]")
     for ax, harmonic in zip(axes[1:], bands):
         _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form)
-    for ax in axes:
+    for ax, per_order in zip(axes, [hertz, *(1.0 for _ in bands)]):
         label(ax, y=_ACCELERATION)
+        _draw_measured(ax, measured, per_order)
     speed = rpm(housing["speed"].values[0])
     level = np.sqrt(0.5 * (linear[order > 0] ** 2).sum())
     title = f"Order spectrum of the fixed sensor, {speed}: {level:.4g} m/s² r.m.s.{excited_to(housing, 0)}"
     figure.suptitle(title, fontsize=12)
-    if form != _EXACT:
+    if form != _EXACT or measured:
         legend_below(figure)
     return figure
+
+
+def _draw_measured(ax, measured: Sequence[MeasuredSection], per_order: float) -> None:
+    """Draw measured lines as open marks where they lie in the panel, whose axis grows so much for every order."""
+    (low, high), (floor, top) = ax.get_xlim(), ax.get_ylim()
+    for entry, mark in zip(measured, itertools.cycle("sD^v")):
+        x, height = per_order * np.array(entry.orders), np.array(entry.accelerations)
+        inside = (x >= low) & (x <= high) & (height >= floor)
+        top = max(top, 2.0 * height[inside].max(initial=0.0))
+        style = {"markerfacecolor": "none", "color": BLACK, "markersize": 5}
+        ax.plot(x[inside], height[inside], mark, label=f"measured: {entry.source}", **style)
+    ax.set_ylim(floor, top)
 
 
 def _draw_band(ax, order, linear, exact, ring_teeth, harmonic, form):
@@ -518,6 +533,7 @@ def _housing_figures(drawn: Drawn) -> Drawings:
     figures: dict[str, Callable[[], Figure]] = {}
     angles, supports = planetary_set(drawn.case).planet_angles, housing_supports(drawn.case)
     for s in shown_speeds(housing):
+        measured = measured_at(drawn.case, float(housing["speed"][s]))
         at_speed, speed = housing.isel(speed=[s]), f"{round(float(housing['speed'][s]))}_rpm"
         if dynamics is not None and "level_change" in dynamics:
             at_speed = at_speed.assign(level_change=("speed", dynamics["level_change"].values[[s]]))
@@ -528,7 +544,7 @@ def _housing_figures(drawn: Drawn) -> Drawings:
 
         figures |= {
             f"housing_signal_{speed}": partial(housing_signal, at_speed),
-            f"order_spectrum_{speed}": partial(draw_order_spectrum, at_speed),
+            f"order_spectrum_{speed}": partial(draw_order_spectrum, at_speed, measured),
             f"modulation_{speed}": modulation,
         }
         if "pressure_level" in at_speed:

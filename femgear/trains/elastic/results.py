@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from femgear.case.planetary import Case
+    from femgear.case.sections import MeasuredSection
     from femgear.contact.bodies import Bodies
     from femgear.contact.loaded_period import LoadedPeriod
     from femgear.gears.kinematics import Speeds
@@ -110,6 +111,8 @@ _ROUNDED, _MANY = 1e-5, 40
 # speeds, and bands at each of them, that are listed
 _FEW, _CUTS = 4, 24
 _FIRST, _STRONGEST = 6, 4
+_MEASURED_SHOWN, _ONE_ORDER = 12, 0.02
+"""Lines of a recording that are listed, and the distance of orders that count as one."""
 FRICTION_CHANGE = "added by friction to the level of the housing"
 _HIGHEST, _EQUIVALENT = "highest frequency of the excitation", "the same with the radiation efficiency one"
 _ESTIMATE = "by equivalent radiated power (radiation efficiency one): an estimate from above"
@@ -1121,6 +1124,29 @@ def _published(case, rpm: float, harmonic: int) -> str:
             lobes = "" if entry.lobes is None else f"; {entry.lobes} lobes"
             return f"{', '.join(map(str, entry.orders))}{lobes}"
     return "-"
+
+
+def measured_at(case: Case, rpm: float) -> tuple[MeasuredSection, ...]:
+    """List the measured lines of a case at a speed of the input [rpm]."""
+    return tuple(entry for entry in case.housing.measured if np.isclose(entry.speed / RPM, rpm))
+
+
+def measured_lines(results: Results) -> tuple[Block, ...]:
+    """Tabulate the strongest measured lines of every recording beside the computed ones of the same order."""
+    housing, rows = results.housing, []
+    for s, rpm in enumerate(map(float, housing["speed"].values)):
+        for entry in measured_at(results.case, rpm):
+            lines = stored_lines(housing.isel(speed=s))
+            computed, height = np.abs(lines.acceleration), np.array(entry.accelerations)
+            for k in sorted(np.argsort(-height, kind="stable")[:_MEASURED_SHOWN]):
+                near = np.abs(lines.order - entry.orders[k]) <= _ONE_ORDER
+                ours = float(computed[near].max(initial=0.0))
+                difference = f"{20 * np.log10(height[k] / ours):+.1f}" if ours > 0.0 and height[k] > 0.0 else "-"
+                numbers = f"{entry.orders[k]:.6g}", f"{height[k]:.3g}", f"{ours:.3g}" if near.any() else "-", difference
+                rows.append((entry.source, f"{rpm:.6g}", *numbers))
+    header = ("measured", "speed [rpm]", "order", "measured [m/s²]", "computed [m/s²]", "measured over computed [dB]")
+    note = "a dash: no line is computed at this order; femgear measured says what would make it"
+    return (Block("Measured lines beside the computed ones", header, tuple(rows), (note,)),) if rows else ()
 
 
 def _line(line, centre: int) -> str:

@@ -145,6 +145,7 @@ from femgear.trains.elastic.results import (
     describe_housing,
     level_changes,
     level_doubts,
+    measured_lines,
     mesh_bands,
     order_cuts,
     ring_shapes,
@@ -840,7 +841,7 @@ ELASTIC = Train(
             describe=lambda results: describe_housing(
                 results.housing, level_changes(results), results.findings, level_doubts(results)
             ),
-            tables=lambda results: (mesh_bands(results),),
+            tables=lambda results: (mesh_bands(results), *measured_lines(results)),
             warnings=HousingResult.warnings,
             concerned_by={"": ("W-DAMPING", "W-FRICTION", "W-POINTS"), "dynamics": ("W-EXCITATION", *RESPONSE_DOUBTS)},
         ),

@@ -1,6 +1,7 @@
 """Figures of an elastic set: ring, sensors, motion of the housing, spectra."""
 
 import itertools
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -57,6 +58,19 @@ def test_polar_modulation_of_an_amplitude_modulated_signal():
     assert "mesh harmonic 5: 4 lobes up to 1.8 m/s²" in ax.get_title()
     line = line_of(figure, "envelope")
     np.testing.assert_allclose(line.get_ydata(), 1 + 0.8 * np.cos(4 * line.get_xdata()), atol=1e-9)
+
+
+def test_measured_lines_stand_over_the_computed_ones():
+    """In every panel at their orders, those below its floor left out, and the tallest inside the frame."""
+    housing = heard({TEETH - 3: 1.0, 2 * TEETH: 0.5})
+    orders, accelerations = (TEETH - 3.0, TEETH + 1.0, 2.0 * TEETH), (40.0, 0.2, 1e-9)
+    entry = SimpleNamespace(source="rig", orders=orders, accelerations=accelerations)
+    figure = elastic_figures.draw_order_spectrum(housing, [entry])
+    drawn = [[line for line in ax.get_lines() if line.get_label() == "measured: rig"] for ax in figure.axes[:3]]
+    hertz = 1e-3 * float(housing["carrier_speed"][0]) / (2 * np.pi)
+    assert drawn[0][0].get_xdata() == pytest.approx([abs(hertz) * order for order in orders[:2]])
+    assert drawn[1][0].get_xydata().tolist() == [[TEETH - 3.0, 40.0], [TEETH + 1.0, 0.2]]
+    assert len(drawn[2][0].get_xdata()) == 0 and figure.axes[1].get_ylim()[1] > 40.0
 
 
 @pytest.mark.parametrize("turn", [1.0, -1.0])

@@ -7,8 +7,15 @@ import pytest
 import xarray as xr
 from report.test_figures import synthetic
 
+from femgear.case.quantities import RPM
+from femgear.housing.sensor import stored_lines
 from femgear.stages import static_figures as static_figures
-from femgear.trains.elastic.results import describe_housing, factors_of_speeds, known_factors
+from femgear.trains.elastic.results import (
+    describe_housing,
+    factors_of_speeds,
+    known_factors,
+    measured_lines,
+)
 
 
 def test_the_table_of_the_housing_has_both_sensors():
@@ -36,3 +43,19 @@ def test_load_factors_are_the_largest_of_all_speeds_also_of_those_that_tables_le
     housing = xr.Dataset({"dynamic_factor": (("speed", "mesh_kind"), np.full((speeds, 2), 1.9))})
     fixed = SimpleNamespace(stages=("dynamics", "housing"), dynamics=dynamics, housing=housing)
     assert known_factors(fixed)["K_v"] == pytest.approx([1.9, 1.9])
+
+
+def test_measured_lines_stand_beside_the_computed_ones_of_their_order():
+    housing = synthetic.housing()
+    rpm, lines = float(housing["speed"][1]), stored_lines(housing.isel(speed=1))
+    k = int(np.abs(lines.acceleration).argmax())
+    order, height = float(lines.order[k]), abs(lines.acceleration[k])
+    entry = SimpleNamespace(
+        speed=rpm * RPM, source="rig", orders=(order + 0.01, order + 0.5), accelerations=(2 * height, height)
+    )
+    case = SimpleNamespace(housing=SimpleNamespace(measured=(entry,)))
+    (block,) = measured_lines(SimpleNamespace(case=case, housing=housing))
+    assert [row[0] for row in block.rows] == ["rig", "rig"]
+    assert [row[-1] for row in block.rows] == ["+6.0", "-"] and block.rows[1][4] == "-"
+    case.housing.measured = ()
+    assert measured_lines(SimpleNamespace(case=case, housing=housing)) == ()
