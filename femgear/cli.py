@@ -710,6 +710,41 @@ def measured(
 
 
 @app.command
+def rigs(
+    name: str | None = None,
+    signal: Path | None = None,
+    /,
+    *,
+    recording: Annotated[Recording | None, Parameter(name="*")] = None,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    force: Annotated[bool, Parameter(negative="")] = False,
+) -> int:
+    """Say what recordings of public rigs should hold, write their cases, and check a recording that you have.
+
+    Parameters
+    ----------
+    name
+        Of a rig. Default: all are listed.
+    signal
+        Recording of the healthy rig, from its owner; none is shipped.
+    output
+        Case file of the rig to write.
+    force
+        Replace the file.
+    """
+    from femgear.rigs import RIGS, describe_rig, find_rig, judge_rig
+
+    if name is None:
+        _print(map(describe_rig, RIGS.values()))
+        return 0
+    rig = find_rig(name)
+    _print([judge_rig(rig, signal, recording or Recording()) if signal is not None else describe_rig(rig)])
+    if output is not None:
+        _write_case(rig.source, output, force=force)
+    return 0
+
+
+@app.command
 def export(
     folder: Path,
     /,

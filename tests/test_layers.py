@@ -25,7 +25,7 @@ LAYERS = (
     ("trains",),
     ("study",),
     ("run",),
-    ("views",),
+    ("views", "rigs"),
     ("assistant",),
     ("app",),
     ("cli",),

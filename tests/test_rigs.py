@@ -1,0 +1,76 @@
+"""femgear.rigs: cases, predicted lines, and the rule by which a recording is judged, fixed before any was looked at."""
+
+import numpy as np
+import pytest
+from recorded_signals import RATE, recording, write_columns
+
+from femgear import cli, solve
+from femgear.errors import CaseError
+from femgear.housing.orders import OrderSpectrum
+from femgear.rigs import PRETORIA, RIGS, SDUST, SNU, check_rig, find_rig
+
+TURNS = 50
+
+
+def spectrum(lines):
+    """Lines through a Hann window, over 50 turns."""
+    order = np.arange(400 * TURNS) / TURNS
+    value = np.full(len(order), 1e-9, complex)
+    for at, height in lines.items():
+        bins = (order - at) * TURNS
+        value += height * (np.sinc(bins) + 0.5 * np.sinc(bins - 1) + 0.5 * np.sinc(bins + 1))
+    return OrderSpectrum(order, value, TURNS)
+
+
+@pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS)
+def test_what_is_predicted_passes(rig):
+    check = check_rig(rig, spectrum({order: height for order, height in rig.predicted.items() if height}))
+    assert check.passed(rig) == (True, True) and check.share == 1.0
+    assert rig.case().ring.teeth == rig.teeth[2] and rig.case().set.planets == rig.planets
+
+
+@pytest.mark.parametrize(
+    ("rig", "lines", "passed"),
+    [
+        (SDUST, SDUST.predicted | {73: 0.2}, (False, True)),
+        (SDUST, SDUST.predicted | {73: 0.09}, (True, True)),  # below -20 dB
+        (SDUST, SDUST.predicted | {80: 0.5}, (True, True)),  # eight orders beside
+        (SDUST, SDUST.predicted | {72: 0.6}, (True, False)),
+        (SDUST, SDUST.predicted | {147.04: 0.5}, (True, True)),
+        (SDUST, SDUST.predicted | {147.08: 0.5}, (False, True)),
+        (SNU, SNU.predicted | {95: 0.95}, (False, False)),
+        (PRETORIA, {57: 1.0, 60: 0.9, 63: 0.8}, (True, False)),
+        (PRETORIA, {}, (False, False)),
+    ],
+)
+def test_the_rule(rig, lines, passed):
+    assert check_rig(rig, spectrum({order: height for order, height in lines.items() if height})).passed(rig) == passed
+
+
+def test_the_command_lists_writes_and_judges(tmp_path, capsys):
+    assert cli.main(["rigs"]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in RIGS)
+    path = tmp_path / "sdust.toml"
+    assert cli.main(["rigs", "sdust", "-o", str(path)]) == 0 and "checksums" in capsys.readouterr().out
+    assert 'module = "2 mm"' in path.read_text()
+    carrier = 5.0
+    signal, _, _ = recording(SDUST.predicted, SDUST.predicted.values(), carrier=carrier, wander=0.0, seconds=12.0)
+    columns = np.arange(len(signal)) / RATE, signal
+    file = write_columns(tmp_path / "a.csv", "time [s];acc [g]\n", columns)
+    assert cli.main(["rigs", "SDUST", str(file), "--speed", f"{carrier * 60 * 5.001} rpm", "--within", "0.005"]) == 0
+    printed = capsys.readouterr().out
+    assert printed.count(" passed") == 2 and "100% of 4" in printed
+    assert cli.main(["rigs", "none"]) == 2 and "E-CHOICE" in capsys.readouterr().err
+    with pytest.raises(CaseError, match="no such rig"):
+        find_rig("none")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rig", RIGS.values(), ids=RIGS)
+def test_predicted_lines_are_those_of_the_case(rig):
+    lines = solve(rig.case(), "housing")["housing"].exact
+    height, ring = np.abs(lines.acceleration[0]), rig.teeth[2]
+    height = height / height[np.abs(lines.order - ring) <= 12].max()
+    for order, predicted in rig.predicted.items():
+        assert height[lines.order == order].sum() == pytest.approx(predicted, abs=0.015)
