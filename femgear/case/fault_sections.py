@@ -1,10 +1,12 @@
-"""Sections of faults of teeth: missing, broken off at the tip, pitted or worn.
+"""Sections of faults of teeth: missing, broken off at the tip, pitted, worn or cracked.
 
 Every entry has its type and its plausible window, as in `femgear.case.sections`.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
@@ -12,9 +14,10 @@ import numpy as np
 from pydantic import model_validator
 
 from femgear.case.flank_sections import MOST_POINTS, Diameter
-from femgear.case.quantities import LENGTH, Count, Quantity, Section, Values
+from femgear.case.quantities import ANGLE, LENGTH, Count, Quantity, Section, Values
 from femgear.errors import CaseError, GeometryError
-from femgear.gears.faults import LEFT, RIGHT, BrokenTip, MissingTooth, Spall, ToothFault, Wear
+from femgear.gears.cracked_tooth import check_crack
+from femgear.gears.faults import LEFT, RIGHT, BrokenTip, Crack, MissingTooth, Spall, ToothFault, Wear
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import roll_at
 
@@ -29,10 +32,13 @@ _ENTRIES = {
     "broken corner": ("length",),
     "spall": ("flank", "diameter", "length", "depth"),
     "wear": ("flank", "depth", "depths", "diameters"),
+    "crack": ("flank", "angle", "depth", "diameter"),
 }
 """Entries of every kind beside the tooth."""
-_OPTIONAL = ("depth", "depths", "diameters")
-"""Those of wear, of which some must be given."""
+_OPTIONAL = {"wear": ("depth", "depths", "diameters"), "crack": ("diameter", "angle")}
+"""Those that may be left out; wear needs some of them."""
+CRACK_ANGLE = math.radians(70.0)
+"""Between a crack and the centre line of its tooth, where none is given."""
 _SIDES = {"left": LEFT, "right": RIGHT, "sun side": LEFT, "ring side": RIGHT}
 
 
@@ -40,16 +46,18 @@ class FaultSection(Section):
     """A fault of one tooth; ``tooth`` counts counter-clockwise from 0 as pitch errors do.
 
     A spall is ``length`` long along the flank about its ``diameter`` and ``depth`` deep; of a broken corner ``length``
-    is what is broken off the tip, radially. Both go across the whole width. Wear has one ``depth``, or ``depths`` over
-    ``diameters``, and without ``tooth`` it is that of all teeth.
+    is what is broken off the tip, radially. A crack is straight, from a ``diameter`` in the root of its flank, at an
+    ``angle`` to the centre line of the tooth; ``depth`` is its length. All go across the whole width. Wear has one
+    ``depth``, or ``depths`` over ``diameters``, and without ``tooth`` it is that of all teeth.
     """
 
-    kind: Literal["missing", "broken corner", "spall", "wear"]
+    kind: Literal["missing", "broken corner", "spall", "wear", "crack"]
     tooth: Annotated[int, Count(0, 5000)] | None = None
     flank: Literal["left", "right"] | None = None
     diameter: Diameter | None = None
     length: _Length | None = None
     depth: _Depth | None = None
+    angle: Annotated[float, Quantity(ANGLE, 0.0, math.radians(120))] | None = None
     depths: Annotated[tuple[_Depth, ...], _Points] | None = None
     diameters: Annotated[tuple[Diameter, ...], _Points] | None = None
 
@@ -59,7 +67,7 @@ class FaultSection(Section):
         if unused := self.given(*sorted(every - set(entries))):
             message = f"a fault of kind {self.kind!r} has no {' and no '.join(unused)}"
             raise CaseError(message, code="E-FAULT", remedy=f"leave out {', '.join(unused)}")
-        needed = [name for name in entries if self.kind != "wear" or name not in _OPTIONAL]
+        needed = [name for name in entries if name not in _OPTIONAL.get(self.kind, ())]
         needed += [] if self.kind == "wear" else ["tooth"]
         if missing := [name for name in needed if getattr(self, name) is None]:
             message = f"a fault of kind {self.kind!r} needs {' and '.join(missing)}"
@@ -98,22 +106,30 @@ def no_faults(case: Any, words: str, remedy: str = "leave the faults out") -> No
             raise CaseError(words, code="E-FAULT", key=key, remedy=remedy, file=case.location(key))
 
 
-def tooth_faults(case: Any, gears: GearSet) -> tuple[ToothFault, ...]:
-    """Make the faults of the teeth of all gears of a case.
+def keyed_faults(case: Any, gears: GearSet) -> Iterator[tuple[str, ToothFault]]:
+    """Make the faults of the teeth of all gears of a case, with their entries; without depth there is none.
 
     GeometryError, with the entry and its place in the file: a tooth or a planet that there is not (E-RANGE), a place
-    that is not on the flank (E-FAULT).
+    that is not on the flank, a crack that the tooth cannot have or that is not the only one of its body (E-FAULT).
     """
-    faults = []
+    cracked = set()
     for number, gear in enumerate(gears.gears):
         for i, section in enumerate(getattr(case, gear.name).fault):
+            key = f"{gear.name}.fault[{i}]"
             try:
-                faults.append(_fault(section, gears, number))
+                fault = _fault(section, gears, number)
+                if isinstance(fault, Crack):
+                    if (number, fault.copy) in cracked:
+                        raise GeometryError(
+                            "a body has one crack", code="E-FAULT", key="kind", remedy="keep one of them"
+                        )
+                    cracked.add((number, fault.copy))
             except GeometryError as error:
-                error.key = f"{gear.name}.fault[{i}].{error.key}"
+                error.key = f"{key}.{error.key}"
                 error.file = case.location(error.key)
                 raise
-    return tuple(faults)
+            if section.depth != 0.0:
+                yield key, fault
 
 
 def _fault(section: FaultSection, gears: GearSet, number: int) -> ToothFault:
@@ -133,6 +149,14 @@ def _fault(section: FaultSection, gears: GearSet, number: int) -> ToothFault:
             return _broken_tip(section, gear, place)
         case "spall":
             return _spall(section, gear, place)
+        case "crack":
+            assert section.depth is not None
+            start = None if section.diameter is None else 0.5 * section.diameter
+            angle = CRACK_ANGLE if section.angle is None else section.angle
+            crack = Crack(**place, start=start, angle=angle, depth=section.depth)
+            if section.depth:
+                check_crack(gear, crack)
+            return crack
         case _:
             return _wear(section, gear, place)
 

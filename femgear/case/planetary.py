@@ -9,7 +9,7 @@ from typing import Annotated, ClassVar
 import numpy as np
 from pydantic import Field, model_validator
 
-from femgear.case.fault_sections import tooth_faults
+from femgear.case.fault_sections import keyed_faults
 from femgear.case.flank_sections import CarrierErrors, GearErrors, RingErrors
 from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.quantities import Count, Title
@@ -141,7 +141,7 @@ class Case(GearCase):
             planet_thickness=[errors.thickness_reduction or 0.0 for errors in planets],
             ring_thickness=ring.thickness_reduction or 0.0,
             planet_misalignment=misaligned,
-            faults=tooth_faults(self, gears),
+            faults=tuple(fault for _, fault in keyed_faults(self, gears)),
             **{
                 f"{name}_misalignment": (askew.x, askew.y)
                 for name in ("sun", "carrier")

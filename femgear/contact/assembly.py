@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from femgear.contact.bodies import Bodies, FlankCompliance, station_weights
+from femgear.contact.cracked_flanks import WindowCrack, window_cracks
 from femgear.contact.flank_friction import WindowFriction, window_friction
 from femgear.contact.flank_pairs import (
     acting_flanks,
@@ -115,6 +116,8 @@ class Candidates:
         meshes [m/N].
     friction : WindowFriction, optional
         Of the flanks, in the equilibrium.
+    cracks : tuple of WindowCrack
+        Of teeth, with what of their faces touches; part of `images`.
     """
 
     setup: MeshWindows
@@ -130,6 +133,7 @@ class Candidates:
     approach: np.ndarray
     supports: np.ndarray
     friction: WindowFriction | None = None
+    cracks: tuple[WindowCrack, ...] = ()
 
     @cached_property
     def smooth(self) -> np.ndarray:
@@ -160,7 +164,25 @@ class Candidates:
             for compliance, other in zip(self.bodies.gears, bodies.gears, strict=True)
         ]
         differing = replace(bodies, gears=tuple(parts))
-        return self.images + body_compliance(self.setup, differing, self.position, self.mesh, self.pair)
+        images = self.images + body_compliance(self.setup, differing, self.position, self.mesh, self.pair)
+        others = window_cracks(self.setup, bodies, *self._places) if self.cracks else ()
+        for crack, other in zip(self.cracks, others, strict=True):
+            if other.flanks is not crack.flanks:
+                images[0] += replace(other, closed=crack.closed).yielding() - crack.yielding()
+        return images
+
+    @property
+    def _places(self) -> tuple:
+        """Arguments of `window_cracks`."""
+        return self.position, self.mesh, self.pair, windows_of_bodies(self.setup.gears, self.mesh)
+
+    def with_closed(self, closed: list[np.ndarray]) -> Candidates:
+        """Close pairs of nodes (P, k) on the faces of every crack, and open the others."""
+        images, cracks = self.images.copy(), []
+        for crack, pairs in zip(self.cracks, closed, strict=True):
+            cracks.append(replace(crack, closed=pairs))
+            images[0] += cracks[-1].yielding() - crack.yielding()
+        return replace(self, images=images, cracks=tuple(cracks))
 
     def touches_window_end(self, active: np.ndarray) -> bool:
         """Whether a contact (P, W, C) ends where its window ends, other than at an end of a flank."""
@@ -254,6 +276,10 @@ def contact_candidates(
     if friction is not None and members is not None:
         image = setup.places[1] if setup.images > 1 else None
         rubbing = window_friction(setup.gears, setup.zeta[place], mesh, friction, members, images=image)
+    images = body_compliance(setup, bodies, positions, mesh, pair)
+    cracks = window_cracks(setup, bodies, positions, mesh, pair, windows_of_bodies(setup.gears, mesh))
+    for crack in cracks:
+        images[0] += crack.yielding()
     return Candidates(
         setup=setup,
         bodies=bodies,
@@ -264,10 +290,11 @@ def contact_candidates(
         candidate=candidate,
         polynomials=polynomials,
         local=local,
-        images=body_compliance(setup, bodies, positions, mesh, pair),
+        images=images,
         approach=approach,
         supports=supports,
         friction=rubbing,
+        cracks=cracks,
     )
 
 

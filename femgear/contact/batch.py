@@ -36,6 +36,8 @@ _ROUNDED = 1e-14
 """Violation that is rounding alone."""
 _RESIDUAL = 1e-12
 """Violation above which a position is solved again by itself."""
+_CRACKS_AT_ONCE, _MOST_CRACKED = 8, 200
+"""Rounds in which all nodes on faces of cracks change sides that must, and rounds in all: later ones change one."""
 _ROUNDS, _SETTLED = 60, 1e-14
 """Solutions of a position by itself that friction may ask for, each with that of the one before; change of the last."""
 
@@ -91,6 +93,35 @@ def solve_batch(
     batch.solve(refined)
     state = batch.loads, batch.gaps, batch.active, batch.motions, batch.iterations, batch.residual
     return BatchState(*state)
+
+
+def solve_with_cracks(
+    candidates: Candidates, load, springs: BearingSprings | None = None
+) -> tuple[Candidates, BatchState]:
+    """Solve the contact of the flanks and of the faces of cracks at all positions.
+
+    Give the candidates with the faces that touch, whose compliance is that of cracks closed there. The arguments are
+    those of `solve_batch`. ContactError (E-CONTACT): faces that do not come to rest.
+    """
+    state = solve_batch(candidates, load, springs)
+    for number in range(_MOST_CRACKED):
+        moments = (candidates.polynomials * state.loads[..., None]).sum(axis=2)
+        wanted = [crack.closing(moments) for crack in candidates.cracks]
+        wrong = [closed != crack.closed for crack, closed in zip(candidates.cracks, wanted, strict=True)]
+        if not any(flips.any() for flips in wrong):
+            return candidates, state
+        if number >= _CRACKS_AT_ONCE:
+            wrong = [_last_flip(flips) for flips in wrong]
+        closed = [crack.closed ^ flips for crack, flips in zip(candidates.cracks, wrong, strict=True)]
+        candidates = candidates.with_closed(closed)
+        state = solve_batch(candidates, load, springs, start=state.active)
+    raise ContactError("the faces of a crack do not come to rest", code="E-CONTACT", limit=f"{_MOST_CRACKED} rounds")
+
+
+def _last_flip(flips: np.ndarray) -> np.ndarray:
+    """The last true entry of every row (P, k) alone."""
+    last = flips.shape[1] - 1 - flips[:, ::-1].argmax(axis=1)
+    return flips & (np.arange(flips.shape[1]) == last[:, None])
 
 
 def check_residual(candidates: Candidates, state: BatchState) -> None:

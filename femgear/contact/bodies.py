@@ -132,6 +132,8 @@ class FlankCompliance:
         Sector with unit loads at the stations, observed where they act; of the ring.
     free : FreeSector, optional
         The same, whatever holds the rim.
+    cracks : tuple of CrackedFlanks
+        What cracks of a tooth change, see `femgear.contact.cracked_flanks`.
     """
 
     roll: np.ndarray
@@ -144,6 +146,7 @@ class FlankCompliance:
     root: ObservedRoot | None = None
     surface: SectorSchur | None = None
     free: FreeSector | None = None
+    cracks: tuple[Any, ...] = ()
 
     @cached_property
     def least(self) -> float:
@@ -337,11 +340,13 @@ def _of_sector(sector: Sector, material: Material, teeth: tuple[float, float], *
 
 
 def with_ring(bodies: Bodies, ring_foundation=None) -> Bodies:
-    """Exchange the ring: held at its outer surface, or on a foundation (2n, 2n) [N/m]."""
+    """Exchange the ring: held at its outer surface, or on a foundation (2n, 2n) [N/m]; without cracks."""
     ring = bodies.gears[-1]
     assert ring.free is not None
     compliance, surface = _seen(ring.free.supported(ring_foundation), len(ring.roll))
-    return bodies.with_gear(-1, replace(ring, regular=regular_compliance(compliance, ring.local), surface=surface))
+    return bodies.with_gear(
+        -1, replace(ring, regular=regular_compliance(compliance, ring.local), surface=surface, cracks=())
+    )
 
 
 def flank_compliance(

@@ -17,7 +17,7 @@ import numpy as np
 
 from femgear import second_process
 from femgear.contact.assembly import Candidates, contact_candidates
-from femgear.contact.batch import BatchState, ContactTangents, check_definite, check_residual, solve_batch
+from femgear.contact.batch import BatchState, ContactTangents, check_definite, check_residual, solve_with_cracks
 from femgear.contact.bodies import Bodies
 from femgear.contact.face_width import FaceWidth, contact_over_width, over_slices
 from femgear.contact.flank_friction import friction_of_record
@@ -538,7 +538,7 @@ class _Walk:
             check_definite(candidates)
         load = np.zeros(candidates.approach.shape[1])
         load[setup.driver] = self.sun_torque / self.planetary_set.gears[0].base_radius / self.images
-        state = solve_batch(candidates, load, self.springs)
+        candidates, state = solve_with_cracks(candidates, load, self.springs)
         check_residual(candidates, state)
         values = {} if self.empty.helical else self._at_positions(candidates, state)
         overflow, nearest = candidates.touches_window_end(state.active), 0.0

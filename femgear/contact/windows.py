@@ -29,7 +29,7 @@ from femgear.contact.flank_pairs import (
 from femgear.contact.local_compliance import hertz_half_width, surface_displacement
 from femgear.errors import LESS_TORQUE, ContactError
 from femgear.gears.deviations import SetDeviations
-from femgear.gears.faults import missing_length
+from femgear.gears.faults import Crack, missing_length
 from femgear.gears.pair import GearSet
 
 WINDOW_NODES = np.array([0.0, 0.5, 1.0])
@@ -130,6 +130,8 @@ class MeshWindows(Windows):
         Those without windows among them, see `femgear.contact.omitted_pairs`.
     images : int
         Sectors of the set that are all in the same state: the planets are those of the first.
+    cracks : tuple of Crack
+        Of teeth.
     """
 
     gears: GearSet
@@ -139,6 +141,7 @@ class MeshWindows(Windows):
     cell_area: np.ndarray
     listed: ListedPairs
     images: int = 1
+    cracks: tuple[Crack, ...] = ()
 
     @property
     def n_planets(self) -> int:
@@ -245,7 +248,9 @@ def mesh_windows(  # noqa: PLR0913
             }
             windows_of_meshes.append(windows(contact_pair, zeta[rows], shift=shift[rows], **options))
         teeth.append(tooth)
-    return _gathered(windows_of_meshes, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
+    setup = _gathered(windows_of_meshes, planetary_set, np.concatenate(teeth, axis=1), turns, bodies, cells)
+    faults = () if deviations is None else deviations.faults
+    return replace(setup, cracks=tuple(fault for fault in faults if isinstance(fault, Crack)))
 
 
 def _over_gaps(

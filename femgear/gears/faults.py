@@ -1,8 +1,8 @@
-"""Faults of a tooth: missing, broken off at its tip, pitted or worn.
+"""Faults of a tooth: missing, broken off at its tip, pitted, worn, or cracked at its root.
 
-They take material off a flank, and so add to the separation of the flanks, over the roll length of the gear that has
-them. Teeth are numbered as in `femgear.gears.deviations`; the left flank of a tooth is the one on its counter-clockwise
-side.
+All but cracks take material off a flank, and so add to the separation of the flanks, over the roll length of the gear
+that has them. Teeth are numbered as in `femgear.gears.deviations`; the left flank of a tooth is the one on its
+counter-clockwise side.
 """
 
 from __future__ import annotations
@@ -118,6 +118,32 @@ class Wear(ToothFault):
 
     def removed(self, roll: np.ndarray) -> np.ndarray:
         return np.interp(roll, self.roll, self.depth)
+
+
+@dataclass(frozen=True)
+class Crack(ToothFault):
+    """A straight crack from the root of a flank into the tooth or its rim, across the whole width.
+
+    Parameters
+    ----------
+    start : float or None
+        Radius of its mouth [m]; None for the critical section.
+    angle : float
+        Between the crack and the centre line of the tooth, towards the body [rad].
+    depth : float
+        Its length [m].
+    """
+
+    start: float | None
+    angle: float
+    depth: float
+
+    separates: ClassVar[bool] = False
+
+    @property
+    def form(self) -> tuple[float | None, float, float]:
+        """Start, angle and depth, whatever tooth has it."""
+        return self.start, self.angle, self.depth
 
 
 def missing_length(fault: ToothFault, gears: GearSet) -> float:

@@ -47,6 +47,7 @@ from femgear.contact.bodies import (
     make_bodies,
     make_sectors,
 )
+from femgear.contact.cracked_flanks import cracked_flanks
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
 from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.root_stress import (
@@ -69,7 +70,9 @@ from femgear.contact.width_waves import (
 )
 from femgear.errors import LESS_TORQUE, CaseError, ContactError
 from femgear.fe.elasticity import foundation
+from femgear.fe.grid import Grid
 from femgear.gears.deviations import SetDeviations, common_period
+from femgear.gears.faults import Crack
 from femgear.gears.iso6336_root import root_face_width
 from femgear.gears.pair import GearSet
 from femgear.gears.planetary import PlanetarySet
@@ -265,7 +268,53 @@ def flank_compliances(
     for name, entry, body in zip(names, entries, bodies.gears):
         steps.keep(f"flanks of the {name}", entry, body)
     base, softer = _helical(case, gears)
-    return sectors, replace(bodies, helical=softer, base_helix_angle=base)
+    bodies = replace(bodies, helical=softer, base_helix_angle=base)
+    return sectors, with_cracks(case, gears, sectors, bodies, elastic=elastic, steps=steps, cache=cache)
+
+
+def with_cracks(
+    case: Any,
+    gears: GearSet,
+    sectors: Sectors,
+    bodies: Bodies,
+    *,
+    elastic: bool,
+    steps: Steps,
+    cache: Path | None = None,
+) -> Bodies:
+    """Add what the cracks of a case change to the flanks of its gears, the ring on its foundation if ``elastic``."""
+    cracks = [fault for fault in set_deviations(case).faults if isinstance(fault, Crack)]
+    for number in sorted({crack.gear for crack in cracks}):
+        of_gear = {crack.form: crack for crack in cracks if crack.gear == number}
+        sector, entries = sectors.gears[number], {**gear_entries(case, gears, number), "cracks": [*of_gear]}
+        support = None
+        if sector.gear.internal and elastic:
+            entries = {**entries, **foundation_entries(case)}
+            support = partial(_foundation_of, case, sector.gear.face_width)
+        name = f"cracks of the {sector.gear.name}"
+        of_cracks = steps.kept(name, entries) or steps.keep(
+            name,
+            entries,
+            tuple(
+                cracked_flanks(
+                    sector,
+                    materials_of(case)[number],
+                    crack,
+                    flank_elements=case.static.flank_elements,
+                    teeth=flank_widths([gear.face_width for gear in gears.gears])[number],
+                    support=support,
+                    cache=cache,
+                )
+                for crack in of_gear.values()
+            ),
+        )
+        bodies = bodies.with_gear(number, replace(bodies.gears[number], cracks=of_cracks))
+    return bodies
+
+
+def _foundation_of(case: Case, width: float, grid: Grid) -> Any:
+    """Stiffness of the foundation of the ring on the rim of a grid, a sparse matrix (2n, 2n) [N/m]."""
+    return foundation(grid, "rim", case.ring.foundation_radial, case.ring.foundation_tangential, thickness=width)
 
 
 def gear_entries(case: Any, gears: GearSet, number: int) -> Entries:
@@ -337,6 +386,7 @@ def check_slices(case: Any, gears: GearSet) -> None:
     except ContactError as error:
         error.file = case.location(error.key or "")
         raise
+    _check_cracks(case, other)
     if static.back_flanks:
         remedy = f"leave static.back_flanks out{other}"
         raise CaseError("slices have no back flanks", key="static.back_flanks", remedy=remedy, **where)
@@ -352,6 +402,21 @@ def check_slices(case: Any, gears: GearSet) -> None:
             remedy=f"use at most {most} slices{other}",
             **where,
         )
+
+
+def _check_cracks(case: Any, other: str) -> None:
+    """Refuse cracks (CaseError, E-FAULT) together with slices."""
+    for name in case.gear_names:
+        for i, fault in enumerate(getattr(case, name).fault):
+            if fault.kind == "crack":
+                key = f"{name}.fault[{i}]"
+                raise CaseError(
+                    "slices over the width know no cracks: a crack goes across the whole width of the plane contact",
+                    code="E-FAULT",
+                    key=key,
+                    remedy=f"leave the crack out{other}",
+                    file=case.location(key),
+                )
 
 
 def _check_width_entries(case: Case, needed: int, *, helical: bool) -> None:
@@ -529,8 +594,7 @@ def relief_kinks(case: Case) -> tuple[bool, ...]:
 
 def ring_foundation(case: Case, sector: Sector):
     """Assemble the elastic foundation of one sector of the ring, a sparse matrix (2n, 2n) [N/m]."""
-    ring, width = case.ring, sector.gear.face_width
-    return foundation(sector.grid, "rim", ring.foundation_radial, ring.foundation_tangential, thickness=width)
+    return _foundation_of(case, sector.gear.face_width, sector.grid)
 
 
 def static_supports(case: Case) -> Supports:

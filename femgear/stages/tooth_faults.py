@@ -6,10 +6,11 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from femgear.case.fault_sections import keyed_faults
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.flank_pairs import RIGHT, acting_flanks
 from femgear.findings import Finding
-from femgear.gears.faults import BrokenTip, MissingTooth, Spall, ToothFault
+from femgear.gears.faults import BrokenTip, Crack, MissingTooth, Spall, ToothFault
 from femgear.gears.pair import BRANCH
 from femgear.report.tables import Block, tabulate
 
@@ -21,6 +22,8 @@ _LEFT_OUT = {
     BrokenTip: "the tooth that is left keeps the compliance of a whole one, and its new edge has no limit of pressure",
     Spall: "a pit that only separates flanks leaves out that the tooth has lost material, some per cent of the "
     "transmission error; pressures at its edges have no limit",
+    Crack: "faces of the crack touch without friction, the crack does not grow, and stresses in the root of its tooth "
+    "are those of a whole one",
 }
 """What the model of every kind of fault leaves out."""
 
@@ -28,7 +31,7 @@ _LEFT_OUT = {
 def fault_findings(case: Any) -> Iterator[Finding]:
     """List what is left out of the faults of a case, and those that nothing shows."""
     gears, back = planetary_set(case), case.torque_on_first_gear() < 0.0
-    for key, fault in _keyed(case, set_deviations(case).faults, gears):
+    for key, fault in keyed_faults(case, gears):
         if (text := _LEFT_OUT.get(type(fault))) is not None:
             yield Finding("W-FAULT", key, text, remedy="take sizes with that margin; orders and places are exact")
         if fault.flank is not None and fault.flank not in _carrying(gears, fault, back=back):
@@ -36,12 +39,6 @@ def fault_findings(case: Any) -> Iterator[Finding]:
             text = f"this flank carries nothing under this torque{looked}"
             yield Finding("W-FAULT", key, text, remedy="give the fault to the other flank, or turn the torque round")
     yield from _unseen(case, gears)
-
-
-def _keyed(case: Any, faults: tuple[ToothFault, ...], gears: GearSet) -> Iterator[tuple[str, ToothFault]]:
-    """Faults with their entries of the case."""
-    keys = (f"{gear.name}.fault[{i}]" for gear in gears.gears for i in range(len(getattr(case, gear.name).fault)))
-    yield from zip(keys, faults, strict=True)
 
 
 def _carrying(gears: GearSet, fault: ToothFault, *, back: bool) -> set[int]:
@@ -95,7 +92,7 @@ def fault_frequencies(gears: GearSet, mesh_frequency: float) -> dict[str, float]
 def describe_faults(case: Any, mesh_frequency: float | None) -> Iterator[Block]:
     """Tabulate the faults of a case, and how often their teeth meet mates at a mesh frequency [Hz], if any is known."""
     gears = planetary_set(case)
-    faults = [*_keyed(case, set_deviations(case).faults, gears)]
+    faults = [*keyed_faults(case, gears)]
     if not faults:
         return
     often = {} if mesh_frequency is None else fault_frequencies(gears, mesh_frequency)

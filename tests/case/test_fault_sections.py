@@ -9,12 +9,14 @@ from femgear.case.fault_sections import FaultSection, PlanetFaultSection, no_fau
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError, GeometryError
 from femgear.gears.faults import LEFT, RIGHT, BrokenTip, MissingTooth, Spall, Wear, missing_length
+from femgear.stages.static import check_slices
 from femgear.study.relief import design_basis
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import check_case
 
 CASES = Path(__file__).parents[2] / "cases"
 SPALL = {"kind": "spall", "tooth": 3, "flank": "left", "diameter": "42 mm", "length": "0.5 mm", "depth": "40 um"}
+CRACK = {"kind": "crack", "tooth": 3, "flank": "left", "depth": "1 mm"}
 WEAR = {"kind": "wear", "flank": "left", "depth": "5 um"}
 
 
@@ -86,6 +88,8 @@ def test_wear_is_given_over_diameters_or_is_even(healthy):
 @pytest.mark.parametrize(
     ("change", "key", "code"),
     [
+        ({"sun.fault": [CRACK | {"depth": "4 mm"}]}, "sun.fault[0].depth", "E-FAULT"),
+        ({"sun.fault": [CRACK, CRACK | {"tooth": 4}]}, "sun.fault[1].kind", "E-FAULT"),
         ({"sun.fault": [{"kind": "missing", "tooth": 27}]}, "sun.fault[0].tooth", "E-RANGE"),
         ({"planet.fault": [{"kind": "missing", "tooth": 3, "planet": 4}]}, "planet.fault[0].planet", "E-RANGE"),
         ({"sun.fault": [SPALL | {"diameter": "60 mm"}]}, "sun.fault[0].diameter", "E-FAULT"),
@@ -96,6 +100,14 @@ def test_places_that_no_tooth_has_are_refused_where_they_stand(healthy, change, 
     with pytest.raises(GeometryError) as refused:
         set_deviations(with_values(healthy, change))
     assert (refused.value.code, refused.value.key) == (code, key)
+
+
+def test_a_fault_without_depth_is_none_and_slices_know_no_cracks(healthy):
+    none = with_values(healthy, {"sun.fault": [CRACK | {"depth": "0 mm"}]})
+    assert set_deviations(none).faults == () and set_deviations(none).ideal
+    sliced = with_values(healthy, {"sun.fault": [CRACK], "static.slices": 9})
+    with pytest.raises(CaseError, match="know no cracks"):
+        check_slices(sliced, planetary_set(sliced))
 
 
 def test_studies_of_designs_refuse_faults(healthy):

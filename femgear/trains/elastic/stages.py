@@ -85,6 +85,7 @@ from femgear.stages.static import (
     loaded_over_width,
     record_positions,
     ring_foundation,
+    with_cracks,
 )
 from femgear.stages.static_results import StaticResult, describe_set
 from femgear.stages.tooth_figures import tooth_key_figures
@@ -323,6 +324,7 @@ def _ring_bodies(case: Case, static: StaticResult, steps: Steps) -> tuple[Bodies
         with_ring(static.bodies, ring_foundation(case, static.sectors.ring) if fixed else None).ring,
     )
     other = static.bodies.with_gear(-1, ring)
+    other = with_cracks(case, gears, static.sectors, other, elastic=fixed, steps=steps)
     return (other, static.bodies) if fixed else (static.bodies, other)
 
 

@@ -18,7 +18,7 @@ from femgear.case.checks import (
     check_torque,
 )
 from femgear.case.csv_columns import embed_profiles
-from femgear.case.fault_sections import FaultSection, tooth_faults
+from femgear.case.fault_sections import FaultSection, keyed_faults
 from femgear.case.flank_sections import GearErrors, ModificationSection
 from femgear.case.load_spectrum import spectrum_notices
 from femgear.case.lubrication import LossesSection, LubricantSection
@@ -201,7 +201,7 @@ class PairCase(GearCase):
             planet_runout=(runout_of(errors_2),),
             sun_thickness=errors_1.thickness_reduction or 0.0,
             planet_thickness=np.array([errors_2.thickness_reduction or 0.0]),
-            faults=tooth_faults(self, gears),
+            faults=tuple(fault for _, fault in keyed_faults(self, gears)),
         )
 
     def torque_on_first_gear(self, torque: float | None = None) -> float:
