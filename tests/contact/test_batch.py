@@ -202,13 +202,13 @@ def test_steps_of_a_position_solved_alone_count_with_those_before(monkeypatch):
 
 def both_routes(gears, images, monkeypatch, *given, **options):
     """A cycle from the planets of one sector, and from all of them."""
-    sizes, together = [], cycle.solve_batch
+    sizes, together = [], batch.solve_batch
 
     def noting(found, *others):
         sizes.append(found.setup.n_planets)
         return together(found, *others)
 
-    monkeypatch.setattr(cycle, "solve_batch", noting)
+    monkeypatch.setattr(batch, "solve_batch", noting)
     one = walk_mesh_cycle(gears, *given, **options)
     assert set(sizes) == {gears.n_planets // images}
     sizes.clear()
@@ -303,9 +303,9 @@ def test_planets_in_the_same_state_are_solved_as_one_over_the_width(seed, images
 )
 def test_planets_with_different_errors_or_errors_that_pass_them_are_solved_each(changed, monkeypatch):
     gears, bodies, torque = random_bodies(3)
-    sizes, together = [], cycle.solve_batch
+    sizes, together = [], batch.solve_batch
     monkeypatch.setattr(
-        cycle, "solve_batch", lambda found, *other: sizes.append(found.approach) or together(found, *other)
+        batch, "solve_batch", lambda found, *other: sizes.append(found.approach) or together(found, *other)
     )
     errors = replace(no_deviations(gears), **changed)
     walk_mesh_cycle(gears, bodies, sun_torque=torque, positions=2, deviations=errors)
