@@ -488,11 +488,13 @@ class HousingSection(Section):
     act both ways.
 
     ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
-    interpolation between ``points`` points of the paper on carrier modulation, with its images.
+    interpolation between ``points`` points of the paper on carrier modulation, with its images. With ``assumptions``
+    a run solves again with half and twice of what nobody knows before the gearbox is built.
     """
 
     form: Literal["exact", "linear"] = "exact"
     points: Annotated[int, Count(3, 100_000)] = 54
+    assumptions: bool = False
     sensor_angle: Angle = 0.0
     microphone: MicrophoneSection = MicrophoneSection()
     published: Annotated[tuple[PublishedLines, ...], Field(max_length=100)] = ()

@@ -187,6 +187,7 @@ CHANGES: tuple[dict[str, object], ...] = (
 )
 # entries of files, of slices, or without which no set is: others of their tables decide the same
 ELSEWHERE = (
+    "housing.assumptions",
     ".span",
     ".over_balls",
     ".ball_diameter",

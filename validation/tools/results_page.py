@@ -37,6 +37,7 @@ RUNS = {
             "dynamics.mesh_harmonics": 2,
             "operation.speeds": ["250 rpm"],
             "runup.count": 2,
+            "housing": {"assumptions": True},
         },
     ),
     "planar": (

@@ -63,6 +63,7 @@ from femgear.report.style import (
     thinned,
 )
 from femgear.report.waterfall import KIND_COLOURS, RUNUP_CAPTIONS, runup_figures
+from femgear.stages.assumptions import ASSUMPTION_FIGURES
 from femgear.stages.protocol import Drawn, Figures
 from femgear.stages.static import ring_foundation
 from femgear.stages.static_figures import FIGURES as STATIC
@@ -602,6 +603,7 @@ FIGURES = STATIC | {
         },
         draw=_housing_figures,
     ),
+    "assumptions": ASSUMPTION_FIGURES,
     "runup": Figures(
         RUNUP_CAPTIONS,
         draw=lambda drawn: runup_figures(drawn.data["runup"], drawn.data["modes"]),

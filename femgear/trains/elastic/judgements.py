@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from femgear.stages.assumptions import most_decisive
 from femgear.stages.judgements import Judgement, judge_noise, judge_numbers
 from femgear.stages.train_judgements import judge_teeth
 from femgear.trains.elastic.results import known_factors, rate_set
@@ -47,6 +48,8 @@ def _noise(results: Any) -> Judgement:
     share = 0.5 * (size[line] / level[at]) ** 2 if level[at] > 0.0 else 0.0
     main = f"order {order:g} ({hertz:,.0f} Hz{_nearest_mode(results, hertz)}) makes {share:.0%} of the power"
     sentence = f"At {speed:,.4g} rpm it has {level[at]:.3g} m/s²{at_microphone}: {main}"
+    if decisive := most_decisive(results):
+        sentence += f", with half and twice of what is assumed: {decisive}"
     if "runup" not in results.stages:
         return judge_noise(answer, sentence)
     runup = results.runup

@@ -61,6 +61,7 @@ from femgear.report.tables import (
 )
 from femgear.solvers.periodic.solution import CIRCLE
 from femgear.solvers.stability.parametric import stability
+from femgear.stages.assumptions import assumption_rows
 from femgear.stages.friction_source import friction_rows
 from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
@@ -638,6 +639,7 @@ def verdict(results: Results) -> Iterator[Block]:
     if "runup" in stages:
         rows.append(("largest dynamic factor K_v of the run-up", largest_factors(results.runup, marks)))
         rows.append(("largest level of the run-up", loudest(results.runup, marks)))
+    rows += assumption_rows(results, marks)
     rows += efficiency_rows(results, marks)
     rows += heat_rows(results, marks)
     if rows:

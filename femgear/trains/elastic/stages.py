@@ -59,6 +59,7 @@ from femgear.solvers.linear.resonances import (
 )
 from femgear.solvers.periodic.spectral import joint_message, solve_spectral
 from femgear.solvers.stability.parametric import decisive_harmonics
+from femgear.stages.assumptions import Assumption, AssumptionsResult, describe_assumptions, solve_assumptions
 from femgear.stages.friction_source import balanced_source
 from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
@@ -85,6 +86,7 @@ from femgear.stages.static import (
     loaded_over_width,
     record_positions,
     ring_foundation,
+    solve_static,
     with_cracks,
 )
 from femgear.stages.static_results import StaticResult, describe_set
@@ -180,6 +182,13 @@ _BELOW_WAVES = 0.9
 _NOTICED, _PACKED, _SECONDS = 2e9, 2.5, 1.5e-5
 """Size of files that is said before, and that of a number in compressed ones [bytes]; what a harmonic of one
 speed takes (2 GHz, one core) [s]."""
+_ASSUMPTIONS = (
+    Assumption("damping", ("dynamics.damping_ratio",)),
+    Assumption("foundation of the ring", ("ring.foundation_radial", "ring.foundation_tangential")),
+    Assumption("bearings of the planets", ("planet.bearing_stiffness",)),
+    Assumption("supports of sun and carrier", ("sun.support_stiffness", "carrier.support_stiffness")),
+)
+"""What levels rest on, and what nobody knows before the gearbox is built."""
 _SHARING_POSITIONS = 8
 """Positions of a mesh period from which mean shares at other bearing stiffnesses are taken."""
 _EQUAL = 0.005
@@ -748,6 +757,35 @@ def _runup_ends(case: Case, modes: ModesResult) -> tuple[float, float]:
     return first, max(min(last, allowed), *case.operation.speeds)
 
 
+def solve_level_assumptions(
+    case: Case, static: StaticResult, *, progress: Progress = silent, steps: Steps | None = None
+) -> AssumptionsResult:
+    """Compute the level at some operating speeds with half and twice of what the case assumes.
+
+    Parameters
+    ----------
+    case : Case
+        As for `solve_modes`.
+    static : StaticResult
+        Of `solve_static` for this case; members that move change it, and are solved again.
+    progress : callable
+        Called with (stage, done, total).
+    steps : Steps, optional
+        As for `solve_modes`.
+    """
+    steps, numbers = steps or Steps(), checked_speeds(len(case.operation.speeds), _COMPARED)
+    speeds = tuple(case.operation.speeds[number] for number in numbers)
+    few = case.model_copy(update={"operation": case.operation.model_copy(update={"speeds": speeds})})
+
+    def level(changed: Case) -> np.ndarray:
+        same = static_entries(changed) == static_entries(case)
+        state = static if same else solve_static(changed, steps=steps)
+        modes = solve_modes(changed, state, steps=steps)
+        return order_level(solve_housing(changed, solve_dynamics(changed, state, modes)).lines)
+
+    return solve_assumptions(few, _ASSUMPTIONS, level, np.array(speeds), progress=progress)
+
+
 def _warnings(case: Case) -> Iterator[Finding]:
     """List what deserves a look in the case, and the size of the results of many speeds."""
     yield from case_warnings(case)
@@ -846,6 +884,19 @@ ELASTIC = Train(
             tables=lambda results: (mesh_bands(results), *measured_lines(results)),
             warnings=HousingResult.warnings,
             concerned_by={"": ("W-DAMPING", "W-FRICTION", "W-POINTS"), "dynamics": ("W-EXCITATION", *RESPONSE_DOUBTS)},
+        ),
+        Stage(
+            name="assumptions",
+            title="What the level rests on",
+            solve=solve_level_assumptions,
+            takes=("static",),
+            needs=lambda case: ("static", "housing"),
+            options=("progress", "steps"),
+            decided_by=heard_entries,
+            wanted=lambda case: case.housing.assumptions,
+            verdict=lambda result: {"assumptions": len(result.assumptions)},
+            describe=lambda results: describe_assumptions(results.assumptions),
+            concerned_by={"": ("W-DAMPING", "W-FRICTION")},
         ),
     ),
     describe=describe_set,
