@@ -370,8 +370,8 @@ def run(
         Folder of the results. Default: CASE_results, beside the case.
     only
         Compute this stage and what it needs, no further: "static", "stress" (whatever static.stresses says),
-        "life", "losses" or "heat" of teeth, "modes", "dynamics", "housing" or "assumptions"; "branch" or "response" of planar
-        cases; "deflection", "balance", "transient" or "spectrum" of gearboxes; "sweep" or "chaos" of gear pairs.
+        "life", "losses" or "heat" of teeth, "modes", "dynamics", "housing" or "assumptions"; "branch" or "response"
+        of planar cases; "deflection", "balance", "transient" or "spectrum" of gearboxes; "sweep" or "chaos" of gear pairs.
     pictures
         Draw figures, fields and report.
     force
