@@ -371,7 +371,8 @@ def run(
     only
         Compute this stage and what it needs, no further: "static", "stress" (whatever static.stresses says),
         "life", "losses" or "heat" of teeth, "modes", "dynamics", "housing" or "assumptions"; "branch" or "response"
-        of planar cases; "deflection", "balance", "transient" or "spectrum" of gearboxes; "sweep" or "chaos" of gear pairs.
+        of planar cases; "deflection", "balance", "transient" or "spectrum" of gearboxes; "sweep" or "chaos" of gear
+        pairs.
     pictures
         Draw figures, fields and report.
     force
