@@ -168,7 +168,7 @@ def level_change(data: xr.Dataset) -> np.ndarray:
     return 20.0 * np.log10(data["changed_level"].values / data["assumed_level"].values[:, None, None])
 
 
-def loudest(data: xr.Dataset) -> int:
+def _loudest(data: xr.Dataset) -> int:
     """Number of the loudest of the speeds of assumptions.nc."""
     return int(data["assumed_level"].values.argmax())
 
@@ -195,7 +195,7 @@ def most_decisive(results: Any, marks: Marks | None = None) -> str:
     if "assumptions" not in results.stages or not results.assumptions.sizes["assumption"]:
         return ""
     data = results.assumptions
-    change = level_change(data)[loudest(data)]
+    change = level_change(data)[_loudest(data)]
     order = np.argsort(-np.abs(change).max(axis=1), kind="stable")[:2]
     text = "; ".join(
         f"{data['assumption'].values[n]} {_decibels(change[:, 0], n)} and {_decibels(change[:, 1], n)} dB"
@@ -212,7 +212,7 @@ def assumption_rows(results: Any, marks: Marks) -> Iterator[tuple[str, str]]:
 
 def draw_assumptions(data: xr.Dataset) -> Figure:
     """Draw the change of the level by half and twice of every assumption, at the loudest speed of assumptions.nc."""
-    at = loudest(data)
+    at = _loudest(data)
     change, names = level_change(data)[at], [str(name) for name in data["assumption"].values]
     order = np.argsort(np.abs(change).max(axis=1), kind="stable")
     figure, (axes,) = new_figure(height=1.4 + 0.5 * len(names))
