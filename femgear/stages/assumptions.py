@@ -152,7 +152,7 @@ def solve_assumptions(
     chosen = assumed(case, candidates)
     cases = [scaled(case, assumption, factor) for assumption in chosen for factor in FACTORS]
     # first alone: what the changed cases have in common with it is known in both processes
-    own = level(case)
+    unchanged = level(case)
 
     def solved(number: int) -> np.ndarray:
         progress("assumptions", float(len(cases) - 1 - number), float(len(cases)))
@@ -160,7 +160,7 @@ def solve_assumptions(
 
     others = second_process.shared([partial(solved, number) for number in range(len(cases))])
     changed = np.array(others).reshape(len(chosen), len(FACTORS), len(input_speed))
-    return AssumptionsResult(chosen, input_speed, own, np.moveaxis(changed, 2, 0))
+    return AssumptionsResult(chosen, input_speed, unchanged, np.moveaxis(changed, 2, 0))
 
 
 def level_change(data: xr.Dataset) -> np.ndarray:
