@@ -686,6 +686,7 @@ def measured(
     *,
     recording: Annotated[Recording | None, Parameter(name="*")] = None,
     search: Annotated[LineSearch | None, Parameter(name="*")] = None,
+    causes: Annotated[bool, Parameter(negative="")] = False,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
 ) -> int:
     """Say of every line of a recording whether a healthy set makes it, unequal planets, a fault, or none of these.
@@ -696,6 +697,8 @@ def measured(
         TOML case file of a planetary set whose ring stands still.
     signal
         Recording of a sensor on the housing: text in columns, WAV or MATLAB file (docs/measured.md).
+    causes
+        Rank errors that would make the abnormal lines, with the size of each: some minutes of computation.
     output
         Folder of lines.csv, order_spectrum.csv and lines.png. Default: none is written.
     """
@@ -703,8 +706,15 @@ def measured(
     from femgear.trains.reading import read_case
 
     data = read_case(case)
-    blocks, names = measured_into(data, signal, recording or Recording(), search or LineSearch(), output)
+    verdict, blocks, names = measured_into(data, signal, recording or Recording(), search or LineSearch(), output)
     _print(blocks)
+    if causes:
+        from femgear.causes import describe_causes, rank_causes
+
+        sys.stdout.flush()
+        with Progress() as progress:
+            ranked = rank_causes(data, verdict, progress=progress)
+        _print([describe_causes(ranked)])
     if names:
         _say(f"files in {output}: {', '.join(names)}")
     return 0

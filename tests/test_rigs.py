@@ -8,6 +8,7 @@ from femgear import cli, solve
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum
 from femgear.rigs import PRETORIA, RIGS, SDUST, SNU, check_rig, find_rig
+from femgear.trains.reading import with_values
 
 TURNS = 50
 
@@ -74,3 +75,31 @@ def test_predicted_lines_are_those_of_the_case(rig):
     height = height / height[np.abs(lines.order - ring) <= 12].max()
     for order, predicted in rig.predicted.items():
         assert height[lines.order == order].sum() == pytest.approx(predicted, abs=0.015)
+
+
+FRICTION = {"losses": {"friction": "constant", "coefficient": 0.05, "excites": True}}
+
+
+def pin(size):
+    return {"set.pin_errors": [{"planet": 1, "tangential": size}]}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("changes", "heights"),
+    [
+        (FRICTION, {93: 0.697, 94: 0.0, 95: 0.0, 97: 0.0}),
+        (pin("10 um"), {93: 0.941, 94: 0.045, 95: 0.0, 97: 0.048}),
+        ({"planet.individual": [{"planet": 1, "thickness_reduction": "10 um"}]}, {94: 0.023, 95: 0.0, 97: 0.024}),
+        ({"carrier.errors": {"runout_amplitude": "5 um"}}, {94: 0.034, 95: 0.0, 97: 0.036}),
+        (pin("5 um") | FRICTION, {93: 0.697, 94: 0.023, 95: 0.001, 97: 0.021}),
+    ],
+    ids=["friction", "pin", "thickness", "carrier", "friction and pin"],
+)
+def test_what_makes_the_mesh_line_of_planets_out_of_phase(changes, heights):
+    """The table of docs/measured.md; all that keeps equal planets makes multiples of three alone."""
+    lines = solve(with_values(SNU.case(), {"static.stresses": False} | changes), "housing")["housing"].exact
+    height = np.abs(lines.acceleration[0])
+    for order, expected in heights.items():
+        ratio = height[np.abs(lines.order - order) < 1e-6].sum() / height[lines.order == 96.0].sum()
+        assert ratio == pytest.approx(expected, abs=6e-4)

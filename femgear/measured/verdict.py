@@ -92,10 +92,10 @@ def measured_verdict(
 
 def measured_into(
     case: Any, path: str | os.PathLike, recording: Recording, search: LineSearch, output: Path | None
-) -> tuple[list[Block], list[str]]:
+) -> tuple[MeasuredVerdict, list[Block], list[str]]:
     """Judge the lines of a recording, and write them, the spectrum and a figure into a folder if there is one.
 
-    Returns the tables to print and the names of the files.
+    Returns the verdict, the tables to print and the names of the files.
     """
     verdict = measured_verdict(case, path, recording, search)
     names = []
@@ -103,7 +103,7 @@ def measured_into(
         names = [_LINES, _SPECTRUM, _FIGURE]
         own_files(output, names)
         _write(verdict, search, output)
-    return list(describe_verdict(verdict, search)), names
+    return verdict, list(describe_verdict(verdict, search)), names
 
 
 def describe_verdict(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[Block]:

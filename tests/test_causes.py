@@ -1,0 +1,81 @@
+"""femgear.causes: an error that made a recording is found again, with its size."""
+
+import numpy as np
+import pytest
+from recorded_signals import CASE, COARSE, HEALTHY, RATE, computed_lines, recording, write_columns
+
+from femgear import causes, read_case
+from femgear.causes import CAUSES, describe_causes, rank_causes
+from femgear.errors import CaseError
+from femgear.measured.requests import LineSearch, Recording
+from femgear.measured.verdict import measured_verdict
+from femgear.trains.reading import with_values
+
+UM = 1e-6
+
+
+def verdict_of(folder, order, value, threshold=-40.0):
+    signal, pulses, _ = recording(order, value)
+    columns = np.arange(len(signal)) / RATE, signal, pulses
+    path = write_columns(folder / "a.csv", "time [s];acc [m/s^2];tacho [V]\n", columns)
+    return measured_verdict(read_case(CASE), path, Recording(pulses="tacho"), LineSearch(threshold=threshold))
+
+
+@pytest.fixture
+def known_lines(monkeypatch):
+    """Lines of errors that are made up: those of a pin beside the second harmonic, of the carrier beside the third."""
+    healthy = {float(order): complex(height) for order, height in HEALTHY.items()}
+    made = {
+        "tangential": {215.0: 0.02, 217.0: 0.03},
+        "radial": {215.0: 0.0002, 217.0: 0.0003},
+        "thickness_reduction": {215.0: 0.01, 217.0: 0.015},
+    }
+
+    def heights(case, progress):
+        pins, planets = case.set.pin_errors, case.planet.individual
+        names = [name for name in ("tangential", "radial") if any(getattr(pin, name) for pin in pins)]
+        names += ["thickness_reduction"] * bool(planets)
+        lines = made[names[0]] if names else {323.0: 0.04} if case.carrier.errors or case.sun.errors else {}
+        return healthy | lines
+
+    monkeypatch.setattr(causes, "_heights", heights)
+
+
+def test_the_error_whose_lines_are_spread_so_comes_first_with_its_size(tmp_path, known_lines):
+    # ten times the lines of a micrometre of the pin; the recording is twice as loud, which drops out
+    lines = HEALTHY | {215: 0.2, 217: 0.3, 110.13: 0.2}
+    ranked = rank_causes(read_case(CASE), verdict_of(tmp_path, lines, [2 * height for height in lines.values()]))
+    found = {entry.cause.name: entry for entry in ranked}
+    assert [entry.cause.entry for entry in ranked][:3] == ["set.pin_errors", "planet.individual", "set.pin_errors"]
+    assert ranked[0].size == pytest.approx(10 * UM, rel=0.01) and ranked[0].explained == pytest.approx(1.0, abs=1e-3)
+    assert ranked[1].size == pytest.approx(20 * UM, rel=0.01) and ranked[2].size == pytest.approx(1000 * UM, rel=0.01)
+    assert found["runout of the sun"].explained == 0.0 and np.isnan(found["runout of the sun"].size)
+    assert "runout of one planet" not in found  # no line has its turns
+    rows = describe_causes(ranked).rows
+    assert rows[0] == ("a planet's pin, along its circle", "set.pin_errors", "10", "1.00", "217, 215")
+
+
+def test_a_healthy_recording_asks_for_no_cause(tmp_path, known_lines):
+    ranked = rank_causes(read_case(CASE), verdict_of(tmp_path, HEALTHY, HEALTHY.values()))
+    assert ranked == () and describe_causes(ranked).rows == ()
+
+
+def test_what_is_refused(tmp_path, known_lines):
+    verdict = verdict_of(tmp_path, HEALTHY | {215: 0.2}, [*HEALTHY.values(), 0.2])
+    case = with_values(read_case(CASE), {CAUSES[0].entry: CAUSES[0].value("3 um")})
+    with pytest.raises(CaseError, match="errors already"):
+        rank_causes(case, verdict)
+    with pytest.raises(CaseError, match="no mesh harmonic has a normal line"):
+        rank_causes(read_case(CASE), verdict_of(tmp_path, [215, 3], [1.0, 0.5]))
+
+
+@pytest.mark.slow
+def test_a_pin_that_stands_wrong_by_20_um_is_found_with_its_size(tmp_path):
+    case = with_values(read_case(CASE), COARSE)
+    ranked = rank_causes(case, verdict_of(tmp_path, *computed_lines(True)))
+    sizes = {entry.cause.name: entry.size for entry in ranked if entry.explained > 0.99}
+    # what shares the load so makes the same lines; only the sizes differ
+    assert sizes["a planet's pin, along its circle"] == pytest.approx(20 * UM, rel=0.05)
+    assert sizes["runout of the carrier's pin circle"] == pytest.approx(13.1 * UM, rel=0.05)
+    assert sizes["thinner teeth of one planet"] == pytest.approx(39 * UM, rel=0.05)
+    assert sizes["a planet's pin, outwards"] > 500 * UM and "runout of the sun" not in sizes
