@@ -841,7 +841,7 @@ class _ToothForm:
     Parameters
     ----------
     teeth
-        Of sun, planet and ring, or of both gears.
+        Of sun, planet and ring, or of both gears; of planets of other kinds in the order of docs/planets.md.
     shifts
         Profile shifts of sun and planet, perhaps of the ring (positive outwards), or of both gears. Default:
         none where the teeth close without, else shared by equal sliding.
@@ -879,7 +879,7 @@ def new(
     Parameters
     ----------
     kind
-        planetary, pair, planar, helical, drivetrain or gearbox.
+        planetary, pair, planar, helical, drivetrain, gearbox; of other planets stepped, double, ravigneaux, wolfrom.
     output
         Case file to write. Default: KIND.toml.
     module
@@ -1526,7 +1526,7 @@ class WantedTeeth:
     Parameters
     ----------
     kind
-        planetary, pair or stepped (planets with two gears; sizes alone).
+        planetary, pair or stepped (planets with two gears, without transmission error).
     planets
         A number, or as 3..5 all from one to another; may be repeated.
     tolerance

@@ -16,8 +16,8 @@ from femgear.trains.drafts import KINDS
 _LARGEST_FILE = 20_000_000
 """Of what is imported [bytes]."""
 _OF_PAIRS = ("pair", "drivetrain", "gearbox")
-_TEETH = {True: "17 40", False: "27 40 108"}
-"""Of a pair, and of a set."""
+_PAIR = "17 40"
+"""Teeth of a pair."""
 _STEEL, _HARDNESS = "case hardened steel", "720"
 
 
@@ -60,10 +60,11 @@ def ask_new(free_name: Callable[[str], str], make: Callable[[NewCase], Awaitable
         ui.label("New case").classes("text-lg")
         kind = ui.select(list(KINDS), value="planetary", label="Kind").classes("w-full")
         name = _input("Name of the file", free_name("planetary"))
-        teeth = _input("Teeth", _TEETH[False], "sun planet ring, or both gears")
+        teeth = _input("Teeth", " ".join(map(str, KINDS["planetary"])), "sun planet ring, or both gears")
 
         def changed() -> None:
-            name.value, teeth.value = free_name(str(kind.value)), _TEETH[kind.value in _OF_PAIRS]
+            usual = _PAIR if kind.value in _OF_PAIRS else " ".join(map(str, KINDS[str(kind.value)]))
+            name.value, teeth.value = free_name(str(kind.value)), usual
 
         kind.on_value_change(changed)
         numbers = {

@@ -60,6 +60,15 @@ def unit_model(case: Any, teeth: Mapping[str, Any], name: str) -> Model:
     for number, coupling in enumerate(case.coupling):
         writer.coupling(coupling, number)
     for number, stage in enumerate(case.pair):
+        if stage.carrier is not None:
+            raise CaseError(
+                "pairs on a carrier are no stages of REXS",
+                code="E-REXS",
+                key=f"pair[{number}].carrier",
+                value=stage.carrier,
+                limit="pairs without a carrier, and [[planetary]] sets",
+                remedy="write the sets of this gearbox as [[planetary]], where they are sun, planets and ring",
+            )
         writer.pair(stage, f"pair[{number}]")
     for number, stage in enumerate(case.planetary):
         writer.planetary(stage, f"planetary[{number}]")

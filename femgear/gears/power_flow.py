@@ -72,20 +72,28 @@ def disagree(terms: Iterable[float], tolerance: float = AGREEMENT) -> bool:
 
 
 def pair_condition(
-    name: str, first: str | None, second: str | None, teeth_1: int, teeth_2: int, internal: bool = False
+    name: str,
+    first: str | None,
+    second: str | None,
+    teeth_1: int,
+    teeth_2: int,
+    internal: bool = False,
+    carrier: str | None = None,
 ) -> SpeedCondition:
     """Tie the speeds of two shafts by a pair of gears: ``z_1 w_1 + z_2 w_2 = 0``, or minus if one is internal.
 
-    A shaft that is None is the casing. GeometryError: tooth numbers that are not positive whole numbers (E-TEETH).
+    Speeds are those against the ``carrier`` of planets, where one is named (Willis). A shaft that is None is the
+    casing. GeometryError: tooth numbers that are not positive whole numbers (E-TEETH).
     """
     _check_teeth(name, {"teeth_1": teeth_1, "teeth_2": teeth_2})
     sense = INTERNAL if internal else EXTERNAL
     gears = StageGears(
         {"gear 1": teeth_1, "gear 2": teeth_2},
-        {"gear 1": first, "gear 2": second},
+        {"gear 1": first, "gear 2": second} | ({} if carrier is None else {"carrier": carrier}),
         (("gear 1", "gear 2", sense),),
     )
-    return _condition(name, ((first, teeth_1), (second, -sense * teeth_2)), gears)
+    weights = willis_weights(teeth_1, -sense * teeth_2)
+    return _condition(name, tuple(zip((first, second, carrier), weights, strict=True)), gears)
 
 
 def planetary_condition(

@@ -95,7 +95,11 @@ def teeth_into(
     sized = search_teeth(demand, progress=lambda done, total: progress("teeth", done, total))
     write_csv(folder / _TABLE, _header(demand), map(_record, sized))
     names, blocks = [_TABLE], [_described(demand, sized)]
-    if demand.kind == "stepped":  # no case file holds them yet
+    if demand.kind == "stepped":
+        # drafts of stepped sets have a ring that stands
+        for choice in best_of_every_phasing(sized, request.best) if demand.fixed == "ring" else ():
+            names.append(f"{_label(choice, '_')}.toml")
+            write_text(case_of(demand, choice), folder / names[-1])
         return blocks, names
     computed = list(_computed(demand, best_of_every_phasing(sized, request.best), request, cache, progress))
     for teeth in computed:
@@ -201,14 +205,14 @@ def _computed(
 
 def case_of(demand: ToothDemand, choice: SizedTeeth) -> str:
     """Write the case file of teeth of their size, with the torque that was asked for on sun or gear 1."""
-    of_set = choice.kind == "planetary"
+    of_set = choice.kind != "pair"
     text = new_case(
         choice.kind,
         teeth=choice.teeth,
         module=f"{math.ceil(1e6 * choice.modules[0]) / 1e3:.10g} mm",
         torque=f"{demand.torque:.10g} N m",
         planets=choice.planets if of_set else None,
-        face_width=LENGTH.show(math.ceil(1e4 * choice.widths[0]) / 1e4),
+        face_width=LENGTH.show(math.ceil(1e4 * max(choice.widths)) / 1e4),
     )
     if not of_set or demand.fixed == "ring":
         return text
@@ -298,7 +302,7 @@ def _described(demand: ToothDemand, sized: Sequence[SizedTeeth]) -> Block:
         f"{demand.root_safety:g} with K = {demand.load_factor:g} (ISO 6336, long life)"
     ]
     if demand.kind == "stepped":
-        notes.append("stepped planets: gears without shift, no case file and no transmission error")
+        notes.append("stepped planets: gears without shift; the cases have the larger face width for all gears")
     return Block(f"Smallest {demand.kind} teeth", (*_COLUMNS, "decided by"), rows, tuple(notes))
 
 

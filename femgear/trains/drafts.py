@@ -38,6 +38,7 @@ from femgear.gears.profile import BasicRack, overlap_ratio, transverse_rack, tra
 from femgear.gears.shifts import SharedShifts, share_shifts
 from femgear.gears.tips import SEEN, typed_diameter
 from femgear.trains.gearbox_draft import pair_in_gearbox
+from femgear.trains.planets_draft import PLANET_KINDS, planets_case
 from femgear.trains.reading import parse_case
 from femgear.trains.registry import train_of
 
@@ -94,6 +95,7 @@ KINDS = {
     "helical": (30, 20, 70),
     "drivetrain": (23, 71),
     "gearbox": (24, 36),
+    **PLANET_KINDS,
 }
 """Kinds of cases that `new_case` writes, with the teeth of their gears."""
 ADDENDA = (1.0, 1.1, 1.2, 0.9, 0.8)
@@ -187,6 +189,8 @@ def new_case(
     _check_options(kind, teeth, planets, form)
     of_set, notes = len(teeth) == 3, _usual_notes(given)
     module, speed = "2 mm" if module is None else module, "1000 rpm" if speed is None else speed
+    if kind in PLANET_KINDS:
+        return _planets_text(kind, teeth, module, given | {"speed": speed})
     size, beta = _read(Module, module, "--module"), math.radians(20.0) if kind == "helical" else 0.0
     beta = beta if form.helix is None else _read(Angle, form.helix, "--helix")
     width = 12.0 * size if face_width is None else _read(FaceWidth, face_width, "--face-width")
@@ -217,6 +221,22 @@ def new_case(
     shape = {"drivetrain": _in_time, "gearbox": pair_in_gearbox}.get(kind)
     tables = tables if shape is None else shape(tables, notes)
     return draft_text(tables, notes, word="estimated", head=_head(kind, left, lacks, form))
+
+
+def _planets_text(kind: str, teeth: tuple[int, ...], module: str, given: Mapping[str, Any]) -> str:
+    """Write a gearbox with planets around a carrier."""
+    size, planets, notes = _read(Module, module, "--module"), given["planets"] or 3, dict[str, str]()
+    width = 12.0 * size if given["face-width"] is None else _read(FaceWidth, given["face-width"], "--face-width")
+    shown = {"module": size, "width": width, "planets": planets, "torque": given["torque"], "speed": given["speed"]}
+    tables = planets_case(kind, teeth, **shown, notes=notes)
+    taken = {"teeth": " ".join(map(str, teeth)), "module": f'"{module}"', "planets": planets}
+    load = tables["operation"]["load_case"][0]["torque"]["motor"]
+    taken |= {"face-width": f'"{LENGTH.show(width)}"', "torque": f'"{load}"', "speed": f'"{given["speed"]}"'}
+    if given["torque"] is None:
+        notes["operation.load_case[0].torque"] = "estimated: K factor of 1 N/mm^2"
+    head = [_HEAD.format(kind) + _STANDS, "Assumed: " + " ".join(f"--{key} {value}" for key, value in taken.items())]
+    head.append("Every planet is a shaft on the carrier, every mesh a pair; gears have no profile shift.")
+    return draft_text(tables, notes, word="estimated", head=head)
 
 
 def _of_kind(kind: str, beta: float, slices: int, notes: dict[str, str]) -> dict[str, Any]:
@@ -270,6 +290,11 @@ def _usual_notes(given: Mapping[str, object]) -> dict[str, str]:
 def _check_options(kind: str, teeth: tuple[int, ...], planets: int | None, form: ToothForm) -> None:
     """Refuse planets and a helix where there are none, and planets that equal spacing does not allow."""
     of_set = len(teeth) == 3
+    if kind in PLANET_KINDS:
+        for option, value in vars(form).items():
+            if value not in ((), None):
+                raise _no_such(kind, f"--{option.replace('_', '-')}", "spur gears without profile shift")
+        return
     if planets is not None and not of_set:
         raise _no_such(kind, "--planets", "no planets")
     if planets and planets > 0 and sum(teeth[::2]) % planets:

@@ -12,6 +12,7 @@ from femgear.gears.tooth_search import ToothDemand, size_of
 from femgear.stages.static import solve_static
 from femgear.stages.strength import case_stresses
 from femgear.study.teeth import ComputedTeeth, best_of_every_phasing, case_of, front_of
+from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.reading import parse_case, read_case, with_values
 
 QUICK = ("--tolerance", "0.004", "--best", "1", "--positions", "8", "--flank-elements", "6")
@@ -38,13 +39,15 @@ def test_the_best_are_listed_solved_and_drawn(tmp_path):
     assert f"{1e6 * float(error):.3f}" in done.stdout
 
 
-def test_stepped_sets_have_sizes_alone(tmp_path):
-    arguments = ("--ratio", "9", "--kind", "stepped", "--tolerance", "0.0005", "-o", "out")
+def test_stepped_sets_have_sizes_and_cases(tmp_path):
+    arguments = ("--ratio", "9", "--kind", "stepped", "--tolerance", "0.0005", "--best", "1", "-o", "out")
     done = run_femgear("teeth", *arguments, folder=tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "no transmission error" in done.stdout
+    assert "larger face width" in done.stdout
     assert len(rows(tmp_path / "out" / "teeth.csv")) > 20
-    assert not [*(tmp_path / "out").glob("*.toml")]
+    (case,) = (tmp_path / "out").glob("stepped_*.toml")
+    flow = gearbox_flow(read_case(case))
+    assert flow.speed["sun"] / flow.speed["carrier"] == pytest.approx(9.0, rel=5e-4)
 
 
 @pytest.mark.parametrize(

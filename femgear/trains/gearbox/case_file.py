@@ -335,12 +335,14 @@ class PairGearsSection(Section):
 class PairSection(Section):
     """Two gears on two shafts: ``positions`` are those of the middles of their face widths.
 
-    ``casing`` in place of a shaft holds the gear. The teeth are the tables of a pair (``teeth``), or sizes and a
-    stiffness (``gears`` with ``mesh``).
+    The teeth are the tables of a pair (``teeth``), or sizes and a stiffness (``gears`` with ``mesh``). A planet is a
+    shaft of its own, whose bearings have the ``carrier`` as ``outer_shaft``; all pairs of its gears name this carrier.
     """
 
     name: Name
     shafts: Annotated[tuple[Name, ...], PAIR]
+    carrier: Name | None = None
+    """The shaft that takes the axes of planets around: both gears turn against it."""
     positions: Annotated[tuple[Along, ...], PAIR] | None = None
     teeth: StageTables | None = None
     gears: PairGearsSection | None = None

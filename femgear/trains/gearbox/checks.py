@@ -26,12 +26,14 @@ from femgear.trains.gearbox.entry_checks import coupling_problems, massless_bodi
 from femgear.trains.gearbox.geometry import (
     DISTANCE_TOLERANCE,
     StageSizes,
+    carriers,
     pair_sizes,
     rolling_bearing,
     set_sizes,
 )
 from femgear.trains.gearbox.holding import floating_shafts, loose_fits, tilting_shafts, untaken_thrust
 from femgear.trains.gearbox.materials import material_notices
+from femgear.trains.gearbox.planet_shafts import carrier_entries, parted_or_in_time, unclosed_chains
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.tooth_life import pitting_problems
 from femgear.trains.gearbox.transient_case import transient_problems
@@ -52,7 +54,7 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     stages, loads = [*_stages(case)], [*_loads(case)]
     problems = [*named, *_seats(case), *_bearings(case), *_shaft_parts(case), *stages, *loads, *_weight(case)]
     problems += [*coupling_problems(case), *run_up_problems(case)]
-    problems += transient_problems(case.transient, port_names(case))
+    problems += [*transient_problems(case.transient, port_names(case)), *parted_or_in_time(case)]
     problems += [] if named else check_casing(case)
     problems += [] if stages else pitting_problems(case, (*case.pair, *case.planetary))
     # what has no mass turns and is held as what has
@@ -100,6 +102,8 @@ def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseErro
             # of many load cases the first one
             told |= {str(problem.key) for problem in thrusts}
             yield from thrusts
+        if number == 0 and not any(key.startswith("shaft") for key in keys):
+            yield from unclosed_chains(case, flow)
 
 
 def _misplaced(problem: CaseError) -> bool:
@@ -161,12 +165,14 @@ def _references(case: GearboxCase) -> Iterator[CaseError]:
         used += [(f"bearing[{i}].outer_shaft", bearing.outer_shaft)] if bearing.outer_shaft is not None else []
     used += [(f"coupling[{i}].between", name) for i, one in enumerate(case.coupling) for name in one.between]
     used += [(f"pair[{i}].shafts", name) for i, one in enumerate(case.pair) for name in one.shafts]
+    used += [(f"pair[{i}].carrier", one.carrier) for i, one in enumerate(case.pair) if one.carrier is not None]
     for i, stage in enumerate(case.planetary):
         used += [(f"planetary[{i}].{member}", getattr(stage, member)) for member in ("sun", "carrier", "ring")]
     used += [("operation.fixed", name) for name in case.operation.fixed]
     casing_allowed = ("pair", "planetary", "coupling")
     for key, name in used:
-        if name == CASING and key.startswith(casing_allowed):
+        on_carrier = key.startswith("pair") and key.endswith(".carrier")
+        if name == CASING and key.startswith(casing_allowed) and not on_carrier:
             continue
         yield from _unknown(key, name, shafts, "[[shaft]]")
     ports = [*port_names(case)]
@@ -348,7 +354,9 @@ def _ring_places(case: GearboxCase, bearing: BoxBearingSection, key: str) -> Ite
         return
     first, second = case.shaft_named(bearing.shaft), case.shaft_named(bearing.outer_shaft or "")
     places = (first.start + (bearing.position or 0.0), second.start + (bearing.outer_position or 0.0))
-    if math.dist(first.axis, second.axis) > DISTANCE_TOLERANCE or abs(places[0] - places[1]) > DISTANCE_TOLERANCE:
+    on_pin = carriers(case).get(bearing.shaft) == bearing.outer_shaft
+    apart = 0.0 if on_pin else math.dist(first.axis, second.axis)
+    if apart > DISTANCE_TOLERANCE or abs(places[0] - places[1]) > DISTANCE_TOLERANCE:
         yield CaseError(
             "inner and outer ring of the bearing lie at two places",
             code="E-RANGE",
@@ -455,6 +463,7 @@ def _pair(case: GearboxCase, stage: PairSection, key: str) -> Iterator[CaseError
     sizes, (first, second) = pair_sizes(stage), (case.shaft_named(name) for name in stage.shafts)
     distance = math.dist(first.axis, second.axis)
     yield from _distance(distance, sizes, f"{key}.shafts", "the axes of the two shafts")
+    yield from carrier_entries(case, stage, key)
     positions = stage.positions or (0.0, 0.0)
     places = [shaft.start + position for shaft, position in zip((first, second), positions, strict=True)]
     yield from _mid_planes(places, sizes, f"{key}.positions")

@@ -31,12 +31,10 @@ def friction_excites(case: GearboxCase) -> bool:
 
 
 def first_speed(model: GearboxModel, section: PairSection | BoxPlanetarySection) -> float:
-    """Find the speed of gear 1, or of the sun against its carrier [rad/s]."""
+    """Find the speed of gear 1, or of the sun, against the carrier [rad/s]."""
     speed = {CASING: 0.0, **model.flow.speed}
-    if isinstance(section, PairSection):
-        first, second = section.shafts
-        return -speed[second] if first == CASING else speed[first]
-    return speed[section.sun] - speed[section.carrier]
+    first = section.shafts[0] if isinstance(section, PairSection) else section.sun
+    return speed[first] - speed[section.carrier or CASING]
 
 
 def stage_friction(

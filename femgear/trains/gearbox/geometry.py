@@ -15,6 +15,7 @@ from femgear.system.rolling_bearings import BallBearing, Bearing, RollerBearing
 from femgear.trains.gearbox.case_file import (
     BoxBearingSection,
     BoxPlanetarySection,
+    GearboxCase,
     PairGearsSection,
     PairSection,
     SetGearsSection,
@@ -169,6 +170,18 @@ def _given_set(given: SetGearsSection) -> StageSizes:
     psi = given.planet_angles or equal_planet_angles(given.planets)
     width = given.face_width or 0.0
     return StageSizes(tuple(given.teeth), (sun, planet, ring), distance, tuple(angles), helix, False, (width,) * 3, psi)
+
+
+def carriers(case: GearboxCase) -> dict[str, str]:
+    """Name the carrier of every shaft that is a planet: beside the axis of the carrier that its pairs name."""
+    shafts = {shaft.name: shaft.axis for shaft in case.shaft}
+    return {
+        shaft: stage.carrier
+        for stage in case.pair
+        if stage.carrier in shafts
+        for shaft in stage.shafts
+        if shaft in shafts and math.dist(shafts[shaft], shafts[stage.carrier]) > DISTANCE_TOLERANCE
+    }
 
 
 def planet_radius(sizes: StageSizes) -> float:

@@ -36,7 +36,7 @@ from femgear.trains.gearbox.case_file import (
 from femgear.trains.gearbox.casing import CasingModel, bearing_name, casing_mass, casing_model
 from femgear.trains.gearbox.casing_file import ElasticParts, elastic_casing_model
 from femgear.trains.gearbox.elastic_carrier import ElasticCarrier, elastic_carrier
-from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, set_sizes
+from femgear.trains.gearbox.geometry import StageSizes, carriers, pair_sizes, set_sizes
 from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
 
 HELD = {"space": (), "plane": (2, 3, 4), "rotation": (0, 1, 2, 3, 4)}
@@ -215,6 +215,7 @@ class _Builder:
         self.contacts: list[Contact] = []
         self.beams: dict[str, BeamShaft] = {}
         self.first: dict[str, int] = {}
+        self.gears: set[tuple[str, float, int]] = set()
         self.casing: CasingModel | None = None
         self.elastic: ElasticParts | None = None
 
@@ -245,6 +246,9 @@ class _Builder:
             for stage in stages:
                 around = stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ()
                 held[[*stage.planets, *around], :2] = False
+            for planet in carriers(case):
+                count = len(self.beams[planet].stations) if planet in self.beams else 1
+                held[self.first[planet] : self.first[planet] + count, :2] = False
         if self.casing is not None and self.elastic is not None:
             # elastic motions have no directions
             held[list(self.casing.elastic)] = self.elastic.held[1 : 1 + len(self.casing.elastic)]
@@ -384,6 +388,12 @@ class _Builder:
         inner = self.seat(bearing.shaft, bearing.position)
         if bearing.outer_shaft is not None:
             outer = self.seat(bearing.outer_shaft, bearing.outer_position)
+            # a planet turns on a pin beside the axis of its carrier
+            beside = np.subtract(
+                self.case.shaft_named(bearing.shaft).axis, self.case.shaft_named(bearing.outer_shaft).axis
+            )
+            offset = np.add(outer.offset, [*beside, 0.0])
+            outer = Seat(outer.station, (float(offset[0]), float(offset[1]), float(offset[2])))
         else:
             outer = self.casing_seat(name)
         return joint(name, (outer.station, inner.station), (outer.offset, inner.offset), np.ones(6))
@@ -395,8 +405,11 @@ class _Builder:
         flank = -1 if self.flow.first_torque(stage) > 0.0 else 1
         teeth = teeth_of(stage)
         if teeth is not None:
-            for key, seat, shaft in zip(teeth.gear_names, seats, stage.shafts, strict=True):
-                self._body(seat, *self._gear_body(teeth, key), self.flow.speed[shaft])
+            for number, (key, seat, shaft) in enumerate(zip(teeth.gear_names, seats, stage.shafts, strict=True)):
+                gear = shaft, round(float(np.asarray(middles[number])[2]), 6), sizes.teeth[number]
+                if gear not in self.gears:  # one gear in mesh with several
+                    self.gears.add(gear)
+                    self._body(seat, *self._gear_body(teeth, key), self.flow.speed[shaft])
         centres, width, middle = _common([np.asarray(m) for m in middles], sizes.face_widths)
         r1, r2 = sizes.base_radii
         towards = (centres[1] - centres[0])[:2]

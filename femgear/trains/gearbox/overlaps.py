@@ -28,7 +28,7 @@ from femgear.trains.gearbox.case_file import (
     PairSection,
     teeth_of,
 )
-from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, pair_sizes, planet_radius, set_sizes
+from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, carriers, pair_sizes, planet_radius, set_sizes
 
 _WIDER = 0.05
 """Share by which a shaft may be wider than the bore of the teeth that sit on it."""
@@ -75,6 +75,7 @@ def overlaps(case: GearboxCase) -> Iterator[Finding]:
             text = f"shafts {first.name} and {second.name} penetrate each other by {LENGTH.show(depth)}"
             remedy = "correct axis, start or diameters of one of them"
             yield Finding("W-OVERLAP", f"shaft[{numbers[second.name]}]", text, remedy=remedy)
+    yield from _beside_planets(case)
     for gear in gear_outlines(case):
         for shaft in shafts:
             if shaft.name == gear.shafts[0]:
@@ -86,6 +87,23 @@ def overlaps(case: GearboxCase) -> Iterator[Finding]:
                     text = f"shaft {shaft.name} reaches into {gear.name} by {LENGTH.show(reach)}"
                     remedy = "correct its axis or diameters, or the place of the gear"
                     yield Finding("W-OVERLAP", gear.key, text, remedy=remedy)
+
+
+def _beside_planets(case: GearboxCase) -> Iterator[Finding]:
+    """Gears of planets that are shafts of their own, and those beside them that are no mates."""
+    planets, mates = carriers(case), {frozenset(pair.shafts) for pair in case.pair}
+    gears = [gear for number, pair in enumerate(case.pair) for gear in _of_pair(case, pair, f"pair[{number}]")]
+    told = set[frozenset[str]]()
+    for first, second in combinations(gears, 2):
+        shafts = frozenset((first.shafts[0], second.shafts[0]))
+        if len(shafts) < 2 or shafts in told or shafts in mates or not shafts & planets.keys():
+            continue
+        beside = min(first.ends[1], second.ends[1]) - max(first.ends[0], second.ends[0])
+        reach = first.tip + second.tip - math.dist(first.axis, second.axis)
+        if beside > DISTANCE_TOLERANCE and reach > DISTANCE_TOLERANCE:
+            told.add(shafts)
+            text = f"{first.name} reaches into {second.name}, which is no mate of it, by {LENGTH.show(reach)}"
+            yield Finding("W-OVERLAP", second.key, text, remedy="fewer planets, or other teeth")
 
 
 def _on_its_shaft(gear: GearOutline, shaft: BoxShaftSection) -> Iterator[Finding]:

@@ -14,7 +14,7 @@ from femgear.gears.power_flow import pair_condition, planetary_condition, power_
 from femgear.gears.shaft_graph import ShaftGraph, SpeedCondition
 from femgear.gears.stage_frequencies import StageFrequencies, stage_frequencies
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, GearboxCase, LoadCaseSection, PairSection
-from femgear.trains.gearbox.geometry import pair_sizes, set_sizes
+from femgear.trains.gearbox.geometry import carriers, pair_sizes, set_sizes
 
 # Torque of a stage over the largest one of any that counts as none.
 _IDLE = 1e-9
@@ -116,8 +116,10 @@ def stage_conditions(case: GearboxCase) -> list[SpeedCondition]:
     """List the kinematic conditions of all stages, pairs first."""
     found = []
     for stage in case.pair:
-        sizes, (first, second) = pair_sizes(stage), stage.shafts
-        found.append(pair_condition(stage.name, first, second, *sizes.teeth[:2], internal=sizes.internal))
+        sizes, (first, second), (teeth_1, teeth_2) = pair_sizes(stage), stage.shafts, pair_sizes(stage).teeth
+        found.append(
+            pair_condition(stage.name, first, second, teeth_1, teeth_2, internal=sizes.internal, carrier=stage.carrier)
+        )
     for stage in case.planetary:
         sun, _, ring = set_sizes(stage).teeth
         members = [None if name == CASING else name for name in (stage.sun, stage.carrier, stage.ring)]
@@ -155,7 +157,21 @@ def gearbox_flow(case: GearboxCase, load_case: LoadCaseSection | None = None) ->
     }
     independent = _independent(case, conditions, given["held"], given["joined"], load_case)
     speeds = {**graph.speed, CASING: 0.0}
-    return BoxFlow(dict(graph.stage_torque), speeds, ports, independent, frequencies, graph.side_by_side)
+    beside = tuple(group for names in graph.side_by_side for group in _branches(case, names))
+    return BoxFlow(dict(graph.stage_torque), speeds, ports, independent, frequencies, beside)
+
+
+def _branches(case: GearboxCase, names: tuple[str, ...]) -> list[tuple[str, ...]]:
+    """Part stages that share torque: those of planets, one after the other from sun to ring, share one kind by one."""
+    pairs, planets = {stage.name: stage for stage in case.pair}, carriers(case)
+    groups = dict[object, list[str]]()
+    for name in names:
+        kind: object = None
+        if name in pairs and pairs[name].carrier is not None:
+            central = tuple("" if shaft in planets else shaft for shaft in pairs[name].shafts)
+            kind = pairs[name].carrier, central, pair_sizes(pairs[name]).teeth
+        groups.setdefault(kind, []).append(name)
+    return [tuple(group) for group in groups.values() if len(group) > 1]
 
 
 def flow_entries(case: GearboxCase, load_case: LoadCaseSection) -> dict[str, Any]:

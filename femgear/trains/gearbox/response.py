@@ -18,7 +18,7 @@ import math
 import os
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -31,6 +31,7 @@ from femgear.trains.gearbox.elastic_ring import elastic_rings
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
 from femgear.trains.gearbox.model import GearboxModel, StageModel, reference_shaft
 from femgear.trains.gearbox.paths import CasingPaths, casing_paths, forces_on_casing
+from femgear.trains.gearbox.planet_shafts import pair_phases
 from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage
 
@@ -251,8 +252,19 @@ def solve_gearbox_response(
         done += 1
         progress(stage, done, len(staged))
     missing = tuple(one.name for one in model.stages if one not in staged)
+    lines = _in_phase(lines, pair_phases(case, model.flow))
     names = () if paths is None else paths.names
     return GearboxResponse(found, reference, speeds, tuple(lines), missing, up_to, names)
+
+
+def _in_phase(lines: Sequence[StageLines], phases: Mapping[str, float]) -> list[StageLines]:
+    """Lines of stages that begin with the phases of their teeth [mesh periods]; those of planetary sets stay."""
+    turned = list[StageLines]()
+    for stage in lines:
+        factor = np.exp(2j * math.pi * phases.get(stage.name, 0.0) * stage.harmonic).astype(stage.motion.dtype)
+        paths = None if stage.paths is None else stage.paths * factor
+        turned.append(replace(stage, motion=stage.motion * factor, paths=paths) if phases.get(stage.name) else stage)
+    return turned
 
 
 def mesh_rows(model: GearboxModel, stage: StageModel) -> np.ndarray:

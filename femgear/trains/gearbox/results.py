@@ -35,6 +35,7 @@ from femgear.trains.gearbox.life import bearing_life_findings, describe_load_cas
 from femgear.trains.gearbox.model import StageModel, bearing_motions, bearing_places, member_of_stations
 from femgear.trains.gearbox.modes import GearboxModes
 from femgear.trains.gearbox.overlaps import overlaps
+from femgear.trains.gearbox.planet_shafts import standing_planets
 from femgear.trains.gearbox.play import play_findings, slack_bearings
 from femgear.trains.gearbox.sensors import (
     describe_sensors,
@@ -573,6 +574,7 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
     yield from sensor_notices(case)
     yield from idle_entries(case)
     yield from overlaps(case)
+    yield from standing_planets(case)
     yield from transient_notices(case)
     for kind in ("pair", "planetary"):
         for i, stage in enumerate(getattr(case, kind)):

@@ -31,7 +31,7 @@ from femgear.trains.gearbox.case_file import (
     teeth_of,
 )
 from femgear.trains.gearbox.casing import bearing_name
-from femgear.trains.gearbox.geometry import StageSizes, pair_sizes, planet_radius, set_sizes
+from femgear.trains.gearbox.geometry import StageSizes, carriers, pair_sizes, planet_radius, set_sizes
 from femgear.trains.gearbox.power import gearbox_flow
 
 _DISC, _RIM, _BORE = 0.3, 1.15, 0.45
@@ -85,16 +85,19 @@ def gearbox_bodies(case: GearboxCase, places: dict[str, np.ndarray]) -> Iterator
         Of the stations by name, as those of planets [m].
     """
     turns, planets = _turns(case)
+    drawn = dict[tuple[str, float, int], float]()
+    around = {name: (*case.shaft_named(of).axis, turns.get(of, 0.0)) for name, of in carriers(case).items()}
     for number, stage in enumerate((*case.pair, *case.planetary)):
-        bodies = _of_pair(case, stage) if isinstance(stage, PairSection) else _of_set(case, stage, places)
+        bodies = _of_pair(case, stage, drawn) if isinstance(stage, PairSection) else _of_set(case, stage, places)
         spin, orbit = planets.get(stage.name, (0.0, None))
         for body in bodies:
             runs_around = body.name.startswith(f"{stage.name} planet")
-            turning = {"turns": spin, "orbit": orbit} if runs_around else {"turns": turns.get(body.member, 0.0)}
-            yield replace(body, stage=number, **turning)
+            own = {"turns": turns.get(body.member, 0.0), "orbit": around.get(body.member)}
+            yield replace(body, stage=number, **({"turns": spin, "orbit": orbit} if runs_around else own))
     for shaft in case.shaft:
-        yield from (replace(part, turns=turns.get(shaft.name, 0.0)) for part in _of_shaft(shaft))
-    yield from _of_bearings(case)
+        own = {"turns": turns.get(shaft.name, 0.0), "orbit": around.get(shaft.name)}
+        yield from (replace(part, **own) for part in _of_shaft(shaft))
+    yield from (replace(bearing, orbit=around.get(bearing.member)) for bearing in _of_bearings(case))
 
 
 def _turns(case: GearboxCase) -> tuple[dict[str, float], dict[str, tuple[float, tuple[float, float, float]]]]:
@@ -228,24 +231,31 @@ def _turned(stage: PairSection | BoxPlanetarySection, turn: float) -> tuple[tupl
     return tuple(gears.gears), [[turn + angle for angle in of_gear] for of_gear in tooth_angles(gears)]
 
 
-def _of_pair(case: GearboxCase, pair: PairSection) -> Iterator[SpaceBody]:
-    """Both gears, on their shafts."""
+def _of_pair(case: GearboxCase, pair: PairSection, drawn: dict[tuple[str, float, int], float]) -> Iterator[SpaceBody]:
+    """Both gears, on their shafts, but those that other pairs have ``drawn`` already at an angle of their teeth."""
     sizes = pair_sizes(pair)
-    on_shaft = next(name for name in pair.shafts if name != CASING)
-    axes = [case.shaft_named(name if name != CASING else on_shaft).axis for name in pair.shafts]
+    axes = [case.shaft_named(name).axis for name in pair.shafts]
     across = math.atan2(axes[1][1] - axes[0][1], axes[1][0] - axes[0][0])
     # gear 2 of a pair lies on x, an internal one on the other side
     gears, angles = _turned(pair, across + math.pi if sizes.internal else across)
     hands = 1.0, 1.0 if sizes.internal else -1.0
-    for number, name in enumerate(pair.shafts):
-        if name == CASING:
+    shafts = [case.shaft_named(name) for name in pair.shafts]
+    middles = [s.start + place for s, place in zip(shafts, pair.positions or (0.0, 0.0), strict=True)]
+    keys = [(s.name, round(z, 6), count) for s, z, count in zip(shafts, middles, sizes.teeth, strict=True)]
+    first, second = (angle[0] for angle in angles[:2]) if angles else (0.0, 0.0)
+    ratio = hands[1] * sizes.teeth[0] / sizes.teeth[1]
+    # a gear that is there already turns its mate into its gaps
+    if keys[0] in drawn:
+        first, second = drawn[keys[0]], second + ratio * (drawn[keys[0]] - first)
+    elif keys[1] in drawn:
+        first, second = first + (drawn[keys[1]] - second) / ratio, drawn[keys[1]]
+    for number, (name, shaft, middle) in enumerate(zip(pair.shafts, shafts, middles, strict=True)):
+        if keys[number] in drawn:
             continue
-        shaft = case.shaft_named(name)
-        middle = shaft.start + (pair.positions[number] if pair.positions else 0.0)
+        drawn[keys[number]] = angle = (first, second)[number]
         words = f"gear {number + 1} of {pair.name}"
         pitch = sizes.base_radii[number] / math.cos(sizes.pressure_angles[0])
         internal = sizes.internal and number == 1
-        angle = angles[number][0] if angles else 0.0
         teeth = _Teeth(gears[number], number, pitch, hands[number], angle, internal)
         yield _gear(_Seat(words, name, (shaft.axis[0], shaft.axis[1]), middle), sizes, teeth)
 

@@ -444,7 +444,7 @@ def in_time(
     """
     section, flow = stage.section, model.flow
     if not isinstance(section, BoxPlanetarySection):
-        turns = flow.speed[section.shafts[0]] if section.shafts[0] != CASING else -flow.speed[section.shafts[1]]
+        turns = flow.speed[section.shafts[0]] - flow.speed[section.carrier or CASING]
         return _reversed(excitation, back=turns < 0.0), MeshPaths(1, (0.0,)), 1
     carrier = flow.speed[section.carrier] if section.carrier != CASING else 0.0
     sun = flow.speed[section.sun] if section.sun != CASING else 0.0

@@ -93,3 +93,14 @@ def test_the_root_circle_of_given_sizes():
     tables["shaft"][0]["part"][0]["outer_diameter"] = "65 mm"
     # 24 teeth of module 3 mm: 72 mm less 2.5 modules
     assert "a root circle of 64.5 mm" in told(tables)["pair[0].shafts"]
+
+
+@pytest.mark.parametrize(("planets", "teeth", "told"), [(3, (28, 38, 104), 0), (4, (20, 64, 148), 4)])
+def test_planets_that_reach_into_one_another_are_told(planets, teeth, told):
+    from planet_gearboxes import simple_set
+
+    tables = simple_set(teeth=teeth, planets=planets)
+    for stage in tables["pair"]:
+        stage["gears"]["face_width"] = "20 mm"
+    found = [finding for finding in overlaps(read_case(tables)) if "no mate" in finding.text]
+    assert len(found) == told

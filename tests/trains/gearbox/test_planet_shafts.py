@@ -1,0 +1,245 @@
+"""Planets that are shafts of their own: as planetary stages, as springs by hand, in phase, refused where they miss."""
+
+import math
+
+import numpy as np
+import pytest
+from planet_gearboxes import known_set, loaded, members, pair, planet, simple_set
+from scipy.linalg import eigh
+
+from femgear.errors import CaseError
+from femgear.gears.gear import Gear
+from femgear.gears.planetary import PlanetarySet, equal_planet_angles
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.modes import solve_gearbox_modes
+from femgear.trains.gearbox.planet_shafts import pair_phases, standing_planets
+from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.response import by_order, solve_gearbox_response
+from femgear.trains.gearbox.solid_bodies import gearbox_bodies
+from femgear.trains.reading import read_case
+
+COUNTED = {"stiffness": "4e8 N/m", "contact_ratio": 1.63, "low_share": 0.999}
+
+
+@pytest.mark.parametrize("motions", ["space", "plane", "rotation"])
+@pytest.mark.parametrize("fixed", ["ring", "carrier"])
+def test_simple_planets_are_those_of_a_planetary_stage(motions, fixed):
+    own, known = (
+        solve_deflection(read_case(make(motions=motions, fixed=fixed, torque=-80.0)))
+        for make in (simple_set, known_set)
+    )
+    np.testing.assert_allclose(own.mesh_force, known.mesh_force, rtol=1e-9)
+    frequencies = [solve_gearbox_modes(found).modes.frequency for found in (own, known)]
+    np.testing.assert_allclose(*frequencies, rtol=1e-9, atol=1e-9 * frequencies[0].max())
+    speed = own.model.flow.speed
+    assert speed["p0"] == pytest.approx(known.model.flow.planet_speed["set"])
+
+
+@pytest.mark.parametrize(("teeth", "planets"), [((28, 38, 104), 3), ((29, 39, 107), 4)])
+@pytest.mark.parametrize("torque", [100.0, -80.0])
+def test_planets_on_a_standing_carrier_respond_as_a_planetary_stage(teeth, planets, torque):
+    """Forces on the bearings of sun, carrier and ring, which the phases of all meshes decide."""
+    forces = []
+    for make in (simple_set, known_set):
+        tables = make(teeth=teeth, fixed="carrier", planets=planets, mesh=COUNTED, torque=torque, motions="plane")
+        found = solve_deflection(read_case(tables | {"dynamics": {"mesh_harmonics": 5}}))
+        response = solve_gearbox_response(found, [70.0])
+        lines = by_order(response, {stage.name: stage.motion for stage in response.stages})[0]
+        forces.append(lines[:9, -5:])
+    # each pair alone with the others at their means leaves out what stiffnesses make of one another's motion
+    assert np.abs(forces[1]).max() > 0.01
+    np.testing.assert_allclose(forces[0], forces[1], atol=3e-3 * np.abs(forces[1]).max())
+
+
+def test_lines_of_equal_planets_are_those_of_their_symmetry():
+    tables = simple_set(teeth=(28, 38, 104), fixed="carrier", mesh=COUNTED, motions="plane")
+    found = solve_deflection(read_case(tables | {"dynamics": {"mesh_harmonics": 6}}))
+    response = solve_gearbox_response(found, [70.0])
+    lines = np.abs(by_order(response, {stage.name: stage.motion for stage in response.stages})[0])
+    # lateral forces on the sun: harmonics 3 and 6 of three planets and 28 teeth cancel, h z_s mod 3 is 0 there
+    assert lines[:2, [2, 5]].max() < 1e-9 * lines[:2].max()
+    assert lines[:2, 0].max() > 1e-3 * lines[:2].max()
+
+
+@pytest.mark.parametrize("torque", [100.0, -100.0])
+@pytest.mark.parametrize("speed", [1000.0, -1000.0])
+def test_phases_are_those_of_the_planetary_set(torque, speed):
+    teeth, planets = (28, 38, 104), 3
+    tables = simple_set(teeth=teeth, planets=planets, torque=torque)
+    tables["operation"]["load_case"][0]["speed"]["sun"] = f"{speed} rpm"
+    case = read_case(tables)
+    phases = pair_phases(case, gearbox_flow(case))
+    gears = [
+        Gear(z, 2e-3, math.radians(20.0), 0.0, 20e-3, 0.12 if inside else 5e-3, internal=inside, tip_open=True)
+        for z, inside in zip(teeth, (False, False, True), strict=True)
+    ]
+    expected = PlanetarySet(*gears, 66e-3, equal_planet_angles(planets)).mesh_phases
+    if torque * speed < 0.0:
+        # the other flanks at the same sense of rotation: the lag of the planets changes its sign
+        expected = np.concatenate([expected[:3], expected[:3] - (expected[3] - expected[0])])
+    if speed < 0.0:
+        expected = -np.asarray(expected)
+    names = [f"sun-{n}" for n in range(3)] + [f"{n}-ring" for n in range(3)]
+    apart = np.array([phases[name] for name in names]) - expected
+    assert np.abs(apart - np.rint(apart)).max() < 1e-9
+
+
+STEPPED = (24, 57, 27, 108)
+
+
+def stepped_set(motions="plane", stiffness=(4e8, 4e8, 4e8, 3e8, 3e8, 3e8)):
+    """Stepped planets on three pins, every mesh with its own stiffness."""
+    sun, first, second, ring = STEPPED
+    tables = members(sun=(1.0, 5e-4), carrier=(4.0, 2e-2), ring=(3.0, 4e-2)) | {"pair": []}
+    for n in range(3):
+        planet(tables, f"p{n}", 81e-3, 2.0 * math.pi * n / 3.0)
+    for n in range(3):
+        mesh = {"stiffness": f"{stiffness[n]!r} N/m"}
+        tables["pair"].append(pair(f"sun-{n}", ("sun", f"p{n}"), (sun, first), 2e-3, mesh=mesh))
+    for n in range(3):
+        mesh = {"stiffness": f"{stiffness[3 + n]!r} N/m"}
+        tables["pair"].append(pair(f"{n}-ring", (f"p{n}", "ring"), (second, ring), 2e-3, internal=True, mesh=mesh))
+    return loaded(tables, 100.0, 1000.0, "carrier", ("ring",), motions)
+
+
+def by_hand(stiffness):
+    """Mass and stiffness of the same set from its lines of action: sun, carrier, ring, planets, each x, y and turn.
+
+    And the approaches (6, 18) of its meshes.
+    """
+    alpha, a = math.radians(20.0), 81e-3
+    base = [1e-3 * z * math.cos(alpha) for z in STEPPED]
+    rows, k = [], np.zeros((18, 18))
+    for n in range(3):
+        psi = 2.0 * math.pi * n / 3.0
+        out, along = np.array([math.cos(psi), math.sin(psi)]), np.array([-math.sin(psi), math.cos(psi)])
+        p = 9 + 3 * n
+        row = np.zeros(18)
+        push = math.cos(alpha) * along + math.sin(alpha) * out
+        row[0:2], row[2], row[p : p + 2], row[p + 2] = push, base[0], -push, base[1]
+        rows.append(row)
+        for way in np.eye(2):  # the pin moves with the carrier
+            pin = np.zeros(18)
+            pin[p : p + 2], pin[3:5], pin[5] = way, -way, -a * along @ way
+            k += 3e8 * np.outer(pin, pin)
+    for n in range(3):
+        psi = 2.0 * math.pi * n / 3.0
+        out, along = np.array([math.cos(psi), math.sin(psi)]), np.array([-math.sin(psi), math.cos(psi)])
+        p = 9 + 3 * n
+        row = np.zeros(18)
+        push = -math.cos(alpha) * along + math.sin(alpha) * out
+        row[p : p + 2], row[p + 2], row[6:8], row[8] = push, -base[2], -push, base[3]
+        rows.append(row)
+    for row, value in zip(rows, stiffness, strict=True):
+        k += value * np.outer(row, row)
+    k[[0, 1, 3, 4, 6, 7], [0, 1, 3, 4, 6, 7]] += 3e8
+    mass = [1.0, 1.0, 5e-4, 4.0, 4.0, 2e-2, 3.0, 3.0, 4e-2] + [0.5, 0.5, 4e-4] * 3
+    return np.diag(mass), k, np.array(rows)
+
+
+def test_stepped_planets_have_the_modes_of_their_springs():
+    stiffness = (4e8, 4.2e8, 3.9e8, 3e8, 3.1e8, 2.8e8)
+    modes = solve_gearbox_modes(solve_deflection(read_case(stepped_set(stiffness=stiffness)))).modes
+    mass, k, _ = by_hand(stiffness)
+    kept = [i for i in range(18) if i != 8]  # the ring is held
+    expected = np.sqrt(np.maximum(eigh(k[np.ix_(kept, kept)], mass[np.ix_(kept, kept)], eigvals_only=True), 0.0))
+    expected /= 2.0 * math.pi
+    np.testing.assert_allclose(modes.frequency, expected, rtol=1e-9, atol=1e-9 * expected.max() + 1e-3)
+
+
+def test_stepped_planets_share_the_load_as_their_springs_do():
+    stiffness = (4e8, 4.4e8, 3.6e8, 3e8, 3.1e8, 2.8e8)
+    found = solve_deflection(read_case(stepped_set(stiffness=stiffness)))
+    _, k, rows = by_hand(stiffness)
+    load = np.zeros(18)
+    load[2], load[5] = 100.0, -100.0 * (1.0 + 57 * 108 / (24 * 27))
+    kept = [i for i in range(18) if i not in (2, 8)]  # the sun's turn is free: it is taken as zero
+    motion = np.zeros(18)
+    motion[kept] = np.linalg.solve(k[np.ix_(kept, kept)], load[kept])
+    np.testing.assert_allclose(found.mesh_force, np.array(stiffness) * (rows @ motion), rtol=1e-9)
+    shares = found.model.flow.torque_shares
+    assert sum(shares[f"sun-{n}"] for n in range(3)) == pytest.approx(1.0)
+    assert shares["sun-1"] > shares["sun-0"] > shares["sun-2"]
+
+
+def test_double_planets_yield_as_a_chain_of_three_pairs():
+    sun, inner, outer, ring = 24, 18, 20, 84
+    stiffness = (4e8, 3e8, 5e8)
+    near, far, between = 42e-3, 64e-3, 38e-3
+    beside = math.acos((near**2 + far**2 - between**2) / (2.0 * near * far))
+    tables = members(sun=(1.0, 5e-4), carrier=(4.0, 2e-2), ring=(3.0, 4e-2)) | {"pair": []}
+    chain = ((sun, inner), (inner, outer), (outer, ring))
+    for n in range(3):
+        psi = 2.0 * math.pi * n / 3.0
+        planet(tables, f"inner {n}", near, psi)
+        planet(tables, f"outer {n}", far, psi + beside)
+        bodies = ("sun", f"inner {n}", f"outer {n}", "ring")
+        for i, (teeth, k) in enumerate(zip(chain, stiffness, strict=True)):
+            mesh = {"stiffness": f"{k!r} N/m"}
+            shafts = bodies[i : i + 2]
+            tables["pair"].append(pair("-".join(shafts), shafts, teeth, 2e-3, internal=i == 2, mesh=mesh))
+    tables = loaded(tables, 90.0, 1000.0, "ring", ("carrier",), "rotation")
+    held = [bearing for bearing in tables["bearing"] if bearing.get("outer_shaft") == "carrier"]
+    for bearing in held:
+        bearing["radial"] = "rigid"
+    found = solve_deflection(read_case(tables))
+    arm = 1e-3 * sun * math.cos(math.radians(20.0))
+    force = 90.0 / (3.0 * arm)
+    np.testing.assert_allclose(found.mesh_force, force, rtol=1e-9)
+    # sun and ring turn against one another by the deflections of all three meshes
+    model = found.model
+    turned = [found.motion[6 * model.first[name] + 5] for name in ("sun", "ring")]
+    yielded = arm * turned[0] - arm * ring / sun * turned[1]
+    assert yielded == pytest.approx(force * sum(1.0 / k for k in stiffness), rel=1e-9)
+
+
+@pytest.mark.parametrize(("shift", "fits"), [(0.0, True), (1.0, True), (0.4, False)])
+def test_planets_stand_where_their_teeth_find_gaps(shift, fits):
+    """Planet 2 so many places of 1/(z_s + z_r) of a turn further on."""
+    tables = simple_set(teeth=(28, 38, 104))
+    angle = 2.0 * math.pi * (1.0 / 3.0 + shift / 132.0)
+    (row,) = (shaft for shaft in tables["shaft"] if shaft["name"] == "p1")
+    row["axis"] = [f"{66.0 * math.cos(angle):.12g} mm", f"{66.0 * math.sin(angle):.12g} mm"]
+    if fits:
+        assert read_case(tables)
+        return
+    with pytest.raises(CaseError, match="do not assemble"):
+        read_case(tables)
+
+
+def refused(change):
+    tables = simple_set()
+    change(tables)
+    with pytest.raises(CaseError) as refusal:
+        read_case(tables)
+    return str(refusal.value)
+
+
+def test_carriers_that_carry_nothing_are_refused():
+    assert "none is a planet" in refused(lambda t: t["pair"][0].update(carrier="ring", shafts=["sun", "carrier"]))
+    assert "has a gear of the pair" in refused(lambda t: t["pair"][0].update(carrier="sun"))
+    assert "no bearing of its carrier" in refused(
+        lambda t: [bearing.pop("outer_shaft") for bearing in t["bearing"] if bearing["shaft"] == "p0"]
+    )
+    assert "'arm'" in refused(lambda t: t["pair"][0].update(carrier="arm"))
+
+
+@pytest.mark.parametrize("more", [{"transient": {"duration": "1 s"}}, {"balance": {"harmonics": 3}}])
+def test_time_and_parting_teeth_are_refused_by_name(more):
+    with pytest.raises(CaseError, match="stand where the case has them"):
+        read_case(simple_set() | more)
+
+
+def test_planets_of_a_turning_carrier_are_told_to_stand():
+    (finding,) = standing_planets(read_case(simple_set()))
+    assert finding.code == "W-STANDING" and "carrier turns" in finding.text
+    assert not [*standing_planets(read_case(simple_set(fixed="carrier")))]
+
+
+def test_planets_run_around_in_the_picture_and_shared_gears_are_drawn_once():
+    bodies = [body for body in gearbox_bodies(read_case(simple_set()), {}) if body.kind == "gear"]
+    assert [body.member for body in bodies] == ["sun", "p0", "p1", "p2", "ring"]
+    around = {body.member: body.orbit for body in bodies}
+    carrier = 27 / (27 + 105)
+    assert around["sun"] is None and around["ring"] is None
+    assert around["p1"] == pytest.approx((0.0, 0.0, carrier))

@@ -1,0 +1,70 @@
+"""Drafts of sets with planets of any kind: they assemble, turn as Willis says, and are loaded as usual."""
+
+import numpy as np
+import pytest
+
+from femgear.errors import CaseError
+from femgear.trains.drafts import ToothForm, new_case
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.planet_shafts import pair_phases
+from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.planets_draft import PLANET_KINDS
+from femgear.trains.reading import parse_case, with_values
+
+RATIOS = {
+    "stepped": ("sun", "carrier", 1 + 57 * 108 / (24 * 27)),
+    "double": ("sun", "carrier", 1 - 84 / 24),
+    "ravigneaux": ("small sun", "ring", 22 / 15),
+    "wolfrom": ("sun", "second ring", (1 + 72 / 18) / (1 - 72 * 26 / (27 * 71))),
+}
+
+
+@pytest.mark.parametrize("kind", PLANET_KINDS)
+def test_a_draft_turns_as_its_teeth_say_and_carries_its_load(kind):
+    case = with_values(parse_case(new_case(kind)), {"deflection.contact": False})
+    driven, output, ratio = RATIOS[kind]
+    flow = gearbox_flow(case)
+    assert flow.speed[driven] / flow.speed[output] == pytest.approx(ratio)
+    assert flow.port_torque["load"] == pytest.approx(-ratio * flow.port_torque["motor"])
+    found = solve_deflection(case)
+    for stage, force in zip(found.model.stages, found.mesh_force, strict=True):
+        expected = abs(flow.first_torque(stage.section)) / stage.sizes.base_radii[0]
+        assert force == pytest.approx(expected, rel=1e-3)
+    # the branches are alike
+    forces = found.mesh_force.reshape(3, -1)
+    np.testing.assert_allclose(forces, np.broadcast_to(forces[0], forces.shape), rtol=1e-3)
+
+
+def test_branches_of_a_double_set_follow_one_another_by_their_teeth():
+    case = parse_case(new_case("double"))
+    phases = pair_phases(case, gearbox_flow(case))
+    for number in (2, 3):
+        apart = phases[f"sun-inner planet {number}"] + 24 * (number - 1) / 3 - phases["sun-inner planet 1"]
+        assert apart == pytest.approx(round(apart), abs=1e-9)
+        lags = [phases[f"outer planet {n}-ring"] - phases[f"sun-inner planet {n}"] for n in (1, number)]
+        # both sides of every branch are as far apart as those of the first one
+        assert lags[0] - lags[1] == pytest.approx(round(lags[0] - lags[1]), abs=1e-9)
+
+
+def test_stepped_planets_may_have_two_modules():
+    case = parse_case(new_case("stepped", teeth=(25, 52, 18, 69)))
+    modules = {stage.name: stage.teeth["set"]["module"] for stage in case.pair}
+    assert float(modules["planet 1-ring"].split()[0]) == pytest.approx(2.0 * (25 + 52) / (69 - 18))
+    flow = gearbox_flow(case)
+    assert flow.speed["sun"] / flow.speed["carrier"] == pytest.approx(1 + 52 * 69 / (25 * 18))
+
+
+@pytest.mark.parametrize(
+    ("kind", "options", "words"),
+    [
+        ("stepped", {"planets": 5}, "cannot be equally spaced"),
+        ("stepped", {"teeth": (24, 57, 27)}, "needs 4 numbers of teeth"),
+        ("stepped", {"form": ToothForm(shifts=(0.1, 0.2))}, "spur gears without profile shift"),
+        ("stepped", {"teeth": (24, 57, 60, 63)}, "do not mesh with planets"),
+        ("double", {"teeth": (24, 18, 80, 84)}, "do not reach each other"),
+        ("ravigneaux", {"teeth": (30, 36, 18, 20, 72)}, "do not mesh with planets"),
+    ],
+)
+def test_what_makes_no_set_is_refused(kind, options, words):
+    with pytest.raises(CaseError, match=words):
+        new_case(kind, **options)
