@@ -239,16 +239,7 @@ class _Builder:
         ]
         others = len(self.springs)
         stages = [self._pair(stage) for stage in case.pair] + [self._planetary(stage) for stage in case.planetary]
-        held = np.zeros((len(self.names), 6), bool)
-        held[:, list(HELD[case.motions])] = True
-        if case.motions == "rotation":
-            # planets go round with their carrier
-            for stage in stages:
-                around = stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ()
-                held[[*stage.planets, *around], :2] = False
-            for planet in carriers(case):
-                count = len(self.beams[planet].stations) if planet in self.beams else 1
-                held[self.first[planet] : self.first[planet] + count, :2] = False
+        held = self._held(stages)
         if self.casing is not None and self.elastic is not None:
             # elastic motions have no directions
             held[list(self.casing.elastic)] = self.elastic.held[1 : 1 + len(self.casing.elastic)]
@@ -290,6 +281,19 @@ class _Builder:
             tuple(joints),
             self.casing,
         )
+
+    def _held(self, stages: Sequence[StageModel]) -> np.ndarray:
+        """Motions (n, 6) that do not take place: by ``motions`` of the case, but planets go round with their carrier."""
+        held = np.zeros((len(self.names), 6), bool)
+        held[:, list(HELD[self.case.motions])] = True
+        if self.case.motions == "rotation":
+            for stage in stages:
+                around = stage.elastic_carrier.stations[1:] if stage.elastic_carrier else ()
+                held[[*stage.planets, *around], :2] = False
+            for planet in carriers(self.case):
+                count = len(self.beams[planet].stations) if planet in self.beams else 1
+                held[self.first[planet] : self.first[planet] + count, :2] = False
+        return held
 
     def _casing(self, section: BoxCasingSection) -> None:
         """Add the stations of the casing with its mass, and its feet."""
