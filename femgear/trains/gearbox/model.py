@@ -283,7 +283,7 @@ class _Builder:
         )
 
     def _held(self, stages: Sequence[StageModel]) -> np.ndarray:
-        """Motions (n, 6) that do not take place: by ``motions`` of the case, but planets go round with their carrier."""
+        """Motions (n, 6) that do not take place by ``motions`` of the case; planets go round with their carrier."""
         held = np.zeros((len(self.names), 6), bool)
         held[:, list(HELD[self.case.motions])] = True
         if self.case.motions == "rotation":

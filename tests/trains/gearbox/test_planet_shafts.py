@@ -243,3 +243,26 @@ def test_planets_run_around_in_the_picture_and_shared_gears_are_drawn_once():
     carrier = 27 / (27 + 105)
     assert around["sun"] is None and around["ring"] is None
     assert around["p1"] == pytest.approx((0.0, 0.0, carrier))
+
+
+@pytest.mark.slow
+def test_teeth_of_pairs_alone_yield_as_those_of_a_whole_set():
+    """What sun and planets yield between their meshes, which pairs leave out, is little."""
+    from femgear.case import text as case_text
+    from femgear.stages.static import solve_static
+    from femgear.trains.drafts import new_case
+    from femgear.trains.reading import parse_case
+
+    coarse = {"positions": 16, "flank_elements": 10, "stresses": False}
+    tables = case_text.parse(new_case("planetary", teeth=(27, 39, 105), torque="90 N m", planets=3), "")
+    whole = solve_static(parse_case(case_text.write(tables | {"static": coarse | {"members": "fixed"}}))).cycle
+    kept = ("teeth", "profile_shift", "bore_radius", "outer_radius", "tip_diameter")
+    shared = {"module": "2 mm", "pressure_angle": "20 deg"} | {k: tables["set"][k] for k in ("face_width", "backlash")}
+    for mesh, (first, second, torque) in enumerate((("sun", "planet", 30.0), ("planet", "ring", 30.0 * 39 / 27))):
+        gears = [{k: v for k, v in tables[name].items() if k in kept} for name in (first, second)]
+        gears = [{"profile_shift": 0.0} | gear for gear in gears]
+        pair_alone = {"model": "pair", "title": "alone", "set": shared, "material": tables["material"]}
+        pair_alone |= {"gear_1": gears[0], "gear_2": gears[1], "static": coarse}
+        alone = solve_static(parse_case(case_text.write(pair_alone | {"operation": {"torque": f"{torque} N m"}}))).cycle
+        assert alone.mean()[0] == pytest.approx(whole.mean()[3 * mesh], rel=5e-4)
+        assert alone.peak_to_peak()[0] == pytest.approx(whole.peak_to_peak()[3 * mesh], rel=2e-3)
