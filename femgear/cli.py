@@ -54,7 +54,7 @@ try:
     from femgear.errors import CaseError, FemgearError, StorageError, nvh_library, printable
     from femgear.exchange.formats import Sampling
     from femgear.findings import FindingWarning
-    from femgear.measured.requests import LineSearch, Recording
+    from femgear.measured.requests import FurtherFiles, LineSearch, Recording
     from femgear.storage.files import noted_interrupts, storage_error
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
@@ -687,6 +687,7 @@ def measured(
     recording: Annotated[Recording | None, Parameter(name="*")] = None,
     search: Annotated[LineSearch | None, Parameter(name="*")] = None,
     causes: Annotated[bool, Parameter(negative="")] = False,
+    further: Annotated[FurtherFiles | None, Parameter(name="*", negative="")] = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
 ) -> int:
     """Say of every line of a recording whether a healthy set makes it, unequal planets, a fault, or none of these.
@@ -706,7 +707,8 @@ def measured(
     from femgear.trains.reading import read_case
 
     data = read_case(case)
-    verdict, blocks, names = measured_into(data, signal, recording or Recording(), search or LineSearch(), output)
+    wanted = recording or Recording(), search or LineSearch()
+    verdict, blocks, names = measured_into(data, signal, *wanted, output, further)
     _print(blocks)
     if causes:
         from femgear.causes import describe_causes, rank_causes

@@ -15,8 +15,9 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.measured.heard_set import heard_set
-from femgear.measured.lines import sharpened_lines, windowed_spectrum
+from femgear.measured.lines import sharpened_lines
 from femgear.measured.recordings import read_by_turns
+from femgear.measured.spectra import windowed_spectrum
 from femgear.report.tables import Block
 from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.reading import parse_case

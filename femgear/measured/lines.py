@@ -8,7 +8,6 @@ import numpy as np
 
 from femgear.errors import CaseError
 from femgear.housing.orders import FOREIGN, NORMAL, UNEQUAL, LineVerdict, OrderSpectrum, classify_line, find_lines
-from femgear.measured.turns import AngleSignal
 
 FINEST = 0.02
 """Orders that a record of 50 turns of the carrier tells apart, halved."""
@@ -35,19 +34,6 @@ class MeasuredLine:
     level: float
     verdict: str
     place: LineVerdict
-
-
-def windowed_spectrum(signal: AngleSignal) -> OrderSpectrum:
-    """Compute the order spectrum of a signal over whole turns through a Hann window, up to its highest order.
-
-    Amplitudes are those of lines (the window's mean of a half is divided out), without the mean of the signal.
-    """
-    values = signal.values - signal.values.mean()
-    window = 1.0 - np.cos(2 * np.pi * np.arange(len(values)) / len(values))
-    value = np.fft.rfft(values * window) * (2 / len(values))
-    order = np.arange(len(value)) / signal.turns
-    kept = order <= min(signal.highest_order, 0.5 * signal.per_turn - 1.0)
-    return OrderSpectrum(order[kept], value[kept], signal.turns)
 
 
 def sharpened_lines(spectrum: OrderSpectrum, threshold: float) -> tuple[np.ndarray, np.ndarray]:

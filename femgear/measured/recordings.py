@@ -74,14 +74,17 @@ def read_by_turns(path: str | os.PathLike, recording: Recording, shafts: HeardSe
             limit="pulses of a shaft, or a constant speed",
             remedy="name the channel of the pulses by --pulses, or give --speed of the input",
         )
-    signal = _in_si(signal, recording.unit)
+    signal = channel_in_si(signal, recording.unit)
     if turns is None:
         turns = constant_turns(signal, _carrier_speed(signal, recording, shafts))
-    return resample_turns(signal, turns)
+    return resample_turns(signal, turns, parts=shafts.ring)
 
 
-def _in_si(signal: Channel, unit: str | None) -> Channel:
-    """A channel in m/s^2 where its unit is an acceleration, or one is given; else as it is."""
+def channel_in_si(signal: Channel, unit: str | None) -> Channel:
+    """Convert a channel to m/s^2 where its unit is an acceleration, or one is given; others stay as they are.
+
+    CaseError: a unit that is no acceleration (E-UNIT).
+    """
     factor = _ACCELERATIONS.get(signal.unit.replace("²", "^2").lower())
     if unit is not None:
         number, _, name = unit.strip().partition(" ")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -61,3 +62,29 @@ class LineSearch:
         if not -200.0 <= self.threshold < 0.0:
             limit = "-200 dB up to below 0"
             raise CaseError("no such level", code="E-RANGE", key="--threshold", value=self.threshold, limit=limit)
+
+
+@dataclass(frozen=True)
+class FurtherFiles:
+    """What is written beside lines and spectrum.
+
+    Parameters
+    ----------
+    average
+        Synchronous averages over turns of the "carrier", or of "sun" or "planet 1" as a planet passes the sensor; may
+        be repeated.
+    density
+        Power spectral density of the signal.
+    force
+        Channel of a force: the frequency response of the signal to it, with its coherence.
+    """
+
+    average: tuple[str, ...] = ()
+    density: bool = False
+    force: str | None = None
+
+    def __post_init__(self):
+        for name in self.average:
+            if not re.fullmatch(r"carrier|sun|planet [1-9]\d?", name):
+                limit = "carrier, sun, planet 1, planet 2, ..."
+                raise CaseError("there is no such average", code="E-CHOICE", key="--average", value=name, limit=limit)

@@ -181,10 +181,11 @@ def aligned_speed(channel: Channel, speed: float, orders: np.ndarray, within: fl
     return float(speeds[score.argmax()])
 
 
-def resample_turns(channel: Channel, turns: Turns) -> AngleSignal:
+def resample_turns(channel: Channel, turns: Turns, *, parts: int = 1) -> AngleSignal:
     """Sample a signal anew at equal steps of the angle of a shaft, over all whole turns of both records.
 
-    The steps are so fine that no sample of the recording is skipped at the slowest speed. CaseError: E-FILE: fewer
+    The steps are so fine that no sample of the recording is skipped at the slowest speed, and each of so many ``parts``
+    of a turn has a whole number of them. CaseError: E-FILE: fewer
     than four whole turns, a record of pulses that ends long before the signal; E-MEMORY: too many samples.
     """
     from scipy.ndimage import map_coordinates
@@ -205,7 +206,7 @@ def resample_turns(channel: Channel, turns: Turns) -> AngleSignal:
         remedy = "check the rate of either channel, or cut the signal to the time of the pulses"
         raise channel.problem(message, value=value, limit="50 % or more", remedy=remedy)
     slowest, fastest = kept.speeds
-    per_turn = int(np.ceil(channel.rate / slowest))
+    per_turn = parts * int(np.ceil(channel.rate / (slowest * parts)))
     if whole * per_turn > _MOST_SAMPLES:
         raise CaseError(
             "the speed changes too much for one spectrum",

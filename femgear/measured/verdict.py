@@ -11,7 +11,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, array_factor, spacing_symmetry
+from femgear.measured.averages import carrier_average, gear_average
+from femgear.measured.channels import choose_channel
 from femgear.measured.heard_set import HeardSet, heard_set
 from femgear.measured.lines import (
     VERDICTS,
@@ -20,10 +23,10 @@ from femgear.measured.lines import (
     judge_lines,
     order_tolerance,
     sharpened_lines,
-    windowed_spectrum,
 )
-from femgear.measured.recordings import read_by_turns
-from femgear.measured.requests import LineSearch, Recording
+from femgear.measured.recordings import channel_in_si, read_by_turns, read_channels
+from femgear.measured.requests import FurtherFiles, LineSearch, Recording
+from femgear.measured.spectra import frequency_response, power_density, windowed_spectrum
 from femgear.measured.turns import AngleSignal
 from femgear.report.style import (
     BLACK,
@@ -91,19 +94,58 @@ def measured_verdict(
 
 
 def measured_into(
-    case: Any, path: str | os.PathLike, recording: Recording, search: LineSearch, output: Path | None
+    case: Any,
+    path: str | os.PathLike,
+    recording: Recording,
+    search: LineSearch,
+    output: Path | None,
+    further: FurtherFiles | None = None,
 ) -> tuple[MeasuredVerdict, list[Block], list[str]]:
-    """Judge the lines of a recording, and write them, the spectrum and a figure into a folder if there is one.
+    """Judge the lines of a recording, and write them, the spectrum, a figure and more into a folder if there is one.
 
     Returns the verdict, the tables to print and the names of the files.
     """
-    verdict = measured_verdict(case, path, recording, search)
+    verdict, further = measured_verdict(case, path, recording, search), further or FurtherFiles()
     names = []
     if output is not None:
-        names = [_LINES, _SPECTRUM, _FIGURE]
+        tables = dict(_further_tables(verdict, path, recording, further))
+        names = [_LINES, _SPECTRUM, _FIGURE, *tables]
         own_files(output, names)
         _write(verdict, search, output)
+        for name, (header, columns) in tables.items():
+            write_csv(output / name, header, zip(*(column.tolist() for column in columns), strict=True))
+    elif further != FurtherFiles():
+        message, remedy = "files are asked for, and no folder is named", "name one by -o"
+        raise CaseError(message, code="E-ARGUMENTS", key="--output", remedy=remedy)
     return verdict, list(describe_verdict(verdict, search)), names
+
+
+def _further_tables(
+    verdict: MeasuredVerdict, path: str | os.PathLike, recording: Recording, further: FurtherFiles
+) -> Iterator[tuple[str, tuple[tuple[str, ...], tuple[np.ndarray, ...]]]]:
+    """Averages, density and frequency response: names of the files, headers and columns."""
+    signal, unit = verdict.signal, verdict.signal.unit or "1"
+    for name in further.average:
+        gear, _, number = name.partition(" ")
+        if gear == "carrier":
+            values, axis, parts = carrier_average(signal), "turns of the carrier", signal.per_turn
+        else:
+            values = gear_average(signal, verdict.gear_set, gear, planet=int(number or 1))
+            axis, parts = f"teeth of the {gear}", signal.per_turn // verdict.gear_set.ring
+        columns = np.arange(len(values)) / parts, values
+        yield f"average_{name.replace(' ', '_')}.csv", ((axis, f"average [{unit}]"), columns)
+    if not further.density and further.force is None:
+        return
+    channels = read_channels(path, rate=recording.rate)
+    channel = channel_in_si(choose_channel(channels, recording.channel or signal.name), recording.unit)
+    if further.density:
+        yield "density.csv", (("frequency [Hz]", f"density [({unit})^2/Hz]"), power_density(channel))
+    if further.force is not None:
+        force = choose_channel(channels, further.force, "--force")
+        frequency, response, coherence = frequency_response(channel, force)
+        header = ("frequency [Hz]", f"response [{unit} a {force.unit or '1'}]", "phase [deg]", "coherence")
+        columns = (frequency, np.abs(response), np.degrees(np.angle(response)), coherence)
+        yield "frequency_response.csv", (header, columns)
 
 
 def describe_verdict(verdict: MeasuredVerdict, search: LineSearch) -> Iterator[Block]:

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.measured.lines import VERDICTS, chance, judge_lines, order_tolerance, sharpened_lines, windowed_spectrum
+from femgear.measured.lines import VERDICTS, chance, judge_lines, order_tolerance, sharpened_lines
+from femgear.measured.spectra import windowed_spectrum
 from femgear.measured.turns import AngleSignal
 
 NORMAL, UNEQUAL, SUN, PLANET, FOREIGN = VERDICTS

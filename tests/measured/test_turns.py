@@ -6,7 +6,8 @@ from recorded_signals import HEALTHY, RATE, recording
 
 from femgear.errors import CaseError
 from femgear.measured.channels import Channel
-from femgear.measured.lines import sharpened_lines, windowed_spectrum
+from femgear.measured.lines import sharpened_lines
+from femgear.measured.spectra import windowed_spectrum
 from femgear.measured.turns import aligned_speed, constant_turns, resample_turns, turns_of_pulses
 
 ORDER, VALUE = np.array(list(HEALTHY), float), np.array(list(HEALTHY.values()))

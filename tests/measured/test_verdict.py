@@ -39,6 +39,30 @@ def test_the_command_prints_a_verdict_for_every_line_and_writes_files(tmp_path, 
     assert "[E-FILE]" in capsys.readouterr().err
 
 
+def test_averages_densities_and_responses_are_written(tmp_path, capsys):
+    signal, pulses, _ = recording(HEALTHY, HEALTHY.values(), wander=0.0)
+    force = np.random.default_rng(7).normal(size=len(signal))
+    columns = np.arange(len(signal)) / RATE, signal + 3 * force, pulses, force
+    path = write_columns(tmp_path / "a.csv", "time [s];acc [m/s^2];tacho [V];hammer [N]\n", columns)
+    words = ["measured", str(CASE), str(path), "--channel", "acc", "--pulses", "tacho"]
+    further = ["--average", "carrier", "--average", "planet 2", "--density", "--force", "hammer"]
+    assert cli.main([*words, *further, "-o", str(tmp_path / "out")]) == 0
+
+    def table(name):
+        return np.genfromtxt(tmp_path / "out" / name, delimiter=",", skip_header=1).T
+
+    turn, average = table("average_carrier.csv")
+    exact = sum(np.real(height) * np.cos(2 * np.pi * order * turn) for order, height in HEALTHY.items())
+    shift = np.fft.irfft(np.fft.rfft(average) * np.conj(np.fft.rfft(exact)))
+    assert shift.max() / (exact @ exact) == pytest.approx(1.0, abs=0.05)  # but for where the record begins
+    assert table("average_planet_2.csv")[0][-1] == pytest.approx(40.0, abs=0.05)
+    frequency, response, _, coherence = table("frequency_response.csv")
+    assert np.median(response) == pytest.approx(3.0, rel=0.02) and np.median(coherence) > 0.99
+    assert table("density.csv").shape == (2, len(frequency))
+    assert cli.main([*words, "--average", "sun"]) == 2 and "name one by -o" in capsys.readouterr().err
+    assert cli.main([*words, "--average", "ring"]) == 2 and "no such average" in capsys.readouterr().err
+
+
 def test_silence_has_no_lines(tmp_path):
     verdict = measured_verdict(read_case(CASE), written(tmp_path, [3], [1e-6], noise=1e6), Recording(pulses="tacho"))
     assert verdict.lines == ()
