@@ -1,6 +1,13 @@
-"""Gearboxes whose planets are shafts of their own: tables of any set around a carrier, of rigid bodies on springs."""
+"""Sets of any planets: tables of gearboxes of rigid bodies, their springs by hand, places by trial of all teeth."""
 
+import itertools
 import math
+import random
+
+import numpy as np
+
+from femgear.gears.planet_assembly import double_gears, ravigneaux_gears, simple_gears, stepped_gears
+from femgear.gears.shaft_graph import StageGears
 
 MESH = {"stiffness": "4e8 N/m"}
 BEARING = {"radial": "3e8 N/m", "axial": "1e8 N/m", "tilt": "2e5 N m/rad"}
@@ -75,3 +82,115 @@ def known_set(teeth=(27, 39, 105), module=2e-3, planets=3, torque=100.0, fixed="
     stage["gears"] = {"teeth": list(teeth), "planets": planets, "module": f"{1e3 * module!r} mm"}
     stage["planet"] = {"mass": "0.5 kg", "inertia": "4e-4 kg m^2", "bearing": BEARING}
     return kept | {"planetary": [stage]}
+
+
+STEPPED = (24, 57, 27, 108)
+
+
+def stepped_set(motions="plane", stiffness=(4e8, 4e8, 4e8, 3e8, 3e8, 3e8)):
+    """Stepped planets on three pins, every mesh with its own stiffness."""
+    sun, first, second, ring = STEPPED
+    tables = members(sun=(1.0, 5e-4), carrier=(4.0, 2e-2), ring=(3.0, 4e-2)) | {"pair": []}
+    for n in range(3):
+        planet(tables, f"p{n}", 81e-3, 2.0 * math.pi * n / 3.0)
+    for n in range(3):
+        mesh = {"stiffness": f"{stiffness[n]!r} N/m"}
+        tables["pair"].append(pair(f"sun-{n}", ("sun", f"p{n}"), (sun, first), 2e-3, mesh=mesh))
+    for n in range(3):
+        mesh = {"stiffness": f"{stiffness[3 + n]!r} N/m"}
+        tables["pair"].append(pair(f"{n}-ring", (f"p{n}", "ring"), (second, ring), 2e-3, internal=True, mesh=mesh))
+    return loaded(tables, 100.0, 1000.0, "carrier", ("ring",), motions)
+
+
+def springs_by_hand(stiffness):
+    """Mass and stiffness of the same set from its lines of action: sun, carrier, ring, planets, each x, y and turn.
+
+    And the approaches (6, 18) of its meshes.
+    """
+    alpha, a = math.radians(20.0), 81e-3
+    base = [1e-3 * z * math.cos(alpha) for z in STEPPED]
+    rows, k = [], np.zeros((18, 18))
+    for n in range(3):
+        psi = 2.0 * math.pi * n / 3.0
+        out, along = np.array([math.cos(psi), math.sin(psi)]), np.array([-math.sin(psi), math.cos(psi)])
+        p = 9 + 3 * n
+        row = np.zeros(18)
+        push = math.cos(alpha) * along + math.sin(alpha) * out
+        row[0:2], row[2], row[p : p + 2], row[p + 2] = push, base[0], -push, base[1]
+        rows.append(row)
+        for way in np.eye(2):  # the pin moves with the carrier
+            pin = np.zeros(18)
+            pin[p : p + 2], pin[3:5], pin[5] = way, -way, -a * along @ way
+            k += 3e8 * np.outer(pin, pin)
+    for n in range(3):
+        psi = 2.0 * math.pi * n / 3.0
+        out, along = np.array([math.cos(psi), math.sin(psi)]), np.array([-math.sin(psi), math.cos(psi)])
+        p = 9 + 3 * n
+        row = np.zeros(18)
+        push = -math.cos(alpha) * along + math.sin(alpha) * out
+        row[p : p + 2], row[p + 2], row[6:8], row[8] = push, -base[2], -push, base[3]
+        rows.append(row)
+    for row, value in zip(rows, stiffness, strict=True):
+        k += value * np.outer(row, row)
+    k[[0, 1, 3, 4, 6, 7], [0, 1, 3, 4, 6, 7]] += 3e8
+    mass = [1.0, 1.0, 5e-4, 4.0, 4.0, 2e-2, 3.0, 3.0, 4e-2] + [0.5, 0.5, 4e-4] * 3
+    return np.diag(mass), k, np.array(rows)
+
+
+def random_set(draw: random.Random, kind: str) -> StageGears:
+    """Gears of a kind of set with teeth that need not run: fits and ratios are matters of numbers alone."""
+    small, large = draw.randint(5, 19), draw.randint(20, 41)
+    first, second, other = draw.randint(5, 19), draw.randint(5, 19), draw.randint(42, 59)
+    return {
+        "simple": lambda: simple_gears(small, first, large),
+        "stepped": lambda: stepped_gears(small, first, second, large),
+        "double": lambda: double_gears(small, first, second, large),
+        "Ravigneaux": lambda: ravigneaux_gears(small, first, second, 7, large),
+        "two rings": lambda: stepped_gears(small, first, second, large, first_ring=other),
+    }[kind]()
+
+
+SET_KINDS = ("simple", "stepped", "double", "Ravigneaux", "two rings")
+
+
+def places_by_trial(gears: StageGears) -> np.ndarray:
+    """All places of a branch in one turn [turns], found by rolling it around the sun after every insertion of teeth.
+
+    A branch whose bodies are put in at every tooth one after the other is rolled around the first central gear until
+    the last mesh is in order, and kept if all others are.
+    """
+    teeth, meshes = gears.teeth, gears.meshes
+    together = dict(gears.bodies) | {b: a for a, b in gears.bodies}
+    free = sorted({g for mesh in meshes for g in mesh[:2]} - {*gears.shafts})
+    bodies = [g for g in free if g not in together or g < together[g]]
+    found = []
+    for inserted in itertools.product(*(range(teeth[body]) for body in bodies)):
+        # turn of every gear as offset + slope * place, seen from the branch: central gears turn back
+        turn = {g: (0.0, -1.0) for g in gears.shafts}
+        waiting, checks = list(meshes), []
+        while waiting:
+            mesh = next(m for m in waiting if m[0] in turn or m[1] in turn)
+            waiting.remove(mesh)
+            first, second, sense = mesh
+            if first in turn and second in turn:
+                checks.append(mesh)
+                continue
+            known, new = (first, second) if first in turn else (second, first)
+            offset, slope = (sense * teeth[known] / teeth[new] * value for value in turn[known])
+            teeth_in = inserted[bodies.index(new if new in bodies else together[new])]
+            turn[new] = offset + teeth_in / teeth[new], slope
+            if new in together:
+                turn[together[new]] = turn[new]
+        rows = [
+            [teeth[a] * x - sense * teeth[b] * y for x, y in zip(turn[a], turn[b], strict=True)]
+            for a, b, sense in checks
+        ]
+        offset, slope = rows[-1]
+        low, high = sorted((offset, offset + slope))
+        at = (np.arange(math.ceil(low - 1e-9), high + 1e-9) - offset) / slope
+        for offset, slope in rows[:-1]:
+            at = at[np.abs(offset + slope * at - np.rint(offset + slope * at)) < 1e-7]
+        found.append(at)
+    places = np.sort(np.concatenate(found))
+    places = places[(places > -1e-9) & (places < 1.0 - 1e-7)]
+    return places[np.diff(places, prepend=-1.0) > 1e-7]

@@ -1,12 +1,13 @@
 """Tests of the angles at which planets fit, of their marks, and of Willis' equation of any planetary set."""
 
-import itertools
 import math
 import random
 from fractions import Fraction
 
 import numpy as np
 import pytest
+from planet_gearboxes import SET_KINDS as KINDS
+from planet_gearboxes import places_by_trial, random_set
 
 from femgear.errors import GeometryError
 from femgear.gears.planet_assembly import (
@@ -28,65 +29,6 @@ from femgear.gears.power_flow import (
     stepped_condition,
 )
 from femgear.gears.shaft_graph import StageGears
-
-
-def random_set(draw: random.Random, kind: str) -> StageGears:
-    """Gears of a kind of set with teeth that need not run: fits and ratios are matters of numbers alone."""
-    small, large = draw.randint(5, 19), draw.randint(20, 41)
-    first, second, other = draw.randint(5, 19), draw.randint(5, 19), draw.randint(42, 59)
-    return {
-        "simple": lambda: simple_gears(small, first, large),
-        "stepped": lambda: stepped_gears(small, first, second, large),
-        "double": lambda: double_gears(small, first, second, large),
-        "Ravigneaux": lambda: ravigneaux_gears(small, first, second, 7, large),
-        "two rings": lambda: stepped_gears(small, first, second, large, first_ring=other),
-    }[kind]()
-
-
-KINDS = ("simple", "stepped", "double", "Ravigneaux", "two rings")
-
-
-def places_by_trial(gears: StageGears) -> np.ndarray:
-    """All places of a branch in one turn [turns], found by rolling it around the sun after every insertion of teeth.
-
-    A branch whose bodies are put in at every tooth one after the other is rolled around the first central gear until
-    the last mesh is in order, and kept if all others are.
-    """
-    teeth, meshes = gears.teeth, gears.meshes
-    together = dict(gears.bodies) | {b: a for a, b in gears.bodies}
-    free = sorted({g for mesh in meshes for g in mesh[:2]} - {*gears.shafts})
-    bodies = [g for g in free if g not in together or g < together[g]]
-    found = []
-    for inserted in itertools.product(*(range(teeth[body]) for body in bodies)):
-        # turn of every gear as offset + slope * place, seen from the branch: central gears turn back
-        turn = {g: (0.0, -1.0) for g in gears.shafts}
-        waiting, checks = list(meshes), []
-        while waiting:
-            mesh = next(m for m in waiting if m[0] in turn or m[1] in turn)
-            waiting.remove(mesh)
-            first, second, sense = mesh
-            if first in turn and second in turn:
-                checks.append(mesh)
-                continue
-            known, new = (first, second) if first in turn else (second, first)
-            offset, slope = (sense * teeth[known] / teeth[new] * value for value in turn[known])
-            teeth_in = inserted[bodies.index(new if new in bodies else together[new])]
-            turn[new] = offset + teeth_in / teeth[new], slope
-            if new in together:
-                turn[together[new]] = turn[new]
-        rows = [
-            [teeth[a] * x - sense * teeth[b] * y for x, y in zip(turn[a], turn[b], strict=True)]
-            for a, b, sense in checks
-        ]
-        offset, slope = rows[-1]
-        low, high = sorted((offset, offset + slope))
-        at = (np.arange(math.ceil(low - 1e-9), high + 1e-9) - offset) / slope
-        for offset, slope in rows[:-1]:
-            at = at[np.abs(offset + slope * at - np.rint(offset + slope * at)) < 1e-7]
-        found.append(at)
-    places = np.sort(np.concatenate(found))
-    places = places[(places > -1e-9) & (places < 1.0 - 1e-7)]
-    return places[np.diff(places, prepend=-1.0) > 1e-7]
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from planet_gearboxes import known_set, loaded, members, pair, planet, simple_set
+from planet_gearboxes import known_set, loaded, members, pair, planet, simple_set, springs_by_hand, stepped_set
 from scipy.linalg import eigh
 
 from femgear.errors import CaseError
@@ -84,63 +84,10 @@ def test_phases_are_those_of_the_planetary_set(torque, speed):
     assert np.abs(apart - np.rint(apart)).max() < 1e-9
 
 
-STEPPED = (24, 57, 27, 108)
-
-
-def stepped_set(motions="plane", stiffness=(4e8, 4e8, 4e8, 3e8, 3e8, 3e8)):
-    """Stepped planets on three pins, every mesh with its own stiffness."""
-    sun, first, second, ring = STEPPED
-    tables = members(sun=(1.0, 5e-4), carrier=(4.0, 2e-2), ring=(3.0, 4e-2)) | {"pair": []}
-    for n in range(3):
-        planet(tables, f"p{n}", 81e-3, 2.0 * math.pi * n / 3.0)
-    for n in range(3):
-        mesh = {"stiffness": f"{stiffness[n]!r} N/m"}
-        tables["pair"].append(pair(f"sun-{n}", ("sun", f"p{n}"), (sun, first), 2e-3, mesh=mesh))
-    for n in range(3):
-        mesh = {"stiffness": f"{stiffness[3 + n]!r} N/m"}
-        tables["pair"].append(pair(f"{n}-ring", (f"p{n}", "ring"), (second, ring), 2e-3, internal=True, mesh=mesh))
-    return loaded(tables, 100.0, 1000.0, "carrier", ("ring",), motions)
-
-
-def by_hand(stiffness):
-    """Mass and stiffness of the same set from its lines of action: sun, carrier, ring, planets, each x, y and turn.
-
-    And the approaches (6, 18) of its meshes.
-    """
-    alpha, a = math.radians(20.0), 81e-3
-    base = [1e-3 * z * math.cos(alpha) for z in STEPPED]
-    rows, k = [], np.zeros((18, 18))
-    for n in range(3):
-        psi = 2.0 * math.pi * n / 3.0
-        out, along = np.array([math.cos(psi), math.sin(psi)]), np.array([-math.sin(psi), math.cos(psi)])
-        p = 9 + 3 * n
-        row = np.zeros(18)
-        push = math.cos(alpha) * along + math.sin(alpha) * out
-        row[0:2], row[2], row[p : p + 2], row[p + 2] = push, base[0], -push, base[1]
-        rows.append(row)
-        for way in np.eye(2):  # the pin moves with the carrier
-            pin = np.zeros(18)
-            pin[p : p + 2], pin[3:5], pin[5] = way, -way, -a * along @ way
-            k += 3e8 * np.outer(pin, pin)
-    for n in range(3):
-        psi = 2.0 * math.pi * n / 3.0
-        out, along = np.array([math.cos(psi), math.sin(psi)]), np.array([-math.sin(psi), math.cos(psi)])
-        p = 9 + 3 * n
-        row = np.zeros(18)
-        push = -math.cos(alpha) * along + math.sin(alpha) * out
-        row[p : p + 2], row[p + 2], row[6:8], row[8] = push, -base[2], -push, base[3]
-        rows.append(row)
-    for row, value in zip(rows, stiffness, strict=True):
-        k += value * np.outer(row, row)
-    k[[0, 1, 3, 4, 6, 7], [0, 1, 3, 4, 6, 7]] += 3e8
-    mass = [1.0, 1.0, 5e-4, 4.0, 4.0, 2e-2, 3.0, 3.0, 4e-2] + [0.5, 0.5, 4e-4] * 3
-    return np.diag(mass), k, np.array(rows)
-
-
 def test_stepped_planets_have_the_modes_of_their_springs():
     stiffness = (4e8, 4.2e8, 3.9e8, 3e8, 3.1e8, 2.8e8)
     modes = solve_gearbox_modes(solve_deflection(read_case(stepped_set(stiffness=stiffness)))).modes
-    mass, k, _ = by_hand(stiffness)
+    mass, k, _ = springs_by_hand(stiffness)
     kept = [i for i in range(18) if i != 8]  # the ring is held
     expected = np.sqrt(np.maximum(eigh(k[np.ix_(kept, kept)], mass[np.ix_(kept, kept)], eigvals_only=True), 0.0))
     expected /= 2.0 * math.pi
@@ -150,7 +97,7 @@ def test_stepped_planets_have_the_modes_of_their_springs():
 def test_stepped_planets_share_the_load_as_their_springs_do():
     stiffness = (4e8, 4.4e8, 3.6e8, 3e8, 3.1e8, 2.8e8)
     found = solve_deflection(read_case(stepped_set(stiffness=stiffness)))
-    _, k, rows = by_hand(stiffness)
+    _, k, rows = springs_by_hand(stiffness)
     load = np.zeros(18)
     load[2], load[5] = 100.0, -100.0 * (1.0 + 57 * 108 / (24 * 27))
     kept = [i for i in range(18) if i not in (2, 8)]  # the sun's turn is free: it is taken as zero

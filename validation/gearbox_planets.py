@@ -1,0 +1,89 @@
+"""Planets of any kind in gearboxes: places by trial, Willis' equation by teeth, modes and forces by hand, phases."""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+from planet_gearboxes import (
+    SET_KINDS,
+    known_set,
+    places_by_trial,
+    random_set,
+    simple_set,
+    springs_by_hand,
+    stepped_set,
+)
+from scipy.linalg import eigh
+
+from femgear.gears.planet_assembly import assembly_step
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.modes import solve_gearbox_modes
+from femgear.trains.gearbox.response import by_order, solve_gearbox_response
+from femgear.trains.reading import read_case
+from validation.rows import Row, at_most, counted
+
+STAGE = "the same set as a planetary stage"
+SPRINGS = "lines of action by hand"
+
+
+def places() -> list[Row]:
+    """Places of planets in random sets, by trial of all teeth."""
+    rows = []
+    for kind in SET_KINDS:
+        draw, agreed = random.Random(f"rows {kind}"), 0
+        for _ in range(100):
+            gears = random_set(draw, kind)
+            step, found = assembly_step(gears), places_by_trial(gears)
+            every = np.arange(step.denominator) / step.denominator
+            agreed += len(found) == len(every) and bool(np.abs(found - every).max() < 1e-9)
+        text = "random sets whose places are found"
+        rows.append(counted(f"{kind} sets", "planets rolled around, all teeth tried", text, 100, agreed))
+    return rows
+
+
+def simple_planets() -> list[Row]:
+    """Planets as shafts against the planets of a planetary stage."""
+    rows = []
+    for motions in ("space", "plane", "rotation"):
+        own, known = (solve_deflection(read_case(make(motions=motions))) for make in (simple_set, known_set))
+        force = np.abs(own.mesh_force / known.mesh_force - 1.0).max()
+        rows.append(at_most(f"27/39/105, {motions}", STAGE, "mesh forces, largest relative difference", 1e-9, force))
+        one, other = (solve_gearbox_modes(found).modes.frequency for found in (own, known))
+        away = np.abs(one - other).max() / other.max()
+        rows.append(at_most(f"27/39/105, {motions}", STAGE, "frequencies over the highest", 1e-9, away))
+    mesh = {"stiffness": "4e8 N/m", "contact_ratio": 1.63, "low_share": 0.999}
+    for torque in (100.0, -80.0):
+        lines = []
+        for make in (simple_set, known_set):
+            sizes = {"teeth": (28, 38, 104), "fixed": "carrier", "mesh": mesh, "torque": torque, "motions": "plane"}
+            found = solve_deflection(read_case(make(**sizes) | {"dynamics": {"mesh_harmonics": 5}}))
+            response = solve_gearbox_response(found, [70.0])
+            every = by_order(response, {stage.name: stage.motion for stage in response.stages})[0]
+            lines.append(every[:9, -5:])
+        away = np.abs(lines[0] - lines[1]).max() / np.abs(lines[1]).max()
+        text = "bearing forces at five harmonics over the largest"
+        note = "Pairs are solved one by one: the gate is what 0.1 % of stiffness that fluctuates may do."
+        rows.append(at_most(f"28/38/104, carrier stands, {torque:g} N m", STAGE, text, 3e-3, away, note=note))
+    return rows
+
+
+def stepped_planets() -> list[Row]:
+    """Stepped planets of unequal meshes against springs set up by hand."""
+    stiffness = (4e8, 4.4e8, 3.6e8, 3e8, 3.1e8, 2.8e8)
+    found = solve_deflection(read_case(stepped_set(stiffness=stiffness)))
+    mass, k, rows = springs_by_hand(stiffness)
+    load, motion = np.zeros(18), np.zeros(18)
+    load[2], load[5] = 100.0, -100.0 * (1.0 + 57 * 108 / (24 * 27))
+    kept = [i for i in range(18) if i not in (2, 8)]
+    motion[kept] = np.linalg.solve(k[np.ix_(kept, kept)], load[kept])
+    force = np.abs(found.mesh_force / (np.array(stiffness) * (rows @ motion)) - 1.0).max()
+    free = np.ix_(*[[i for i in range(18) if i != 8]] * 2)
+    hertz = np.sqrt(np.maximum(eigh(k[free], mass[free], eigvals_only=True), 0.0)) / (2.0 * math.pi)
+    away = np.abs(solve_gearbox_modes(found).modes.frequency - hertz).max() / hertz.max()
+    case = "stepped 24/57/27/108, three planets"
+    return [
+        at_most(case, SPRINGS, "mesh forces, largest relative difference", 1e-9, force),
+        at_most(case, SPRINGS, "frequencies over the highest", 1e-9, away),
+    ]
