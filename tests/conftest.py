@@ -33,6 +33,15 @@ if pytest.approx(1e-20) == 2e-20:
 TESTS = Path(__file__).parent
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items):
+    """Mark tests slow whose lines quicker ones run too, by the list of validation/tools/slow_tests.py."""
+    listed = set((TESTS / "slow_tests.txt").read_text(encoding="utf-8").split("\n"))
+    for item in items:
+        if item.nodeid in listed and not item.get_closest_marker("decisive"):
+            item.add_marker("slow")
+
+
 def pytest_collection_finish():
     """Test modules stay: no collection need walk them again."""
     gc.freeze()

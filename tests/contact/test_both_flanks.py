@@ -17,6 +17,8 @@ from femgear.gears.gear import half_thickness_angle
 from femgear.gears.kinematics import orientations
 from validation.planetary import reference_set
 
+pytestmark = pytest.mark.decisive
+
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
 BOTH = CycleOptions(both_flanks=True)

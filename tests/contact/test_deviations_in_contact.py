@@ -14,6 +14,8 @@ from femgear.gears.deviations import Runout, common_period, no_deviations
 from femgear.gears.modifications import FlankForm, TipRelief
 from validation.planetary import reference_set
 
+pytestmark = pytest.mark.decisive
+
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
 

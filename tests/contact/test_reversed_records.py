@@ -13,6 +13,8 @@ from femgear.gears.deviations import Runout, common_period, mirrored_deviations,
 from femgear.gears.planetary import mirrored_set
 from validation.planetary import reference_set
 
+pytestmark = pytest.mark.decisive
+
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
 POSITIONS = 2

@@ -14,6 +14,8 @@ from femgear.gears.kinematics import mesh_normals
 from femgear.gears.planetary import equal_planet_angles
 from validation.planetary import reference_set
 
+pytestmark = pytest.mark.decisive
+
 STEEL = Material(206e9, 0.3, 7850.0)
 TORQUE = 100.0
 GAPS = [3e-6, 0.0, 1e-6]

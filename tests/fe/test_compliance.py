@@ -55,6 +55,7 @@ def whole(sector, gear):
     return rotated_copies(sector, gear.teeth)
 
 
+@pytest.mark.decisive
 def test_sector_compliance_is_that_of_the_whole_gear(gear, sector, whole):
     """Displacements on several teeth for loads on both flanks of tooth 0: to 1e-10 of the largest."""
     K = stiffness(sector, STEEL, state="plane strain", thickness=THICKNESS)

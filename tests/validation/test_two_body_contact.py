@@ -12,6 +12,8 @@ from validation.mapped import mapped_grid
 from validation.mortar import boundary_dofs, make_surface, mortar_contact
 from validation.planetary import reference_set
 
+pytestmark = pytest.mark.decisive
+
 STEEL = Material(206e9, 0.3, 7850.0)
 
 

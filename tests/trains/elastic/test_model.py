@@ -32,6 +32,8 @@ from femgear.trains.elastic.model import (
     ring_model,
 )
 
+pytestmark = pytest.mark.decisive
+
 STEEL = Material(206e9, 0.3, 7850.0)
 SUN = SimpleNamespace(mass=0.22, inertia=1e-4, support_stiffness=5e7)
 CARRIER = SimpleNamespace(mass=3.0, inertia=6e-3, support_stiffness=2e8)
