@@ -27,7 +27,7 @@ def test_quick_ones_promises_and_those_without_lines_stay():
 
 
 def test_the_list_names_tests_of_files_that_are_there():
-    listed = PAGE.read_text(encoding="utf-8").split()
+    listed = PAGE.read_text(encoding="utf-8").splitlines()
     assert listed == sorted(set(listed)) and len(listed) > 50
     missing = {name.split("::")[0] for name in listed if not (PAGE.parents[1] / name.split("::")[0]).exists()}
     assert not missing
