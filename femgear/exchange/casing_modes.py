@@ -204,8 +204,10 @@ def _without_binary(content: bytes) -> bytes:
     while head := _BINARY.search(content):
         end = head.end()
         for _ in range(int(head[1])):
-            end = content.index(b"\n", end) + 1
-        end = content.index(b"    -1", end + int(head[2])) + len(b"    -1")
+            end = content.find(b"\n", end) + 1 or len(content)
+        end = content.find(b"    -1", end + int(head[2])) + len(b"    -1")
+        if end < len(b"    -1"):
+            raise ValueError("it breaks off within a binary dataset")
         content = content[: head.start()] + content[end:].lstrip(b" ").removeprefix(b"\r").removeprefix(b"\n")
     return content
 

@@ -37,6 +37,8 @@ _KINDS = (*_ARRAYS, *_PUNCH, ".op4")
 _DIRECTIONS = "x", "y", "z"
 # Smallest eigenvalue of a matrix, of unit diagonal, from which it is positive; part of it that digits of a file leave.
 _POSITIVE, _ROUNDING = 1e-12, 1e-6
+# Entry of the mass matrix over its largest one of a coordinate without mass.
+_MASSLESS = 1e-14
 # Part of the square of the first elastic natural frequency with which a rigid motion may swing: 1 % of the frequency.
 _FREE = 1e-4
 
@@ -178,10 +180,42 @@ def superelement_of(
     scale = np.ones(len(matrices[0]))
     scale[[at for (_, component), at in row.items() if component > 3]] = length
     K, M = (0.5 * mass * np.outer(scale, scale) * np.real(matrix + matrix.T) for matrix in matrices)
+    K, M, row = _without_massless(K, M, row, {node.number for node in table})
     places = dict(place) | {node.number: node.position for node in table if node.position is not None}
     _check_nodes(table, row, places)
     in_metres = {number: length * x for number, x in places.items()}
     return Superelement(K, M, row, in_metres, table, (apart[0], apart[1]))
+
+
+def _without_massless(
+    stiffness: np.ndarray, mass: np.ndarray, row: Mapping[tuple[int, int], int], kept: set[int]
+) -> tuple[np.ndarray, np.ndarray, dict[tuple[int, int], int]]:
+    """Condense coordinates that no mass moves with, but those of the nodes of the table; nothing loads them.
+
+    Exactly, by their stiffness (R. J. Guyan, AIAA J. 3, 1965, 380): such as those of nodes at the middle of edges, or
+    rotations of nodes of solids. CaseError: coordinates that neither mass nor stiffness holds (E-MECHANISM).
+    """
+    size = np.abs(mass).max(axis=1)
+    of_table = [at for (number, _), at in row.items() if number in kept]
+    light = np.setdiff1d(np.flatnonzero(size <= _MASSLESS * size.max()), of_table)
+    if not len(light):
+        return stiffness, mass, dict(row)
+    heavy = np.setdiff1d(np.arange(len(mass)), light)
+    inner = stiffness[np.ix_(light, light)]
+    scale = np.sqrt(np.abs(np.diag(inner)))
+    if not (scale > 0.0).all() or np.linalg.cond(inner / np.outer(scale, scale)) > 1.0 / _POSITIVE:
+        raise CaseError(
+            "coordinates without mass are held by nothing",
+            code="E-MECHANISM",
+            key="file",
+            limit="stiffness or mass on every coordinate",
+            remedy="leave these coordinates out of the export, or give them mass",
+        )
+    across = stiffness[np.ix_(light, heavy)]
+    condensed = stiffness[np.ix_(heavy, heavy)] - across.T @ linalg.solve(inner, across, assume_a="sym")
+    number = dict(zip(heavy.tolist(), range(len(heavy)), strict=True))
+    rows = {label: number[at] for label, at in row.items() if at in number}
+    return 0.5 * (condensed + condensed.T), mass[np.ix_(heavy, heavy)], rows
 
 
 def _check_real(matrices: Sequence[np.ndarray]) -> None:

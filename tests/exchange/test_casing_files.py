@@ -323,7 +323,7 @@ ONE[2, 3] = 1.0
         (
             {"cards": lambda t: t.replace("*       " + card(0.0), f"*       {card(0.0)}{2:16d}", 1)},
             {"name": "ring.pch"},
-            "E-CHOICE",
+            "E-KEY-MISSING",
         ),
     ],
 )

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from femgear.errors import CaseError
-from femgear.exchange.casing_modes import modes_of_matrices
+from femgear.exchange.casing_modes import modes_of_matrices, modes_of_universal_file
 from femgear.exchange.node_tables import Node
 
 ROW = {(1, 1): 0, (2, 1): 1}
@@ -53,3 +53,13 @@ def test_a_casing_that_nothing_holds_is_refused():
     with pytest.raises(CaseError) as error:
         modes_of_matrices(chain((0.0, 2.0, 0.0), (0.5, 0.5)), ROW, {}, nodes("ring", "sensor A"), 1.0, 1.0)
     assert error.value.code == "E-MECHANISM" and "hold the casing" in error.value.remedy
+
+
+def test_a_binary_dataset_that_breaks_off_is_told_as_such(tmp_path):
+    head = b"    -1\n    58b     1     2          11        4096     0     0           0           0\n"
+    path = tmp_path / "a.uff"
+    for data in (head + b"NONE\n" * 11 + b"\0" * 100, head + b"NONE\n" * 3):
+        path.write_bytes(data)
+        with pytest.raises(CaseError, match="it breaks off within a binary dataset") as refused:
+            modes_of_universal_file(path, nodes("ring"), 1.0, 1.0)
+        assert refused.value.code == "E-FILE"

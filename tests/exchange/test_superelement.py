@@ -182,6 +182,24 @@ def test_a_node_off_its_place_makes_turns_carry_stiffness(tmp_path):
     assert "about" in problem.message
 
 
+def test_coordinates_without_mass_are_condensed_exactly(tmp_path, body):
+    """Two more coordinates of no node, without mass, whose stiffness leaves that of the others as it was."""
+    rng = np.random.default_rng(3)
+    count = len(body.stiffness)
+    inner, across = 1e8 * np.array([[2.0, -0.5], [-0.5, 1.0]]), 1e7 * rng.normal(size=(2, count))
+    stiffness = np.block([[body.stiffness + across.T @ np.linalg.solve(inner, across), across.T], [across, inner]])
+    mass = np.zeros_like(stiffness)
+    mass[:count, :count] = body.mass
+    other = written(tmp_path, [stiffness, mass])
+    assert apart(other.stiffness, body.stiffness) <= 1e-9 and (other.mass == body.mass).all()
+    assert other.row == body.row
+    loose = stiffness.copy()
+    loose[count:], loose[:, count:] = 0.0, 0.0
+    with pytest.raises(CaseError, match="without mass are held by nothing") as refused:
+        written(tmp_path, [loose, mass])
+    assert refused.value.code == "E-MECHANISM"
+
+
 def test_all_faults_come_at_once(tmp_path):
     write_casing_file(tmp_path, PATHS, [m.copy() for m in body_matrices_of(PATHS)])
     text = (tmp_path / "nodes.csv").read_text().replace("seat B", "seat A")
