@@ -1,5 +1,7 @@
 """Drafts of sets with planets of any kind: they assemble, turn as Willis says, and are loaded as usual."""
 
+import math
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from femgear.trains.drafts import ToothForm, new_case
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.planet_shafts import pair_phases
 from femgear.trains.gearbox.power import gearbox_flow
+from femgear.trains.gearbox.solid_bodies import gearbox_bodies
 from femgear.trains.planets_draft import PLANET_KINDS
 from femgear.trains.reading import parse_case, with_values
 
@@ -68,3 +71,27 @@ def test_stepped_planets_may_have_two_modules():
 def test_what_makes_no_set_is_refused(kind, options, words):
     with pytest.raises(CaseError, match=words):
         new_case(kind, **options)
+
+
+@pytest.mark.parametrize("kind", PLANET_KINDS)
+def test_in_the_picture_every_tooth_stands_in_a_gap_of_its_mate(kind):
+    """In closed chains too, where the last mesh has no freedom left."""
+    case = parse_case(new_case(kind))
+    gears = [body for body in gearbox_bodies(case, {}) if body.kind == "gear"]
+    for stage in case.pair:
+        mates = []
+        for number, (shaft, place) in enumerate(zip(stage.shafts, stage.positions, strict=True), start=1):
+            middle, teeth = case.shaft_named(shaft).start + place, stage.teeth[f"gear_{number}"]["teeth"]
+            on_shaft = [gear for gear in gears if gear.member == shaft and gear.teeth == teeth]
+            mates.append(min(on_shaft, key=lambda gear: abs(sum(gear.ends) / 2 - middle)))
+        first, second = mates
+        line = math.atan2(second.axis[1] - first.axis[1], second.axis[0] - first.axis[0])
+        touch = line + math.pi if second.internal else line
+        passed = first.teeth * (touch - first.angle)
+        passed += second.teeth * ((second.angle - touch) if second.internal else (touch + math.pi - second.angle))
+        away = passed / (2.0 * math.pi) - 0.5
+        assert away == pytest.approx(round(away), abs=1e-8), stage.name
+    if kind == "ravigneaux":
+        assert {gear.angle for gear in gears if gear.member == "long planet 1"} == {
+            next(gear.angle for gear in gears if gear.member == "long planet 1")
+        }

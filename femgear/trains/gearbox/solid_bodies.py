@@ -244,11 +244,12 @@ def _of_pair(case: GearboxCase, pair: PairSection, drawn: dict[tuple[str, float,
     keys = [(s.name, round(z, 6), count) for s, z, count in zip(shafts, middles, sizes.teeth, strict=True)]
     first, second = (angle[0] for angle in angles[:2]) if angles else (0.0, 0.0)
     ratio = hands[1] * sizes.teeth[0] / sizes.teeth[1]
-    # a gear that is there already turns its mate into its gaps
-    if keys[0] in drawn:
-        first, second = drawn[keys[0]], second + ratio * (drawn[keys[0]] - first)
-    elif keys[1] in drawn:
-        first, second = first + (drawn[keys[1]] - second) / ratio, drawn[keys[1]]
+    # a gear that is there already turns its mate into its gaps, as one of equal teeth on the shaft of a planet
+    there = [drawn.get(key, _as_long(key, drawn) if pair.carrier is not None else None) for key in keys]
+    if there[0] is not None:
+        first, second = there[0], second + ratio * (there[0] - first)
+    elif there[1] is not None:
+        first, second = first + (there[1] - second) / ratio, there[1]
     for number, (name, shaft, middle) in enumerate(zip(pair.shafts, shafts, middles, strict=True)):
         if keys[number] in drawn:
             continue
@@ -258,6 +259,11 @@ def _of_pair(case: GearboxCase, pair: PairSection, drawn: dict[tuple[str, float,
         internal = sizes.internal and number == 1
         teeth = _Teeth(gears[number], number, pitch, hands[number], angle, internal)
         yield _gear(_Seat(words, name, (shaft.axis[0], shaft.axis[1]), middle), sizes, teeth)
+
+
+def _as_long(key: tuple[str, float, int], drawn: dict[tuple[str, float, int], float]) -> float | None:
+    """Angle of a gear of as many teeth on the same shaft."""
+    return next((angle for (shaft, _, teeth), angle in drawn.items() if (shaft, teeth) == (key[0], key[2])), None)
 
 
 def _of_set(case: GearboxCase, stage: BoxPlanetarySection, places: dict[str, np.ndarray]) -> Iterator[SpaceBody]:
