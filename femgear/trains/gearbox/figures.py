@@ -32,7 +32,9 @@ _BESIDE = 6.0  # distance of a name beside its arrow [points]
 _NAME_HEIGHT = 0.035  # of the names of lines of excitation, over that of the picture
 _STEP, _MOST_STEPS = 4.0, 60  # by which names are pushed on [points], and how often
 _NEAR = 16  # first places of a name, which are near enough to its arrow to leave a curve for
+_MOST_NAMED = 8  # bearings that are named in a plane: of many planets no more names find room
 _LEAST = 0.04  # force that is drawn, over the largest
+_WIDE_NAME = 40  # letters of which two names have room beside one another
 _STILL = 1e-12  # motion aside that is rounding [m]
 _MOST_MODES = 24
 _EQUAL = 1e-6  # difference of two frequencies of one pair, over them
@@ -59,6 +61,7 @@ def deflected_shafts(deflection: xr.Dataset) -> Figure | None:
             own = np.flatnonzero(member == shaft)
             own = own[np.argsort(place[own, 2])]
             style = {"color": COLOURS[number % len(COLOURS)], "marker": "o" if len(own) == 1 else "."}
+            style["linestyle"] = _DASHES[number // len(COLOURS) % len(_DASHES)]
             ax.plot(1e3 * place[own, 2], 1e6 * moved[own, way], linewidth=2.2, label=str(shaft), **style)
         ax.axhline(0.0, color=GREY, linewidth=0.8)
         if seats := seat_curve(one, way):
@@ -88,7 +91,11 @@ def _part_names(figure: Figure) -> None:
             spots = [*_spots(text.xyann[1], text.get_verticalalignment())]
             boxes = [_moved(text, spot) for spot in spots]
             clear = [i for i, box in enumerate(boxes) if not any(box.overlaps(other) for other in (*arrows, *placed))]
-            inside = [i for i in clear if ax.bbox.x0 <= boxes[i].x0 and boxes[i].x1 <= ax.bbox.x1]
+            inside = [
+                i
+                for i in clear
+                if ax.bbox.x0 <= boxes[i].x0 and boxes[i].x1 <= ax.bbox.x1 and boxes[i].y1 <= figure.bbox.y1
+            ]
             free = [i for i in inside if not any(curve.intersects_bbox(boxes[i], filled=False) for curve in curves)]
             near = [i for i in free if i < _NEAR]
             chosen = next(iter((*near, *inside, *clear)), 0)
@@ -114,9 +121,10 @@ def _spots(behind: float, va: str) -> Iterator[tuple[tuple[float, float], str, s
 
 
 def _arrows(ax, one: xr.Dataset, way: int) -> None:
-    """Draw the forces of the bearings on their shafts, the longest one `_ARROW` points long."""
+    """Draw the forces of the bearings on their shafts, the longest one `_ARROW` points long, and name the largest."""
     force, place, moved = (one[name].values for name in ("bearing_force", "bearing_place", "bearing_displacement"))
     largest = float(np.abs(force[:, :2]).max(initial=0.0))
+    named = np.sort(np.abs(force[:, way]))[::-1][:_MOST_NAMED].min(initial=np.inf)
     for name, vector, at, motion in zip(one["bearing"].values, force, place, moved, strict=True):
         if not largest or abs(vector[way]) < _LEAST * largest:
             continue
@@ -124,6 +132,8 @@ def _arrows(ax, one: xr.Dataset, way: int) -> None:
         tip = (1e3 * at[2], 1e6 * motion[way])
         style = {"arrowstyle": "-|>", "color": BLACK, "linewidth": 1.6, "shrinkA": 0, "shrinkB": 0}
         ax.annotate("", tip, (0.0, -length), textcoords="offset points", arrowprops=style)
+        if abs(vector[way]) < named:
+            continue
         ax.annotate(
             f"{name}\n{_force_text(abs(vector[way]))}",
             tip,
@@ -163,7 +173,8 @@ def load_patterns(deflection: xr.Dataset) -> Figure | None:
         ax.plot(1e3 * height[i], 1e-3 * load[i], linewidth=2.0, label=text, **style)
     ax.set_ylim(bottom=0.0)
     label(ax, "place on the width, from its middle [mm]", "load per width [N/mm]")
-    legend_below(figure, ax, columns=2)
+    longest = max((len(str(line.get_label())) for line in ax.lines), default=0)
+    legend_below(figure, ax, columns=2 if longest <= _WIDE_NAME else 1)
     return figure
 
 

@@ -28,6 +28,19 @@ def test_every_shaft_has_a_curve_in_both_planes_and_bearings_their_forces(data):
         assert {text.get_text().split("\n")[0] for text in ax.texts if text.get_text()} == {"A", "B", "C", "D"}
 
 
+def test_of_many_bearings_those_with_the_largest_forces_are_named(data):
+    from femgear.trains.gearbox import figures
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(figures, "_MOST_NAMED", 2)
+        figure = deflected_shafts(data[0])
+    force = np.abs(data[0]["bearing_force"].values[0])
+    for way, ax in enumerate(figure.axes):
+        expected = {"ABCD"[i] for i in np.argsort(force[:, way])[-2:]}
+        named = {text.get_text().split("\n")[0] for text in ax.texts if text.get_text()}
+        assert named <= expected and named
+
+
 def test_shafts_that_stay_where_they_are_have_no_picture(data):
     still = data[0].copy(deep=True)
     still["displacement"][..., :2] = 1e-15
