@@ -31,14 +31,20 @@ _LEFT_OUT = {
 def fault_findings(case: Any) -> Iterator[Finding]:
     """List what is left out of the faults of a case, and those that nothing shows."""
     gears, back = planetary_set(case), case.torque_on_first_gear() < 0.0
+    yield from left_out_of_faults(case)
     for key, fault in keyed_faults(case, gears):
-        if (text := _LEFT_OUT.get(type(fault))) is not None:
-            yield Finding("W-FAULT", key, text, remedy="take sizes with that margin; orders and places are exact")
         if fault.flank is not None and fault.flank not in _carrying(gears, fault, back=back):
             looked = ", and back flanks are not looked at" if not case.static.back_flanks else ""
             text = f"this flank carries nothing under this torque{looked}"
             yield Finding("W-FAULT", key, text, remedy="give the fault to the other flank, or turn the torque round")
     yield from _unseen(case, gears)
+
+
+def left_out_of_faults(case: Any) -> Iterator[Finding]:
+    """List what the model leaves out of the faults of a case."""
+    for key, fault in keyed_faults(case, planetary_set(case)):
+        if (text := _LEFT_OUT.get(type(fault))) is not None:
+            yield Finding("W-FAULT", key, text, remedy="take sizes with that margin; orders and places are exact")
 
 
 def _carrying(gears: GearSet, fault: ToothFault, *, back: bool) -> set[int]:

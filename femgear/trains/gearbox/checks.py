@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 
+from femgear.case.fault_sections import no_faults
 from femgear.case.load_spectrum import check_running_shares
 from femgear.case.messages import no_such
 from femgear.case.quantities import LENGTH
@@ -41,6 +42,7 @@ from femgear.trains.gearbox.transient_case import transient_problems
 # Entries that speeds and torques hang on.
 _OF_THE_FLOW = ("pair", "planetary", "coupling", "operation", "load")
 _OR_BODY = ", or a shaft that is one rigid body"
+_NO_CONTACT = "without contact no flank is looked at, and so no fault of a tooth"
 """What a torque may act on beside a load."""
 _ROLLER = ("rolling_elements", "element_diameter", "pitch_diameter")
 _SPRINGS = ("radial", "axial", "tilt", "torsional")
@@ -416,6 +418,8 @@ def _stages(case: GearboxCase) -> Iterator[CaseError]:
             try:
                 pair = isinstance(stage, PairSection)
                 yield from _pair(case, stage, key) if pair else _planetary(case, stage, key)
+                if stage.teeth is not None and not case.deflection.contact:
+                    no_faults(teeth_of(stage), _NO_CONTACT, "leave deflection.contact out")
             except FemgearError as error:
                 where = f"{key}.{'teeth' if stage.teeth is not None else 'gears'}"
                 yield from (refused_at(one, f"{where}.{one.key}" if one.key else where) for one in error.problems)

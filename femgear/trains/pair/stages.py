@@ -185,7 +185,11 @@ def _warnings(case: PairCase) -> Iterator[Finding]:
     yield from (*check_meshes(gears, overlap=case_overlap(case, gears)), *case.notices)
     yield from load_warnings(case)
     if case.operation.speeds and (why := _no_modes(case)):
-        yield Finding("W-UNUSED", "operation.speeds", f"no effect, static results are all: {why}")
+        text = f"no effect, static results are all: {why}"
+        remedy = (
+            "" if case.operation.torque == 0.0 else "write it as a gearbox, whose stages take any: femgear gearbox CASE"
+        )
+        yield Finding("W-UNUSED", "operation.speeds", text, remedy=remedy)
 
 
 def _no_modes(case: PairCase) -> str:
