@@ -100,6 +100,11 @@ def _script(command: str, title: str, **says: str) -> Run:
 RUNS = {
     "planetary_27_40_108": _case("planetary_27_40_108", "Reference set 27/40/108, elastic ring"),
     "on_six_bolts": _case("on_six_bolts", "Reference set on six bolts, two named sensors", HOUSING[:-1]),
+    "cracked_planet": Run(
+        "femgear run cases/cracked_planet.toml --only static",
+        "Reference set with a cracked planet, contact of its teeth",
+        shows=("load_sharing", "static_transmission_error"),
+    ),
     "in_a_casing": _case("in_a_casing", "Reference set in a casing of a file", HOUSING),
     "misaligned": Run(
         "femgear run cases/planetary_27_40_108.toml --only stress",

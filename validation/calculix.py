@@ -18,9 +18,11 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from scipy.spatial import KDTree
 
+from femgear.fe.cracks import split_grid
 from femgear.fe.elasticity import Material
 from femgear.fe.grid import Grid
-from femgear.fe.meshing import mesh_outlines
+from femgear.fe.meshing import mesh_outline, mesh_outlines
+from femgear.gears.cracked_tooth import BESIDE, SECTION, cracked_outline
 from femgear.gears.gear import Gear, flank_points
 from femgear.gears.tooth import HalfSector, half_sector
 
@@ -147,6 +149,8 @@ CONTACT_REACH = 0.25e-3
 Flanks that are turned into each other overlap over three times the width of the contact: with more
 elements that may touch CalculiX takes more iterations until those that pull are out.
 """
+CRACK_ANGLE = np.radians(70.0)
+"""Of cracks to the centre line of their tooth."""
 GROWTH = 0.3
 """Growth of the elements with the distance from there."""
 
@@ -159,6 +163,7 @@ def whole_gear(
     size: float,
     sizes: tuple[float, float, float] = SIZES,
     span: int | None = None,
+    crack: tuple[int, float] | None = None,
 ) -> PlaneBody:
     """Mesh all teeth of a gear, one side of loaded ones as finely as femgear does and finer at the contact.
 
@@ -177,6 +182,8 @@ def whole_gear(
         See `SIZES`.
     span : int, optional
         Teeth to either side of loaded ones; others are left out.
+    crack : (int, float), optional
+        Number of a loaded tooth that is cracked at the root of its left flank, and the depth of the crack [m].
     """
     far, near = (half_sector(gear, flank_elements=12, refine=1.0 / ratio) for ratio in sizes[:0:-1])
     cuts = {name: far.curve(name) for name in ("cut", "rim")}
@@ -190,6 +197,9 @@ def whole_gear(
         if span is not None and min(map(abs, away)) > span:
             continue
         index = away.index(0) if 0 in away else None
+        if crack is not None and index is not None and numbers[index] == crack[0]:
+            parts.append(_cracked(gear, loaded[index], *crack, place=flank_points(gear, [contacts[crack[0]]])[0]))
+            continue
         for half in ("left", "right"):
             chosen = index is not None and half == side
             level = 2 + index if chosen else int(min(map(abs, away)) <= 1)
@@ -203,6 +213,20 @@ def whole_gear(
             points = _turned(grid.points, tooth * gear.pitch_angle)
             parts.append(PlaneBody(points, grid.triangles, edges | {"rim": grid.boundaries["rim"]}, is_tooth))
     return _joined(parts)
+
+
+def _cracked(gear: Gear, half: HalfSector, number: int, depth: float, *, place: np.ndarray) -> PlaneBody:
+    """Sector of a loaded tooth with an open crack, its faces a tenth of a micrometre apart so that they stay two."""
+    outline = cracked_outline(half, gear, angle=CRACK_ANGLE, depth=depth)
+    split = split_grid(mesh_outline(outline), SECTION, len(outline.crack), BESIDE[0])
+    grid, points = split.grid, split.grid.points.copy()
+    points[split.faces[0]] += 1e-7 * split.normals
+    middle = np.hypot(*grid.points[grid.triangles[:, :3]].mean(axis=1).T)
+    base = np.hypot(*half.interfaces[0][1][0])
+    left = replace(grid, boundaries={name: grid.boundaries[f"{name}_left"] for name in ("flank", "fillet")})
+    rim = np.vstack([grid.boundaries["rim_left"], grid.boundaries["rim_right"]])
+    edges = _loaded_edges(left, number, place) | {"rim": rim}
+    return PlaneBody(_turned(points, number * gear.pitch_angle), grid.triangles, edges, middle > base)
 
 
 def _loaded_edges(grid: Grid, number: int, place: np.ndarray) -> dict[str, np.ndarray]:

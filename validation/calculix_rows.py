@@ -204,6 +204,7 @@ def contact_of_gears(
     penalty: float = PENALTY,
     size: float = SIZE,
     states: Sequence[dict[str, str]] | None = None,
+    crack: tuple[int, float] | None = None,
 ) -> np.ndarray:
     """Compute the quantities of `QUANTITIES` of a pair by CalculiX.
 
@@ -222,6 +223,8 @@ def contact_of_gears(
         See `calculix.pair_contact` and `calculix.whole_gear`.
     states : two dicts, optional
         Plane states of the gears as in `calculix.body_input`, left out those of femgear.
+    crack : (int, float), optional
+        Tooth of the first gear and depth, see `calculix.whole_gear`.
     """
     first, second = gears.kinds[0].gears
     angles = [of_gear[0] for of_gear in orientations(gears, position).gears]
@@ -233,6 +236,7 @@ def contact_of_gears(
             "right" if gear.internal else "left",
             {pair.teeth[number]: pair.rolls[number] for pair in mates},
             size=size,
+            crack=None if number else crack,
         ).turned(angles[number], (place, 0.0))
         for number, (gear, place) in enumerate(((first, 0.0), (second, centre)))
     ]

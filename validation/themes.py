@@ -11,6 +11,7 @@ from validation import (
     bearings,
     calculix_carrier,
     calculix_casing,
+    calculix_cracks,
     calculix_rows,
     calculix_shafts,
     calculix_solid,
@@ -22,6 +23,7 @@ from validation import (
     dynamics,
     elasticity,
     face_width,
+    faults,
     fixed_housing,
     friction,
     gearbox,
@@ -234,6 +236,7 @@ THEMES = (
             calculix_rows.external_pair,
             calculix_rows.internal_pair,
             calculix_rows.settings,
+            calculix_cracks.cracked_pair,
             calculix_solid.face_load,
             calculix_rows.ring_on_feet,
             calculix_casing.casing_example,
@@ -338,6 +341,15 @@ THEMES = (
             life.reversed_set,
         ),
         (life.spectrum_of_a_file, life.spectrum_as_imported),
+    ),
+    Theme(
+        "faults",
+        "Faulty teeth",
+        "Reference set, cracks at 70° to the centre line of their tooth, their faces open. "
+        "Compared with: the whole matrix of all cuts; one grid of all teeth; the energy release rate by J in two "
+        "domains; published frequencies of a set 17/37/91; gates: 1e-12; 1 %; 2 %; printed digits.",
+        (faults.frequencies, faults.energy_release),
+        (faults.update_identity, faults.one_grid),
     ),
     Theme(
         "rims",

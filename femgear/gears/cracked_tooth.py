@@ -68,7 +68,15 @@ def cracked_sector(
     flank_elements : int
         As of `femgear.gears.tooth.half_sector`.
     """
-    half = half_sector(gear, flank_elements=flank_elements)
+    return cracked_outline(
+        half_sector(gear, flank_elements=flank_elements), gear, angle=angle, depth=depth, start=start
+    )
+
+
+def cracked_outline(
+    half: HalfSector, gear: Gear, *, angle: float, depth: float, start: float | None = None
+) -> CrackedSector:
+    """Make the boundary of a cracked sector from the half one of a gear, as `cracked_sector`."""
     curves = _whole(half)
     mouth, beside = _mouth(half, gear, start)
     inwards = 1.0 if gear.internal else -1.0

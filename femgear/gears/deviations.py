@@ -603,14 +603,14 @@ def _causes(d: SetDeviations) -> list[str]:
         "tooth thickness": bool(d.sun_thickness or d.ring_thickness or d.planet_thickness.any()),
         "profile modifications": any(form.profile for form in forms),
         "lead modifications such as crowning": any(form.lead for form in forms),
-        "faults of teeth": bool(d.faults),
     }
     return [name for name, there in causes.items() if there]
 
 
 def _wedging(d: SetDeviations, s: GearSet):
     """Warn where the deviations may use up the play (W-WEDGING)."""
-    if d.ideal and not (d.planet_thickness.any() or d.sun_thickness or d.ring_thickness):
+    # faults take material off
+    if replace(d, faults=()).ideal and not (d.planet_thickness.any() or d.sun_thickness or d.ring_thickness):
         return
     single, whole = least_play(d, s)
     least = min(single, whole)

@@ -20,7 +20,8 @@ from femgear.trains import registry
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 
-PAGES = ("pin_errors", "faq", "api", "live", pytest.param("silent_without_load", marks=pytest.mark.slow))
+SLOW_PAGES = [pytest.param(name, marks=pytest.mark.slow) for name in ("silent_without_load", "faults")]
+PAGES = ("pin_errors", "faq", "api", "live", *SLOW_PAGES)
 TUTORIAL = ("drawing_to_ste",)
 HOW_TO = (
     "how_to",
