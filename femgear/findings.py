@@ -104,6 +104,7 @@ CATALOGUE = {
     "W-TORQUE": (NOTE, "The torque has an unusual sign or size."),
     "W-UNDERCUT": (NOTE, "The tool cuts into the flank at the root."),
     "W-UNSTABLE": (DOUBT, "A periodic solution is unstable: a real machine leaves it."),
+    "W-UNSTEADY": (DOUBT, "The speed of a recording is another one than is said, or changes: lines are smeared."),
     "W-UNUSED": (NOTE, "An entry of the case has no effect."),
     "W-WEDGED": (NOTE, "Meshes are loaded on both flanks at once."),
     "W-WEDGING": (NOTE, "Teeth have so little play that they may wedge."),

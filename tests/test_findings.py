@@ -508,6 +508,22 @@ def plugin(folder: Path) -> list[Finding]:
     return [one.message.args[0] for one in w]
 
 
+def unsteady(folder: Path) -> list[Finding]:
+    """A recording whose speed is a little above what is said."""
+    from recorded_signals import HEALTHY, RATE, recording, write_columns
+
+    from femgear.measured.heard_set import heard_set
+    from femgear.measured.recordings import read_by_turns
+    from femgear.measured.requests import Recording
+
+    signal, _, _ = recording(HEALTHY, HEALTHY.values(), wander=0.0, carrier=3.006, seconds=8.0)
+    path = write_columns(folder / "a.csv", "time [s];acc\n", (np.arange(len(signal)) / RATE, signal))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        read_by_turns(path, Recording(speed="900 rpm"), heard_set(read_case(CASES / "planetary_27_40_108.toml")))
+    return [warning.message.args[0] for warning in caught if isinstance(warning.message, FindingWarning)]
+
+
 OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
     "W-CLIPPING": exported("wav", acceleration_scale=1e-6),
     "W-JOURNAL": damaged_journal,
@@ -515,6 +531,7 @@ OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
     "W-REXS": rexs,
     "W-ROWS": exported("xlsx", rows=3),
     "W-SWEEP": long_sweep,
+    "W-UNSTEADY": unsteady,
 }
 RAISED = {
     **{code: lambda folder, way=way: way() for code, way in {**RESULTS, **OF_CASES}.items()},

@@ -11,17 +11,28 @@ import numpy as np
 
 from femgear.case.quantities import SPEED, to_si
 from femgear.errors import CaseError
+from femgear.findings import Finding, tell
 from femgear.measured.channels import Channel, choose_channel
 from femgear.measured.csv_signals import read_csv_signals
 from femgear.measured.heard_set import HeardSet
 from femgear.measured.requests import Recording
 from femgear.measured.sampled_files import read_matlab_signals, read_wav_signals
-from femgear.measured.turns import AngleSignal, Turns, aligned_speed, constant_turns, resample_turns, turns_of_pulses
+from femgear.measured.turns import (
+    AngleSignal,
+    Turns,
+    aligned_speed,
+    constant_turns,
+    resample_turns,
+    turns_of_pulses,
+    widest_range,
+)
 from femgear.measured.universal_functions import read_universal_signals
 
 _READERS = {".wav": read_wav_signals, ".mat": read_matlab_signals}
 _READERS |= dict.fromkeys((".uff", ".unv", ".bunv", ".uf"), read_universal_signals)
 
+_OFF = 0.05
+"""Distance of the mesh order from where lines stand best, in orders, from which a constant speed is doubted."""
 _ACCELERATIONS = {"m/s^2": 1.0, "m/s2": 1.0, "mm/s^2": 1e-3, "g": 9.80665, "mg": 9.80665e-3}
 """Accelerations [m/s^2] by their units, in which g is that of free fall (ISO 80000-3)."""
 
@@ -123,7 +134,31 @@ def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> f
         raise CaseError(
             "at rest nothing is heard", code="E-SPEED", key="--speed", value=recording.speed, limit="not zero"
         )
-    if recording.within is None:
-        return speed
     orders = shafts.symmetric_orders(harmonics=3)
-    return aligned_speed(signal, speed, orders[orders * speed < signal.rate / 3], recording.within)
+    orders = orders[orders * speed < signal.rate / 3]
+    if len(orders) < 2:
+        return speed
+    if recording.within is not None:
+        best = aligned_speed(signal, speed, orders, recording.within)
+        _tell_drift(signal, best, orders, recording.within)
+        return best
+    best = aligned_speed(signal, speed, orders, widest_range(orders))
+    if abs(best / speed - 1.0) * shafts.ring > _OFF:
+        rpm = 60.0 / shafts.carrier_per_turn[shafts.input]
+        words = f"lines stand best on orders of the set at {best * rpm:.6g} rpm, not at {speed * rpm:.6g} rpm"
+        remedy = f"give --within {1.2 * abs(best / speed - 1.0):.2g}, or record pulses"
+        tell(Finding("W-UNSTEADY", "--speed", words, remedy=remedy))
+    return speed
+
+
+def _tell_drift(signal: Channel, speed: float, orders: np.ndarray, within: float) -> None:
+    """Say where the speeds of both halves of a recording smear its lines over more than a step of orders."""
+    half = len(signal.values) // 2
+    halves = [replace(signal, values=part) for part in (signal.values[:half], signal.values[half:])]
+    first, second = (aligned_speed(part, speed, orders, min(within, widest_range(orders))) for part in halves)
+    smeared = abs(first - second) / speed * float(orders[-1])
+    if smeared > 1.0 / (signal.duration * speed):
+        words = f"from the first half to the second the speed changes by {abs(second / first - 1):.2%}, and order "
+        words += f"{orders[-1]} is smeared over {smeared:.2g} orders"
+        remedy = "record pulses, or cut the record to a part of steady speed"
+        tell(Finding("W-UNSTEADY", "--speed", words, remedy=remedy))

@@ -154,6 +154,11 @@ def constant_turns(channel: Channel, speed: float) -> Turns:
     return Turns(time, (time - time[0]) * speed)
 
 
+def widest_range(orders: np.ndarray) -> float:
+    """Find the share of a speed within which no other lines come to the places of some orders (k,), two or more."""
+    return 0.4 * float(np.diff(np.unique(orders)).min()) / float(orders.max())
+
+
 def aligned_speed(channel: Channel, speed: float, orders: np.ndarray, within: float) -> float:
     """Find the constant speed near a nominal one [1/s] at which lines of a signal stand best at some orders.
 
@@ -167,8 +172,8 @@ def aligned_speed(channel: Channel, speed: float, orders: np.ndarray, within: fl
     within : float
         Largest share of the nominal speed that the speed may differ by.
     """
-    most = 0.4 * float(np.diff(np.unique(orders)).min()) / float(orders.max())
-    if not 0.0 < within <= most:
+    most = widest_range(orders)
+    if not 0.0 < within <= 1.0001 * most:
         message, remedy = "lines next to one another would fit as well", "measure the speed, or record its pulses"
         raise CaseError(message, code="E-RANGE", key="--within", value=within, limit=f"{most:.3g}", remedy=remedy)
     values = (channel.values - channel.values.mean()) * np.hanning(len(channel.values))

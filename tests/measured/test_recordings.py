@@ -41,6 +41,25 @@ def test_a_constant_speed_is_that_of_the_input(tmp_path):
     assert over_angle.turns == 11 and over_angle.speed == pytest.approx(3.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("speed", "within", "wander", "words"),
+    [
+        (3.0, None, 0.0, None),
+        (3.006, None, 0.0, "stand best on orders of the set at 901."),
+        (3.006, 0.0035, 0.0, None),
+        (3.0, 0.0035, 0.004, "from the first half to the second the speed changes"),
+    ],
+)
+def test_a_constant_speed_that_is_none_is_told(speed, within, wander, words, tmp_path, recwarn):
+    signal, _, _ = recording(HEALTHY, HEALTHY.values(), seconds=6.0, carrier=speed, wander=wander)
+    path = write_columns(tmp_path / "a.csv", "time [s];acc\n", (np.arange(len(signal)) / RATE, signal))
+    over_angle = read_by_turns(path, Recording(speed="900 rpm", within=within), HEARD)
+    told = [str(warning.message) for warning in recwarn]
+    assert (told == []) if words is None else (words in told[0] and "W-UNSTEADY" in told[0])
+    if not wander:
+        assert over_angle.speed == pytest.approx(speed if within else 3.0, rel=1e-3)
+
+
 def test_accelerations_come_in_si_units(tmp_path):
     path = written(tmp_path, "wav")
     plain, scaled = (
