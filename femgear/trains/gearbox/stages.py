@@ -11,7 +11,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
-from femgear.report.tables import Block, tabulate
+from femgear.report.tables import Block, merged, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.balance import (
@@ -175,10 +175,21 @@ def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
     blocks = []
     for load_case in case.operation.load_case[:12]:
         blocks += list(_flow_blocks(case, load_case))
+    return (*blocks, *_drawing_blocks(case), *describe_casing(case))
+
+
+def _drawing_blocks(case: GearboxCase) -> Iterator[Block]:
+    """Tabulate what drawings carry of all teeth, once where stages have the same, as those of equal planets."""
+    stages = dict[Block, list[str]]()
     for stage in (*case.pair, *case.planetary):
         if (teeth := teeth_of(stage)) is not None:
-            blocks += [replace(block, title=f"{block.title}, {stage.name}") for block in describe_drawing(teeth)]
-    return (*blocks, *describe_casing(case))
+            for block in describe_drawing(teeth):
+                stages.setdefault(block, []).append(stage.name)
+    for block, names in stages.items():
+        # those that differ by a number alone stand together
+        by_words = sorted(names, key=lambda name: name.translate(dict.fromkeys(map(ord, "0123456789"))))
+        words = ", ".join(name for (name,) in merged([(name,) for name in by_words]))
+        yield replace(block, title=f"{block.title}, {words}")
 
 
 def _flow_blocks(case: GearboxCase, load_case: LoadCaseSection) -> Iterator[Block]:

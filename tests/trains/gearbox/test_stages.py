@@ -9,11 +9,12 @@ from femgear.case.dependencies import Steps
 from femgear.exchange.formats import Sampling
 from femgear.run import export_results, run_case
 from femgear.storage.results import run_folder
+from femgear.trains.drafts import new_case
 from femgear.trains.gearbox.results import describe_deflection, describe_gearbox_modes
 from femgear.trains.gearbox.stages import describe_gearbox
 from femgear.trains.gearbox.verdict import gearbox_verdict
 from femgear.trains.live import Answer, Live
-from femgear.trains.reading import open_results, read_case
+from femgear.trains.reading import open_results, parse_case, read_case
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 
@@ -191,3 +192,13 @@ def test_answers_after_changes_are_those_of_fresh_cases():
                     assert values == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True), (changes, stage, name)
                 else:
                     assert values.tolist() == expected.tolist(), (changes, stage, name)
+
+
+def test_teeth_that_several_stages_have_are_drawn_once():
+    case = parse_case(new_case("stepped"))
+    titles = [block.title for block in describe_gearbox(case)]
+    assert [title for title in titles if title.startswith(("Drawing", "Play"))] == [
+        "Drawing, sun-planet 1..3",
+        "Play of the meshes, planet 1..3-ring, sun-planet 1..3",
+        "Drawing, planet 1..3-ring",
+    ]
