@@ -20,7 +20,7 @@ from mutants import ROOT
 from mutation import LineMap, preload
 
 PAGE = ROOT / "tests" / "slow_tests.txt"
-QUICK = 0.4
+QUICK = 0.3
 """Seconds, of a process that notes which lines it runs, up to which a test stays."""
 PROMISES = ("tests/docs/", "tests/soak/")
 """Tests that stay whatever lines they run."""
