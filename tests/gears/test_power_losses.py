@@ -115,3 +115,17 @@ def test_stages_side_by_side_lose_by_the_shares_that_they_have():
     assert flow.mesh_loss["one"][0] == pytest.approx(6.0, rel=0.02)
     assert flow.mesh_loss["two"][0] == pytest.approx(6.0, rel=0.02)
     assert flow.imbalance == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("torque", [10.0, -10.0])
+def test_branches_of_planets_as_pairs_on_a_carrier_lose_what_a_set_loses(torque):
+    shafts, numbers = ["sun", "carrier", "ring", "p1", "p2", "p3"], (1, 2, 3)
+    pairs = [pair_condition(f"s{n}", "sun", f"p{n}", 27, 39, carrier="carrier") for n in numbers]
+    pairs += [pair_condition(f"r{n}", f"p{n}", "ring", 39, 105, internal=True, carrier="carrier") for n in numbers]
+    given = {"torques": {"sun": torque}, "held": ["ring"], "outputs": ["carrier"]}
+    flow = power_flow(shafts, pairs, speeds={"sun": 100.0}, share=True, **given)
+    efficiencies = {f"s{n}": [0.98] for n in numbers} | {f"r{n}": [0.99] for n in numbers}
+    lossy = lossy_flow(shafts, pairs, speeds=flow.speed, efficiencies=efficiencies, lossless=flow.stage_torque, **given)
+    expected = planetary_efficiency(0.98 * 0.99, 105 / 27, sun_drives=torque > 0.0)
+    assert lossy.efficiency == pytest.approx(expected, rel=1e-12)
+    assert abs(lossy.imbalance) < 1e-12

@@ -57,6 +57,17 @@ def test_stepped_planets_may_have_two_modules():
     assert flow.speed["sun"] / flow.speed["carrier"] == pytest.approx(1 + 52 * 69 / (25 * 18))
 
 
+def test_a_sun_that_turns_along_carries_nothing():
+    """First gear of a Ravigneaux set: the carrier stands, the large sun has no torque."""
+    case = parse_case(new_case("ravigneaux").replace('fixed = ["large sun"]', 'fixed = ["carrier"]'))
+    flow = gearbox_flow(case)
+    assert flow.speed["small sun"] / flow.speed["ring"] == pytest.approx(72 / 30)
+    assert flow.speed["large sun"] / flow.speed["ring"] == pytest.approx(-72 / 36)
+    found = solve_deflection(with_values(case, {"deflection.contact": False}))
+    idle = ["large sun" in stage.name for stage in found.model.stages]
+    assert np.abs(found.mesh_force[idle]).max() < 1e-6 * found.mesh_force.max()
+
+
 @pytest.mark.parametrize(
     ("kind", "options", "words"),
     [

@@ -189,7 +189,9 @@ def _walked(case: GearboxCase, flow: BoxFlow) -> tuple[dict[str, float], list[tu
 
 def _meshing_gears(stage: PairSection, case: GearboxCase, flow: BoxFlow) -> tuple[_MeshingGear, _MeshingGear]:
     """Both gears of a pair with their pitch points and loaded flanks."""
-    sizes, teeth, flank = pair_sizes(stage), teeth_of(stage), -1.0 if flow.first_torque(stage) > 0.0 else 1.0
+    sizes, teeth = pair_sizes(stage), teeth_of(stage)
+    # of branches that carry nothing, whose torques are rounding, all have the same flanks
+    flank = -1.0 if flow.carries(stage) and flow.first_torque(stage) > 0.0 else 1.0
     halves = tuple(0.5 * math.pi / count for count in sizes.teeth)
     if teeth is not None:
         gears: Any = planetary_set(teeth)
