@@ -1,14 +1,21 @@
 """What is said of faults of teeth."""
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.contact.flank_pairs import mesh_pairs
+from femgear.errors import CaseError
+from femgear.gears.deviations import common_period
 from femgear.gears.gear import Gear
 from femgear.gears.kinematics import speeds
 from femgear.gears.planetary import close_set, equal_planet_angles
-from femgear.stages.tooth_faults import describe_faults, fault_findings, fault_frequencies, sun_fault_step
+from femgear.stages.static import solve_static
+from femgear.stages.tooth_faults import archard_wear, describe_faults, fault_findings, fault_frequencies, sun_fault_step
 from femgear.trains.reading import read_case, with_values
 from validation.planetary import reference_set
 
@@ -84,3 +91,27 @@ def test_a_table_lists_the_faults(healthy):
     assert block.rows == (("wear", "planet 2", "3", "ring side", "2.5000"),)
     (block,) = describe_faults(case, None)
     assert block.rows[0][-1] == "-"
+
+
+def test_wear_by_archard_is_load_over_width_times_sliding_times_passages(healthy):
+    """Closed form where one tooth pair carries, zero at the pitch point, and what makes the flanks of a case."""
+    coarse = with_values(healthy, {"static.flank_elements": 4, "static.positions": 32, "static.stresses": False})
+    static = solve_static(coarse)
+    given = {"hours": 100.0, "coefficient": 1e-17, "mesh_frequency": 360.0}
+    entries = archard_wear(coarse, static, **given)
+    assert {key: len(faults) for key, faults in entries.items()} == {"sun.fault": 1, "planet.fault": 6, "ring.fault": 1}
+    worn = with_values(coarse, entries)
+    fault, gears = set_deviations(worn).faults[0], planetary_set(coarse)
+    assert common_period(set_deviations(worn), gears)[0] == 1
+    pair = mesh_pairs(gears)[0]
+    force = 100.0 / 3 / gears.sun.base_radius
+    begin, end = pair.path
+    # within the single contact
+    zeta = np.array([end - gears.base_pitch, begin + gears.base_pitch]).mean()
+    rolls = pair.roll_on(0, zeta), pair.roll_on(1, zeta)
+    sliding = abs(1.0 - rolls[1] / pair.base_radius_2 / (rolls[0] / pair.base_radius_1))
+    expected = 1e-17 * force / 25e-3 * sliding * 3600 * 100 * 3 * 360 / 27
+    assert fault.removed(rolls[0]) == pytest.approx(expected, rel=0.05)
+    assert fault.removed(pair.pitch_roll_1) < 0.1 * fault.removed(rolls[0]) or sliding < 0.02
+    with pytest.raises(CaseError, match="positive torque"):
+        archard_wear(coarse, replace(static, sun_torque=-1.0), **given)
