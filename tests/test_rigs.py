@@ -103,3 +103,24 @@ def test_what_makes_the_mesh_line_of_planets_out_of_phase(changes, heights):
     for order, expected in heights.items():
         ratio = height[np.abs(lines.order - order) < 1e-6].sum() / height[lines.order == 96.0].sum()
         assert ratio == pytest.approx(expected, abs=6e-4)
+
+
+@pytest.mark.slow
+def test_on_feet_the_mesh_line_stays_small_too():
+    """A pin by 40 um: lines over the largest, on four feet and a soft foundation."""
+    stiff = {"radial_stiffness": "4e8 N/m", "tangential_stiffness": "4e8 N/m"}
+    changes = {
+        "static.stresses": False,
+        "housing.support": [{"angle": f"{angle} deg", **stiff} for angle in (35, 145, 215, 325)],
+        "housing.nodal_diameters": 8,
+        "ring.foundation_radial": "1e8 N/m^3",
+        "ring.foundation_tangential": "1e8 N/m^3",
+        "dynamics.up_to": None,
+        "dynamics.mesh_harmonics": 3,
+        "runup.count": 0,
+    }
+    lines = solve(with_values(SNU.case(), changes | pin("40 um")), "housing")["housing"].exact
+    height = np.abs(lines.acceleration[0])
+    largest = height[np.abs(lines.order - 95) <= 11].max()
+    for order, expected in {94: 0.098, 95: 0.002, 97: 0.236}.items():
+        assert height[np.abs(lines.order - order) < 1e-6].sum() / largest == pytest.approx(expected, abs=2e-3)

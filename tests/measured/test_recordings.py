@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import pyuff
 from recorded_signals import HEALTHY, RATE, recording, write_columns
 from scipy.io import savemat, wavfile
 
@@ -21,11 +22,19 @@ def written(folder, kind):
     if kind == "wav":
         wavfile.write(folder / "a.wav", int(RATE), np.stack([SIGNAL, PULSES], 1).astype(np.float32))
         return folder / "a.wav"
+    if kind == "uff":
+        for name, values in (("acc", SIGNAL), ("tacho", PULSES)):
+            scalar = {"rsp_node": 1, "rsp_dir": 3, "ref_dir": 0, "ref_node": 0, "z_axis_value": 0.0, "binary": 1}
+            scalar |= {f"{part}_spec_data_type": 0 for part in ("orddenom", "z_axis", "ordinate")}
+            data = {"func_type": 1, "data": values, "x": np.arange(len(values)) / RATE, "id1": name}
+            times = {"abscissa_spacing": 1, "abscissa_spec_data_type": 17}
+            pyuff.UFF(str(folder / "a.uff")).write_sets(pyuff.prepare_58(**data, **scalar, **times), mode="add")
+        return folder / "a.uff"
     savemat(folder / "a.MAT", {"acc": SIGNAL, "tacho": PULSES, "fs": RATE})
     return folder / "a.MAT"
 
 
-@pytest.mark.parametrize("kind", ["csv", "wav", "mat"])
+@pytest.mark.parametrize("kind", ["csv", "wav", "mat", "uff"])
 def test_formats_give_the_same_signal_over_the_angle(kind, tmp_path):
     path = written(tmp_path, kind)
     assert [len(channel.values) for channel in read_channels(path)] == [len(SIGNAL)] * 2
