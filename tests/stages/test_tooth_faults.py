@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.contact.flank_pairs import mesh_pairs
 from femgear.errors import CaseError
@@ -16,7 +17,9 @@ from femgear.gears.kinematics import speeds
 from femgear.gears.planetary import close_set, equal_planet_angles
 from femgear.stages.static import solve_static
 from femgear.stages.tooth_faults import archard_wear, describe_faults, fault_findings, fault_frequencies, sun_fault_step
-from femgear.trains.reading import read_case, with_values
+from femgear.trains.gearbox_of_case import gearbox_of_case
+from femgear.trains.reading import parse_case, read_case, with_values
+from femgear.trains.registry import train_of
 from validation.planetary import reference_set
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -115,3 +118,22 @@ def test_wear_by_archard_is_load_over_width_times_sliding_times_passages(healthy
     assert fault.removed(pair.pitch_roll_1) < 0.1 * fault.removed(rolls[0]) or sliding < 0.02
     with pytest.raises(CaseError, match="positive torque"):
         archard_wear(coarse, replace(static, sun_torque=-1.0), **given)
+
+
+def test_a_gearbox_says_what_faults_leave_out_and_refuses_them_without_contact():
+    crack = {"kind": "crack", "tooth": 3, "flank": "left", "depth": "2 mm"}
+    pair = with_values(read_case(CASES / "spur_pair.toml"), {"gear_1.fault": [crack]})
+    tables = gearbox_of_case(pair).tables
+    box = parse_case(case_text.write(tables), name="box")
+    said = [str(finding) for finding in train_of(box).warnings(box)]
+    assert any("pair[0].teeth.gear_1.fault[0]: faces of the crack" in text for text in said)
+    with pytest.raises(CaseError, match="without contact") as refused:
+        parse_case(case_text.write(tables | {"deflection": {"contact": False}}), name="box")
+    assert refused.value.code == "E-FAULT"
+
+
+def test_a_pair_with_a_fault_is_told_to_become_a_gearbox_for_its_vibration():
+    crack = {"kind": "crack", "tooth": 3, "flank": "left", "depth": "2 mm"}
+    pair = with_values(read_case(CASES / "spur_pair.toml"), {"gear_2.fault": [crack]})
+    said = [str(finding) for finding in train_of(pair).warnings(pair)]
+    assert any("span 36 mesh periods" in text and "femgear gearbox CASE" in text for text in said)

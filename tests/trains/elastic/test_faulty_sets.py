@@ -11,7 +11,7 @@ from femgear.trains.reading import parse_case
 SET = """
 format = 1
 title = "{sun}/{planet}/{ring}"
-set = {{ planets = {planets}, face_width = "20 mm" }}
+set = {{ planets = {planets}, face_width = "20 mm"{angles} }}
 material = {{ youngs_modulus = "206 GPa", poisson_ratio = 0.3, density = "7850 kg/m^3" }}
 operation = {{ input = "sun", fixed = "ring", torque = "30 N m", speeds = ["900 rpm"] }}
 static = {{ flank_elements = 4, positions = 8, stresses = false }}
@@ -26,7 +26,7 @@ FOUNDATION = 'foundation_radial = "1e10 N/m^3", foundation_tangential = "1e10 N/
 BOLT = '{ angle = "20 deg", radial_stiffness = "2e8 N/m", tangential_stiffness = "1e8 N/m" }'
 
 
-def lines_of(teeth, planets, of, *, bolted=False):
+def lines_of(teeth, planets, of, *, bolted=False, angles=""):
     """Orders of the carrier and amplitudes over the largest, at a sensor of a set with a worn tooth."""
     sun, planet, ring = teeth
     text = SET.format(
@@ -34,6 +34,7 @@ def lines_of(teeth, planets, of, *, bolted=False):
         planet=planet,
         ring=ring,
         planets=planets,
+        angles=f", planet_angles = [{angles}]" if angles else "",
         outer=ring + 8,
         foundation=FOUNDATION,
         of_sun=WORN.format(flank="left") if of == "sun" else "",
@@ -66,3 +67,11 @@ def test_lines_of_a_fault_lie_at_whole_multiples_of_its_step(teeth, planets, of,
     assert lines[off].max(initial=0.0) < 1e-6
     there = np.rint(number[lines > 1e-5]).astype(int)
     assert np.gcd.reduce(there) == 1
+
+
+@pytest.mark.slow
+def test_planets_at_unequal_angles_are_heard_at_every_turn_of_the_carrier():
+    """``L = q + m S`` with any whole q: of 18/18/54 all whole orders."""
+    order, lines = lines_of((18, 18, 54), 3, "sun", angles='"0 deg", "120 deg", "245 deg"')
+    assert lines[np.abs(order - np.rint(order)) > 1e-6].max(initial=0.0) < 1e-6
+    assert np.gcd.reduce(np.rint(order[lines > 1e-5]).astype(int)) == 1
