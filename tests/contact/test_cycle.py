@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 
-from femgear.contact import cycle as cycle_module
+from femgear.contact import batch as batch_module
 from femgear.contact.assembly import assemble_contact
 from femgear.contact.bodies import make_bodies, make_sectors
 from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
@@ -256,9 +256,9 @@ def test_planets_that_come_to_the_same_states_are_solved_once(five, torque, monk
     solved, options = [], CycleOptions(pressures=True, cells=20, held_bodies=bodies)
     given = {"sun_torque": torque, "supports": Supports(sun=0.0, planet=1e8), "options": options}
     every = walk_mesh_cycle(gears, bodies, positions=np.arange(20) / 20, **given)
-    batch = cycle_module.solve_batch
+    batch = batch_module.solve_batch
     monkeypatch.setattr(
-        cycle_module,
+        batch_module,
         "solve_batch",
         lambda found, *rest: solved.append(len(found.position)) or batch(found, *rest),
     )
