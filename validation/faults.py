@@ -204,7 +204,7 @@ def frequencies() -> tuple[Row, ...]:
     )
     turning = speeds(gears, input="sun", fixed="ring", speed=800 * math.pi / 30)
     often = fault_frequencies(gears, turning.mesh_frequency)
-    source = "published diagnosis of a set 17/37/91"
+    source = "closed forms from Willis' equation: carrier z_s f_s / (z_s + z_r)"
     values = (
         ("mesh", "190.99", turning.mesh_frequency),
         ("a tooth of the sun meets a planet", "33.70", often["sun"]),

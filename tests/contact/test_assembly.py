@@ -4,6 +4,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from femgear.contact.assembly import Candidates, ContactProblem
 
@@ -14,6 +15,7 @@ def cells(*places) -> Any:
     return SimpleNamespace(mesh=mesh, pair=pair, cell=cell)
 
 
+@pytest.mark.decisive
 def test_a_start_is_taken_from_the_same_cells_and_from_all_springs():
     before = cells((0, 0, 5), (0, 1, 3), (1, 0, 2), (1, 1, 3), (5, 2, 35))
     now = cells((1, 1, 3), (0, 1, 3), (0, 1, 4), (0, 0, 5), (1, 0, 2), (5, 2, 35), (4, 2, 35), (2, 0, 5))

@@ -136,6 +136,7 @@ def test_supports(supports):
         compare(both_ways(gears, bodies, torque, supports=supports, pins=0.5))
 
 
+@pytest.mark.decisive
 def test_planet_with_clearance_that_loses_all_load(monkeypatch):
     # its motions are restrained by nothing: most positions need no other route all the same
     alone = []

@@ -169,6 +169,7 @@ def test_corner_contact_does_not_depend_on_cells(bodies):
     np.testing.assert_allclose(few.tangent, many.tangent, rtol=5e-3)
 
 
+@pytest.mark.decisive
 @pytest.mark.parametrize(
     "options",
     [

@@ -56,6 +56,7 @@ def test_air_is_a_resistance_to_short_waves_and_a_mass_to_long_ones():
     assert slow == pytest.approx(1j * TURN * 1.204 * 0.1 / 4, rel=1e-4)
 
 
+@pytest.mark.decisive
 @pytest.mark.parametrize(("n", "frequency", "distance"), [(0, 60.0, 0.9), (3, 1116.0, 0.4), (12, 9000.0, 0.1)])
 def test_a_ring_in_a_rigid_cylinder_is_the_sum_of_its_axial_waves(n, frequency, distance):
     expected = axial_waves(n, frequency, RING, distance)
