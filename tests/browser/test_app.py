@@ -307,6 +307,8 @@ def test_nothing_is_lost_with_the_server(window, serve, folder):
     press(again, "Back to the file")
     again.get_by_text("saved", exact=True).wait_for()
     press(again, "Undo")
+    # the file is that of the form once the undone change is back in it
+    again.get_by_text("saved", exact=True).wait_for(state="hidden")
     assert saved(again, folder)["operation"]["torque"] == "123 N m"
 
 
