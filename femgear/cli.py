@@ -56,6 +56,7 @@ try:
     from femgear.findings import FindingWarning
     from femgear.measured.requests import FurtherFiles, LineSearch, Recording
     from femgear.storage.files import noted_interrupts, storage_error
+    from femgear.study.teeth_request import TeethStrength, WantedTeeth
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
     raise SystemExit(_INTERRUPTED) from None
@@ -1492,76 +1493,13 @@ def harris(
     return 0
 
 
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Strength:
-    """What decides the size of gears.
-
-    Parameters
-    ----------
-    torque
-        On sun or gear 1. Sizes go with its third root, their order does not depend on it.
-    width_ratio
-        Face width over the reference diameter of the smaller external gear of a mesh.
-    contact_limit, root_limit
-        sigma_Hlim and sigma_Flim. Default: case hardened steel, grade MQ.
-    load_factor
-        Product of all load factors K of ISO 6336.
-    contact_safety, root_safety
-        Least S_H and S_F.
-    """
-
-    torque: Quantity = "100 N m"
-    width_ratio: float = 0.8
-    contact_limit: Quantity = "1500 MPa"
-    root_limit: Quantity = "425 MPa"
-    load_factor: float = 1.5
-    contact_safety: float = 1.1
-    root_safety: float = 1.4
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class WantedTeeth:
-    """What gears are searched for.
-
-    Parameters
-    ----------
-    kind
-        planetary, pair or stepped (planets with two gears, without transmission error).
-    planets
-        A number, or as 3..5 all from one to another; may be repeated.
-    tolerance
-        Largest relative deviation from the ratio.
-    fixed
-        Member of a set that stands: ring, carrier (the ring is driven), or sun (the ring drives).
-    most
-        Teeth to size; of more, those nearest to the ratio.
-    best
-        Teeth whose transmission error is computed: the smallest of every phasing, then the smallest.
-    positions
-        Positions over one mesh period for the transmission error.
-    flank_elements
-        Elements along a flank for it.
-    """
-
-    kind: str = "planetary"
-    planets: Annotated[tuple[str, ...], Parameter(negative="")] = ("3",)
-    tolerance: float = 0.02
-    fixed: str = "ring"
-    most: Whole = 10_000
-    best: Whole = 12
-    positions: Whole = 24
-    flank_elements: Whole = 12
-
-
 @app.command
 def teeth(
     *,
     ratio: float,
     output: Annotated[Path, Parameter(name=("--output", "-o"))],
-    wanted: WantedTeeth | None = None,
-    strength: Strength | None = None,
+    wanted: Annotated[WantedTeeth | None, Parameter(name="*", negative="")] = None,
+    strength: Annotated[TeethStrength | None, Parameter(name="*")] = None,
 ) -> int:
     """Find tooth numbers for a ratio: all that assemble, by size, with phasing, hunting teeth and transmission error.
 
@@ -1573,11 +1511,11 @@ def teeth(
         Folder of teeth.csv, teeth.png and the case files of the best.
     """
     from femgear.run import grid_cache
-    from femgear.study.teeth import TeethRequest, teeth_into
+    from femgear.study.teeth import teeth_into
 
-    request = TeethRequest(ratio, **vars(wanted or WantedTeeth()), **vars(strength or Strength()))
+    request = wanted or WantedTeeth(), strength or TeethStrength()
     with Progress() as progress:
-        blocks, names = teeth_into(output, request, cache=grid_cache(), progress=progress)
+        blocks, names = teeth_into(output, ratio, *request, cache=grid_cache(), progress=progress)
     _print(blocks)
     _say(f"files in {output}: {', '.join(names)}")
     return 0

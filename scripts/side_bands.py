@@ -134,7 +134,7 @@ def main(
         write_csv(folder / LINES, HEADER, rows)
         _print_lines(measured.name, rows, threshold, tolerance, known)
     lines_of = {word: [(row[0], row[1]) for row in rows if row[4] == word] for word in (NORMAL, UNEQUAL, FOREIGN)}
-    drawn = {"threshold": threshold, "harmonics": harmonics, "half_width": half_width}
+    drawn = {"threshold": threshold, "harmonics": range(1, harmonics + 1), "half_width": half_width}
     save_figure(draw_side_bands(known, lines_of if rows else {}, **drawn), folder / PICTURE)
     say_files(folder, files)
 

@@ -16,7 +16,7 @@ from femgear.contact.cracked_flanks import (
     cracked_grids,
 )
 from femgear.fe.compliance import boundary_nodes, node_dofs, symmetric_factor
-from femgear.fe.cracks import SplitGrid, condense_whole, cracked_ring, cut_ring
+from femgear.fe.cracks import SplitGrid, WholeSchur, condense_whole, cracked_ring
 from femgear.fe.elasticity import Material
 from femgear.fe.grid import Grid, copy_nodes, shape_functions
 from femgear.gears.faults import LEFT, Crack
@@ -48,6 +48,24 @@ def crack_of(depth: float, number: int = 0) -> Crack:
 def sector_of(number: int, elements: int = ELEMENTS) -> Sector:
     """Sector of a gear of the reference set."""
     return make_sectors(reference_set(), STEEL, flank_elements=elements).gears[number]
+
+
+def cut_ring(whole: WholeSchur, cracked: WholeSchur, count: int) -> np.ndarray:
+    """Compute the compliance (count L, count L) of a ring with one cracked sector by the matrix of all its cuts [m/N].
+
+    What the update of `femgear.fe.cracks.cracked_ring` must give.
+    """
+    nb, L = len(whole.stiffness) // 2, whole.load_cut.shape[1]
+    matrix, loads = np.zeros((count * nb,) * 2), np.zeros((count * nb, count * L))
+    compliance = np.zeros((count * L,) * 2)
+    for k in range(count):
+        sector = cracked if k == 0 else whole
+        rows = np.concatenate([((k - 1) % count) * nb + np.arange(nb), k * nb + np.arange(nb)])
+        columns = k * L + np.arange(L)
+        matrix[np.ix_(rows, rows)] += sector.stiffness
+        loads[np.ix_(rows, columns)] += sector.load_cut
+        compliance[np.ix_(columns, columns)] += sector.compliance
+    return compliance + loads.T @ np.linalg.solve(matrix, loads)
 
 
 def update_identity() -> tuple[Row, ...]:

@@ -34,7 +34,7 @@ class Between:
     records : tuple of MeshCycle
         The same positions in the order in which they were solved, with the loads of the tooth pairs.
     doubt : float
-        Share of a peak to peak that what is not resolved may still add.
+        Share of a peak to peak that what is not resolved may still add; 1 where it was not searched to the end.
     """
 
     position: np.ndarray

@@ -309,7 +309,8 @@ def check_loads(loads: np.ndarray, cut: np.ndarray) -> None:
         raise GridError("a load acts on a cut of the sector", code="E-GRID", remedy="load nodes of the flanks alone")
 
 
-def _check_residual(residual: float) -> None:
+def check_sector_residual(residual: float) -> None:
+    """Refuse a solution of a sector whose largest relative residual is not small (`GridError`, E-RESIDUAL)."""
     if not residual <= 1e-8:
         raise GridError(
             f"the sector solution has a relative residual of {residual:.1e}",
@@ -396,7 +397,7 @@ def _schur_complements(parts, factors, columns, inner: int) -> list[np.ndarray]:
         # by the factor and by its last part alone
         solution = factor.solve(right)
         missed = whole @ solution - right, schur @ solution[last] - right[last]
-        _check_residual(max(np.abs(residual).max() for residual in missed))
+        check_sector_residual(max(np.abs(residual).max() for residual in missed))
         schur -= np.diag(diagonal * signs[last])
         unscale = np.append(np.ones(size - inner), length / diagonal)
         complements.append(unscale[:, None] * schur * unscale)
@@ -473,7 +474,7 @@ class CondensedHalfSector:
         # column by column: stiffnesses are many powers of ten larger than unit loads
         missed = self.interior @ solution - forces
         largest = np.abs(forces).max(axis=0)
-        _check_residual((np.abs(missed).max(axis=0) / np.where(largest == 0.0, 1.0, largest)).max())
+        check_sector_residual((np.abs(missed).max(axis=0) / np.where(largest == 0.0, 1.0, largest)).max())
         return solution
 
     def on_cut(self, shapes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

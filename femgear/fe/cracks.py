@@ -11,8 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import block_diag, csc_array, csr_array
 
-from femgear.errors import GridError
-from femgear.fe.compliance import SectorSchur, boundary_nodes, node_dofs, symmetric_factor
+from femgear.fe.compliance import SectorSchur, boundary_nodes, check_sector_residual, node_dofs, symmetric_factor
 from femgear.fe.grid import Grid, ordered_nodes
 
 
@@ -120,10 +119,7 @@ def condense_whole(grid: Grid, stiffness, loads: np.ndarray, *, held: str | None
     right = np.hstack([-across.toarray(), loads[inner]])
     solution = symmetric_factor(within).solve(right)
     missed = np.abs(within @ solution - right).max(axis=0) / np.abs(right).max(axis=0)
-    if not missed.max() <= 1e-8:
-        raise GridError(
-            f"the cracked sector has a relative residual of {missed.max():.1e}", code="E-RESIDUAL", limit="1e-8"
-        )
+    check_sector_residual(float(missed.max()))
     fields, moved = np.split(solution, [len(edge)], axis=1)
     schur = (polar.T @ matrix[edge][:, edge] @ polar).toarray() + across.T @ fields
     return WholeSchur(0.5 * (schur + schur.T), fields.T @ loads[inner], _symmetric(loads[inner].T @ moved))
@@ -177,24 +173,6 @@ def sector_cuts_compliance(whole: WholeSchur, count: int) -> tuple[np.ndarray, n
 
 def _symmetric(matrix: np.ndarray) -> np.ndarray:
     return 0.5 * (matrix + matrix.T)
-
-
-def cut_ring(whole: WholeSchur, cracked: WholeSchur, count: int) -> np.ndarray:
-    """Compute the compliance of a ring with one cracked sector by its whole matrix, (count L, count L) [m/N].
-
-    What the update of `cracked_ring` must give; its matrix has all cuts of all sectors.
-    """
-    nb, L = len(whole.stiffness) // 2, whole.load_cut.shape[1]
-    matrix, loads = np.zeros((count * nb,) * 2), np.zeros((count * nb, count * L))
-    compliance = np.zeros((count * L,) * 2)
-    for k in range(count):
-        sector = cracked if k == 0 else whole
-        rows = np.concatenate([((k - 1) % count) * nb + np.arange(nb), k * nb + np.arange(nb)])
-        columns = k * L + np.arange(L)
-        matrix[np.ix_(rows, rows)] += sector.stiffness
-        loads[np.ix_(rows, columns)] += sector.load_cut
-        compliance[np.ix_(columns, columns)] += sector.compliance
-    return compliance + loads.T @ np.linalg.solve(matrix, loads)
 
 
 @dataclass(frozen=True)

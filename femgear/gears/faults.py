@@ -32,6 +32,8 @@ class ToothFault:
         Number of the tooth; None stands for all teeth.
     flank : int or None
         `LEFT` or `RIGHT`; None stands for both.
+    separates : bool
+        Whether it takes material off the flank; a crack does not.
     """
 
     gear: int
@@ -40,7 +42,6 @@ class ToothFault:
     flank: int | None
 
     separates: ClassVar[bool] = True
-    """Whether it takes material off the flank."""
 
     def removed(self, roll: np.ndarray) -> np.ndarray:
         """Compute what is missing along the flank normal (...) [m] at roll lengths (...) [m]."""
@@ -132,6 +133,8 @@ class Crack(ToothFault):
         Between the crack and the centre line of the tooth, towards the body [rad].
     depth : float
         Its length [m].
+    separates : bool
+        False.
     """
 
     start: float | None

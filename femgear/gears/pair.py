@@ -216,6 +216,8 @@ class GearPair(GearSet):
         Of one module and pressure angle; gear 2 may be internal.
     centre_distance : float
         [m]
+    members : dict
+        None moves on supports of its own.
 
     Raises
     ------

@@ -43,6 +43,8 @@ class PlanetarySet(GearSet):
         Sun (and ring) to planet [m].
     planet_angles : tuple of float
         psi_n [rad], ascending, within one turn.
+    members : dict
+        Sun, carrier with the planets, and ring.
 
     Raises
     ------

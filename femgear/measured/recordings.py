@@ -139,9 +139,11 @@ def _carrier_speed(signal: Channel, recording: Recording, shafts: HeardSet) -> f
     if len(orders) < 2:
         return speed
     if recording.within is not None:
-        best = aligned_speed(signal, speed, orders, recording.within)
-        _tell_drift(signal, best, orders, recording.within)
-        return best
+        near = aligned_speed(signal, speed, orders, recording.within)
+        _tell_drift(signal, near, orders, recording.within)
+        # high orders tell the speed finer, as soon as it is near enough for the right ones of them
+        every = shafts.symmetric_orders(harmonics=max(int(signal.rate / (3 * near * shafts.ring)), 1))
+        return aligned_speed(signal, near, every, min(recording.within, widest_range(every)))
     best = aligned_speed(signal, speed, orders, widest_range(orders))
     if abs(best / speed - 1.0) * shafts.ring > _OFF:
         rpm = 60.0 / shafts.carrier_per_turn[shafts.input]

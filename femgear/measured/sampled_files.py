@@ -84,9 +84,13 @@ def read_matlab_signals(path: str | os.PathLike, *, rate: float | None = None) -
         in_file, start = rate_of_times(times[0], "s", name, rate)
     signals = [(title, vector) for title, vector in vectors if not is_time(_last(title))]
     if not signals:
-        limit, remedy = f"vectors of {LEAST_SAMPLES} samples or more", "save the samples as vectors, and the rate as fs"
-        raise file_problem(name, "no signals", value=", ".join(title for title, _ in arrays[:12]) or None, limit=limit,
-                           remedy=remedy)  # fmt: skip
+        raise file_problem(
+            name,
+            "no signals",
+            value=", ".join(title for title, _ in arrays[:12]) or None,
+            limit=f"vectors of {LEAST_SAMPLES} samples or more",
+            remedy="save the samples as vectors, and the rate as fs",
+        )
     rate = agreed_rate(in_file, rate, name)
     return tuple(Channel(name, title, "", rate, vector, start) for title, vector in signals[:_MOST_CHANNELS])
 

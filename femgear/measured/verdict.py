@@ -197,10 +197,21 @@ def _write(verdict: MeasuredVerdict, search: LineSearch, folder: Path) -> None:
     by_verdict = {
         word: [(line.order, line.level) for line in verdict.lines if line.verdict == word] for word in VERDICTS
     }
-    highest = int((verdict.spectrum.order[-1] - _HALF_WIDTH) // verdict.gear_set.ring)
-    harmonics = int(np.clip(highest, 1, _HARMONICS))
-    drawn = {"threshold": search.threshold, "harmonics": harmonics, "half_width": _HALF_WIDTH}
+    drawn = {"threshold": search.threshold, "harmonics": _loud_harmonics(verdict), "half_width": _HALF_WIDTH}
     save_figure(draw_side_bands(verdict.gear_set, by_verdict, **drawn), folder / _FIGURE)
+
+
+def _loud_harmonics(verdict: MeasuredVerdict) -> list[int]:
+    """Choose the mesh harmonics with the most power in the lines around them, ascending; the first of a silent one."""
+    ring = verdict.gear_set.ring
+    highest = max(int((verdict.spectrum.order[-1] - _HALF_WIDTH) // ring), 1)
+    power = np.zeros(highest + 1)
+    for line in verdict.lines:
+        harmonic = round(line.order / ring)
+        if 1 <= harmonic <= highest and abs(line.order - harmonic * ring) <= _HALF_WIDTH:
+            power[harmonic] += line.amplitude**2
+    loudest = np.argsort(-power[1:], kind="stable")[: min(_HARMONICS, highest)] + 1
+    return sorted(loudest.tolist())
 
 
 def draw_side_bands(
@@ -208,7 +219,7 @@ def draw_side_bands(
     lines: Mapping[str, Sequence[tuple[float, float]]],
     *,
     threshold: float,
-    harmonics: int,
+    harmonics: Sequence[int],
     half_width: int,
 ) -> Figure:
     """Draw the array factor as bars, forbidden orders crossed, and levels of measured lines over it.
@@ -221,14 +232,16 @@ def draw_side_bands(
         Orders and levels [dB over the strongest line] by their verdict.
     threshold : float
         Least level [dB].
-    harmonics, half_width : int
-        Mesh harmonics drawn, and carrier orders on either side of each.
+    harmonics : sequence of int
+        Mesh harmonics drawn, ascending.
+    half_width : int
+        Carrier orders on either side of each.
     """
-    figure, axes = new_figure(rows=harmonics, width=9.5, height=1.6 + 2.5 * harmonics)
+    figure, axes = new_figure(rows=len(harmonics), width=9.5, height=1.6 + 2.5 * len(harmonics))
     symmetry = spacing_symmetry(gear_set.angles)
     marks = (("o", BLUE), ("s", VERMILION), ("D", VERMILION), ("v", GREEN), ("^", BLACK))
     styles = dict(zip(lines, marks[: len(lines) - 1] + marks[-1:], strict=True)) if lines else {}
-    for h, ax in enumerate(axes, 1):
+    for h, ax in zip(harmonics, axes, strict=True):
         centre = h * gear_set.ring
         whole = np.arange(max(centre - half_width, 1), centre + half_width + 1)
         ax.bar(whole, array_factor(gear_set.angles, whole), width=0.8, color=SKY, alpha=0.5, label="array factor")
@@ -237,7 +250,7 @@ def draw_side_bands(
         ax.set_ylim(0, 1.12)
         ax.set_xlim(centre - half_width - 0.8, centre + half_width + 0.8)
         title = f"mesh harmonic {h} (order {centre})"
-        label(ax, "carrier order [1]" if h == harmonics else "", "array factor [1]", title)
+        label(ax, "carrier order [1]" if h == harmonics[-1] else "", "array factor [1]", title)
         if not any(lines.values()):
             continue
         over, bottom = ax.twinx(), min(10 * math.floor(threshold / 10), -20)

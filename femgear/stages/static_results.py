@@ -740,6 +740,11 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
             "between the positions transmission errors, mesh stiffnesses or load shares may go on by "
             f"{doubt:.0%} of their peak to peak"
         )
+        if doubt >= 1.0:
+            text = (
+                "between the positions transmission errors, mesh stiffnesses or load shares may have higher peaks: in a "
+                "record with so many tooth pairs they are not searched to the end"
+            )
         yield Finding("W-POSITIONS", "static.positions", text, remedy="take more positions")
     if ((force > 0) & (pressure <= 0)).any():
         text = (

@@ -248,11 +248,13 @@ def size_and_error(
             label=f"leaves {kind}" if kind else "pairs",
         )
     top = 1.15 * max(errors)
-    ax.set_ylim(0.0, top)
+    ax.set_ylim(-0.05 * top, top)
     span = max(volumes) - min(volumes) or max(volumes)
-    ax.set_xlim(min(volumes) - 0.08 * span, max(volumes) + 0.25 * span)
+    ax.set_xlim(min(volumes) - 0.25 * span, max(volumes) + 0.08 * span)
+    # below the front, on the side of less volume, there are no other teeth
+    beside = {"xytext": (-6, -4), "textcoords": "offset points", "ha": "right", "va": "top"}
     for place in front:
-        ax.annotate(names[place], (volumes[place], errors[place]), xytext=(6, 5), textcoords="offset points")
+        ax.annotate(names[place], (volumes[place], errors[place]), **beside)
     title = "what planets leave of the first mesh harmonic" if any(left) else ""
     label(ax, "volume [cm³]", "transmission error peak to peak [µm]", title)
     legend_below(figure)

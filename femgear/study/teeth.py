@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from femgear.case import text as case_text
 from femgear.case.quantities import LENGTH, STRESS, TORQUE, to_si
@@ -18,48 +19,13 @@ from femgear.stages.static import solve_static
 from femgear.storage.files import own_files, write_csv, write_text
 from femgear.study.faults import all_faults
 from femgear.study.figures import size_and_error
+from femgear.study.teeth_request import TeethStrength, WantedTeeth
 from femgear.trains.drafts import new_case
 from femgear.trains.reading import parse_case
 
 _TABLE, _FIGURE = "teeth.csv", "teeth.png"
 _SHOWN = 12
 """Rows of the smallest teeth that are printed."""
-
-
-@dataclass(frozen=True)
-class TeethRequest:
-    """What teeth are searched for; quantities with their units.
-
-    Parameters
-    ----------
-    ratio, kind, tolerance, fixed, width_ratio, load_factor, contact_safety, root_safety, most
-        As of `femgear.gears.tooth_search.ToothDemand`.
-    planets : sequence of str
-        Numbers of planets, ``"3"`` or from the first to the last one, ``"3..5"``.
-    torque, contact_limit, root_limit : str
-        As of `ToothDemand`.
-    best : int
-        Teeth whose transmission error is computed.
-    positions, flank_elements : int
-        Of these computations, over one mesh period and along a flank.
-    """
-
-    ratio: float
-    kind: str = "planetary"
-    tolerance: float = 0.02
-    planets: Sequence[str] = ("3",)
-    fixed: str = "ring"
-    torque: str = "100 N m"
-    width_ratio: float = 0.8
-    contact_limit: str = "1500 MPa"
-    root_limit: str = "425 MPa"
-    load_factor: float = 1.5
-    contact_safety: float = 1.1
-    root_safety: float = 1.4
-    most: int = 10_000
-    best: int = 12
-    positions: int = 24
-    flank_elements: int = 12
 
 
 @dataclass(frozen=True)
@@ -83,25 +49,45 @@ class ComputedTeeth:
 
 @one_blas_thread()
 def teeth_into(
-    folder: Path, request: TeethRequest, *, cache: Path | None = None, progress: Progress = silent
+    folder: Path,
+    ratio: float,
+    wanted: WantedTeeth,
+    strength: TeethStrength,
+    *,
+    cache: Path | None = None,
+    progress: Progress = silent,
 ) -> tuple[list[Block], list[str]]:
     """Search teeth; write the table of all, the cases of the best and a figure, and give tables and names of files.
 
-    ``cache`` is the folder of generated grids. CaseError, GeometryError: a request that no teeth meet. StorageError:
-    files of others (E-OUTPUT).
+    CaseError, GeometryError: a demand that no teeth meet. StorageError: files of others (E-OUTPUT).
+
+    Parameters
+    ----------
+    folder : path
+        Of the files.
+    ratio : float
+        As of `femgear.gears.tooth_search.ToothDemand`.
+    wanted : WantedTeeth
+        Gears, and how finely the best of them are computed.
+    strength : TeethStrength
+        What decides their size, with units.
+    cache : path, optional
+        Folder of generated grids.
+    progress : callable
+        Called with (stage, done, total).
     """
-    demand = _demand(request)
+    demand = tooth_demand(ratio, wanted, strength)
     own_files(folder, (_TABLE, _FIGURE, f"{demand.kind}_*.toml"))
     sized = search_teeth(demand, progress=lambda done, total: progress("teeth", done, total))
     write_csv(folder / _TABLE, _header(demand), map(_record, sized))
     names, blocks = [_TABLE], [_described(demand, sized)]
     if demand.kind == "stepped":
         # drafts of stepped sets have a ring that stands
-        for choice in best_of_every_phasing(sized, request.best) if demand.fixed == "ring" else ():
+        for choice in best_of_every_phasing(sized, wanted.best) if demand.fixed == "ring" else ():
             names.append(f"{_label(choice, '_')}.toml")
             write_text(case_of(demand, choice), folder / names[-1])
         return blocks, names
-    computed = list(_computed(demand, best_of_every_phasing(sized, request.best), request, cache, progress))
+    computed, refused = _computed(demand, best_of_every_phasing(sized, wanted.best), wanted, cache, progress)
     for teeth in computed:
         names.append(f"{_label(teeth.choice, '_')}.toml")
         write_text(teeth.case, folder / names[-1])
@@ -115,7 +101,7 @@ def teeth_into(
             front=front,
         )
         save_figure(figure, folder / _FIGURE)
-        blocks.append(_described_errors(demand, computed, front))
+        blocks.append(_described_errors(demand, computed, front, refused))
         names.append(_FIGURE)
     return blocks, names
 
@@ -143,37 +129,26 @@ def front_of(computed: Sequence[ComputedTeeth]) -> list[int]:
     return front
 
 
-def _demand(request: TeethRequest) -> ToothDemand:
-    """Read the quantities of a request."""
-    planets, values = list[int](), {}
+def tooth_demand(ratio: float, wanted: WantedTeeth, strength: TeethStrength) -> ToothDemand:
+    """Read the quantities of what is wanted."""
+    planets, values = list[int](), dict[str, Any](vars(strength))
     with all_faults() as part:
-        for text in request.planets:
+        for text in wanted.planets:
             with part("--planets"):
                 planets += _counts(text)
         for name, dimension in (("torque", TORQUE), ("contact_limit", STRESS), ("root_limit", STRESS)):
             with part(f"--{name.replace('_', '-')}"):
-                values[name] = to_si(getattr(request, name), dimension)
+                values[name] = to_si(values[name], dimension)
         for key, value, low, high in (
-            ("--best", request.best, 1, 200),
-            ("--positions", request.positions, 8, 512),
-            ("--flank-elements", request.flank_elements, 4, 64),
+            ("--best", wanted.best, 1, 200),
+            ("--positions", wanted.positions, 8, 512),
+            ("--flank-elements", wanted.flank_elements, 4, 64),
         ):
             with part(key):
                 if not low <= value <= high:
                     raise CaseError("out of range", code="E-RANGE", key=key, value=value, limit=f"{low} to {high}")
-    return ToothDemand(
-        ratio=request.ratio,
-        kind=request.kind,
-        tolerance=request.tolerance,
-        planets=tuple(sorted(set(planets))),
-        fixed=request.fixed,
-        width_ratio=request.width_ratio,
-        load_factor=request.load_factor,
-        contact_safety=request.contact_safety,
-        root_safety=request.root_safety,
-        most=request.most,
-        **values,
-    )
+    searched = {"kind": wanted.kind, "tolerance": wanted.tolerance, "fixed": wanted.fixed, "most": wanted.most}
+    return ToothDemand(ratio=ratio, planets=tuple(sorted(set(planets))), **searched, **values)
 
 
 def _counts(text: str) -> range:
@@ -186,21 +161,24 @@ def _counts(text: str) -> range:
 
 
 def _computed(
-    demand: ToothDemand, teeth: Sequence[SizedTeeth], request: TeethRequest, cache: Path | None, progress: Progress
-) -> Iterator[ComputedTeeth]:
-    """Static transmission errors on a coarse grid, of cases that can be made and solved."""
+    demand: ToothDemand, teeth: Sequence[SizedTeeth], wanted: WantedTeeth, cache: Path | None, progress: Progress
+) -> tuple[list[ComputedTeeth], list[str]]:
+    """Static transmission errors on a coarse grid, and why teeth have none that ISO 6336 rates."""
+    computed, refused = list[ComputedTeeth](), list[str]()
+    grid = {"positions": wanted.positions, "flank_elements": wanted.flank_elements, "stresses": False}
     for number, choice in enumerate(teeth):
         progress("transmission error", number, len(teeth))
         try:
             text = case_of(demand, choice)
             tables = case_text.parse(text, "")
-            grid = {"positions": request.positions, "flank_elements": request.flank_elements, "stresses": False}
             tables["static"] = tables.get("static", {}) | grid
             cycle = solve_static(parse_case(case_text.write(tables)), cache=cache).cycle
-        except FemgearError:  # teeth that ISO 6336 rates, and whose grid or contact has no solution
+        except FemgearError as error:
+            refused.append(f"{_label(choice, '/').partition('_')[2]} has none: {error.message} ({error.code})")
             continue
-        yield ComputedTeeth(choice, text, float(cycle.peak_to_peak("sun_arc")))
+        computed.append(ComputedTeeth(choice, text, float(cycle.peak_to_peak("sun_arc"))))
     progress("transmission error", len(teeth), len(teeth))
+    return computed, refused
 
 
 def case_of(demand: ToothDemand, choice: SizedTeeth) -> str:
@@ -306,8 +284,10 @@ def _described(demand: ToothDemand, sized: Sequence[SizedTeeth]) -> Block:
     return Block(f"Smallest {demand.kind} teeth", (*_COLUMNS, "decided by"), rows, tuple(notes))
 
 
-def _described_errors(demand: ToothDemand, computed: Sequence[ComputedTeeth], front: Sequence[int]) -> Block:
-    """Transmission errors of the teeth that were computed."""
+def _described_errors(
+    demand: ToothDemand, computed: Sequence[ComputedTeeth], front: Sequence[int], refused: Sequence[str]
+) -> Block:
+    """Transmission errors of the teeth that were computed, and which could not be."""
     rows = tuple(
         (*_cells(teeth.choice), f"{1e6 * teeth.error:.3f}", "*" if place in front else "")
         for place, teeth in enumerate(computed)
@@ -315,6 +295,5 @@ def _described_errors(demand: ToothDemand, computed: Sequence[ComputedTeeth], fr
     note = "STE: static transmission error peak to peak of unmodified teeth, as an arc on the base circle of " + (
         "gear 1" if demand.kind == "pair" else "the sun"
     )
-    return Block(
-        "Transmission error", (*_COLUMNS, "STE p-p [µm]", "front"), rows, (note, "front: none is smaller with less")
-    )
+    notes = (note, "front: none is smaller with less", *refused)
+    return Block("Transmission error", (*_COLUMNS, "STE p-p [µm]", "front"), rows, notes)

@@ -8,10 +8,11 @@ import pytest
 from femgear.contact.bodies import flank_load_columns, flank_stations, make_sectors
 from femgear.contact.cracked_flanks import both_flank_loads, crack_stiffness, cracked_grids
 from femgear.fe.compliance import condense_sector, tooth_compliance
-from femgear.fe.cracks import WholeSchur, both_cuts, condense_whole, cracked_ring, cut_ring, sector_cuts_compliance
+from femgear.fe.cracks import WholeSchur, both_cuts, condense_whole, cracked_ring, sector_cuts_compliance
 from femgear.fe.elasticity import Material
 from femgear.fe.grid import check_grid
 from femgear.gears.faults import Crack
+from validation.faults import cut_ring
 from validation.planetary import reference_set
 
 STEEL = Material(206e9, 0.3, 7850.0)

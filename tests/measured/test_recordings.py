@@ -8,8 +8,10 @@ from scipy.io import savemat, wavfile
 
 from femgear.errors import CaseError
 from femgear.measured.heard_set import HeardSet
+from femgear.measured.lines import sharpened_lines
 from femgear.measured.recordings import read_by_turns, read_channels
 from femgear.measured.requests import Recording
+from femgear.measured.spectra import windowed_spectrum
 
 HEARD = HeardSet(108, 27, 40, np.radians([0, 120, 240]), "sun", {"sun": 0.2, "carrier": 1.0})
 SIGNAL, PULSES, TURNS = recording(HEALTHY, HEALTHY.values(), seconds=4.0)
@@ -42,6 +44,17 @@ def test_formats_give_the_same_signal_over_the_angle(kind, tmp_path):
     assert over_angle.turns == 11 and over_angle.speed == pytest.approx(3.0, rel=0.02)
     alone = read_by_turns(path, Recording(pulses="2"), HEARD)  # the other channel is the signal
     assert np.array_equal(alone.values, over_angle.values)
+
+
+def test_a_speed_that_is_searched_holds_for_high_orders_too(tmp_path):
+    seconds, rate, carrier = 6.0, 48000.0, 10.331
+    time = np.arange(int(seconds * rate)) / rate
+    orders = (321, 327, 429, 435, 1074, 1086, 1506, 1518)
+    signal = sum(np.sin(2 * np.pi * order * carrier * time + order) for order in orders)
+    wavfile.write(tmp_path / "a.wav", int(rate), signal.astype(np.float32))
+    searched = Recording(speed="3100 rpm", within=0.002)
+    found, _ = sharpened_lines(windowed_spectrum(read_by_turns(tmp_path / "a.wav", searched, HEARD)), -30.0)
+    assert found == pytest.approx(orders, abs=5e-3)
 
 
 def test_a_constant_speed_is_that_of_the_input(tmp_path):

@@ -90,7 +90,7 @@ def test_computed_signals_with_noise_and_a_wandering_speed_come_back(unequal, tm
 def test_lines_of_every_verdict_are_drawn_at_their_orders():
     heard = HeardSet(108, 27, 40, np.radians([0, 120, 240]))
     lines = {"normal": [(108.0, 0.0), (219.0, -3.0)], "odd": [(109.0, -9.0)], "none": []}
-    figure = draw_side_bands(heard, lines, threshold=-40.0, harmonics=2, half_width=12)
+    figure = draw_side_bands(heard, lines, threshold=-40.0, harmonics=(1, 2), half_width=12)
     first, second, over_first, over_second = figure.axes
     assert [len(ax.patches) for ax in (first, second)] == [25, 25]
     drawn = [[line.get_xydata().tolist() for line in ax.get_lines()] for ax in (over_first, over_second)]
