@@ -735,17 +735,18 @@ def static_warnings(data: xr.Dataset) -> Iterator[Finding]:
             "are those of the unmoved set"
         )
         yield Finding("W-MOTION", "", text)
-    if (doubt := _peak_doubt(data)) > LARGEST_PEAK_DOUBT:
+    if (doubt := _peak_doubt(data)) >= 1.0:
         text = (
+            "between the positions transmission errors, mesh stiffnesses or load shares may have higher peaks: "
+            "a record with so many tooth pairs is not searched to the end for them"
+        )
+        yield Finding("W-POSITIONS", "static.positions", text, remedy="take more positions")
+    elif doubt > LARGEST_PEAK_DOUBT:
+        reach = (
             "between the positions transmission errors, mesh stiffnesses or load shares may go on by "
             f"{doubt:.0%} of their peak to peak"
         )
-        if doubt >= 1.0:
-            text = (
-                "between the positions transmission errors, mesh stiffnesses or load shares may have higher peaks: in a "
-                "record with so many tooth pairs they are not searched to the end"
-            )
-        yield Finding("W-POSITIONS", "static.positions", text, remedy="take more positions")
+        yield Finding("W-POSITIONS", "static.positions", reach, remedy="take more positions")
     if ((force > 0) & (pressure <= 0)).any():
         text = (
             "at some positions every contact of a mesh lies at the end of a flank: its pressure has no limit "
