@@ -151,8 +151,10 @@ class _UnitMesh:
     names: tuple[str, str]
 
 
-def search_teeth(demand: ToothDemand, *, progress: Callable[[int, int], None] | None = None) -> list[SizedTeeth]:
-    """Find all tooth numbers that assemble and close, the smallest first.
+def search_teeth(
+    demand: ToothDemand, *, progress: Callable[[int, int], None] | None = None
+) -> tuple[list[SizedTeeth], int]:
+    """Find all tooth numbers that assemble and close, the smallest first, and count those beyond ``most``.
 
     Equally spaced planets, tips a module apart at least.
 
@@ -162,7 +164,8 @@ def search_teeth(demand: ToothDemand, *, progress: Callable[[int, int], None] | 
         A demand that nothing can meet (E-CHOICE, E-RANGE), or that no teeth meet (E-CHOICE).
     """
     _check(demand)
-    wanted, sized = candidates(demand), []
+    listed, sized = candidates(demand), []
+    wanted = listed[: demand.most]
     for number, (teeth, planets) in enumerate(wanted):
         try:
             sized.append(size_of(demand, teeth, planets))
@@ -180,14 +183,13 @@ def search_teeth(demand: ToothDemand, *, progress: Callable[[int, int], None] | 
             limit=f"within {demand.tolerance:.3g} of it, gears of {LEAST_TEETH} to {MOST_TEETH} teeth that close",
             remedy="a larger --tolerance, another number of planets, or another kind",
         )
-    return sorted(sized, key=lambda choice: choice.volume)
+    return sorted(sized, key=lambda choice: choice.volume), len(listed) - len(wanted)
 
 
 def candidates(demand: ToothDemand) -> list[tuple[tuple[int, ...], int]]:
-    """List teeth and numbers of planets of the ratio that assemble, as many as are to be rated, nearest ratio first."""
+    """List teeth and numbers of planets of the ratio that assemble, nearest ratio first."""
     listed = {"pair": _pairs, "planetary": _sets, "stepped": _stepped_sets}[demand.kind](demand)
-    ordered = sorted(listed, key=lambda teeth: (round(abs(_ratio(demand, teeth[0]) / demand.ratio - 1.0), 9), teeth))
-    return ordered[: demand.most]
+    return sorted(listed, key=lambda teeth: (round(abs(_ratio(demand, teeth[0]) / demand.ratio - 1.0), 9), teeth))
 
 
 def size_of(demand: ToothDemand, teeth: tuple[int, ...], planets: int) -> SizedTeeth:

@@ -78,9 +78,9 @@ def teeth_into(
     """
     demand = tooth_demand(ratio, wanted, strength)
     own_files(folder, (_TABLE, _FIGURE, f"{demand.kind}_*.toml"))
-    sized = search_teeth(demand, progress=lambda done, total: progress("teeth", done, total))
+    sized, beyond = search_teeth(demand, progress=lambda done, total: progress("teeth", done, total))
     write_csv(folder / _TABLE, _header(demand), map(_record, sized))
-    names, blocks = [_TABLE], [_described(demand, sized)]
+    names, blocks = [_TABLE], [_described(demand, sized, beyond)]
     if demand.kind == "stepped":
         # drafts of stepped sets have a ring that stands
         for choice in best_of_every_phasing(sized, wanted.best) if demand.fixed == "ring" else ():
@@ -271,14 +271,18 @@ _COLUMNS = (
 )
 
 
-def _described(demand: ToothDemand, sized: Sequence[SizedTeeth]) -> Block:
-    """The smallest teeth."""
+def _described(demand: ToothDemand, sized: Sequence[SizedTeeth], beyond: int) -> Block:
+    """The smallest teeth, and how many further from the ratio were not sized."""
     rows = tuple((*_cells(choice), choice.decides) for choice in sized[:_SHOWN])
     notes = [
         f"{len(sized)} sets of teeth close and assemble; sizes for {demand.torque:g} N m on "
         f"{'gear 1' if demand.kind == 'pair' else 'the sun'}, S_H {demand.contact_safety:g} and S_F "
         f"{demand.root_safety:g} with K = {demand.load_factor:g} (ISO 6336, long life)"
     ]
+    if beyond:
+        notes.append(
+            f"{beyond} more that assemble are further from the ratio and were not sized: raise --most for them"
+        )
     if demand.kind == "stepped":
         notes.append("stepped planets: gears without shift; the cases have the larger face width for all gears")
     return Block(f"Smallest {demand.kind} teeth", (*_COLUMNS, "decided by"), rows, tuple(notes))

@@ -45,9 +45,17 @@ def test_stepped_sets_of_the_ratio_assemble_with_equal_spacing():
         assert abs(1.0 / planets / step - round(1.0 / planets / step)) < 1e-9
 
 
+def test_teeth_that_are_not_sized_are_counted():
+    demand = ToothDemand(5.0, tolerance=0.005)
+    listed, (sized, beyond) = candidates(demand), search_teeth(replace(demand, most=5))
+    assert beyond == len(listed) - 5 > 0
+    assert {(choice.teeth, choice.planets) for choice in sized} <= set(listed[:5])
+    assert search_teeth(demand)[1] == 0
+
+
 def test_sizes_go_with_the_third_root_of_the_torque():
     demand = ToothDemand(5.0, tolerance=0.005)
-    light, heavy = search_teeth(demand), search_teeth(replace(demand, torque=800.0))
+    light, heavy = search_teeth(demand)[0], search_teeth(replace(demand, torque=800.0))[0]
     assert [choice.teeth for choice in light] == [choice.teeth for choice in heavy]
     for one, other in zip(light, heavy, strict=True):
         assert other.modules[0] == pytest.approx(2.0 * one.modules[0], rel=1e-12)
@@ -91,7 +99,7 @@ def test_what_the_first_harmonic_leaves_follows_from_the_phases():
     ],
 )
 def test_the_search_finds_nothing_larger_than_known_teeth_of_the_ratio(demand, shipped, planets):
-    best = search_teeth(demand)[0]
+    best = search_teeth(demand)[0][0]
     assert best.volume <= size_of(demand, shipped, planets).volume
 
 
