@@ -88,7 +88,7 @@ CATALOGUE = {
     "W-SMOOTHING": (DOUBT, "The smoothing of contact changes the result."),
     "W-SPECTRUM": (NOTE, "The stage spectrum refuses this case."),
     "W-SPEED": (NOTE, "Torques change the speed within the record."),
-    "W-STANDING": (NOTE, "Planets of a carrier that turns vibrate where they stand: lines have no side bands."),
+    "W-STANDING": (DOUBT, "Planets of a carrier that turns vibrate where they stand: lines have no side bands."),
     "W-STEPS": (DOUBT, "Peaks of resonances are too narrow for the speeds of a run-up."),
     "W-STIFFNESS": (DOUBT, "Results rest on estimated stiffnesses, of bearings or of meshes."),
     "W-STRENGTH": (FAULT, "A tooth fails at once: a stress exceeds its static strength."),

@@ -163,7 +163,7 @@ def load_patterns(deflection: xr.Dataset) -> Figure | None:
         )
     for number, names in enumerate(drawn.values()):
         i = list(deflection["mesh"].values).index(names[0])
-        text = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} alike"
+        text = names[0] if len(names) == 1 else f"{names[0]} and {len(names) - 1} more alike"
         factor = float(deflection["face_load_factor"].values[int(deflection.attrs["load_case"]), i])
         text += "" if np.isnan(factor) else f", K_Hβ {factor:.3f}"
         style = {
