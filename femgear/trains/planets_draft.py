@@ -33,6 +33,8 @@ _DENSITY, _MODULUS, _BACKLASH = 7850.0, 206e9, 0.04
 _STEEL = {"youngs_modulus": "206 GPa", "poisson_ratio": 0.3, "density": "7850 kg/m^3"}
 _BEARING, _FLANGE = 0.2, 2.0
 """Stiffness of a bearing, and of the flange of a ring, over that of a mesh."""
+_LEVER = 3.0
+"""Lever of the tilt stiffness of a flange over the face width."""
 _SHAFT = 0.6
 """Outer diameter of shafts over the root circle of their smallest gear."""
 
@@ -301,8 +303,7 @@ class _Tables:
         if axial:
             table["axial"] = STIFFNESS.show(radial)
         if tilt:
-            lever = 0.25 * self.width * 12.0
-            table["tilt"] = TORSION.show(float(f"{radial * lever**2:.3g}"))
+            table["tilt"] = TORSION.show(float(f"{radial * (_LEVER * self.width) ** 2:.3g}"))
         share = radial / self.stiffness * _BEARING
         self.notes[f"bearing[{len(self.bearings)}].radial"] = f"estimated: {share:g} of a mesh of this width"
         self.bearings.append(table | {"estimated": True})
