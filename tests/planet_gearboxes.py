@@ -3,11 +3,13 @@
 import itertools
 import math
 import random
+from fractions import Fraction
 
 import numpy as np
 
 from femgear.gears.planet_assembly import double_gears, ravigneaux_gears, simple_gears, stepped_gears
-from femgear.gears.shaft_graph import StageGears
+from femgear.gears.power_flow import pair_condition
+from femgear.gears.shaft_graph import INTERNAL, SpeedCondition, StageGears
 
 MESH = {"stiffness": "4e8 N/m"}
 BEARING = {"radial": "3e8 N/m", "axial": "1e8 N/m", "tilt": "2e5 N m/rad"}
@@ -87,12 +89,12 @@ def known_set(teeth=(27, 39, 105), module=2e-3, planets=3, torque=100.0, fixed="
 STEPPED = (24, 57, 27, 108)
 
 
-def stepped_set(motions="plane", stiffness=(4e8, 4e8, 4e8, 3e8, 3e8, 3e8)):
+def stepped_set(motions="plane", stiffness=(4e8, 4e8, 4e8, 3e8, 3e8, 3e8), teeth=STEPPED, turns=(0.0, 1 / 3, 2 / 3)):
     """Stepped planets on three pins, every mesh with its own stiffness."""
-    sun, first, second, ring = STEPPED
+    sun, first, second, ring = teeth
     tables = members(sun=(1.0, 5e-4), carrier=(4.0, 2e-2), ring=(3.0, 4e-2)) | {"pair": []}
-    for n in range(3):
-        planet(tables, f"p{n}", 81e-3, 2.0 * math.pi * n / 3.0)
+    for n, turn in enumerate(turns):
+        planet(tables, f"p{n}", 1e-3 * (sun + first), 2.0 * math.pi * turn)
     for n in range(3):
         mesh = {"stiffness": f"{stiffness[n]!r} N/m"}
         tables["pair"].append(pair(f"sun-{n}", ("sun", f"p{n}"), (sun, first), 2e-3, mesh=mesh))
@@ -151,6 +153,35 @@ def random_set(draw: random.Random, kind: str) -> StageGears:
 
 
 SET_KINDS = ("simple", "stepped", "double", "Ravigneaux", "two rings")
+
+
+def pair_conditions(gears: StageGears) -> tuple[list[str], list[SpeedCondition]]:
+    """Shafts of a set, its planets by their bodies among them, and one pair on the carrier for every mesh."""
+    body = {second: first for first, second in gears.bodies}
+    shafts = list(dict.fromkeys([*gears.shafts, *(body.get(gear, gear) for mesh in gears.meshes for gear in mesh[:2])]))
+    conditions = []
+    for a, b, sense in gears.meshes:
+        between = body.get(a, a), body.get(b, b)
+        sizes = gears.teeth[a], gears.teeth[b]
+        inside = sense == INTERNAL
+        conditions.append(pair_condition(f"{a}-{b}", *between, *sizes, internal=inside, carrier="carrier"))
+    return shafts, conditions
+
+
+def free_speeds(gears: StageGears, given: dict[str, Fraction]) -> dict[str, Fraction]:
+    """Speeds of all gears and the carrier from those given, every gear by the teeth that pass in its meshes."""
+    speed = dict(given)
+    twins = dict(gears.bodies) | {b: a for a, b in gears.bodies}
+    while len(speed) < len(gears.teeth) + 1:
+        before = len(speed)
+        for first, second, sense in gears.meshes:
+            for known, new in ((first, second), (second, first)):
+                if known in speed and new not in speed:
+                    passed = (speed[known] - speed["carrier"]) * gears.teeth[known]
+                    speed[new] = speed["carrier"] + sense * passed / gears.teeth[new]
+        speed |= {twins[gear]: value for gear, value in list(speed.items()) if gear in twins}
+        assert len(speed) > before
+    return speed
 
 
 def places_by_trial(gears: StageGears) -> np.ndarray:

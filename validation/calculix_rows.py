@@ -170,6 +170,39 @@ def pair_rows(name: str) -> tuple[Row, ...]:
 
 
 @where_installed
+def stepped_set() -> tuple[Row, ...]:
+    """Both meshes of a stepped planet of `femgear new stepped`, where one and where two pairs of teeth carry."""
+    from femgear.case import text as case_text
+    from femgear.case.gear_set import gear_material
+    from femgear.stages.static import solve_static
+    from femgear.trains.drafts import new_case
+    from femgear.trains.gearbox.contact import loaded_tables
+    from femgear.trains.gearbox.power import gearbox_flow
+    from femgear.trains.reading import parse_case
+
+    rows, gearbox = list[Row](), parse_case(new_case("stepped"))
+    flow = gearbox_flow(gearbox)
+    for stage in gearbox.pair[:2]:
+        tables = loaded_tables(stage, abs(flow.first_torque(stage)), 1) | {"static": {"positions": 64}}
+        case = parse_case(case_text.write(tables))
+        static = solve_static(case)
+        approach, stiffness = static.cycle.deflection[0], static.cycle.stiffness[0]
+        for words, at in (("one pair of teeth", int(stiffness.argmin())), ("two", int(stiffness.argmax()))):
+            theirs = contact_of_gears(
+                static.planetary_set,
+                gear_material(case, "gear_1"),
+                torque=static.sun_torque,
+                position=at / 64,
+                approach=approach[at],
+            )
+            for quantity, value, reference in zip(QUANTITIES[:2], (1e6 * approach, 1e-6 * stiffness), theirs):
+                teeth = "/".join(str(gear.teeth) for gear in static.planetary_set.gears)
+                text = f"{stage.name} {teeth}, {words}: {quantity}"
+                rows.append(within("stepped 24/57/27/108", SOURCE, text, float(reference), float(value[at]), 0.01))
+    return tuple(rows)
+
+
+@where_installed
 def settings() -> tuple[Row, ...]:
     """What penalty and elements of CalculiX change, and the plane state that femgear does not take."""
     rows, name, position = list[Row](), "24/36", 0.5

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from planet_gearboxes import SET_KINDS as KINDS
-from planet_gearboxes import places_by_trial, random_set
+from planet_gearboxes import free_speeds, places_by_trial, random_set
 
 from femgear.errors import GeometryError
 from femgear.gears.planet_assembly import (
@@ -28,7 +28,6 @@ from femgear.gears.power_flow import (
     ravigneaux_conditions,
     stepped_condition,
 )
-from femgear.gears.shaft_graph import StageGears
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -88,22 +87,6 @@ def test_planets_off_their_places_are_refused_with_the_nearest_angles():
     step = 2.0 * math.pi * assembly_step(gears)
     angles = [0.3 + place * step for place in nearest_places(assembly_step(gears), (0.0, third, 2.0 * third))]
     assert assembly_places(gears, angles) == (0, 1237, 2475)
-
-
-def free_speeds(gears: StageGears, given: dict[str, Fraction]) -> dict[str, Fraction]:
-    """Speeds of all gears and the carrier from those given, every gear by the teeth that pass in its meshes."""
-    speed = dict(given)
-    twins = dict(gears.bodies) | {b: a for a, b in gears.bodies}
-    while len(speed) < len(gears.teeth) + 1:
-        before = len(speed)
-        for first, second, sense in gears.meshes:
-            for known, new in ((first, second), (second, first)):
-                if known in speed and new not in speed:
-                    passed = (speed[known] - speed["carrier"]) * gears.teeth[known]
-                    speed[new] = speed["carrier"] + sense * passed / gears.teeth[new]
-        speed |= {twins[gear]: value for gear, value in list(speed.items()) if gear in twins}
-        assert len(speed) > before
-    return speed
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -109,6 +109,73 @@ def test_stepped_planets_share_the_load_as_their_springs_do():
     assert shares["sun-1"] > shares["sun-0"] > shares["sun-2"]
 
 
+UNEQUAL = (4e8, 4.4e8, 3.6e8, 3e8, 3.1e8, 2.8e8)
+
+
+def forces_by_name(tables):
+    found = solve_deflection(read_case(tables))
+    return {stage.name: force for stage, force in zip(found.model.stages, found.mesh_force, strict=True)}, found
+
+
+def scaled(value, size):
+    """A quantity, its number times what its unit asks for of a gearbox ``size`` times as large of one material."""
+    number, unit = value.split(" ", 1)
+    power = {"mm": 1, "N/m": 1, "N m/rad": 3, "N m": 3, "kg": 3, "kg m^2": 5}.get(unit, 0)
+    return f"{float(number) * size**power!r} {unit}"
+
+
+def enlarged(tables, size):
+    if isinstance(tables, dict):
+        return {key: enlarged(value, size) for key, value in tables.items()}
+    if isinstance(tables, list):
+        return [enlarged(value, size) for value in tables]
+    is_quantity = isinstance(tables, str) and tables[0] in "-0123456789" and " " in tables
+    return scaled(tables, size) if is_quantity else tables
+
+
+def test_a_stepped_set_in_the_mirror_carries_the_same():
+    own, _ = forces_by_name(stepped_set(stiffness=UNEQUAL))
+    tables = stepped_set(stiffness=UNEQUAL)
+    for shaft in tables["shaft"]:
+        x, y = shaft["axis"]
+        shaft["axis"] = [x, y.removeprefix("-") if y.startswith("-") else f"-{y}"]
+    tables["operation"]["load_case"][0] |= {"torque": {"sun": "-100 N m"}, "speed": {"sun": "-1000 rpm"}}
+    assert forces_by_name(tables)[0] == pytest.approx(own, rel=1e-9)
+
+
+def test_a_stepped_set_that_drives_backwards_carries_as_its_mirror_image():
+    own, found = forces_by_name(stepped_set(stiffness=UNEQUAL))
+    swapped = [UNEQUAL[n] for n in (0, 2, 1, 3, 5, 4)]
+    tables = stepped_set(stiffness=swapped)
+    tables["operation"]["load_case"][0]["torque"] = {"sun": "-100 N m"}
+    back, driven = forces_by_name(tables)
+    twins = {"sun-1": "sun-2", "sun-2": "sun-1", "1-ring": "2-ring", "2-ring": "1-ring"}
+    assert {twins.get(name, name): force for name, force in back.items()} == pytest.approx(own, rel=1e-9)
+    assert back != pytest.approx(own, rel=1e-3)
+    outputs = [one.model.flow.port_torque["carrier"] for one in (found, driven)]
+    assert outputs[0] == pytest.approx(-outputs[1])
+
+
+def test_a_stepped_set_of_twice_the_size_carries_as_its_surface_grows():
+    own, found = forces_by_name(stepped_set(stiffness=UNEQUAL))
+    large, grown = forces_by_name(enlarged(stepped_set(stiffness=UNEQUAL), 2.0))
+    assert large == pytest.approx({name: 4.0 * force for name, force in own.items()}, rel=1e-9)
+    frequencies = [solve_gearbox_modes(one).modes.frequency for one in (found, grown)]
+    np.testing.assert_allclose(2.0 * frequencies[1], frequencies[0], rtol=1e-9, atol=1e-9 * frequencies[0].max())
+
+
+def test_the_order_of_planets_in_the_file_is_no_matter():
+    own, found = forces_by_name(stepped_set(stiffness=UNEQUAL))
+    tables = stepped_set(stiffness=UNEQUAL)
+    for key in ("pair", "shaft", "mass", "bearing"):
+        driven, *others = tables[key]
+        tables[key] = [driven, *reversed(others)]
+    other, turned = forces_by_name(tables)
+    assert other == pytest.approx(own, rel=1e-9)
+    frequencies = [solve_gearbox_modes(one).modes.frequency for one in (found, turned)]
+    np.testing.assert_allclose(*frequencies, rtol=1e-9, atol=1e-9 * frequencies[0].max())
+
+
 def test_double_planets_yield_as_a_chain_of_three_pairs():
     sun, inner, outer, ring = 24, 18, 20, 84
     stiffness = (4e8, 3e8, 5e8)
