@@ -131,9 +131,9 @@ THEMES = (
     Theme(
         "gearbox_planets",
         "Planets of any kind",
-        "Planets that are shafts of their own. Compared with: places by trial of all teeth in random sets, speeds by the "
-        "teeth that pass, planetary stages, springs set up by hand; gates: exact; 1e-12 of linear statics, 1e-9; 0.3 % "
-        "where pairs are solved one by one.",
+        "Planets that are shafts of their own. Compared with: places by trial of all teeth in random sets, speeds by "
+        "the teeth that pass, planetary stages, springs set up by hand; gates: exact; 1e-12 of linear statics, 1e-9; "
+        "0.3 % where pairs are solved one by one.",
         (
             gearbox_planets.places,
             gearbox_planets.kinematics,
@@ -236,7 +236,8 @@ THEMES = (
         "whole gears in contact at eight positions, straight teeth as solids under a lead slope, ring on feet, "
         "the casing example; gates: 0.2 % of transmission error, tangent stiffness and frequencies; 2 % of "
         "pressure and root stress; 1 % of both meshes of a stepped planet; 0.5 % of K_Hβ and of the casing's "
-        "frequencies; positions where a tip corner carries differ by up to 0.8 % in transmission error and 1.8 % in stiffness.",
+        "frequencies; positions where a tip corner carries differ by up to 0.8 % in transmission error and 1.8 % in "
+        "stiffness.",
         (),
         (
             calculix_rows.external_pair,
