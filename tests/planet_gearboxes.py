@@ -104,6 +104,30 @@ def stepped_set(motions="plane", stiffness=(4e8, 4e8, 4e8, 3e8, 3e8, 3e8), teeth
     return loaded(tables, 100.0, 1000.0, "carrier", ("ring",), motions)
 
 
+def held(tables, **radial):
+    """Bearings rigid across their axes, but for those of these shafts."""
+    for bearing in tables["bearing"]:
+        bearing["radial"] = radial.get(bearing["shaft"], "rigid")
+    return tables
+
+
+def planet_shaft(tables, number):
+    """Tables of the shaft of a planet."""
+    return next(shaft for shaft in tables["shaft"] if shaft["name"] == f"p{number}")
+
+
+def stepped_forces(opened, torque=100.0, sun_mesh=4e8, ring_mesh=3e8):
+    """Forces (3,) of the sun meshes of stepped planets between members that turn alone.
+
+    ``opened`` (3,) are the errors on the line of action of the sun: those of the sun mesh, and by the lever of the
+    planet those of the ring mesh. A branch has the compliance 1/k_s + lever^2/k_r.
+    """
+    lever, base = STEPPED[1] / STEPPED[2], 1e-3 * STEPPED[0] * math.cos(math.radians(20.0))
+    stiffness = 1.0 / (1.0 / sun_mesh + lever**2 / ring_mesh)
+    opened = np.asarray(opened)
+    return abs(torque) / (3.0 * base) + stiffness * (opened.mean() - opened)
+
+
 def springs_by_hand(stiffness):
     """Mass and stiffness of the same set from its lines of action: sun, carrier, ring, planets, each x, y and turn.
 

@@ -10,13 +10,17 @@ from fractions import Fraction
 import numpy as np
 from planet_gearboxes import (
     SET_KINDS,
+    STEPPED,
     free_speeds,
+    held,
     known_set,
     pair_conditions,
     places_by_trial,
+    planet_shaft,
     random_set,
     simple_set,
     springs_by_hand,
+    stepped_forces,
     stepped_set,
 )
 from scipy.linalg import eigh
@@ -135,3 +139,23 @@ def stepped_planets() -> list[Row]:
         ),
         at_most(case, SPRINGS, "frequencies over the highest", 1e-9, away),
     ]
+
+
+def planet_errors() -> list[Row]:
+    """Load sharing of stepped planets with errors of a pin and of the timing of two gears."""
+    cosine, lever, rows = math.cos(math.radians(20.0)), STEPPED[1] / STEPPED[2], []
+    pin, timing = 3e-6 * cosine * (1.0 + lever), 1e-4 * 1e-3 * STEPPED[2] * cosine * lever
+    for words, key, error, opened in (
+        ("pin 3 um ahead", "shaft", {"pin_error": {"tangential": "3 um"}}, pin),
+        ("gear on the ring turned by 0.1 mrad", "pair", {"timing_error": "1e-4 rad"}, timing),
+    ):
+        for held_by, sun, gate in (("stiff members", "rigid", 1e-9), ("a floating sun", "1 N/m", 1e-6)):
+            tables = held(stepped_set(), sun=sun)
+            (planet_shaft(tables, 1) if key == "shaft" else tables["pair"][4]).update(error)
+            force = solve_deflection(read_case(tables)).mesh_force[:3]
+            expected = stepped_forces([0.0, opened if sun == "rigid" else 0.0, 0.0])
+            away = np.abs(force / expected - 1.0).max()
+            source = "compliances of a branch in series" if sun == "rigid" else "equal shares of three planets"
+            text = f"mesh forces, {words}, largest relative difference"
+            rows.append(at_most(f"stepped 24/57/27/108, {held_by}", source, text, gate, away))
+    return rows

@@ -35,8 +35,7 @@ from operator import mul
 from femgear.errors import GeometryError
 from femgear.gears.exact_linear import whole_echelon
 from femgear.gears.gear import is_whole
-from femgear.gears.planetary import ASSEMBLY_TOLERANCE, check_angles
-from femgear.gears.shaft_graph import EXTERNAL, INTERNAL, SpeedCondition, StageGears, connected_sets
+from femgear.gears.shaft_graph import EXTERNAL, INTERNAL, StageGears, connected_sets
 
 
 def simple_gears(sun: int, planet: int, ring: int) -> StageGears:
@@ -103,25 +102,6 @@ def tooth_relations(gears: StageGears) -> tuple[dict[str, int], ...]:
     return tuple(relations)
 
 
-def willis_conditions(name: str, gears: StageGears) -> tuple[SpeedCondition, ...]:
-    """Tie the speeds of the shafts of a planetary set of any gears (Willis), as `femgear.gears.power_flow` takes them.
-
-    One condition for every relation; of several each has the names of its gears behind that of the set. A shaft that
-    is None is the casing. GeometryError as of `tooth_relations`.
-    """
-    relations, conditions = tooth_relations(gears), []
-    for relation in relations:
-        weights: dict[str, Fraction] = {}
-        terms = [*relation.items(), ("carrier", -sum(relation.values()))]
-        for gear, weight in terms:
-            shaft = gears.shafts.get(gear)
-            if shaft is not None:
-                weights[shaft] = weights.get(shaft, Fraction(0)) + weight
-        label = name if len(relations) == 1 else f"{name} {'-'.join(relation)}"
-        conditions.append(SpeedCondition(label, weights, gears))
-    return tuple(conditions)
-
-
 def assembly_step(gears: StageGears) -> Fraction:
     """Find the smallest angle [turns] by which equal planets stand apart where they fit; all others are its multiples.
 
@@ -142,34 +122,6 @@ def assembly_step(gears: StageGears) -> Fraction:
 def nearest_places(step: Fraction, angles: Sequence[float]) -> tuple[int, ...]:
     """Find the multiples (N,) of an assembly step [turns] nearest to planet angles [rad], from the first planet on."""
     return tuple(math.floor((a - angles[0]) / (2.0 * math.pi * step) + 0.5 + 1e-9) for a in angles)
-
-
-def assembly_places(gears: StageGears, angles: Sequence[float]) -> tuple[int, ...]:
-    """Find the multiples (N,) of the `assembly_step` at which planets stand, from their angles (N,) [rad].
-
-    Raises
-    ------
-    GeometryError
-        A planet that misses every place by more than `ASSEMBLY_TOLERANCE` of a tooth pitch (E-ASSEMBLY, with the
-        nearest angles), angles that do not ascend within one turn (E-RANGE).
-    """
-    check_angles(tuple(angles))
-    step = assembly_step(gears)
-    places = nearest_places(step, angles)
-    at = [angles[0] + float(2 * place * step) * math.pi for place in places]
-    worst = max(abs(a - b) for a, b in zip(angles, at, strict=True)) * max(gears.teeth.values()) / (2.0 * math.pi)
-    if worst > ASSEMBLY_TOLERANCE:
-        listing = ", ".join(f"{math.degrees(a):.6f}" for a in at[:24])
-        teeth = ", ".join(f"{gear} {count}" for gear, count in gears.teeth.items())
-        raise GeometryError(
-            f"{len(angles)} equal planets do not assemble at these angles ({teeth} teeth): one misses by "
-            f"{worst:.3g} pitches of the largest gear",
-            code="E-ASSEMBLY",
-            key="set.planet_angles",
-            limit=f"multiples of {float(360 * step):.6f} deg from the first planet",
-            remedy=f"nearest planet_angles that assemble: {listing} deg",
-        )
-    return places
 
 
 def timing_marks(gears: StageGears, turn: Fraction) -> dict[str, Fraction]:

@@ -29,6 +29,7 @@ _MODES = 16
 """Rows of the table of modes."""
 _NUMBERED = re.compile(r"(.*?)((?<![\d.])\d{1,9}(?![\d.]))?(\D*)", re.DOTALL)
 """A name with its last whole number."""
+_WITHOUT_DIGITS = dict.fromkeys(map(ord, "0123456789"))
 _NOTHING = 1e-3
 """Pull that is no more than the end of the harmonics, in mean mesh forces."""
 
@@ -61,6 +62,14 @@ def merged(rows: Sequence[Sequence[str]]) -> list[tuple[str, ...]]:
     return [
         row if first == last else (f"{head}{first}..{last}{tail}", *row[1:]) for row, head, first, last, tail in groups
     ]
+
+
+def merged_names(names: Iterable[str]) -> str:
+    """List names, once those that differ in a running number alone: "sun-planet 1..3, planet 1..3-ring"."""
+    groups = dict[str, list[str]]()
+    for name in names:
+        groups.setdefault(name.translate(_WITHOUT_DIGITS), []).append(name)
+    return ", ".join(name for group in groups.values() for (name,) in merged([(one,) for one in group]))
 
 
 def tabulate(

@@ -7,11 +7,10 @@ from fractions import Fraction
 import numpy as np
 import pytest
 from planet_gearboxes import SET_KINDS as KINDS
-from planet_gearboxes import free_speeds, places_by_trial, random_set
+from planet_gearboxes import free_speeds, pair_conditions, places_by_trial, random_set
 
 from femgear.errors import GeometryError
 from femgear.gears.planet_assembly import (
-    assembly_places,
     assembly_step,
     double_gears,
     nearest_places,
@@ -20,14 +19,8 @@ from femgear.gears.planet_assembly import (
     stepped_gears,
     timing_marks,
     tooth_relations,
-    willis_conditions,
 )
-from femgear.gears.power_flow import (
-    planetary_condition,
-    power_flow,
-    ravigneaux_conditions,
-    stepped_condition,
-)
+from femgear.gears.power_flow import power_flow, ravigneaux_conditions
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -78,15 +71,9 @@ def test_marks_are_the_smallest_turns_and_say_where_no_planet_fits():
         timing_marks(gears, assembly_step(gears) / 2)
 
 
-def test_planets_off_their_places_are_refused_with_the_nearest_angles():
+def test_the_nearest_places_are_multiples_of_the_step():
     gears, third = stepped_gears(23, 41, 17, 81), 2.0 * math.pi / 3.0
-    with pytest.raises(GeometryError, match="do not assemble") as refusal:
-        assembly_places(gears, (0.0, third, 2.0 * third))
-    near = [float(angle) for angle in refusal.value.remedies[0].split(": ")[1].removesuffix(" deg").split(", ")]
-    assert near == pytest.approx([0.0, 120.0, 240.0], abs=0.5 * 360.0 / 3712 + 1e-6)
-    step = 2.0 * math.pi * assembly_step(gears)
-    angles = [0.3 + place * step for place in nearest_places(assembly_step(gears), (0.0, third, 2.0 * third))]
-    assert assembly_places(gears, angles) == (0, 1237, 2475)
+    assert nearest_places(assembly_step(gears), (0.3, 0.3 + third, 0.3 + 2.0 * third)) == (0, 1237, 2475)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -97,42 +84,40 @@ def test_willis_equation_holds_for_the_speeds_that_teeth_pass_on(kind):
         names = [gear for gear in gears.shafts if gear != "carrier"]
         start = {"carrier": Fraction(draw.randint(-9, 9)), names[0]: Fraction(draw.randint(-9, 9))}
         speed = free_speeds(gears, start)
-        conditions = willis_conditions("set", gears)
-        assert len(conditions) == len(names) - 1
-        for condition in conditions:
-            assert sum(weight * speed[shaft] for shaft, weight in condition.weights.items()) == 0
+        relations = tooth_relations(gears)
+        assert len(relations) == len(names) - 1
+        for relation in relations:
+            assert sum(weight * (speed[gear] - speed["carrier"]) for gear, weight in relation.items()) == 0
+        shafts, conditions = pair_conditions(gears)
         flow = power_flow(
-            [*gears.shafts], conditions, speeds={k: float(v) for k, v in start.items()}, torques={}, outputs=names[1:]
+            shafts, conditions, speeds={k: float(v) for k, v in start.items()}, torques={}, outputs=names[1:]
         )
         shares = flow.speed_ratio[names[-1]]
         assert sum(share * start[shaft] for shaft, share in shares.items()) == speed[names[-1]]
 
 
 def test_the_relations_are_those_of_the_known_sets():
-    of_simple = planetary_condition("set", "sun", "carrier", "ring", 27, 108)
-    assert willis_conditions("set", simple_gears(27, 40, 108))[0].weights == of_simple.weights
-    of_double = planetary_condition("set", "sun", "carrier", "ring", 20, 70, double=True)
-    assert willis_conditions("set", double_gears(20, 15, 18, 70))[0].weights == of_double.weights
-    of_stepped = stepped_condition("set", "sun", "carrier", "ring", 23, 41, 17, 81)
-    assert willis_conditions("set", stepped_gears(23, 41, 17, 81))[0].weights == of_stepped.weights
+    assert tooth_relations(simple_gears(27, 40, 108)) == ({"sun": 27, "ring": 108},)
+    assert tooth_relations(double_gears(20, 15, 18, 70)) == ({"sun": 20, "ring": -70},)
+    assert tooth_relations(stepped_gears(23, 41, 17, 81)) == ({"sun": 23 * 17, "ring": 41 * 81},)
 
 
-def gear_of(conditions, held: str, driven: str, out: str) -> Fraction:
+def gear_of(shafts, conditions, held: str, driven: str, out: str) -> Fraction:
     """Speed of the driven over that of the output shaft."""
-    shafts = ["small sun", "large sun", "carrier", "ring"]
     flow = power_flow(shafts, conditions, speeds={out: 1.0}, torques={driven: 1.0}, held=[held], outputs=[out])
     return flow.speed_ratio[driven][out]
 
 
 def test_a_ravigneaux_set_has_its_published_gears():
     # 30/36/72 teeth: four forward gears of 2.40, 1.47, 1.00, 0.67 and reverse 2.00, as of the Ford AOD transmission
-    any_set = willis_conditions("set", ravigneaux_gears(30, 36, 18, 20, 72))
-    known = ravigneaux_conditions("set", "small sun", "large sun", "carrier", "ring", 30, 36, 72)
-    for conditions in (any_set, known):
-        assert gear_of(conditions, "carrier", "small sun", "ring") == Fraction(72, 30)
-        assert gear_of(conditions, "large sun", "small sun", "ring") == Fraction(22, 15)
-        assert gear_of(conditions, "large sun", "carrier", "ring") == Fraction(2, 3)
-        assert gear_of(conditions, "carrier", "large sun", "ring") == -2
+    any_set = pair_conditions(ravigneaux_gears(30, 36, 18, 20, 72))
+    members = ["small sun", "large sun", "carrier", "ring"]
+    known = members, ravigneaux_conditions("set", *members, 30, 36, 72)
+    for shafts, conditions in (any_set, known):
+        assert gear_of(shafts, conditions, "carrier", "small sun", "ring") == Fraction(72, 30)
+        assert gear_of(shafts, conditions, "large sun", "small sun", "ring") == Fraction(22, 15)
+        assert gear_of(shafts, conditions, "large sun", "carrier", "ring") == Fraction(2, 3)
+        assert gear_of(shafts, conditions, "carrier", "large sun", "ring") == -2
 
 
 def test_gears_without_teeth_or_without_a_ring_of_their_own_are_refused():

@@ -3,7 +3,7 @@
 import pytest
 
 from femgear.findings import CATALOGUE, Finding
-from femgear.report.tables import Marks, in_decibels, lower_bound, significant, tabulate, unmarked
+from femgear.report.tables import Marks, in_decibels, lower_bound, merged_names, significant, tabulate, unmarked
 
 
 def test_a_doubtful_number_is_marked_where_it_stands_and_a_note_is_not():
@@ -53,3 +53,8 @@ def test_a_level_that_hardly_changes_has_no_sign():
         "+0.2 dB",
         "-3.0 dB",
     ]
+
+
+def test_names_that_differ_in_a_number_alone_stand_once_in_the_order_of_their_first():
+    names = ["sun-planet 1", "planet 1-ring", "sun-planet 2", "planet 2-ring", "counter", "planet 4-ring"]
+    assert merged_names(names) == "sun-planet 1..2, planet 1..2-ring, planet 4-ring, counter"

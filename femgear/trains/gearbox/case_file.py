@@ -18,6 +18,7 @@ from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema, model_v
 
 from femgear.case import text as case_text
 from femgear.case.csv_columns import add_checksum, embed_profiles, embedded
+from femgear.case.flank_sections import Deviation
 from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.quantities import (
     ACCELERATION,
@@ -122,6 +123,7 @@ Turning = Annotated[float, StiffnessOrRigid(TORSION, 0.0, 1e15)]
 Product = Annotated[float, Quantity(INERTIA, -1e11, 1e11)]
 MeshStiffness = Annotated[float, Quantity(STIFFNESS, 1e3, 1e13)]
 Torque = Annotated[float, Quantity(TORQUE, -_LARGEST_TORQUE, _LARGEST_TORQUE)]
+Turned = Annotated[float, Quantity(ANGLE, -0.1, 0.1)]
 Rise = Annotated[float, Quantity(RISE, -300.0, 1000.0)]
 """Of the temperature in operation over that at which the gearbox was put together."""
 Expansion = Annotated[float, Quantity(EXPANSION, -1e-4, 1e-3)]
@@ -164,10 +166,18 @@ class BoxShaftPartSection(Section):
         return self.inner_diameter if self.end_inner_diameter is None else self.end_inner_diameter
 
 
+class PlanetPinErrorSection(Section):
+    """How far the pin of a planet stands off its place: radial outwards, tangential counter-clockwise positive."""
+
+    radial: Deviation = 0.0
+    tangential: Deviation = 0.0
+
+
 class BoxShaftSection(Section):
     """A shaft: an axis, and parts from its left end on; without parts it is one rigid body.
 
-    ``axis`` are x and y of its axis, ``start`` is z of its left end, of a body that of its centre.
+    ``axis`` are x and y of its axis, ``start`` is z of its left end, of a body that of its centre. A planet may have a
+    ``pin_error``.
     """
 
     name: Name
@@ -178,6 +188,9 @@ class BoxShaftSection(Section):
     temperature_rise: Rise = 0.0
     longest_element: Length | None = None
     """Of finite elements; by default a sixteenth of the shaft."""
+    pin_error: PlanetPinErrorSection | None = None
+    gears_timed: StrictBool = False
+    """Of a planet: its gears are put on their shaft for its place, in place of planets that are all alike."""
 
     @property
     def length(self) -> float:
@@ -343,6 +356,8 @@ class PairSection(Section):
     shafts: Annotated[tuple[Name, ...], PAIR]
     carrier: Name | None = None
     """The shaft that takes the axes of planets around: both gears turn against it."""
+    timing_error: Turned = 0.0
+    """How far the gear of the planet is turned ahead on its shaft, counter-clockwise; of two planets that of gear 1."""
     positions: Annotated[tuple[Along, ...], PAIR] | None = None
     teeth: StageTables | None = None
     gears: PairGearsSection | None = None

@@ -34,6 +34,8 @@ from femgear.trains.gearbox.geometry import (
 )
 from femgear.trains.gearbox.holding import floating_shafts, loose_fits, tilting_shafts, untaken_thrust
 from femgear.trains.gearbox.materials import material_notices
+from femgear.trains.gearbox.planet_branches import misplaced_branches
+from femgear.trains.gearbox.planet_errors import planet_error_problems
 from femgear.trains.gearbox.planet_shafts import carrier_entries, parted_or_in_time, unclosed_chains
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.tooth_life import pitting_problems
@@ -57,6 +59,7 @@ def check_gearbox_entries(case: GearboxCase) -> list[CaseError]:
     problems = [*named, *_seats(case), *_bearings(case), *_shaft_parts(case), *stages, *loads, *_weight(case)]
     problems += [*coupling_problems(case), *run_up_problems(case)]
     problems += [*transient_problems(case.transient, port_names(case)), *parted_or_in_time(case)]
+    problems += [] if named else [*planet_error_problems(case)]
     problems += [] if named else check_casing(case)
     problems += [] if stages else pitting_problems(case, (*case.pair, *case.planetary))
     # what has no mass turns and is held as what has
@@ -105,7 +108,8 @@ def _held(case: GearboxCase, problems: Sequence[CaseError]) -> Iterator[CaseErro
             told |= {str(problem.key) for problem in thrusts}
             yield from thrusts
         if number == 0 and not any(key.startswith("shaft") for key in keys):
-            yield from unclosed_chains(case, flow)
+            unclosed = [*unclosed_chains(case, flow)]
+            yield from unclosed or misplaced_branches(case)
 
 
 def _misplaced(problem: CaseError) -> bool:

@@ -30,6 +30,8 @@ from femgear.trains.gearbox.geometry import rolling_bearing
 from femgear.trains.gearbox.holding import loose_shafts, without_balance
 from femgear.trains.gearbox.model import GearboxModel, StageModel, gearbox_model, member_of_stations
 from femgear.trains.gearbox.passes import ContactPass, MeshPositions, forces_agree, next_start, slopes_agree
+from femgear.trains.gearbox.planet_errors import error_gaps
+from femgear.trains.gearbox.power import BoxFlow
 
 _STEPS = 200
 LEVERS = (1.0, 1.0, 1.0, 0.05, 0.05, 0.05)
@@ -239,9 +241,14 @@ def solve_deflection(
     history, passes = [start.slopes], []
     contacts: dict[str, StageContact] = {}
     settled, coarse = False, True
-    model = found.model
+    equal, model = model.flow, found.model
     for _ in range(case.deflection.passes):
-        contacts = {stage.name: _contact(model, stage, start, steps, _COARSE if coarse else None) for stage in staged}
+        # stages without load, as of planets far off their places, lie where equal shares would press them
+        flows = {stage.name: found.model.flow if found.model.flow.touches(stage.section) else equal for stage in staged}
+        contacts = {
+            stage.name: _contact(model, stage, start, steps, _COARSE if coarse else None, flows[stage.name])
+            for stage in staged
+        }
         stiffness = {name: contact.stiffness for name, contact in contacts.items()}
         model = gearbox_model(case, load_case, mesh_stiffness=stiffness, estimate=estimate, flow=found.model.flow)
         gap = _gaps(model, staged, contacts, start.slopes)
@@ -257,6 +264,8 @@ def solve_deflection(
         if coarse and len(passes) > 1:
             # what is left of the change after this pass
             alike = alike or slopes_agree(model, start.slopes, end.slopes, tolerance, least)
+        carried = {stage.name for stage in staged if model.flow.touches(stage.section)}
+        contacts = {name: contact for name, contact in contacts.items() if name in carried}
         alike = alike and forces_agree(model, found.mesh_force, contacts, tolerance)
         if alike and not coarse:
             settled = True
@@ -279,10 +288,10 @@ def shared_torques(found: Deflection) -> Deflection:
 
 
 def _contact(
-    model: GearboxModel, stage: StageModel, start: MeshPositions, steps, positions: int | None
+    model: GearboxModel, stage: StageModel, start: MeshPositions, steps, positions: int | None, flow: BoxFlow
 ) -> StageContact:
     """Contact of the teeth of a stage with the positions of its meshes, at few angles until they settle."""
-    torque, own = -model.flow.first_torque(stage.section), list(stage.meshes)
+    torque, own = -flow.first_torque(stage.section), list(stage.meshes)
     slices = model.case.deflection.slices if model.case.motions == "space" else 0
     try:
         return stage_contact(
@@ -300,26 +309,26 @@ def _contact(
 
 
 def _first_gaps(model: GearboxModel, staged: Sequence[StageModel]) -> np.ndarray:
-    """Gaps (g,) of the slices by errors of the teeth [m], as of planets off their places."""
-    gap = np.zeros(len(model.assembly.slice_stiffness))
+    """Gaps (g,) of the slices by errors of teeth and planets [m]."""
+    gap = error_gaps(model)
     for stage in staged:
         apart = given_separation(stage.section, -model.flow.first_torque(stage.section))
         for mesh, value in zip(stage.meshes, apart, strict=True):
-            gap[model.assembly.slices[mesh]] = value
+            gap[model.assembly.slices[mesh]] += value
     return gap
 
 
 def _gaps(model, staged, contacts, slopes) -> np.ndarray:
     """Gaps (g,) of the slices with which springs have the loads of the contact at its slopes and approaches [m]."""
     assembly = model.assembly
-    gap = np.zeros(len(assembly.slice_stiffness))
+    gap = error_gaps(model)
     for stage in staged:
         contact = contacts[stage.name]
         for place, mesh in enumerate(stage.meshes):
             one, part = assembly.contacts[mesh], assembly.slices[mesh]
             force = contact.shares_at(place, len(one.heights)) * contact.normal_force[place]
             # slope and approach are those with which the contact was solved
-            gap[part] = slopes[mesh] * one.heights + contact.approach[place] - force / one.stiffness
+            gap[part] += slopes[mesh] * one.heights + contact.approach[place] - force / one.stiffness
     return gap
 
 
@@ -343,7 +352,7 @@ def solve_state(model: GearboxModel, gap: np.ndarray, *, start: Deflection | Non
     spread = [(spread_rows(springs, assembly), law) for _, law, springs in laws]
     scale = max(np.abs(model.load).max(initial=0.0), _LEAST_LOAD)
     y = np.zeros(T.shape[1]) if start is None else np.linalg.lstsq(T, start.motion, rcond=None)[0]
-    if start is None and laws:
+    if start is None and (laws or gap.any()):
         y = _guess(T, K, W, k, gap, laws, model.load, assembly)
 
     def forces(y):
@@ -412,7 +421,7 @@ def _solved(tangent: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _guess(T, K, W, k, gap, laws, load, assembly) -> np.ndarray:
-    """Motions with a linear spring in the place of every rolling bearing."""
+    """Motions with a linear spring in the place of every rolling bearing, and of every mesh."""
     tangent = K + (W * k) @ W.T
     for _, law, springs in laws:
         rows = spread_rows(springs, assembly)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from femgear.case.load_spectrum import required_life
+from femgear.report.tables import merged_names
 from femgear.stages.judgements import (
     Judgement,
     Least,
@@ -47,7 +48,7 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
         with_teeth = [stage.name for stage in (*case.pair, *case.planetary) if stage.teeth]
         remedy = "no stage has teeth of its own, which safeties are of"
         if with_teeth:
-            remedy = f"give treatment and hardness in the material of the teeth of {', '.join(with_teeth)}"
+            remedy = f"give treatment and hardness in the material of the teeth of {merged_names(with_teeth)}"
         yield judge_strength(root, flank, case.strength, _stresses(results), findings, OF_TEETH, open_factors, remedy)
         yield from judge_lives((*lives_of_teeth(data), *lives_of_bearings(data)), required_life(case.operation))
     yield from judge_heat(results)

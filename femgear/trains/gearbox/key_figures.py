@@ -39,6 +39,11 @@ _OF_FORCES = "W-PULL", "W-TAIL", "W-CROSS", "W-STEPS"
 """Codes of the findings that concern mesh forces of a response."""
 
 
+def has_planets(stage: PairSection | BoxPlanetarySection) -> bool:
+    """Whether planets run around in a stage."""
+    return not isinstance(stage, PairSection) or stage.carrier is not None
+
+
 def stage_meshes(stage: PairSection | BoxPlanetarySection) -> tuple[str, ...]:
     """Name the meshes of a stage, as the files do."""
     if isinstance(stage, PairSection):
@@ -83,8 +88,7 @@ def _of_deflection(case: GearboxCase) -> Iterator[KeyFigure]:
         misaligned = Stored("mesh_misalignment", pick="size")
         yield from of_mesh("misalignment", MICROMETRES, stored=misaligned, parts=every)
         yield from of_mesh("mesh force", FORCE, stored=Stored("mesh_force"), parts=every)
-    if case.planetary:
-        sets = [(stage.name, (stage.name,)) for stage in case.planetary]
+    if sets := [(stage.name, (stage.name,)) for stage in stages if has_planets(stage)]:
         sharing = Stored("planet_load_factor")
         yield from _family("K_gamma", NUMBER, "deflection", sharing, sets, "stage")
     yield from _of_lives(case)

@@ -23,10 +23,8 @@ from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.trains.gearbox.case_file import CASING, GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, carriers, pair_sizes
+from femgear.trains.gearbox.planet_branches import ASSEMBLY_TOLERANCE
 from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
-
-ASSEMBLY_TOLERANCE = 5e-3
-"""Part of a tooth pitch by which teeth may miss their gaps: what axes to a micrometre leave open."""
 
 
 @dataclass(frozen=True)

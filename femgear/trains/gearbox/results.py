@@ -23,7 +23,7 @@ from femgear.stages.tooth_faults import left_out_of_faults
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
 from femgear.system.assembly import MOTIONS
-from femgear.trains.gearbox.case_file import GearboxCase, named_load_case, teeth_of
+from femgear.trains.gearbox.case_file import GearboxCase, PairSection, named_load_case, teeth_of
 from femgear.trains.gearbox.casing_file import casing_notices
 from femgear.trains.gearbox.casing_results import (
     casing_coordinates,
@@ -133,7 +133,7 @@ class DeflectionResult(StageResult):
                 "load_case stage",
                 [[_planet_factor(one, stage) for stage in one.model.stages] for one in every],
                 "1",
-                "K_gamma: largest force of the planets' meshes over their mean; NaN of pairs",
+                "K_gamma: largest load of the planets over their mean; NaN of pairs without planets",
             ),
             "share": (load_case, running_shares(case.operation.load_case), "1", "share of the running time"),
             "mesh_force": (mesh, [one.mesh_force for one in every], "N", "force along the normal of the flanks"),
@@ -243,7 +243,12 @@ def _approaches(states) -> np.ndarray:
 
 
 def _planet_factor(state: Deflection, stage: StageModel) -> float:
-    """K_gamma of a planetary set by its meshes with the sun; NaN of a pair."""
+    """K_gamma of a planetary set by its meshes with the sun, of pairs on a carrier by their torques; else NaN."""
+    flow = state.model.flow
+    beside = next((names for names in flow.side_by_side if stage.name in names), ())
+    shares = [share for name, share in flow.torque_shares.items() if name in beside]
+    if shares and isinstance(stage.section, PairSection) and stage.section.carrier is not None:
+        return len(shares) * max(shares)
     force = state.mesh_force[list(stage.meshes)[: len(stage.planets)]]
     return float(force.max() / force.mean()) if len(force) and force.any() else math.nan
 
@@ -505,6 +510,13 @@ def _idle_planets(data: xr.Dataset) -> Iterator[Finding]:
             if idle:
                 text = f"{', '.join(idle)} carry nothing in {named_load_case(str(data['load_case'].values[case]))}"
                 remedy = "smaller errors of the pins, or members that give way"
+                yield Finding("W-OPEN", "operation.load_case", text, remedy=remedy)
+    if "torque_share" in data:
+        for case, shares in enumerate(data["torque_share"].values):
+            idle = [str(name) for name, share in zip(data["stage"].values, shares, strict=True) if share <= _IDLE]
+            if idle and np.nansum(shares) > 0.0:
+                text = f"{', '.join(idle)} carry nothing in {named_load_case(str(data['load_case'].values[case]))}"
+                remedy = "smaller errors of pins and timing, or members that give way"
                 yield Finding("W-OPEN", "operation.load_case", text, remedy=remedy)
 
 

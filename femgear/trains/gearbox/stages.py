@@ -11,7 +11,7 @@ import numpy as np
 
 from femgear.case.dependencies import Steps, box_entries, load_case_entries
 from femgear.case.quantities import RPM
-from femgear.report.tables import Block, merged, tabulate
+from femgear.report.tables import Block, merged_names, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import FiguresOf, Progress, Stage, Train, modes_verdict, one_blas_thread, silent
 from femgear.trains.gearbox.balance import (
@@ -32,6 +32,7 @@ from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries
 from femgear.trains.gearbox.model import reference_shaft
 from femgear.trains.gearbox.modes import solve_gearbox_modes
+from femgear.trains.gearbox.planet_branches import describe_branches
 from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
 from femgear.trains.gearbox.resonance_table import describe_resonances
 from femgear.trains.gearbox.response import solve_gearbox_response
@@ -175,7 +176,7 @@ def describe_gearbox(case: GearboxCase) -> tuple[Block, ...]:
     blocks = []
     for load_case in case.operation.load_case[:12]:
         blocks += list(_flow_blocks(case, load_case))
-    return (*blocks, *_drawing_blocks(case), *describe_casing(case))
+    return (*blocks, *describe_branches(case), *_drawing_blocks(case), *describe_casing(case))
 
 
 def _drawing_blocks(case: GearboxCase) -> Iterator[Block]:
@@ -186,10 +187,7 @@ def _drawing_blocks(case: GearboxCase) -> Iterator[Block]:
             for block in describe_drawing(teeth):
                 stages.setdefault(block, []).append(stage.name)
     for block, names in stages.items():
-        # those that differ by a number alone stand together
-        by_words = sorted(names, key=lambda name: name.translate(dict.fromkeys(map(ord, "0123456789"))))
-        words = ", ".join(name for (name,) in merged([(name,) for name in by_words]))
-        yield replace(block, title=f"{block.title}, {words}")
+        yield replace(block, title=f"{block.title}, {merged_names(names)}")
 
 
 def _flow_blocks(case: GearboxCase, load_case: LoadCaseSection) -> Iterator[Block]:
@@ -212,7 +210,7 @@ def _flow_blocks(case: GearboxCase, load_case: LoadCaseSection) -> Iterator[Bloc
         "same teeth meet after": lambda name: turns_in_words(flow.frequencies[name]),
     }
     notes = tuple(
-        f"{', '.join(names)} stand side by side: equal shares here, those of their stiffness in deflection"
+        f"{merged_names(names)} stand side by side: equal shares here, those of their stiffness in deflection"
         for names in flow.side_by_side
     )
     yield tabulate(f"Stages, {load_case.name}" if many else "Stages", flow.stage_torque, columns, notes)

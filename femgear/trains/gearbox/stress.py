@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.findings import Finding
-from femgear.report.tables import Block
+from femgear.report.tables import Block, merged_names
 from femgear.stages.protocol import Progress, StageResult, silent
 from femgear.stages.static import solve_stress
 from femgear.stages.static_results import describe_stress, stress_warnings
@@ -214,6 +214,9 @@ def describe_box_stress(data: xr.Dataset, findings: Sequence[Finding] = ()) -> I
 def box_reason_rows(data: xr.Dataset) -> Iterator[tuple[str, str]]:
     """Write the rows of a verdict that say which stresses differ from those of ISO 6336, and why, stage by stage."""
     parts = list(stage_parts(data))
+    stages = dict[tuple[str, str], list[str]]()
     for name, _, part in parts:
-        for title, text in reason_row(part):
-            yield (f"{title}, {name}" if len(parts) > 1 else title), text
+        for row in reason_row(part):
+            stages.setdefault(row, []).append(name)
+    for (title, text), names in stages.items():
+        yield (f"{title}, {merged_names(names)}" if len(parts) > 1 else title), text

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from femgear.report.tables import Block, Marks, doubtful_excitation
+from femgear.report.tables import Block, Marks, doubtful_excitation, merged_names
 from femgear.stages.friction_source import friction_rows
 from femgear.stages.heat_results import heat_rows
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
@@ -86,11 +86,11 @@ def _worst_of_deflection(data: Any, marks: Marks) -> Iterator[tuple[str, str]]:
     if "torque_share" in data:
         share = data["torque_share"].values
         at = int(np.nanargmax(share.max(axis=1, where=np.isfinite(share), initial=0.0)))
-        parts = [
-            f"{name} {value:.1%}"
-            for name, value in zip(data["stage"].values, share[at], strict=True)
-            if np.isfinite(value)
-        ]
+        stages = dict[str, list[str]]()
+        for name, value in zip(data["stage"].values, share[at], strict=True):
+            if np.isfinite(value):
+                stages.setdefault(f"{value:.1%}", []).append(str(name))
+        parts = [f"{merged_names(names)} {value}" for value, names in stages.items()]
         case = f", {cases[at]}" if len(cases) > 1 else ""
         yield "torque of stages side by side", f"{of_teeth(', '.join(parts))}{case}"
     if len(bearings):
