@@ -69,7 +69,7 @@ def merged_names(names: Iterable[str]) -> str:
     groups = dict[str, list[str]]()
     for name in names:
         groups.setdefault(name.translate(_WITHOUT_DIGITS), []).append(name)
-    return ", ".join(name for group in groups.values() for (name,) in merged([(one,) for one in group]))
+    return ", ".join(words for group in groups.values() for (words,) in merged([(name,) for name in group]))
 
 
 def tabulate(
