@@ -32,7 +32,7 @@ from femgear.trains.pair.model import pair_model
 from femgear.trains.reading import read_case, with_values
 from validation.reference import drivetrain_train
 from validation.reference.multistage_train import stored
-from validation.rows import Row, at_most, counted
+from validation.rows import Row, at_most, counted, within
 
 LARGEST = 1e-9
 DOWN = {"direction": [0.0, -1.0, 0.0]}
@@ -326,3 +326,58 @@ def loaded_states() -> tuple[Row, ...]:
         rows += [at_most(name, source, text + what, LARGEST, value) for what, value in state.apart.items()]
         rows += compared(name, source, state.ours, state.other)
     return tuple(rows)
+
+
+def stages_side_by_side() -> tuple[Row, ...]:
+    """Two pairs between the same two shafts: torque goes with the springs of both ways, in closed form."""
+    modulus, radius, ratio = 206e9 / 2.6, 0.036 * math.cos(math.radians(20.0)), 36.0 / 24.0
+    rows = []
+    for second, gap in ((1e8, 0.0), (4e8, 0.03), (1e8, 0.03)):
+        found = solve_deflection(read_case(_two_pairs(second, gap)))
+        # torque enters before the pairs and leaves behind them: each way has the shaft of the other's gap
+        of_input, of_output = (gap * 32.0 / (math.pi * modulus * diameter**4) for diameter in (0.03, 0.04))
+        first = 1.0 / (4e8 * radius**2) + ratio**2 * of_output
+        other = 1.0 / (second * radius**2) + of_input
+        case = f"two pairs, {1e-6 * second:g} and 400 N/um, {1e3 * gap:g} mm apart"
+        share = found.mesh_force[1] / found.mesh_force.sum()
+        rows.append(within(case, "closed form", "share of the second pair", first / (first + other), share, 1e-6))
+        balance = found.mesh_force.sum() * radius / 100.0 - 1.0
+        rows.append(at_most(case, "equilibrium", "torques of both less the input, relative", LARGEST, balance))
+    return tuple(rows)
+
+
+def _two_pairs(second: float, gap: float) -> dict[str, Any]:
+    """Tables of two pairs 24/36 on two shafts that twist, the second one of its own stiffness [N/m] and place [m]."""
+    gears = {"teeth": [24, 36], "module": "3 mm", "face_width": "20 mm"}
+    pairs = [
+        {
+            "name": name,
+            "shafts": ["input", "output"],
+            "positions": [f"{place} m", f"{place} m"],
+            "gears": gears,
+            "mesh": {"stiffness": f"{stiffness} N/m"},
+        }
+        for name, place, stiffness in (("first", 0.03, 4e8), ("second", 0.03 + gap, second))
+    ]
+    return {
+        "model": "gearbox",
+        "title": "two pairs side by side",
+        "motions": "rotation",
+        "shaft": [
+            {"name": "input", "part": [{"length": "90 mm", "outer_diameter": "30 mm"}]},
+            {"name": "output", "axis": ["90 mm", "0 mm"], "part": [{"length": "90 mm", "outer_diameter": "40 mm"}]},
+        ],
+        "bearing": [
+            {"name": name, "shaft": name, "position": "5 mm", "radial": "2e8 N/m", "axial": "1e8 N/m"}
+            for name in ("input", "output")
+        ],
+        "pair": pairs,
+        "load": [
+            {"name": "motor", "shaft": "input", "position": "0 mm"},
+            {"name": "brake", "shaft": "output", "position": "90 mm"},
+        ],
+        "operation": {
+            "output": ["brake"],
+            "load_case": [{"torque": {"motor": "100 N m"}, "speed": {"input": "1000 rpm"}}],
+        },
+    }

@@ -437,6 +437,7 @@ THEMES = (
             gearbox.other_trains,
             gearbox.elastic_ring,
             gearbox_statics.loaded_states,
+            gearbox_statics.stages_side_by_side,
             gearbox.wind_turbine,
             gearbox.statics,
             gearbox.passes,
