@@ -139,6 +139,14 @@ def test_heights_are_the_same_lengths_in_both_sections(shift):
     assert gears.sun.tip_radius - gears.sun.reference_radius == pytest.approx(2e-3 * (1.0 + shift))
 
 
+def test_a_given_tip_stands_as_far_out_of_the_virtual_gear():
+    gears = helical(math.radians(25.0))
+    lower = gears.sun.tip_radius - 0.3e-3
+    virtual = virtual_set(replace(gears, sun=replace(gears.sun, tip_diameter=2.0 * lower)), math.radians(25.0))
+    height = virtual.sun.tip_radius - virtual.sun.reference_radius
+    assert height == pytest.approx(lower - gears.sun.reference_radius, rel=1e-12)
+
+
 def test_virtual_gears_have_the_curvature_of_the_normal_section():
     beta = math.radians(20.0)
     gears = helical(beta)

@@ -50,6 +50,13 @@ def test_forces_and_tangents_are_those_of_springs_along_the_turned_directions(se
     assert np.all(element.steepest(THETA) >= np.diagonal(tangent, axis1=2, axis2=3).max(axis=0) - 1e-12)
 
 
+def test_the_mean_stiffness_of_a_column_is_that_of_a_whole_turn():
+    element, angle = meshes(separates=False), 2.0 * np.pi * np.arange(16)[:, None, None] / 16
+    direction = element.fixed + element.even * np.cos(angle) + element.odd * np.sin(angle)
+    wanted = np.array([[3.0], [2.0]]) * (direction**2).mean(axis=0)
+    np.testing.assert_allclose(element.reference, wanted, rtol=1e-13)
+
+
 @pytest.mark.parametrize("count", [3, 4, 5, 7])
 def test_waves_of_planets_carry_the_motion_of_a_body_at_rest_unchanged(count):
     psi = 0.3 + 2.0 * np.pi * np.arange(count) / count

@@ -159,7 +159,7 @@ class SpunSystem:
             return np.broadcast_to(table, (len(angle), table.shape[1]))
         steps = len(table) - 1
         place = (np.abs(np.asarray(angle)[:, None] * self.phase_ratio) / (2.0 * np.pi) % 1.0) * steps
-        low = np.minimum(place.astype(int), steps - 1)
+        low = place.astype(int)
         part, column = place - low, np.arange(table.shape[1])
         return (1.0 - part) * table[low, column] + part * table[low + 1, column]
 
