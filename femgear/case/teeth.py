@@ -115,7 +115,7 @@ def case_overlap(case: Any, gears: GearSet) -> float:
 
 
 def pitch_of(errors: GearErrors, gear: Gear) -> np.ndarray:
-    """Displacement of every tooth on the base circle [m]."""
+    """Displacement (z,) of every tooth on the base circle [m]."""
     return tooth_displacements(gear, cumulative=errors.cumulative_pitch, single=errors.pitch)
 
 

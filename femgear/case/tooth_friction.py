@@ -66,7 +66,7 @@ def law_friction(case: Any, name: str, pair: GearPair, line_load: np.ndarray, at
 
     Parameters
     ----------
-    line_load : array
+    line_load : (...) array
         Force at the base circle over face width [N/m]; ISO/TS 6336-20 has that at the pitch circle.
     at_pitch : PathSpeeds
         At the pitch point.

@@ -82,7 +82,7 @@ def placed_gears(bodies: Iterable[SpaceBody]) -> tuple[PlacedGear, ...]:
 
 
 def half_curves(gear: Gear) -> dict[str, np.ndarray]:
-    """Find the curves of half a tooth [m], each from the middle of the tooth to the middle of the gap."""
+    """Find the curves (k, 2) of half a tooth [m], each from the middle of the tooth to the middle of the gap."""
     curves = dict(half_sector(gear, flank_elements=_FLANK).curves)
     half = {}
     for name in ("tip", "flank", "fillet", "root"):

@@ -340,7 +340,7 @@ def _radial_sensor(structure: FixedStructure, named, angle: float, top: int) -> 
 def heard_in_housing(
     model: HousingModel, carrier: np.ndarray, limit: FrequencyLimit, workers: int | None = None
 ) -> HeardSpeeds:
-    """What is kept of the run-up at speeds of the carrier [rad/s] in a housing that stands still.
+    """What is kept of the run-up at speeds (S,) of the carrier [rad/s] in a housing that stands still.
 
     By so many threads, default one for every core.
     """

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def sensor_lines(case: Case, modes: ModesResult, response: Response, carrier: np.ndarray) -> SensorLines:
-    """Lines of the fixed sensor at speeds of the carrier [rad/s]."""
+    """Lines of the fixed sensor at speeds (S,) of the carrier [rad/s]."""
     return lines_of_field(case, modes, mesh_and_ring_outputs(modes, response)[1], carrier)
 
 

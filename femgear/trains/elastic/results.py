@@ -836,7 +836,7 @@ def _operating_points(results: Results, factors: np.ndarray, doubts: Mapping[int
 
 
 def level_changes(results: Results) -> np.ndarray:
-    """Find how far a longer excitation changes the level of the housing at every speed [dB], NaN unknown."""
+    """Find how far a longer excitation changes the level of the housing at every speed (S,) [dB], NaN unknown."""
     if "dynamics" not in results.stages:
         return np.full(results.housing.sizes["speed"], np.nan)
     change = results.dynamics.get("level_change")

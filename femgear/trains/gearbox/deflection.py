@@ -98,12 +98,12 @@ class Deflection:
 
     @property
     def mesh_force(self) -> np.ndarray:
-        """Force of every mesh along its normal [N]."""
+        """Force (M,) of every mesh along its normal [N]."""
         return np.array([self.slice_force[part].sum() for part in self.model.assembly.slices])
 
     @property
     def mesh_slope(self) -> np.ndarray:
-        """Slope of the approach of the flanks of every mesh along its width [rad], closer at z > 0 positive."""
+        """Slope (M,) of the approach of the flanks of every mesh along its width [rad], closer at z > 0 positive."""
         return mesh_slopes(self.model.assembly, self.motion)
 
 

@@ -91,7 +91,7 @@ def added_damage(hours: np.ndarray, shares: Sequence[float] | np.ndarray) -> np.
 
 
 def spectrum_lives(states: Sequence[Deflection], shares: Sequence[float] | np.ndarray) -> SpectrumLives:
-    """Compute the lives of all bearings over load cases with their shares of the time."""
+    """Compute the lives of all bearings over load cases with their shares (load cases,) of the time."""
     q, case = np.asarray(shares, float), states[0].model.case
     lives = np.array([bearing_lives(state) for state in states]).reshape(len(states), -1, 3)
     hours = added_damage(lives, q)

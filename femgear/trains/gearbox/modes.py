@@ -116,7 +116,7 @@ class GearboxModes:
 
 
 def linear_system(found: Deflection) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
-    """Linearise a gearbox about its loaded state: assembly with bearings, system, stiffness of all slices [N/m].
+    """Linearise a gearbox about its loaded state: assembly with bearings, system, stiffness (s,) of slices [N/m].
 
     Slices that carry nothing have no stiffness.
     """

@@ -96,7 +96,7 @@ class NonlinearStage:
 
     @property
     def back_flanks(self) -> np.ndarray:
-        """Numbers of the meshes that have back flanks."""
+        """Numbers (k,) of the meshes that have back flanks."""
         return np.flatnonzero((self.excitation.backlash > 0.0) & np.isfinite(self.excitation.backlash))
 
 

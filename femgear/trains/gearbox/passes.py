@@ -85,7 +85,7 @@ def _lengths(model: GearboxModel, positions: MeshPositions) -> np.ndarray:
 
 
 def slopes_agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, tolerance: float, least: float) -> bool:
-    """Whether slopes agree: their difference over the width against the misalignment, or a least one [m]."""
+    """Whether slopes (M,) [rad] agree: their difference over the width against the misalignment, or a least one [m]."""
     for stage in model.stages:
         for mesh in stage.meshes:
             size = max(abs(new[mesh]) * stage.width, least)
@@ -98,7 +98,7 @@ def slopes_agree(model: GearboxModel, new: np.ndarray, old: np.ndarray, toleranc
 def forces_agree(
     model: GearboxModel, mesh_force: np.ndarray, contacts: Mapping[str, StageContact], tolerance: float
 ) -> bool:
-    """Whether all meshes have the forces of the contact of their teeth, against the largest one of their stage."""
+    """Whether mesh forces (M,) [N] are those of the contact of the teeth, against the largest one of their stage."""
     for stage in model.stages:
         if stage.name in contacts:
             force = contacts[stage.name].normal_force

@@ -60,7 +60,7 @@ class GearboxResonances:
 
     @property
     def expected(self) -> np.ndarray:
-        """Level that is expected in resonance, but for a factor that is the same of all."""
+        """Level (resonances,) that is expected, but for a factor that is the same of all."""
         return self.heard / np.where(self.damping > 0.0, self.damping, np.inf)
 
 
