@@ -758,6 +758,65 @@ def rigs(
     return 0
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class ModelFiles:
+    """Files of a model for other programs, of a run or a case.
+
+    Parameters
+    ----------
+    state_space
+        File .npz or .mat: matrices A, B, C, D of the vibration, and what the meshes do over the angle.
+    fmu
+        File .fmu: the vibration in time as functional mock-up unit, co-simulation by FMI 2.0.
+    stiffness_table
+        File .csv, .mat or .npz: mesh stiffness and transmission error over the angle of the first gear.
+    harmonics
+        Mesh harmonics that tables of the state space and of the unit keep. Default: 100.
+    force
+        Replace files that are there.
+    """
+
+    state_space: Path | None = None
+    fmu: Path | None = None
+    stiffness_table: Path | None = None
+    harmonics: Whole | None = None
+    force: Annotated[bool, Parameter(negative="")] = False
+
+    @property
+    def paths(self) -> dict[str, Path]:
+        """All files that are asked for, by their options."""
+        named = {"--state-space": self.state_space, "--fmu": self.fmu, "--stiffness-table": self.stiffness_table}
+        return {option: path for option, path in named.items() if path is not None}
+
+
+def _write_models(source: Path, wanted: ModelFiles) -> None:
+    """Write the models of a case file, or of the case of a run."""
+    from femgear.exchange.dynamic_model import HARMONICS, check_ending, write_state_space, write_stiffness_table
+    from femgear.exchange.fmu import write_fmu
+    from femgear.run import dynamic_model, stiffness_table
+    from femgear.trains.reading import open_results, read_case
+
+    for option, path in wanted.paths.items():
+        check_ending(path, option)
+    _need_new([*wanted.paths.values()], force=wanted.force)
+    of_run = open_results(source) if source.is_dir() else None
+    case = read_case(source) if of_run is None else of_run.case
+    harmonics = HARMONICS if wanted.harmonics is None else wanted.harmonics
+    with Progress() as progress:
+        if wanted.state_space is not None or wanted.fmu is not None:
+            model = dynamic_model(case, progress=progress)
+            if wanted.state_space is not None:
+                write_state_space(model, wanted.state_space, harmonics=harmonics)
+            if wanted.fmu is not None:
+                write_fmu(model, wanted.fmu, harmonics=harmonics)
+        if wanted.stiffness_table is not None:
+            table = stiffness_table(case if of_run is None else of_run, progress=progress)
+            write_stiffness_table(table, wanted.stiffness_table)
+    for path in wanted.paths.values():
+        _say(f"written: {path}")
+
+
 @app.command
 def export(
     folder: Path,
@@ -765,16 +824,17 @@ def export(
     *,
     formats: Formats | None = None,
     sampling: Annotated[Sampling | None, Parameter(name="*")] = None,
+    models: ModelFiles | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
 ) -> int:
-    """Write the numbers of a run as files that other programs read.
+    """Write the numbers of a run, or a model of its vibration, as files that other programs read.
 
     Parameters
     ----------
     folder
-        Folder that femgear run wrote.
+        Folder that femgear run wrote; for models alone a case file, too.
     output
-        Folder of the files. Default: exported, inside the other.
+        Folder of the numbers. Default: exported, inside the other.
     """
     from femgear.run import export_results
     from femgear.storage.files import list_own, own_files
@@ -782,8 +842,12 @@ def export(
     from femgear.trains.reading import open_results
 
     named = [name for name, wanted in vars(formats or Formats()).items() if wanted]
+    if models is not None and models.paths:
+        _write_models(folder, models)
+        if not named:
+            return 0
     if not named:
-        options = ", ".join(f"--{name}" for name in vars(Formats()))
+        options = ", ".join(f"--{name}" for name in (*vars(Formats()), "state-space", "fmu", "stiffness-table"))
         raise CaseError("no format is named", code="E-ARGUMENTS", limit=options, remedy="femgear export --help")
     wanted = named, sampling or Sampling()
     if output is None:

@@ -27,6 +27,7 @@ CATALOGUE = {
     "W-CHAOS": (DOUBT, "Neighbouring motions move apart: details of the record depend on the steps."),
     "W-CLEARANCE": (NOTE, "A tip comes close to the root of its mate."),
     "W-CLIPPING": (DOUBT, "Samples of a sound exceed its full scale."),
+    "W-COMPILER": (NOTE, "A functional mock-up unit has no binary."),
     "W-CONTACT-POINTS": (DOUBT, "The mesh forces on both gears do not act on one line."),
     "W-CONTACT-RATIO": (NOTE, "The contact ratio is low."),
     "W-CONVERGENCE": (DOUBT, "A periodic solution did not converge."),

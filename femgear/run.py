@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from femgear.case.dependencies import fingerprint
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, StorageError, nvh_library
+from femgear.exchange.dynamic_model import DynamicModel, StiffnessTable
 from femgear.exchange.formats import (
     SCALES,
     Sampling,
@@ -143,6 +145,72 @@ def live(case: ReadCase, *, progress: Progress = silent) -> Live:
     `femgear.trains.live.Live`. The case is one from `femgear.read_case`, or what that reads.
     """
     return Live(case, cache=grid_cache(), progress=progress)
+
+
+def dynamic_model(case: Any, *, progress: Progress = silent) -> DynamicModel:
+    """Compute the vibration of a case as a model for other programs, with all stages that it takes.
+
+    Parameters
+    ----------
+    case : Case
+        A planetary set or a pair.
+    progress : callable
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    CaseError
+        A kind of case without such a model, or without speeds (E-MODEL).
+    """
+    make = train_of(case).dynamic_model
+    if make is None or not case.operation.speeds:
+        raise CaseError(
+            "this case has no linear model for other programs" if make is None else "a model needs a speed",
+            code="E-MODEL",
+            value=train_of(case).words,
+            limit="planetary sets and pairs, with operation.speeds",
+            remedy="give operation.speeds" if make else "take a case of one of its stages",
+        )
+    return make(case, solve(case, "modes", progress=progress))
+
+
+def stiffness_table(source: Any, *, progress: Progress = silent) -> StiffnessTable:
+    """Collect k(theta) of all meshes of a set or a pair over the angle of its first gear, both ends included.
+
+    Parameters
+    ----------
+    source : Case or Results
+        Of results the stage that has the curves is read.
+    progress : callable
+        Called with (stage, done, total).
+
+    Raises
+    ------
+    CaseError
+        A kind of case that has no mesh stiffness over the position (E-STAGE).
+    """
+    case = source.case if isinstance(source, Results) else source
+    stage, stiffness, deflection = train_of(case).stiffness_curves
+    if isinstance(source, Results) and stage in source.stages:
+        data = source[stage]
+    elif train_of(case).stage(stage) is None:
+        raise no_stiffness_curves(stage)
+    else:
+        data = solve(case, stage, progress=progress)[stage].dataset()
+    if stiffness not in data or "position" not in data[stiffness].dims:
+        raise no_stiffness_curves(stage)
+    k, error = (data[name].values for name in (stiffness, deflection))
+    k, error = (np.column_stack([values, values[:, 0]]) for values in (k, error))
+    position, teeth = data["position"].values, planetary_set(case).gears[0].teeth
+    # equidistant, over whole mesh periods
+    end = position[0] + len(position) * (position[1] - position[0])
+    angle = 2.0 * np.pi / teeth * np.append(position, end)
+    return StiffnessTable(angle, tuple(str(name) for name in data["mesh"].values), k, error)
+
+
+def no_stiffness_curves(stage: str) -> CaseError:
+    """Make the refusal of a kind of case that has no mesh stiffness over the position."""
+    return CaseError("this kind of case has no mesh stiffness over the position", code="E-STAGE", key=stage)
 
 
 def _asked(case: ReadCase, only: str | None) -> tuple[Any, tuple[Stage, ...]]:

@@ -15,6 +15,7 @@ import numpy as np
 from femgear.errors import CaseError
 from femgear.findings import once
 from femgear.report.style import Drawings
+from femgear.run import no_stiffness_curves
 from femgear.stages.protocol import Drawn
 from femgear.storage.contents import as_dataset
 from femgear.storage.results import Manifest, Results
@@ -183,21 +184,21 @@ def mesh_stiffness(case: Any, torques: Sequence[float] | None = None) -> xr.Data
     Raises
     ------
     CaseError
-        E-STAGE: a kind of case whose static stage has no mesh stiffness over the position; torques that cannot be.
+        E-STAGE: a kind of case that has no mesh stiffness over the position; torques that cannot be.
     """
     import xarray as xr
 
     handle = Live(case)
-    lacks = CaseError("this kind of case has no mesh stiffness over the position", code="E-STAGE", key="static")
-    if "static" not in handle.answer or not hasattr(handle.case.operation, "torque"):
-        raise lacks
+    stage, name, _ = train_of(handle.case).stiffness_curves
+    if stage not in handle.answer or not hasattr(handle.case.operation, "torque"):
+        raise no_stiffness_curves(stage)
     given = [float(handle.case.operation.torque)] if torques is None else [float(torque) for torque in torques]
     curves = []
     for torque in given:
-        data = handle.change({"operation.torque": f"{torque!r} N m"})["static"].dataset()
-        if "mesh_stiffness" not in data:
-            raise lacks
-        curves.append(data["mesh_stiffness"])
+        data = handle.change({"operation.torque": f"{torque!r} N m"})[stage].dataset()
+        if name not in data:
+            raise no_stiffness_curves(stage)
+        curves.append(data[name])
     joined: Any = xr.concat(curves, "torque", combine_attrs="override")
     words = {"units": "N m", "long_name": "torque of the input"}
     return joined.assign_coords(torque=("torque", np.array(given), words))

@@ -524,8 +524,20 @@ def unsteady(folder: Path) -> list[Finding]:
     return [warning.message.args[0] for warning in caught if isinstance(warning.message, FindingWarning)]
 
 
+def without_compiler(folder: Path) -> tuple[Finding, ...]:
+    """A unit that is written where there is no C compiler."""
+    from chain_model import chain_model
+
+    from femgear.exchange.fmu import write_fmu
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("PATH", str(folder))
+        return told(lambda: write_fmu(chain_model(), folder / "chain.fmu"))
+
+
 OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
     "W-CLIPPING": exported("wav", acceleration_scale=1e-6),
+    "W-COMPILER": without_compiler,
     "W-JOURNAL": damaged_journal,
     "W-PLUGIN": plugin,
     "W-REXS": rexs,

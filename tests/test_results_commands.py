@@ -23,7 +23,7 @@ from femgear.storage.results import (
     run_folder,
     write_csv_tables,
 )
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, with_values
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 
@@ -250,3 +250,45 @@ def test_a_table_has_a_safe_name(tmp_path):
     with pytest.raises(StorageError) as info:
         write_csv_tables(data, tmp_path, "static")
     assert info.value.code == "E-CHOICE" and list(tmp_path.iterdir()) == []
+
+
+# --- models for other programs ---------------------------------------------------------------------
+
+SMALL = {"static.positions": 8, "static.stresses": False, "static.flank_elements": 6, "set.backlash": "0.1 mm"}
+
+
+def small_pair(folder):
+    case = with_values(read_case("cases/spur_pair.toml"), SMALL)
+    (folder / "pair.toml").write_text(case.source, encoding="utf-8")
+    return folder / "pair.toml"
+
+
+def test_models_are_written_of_a_case_file(tmp_path, capsys):
+    case, names = small_pair(tmp_path), ("set.npz", "set.fmu", "k.csv")
+    files = [str(tmp_path / name) for name in names]
+    options = [word for pair in zip(("--state-space", "--fmu", "--stiffness-table"), files) for word in pair]
+    assert cli.main(["export", str(case), *options, "--harmonics", "3"]) == 0
+    assert np.load(tmp_path / "set.npz")["stiffness"].shape == (1, 3 * 64)
+    assert len((tmp_path / "k.csv").read_text().splitlines()) == 10
+    before = {name: (tmp_path / name).read_bytes() for name in names}
+    capsys.readouterr()
+    assert cli.main(["export", str(case), "--stiffness-table", files[2], "--harmonics", "2"]) == 2
+    assert "[E-OUTPUT]" in capsys.readouterr().err
+    assert {name: (tmp_path / name).read_bytes() for name in names} == before
+    assert cli.main(["export", str(case), "--stiffness-table", files[2], "--force"]) == 0
+    assert cli.main(["export", str(case), "--state-space", str(tmp_path / "set.txt")]) == 2
+    assert "--state-space" in capsys.readouterr().err and not (tmp_path / "set.txt").exists()
+
+
+def test_models_are_written_of_a_run_beside_its_numbers(tmp_path, monkeypatch):
+    """Curves that the run has are not computed again."""
+    case, out = small_pair(tmp_path), tmp_path / "out"
+    assert cli.main(["run", str(case), "-o", str(out), "--only", "static", "--no-pictures"]) == 0
+    monkeypatch.setattr("femgear.run.solve", None)
+    assert cli.main(["export", str(out), "--csv", "--stiffness-table", str(tmp_path / "k.mat")]) == 0
+    assert (tmp_path / "k.mat").is_file() and (out / "exported" / "static.csv").is_file()
+
+
+def test_numbers_are_those_of_a_run(tmp_path, capsys):
+    assert cli.main(["export", str(small_pair(tmp_path)), "--csv"]) == 4
+    assert "remedy" in capsys.readouterr().err

@@ -11,10 +11,10 @@ import pytest
 import xarray as xr
 from edited_manifests import edit_manifest
 
-from femgear.errors import StorageError
+from femgear.errors import CaseError, StorageError
 from femgear.findings import as_data
 from femgear.report import page as report_page
-from femgear.run import run_case
+from femgear.run import dynamic_model, run_case, solve, stiffness_table
 from femgear.storage import files
 from femgear.storage.files import append_dataset, checksum, read_dataset, read_result, write_result
 from femgear.storage.results import read_manifest, run_folder
@@ -358,3 +358,37 @@ def test_the_size_of_many_speeds_is_said_before(many_speeds, monkeypatch):
     # some of a small file is not numbers
     assert 0.8 < 1e9 * float(said[2]) / size < 2.2
     assert int(said[1]) >= read_dataset(folder / "dynamics.nc").sizes["harmonic"] - 1
+
+
+def test_a_stiffness_table_has_the_period_of_the_first_gear():
+    """Of a case, and of results without computing anything."""
+    case = with_values(read_case(CASES / "spur_pair.toml"), {"static.positions": 8, "static.stresses": False})
+    table = stiffness_table(case)
+    assert table.angle == pytest.approx(2.0 * np.pi / 24 * np.arange(9) / 8, rel=1e-12)
+    data = solve(case, "static")["static"].dataset()
+    assert np.array_equal(table.stiffness[:, :-1], data["mesh_stiffness"].values)
+    assert np.array_equal(table.deflection[:, -1], data["ste"].values[:, 0])
+    assert table.meshes == ("gear 1-gear 2",)
+
+
+@pytest.mark.slow
+def test_helical_sets_have_the_stiffness_of_their_modes():
+    helical_case = quick("helical_30_20_70")
+    table = stiffness_table(helical_case)
+    data = solve(helical_case, "modes")["modes"].dataset()
+    assert np.array_equal(table.stiffness[:, :-1], data["helical_stiffness"].values)
+
+
+@pytest.mark.parametrize("name", ["gear_pair", "four_stage_reducer"])
+def test_kinds_of_cases_without_a_model_for_other_programs_are_refused(name):
+    case = quick(name)
+    for make, code in ((stiffness_table, "E-STAGE"), (dynamic_model, "E-MODEL")):
+        with pytest.raises(CaseError) as refused:
+            make(case)
+        assert refused.value.code == code
+
+
+def test_a_model_needs_a_speed():
+    case = with_values(read_case(CASES / "spur_pair.toml"), {"operation.speeds": None, "static.positions": 8})
+    with pytest.raises(CaseError, match="needs a speed"):
+        dynamic_model(case)

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from threadpoolctl import ThreadpoolController
 
     from femgear.case.text import ReadCase
+    from femgear.exchange.dynamic_model import DynamicModel
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
     from femgear.findings import Finding
     from femgear.report.space import SpaceBody
@@ -347,6 +348,11 @@ class Train:
         teeth.
     draft_casing : callable, optional
         ``(case) -> text, findings``: the tables of an estimated casing for a case without one.
+    dynamic_model : callable, optional
+        ``(case, results by stage) -> DynamicModel``: its vibration for other programs, of the stages up to ``modes``;
+        None of trains that have no linear model in a frame of their own.
+    stiffness_curves : tuple of str
+        Stage that has the mesh stiffness over the position, and its variables of stiffness and transmission error.
     front : tuple of (str, int)
         Charts of page one, the first two of which are there: name of the figure, and number of its panel.
     """
@@ -364,6 +370,8 @@ class Train:
     judgements: Callable[[Results], Iterable[Judgement]] = lambda results: ()
     bodies: Callable[[Any], Iterable[SpaceBody]] | None = None
     draft_casing: Callable[[Any], tuple[str, tuple[Finding, ...]]] | None = None
+    dynamic_model: Callable[[Any, Mapping[str, Any]], DynamicModel] | None = None
+    stiffness_curves: tuple[str, str, str] = ("static", "mesh_stiffness", "ste")
     front: tuple[tuple[str, int], ...] = ()
 
     def stage(self, name: str) -> Stage | None:

@@ -143,7 +143,7 @@ def undamped_modes(
     values, shape, rigid = _eigen(system.M, stiffness, count, max_frequency)
     if np.any(rigid):
         shape[:, rigid] = _refined_rigid(system.M, stiffness, shape[:, rigid])
-    springs = _spring_directions(system, mesh_stiffness)
+    springs = spring_directions(system, mesh_stiffness)
     rows, modal_load = springs.T @ shape, shape.T @ system.load
     _check_rigid(system, shape[:, rigid])
     rows[:, rigid] = modal_load[rigid] = 0.0
@@ -186,7 +186,7 @@ def residual_output(system: MechanicalSystem, modes: Modes, outputs) -> np.ndarr
     (n_outputs, n) and the modes of the system.
     """
     outputs = np.atleast_2d(np.asarray(outputs, dtype=float))
-    springs = _spring_directions(system, modes.mesh_stiffness)
+    springs = spring_directions(system, modes.mesh_stiffness)
     static = outputs @ pseudo_solve(*rigid_basis(system, modes), springs)
     omega = 2.0 * np.pi * modes.frequency
     return static - _modal_flexibility(outputs @ modes.shape, modes.mesh_deflection, omega)
@@ -385,7 +385,7 @@ def total_stiffness(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     return 0.5 * (system.K + system.K.T) + system.W @ carried @ system.W.T
 
 
-def _spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
+def spring_directions(system: MechanicalSystem, mesh_stiffness) -> np.ndarray:
     """Directions (n, n_meshes) of which ``directions^T q`` are the deflections of the mesh springs.
 
     With a flexibility C between the meshes, ``f = k d + g`` and ``d = W^T q - C f`` give

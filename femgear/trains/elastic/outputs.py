@@ -8,11 +8,18 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy import linalg
 
+from femgear.case.gear_set import planetary_set
+from femgear.exchange.dynamic_model import DynamicModel, RingSensor
+from femgear.gears.planetary import mesh_names
 from femgear.housing.sensor import SensorLines, component_lines
 from femgear.solvers.linear.modal import output_load, output_response, residual_output, source_output
+from femgear.solvers.linear.state_space import Port, modal_model
+from femgear.stages.lumped_set import member_speeds
 from femgear.trains.elastic.model import RADIAL, ring_field
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from femgear.case.planetary import Case
     from femgear.system.system import Response
     from femgear.trains.elastic.results import DynamicsResult, ModesResult
@@ -75,3 +82,57 @@ def named_sensors(case: Case, dynamics: DynamicsResult) -> tuple[tuple[str, ...]
 def lines_method(case: Case) -> str:
     """Name how the lines of a sensor are found, see `SensorLines`."""
     return "casing" if case.housing.structure else "supports" if case.housing.support else "exact"
+
+
+def elastic_dynamic_model(case: Case, results: Mapping[str, Any]) -> DynamicModel:
+    """Make the model of the set on the foundation of its ring, with torques at its ends and the sensor of the level."""
+    result: ModesResult = results["modes"]
+    model, system = result.model, result.model.system
+    turning, meshes = member_speeds(case, planetary_set(case)), mesh_names(len(result.modes.mesh_stiffness) // 2)
+    unit, rigid = np.eye(len(system.dofs)), slice(model.ring_slice.start)
+    ends = [system.dofs.index(f"{_end_of(case, name)}: rotation") for name in ("input", "output")]
+    inputs = [
+        Port(f"torque on {system.dofs[end].split(':')[0]}", "N m", unit[end], float(system.load[end])) for end in ends
+    ]
+    outputs = [
+        Port(name, "rad" if name.endswith("rotation") else "m", row)
+        for name, row in zip(system.dofs[rigid], unit[rigid], strict=True)
+    ]
+    outputs += [
+        Port(f"transmission error of {mesh}", "m", row)
+        for mesh, row in zip(meshes, model.rigid_directions.T, strict=True)
+    ]
+    first, n_max = len(outputs), result.max_diameter
+    for number, row in enumerate(_ring_waves(result)):
+        name = f"ring radial {'sin' if number and number % 2 == 0 else 'cos'} {(number + 1) // 2}"
+        outputs.append(Port(name, "m", row))
+    return DynamicModel(
+        title=case.title,
+        modal=modal_model(system, result.modes, meshes=meshes, inputs=inputs, outputs=outputs),
+        excitation=result.excitation,
+        speed=float(max(case.operation.speeds)),
+        mesh_rate=turning.mesh_frequency,
+        driver=ends[0],
+        sensor=RingSensor(case.housing.sensor_angle, first, n_max, turning.carrier),
+    )
+
+
+def _end_of(case: Case, side: str) -> str:
+    """Name of the body at which the torque of the input or the output acts."""
+    member = case.operation.input
+    if side == "output":
+        member = "carrier" if member == "sun" else "sun"
+    machine = case.motor if side == "input" else case.brake
+    return member if machine is None else {"input": "motor", "output": "brake"}[side]
+
+
+def _ring_waves(result: ModesResult) -> np.ndarray:
+    """Rows (2 n_max + 1, n) of the radial displacement of the ring: a_0, then a_n and b_n of every n."""
+    n_max, columns = result.max_diameter, result.model.ring_slice
+    size = columns.stop - columns.start
+    field: Any = ring_field(result.ring.modes, np.eye(size), RADIAL, n_max).T
+    forward, backward = field[n_max + 1 :], field[n_max - 1 :: -1] if n_max else field[:0]
+    waves = np.zeros((2 * n_max + 1, len(result.model.system.dofs)))
+    waves[0, columns] = field[n_max].real
+    waves[1::2, columns], waves[2::2, columns] = (forward + backward).real, (backward - forward).imag
+    return waves

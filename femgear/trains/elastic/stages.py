@@ -132,6 +132,7 @@ from femgear.trains.elastic.model import (
     ring_model,
 )
 from femgear.trains.elastic.outputs import (
+    elastic_dynamic_model,
     lines_method,
     lines_of_field,
     mesh_and_ring_outputs,
@@ -903,6 +904,7 @@ ELASTIC = Train(
     warnings=_warnings,
     verdict=verdict,
     key_figures=tooth_key_figures,
+    dynamic_model=elastic_dynamic_model,
     bodies=case_bodies,
     judgements=set_with_ring_judgements,
     front=(("run_up_levels", 0), ("static_transmission_error", 0), ("load_sharing", 0)),

@@ -5,10 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from femgear.stages.gears_in_space import case_bodies
 from femgear.stages.heat import HEAT
 from femgear.stages.life import LIFE, LifeResult, solve_life
 from femgear.stages.losses import LOSSES
+from femgear.stages.lumped_model import lumped_dynamic_model
 from femgear.stages.lumped_set import (
     driving_torque,
     gear_set_modes,
@@ -87,6 +88,7 @@ from femgear.trains.helical.section import HelicalCase
 
 if TYPE_CHECKING:
     from femgear.contact.mesh_cycle import MeshCycle
+    from femgear.exchange.dynamic_model import DynamicModel
     from femgear.storage.results import Results
 
 _NOTHING_EXCITES = "a given helical.mesh_stiffness does not vary: nothing excites the set"
@@ -292,6 +294,16 @@ def _given(case: HelicalCase) -> bool:
     return case.helical.mesh_stiffness is not None
 
 
+def _dynamic_model(case: HelicalCase, results: Mapping[str, Any]) -> DynamicModel:
+    modes: HelicalModesResult = results["modes"]
+    excitation = modes.excitation
+    if excitation is None:
+        k = np.repeat(modes.data.column_stiffness[:, None], 3, axis=1)
+        excitation = MeshExcitation(k, 0.0 * k, 0.0 * k, np.zeros(len(k)))
+    torque = driving_torque(case)
+    return lumped_dynamic_model(case, modes.planetary_set, modes.data, modes.system, modes.modes, excitation, torque)
+
+
 HELICAL = Train(
     name="helical",
     words="a helical case",
@@ -352,4 +364,6 @@ HELICAL = Train(
     remarks=_remarks,
     verdict=strength_verdict,
     key_figures=tooth_key_figures,
+    dynamic_model=_dynamic_model,
+    stiffness_curves=("modes", "helical_stiffness", "helical_ste"),
 )

@@ -21,10 +21,12 @@ from femgear.case.gear_set import line_play, set_deviations
 from femgear.case.tooth_friction import friction_acts
 from femgear.contact.cycle import CycleOptions
 from femgear.contact.loaded_period import loaded_period
+from femgear.exchange.dynamic_model import DynamicModel
 from femgear.fe.beam import body_matrices
 from femgear.gears.kinematics import unit_vectors
 from femgear.gears.pair import GearPair
 from femgear.solvers.linear.modal import modal_damping
+from femgear.solvers.linear.state_space import Port, modal_model
 from femgear.stages.friction_source import friction_source
 from femgear.stages.static import over_width, record_positions
 from femgear.stages.static_results import StaticResult
@@ -191,3 +193,30 @@ def pair_kinds(modes: Modes, mass: np.ndarray) -> tuple[str, ...]:
     kinds = np.where(shares <= 1.0 - _ONE_KIND, "lateral", "coupled")
     kinds = np.where(shares >= _ONE_KIND, "torsional", kinds)
     return tuple(np.where(modes.frequency == 0.0, "rigid", kinds).tolist())
+
+
+def pair_dynamic_model(
+    case: PairCase, gears: GearPair, model: PairModel, modes: Modes, excitation: MeshExcitation
+) -> DynamicModel:
+    """Make the model of a pair whose flanks may part, with torques at its ends."""
+    system, unit = model.system, np.eye(len(model.system.dofs))
+    outputs = [
+        Port(name, "rad" if name.endswith("rotation") else "m", row)
+        for name, row in zip(system.dofs, unit, strict=True)
+    ]
+    outputs.append(Port("transmission error", "m", model.rotation))
+    ends = ["gear 1" if case.motor is None else "motor", "gear 2" if case.brake is None else "brake"]
+    places = [system.dofs.index(f"{end}: rotation") for end in ends]
+    inputs = [
+        Port(f"torque on {end}", "N m", unit[place], float(system.load[place]))
+        for end, place in zip(ends, places, strict=True)
+    ]
+    return DynamicModel(
+        title=case.title,
+        modal=modal_model(system, modes, meshes=gears.mesh_names, inputs=inputs, outputs=outputs),
+        excitation=excitation,
+        speed=float(max(case.operation.speeds)),
+        mesh_rate=case.gear_1.teeth / (2.0 * np.pi),
+        driver=places[0],
+        separates=True,
+    )

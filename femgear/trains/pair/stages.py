@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -84,6 +84,7 @@ from femgear.trains.pair.case_file import PairCase
 from femgear.trains.pair.figures import DYNAMICS, RUNUP
 from femgear.trains.pair.model import (
     PairModel,
+    pair_dynamic_model,
     pair_excitation,
     pair_kinds,
     pair_model,
@@ -103,6 +104,7 @@ from femgear.trains.pair.results import (
 if TYPE_CHECKING:
     import xarray as xr
 
+    from femgear.exchange.dynamic_model import DynamicModel
     from femgear.storage.results import Results
 
 _CAPTIONS = {
@@ -443,6 +445,11 @@ def _unbounded(modes: PairModesResult, omega: float, count: int, grown: float) -
     )
 
 
+def _dynamic_model(case: PairCase, results: Mapping[str, Any]) -> DynamicModel:
+    modes: PairModesResult = results["modes"]
+    return pair_dynamic_model(case, modes.gears, modes.model, modes.modes, modes.excitation)
+
+
 PAIR = Train(
     name="pair",
     words="a pair",
@@ -500,4 +507,5 @@ PAIR = Train(
     recorded=Recorded(pair_signals, pair_signal_extent, {"wav": ("dynamics",)}, lambda results: 3),
     verdict=strength_verdict,
     key_figures=pair_key_figures,
+    dynamic_model=_dynamic_model,
 )

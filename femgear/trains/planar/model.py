@@ -16,6 +16,9 @@ import numpy as np
 from femgear.case.dependencies import check_entries, static_entries
 from femgear.case.gear_set import support_stiffness
 from femgear.case.planetary import pin_errors
+from femgear.case.tooth_friction import friction_acts
+from femgear.errors import CaseError
+from femgear.exchange.dynamic_model import DynamicModel
 from femgear.solvers.continuation.branches import Branch, frequency_response_curve
 from femgear.solvers.continuation.corrector import StepOptions
 from femgear.solvers.linear.modal import undamped_modes
@@ -24,14 +27,17 @@ from femgear.solvers.periodic.harmonic_balance import displacements
 from femgear.solvers.periodic.phase_grid import equidistant_phases
 from femgear.solvers.periodic.solution import FloquetVerdict, PeriodicSolution
 from femgear.solvers.stability.floquet import floquet_verdicts
+from femgear.stages.lumped_model import lumped_dynamic_model
 from femgear.stages.lumped_set import (
     Bearings,
     Gravity,
     MemberBearing,
     driving_torque,
+    gear_set_modes,
     gear_set_problem,
     member_speeds,
     mesh_stiffnesses,
+    mode_ratios,
     needed,
     rotation_sense,
     torsional_support,
@@ -176,6 +182,38 @@ def planar_model(
         count = case.mesh_harmonics if mesh_frequency else 0
         problem = _rubbing(problem, gear_set_system(data, torque=torque, friction=True), static.cycle, count, orders)
     return PlanarModel(data, problem, planar.back_flanks, bearings)
+
+
+def planar_dynamic_model(case: PlanarCase, gears: PlanetarySet, static: StaticResult | None) -> DynamicModel:
+    """Make the model of a set whose drive flanks alone carry, for other programs.
+
+    CaseError: what no linear model has: weight, back flanks on lines of their own, clearances, pin errors beside a
+    given mesh stiffness, friction, gyroscopic terms (E-MODEL).
+    """
+    planar = case.planar
+    beyond = {"planar.gravity": planar.gravity, "planar.back_flanks": planar.back_flanks}
+    beyond |= {"planar.carrier_bearing": planar.carrier_bearing, "planar.gyroscopic": planar.gyroscopic}
+    beyond |= {"planet.bearing_clearance": case.planet.bearing_clearance, "losses.excites": friction_acts(case)}
+    beyond |= {"set.pin_errors": planar.mesh_stiffness and case.set.pin_errors}
+    for key in (key for key, given in beyond.items() if given):
+        text = "a linear model of the set for other programs has none of this"
+        raise CaseError(text, code="E-MODEL", key=key, remedy="leave it out", file=case.location(key))
+    data, torque = planar_data(case, gears, static), driving_torque(case, reacts=planar.reaction == "output")
+    if planar.mesh_stiffness is None:
+        cycle = needed(static, "static").cycle
+        record = np.stack([cycle.stiffness, cycle.deflection, cycle.force])
+        # positions run with the sun against the carrier
+        record = record if rotation_sense(case, gears) > 0 else np.roll(record[..., ::-1], 1, axis=-1)
+    else:
+        record = np.zeros((3, 2 * gears.n_planets, 3))
+        record[0] = data.mesh_stiffness[:, None]
+    excitation, system = (
+        MeshExcitation(*record, backlash=np.zeros(2 * gears.n_planets)),
+        gear_set_system(data, torque=torque),
+    )
+    modes = gear_set_modes(data, system=system, mesh_stiffness=excitation.stiffness.mean(axis=1))
+    modes = replace(modes, damping_ratio=mode_ratios(modes.frequency, planar_ratios(case)))
+    return lumped_dynamic_model(case, gears, data, system, modes, excitation, torque)
 
 
 def _rubbing(

@@ -7,9 +7,9 @@ draws of each.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,6 +47,7 @@ from femgear.trains.planar.model import (
     carrier_sense,
     judged_branch,
     motion_lines,
+    planar_dynamic_model,
     planar_model,
     planar_ratios,
     weight_curve,
@@ -66,6 +67,7 @@ from femgear.trains.planar.results import (
 from femgear.trains.planar.section import PlanarCase
 
 if TYPE_CHECKING:
+    from femgear.exchange.dynamic_model import DynamicModel
     from femgear.gears.planetary import PlanetarySet
     from femgear.solvers.continuation.branches import Branch
     from femgear.solvers.periodic.solution import PeriodicSolution
@@ -396,6 +398,10 @@ def _lacks(section: str) -> Callable[[PlanarCase], str]:
     return lambda case: "" if getattr(case.planar, section) else f"the case has no section planar.{section}"
 
 
+def _dynamic_model(case: PlanarCase, results: Mapping[str, Any]) -> DynamicModel:
+    return planar_dynamic_model(case, planetary_set(case), results.get("static"))
+
+
 PLANAR = Train(
     name="planar",
     words="a planar case",
@@ -450,6 +456,7 @@ PLANAR = Train(
     front=(("weight_response", 0), ("tooth_contact", 0), ("response_mesh_forces", 0)),
     figures=FiguresOf("femgear.trains.planar.figures:FIGURES"),
     verdict=strength_verdict,
+    dynamic_model=_dynamic_model,
     key_figures=lambda case: tuple(figure for figure in tooth_key_figures(case) if figure != FRICTION_FIGURE),
     remarks=lambda results, stem: (*comparisons(results.case, stem), *doubts(results, stem)),
 )

@@ -8,13 +8,17 @@ import pytest
 
 from femgear.case import text as case_text
 from femgear.case.dependencies import Steps
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.housing.orders import OrderSpectrum, order_level
 from femgear.housing.sensor import fixed_sensor_lines, heaviside_linear_lines, stored_lines
+from femgear.solvers.linear.state_space import state_space
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.stages.lumped_set import member_speeds
 from femgear.stages.static import solve_static
 from femgear.system.fourier import harmonics_of, sample
 from femgear.trains.elastic.checks import max_nodal_diameter
-from femgear.trains.elastic.outputs import mesh_and_ring_outputs
+from femgear.trains.elastic.outputs import elastic_dynamic_model, mesh_and_ring_outputs
 from femgear.trains.elastic.results import _passing
 from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
 from femgear.trains.reading import parse_case, read_case, with_value, with_values
@@ -370,3 +374,42 @@ def test_shares_with_half_and_twice_the_bearing_stiffness_are_those_of_the_other
     assert own["6e8 N/m"].max() > own["3e8 N/m"].max() + 2e-3
     data = shares["3e8 N/m"].dataset()
     assert data.bearing_factor.values.tolist() == [0.5, 2.0]
+
+
+def test_the_model_for_other_programs_has_the_receptance_of_the_response(case, static, modes):
+    """Deflections, forces, transmission errors and waves of the ring, of all harmonics of a response."""
+    model = elastic_dynamic_model(case, {"static": static, "modes": modes})
+    space, M = state_space(model.modal), 6
+    assert [name.split()[0] for name in space.inputs] == ["displacement"] * M + ["torque"] * 2
+    hertz = model.mesh_rate * 300.0
+    response = solve_spectral(modes.modes, modes.excitation, [hertz], excitation_harmonics=4, tolerance=1e-12)
+    error, field = mesh_and_ring_outputs(modes, response)
+    x, force = response.deflection[0], response.force[0]
+    waves = np.zeros((2 * modes.max_diameter + 1, field.shape[1]), complex)
+    forward, backward = field[0, :, modes.max_diameter + 1 :].T, field[0, :, modes.max_diameter - 1 :: -1].T
+    waves[0], waves[1::2], waves[2::2] = field[0, :, modes.max_diameter], forward + backward, 1j * (forward - backward)
+    expected = np.concatenate([x, force, error[0], waves])
+    names = [name for name in space.outputs if not name.startswith(("sun", "carrier", "planet ", "motor", "brake"))]
+    rows = [space.outputs.index(name) for name in names]
+    assert len(rows) == len(expected)
+    displacement = x - force / modes.modes.mesh_stiffness[:, None]
+    for h in range(x.shape[1]):
+        inputs = np.concatenate([displacement[:, h], space.nominal[M:] * (h == 0)])
+        states = 2j * np.pi * hertz * h * np.eye(len(space.A)) - space.A
+        # the rotation of the whole, which strains nothing, has no mean
+        states[len(states) // 2, 0] += h == 0
+        moved = np.linalg.solve(states, space.B @ inputs)
+        found = (space.C @ moved + space.D @ inputs)[rows]
+        for part in (slice(M), slice(M, 2 * M), slice(2 * M, 3 * M), slice(3 * M, None)):
+            size = np.abs(expected[part]).max()
+            assert np.abs(found[part] - expected[part, h]).max() <= 1e-9 * size, (h, part)
+
+
+def test_the_model_for_other_programs_turns_as_the_gears_do(case, modes):
+    model = elastic_dynamic_model(case, {"modes": modes})
+    named = dict(zip([port.name for port in model.modal.outputs], model.ratios, strict=True))
+    turning = member_speeds(case, planetary_set(case))
+    assert named["sun: rotation"] == pytest.approx(1.0, rel=1e-9)
+    assert named["carrier: rotation"] == pytest.approx(turning.carrier, rel=1e-9)
+    assert named["planet 2: rotation"] == pytest.approx(turning.planet, rel=1e-9)
+    assert model.sensor.carrier == turning.carrier and model.mesh_rate == turning.mesh_frequency

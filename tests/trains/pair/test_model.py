@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 from trains.pair.test_stages import BEARINGS, gears, pair_case, solved
 
+from femgear.case.gear_set import line_play
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
 from femgear.solvers.periodic.spectral import solve_spectral
 from femgear.solvers.time.transient import solve_transient
 from femgear.system.system import MeshExcitation
 from femgear.trains.impacts.model import ImpactPair
-from femgear.trains.pair.model import pair_model, separating_pair
+from femgear.trains.pair.model import pair_dynamic_model, pair_model, separating_pair
 
 STIFFNESS, TAU = 4e8, np.arange(512) / 512
 
@@ -95,3 +96,17 @@ def test_contact_loss_against_integration_in_time():
     expected = found.at(times[-65:])[:, 0]
     assert found.stable
     np.testing.assert_allclose(x, expected, atol=2e-3 * np.ptp(expected))
+
+
+def test_the_model_for_other_programs_has_torques_at_its_ends_and_flanks_that_part():
+    case, modes, _ = solved()
+    model = pair_dynamic_model(case, modes.gears, modes.model, modes.modes, modes.excitation)
+    torque = case.operation.torque
+    assert [port.name for port in model.modal.inputs] == ["torque on gear 1", "torque on gear 2"]
+    assert model.modal.nominal == pytest.approx([torque, torque * 36 / 24], rel=1e-9)
+    assert model.ratios[:2] == pytest.approx([1.0, -24 / 36], rel=1e-9) and model.separates
+    assert model.mesh_rate == pytest.approx(24 / (2.0 * np.pi), rel=1e-15)
+    # of held gears the transmission error is the deflection
+    seen = [port.name for port in model.modal.outputs].index("transmission error")
+    np.testing.assert_allclose(model.modal.output_rows[seen, 1:], model.modal.mesh_rows[0, 1:], rtol=1e-9)
+    assert model.excitation.backlash == pytest.approx([line_play(case)], rel=1e-12)

@@ -15,7 +15,8 @@ from femgear.errors import CaseError
 from femgear.gears.kinematics import torques
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.solvers.periodic.harmonic_balance import solve_harmonic_balance
-from femgear.stages.lumped_set import Bearings
+from femgear.solvers.periodic.spectral import solve_spectral
+from femgear.stages.lumped_set import Bearings, driving_torque
 from femgear.stages.static import solve_static
 from femgear.system.fourier import harmonics_of
 from femgear.system.mesh_directions import (
@@ -26,7 +27,7 @@ from femgear.system.mesh_directions import (
     pin_directions,
 )
 from femgear.system.rigid_bodies import CENTRAL, PlanarBody, PlanarTorque, planar_from_set, torque_shares
-from femgear.trains.planar.model import planar_model
+from femgear.trains.planar.model import planar_data, planar_dynamic_model, planar_model
 from femgear.trains.reading import read_case, with_values
 from validation.planetary import nrel_set
 
@@ -377,3 +378,46 @@ def test_friction_loads_the_planets_as_the_statics_have_it():
     assert np.abs(moving - still).max() < 1e-3 * np.abs(still).max()
     assert np.abs(still[:, 1:]).max() > 1000.0
     assert len(planar_model(case, gears, static).problem.forces) == 0
+
+
+LINEAR: dict[str, Any] = {
+    "planar.gravity": None,
+    "planar.branch": None,
+    "planar.response": None,
+    "planar.published": None,
+}
+LINEAR |= {"planar.back_flanks": False, "static.stresses": False, "static.flank_elements": 8, "static.positions": 24}
+
+
+def test_the_model_for_other_programs_runs_with_time():
+    """Its meshes move as harmonic balance has them, whose contact is smoothed by 0.3 um."""
+    case: Any = with_values(read_case("cases/nrel_pgb_static.toml"), LINEAR)
+    static, gears = solve_static(case), planetary_set(case)
+    whole, model = planar_model(case, gears, static, mesh_frequency=True), planar_dynamic_model(case, gears, static)
+    count, hertz = case.mesh_harmonics, 40.0
+    orders = np.array([[0, harmonic] for harmonic in range(2 * count + 1)])
+    balance = solve_harmonic_balance(
+        whole.problem, np.array([1e-3, 2.0 * np.pi * hertz]), orders=orders, reduction=whole.reduction, radius=False
+    )
+    modal, excitation = model.modal, model.excitation
+    system = gear_set_system(planar_data(case, gears, static), torque=driving_torque(case, reacts=False))
+    modes = replace(
+        undamped_modes(system, excitation.stiffness.mean(axis=1), damping_ratio=0.0), damping_ratio=modal.damping_ratio
+    )
+    response = solve_spectral(modes, excitation, [hertz], excitation_harmonics=count, response_harmonics=2 * count)
+    expected, found = balance.force[whole.groups["meshes"]], response.force[0]
+    assert np.abs(found - expected).max() < 2e-3 * np.abs(expected).max()
+    assert np.abs(found - expected)[:, 1:].max() < 2e-2 * np.abs(expected)[:, 1:].max()
+    # the other way round in time it would be another motion
+    turned = np.conj(found)
+    assert np.abs(turned - expected)[:, 1:].max() > 0.3 * np.abs(expected)[:, 1:].max()
+
+
+@pytest.mark.parametrize("key", ["planar.gravity", "planar.back_flanks", "planet.bearing_clearance"])
+def test_what_no_linear_model_has_is_refused_for_other_programs(key):
+    plain = {"planar.gravity": None, "planar.branch": None, "planar.response": None, "planar.back_flanks": False}
+    given = {"planar.gravity": {}, "planar.back_flanks": True, "planet.bearing_clearance": "20 um"}[key]
+    case: Any = with_values(read_case("cases/nrel_pgb.toml"), plain | {key: given})
+    with pytest.raises(CaseError, match="none of this") as refused:
+        planar_dynamic_model(case, planetary_set(case), None)
+    assert refused.value.key == key and refused.value.code == "E-MODEL"
