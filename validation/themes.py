@@ -56,6 +56,7 @@ from validation import (
     nonlinear_tones,
     nrel,
     one_system,
+    other_programs,
     pairs,
     parametric,
     parametric_routes,
@@ -734,6 +735,15 @@ THEMES = (
             housing.resonances,
         ),
         (turning.orders,),
+    ),
+    Theme(
+        "other_programs",
+        "Models for other programs",
+        "Functional mock-up units run by FMPy until their start is forgotten, and matrices A, B, C, D. Rows with FMU "
+        "need the library fmpy and a C compiler. Compared with: the spectral solver, harmonic balance, lines of the "
+        "sensor, modes; gates: 1e-6 of the largest value in the period; 1e-9.",
+        (other_programs.matrices,),
+        (other_programs.pairs, other_programs.sets),
     ),
     Theme(
         "fixed_housing",
