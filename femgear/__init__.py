@@ -12,11 +12,12 @@ if TYPE_CHECKING:
     from femgear.case.gear_set import planetary_set
     from femgear.case.planetary import Case
     from femgear.errors import FemgearError
-    from femgear.run import live, solve
+    from femgear.run import live, mesh_stiffness, solve
     from femgear.stages.static import solve_static, solve_stress
+    from femgear.trains.drafts import new_case
     from femgear.trains.elastic.stages import solve_dynamics, solve_housing, solve_modes
     from femgear.trains.reading import open_results, read_case, with_value, with_values
-    from femgear.views import figures, mesh_stiffness, summary, tables
+    from femgear.trains.shown import figures, summary, tables
 
 __all__ = [
     "Case",
@@ -25,6 +26,7 @@ __all__ = [
     "figures",
     "live",
     "mesh_stiffness",
+    "new_case",
     "open_results",
     "planetary_set",
     "read_case",
@@ -45,9 +47,10 @@ sys.meta_path.insert(0, FormerNames)  # type: ignore[arg-type]
 _HOME = {
     "Case": "case.planetary",
     "FemgearError": "errors",
-    "figures": "views",
+    "figures": "trains.shown",
     "live": "run",
-    "mesh_stiffness": "views",
+    "mesh_stiffness": "run",
+    "new_case": "trains.drafts",
     "open_results": "trains.reading",
     "planetary_set": "case.gear_set",
     "read_case": "trains.reading",
@@ -57,8 +60,8 @@ _HOME = {
     "solve_modes": "trains.elastic.stages",
     "solve_static": "stages.static",
     "solve_stress": "stages.static",
-    "summary": "views",
-    "tables": "views",
+    "summary": "trains.shown",
+    "tables": "trains.shown",
     "with_value": "trains.reading",
     "with_values": "trains.reading",
 }

@@ -73,6 +73,7 @@ from femgear.storage.results import (
 from femgear.trains.live import Live
 from femgear.trains.reading import open_results, read_case
 from femgear.trains.registry import check_case, stages_of, train_of
+from femgear.trains.shown import Shown, summary
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,8 +92,11 @@ def grid_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "femgear" / "meshes"
 
 
-class Solution(dict[str, Any]):
-    """Results of the computed stages by name, in order, and the ``case`` that they are of."""
+class Solution(dict[str, Any], Shown):
+    """Results of the computed stages by name, in order, and the ``case`` that they are of.
+
+    ``plot(name)`` draws a figure; in a notebook it shows what page one of a report says.
+    """
 
     def __init__(self, case: Any) -> None:
         super().__init__()
@@ -100,6 +104,9 @@ class Solution(dict[str, Any]):
 
     def __repr__(self) -> str:
         return f"<Solution: {', '.join(self) or 'no stage'}>"
+
+    def _repr_html_(self) -> str:
+        return summary(self)._repr_html_()
 
     def __missing__(self, name: str):
         raise KeyError(f"{name!r} was not computed: there are {', '.join(self) or 'no stages'}")
@@ -206,6 +213,43 @@ def stiffness_table(source: Any, *, progress: Progress = silent) -> StiffnessTab
     end = position[0] + len(position) * (position[1] - position[0])
     angle = 2.0 * np.pi / teeth * np.append(position, end)
     return StiffnessTable(angle, tuple(str(name) for name in data["mesh"].values), k, error)
+
+
+def mesh_stiffness(case: Any, torques: Sequence[float] | None = None) -> xr.DataArray:
+    """Compute the mesh stiffness k(theta) of all meshes of a set or a pair, at several torques.
+
+    Parameters
+    ----------
+    case : Case, or what `femgear.read_case` takes
+    torques : sequence of float, optional
+        On the input [N m]; by default that of the case.
+
+    Returns
+    -------
+    DataArray
+        ``(torque, mesh, position)`` [N/m], over the position in mesh periods.
+
+    Raises
+    ------
+    CaseError
+        E-STAGE: a kind of case that has no mesh stiffness over the position; torques that cannot be.
+    """
+    import xarray as xr
+
+    handle = Live(case)
+    stage, name, _ = train_of(handle.case).stiffness_curves
+    if stage not in handle.answer or not hasattr(handle.case.operation, "torque"):
+        raise no_stiffness_curves(stage)
+    given = [float(handle.case.operation.torque)] if torques is None else [float(torque) for torque in torques]
+    curves = []
+    for torque in given:
+        data = handle.change({"operation.torque": f"{torque!r} N m"})[stage].dataset()
+        if name not in data:
+            raise no_stiffness_curves(stage)
+        curves.append(data[name])
+    joined: Any = xr.concat(curves, "torque", combine_attrs="override")
+    words = {"units": "N m", "long_name": "torque of the input"}
+    return joined.assign_coords(torque=("torque", np.array(given), words))
 
 
 def no_stiffness_curves(stage: str) -> CaseError:

@@ -25,7 +25,7 @@ LAYERS = (
     ("trains",),
     ("study",),
     ("run",),
-    ("views", "rigs", "causes"),
+    ("rigs", "causes"),
     ("assistant",),
     ("app",),
     ("cli",),

@@ -14,7 +14,7 @@ from edited_manifests import edit_manifest
 from femgear.errors import CaseError, StorageError
 from femgear.findings import as_data
 from femgear.report import page as report_page
-from femgear.run import dynamic_model, run_case, solve, stiffness_table
+from femgear.run import dynamic_model, mesh_stiffness, run_case, solve, stiffness_table
 from femgear.storage import files
 from femgear.storage.files import append_dataset, checksum, read_dataset, read_result, write_result
 from femgear.storage.results import read_manifest, run_folder
@@ -392,3 +392,19 @@ def test_a_model_needs_a_speed():
     case = with_values(read_case(CASES / "spur_pair.toml"), {"operation.speeds": None, "static.positions": 8})
     with pytest.raises(CaseError, match="needs a speed"):
         dynamic_model(case)
+
+
+def test_mesh_stiffness_over_angle_and_torque():
+    case = with_values(read_case(CASES / "spur_pair.toml"), {"static.positions": 8})
+    k = mesh_stiffness(case, [50.0, case.operation.torque])
+    assert k.dims == ("torque", "mesh", "position")
+    assert k.attrs["units"] == "N/m" and k["torque"].attrs["units"] == "N m"
+    assert np.array_equal(k.values[1], solve(case, "static")["static"].dataset()["mesh_stiffness"].values)
+    assert k.values[0].mean() != k.values[1].mean()
+    assert np.array_equal(mesh_stiffness(case).values[0], k.values[1])
+
+
+@pytest.mark.parametrize("name", ("gear_pair", "four_stage_reducer"))
+def test_a_kind_of_case_without_the_curve_is_refused(name):
+    with pytest.raises(CaseError, match="no mesh stiffness over the position"):
+        mesh_stiffness(CASES / f"{name}.toml")

@@ -29,7 +29,7 @@ from femgear.storage.results import Results
 from femgear.trains.live import Answer
 from femgear.trains.reading import parse_case
 from femgear.trains.registry import check_case, stages_of, train_of
-from femgear.views import results_in_memory
+from femgear.trains.shown import results_in_memory
 
 LISTENED = 2.0
 """Duration of the sound [s], whose end goes on with its beginning as well as whole turns let it."""

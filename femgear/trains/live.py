@@ -17,9 +17,10 @@ from femgear.errors import CaseError
 from femgear.stages.protocol import Progress, Stage, one_blas_thread, silent
 from femgear.trains.reading import read_case, with_values
 from femgear.trains.registry import check_case, stages_of, train_of
+from femgear.trains.shown import Shown
 
 
-class Answer(Mapping[str, Any]):
+class Answer(Shown):
     """Results of the stages of one case, each computed when it is first asked for.
 
     ``answer.static`` and ``answer["static"]`` are what `femgear.solve` gives by that name; the mapping has
@@ -129,6 +130,9 @@ class Live:
         check_case(case)
         self._first = self.answer = Answer(case, Steps(), cache=cache, progress=progress)
         self.changed = self.answer.unknown()
+
+    def __repr__(self) -> str:
+        return f"<Live: {self.case!r}>"
 
     @property
     def case(self) -> Any:

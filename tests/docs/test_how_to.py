@@ -21,7 +21,7 @@ from femgear.trains import registry
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 
 SLOW_PAGES = [pytest.param(name, marks=pytest.mark.slow) for name in ("silent_without_load", "faults")]
-PAGES = ("pin_errors", "faq", "api", "live", *SLOW_PAGES)
+PAGES = ("pin_errors", "faq", "api", "live", "notebook", *SLOW_PAGES)
 TUTORIAL = ("drawing_to_ste",)
 HOW_TO = (
     "how_to",
@@ -39,6 +39,7 @@ HOW_TO = (
     "run_up_sound",
     "samples",
     "live",
+    "notebook",
     "cluster",
     "plugin",
     "faq",

@@ -1,36 +1,65 @@
-"""What scripts and notebooks show of results: figures, tables, answers of page one, curves of the mesh stiffness.
+"""What scripts and notebooks show of results: figures, tables, answers of page one.
 
 They take results wherever these are: of `femgear.solve` and handles in memory, of a run in its folder.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from femgear.errors import CaseError
 from femgear.findings import once
 from femgear.report.style import Drawings
-from femgear.run import no_stiffness_curves
-from femgear.stages.protocol import Drawn
+from femgear.stages.protocol import Drawn, Train
 from femgear.storage.contents import as_dataset
 from femgear.storage.results import Manifest, Results
-from femgear.trains.live import Live
 from femgear.trains.reading import read_case
 from femgear.trains.registry import train_of
 
 if TYPE_CHECKING:
     import pandas as pd
-    import xarray as xr
     from matplotlib.figure import Figure
 
-    from femgear.run import Solution
     from femgear.stages.judgements import Judgement
-    from femgear.trains.live import Answer
+
+
+class Shown(Mapping[str, Any]):
+    """Results by stage of a ``case`` that show themselves: those of `femgear.solve`, and answers of `femgear.live`."""
+
+    case: Any
+
+    def plot(self, name: str) -> Figure:
+        """Draw a figure of the results, of an answer with no more stages than it takes.
+
+        Parameters
+        ----------
+        name : str
+            Of `figures`, such as ``"static_transmission_error"``.
+
+        Raises
+        ------
+        CaseError
+            E-CHOICE: there is no such figure.
+        """
+        train = train_of(self.case)
+        by_stage = {stage: [*of_stage.captions] for stage, of_stage in train.figures.items() if stage in self}
+        stage = next((stage for stage, names in by_stage.items() if any(map(name.startswith, names))), "")
+        computed = {needed: self[needed] for needed in self._up_to(train, stage)}
+        drawn = _drawings(results_in_memory(self.case, computed), computed)
+        if name not in drawn:
+            limit = ", ".join(drawn or (name for names in by_stage.values() for name in names))
+            raise CaseError("there is no such figure", code="E-CHOICE", key="name", value=name, limit=limit)
+        return drawn[name]
+
+    def _up_to(self, train: Train, name: str) -> list[str]:
+        """Stages that one is computed of, itself the last."""
+        stage = train.stage(name)
+        before = () if stage is None else stage.before(self.case)
+        found = [earlier for needed in before for earlier in self._up_to(train, needed)]
+        return [*dict.fromkeys(found), *([name] if stage is not None and name in self else [])]
 
 
 class Summary:
@@ -93,7 +122,7 @@ def _as_results(source: Any) -> tuple[Results, Mapping[str, Any]]:
     return results_in_memory(case, computed), computed
 
 
-def figures(source: Solution | Answer | Results) -> Mapping[str, Figure]:
+def figures(source: Shown | Results) -> Mapping[str, Figure]:
     """Give the figures of results by name, as a report shows them; each is drawn when it is asked for.
 
     Parameters
@@ -111,14 +140,18 @@ def figures(source: Solution | Answer | Results) -> Mapping[str, Figure]:
     CaseError
         E-TYPE: these are no results.
     """
-    results, computed = _as_results(source)
+    return _drawings(*_as_results(source))
+
+
+def _drawings(results: Results, computed: Mapping[str, Any]) -> Mapping[str, Figure]:
+    """Figures of results by name, each drawn when it is asked for; see `figures`."""
     train, data = train_of(results.case), {name: results[name] for name in results.stages}
     drawn = Drawn(results.case, data, computed)
     of_stages = [train.figures[name].draw(drawn) for name in (*data, "") if name in train.figures]
     return Drawings({name: (lambda shown=shown, name=name: shown[name]) for shown in of_stages for name in shown})
 
 
-def tables(source: Solution | Answer | Results) -> dict[str, pd.DataFrame]:
+def tables(source: Shown | Results) -> dict[str, pd.DataFrame]:
     """Give the tables that are printed of results, by their titles.
 
     Parameters
@@ -145,7 +178,7 @@ def tables(source: Solution | Answer | Results) -> dict[str, pd.DataFrame]:
     return {block.title: pd.DataFrame(list(block.rows), columns=list(block.header) or None) for block in filled}
 
 
-def summary(source: Solution | Answer | Results) -> Summary:
+def summary(source: Shown | Results) -> Summary:
     """Answer the questions of page one of a report: is it strong, quiet, cool, and can the numbers be relied on.
 
     Parameters
@@ -165,40 +198,3 @@ def summary(source: Solution | Answer | Results) -> Summary:
     """
     results, _ = _as_results(source)
     return Summary(*train_of(results.case).summary(results))
-
-
-def mesh_stiffness(case: Any, torques: Sequence[float] | None = None) -> xr.DataArray:
-    """Compute the mesh stiffness k(theta) of all meshes of a set or a pair, at several torques.
-
-    Parameters
-    ----------
-    case : Case, or what `femgear.read_case` takes
-    torques : sequence of float, optional
-        On the input [N m]; by default that of the case.
-
-    Returns
-    -------
-    DataArray
-        ``(torque, mesh, position)`` [N/m], over the position in mesh periods.
-
-    Raises
-    ------
-    CaseError
-        E-STAGE: a kind of case that has no mesh stiffness over the position; torques that cannot be.
-    """
-    import xarray as xr
-
-    handle = Live(case)
-    stage, name, _ = train_of(handle.case).stiffness_curves
-    if stage not in handle.answer or not hasattr(handle.case.operation, "torque"):
-        raise no_stiffness_curves(stage)
-    given = [float(handle.case.operation.torque)] if torques is None else [float(torque) for torque in torques]
-    curves = []
-    for torque in given:
-        data = handle.change({"operation.torque": f"{torque!r} N m"})[stage].dataset()
-        if name not in data:
-            raise no_stiffness_curves(stage)
-        curves.append(data[name])
-    joined: Any = xr.concat(curves, "torque", combine_attrs="override")
-    words = {"units": "N m", "long_name": "torque of the input"}
-    return joined.assign_coords(torque=("torque", np.array(given), words))

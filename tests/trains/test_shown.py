@@ -2,13 +2,12 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 import femgear
 from femgear.errors import CaseError
 
-CASES = Path(__file__).parents[1] / "cases"
+CASES = Path(__file__).parents[2] / "cases"
 PAIR = (CASES / "spur_pair.toml").read_text("utf-8").replace("positions = 64", "positions = 8")
 
 
@@ -45,16 +44,6 @@ def test_results_in_memory_and_of_a_handle_show_the_same(solution):
         assert all(isinstance(cell, str) for cell in table.to_numpy().ravel())
 
 
-def test_mesh_stiffness_over_angle_and_torque(solution):
-    case = solution.case
-    k = femgear.mesh_stiffness(case, [50.0, case.operation.torque])
-    assert k.dims == ("torque", "mesh", "position")
-    assert k.attrs["units"] == "N/m" and k["torque"].attrs["units"] == "N m"
-    assert np.array_equal(k.values[1], solution["static"].dataset()["mesh_stiffness"].values)
-    assert k.values[0].mean() != k.values[1].mean()
-    assert np.array_equal(femgear.mesh_stiffness(case).values[0], k.values[1])
-
-
 @pytest.mark.parametrize("source", ({}, None, "results", {"static": 1}))
 def test_what_are_no_results_is_refused(source):
     for show in (femgear.figures, femgear.tables, femgear.summary):
@@ -62,7 +51,21 @@ def test_what_are_no_results_is_refused(source):
             show(source)
 
 
-@pytest.mark.parametrize("name", ("gear_pair", "four_stage_reducer"))
-def test_a_kind_of_case_without_the_curve_is_refused(name):
-    with pytest.raises(CaseError, match="no mesh stiffness over the position"):
-        femgear.mesh_stiffness(CASES / f"{name}.toml")
+def test_a_figure_is_drawn_by_its_name(solution):
+    assert "transmission error" in solution.plot("static_transmission_error").axes[0].get_ylabel()
+    with pytest.raises(CaseError, match="no such figure") as refused:
+        solution.plot("run_up_levels")
+    assert "mesh_stiffness" in str(refused.value.limit) and refused.value.code == "E-CHOICE"
+
+
+def test_an_answer_computes_what_its_figure_takes_and_no_more():
+    handle = femgear.live(PAIR)
+    answer = handle.change({"operation.torque": "120 N m"})
+    assert answer.plot("mesh_stiffness").axes
+    assert repr(answer).endswith("computed: static>") and "Spur pair" in repr(handle)
+    with pytest.raises(CaseError, match="no such figure"):
+        answer.plot("nothing")
+
+
+def test_a_solution_shows_page_one_in_a_notebook(solution):
+    assert solution._repr_html_() == femgear.summary(solution)._repr_html_()
