@@ -58,8 +58,8 @@ class Shown(Mapping[str, Any]):
         """Stages that one is computed of, itself the last."""
         stage = train.stage(name)
         before = () if stage is None else stage.before(self.case)
-        found = [earlier for needed in before for earlier in self._up_to(train, needed)]
-        return [*dict.fromkeys(found), *([name] if stage is not None and name in self else [])]
+        earlier_stages = [earlier for needed in before for earlier in self._up_to(train, needed)]
+        return [*dict.fromkeys(earlier_stages), *([name] if stage is not None and name in self else [])]
 
 
 class Summary:
