@@ -40,6 +40,6 @@ def test_teeth_bend_under_friction_as_the_page_says():
             loads = np.column_stack([along @ weight, tangent @ weight])[free] / weight.sum()
             moved = spsolve(stiffness, loads)
             shares.append(loads[:, 0] @ moved[:, 1] / (loads[:, 0] @ moved[:, 0]))
-    low, high = map(float, re.search(r"by ([\d.]+) to ([\d.]+) of what an equal", PAGE).groups())
+    low, high = map(float, re.search(r"by\s+([\d.]+)\s+to\s+([\d.]+)\s+of\s+what\s+an\s+equal", PAGE).groups())
     assert (round(min(shares), 2), round(max(shares), 2)) == (low, high)
     assert 0.06 * min(shares) == pytest.approx(0.01, abs=0.005) and 0.06 * max(shares) == pytest.approx(0.03, abs=0.005)
