@@ -64,7 +64,9 @@ def test_lives_of_the_axle_are_those_of_the_page():
     tables["strength"], tables["operation"]["required_hours"] = {"quality": 6}, 8000
     data = solve_deflections(read_case(tables)).dataset()
     safeties = [data[f"{kind}_spectrum_safety"].values.min() for kind in ("root", "flank")]
-    numbers = re.search(r"smallest S_F over\s+the load cases is ([\d.]+).*?smallest S_H is\s+([\d.]+).*?L10r = (\d+) h", PAGE, re.S)
+    numbers = re.search(
+        r"smallest S_F over\s+the load cases is ([\d.]+).*?smallest S_H is\s+([\d.]+).*?L10r = (\d+) h", PAGE, re.S
+    )
     assert numbers and [f"{value:.2f}" for value in safeties] == [*numbers.groups()[:2]]
     assert f"{data['spectrum_reference_life'].values.min():.0f}" == numbers[3]
     assert not data["root_damage"].any() and not data["flank_damage"].any()
