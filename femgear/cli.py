@@ -56,6 +56,7 @@ try:
     from femgear.findings import FindingWarning
     from femgear.measured.requests import FurtherFiles, LineSearch, Recording
     from femgear.storage.files import noted_interrupts, storage_error
+    from femgear.study.fault_request import FaultRequest, FurtherRecords
     from femgear.study.teeth_request import TeethStrength, WantedTeeth
 except KeyboardInterrupt:  # loading takes long enough to be interrupted, before main can say so
     sys.stderr.write("interrupted\n")
@@ -723,6 +724,66 @@ def measured(
     return 0
 
 
+@Parameter(name="*")
+@dataclass(frozen=True)
+class Tasks:
+    """What computes the tasks of a command.
+
+    Parameters
+    ----------
+    workers
+        Processes of this machine that compute.
+    cluster
+        Dask scheduler whose workers compute: tcp://host:port or tls://host:port (docs/cluster.md).
+    """
+
+    workers: Whole = 1
+    cluster: str | None = None
+
+
+@app.command
+def faults(
+    case: Path,
+    /,
+    *,
+    output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
+    tolerances: Path | None = None,
+    request: Annotated[FaultRequest | None, Parameter(name="*", negative="")] = None,
+    further: Annotated[FurtherRecords | None, Parameter(name="*", negative="")] = None,
+    tasks: Tasks | None = None,
+) -> int:
+    """Compute labelled signals of sets with faulty teeth, or tabulate the orders of their faults.
+
+    Goes on where it was interrupted.
+
+    Parameters
+    ----------
+    case
+        TOML case file of a planetary set with an elastic ring that stands still.
+    output
+        Folder of labels.csv and of a NetCDF file for every machine. Default: orders are tabulated alone.
+    tolerances
+        TOML file of the distributions of errors of the machines, as in docs/samples.md. Default: no errors.
+    """
+    from femgear.run import grid_cache
+    from femgear.stages.fault_orders import describe_fault_orders
+    from femgear.study.fault_files import fault_records_into
+    from femgear.study.runner import open_runner
+    from femgear.trains.reading import read_case
+
+    data = read_case(case)
+    _print(describe_fault_orders(data))
+    if output is None:
+        return 0
+    with open_runner(**vars(tasks or Tasks())) as runner, Progress() as progress:
+        options = {"cache": grid_cache(), "progress": progress, "runner": runner}
+        parts = request or FaultRequest(), tolerances, further
+        blocks, names = fault_records_into(data, output, *parts, **options)
+    _print(blocks)
+    _say(f"files in {output}: {', '.join(names)}")
+    return 0
+
+
 @app.command
 def rigs(
     name: str | None = None,
@@ -1131,23 +1192,6 @@ def rexs(
     _warn(model.findings)
     _write_case(text, output, force=force)
     return 0
-
-
-@Parameter(name="*")
-@dataclass(frozen=True)
-class Tasks:
-    """What computes the tasks of a command.
-
-    Parameters
-    ----------
-    workers
-        Processes of this machine that compute.
-    cluster
-        Dask scheduler whose workers compute: tcp://host:port or tls://host:port (docs/cluster.md).
-    """
-
-    workers: Whole = 1
-    cluster: str | None = None
 
 
 @app.command(name="sweep")

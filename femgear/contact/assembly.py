@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from femgear.contact.flank_pairs import (
 from femgear.contact.supports import MovingMembers
 from femgear.contact.windows import MeshWindows, cell_centres, equal_cells
 from femgear.gears.pair import GearSet
+
+_SAME_ROLL = 1e-13
+"""Distance of roll lengths that count as one [m]."""
 
 
 @dataclass(frozen=True)
@@ -259,9 +263,10 @@ def contact_candidates(
     at = mesh[filled[1]], positions[filled[0]], pair[filled]
     polynomials = _window_polynomials(setup.cells)[layout]
     local = np.zeros((*layout.shape, setup.cells, setup.cells))
-    local[filled] = setup.local[setup.kind(at[0]), layout[filled]]
-    local[filled] += _corner_part(setup, bodies, *at, polynomials[filled])
-    local /= bodies.of_kinds(setup.kind(mesh))[:, None, None]
+    for kind in range(len(setup.gears.mates)):
+        of_kind = setup.kind(at[0]) == kind
+        values, again = _within_windows(setup, bodies, kind, *(part[of_kind] for part in at))
+        local[filled[0][of_kind], filled[1][of_kind]] = values[again]
     turns = setup.gears.rotation_approach
     approach = np.vstack([turns, -turns])[:meshes]
     supports = np.zeros((meshes, meshes))
@@ -364,22 +369,37 @@ def _add_body(smooth, body: FlankCompliance, members, roll, tooth, side):
         smooth[-image][:, *images] += block[:, other].transpose(1, 0, 3, 2)
 
 
-def _corner_part(setup: MeshWindows, bodies: Bodies, mesh, position, pair, polynomials) -> np.ndarray:
-    """What tip corners of both flanks add within each window, shape (windows, cells, cells) [m/N]."""
-    total = np.zeros((len(mesh), polynomials.shape[1], polynomials.shape[1]))
-    of_kind = setup.kind(mesh)
-    for kind, pairing in enumerate(setup.gears.mates):
-        rows, flanks = of_kind == kind, [bodies.gears[number] for number in pairing]
-        place, values = (mesh[rows], position[rows], pair[rows]), polynomials[rows]
-        parts = []
-        for roll, flank in zip(setup.roll, flanks, strict=True):
-            arc = roll[place] ** 2 / (2 * flank.base_radius)
-            away = (values @ np.abs(arc - flank.corner.arc)[..., None])[..., 0]
-            # cells beyond the end of a flank are no candidates
-            away = np.maximum(away, 1e-12)
-            parts.append(flank.corner.surface(away[:, :, None], away[:, None, :]))
-        total[rows] = (parts[0] + parts[1]) / bodies.widths[kind]
-    return total
+def _within_windows(setup: MeshWindows, bodies: Bodies, kind: int, mesh, position, pair) -> tuple[np.ndarray, Any]:
+    """Compliance within windows (n,) of a kind of mesh over its softness, and which of these (u, cells, cells) all are.
+
+    That of half planes, and what tip corners of both flanks add [m/N].
+    """
+    pairing, width, softness = setup.gears.mates[kind], bodies.widths[kind], float(bodies.of_kinds(np.array([kind]))[0])
+    first, again = _different_windows(setup, mesh, position, pair)
+    place = mesh[first], position[first], pair[first]
+    layout = setup.layout[place]
+    polynomials, parts = _window_polynomials(setup.cells)[layout], []
+    for roll, flank in zip(setup.roll, [bodies.gears[number] for number in pairing], strict=True):
+        arc = roll[place] ** 2 / (2 * flank.base_radius)
+        away = (polynomials @ np.abs(arc - flank.corner.arc)[..., None])[..., 0]
+        # cells beyond the end of a flank are no candidates
+        away = np.maximum(away, 1e-12)
+        parts.append(flank.corner.surface(away[:, :, None], away[:, None, :]))
+    return (setup.local[kind, layout] + (parts[0] + parts[1]) / width) / softness, again
+
+
+def _different_windows(setup: MeshWindows, mesh, position, pair) -> tuple[np.ndarray, Any]:
+    """Find those of some windows (n,) of a kind that lie at different places of their flanks, and which all are.
+
+    Records of one mesh period have no others.
+    """
+    every, turns = np.arange(len(mesh)), setup.turns[position]
+    if (turns == turns[:1]).all():
+        return every, every
+    place = mesh, position, pair
+    where = np.vstack([setup.layout[place], *np.rint(setup.roll[:, *place] / _SAME_ROLL).transpose(0, 2, 1)])
+    _, first, again = np.unique(where.astype(np.int64), axis=1, return_index=True, return_inverse=True)
+    return first, again.ravel()
 
 
 def _window_polynomials(cells: int) -> np.ndarray:

@@ -31,6 +31,7 @@ from femgear.contact.peaks import (
     pitch_passages,
     tooth_pair_codes,
 )
+from femgear.contact.repeated_positions import different_positions
 from femgear.contact.supports import (
     RIGID,
     UPRIGHT,
@@ -447,6 +448,22 @@ class _Walk:
         Where a tooth is missing corners carry far off the path, and the arcs by which gears turn change where flanks
         are: separations are those of the flanks where the solution before has them, until that is where they stay.
         """
+        first, again = self._different(share, nearest)
+        if len(first) == len(again):
+            return self._solved_in_place(share, nearest)
+        record, wider, further = self._with(self.empty.position[first])._solved_in_place(share, nearest)
+        return None if record is None else _repeated_record(record, self.empty, again), wider, further
+
+    def _different(self, share: float, nearest: float) -> tuple[np.ndarray, np.ndarray]:
+        """Positions in different states, and which of them all repeat, see `different_positions`."""
+        every = np.arange(len(self.empty.position))
+        if self.empty.periods == 1 or self.options.ahead is not None or self.options.both_flanks:
+            return every, every
+        windows = {"share": share, "nearest": nearest, "contact": self.empty.contact}
+        return different_positions(self.sector, self.bodies, self.deviations, self.empty.position, **windows)
+
+    def _solved_in_place(self, share: float, nearest: float) -> tuple[MeshCycle | None, float, float]:
+        """Solve as `attempt`, at every position."""
         record, wider, further = self._attempt(share, nearest, None)
         if record is None or not self._far_off:
             return record, wider, further
@@ -619,10 +636,13 @@ class _Walk:
 
     def _at(self, places: np.ndarray) -> _Walk:
         """The same set at other positions (n,) of the first part, and of all parts; nobody is told."""
-        options, empty = replace(self.options, progress=None, pressures=False), self.empty
-        record = {"periods": empty.periods, "contact": empty.contact, "options": options}
         parts = np.arange(self.repeats)[:, None] / self.repeats + places
-        return replace(self, options=options, empty=cycle_without_load(self.planetary_set, parts.ravel(), **record))
+        return replace(self, options=replace(self.options, progress=None, pressures=False))._with(parts.ravel())
+
+    def _with(self, position: np.ndarray) -> _Walk:
+        """The same set at other positions (P,)."""
+        record = {"periods": self.empty.periods, "contact": self.empty.contact, "options": self.options}
+        return replace(self, empty=cycle_without_load(self.planetary_set, position, **record))
 
     def _curves(self, record: MeshCycle) -> dict[str, np.ndarray]:
         """What has peaks over the positions, and the tooth pairs that carry as `tooth_pair_codes`."""
@@ -867,6 +887,14 @@ class _Walk:
             for name in (name for name in moved if name in values):
                 repeated[name].append(np.concatenate(_mapped(moved[name], values[name], planet, _turn(angle))))
         return {name: np.concatenate(parts, axis=-1) for name, parts in repeated.items() if parts}
+
+
+def _repeated_record(record: MeshCycle, empty: MeshCycle, again: np.ndarray) -> MeshCycle:
+    """The record at all positions of an empty one, by those (P,) of the record whose states they repeat."""
+    over_positions = (name for axes, names in _AXES.items() if axes[-1] == "t" for name in names)
+    names = (*over_positions, "bearing_force", "member_motion", "member_tilt")
+    values = {name: values[..., again] for name in names if (values := getattr(record, name)) is not None}
+    return replace(record, position=empty.position, **values)
 
 
 def _over_positions(values: np.ndarray, slices: int) -> np.ndarray:

@@ -153,6 +153,9 @@ def loaded_period(
     looked = first + (options.ahead is None)
     wanted, record, helical = np.arange(looked) / (first * parts) * periods, {}, False
     while len(wanted):
+        if periods > 1:
+            # what repeats later mesh periods is solved once, within a walk
+            wanted = wanted[np.argsort(np.mod(wanted + SHORTEST**2, 1.0), kind="stable")]
         for positions_of_block in np.array_split(wanted, -(-len(wanted) // _WALK)):
             cycle = walk_mesh_cycle(
                 planetary_set,

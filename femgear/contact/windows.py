@@ -218,7 +218,7 @@ def mesh_windows(  # noqa: PLR0913
         Arcs by which gear 1 of every mesh has turned on its base circle [m], positive as it drives: separations are
         those of flanks there, to which approaches by all motions still come. Approaches of gear 2 are exact anyway.
     """
-    tau, turns = _in_periods(cycle_positions(positions))
+    tau, turns = in_mesh_periods(cycle_positions(positions))
     pairs = mesh_pairs(planetary_set)
     widths = [
         WIDTH * _contact_half_width(pair, share / width, modulus)
@@ -277,7 +277,7 @@ def _over_gaps(
 
 def pair_paths(planetary_set: GearSet, positions, *, both_flanks: bool) -> tuple[np.ndarray, np.ndarray]:
     """Compute path coordinates (meshes, P, pairs) [m] and teeth (2, meshes, pairs) of `mesh_windows`."""
-    tau, turns = _in_periods(cycle_positions(positions))
+    tau, turns = in_mesh_periods(cycle_positions(positions))
     paths = list[tuple[np.ndarray, np.ndarray]]()
     for direction in (DRIVE_SIDE, BACK_SIDE) if both_flanks else (DRIVE_SIDE,):
         phase = flank_side(planetary_set, direction)[0]
@@ -286,8 +286,8 @@ def pair_paths(planetary_set: GearSet, positions, *, both_flanks: bool) -> tuple
     return np.concatenate(zeta), np.concatenate(tooth, axis=1)
 
 
-def _in_periods(tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Positions (P,), of slices one after the other, by (P,) or (P, S), and the mesh periods passed."""
+def in_mesh_periods(tau: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Give positions (P,), of slices one after the other, by (P,) or (P, S), and the mesh periods passed."""
     # a tooth pair has one number in all slices; what is rounded off their mean belongs to the same period
     middle = tau.reshape(len(tau), -1).mean(axis=1)
     # mesh periods are those of the record: one that ends at zero has its seams just after whole positions

@@ -48,7 +48,7 @@ from femgear.contact.bodies import (
     make_sectors,
 )
 from femgear.contact.cracked_flanks import cracked_flanks
-from femgear.contact.cycle import CycleOptions, walk_mesh_cycle
+from femgear.contact.cycle import CycleOptions, cycle_without_load, walk_mesh_cycle
 from femgear.contact.mesh_cycle import MeshCycle
 from femgear.contact.root_stress import (
     RootStresses,
@@ -165,6 +165,19 @@ def solve_static(
     parts = gears, sectors, bodies, cycle, sun_torque, static_entries(case), period_message
     drawing = drawing_attributes(case)
     return StaticResult(*parts, overlap_ratio=overlap, base_helix_angle=base, waves=width.get("waves"), drawing=drawing)
+
+
+def static_without_load(case: Case, *, cache: Path | None = None, steps: Steps | None = None) -> StaticResult:
+    """Make what modes take of a static solution, gears and their flank compliances, without solving any contact.
+
+    ``cycle`` is empty. Arguments are those of `solve_static`.
+    """
+    gears, steps = planetary_set(case), steps or Steps()
+    sectors, bodies = known_compliances(case, gears, steps, cache=cache)
+    waves = over_width(case, gears, cache=cache, steps=steps).get("waves")
+    cycle = cycle_without_load(gears, np.zeros(1), periods=1, contact=case.static.contact)
+    parts = gears, sectors, bodies, cycle, case.torque_on_first_gear(), static_entries(case)
+    return StaticResult(*parts, waves=waves)
 
 
 def _walk(case: Any, gears: GearSet, deviations: SetDeviations, periods: int) -> dict[str, Any]:

@@ -64,6 +64,7 @@ from femgear.gears.deviations import (
 )
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import LARGEST_DEVIATION, FlankForm, LeadCrowning, LeadSlope, ProfileSlope
+from femgear.gears.planetary import PlanetarySet
 from femgear.gears.tolerances import CLASSES
 from femgear.stages.protocol import one_blas_thread
 from femgear.stages.static_results import SLICES
@@ -616,17 +617,12 @@ def sample_model(
     walked = is_walked(basis)
     solved, order = basis.loaded(sun_torque, clearance=walked)
     gears, members = solved.gears, moving_members(solved.gears, solved.supports)
-    N, errors = gears.n_planets, []
-    for key, law in tolerances.laws():
-        name, _, kind = key.partition(".")
-        values = getattr(gears, name).teeth if "pitch" in kind else 2 if "runout" in kind else 1
-        each = (N if name in ("planet", "pin_errors") else 1, values)
-        errors.append((key, law, (1, len(_FLANKS[name])) if kind in _FORMS else each))
+    N, errors = gears.n_planets, drawn_laws(gears, tolerances)
     load = np.zeros(N + 1 + int(members.free.sum()))
     load[N] = abs(sun_torque) / gears.sun.base_radius
     position = cycle_positions(gears.equal_positions(positions) if isinstance(positions, int) else positions)
     position = -position[::-1] if sun_torque < 0 else position
-    model = SampleModel(basis, solved, order, tuple(errors), members, load, position, len(position))
+    model = SampleModel(basis, solved, order, errors, members, load, position, len(position))
     if walked:
         return replace(model, basis=replace(basis, positions=positions), walked=True)
 
@@ -647,6 +643,31 @@ def sample_model(
 
     windows = in_windows(attempt, *first_windows(gears, solved.bodies, abs(sun_torque)))
     return replace(model, windows=windows)
+
+
+def drawn_laws(gears: PlanetarySet, tolerances: Tolerances) -> tuple[tuple[str, Law, tuple[int, int]], ...]:
+    """List the errors of a set that are drawn, as `SampleModel` has them."""
+    errors = []
+    for key, law in tolerances.laws():
+        name, _, kind = key.partition(".")
+        values = getattr(gears, name).teeth if "pitch" in kind else 2 if "runout" in kind else 1
+        each = (gears.n_planets if name in ("planet", "pin_errors") else 1, values)
+        errors.append((key, law, (1, len(_FLANKS[name])) if kind in _FORMS else each))
+    return tuple(errors)
+
+
+def drawn_alone(case: Case, tolerances: Path, *, cache: Path | None = None, steps: Steps | None = None) -> SampleModel:
+    """Prepare samples of a case that are drawn and written as cases, and solved by others.
+
+    Refused is (CaseError) what `read_tolerances` and `design_basis` refuse.
+    """
+    law, _ = read_tolerances(tolerances, case.sun.module)
+    basis = design_basis(case, cache=cache, steps=steps)
+    law = with_classes(law, case)
+    _check_over_width(basis, law)
+    members, order = moving_members(basis.gears, basis.supports), np.arange(basis.gears.n_planets)
+    parts = basis, basis, order, drawn_laws(basis.gears, law), members
+    return SampleModel(*parts, np.zeros(0), np.zeros(1), case.static.positions)
 
 
 def is_walked(basis: DesignBasis) -> bool:

@@ -44,7 +44,7 @@ from femgear.findings import Finding
 from femgear.gears.deviations import common_period, rotational_symmetry
 from femgear.gears.planetary import PlanetarySet
 from femgear.housing.orders import order_level
-from femgear.housing.sensor import component_lines
+from femgear.housing.sensor import SensorLines, component_lines
 from femgear.housing.sound import Cylinder, Microphone, component_sound
 from femgear.remembered import remembered
 from femgear.report.tables import RESPONSE_DOUBTS, describe_modes, describe_response
@@ -200,7 +200,12 @@ _LINES = ("deflection", "force", "modal", "source")
 
 @one_blas_thread()
 def solve_modes(
-    case: Case, static: StaticResult, *, progress: Progress = silent, steps: Steps | None = None
+    case: Case,
+    static: StaticResult,
+    *,
+    progress: Progress = silent,
+    steps: Steps | None = None,
+    over_bearings: bool = True,
 ) -> ModesResult:
     """Solve for the modal basis of the set with its elastic ring and mean mesh stiffnesses.
 
@@ -217,6 +222,8 @@ def solve_modes(
         Called with (stage, done, total).
     steps : Steps, optional
         Compliances, loaded states and ring models of other cases, taken where they are those of this one.
+    over_bearings : bool
+        Whether load shares at other bearing stiffnesses are computed, which reports show.
 
     Returns
     -------
@@ -265,7 +272,7 @@ def solve_modes(
     )
     modes = replace(modes, kind=kinds, nodal_diameter=diameters)
     symmetry = rotational_symmetry(deviations, gears)
-    sharing = _sharing_over_bearings(case, gears, bodies[0], state, steps)
+    sharing = _sharing_over_bearings(case, gears, bodies[0], state, steps) if over_bearings else None
     made = model, balanced_source(excitation, modes), modes, bodies, state, reach, symmetry, modal_entries(case)
     return ModesResult(ring, *made, sharing, frictionless)
 
@@ -494,6 +501,16 @@ def solve_response(case: Case, modes: ModesResult) -> Response:
     frequency = _turning_speeds(case, modes)[0]
     limit = first_limit(case, modes, frequency)
     return solve_spectral(modes.modes, modes.excitation, frequency, **limit.options(case))
+
+
+@one_blas_thread()
+def solve_lines(case: Case, modes: ModesResult) -> SensorLines:
+    """Solve for the lines of the fixed sensor at the case's speeds, on a foundation, and nothing that a report adds.
+
+    The excitation ends at ``dynamics.up_to``, where that is given as in `solve_dynamics`. CaseError: E-SPEED.
+    """
+    frequency, carrier = _turning_speeds(case, modes)
+    return lines_on_foundation(case, modes, frequency, carrier, first_limit(case, modes, frequency))
 
 
 @one_blas_thread()
