@@ -58,7 +58,7 @@ def describe_fault_orders(case: Any, speed: float | None = None) -> Iterator[Blo
     CaseError: as `need_fixed_ring`.
     """
     gears = need_fixed_ring(case)
-    speed = case.operation.speeds[0] if speed is None else speed
+    speed = float(case.operation.speeds[0] if speed is None else speed)
     turning = speeds(gears, input=case.operation.input, fixed=case.operation.fixed, speed=speed)
     carrier, mesh, ring = abs(turning.carrier) / (2.0 * math.pi), turning.mesh_frequency, gears.ring.teeth
     meets, g = fault_frequencies(gears, mesh), gears.rotations

@@ -25,7 +25,7 @@ from femgear.stages.fault_orders import need_fixed_ring
 from femgear.stages.protocol import one_blas_thread
 from femgear.stages.static import LARGEST_APPROACH, static_without_load
 from femgear.study.fault_request import FaultRequest
-from femgear.study.fault_sizes import GEARS, KINDS, FaultPlace, chosen, drawn_fault, fault_entries, size_ranges
+from femgear.study.fault_sizes import GEARS, KINDS, FaultPlace, chosen_words, drawn_fault, fault_entries, size_ranges
 from femgear.study.objectives import need_elastic_ring
 from femgear.study.samples import SampleModel, checked, drawn_alone, sample_case
 from femgear.trains.elastic import stages as elastic_stages
@@ -154,8 +154,8 @@ def fault_plan(
     plan = FaultPlan(
         case,
         None if tolerances is None else drawn_alone(case, tolerances, cache=cache, steps=steps),
-        chosen(request.kinds, KINDS, "--kinds"),
-        chosen(request.gears, GEARS, "--gears"),
+        chosen_words(request.kinds, KINDS, "--kinds"),
+        chosen_words(request.gears, GEARS, "--gears"),
         size_ranges(request.sizes, gears.sun.module),
         _range(request.speeds, SPEED, (0.5 * fastest, fastest), "--speeds"),
         _range(request.torques, TORQUE, (0.5 * torque, torque), "--torques"),

@@ -55,14 +55,14 @@ class FaultPlace:
     size: float = 0.0
 
 
-def words(values: Sequence[str]) -> tuple[str, ...]:
+def separated_words(values: Sequence[str]) -> tuple[str, ...]:
     """Split words that commas separate, as in ``("crack,spall", "wear")``."""
     return tuple(word.strip() for text in values for word in text.split(",") if word.strip())
 
 
-def chosen(values: Sequence[str], allowed: Sequence[str], key: str) -> tuple[str, ...]:
-    """Give the words that are chosen, all that are allowed by default; CaseError (E-CHOICE): another one."""
-    named = words(values) or tuple(allowed)
+def chosen_words(values: Sequence[str], allowed: Sequence[str], key: str) -> tuple[str, ...]:
+    """Give the words that are chosen_words, all that are allowed by default; CaseError (E-CHOICE): another one."""
+    named = separated_words(values) or tuple(allowed)
     if wrong := [word for word in named if word not in allowed]:
         limit = ", ".join(allowed)
         raise CaseError(f"there is no {wrong[0]}", code="E-CHOICE", key=key, value=wrong[0], limit=limit)
@@ -75,7 +75,7 @@ def size_ranges(values: Sequence[str], module: float) -> dict[str, tuple[float, 
     CaseError: E-CHOICE (no such kind), E-UNIT, E-RANGE.
     """
     ranges = {kind: (low * module, high * module) for kind, (low, high) in _RANGES.items()}
-    for text in words(values):
+    for text in separated_words(values):
         kind, equal, rest = text.partition("=")
         kind, ends = kind.strip(), rest.split("..")
         if kind not in SIZED or not equal:

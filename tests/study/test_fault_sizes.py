@@ -12,7 +12,7 @@ from femgear.study.fault_sizes import (
     KINDS,
     SIZED,
     carrying_flanks,
-    chosen,
+    chosen_words,
     drawn_fault,
     fault_entries,
     size_ranges,
@@ -46,10 +46,10 @@ def test_wrong_sizes_are_refused(text, code):
 
 
 def test_words_are_chosen_once_and_in_their_order():
-    assert chosen(("crack, spall", "crack"), KINDS, "--kinds") == ("crack", "spall")
-    assert chosen((), KINDS, "--kinds") == KINDS
+    assert chosen_words(("crack, spall", "crack"), KINDS, "--kinds") == ("crack", "spall")
+    assert chosen_words((), KINDS, "--kinds") == KINDS
     with pytest.raises(CaseError) as caught:
-        chosen(("creak",), KINDS, "--kinds")
+        chosen_words(("creak",), KINDS, "--kinds")
     assert "crack" in str(caught.value)
 
 
