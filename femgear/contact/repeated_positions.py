@@ -68,15 +68,15 @@ def different_positions(
     options = {"share": share, "nearest": nearest, "positions": within, "contact": contact, "deviations": whole}
     setup = mesh_windows(gears, bodies, **options)
     shift = pair_separations(gears, deviations, setup.listed.tooth, turns, tau, back=False)
-    met = _may_touch(gears, deviations, setup.listed.gap, nearest + 2.0 * float(np.ptp(shift)), within)[:, place]
-    apart = np.rint(np.where(met, shift, 0.0) / _SAME_SEPARATION).astype(np.int64)
+    near = _may_touch(gears, deviations, setup.listed.gap, nearest + 2.0 * float(np.ptp(shift)), within)[:, place]
+    apart = np.rint(np.where(near, shift, 0.0) / _SAME_SEPARATION).astype(np.int64)
     states = [places[:, None], np.moveaxis(apart, 1, 0).reshape(len(tau), -1)]
     for fault in (fault for fault in deviations.faults if fault.tooth is not None):
         away = _teeth_away(gears, fault, setup.listed.tooth, turns)
         if isinstance(fault, Crack):
-            states.append(_near_crack(gears, bodies, fault, np.where(met, away, _ELSEWHERE), turns)[:, None])
+            states.append(_near_crack(gears, bodies, fault, np.where(near, away, _ELSEWHERE), turns)[:, None])
         else:
-            states.append(np.moveaxis((away == 0) & met, 1, 0).reshape(len(tau), -1).astype(np.int64))
+            states.append(np.moveaxis((away == 0) & near, 1, 0).reshape(len(tau), -1).astype(np.int64))
     _, first, again = np.unique(np.hstack(states), axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     return first[order], np.argsort(order)[again.ravel()]
@@ -92,14 +92,16 @@ def _may_touch(
     """
     faults = deviations.faults
     number = min(len(faults), gap.shape[-1] - 1)
-    met = gap <= np.sort(gap, axis=-1)[..., number : number + 1] + nearest
+    near = gap <= np.sort(gap, axis=-1)[..., number : number + 1] + nearest
     short = sum(isinstance(fault, MissingTooth | BrokenTip) for fault in faults)
     if short:
         pitch = gears.base_pitch
         zeta = pair_paths(gears, within, both_flanks=False)[0]
         ends = gears.of_kinds([pair.path for pair in mesh_pairs(gears)])
-        met = met | ((zeta > ends[:, 0, None, None] - short * pitch) & (zeta < ends[:, 1, None, None] + short * pitch))
-    return met
+        near = near | (
+            (zeta > ends[:, 0, None, None] - short * pitch) & (zeta < ends[:, 1, None, None] + short * pitch)
+        )
+    return near
 
 
 def _teeth_away(gears: GearSet, fault: ToothFault, tooth: np.ndarray, turns: np.ndarray) -> np.ndarray:

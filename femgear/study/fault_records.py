@@ -261,9 +261,9 @@ def solve_machine(plan: FaultPlan, machine: int) -> MachineRecords:
     for row, number in enumerate(numbers):
         values = lines.acceleration[row] * np.exp(1j * lines.order * angle[row])
         options = {"samples": plan.samples, "rate": plan.rate}
-        heard = sampled_signal(lines.order, values, float(lines.base_speed[row]), **options)
+        recorded = sampled_signal(lines.order, values, float(lines.base_speed[row]), **options)
         noise = np.random.default_rng([plan.seed, number, _RECORD, 1]).standard_normal(plan.samples)
-        signal[row] = heard + plan.noise * np.sqrt(np.mean(heard**2)) * noise
+        signal[row] = recorded + plan.noise * np.sqrt(np.mean(recorded**2)) * noise
     return MachineRecords(machine, case, fault, errors, angle, signal, lines)
 
 

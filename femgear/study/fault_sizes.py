@@ -96,7 +96,7 @@ def size_ranges(values: Sequence[str], module: float) -> dict[str, tuple[float, 
 def carrying_flanks(gears: PlanetarySet, gear: str, *, back: bool) -> tuple[str, ...]:
     """Name the flanks of a gear that carry; ``back`` under a negative torque."""
     number = GEARS.index(gear)
-    sides = sorted({side for own, acting in acting_flanks(gears) if own == number for *_, side in acting})
+    sides = sorted({side for body, acting in acting_flanks(gears) if body == number for *_, side in acting})
     names = ("sun side", "ring side") if gear == "planet" else ("left", "right")
     return tuple(names[RIGHT - side if back else side] for side in sides)
 
@@ -120,8 +120,8 @@ def drawn_fault(
         low, high = sizes[kind]
         size = low + (high - low) * float(shares[4])
     if kind == "broken corner":
-        own = getattr(gears, gear)
-        size = min(size, _LEFT_OVER * abs(own.tip_radius - own.form_radius))
+        faulty = getattr(gears, gear)
+        size = min(size, _LEFT_OVER * abs(faulty.tip_radius - faulty.form_radius))
     return FaultPlace(
         kind,
         gear,
