@@ -51,7 +51,10 @@ _FOUNDATION = {"ring.foundation_radial", "ring.foundation_tangential"}
 _MACHINES = {"dynamics", "motor", "brake", "planar", "operation"}
 _DYNAMIC = _WORDS | {"static.stresses", "static.members"}
 """What decides neither modes nor response."""
-_COMPARED = {"housing.published", "housing.measured", "housing.assumptions"}
+_COMPARED = {
+    *("housing.published", "housing.measured", "housing.assumptions"),
+    *("housing.level_limit", "housing.microphone.level_limit"),
+}
 """What results are compared with, and whether others are computed to compare."""
 _SOLUTION = {f"static.{name}" for name in ("positions", "contact", "back_flanks", "stresses", "longest_record")}
 """How the contact is solved, whatever the grids."""

@@ -26,6 +26,7 @@ from femgear.case.flank_sections import (
     PlanetModificationSection,
     RingErrors,
 )
+from femgear.case.level_limits import LevelLimit, SoundLimit
 from femgear.case.quantities import (
     ACCELERATION,
     ANGLE,
@@ -432,10 +433,14 @@ class MeasuredSection(Section):
 
 
 class MicrophoneSection(Section):
-    """Where sound is heard: distance from the outer surface of the ring, and angle, that of the sensor."""
+    """Where sound is heard: distance from the outer surface of the ring, and angle, that of the sensor.
+
+    ``level_limit`` is the largest sound pressure level allowed at speeds of operation [dB(A)].
+    """
 
     distance: Annotated[float, Quantity(LENGTH, 1e-3, 1000.0)] = 1.0
     angle: Angle | None = None
+    level_limit: SoundLimit = ()
 
 
 class SupportSection(Section):
@@ -489,13 +494,15 @@ class HousingSection(Section):
 
     ``form = "exact"`` hears every circumferential component at its own order; ``"linear"`` is the
     interpolation between ``points`` points of the paper on carrier modulation, with its images. With ``assumptions``
-    a run solves again with half and twice of what nobody knows before the gearbox is built.
+    a run solves again with half and twice of what nobody knows before the gearbox is built. ``level_limit`` is the
+    largest acceleration allowed at the sensor.
     """
 
     form: Literal["exact", "linear"] = "exact"
     points: Annotated[int, Count(3, 100_000)] = 54
     assumptions: bool = False
     sensor_angle: Angle = 0.0
+    level_limit: LevelLimit = ()
     microphone: MicrophoneSection = MicrophoneSection()
     published: Annotated[tuple[PublishedLines, ...], Field(max_length=100)] = ()
     measured: Annotated[tuple[MeasuredSection, ...], Field(max_length=100)] = ()

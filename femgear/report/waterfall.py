@@ -231,14 +231,21 @@ def _doubt(figure: Figure, runup: xr.Dataset) -> None:
         figure.suptitle(f"{speed.min():.4g} to {speed.max():.4g} rpm: {words}", fontsize=12)
 
 
-def runup_levels(runup: xr.Dataset) -> Figure:
-    """Draw level, fluctuation of the mesh forces and dynamic factors of runup.nc over the speed."""
+def runup_levels(runup: xr.Dataset, limit: np.ndarray | None = None) -> Figure:
+    """Draw level, fluctuation of the mesh forces and dynamic factors of runup.nc over the speed.
+
+    ``limit`` (speeds,) is the largest level allowed [m/s^2].
+    """
     figure, axes = new_figure(rows=3, height=7.4, sharex=True)
     speed, level = runup["speed"].values, runup["level"].values
     short = _short(runup)
     _curve(axes[0], speed, level, short, color=BLACK)
     axes[0].set_ylim(0.0, 1.45 * level.max(initial=0.0) or 1.0)
     words = "a × b: mode a at mesh harmonic b; dots: operating speeds"
+    if limit is not None:
+        axes[0].plot(speed, limit, color=VERMILION, linewidth=1.6, linestyle="--")
+        axes[0].set_ylim(top=max(axes[0].get_ylim()[1], 1.1 * float(limit.max())))
+        words += "; dashed: limit"
     if runup.attrs.get("method", "exact") != "exact":
         words += f"\nexcited up to {1e-3 * runup['excitation_limit'].values.max():.4g} kHz"
     if short.any():
@@ -315,11 +322,11 @@ def _name_resonances(ax, runup: xr.Dataset) -> None:
         )
 
 
-def runup_figures(runup: xr.Dataset, modes: xr.Dataset) -> Drawings:
-    """Draw the figures of a run-up by the names of their files."""
+def runup_figures(runup: xr.Dataset, modes: xr.Dataset, limit: np.ndarray | None = None) -> Drawings:
+    """Draw the figures of a run-up by the names of their files; ``limit`` as of `runup_levels`."""
     return Drawings(
         {
-            "run_up_levels": partial(runup_levels, runup),
+            "run_up_levels": partial(runup_levels, runup, limit),
             "campbell": partial(campbell_diagram, runup, modes),
             "waterfall": partial(waterfall, runup),
             "order_cuts": partial(draw_order_cuts, runup),

@@ -323,8 +323,45 @@ def _against(results: Any, stages: Sequence[str]) -> Iterator[str]:
 _CLEAR = "no resonance makes the level at a speed of operation"
 
 
-def judge_noise(answer: str, sentence: str, resonance: str = "", open_words: str = _CLEAR) -> Judgement:
-    """Judge how loud it is: by resonances at speeds of operation, since a level has no limit of its own.
+@dataclass(frozen=True)
+class LevelMargin:
+    """Where a level comes nearest to its limit, or is farthest beyond it.
+
+    Parameters
+    ----------
+    decibels : float
+        Level over limit; negative where it holds.
+    speed : float
+        [rpm]
+    place : str
+        Sensor or microphone.
+    """
+
+    decibels: float
+    speed: float
+    place: str
+
+    @property
+    def words(self) -> str:
+        """The margin in words."""
+        side = "over" if self.decibels > 0.0 else "below"
+        return f"{abs(self.decibels):.1f} dB {side} the limit at {self.place}, {self.speed:,.4g} rpm"
+
+
+def margin_of_levels(speed: np.ndarray, decibels: np.ndarray, place: str) -> LevelMargin:
+    """Find the worst of levels (n,) over their limits [dB] at speeds (n,) [rpm]."""
+    at = int(np.argmax(decibels))
+    return LevelMargin(float(decibels[at]), float(speed[at]), place)
+
+
+def judge_noise(
+    answer: str,
+    sentence: str,
+    resonance: str = "",
+    open_words: str = _CLEAR,
+    margins: Sequence[LevelMargin] = (),
+) -> Judgement:
+    """Judge how loud it is: by the limits of the case, else by resonances at speeds of operation.
 
     Parameters
     ----------
@@ -335,8 +372,15 @@ def judge_noise(answer: str, sentence: str, resonance: str = "", open_words: str
     resonance : str
         The resonance that makes the level at a speed of operation, empty where there is none.
     open_words : str
-        What to say where there is none.
+        What to say where there is neither a limit nor a resonance.
+    margins : sequence of LevelMargin
+        Of the levels that have a limit.
     """
+    if margins:
+        worst = max(margins, key=lambda margin: margin.decibels)
+        if worst.decibels > 0.0:
+            return Judgement(QUIET, "bad", answer, worst.words, f"{sentence}. Too loud: {worst.words}")
+        return Judgement(QUIET, "look" if resonance else "good", answer, resonance or worst.words, sentence)
     if resonance:
         return Judgement(QUIET, "look", answer, resonance, sentence)
     return Judgement(QUIET, "open", answer, open_words, sentence)

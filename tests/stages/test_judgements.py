@@ -22,6 +22,7 @@ from femgear.stages.judgements import (
     least_over_life,
     lives_of_bearings,
     lives_of_teeth,
+    margin_of_levels,
 )
 
 ROOT, FLANK = Least(1.92, "root of the planet"), Least(1.21, "flank of the sun")
@@ -159,9 +160,20 @@ def test_a_run_is_smooth_unless_teeth_part_or_motions_grow():
     assert judge_smoothness("-", pulled, ("dynamics",)).limit == "teeth part"
 
 
-def test_a_level_is_judged_by_resonances_alone():
+def test_a_level_without_a_limit_is_judged_by_resonances_alone():
     assert judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2").state == "look"
     assert judge_noise("1 m/s²", "so").state == "open"
+
+
+def test_a_level_is_judged_by_the_worst_of_its_limits():
+    speed = np.array([1000.0, 2000.0, 3000.0])
+    below, over = (margin_of_levels(speed, np.array(values), "foot") for values in ([-9.0, -3.0, -5.0], [-2.0, 1.5, 0]))
+    holds = judge_noise("1 m/s²", "so", margins=(below,))
+    assert (holds.state, holds.limit) == ("good", "3.0 dB below the limit at foot, 2,000 rpm")
+    assert judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below,)).state == "look"
+    fails = judge_noise("1 m/s²", "so", "mode 3 meets mesh harmonic 2", margins=(below, over))
+    assert (fails.state, fails.limit) == ("bad", "1.5 dB over the limit at foot, 2,000 rpm")
+    assert fails.sentence == "so. Too loud: 1.5 dB over the limit at foot, 2,000 rpm"
 
 
 def test_numbers_are_judged_by_the_findings():

@@ -178,6 +178,10 @@ CHANGES: tuple[dict[str, object], ...] = (
     {"dynamics.tolerance": 1e-8},
     {"housing.form": "linear", "housing.points": 60},
     {"housing.sensor_angle": "11 deg"},
+    {
+        "housing.level_limit": [{"speed": "1000 rpm", "level": "100 m/s^2"}],
+        "housing.microphone": {"level_limit": [{"speed": "1000 rpm", "level": 60.0}]},
+    },
     {"housing.microphone": {"distance": "2 m", "angle": "40 deg"}},
     {"housing.sensor": [{"name": "foot", "angle": "5 deg", "direction": "30 deg"}]},
     {"housing.support": [SUPPORT], "housing.nodal_diameters": 4},

@@ -23,6 +23,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from femgear.case.gear_set import material_of, planetary_set
+from femgear.case.level_limits import limit_at
 from femgear.contact.bodies import active_flank_load
 from femgear.fe.elasticity import mass
 from femgear.fe.reduction import cyclic_modes, sector_basis
@@ -529,6 +530,12 @@ def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
     return [EXPLORER]
 
 
+def _runup_figures(drawn: Drawn) -> Drawings:
+    runup, points = drawn.data["runup"], drawn.case.housing.level_limit
+    limit = limit_at(points, runup["speed"].values) if points else None
+    return runup_figures(runup, drawn.data["modes"], limit)
+
+
 def _housing_figures(drawn: Drawn) -> Drawings:
     housing, dynamics = drawn.data["housing"], drawn.data.get("dynamics")
     figures: dict[str, Callable[[], Figure]] = {}
@@ -606,7 +613,7 @@ FIGURES = STATIC | {
     "assumptions": ASSUMPTION_FIGURES,
     "runup": Figures(
         RUNUP_CAPTIONS,
-        draw=lambda drawn: runup_figures(drawn.data["runup"], drawn.data["modes"]),
+        draw=_runup_figures,
         write=(_write_explorer,),
     ),
 }

@@ -7,8 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case.level_limits import limit_at
 from femgear.stages.assumptions import most_decisive
-from femgear.stages.judgements import Judgement, judge_noise, judge_numbers
+from femgear.stages.judgements import Judgement, LevelMargin, judge_noise, judge_numbers, margin_of_levels
 from femgear.stages.train_judgements import judge_teeth
 from femgear.trains.elastic.results import known_factors, rate_set
 
@@ -50,13 +51,27 @@ def _noise(results: Any) -> Judgement:
     sentence = f"At {speed:,.4g} rpm it has {level[at]:.3g} m/s²{at_microphone}: {main}"
     if decisive := most_decisive(results):
         sentence += f", with half and twice of what is assumed: {decisive}"
+    margins = tuple(_margins(results))
     if "runup" not in results.stages:
-        return judge_noise(answer, sentence)
+        return judge_noise(answer, sentence, margins=margins)
     runup = results.runup
     worst = int(runup["level"].values.argmax())
     loudest = float(runup["level"].values[worst])
     sentence += f". Loudest of the run-up: {loudest:.3g} m/s² at {float(runup['speed'].values[worst]):,.0f} rpm"
-    return judge_noise(answer, sentence, _resonance(runup))
+    return judge_noise(answer, sentence, _resonance(runup), margins=margins)
+
+
+def _margins(results: Any) -> Iterator[LevelMargin]:
+    """Compare levels of operation and of the run-up with the limits of sensor and microphone."""
+    limits = results.case.housing
+    for stage in ("housing", "runup"):
+        if limits.level_limit and stage in results.stages:
+            speed, level = results[stage]["speed"].values, results[stage]["level"].values
+            over = np.maximum(level, np.finfo(float).tiny) / limit_at(limits.level_limit, speed)
+            yield margin_of_levels(speed, 20.0 * np.log10(over), "the sensor")
+    if limits.microphone.level_limit and "pressure_level" in results.housing:
+        speed, level = results.housing["speed"].values, results.housing["pressure_level"].values
+        yield margin_of_levels(speed, level - limit_at(limits.microphone.level_limit, speed), "the microphone")
 
 
 def _nearest_mode(results: Any, hertz: float) -> str:

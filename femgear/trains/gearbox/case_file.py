@@ -19,6 +19,7 @@ from pydantic import BeforeValidator, Field, StrictBool, WithJsonSchema, model_v
 from femgear.case import text as case_text
 from femgear.case.csv_columns import add_checksum, embed_profiles, embedded
 from femgear.case.flank_sections import Deviation
+from femgear.case.level_limits import LevelLimit
 from femgear.case.lubrication import LossesSection, LubricantSection
 from femgear.case.quantities import (
     ACCELERATION,
@@ -568,7 +569,7 @@ class BoxSensorSection(Section):
     On a rigid casing it is at a ``position`` in the coordinates of the case. On one from a file ``name`` is that of a
     node of the role sensor, whose row of the table of nodes has place and direction; a direction here goes before it.
     On the elastic ``ring`` of a stage it is at an ``angle`` from x on the outer surface, and feels along the radius
-    where no direction is given.
+    where no direction is given. ``level_limit`` is the largest acceleration allowed there.
     """
 
     name: Name
@@ -576,6 +577,7 @@ class BoxSensorSection(Section):
     angle: Angle | None = None
     position: Annotated[tuple[Along, ...], TRIPLE] | None = None
     direction: Annotated[SensorDirection, BeforeValidator(_axis_vector)] | None = None
+    level_limit: LevelLimit = ()
 
 
 class LoadCaseSection(Section):

@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from femgear.case.level_limits import limit_at
 from femgear.case.load_spectrum import required_life
 from femgear.report.tables import merged_names
 from femgear.stages.judgements import (
     Judgement,
     Least,
+    LevelMargin,
     judge_heat,
     judge_lives,
     judge_noise,
@@ -22,6 +24,7 @@ from femgear.stages.judgements import (
     least_over_life,
     lives_of_bearings,
     lives_of_teeth,
+    margin_of_levels,
     stresses_text,
 )
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
@@ -118,9 +121,21 @@ def _noise(results: Any) -> Judgement:
         sentence += (
             f". Loudest of the run-up: {_level(float(over[at]))} at {results.runup['speed'].values[at]:,.0f} rpm"
         )
-    return judge_noise(
-        answer, sentence, open_words="no limit is known: femgear compare sets two runs beside one another"
-    )
+    open_words = "give sensor.level_limit, or femgear compare sets two runs beside one another"
+    return judge_noise(answer, sentence, open_words=open_words, margins=tuple(_margins(results)))
+
+
+def _margins(results: Any) -> Iterator[LevelMargin]:
+    """Compare levels of operation and of the run-up with the limits of the sensors that have one."""
+    limits = {sensor.name: sensor.level_limit for sensor in results.case.sensor if sensor.level_limit}
+    for stage in ("dynamics", "runup"):
+        if stage not in results.stages or "level" not in results[stage]:
+            continue
+        speed, names = results[stage]["speed"].values, results[stage]["sensor"].values.tolist()
+        for name, points in limits.items():
+            level = results[stage]["level"].values[:, names.index(name)]
+            over = np.maximum(level, np.finfo(float).tiny) / limit_at(points, speed)
+            yield margin_of_levels(speed, 20.0 * np.log10(over), name)
 
 
 def _level(level: float) -> str:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from femgear.case.level_limits import limit_at
 from femgear.report.style import BLACK, COLOURS, DASHES, GREY, SMALL, label, legend_below, new_figure, rpm, stems
 from femgear.stages.protocol import Drawn, Figures
 from femgear.trains.gearbox.stage_figures import draw_stage_forces
@@ -54,7 +56,9 @@ def _mark_operation(ax, data: xr.Dataset, operation: float | None) -> None:
         ax.axvline(operation, color=BLACK, linewidth=1.2, linestyle=":", label="speed of the load case")
 
 
-def draw_run_up_levels(runup: xr.Dataset, operation: float | None = None) -> Figure:
+def draw_run_up_levels(
+    runup: xr.Dataset, operation: float | None = None, limits: Mapping[str, np.ndarray] | None = None
+) -> Figure:
     """Draw the level at every sensor over the speed, and the part of every stage in it, of runup.nc.
 
     Parameters
@@ -63,6 +67,8 @@ def draw_run_up_levels(runup: xr.Dataset, operation: float | None = None) -> Fig
         With the levels of sensors.
     operation : float, optional
         Speed of the load case [rpm].
+    limits : mapping of str to (speeds,) array, optional
+        Largest levels allowed at sensors [m/s^2].
     """
     chosen, words = _loudest(runup)
     speed, level, parts = (runup[name].values for name in ("speed", "level", "level_of_stage"))
@@ -73,12 +79,17 @@ def draw_run_up_levels(runup: xr.Dataset, operation: float | None = None) -> Fig
         for number, stage in enumerate(runup["stage"].values if several else ()):
             ax.plot(speed, parts[:, sensor, number], linewidth=1.4, label=str(stage), **_stage_style(number))
         _log_axis(ax, level[:, sensor], parts[:, sensor])
+        limit = (limits or {}).get(str(runup["sensor"].values[sensor]))
+        if limit is not None:
+            ax.plot(speed, limit, color=BLACK, linewidth=1.6, linestyle="--", label="limit")
+            low, high = ax.get_ylim()
+            ax.set_ylim(min(low, 0.7 * limit.min()), max(high, 1.5 * limit.max()))
         _mark_operation(ax, runup, operation)
         label(ax, y="level, r.m.s. [m/s²]", title=f"sensor {runup['sensor'].values[sensor]}")
     label(axes[-1], f"speed of {runup.attrs['reference']} [rpm]")
     if words:
         figure.suptitle(words, fontsize=SMALL)
-    legend_below(figure, axes[0])
+    legend_below(figure)
     return figure
 
 
@@ -159,7 +170,9 @@ def _operation(drawn: Drawn) -> float | None:
 
 def _draw_runup(drawn: Drawn) -> dict[str, Figure]:
     runup, operation = drawn.data["runup"], _operation(drawn)
-    levels = {"run_up_levels": draw_run_up_levels(runup, operation)} if "level" in runup else {}
+    speeds = runup["speed"].values
+    limits = {sensor.name: limit_at(sensor.level_limit, speeds) for sensor in drawn.case.sensor if sensor.level_limit}
+    levels = {"run_up_levels": draw_run_up_levels(runup, operation, limits)} if "level" in runup else {}
     by_stage = draw_stage_forces(runup)
     forces = {"run_up_forces": draw_run_up_forces(runup, operation)}
     return levels | forces | ({} if by_stage is None else {"stage_forces": by_stage})

@@ -9,10 +9,11 @@ import xarray as xr
 
 from femgear.stages.judgements import QUIET
 from femgear.trains.elastic.judgements import set_with_ring_judgements
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, with_values
 
 CASE = Path(__file__).parents[3] / "cases" / "planetary_27_40_108.toml"
 CARRIER = 2.0 * np.pi * 10.0
+CURVE = [{"speed": "2000 rpm", "level": "20 m/s^2"}, {"speed": "4000 rpm", "level": "4.5 m/s^2"}]
 
 
 @pytest.fixture
@@ -74,3 +75,28 @@ def test_a_resonance_that_makes_the_level_deserves_a_look(results):
     assert judged(results).limit == "mode 7 meets mesh harmonic 2 -1.6 % from 3,000 rpm"
     results.runup["distance"].values[1] = 12.0
     assert judged(results).state == "open"
+
+
+@pytest.mark.parametrize(
+    ("limit", "state", "words"),
+    [
+        ("10 m/s^2", "look", "mode 7 meets mesh harmonic 2"),
+        (
+            [{"speed": "2000 rpm", "level": "20 m/s^2"}, {"speed": "4000 rpm", "level": "4.5 m/s^2"}],
+            "bad",
+            "6.0 dB over",
+        ),
+    ],
+)
+def test_limits_of_the_sensor_hold_in_operation_and_run_up(results, limit, state, words):
+    results.case = with_values(results.case, {"housing.level_limit": limit})
+    noise = judged(results)
+    assert noise.state == state and noise.limit.startswith(words)
+    if state == "bad":
+        assert noise.limit.endswith("at the sensor, 4,000 rpm")
+
+
+def test_a_limit_of_the_microphone_holds_in_operation(results):
+    results.case = with_values(results.case, {"housing.microphone": {"level_limit": 60}})
+    results.housing["pressure_level"] = ("speed", [63.5])
+    assert judged(results).limit == "3.5 dB over the limit at the microphone, 3,000 rpm"

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from casings import answer_in_a_casing
 
+from femgear.case.level_limits import LevelPoint
 from femgear.stages.judgements import QUIET, SMOOTH, STRONG, SURE
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.mode_words import nearest_mode
@@ -53,6 +54,24 @@ def test_a_silent_gearbox_is_said_to_be_silent(results):
     silent.dynamics = _with(results.dynamics, level=levels)
     judged = {judgement.question: judgement for judgement in gearbox_judgements(silent)}
     assert judged[QUIET].answer.startswith("silence") and judged[QUIET].limit == "nothing excites it"
+
+
+def test_the_worst_sensor_is_judged_by_its_limit(results):
+    sensor = str(results.dynamics["sensor"].values[0])
+    level = results.dynamics["level"].values[:, 0]
+    limited = Files(**vars(results))
+    for factor, state in ((2.0, "good"), (0.5, "bad")):
+        highest = factor * max(float(level.max()), float(results.runup["level"].values[:, 0].max()))
+        limited.case = SimpleNamespace(
+            **{
+                entry: getattr(results.case, entry)
+                for entry in ("strength", "pair", "planetary", "operation", "losses")
+            },
+            sensor=(SimpleNamespace(name=sensor, level_limit=(LevelPoint(level=f"{highest:.17g} m/s^2"),)),),
+        )
+        noise = {judgement.question: judgement for judgement in gearbox_judgements(limited)}[QUIET]
+        assert noise.state == state
+        assert f"6.0 dB {'below' if state == 'good' else 'over'} the limit at {sensor}" in noise.limit
 
 
 def _with(data, **values):
