@@ -24,7 +24,9 @@ _HARMONICS = 8
 """Mesh orders that are drawn."""
 
 
-def explorer(runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None = None) -> dict[str, Any]:
+def explorer(
+    runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None = None, limit: np.ndarray | None = None
+) -> dict[str, Any]:
     """Collect what the browser shows of a run-up.
 
     Parameters
@@ -35,6 +37,8 @@ def explorer(runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None =
         Of modes.nc.
     pressure : (speed, order) complex array, optional
         Lines of the sound pressure at the microphone [Pa], peak values.
+    limit : (speed,) array, optional
+        Largest level allowed [m/s^2].
 
     Returns
     -------
@@ -61,6 +65,7 @@ def explorer(runup: xr.Dataset, modes: xr.Dataset, pressure: np.ndarray | None =
         "carrier": (np.abs(runup["carrier_speed"].values[speeds]) / (2 * np.pi)).tolist(),
         "mesh": runup["mesh_frequency"].values[speeds].tolist(),
         "level": runup["level"].values[speeds].tolist(),
+        **({} if limit is None else {"limit": np.asarray(limit)[speeds].tolist()}),
         "short": (np.abs(level_change_at(runup, runup["speed"].values[speeds])) >= NOTICEABLE).tolist(),
         "teeth": int(runup.attrs["ring_teeth"]),
         "harmonics": _HARMONICS,

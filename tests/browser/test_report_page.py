@@ -347,6 +347,43 @@ def test_one_switch_changes_the_levels_of_the_whole_run_up(opened):
     assert in_decibels == pytest.approx(wanted, abs=1e-6)
 
 
+def test_levels_of_a_band_and_with_weights(opened):
+    """Weights of IEC 61672-1, Table 3 [dB]; lines above the band are silent."""
+    tab = opened(DEMO)
+    tab.wait_for_function("() => document.querySelector('[data-part=cuts]').data")
+    weights = tab.evaluate("() => [100, 1000, 4000, 10000].map((one) => 20 * Math.log10(page.aWeight(one)))")
+    assert weights == pytest.approx([-19.1, 0.0, 1.0, -2.5], abs=0.06)
+    tab.select_option("[data-part=source]", "acceleration")
+    tab.select_option("[data-part=form]", label="m/s² r.m.s.")
+    level = "document.querySelector('[data-part=level]').data[0].y"
+    whole = tab.evaluate(level)
+    tab.select_option("[data-part=band]", label="to 5 kHz")
+    band = tab.evaluate(level)
+    powers = """() => { const { linesAt } = document.querySelector('.runup').explorer, last = whole.length - 1;
+        return Math.sqrt(linesAt(last, 'acceleration').filter((one) => one.hertz > 0 && one.hertz <= 5000)
+            .reduce((sum, one) => sum + 0.5 * one.size ** 2, 0)); }""".replace("whole.length", str(len(whole)))
+    assert band[-1] == pytest.approx(tab.evaluate(powers), rel=1e-9)
+    assert band[-1] < whole[-1] and max(a / b for a, b in zip(band, whole)) <= 1.0 + 1e-12
+    tab.check("[data-part=weighted]")
+    titles = tab.evaluate("document.querySelector('[data-part=level]').layout.yaxis.title.text")
+    assert titles.replace("<br>", " ") == "acceleration, r.m.s., A-weighted, to 5 kHz [m/s²]"
+    weighted = powers.replace("one.size **", "(page.aWeight(one.hertz) * one.size) **")
+    assert tab.evaluate(level)[-1] == pytest.approx(tab.evaluate(weighted), rel=1e-9)
+
+
+def test_cuts_of_the_orders_that_are_asked_for(opened):
+    tab = opened(DEMO)
+    tab.wait_for_function("() => document.querySelector('[data-part=cuts]').data")
+    first, second = tab.evaluate("page.data.runup.order.filter((one) => one > 0).slice(-2)")
+    tab.fill("[data-part=orders]", f"{second}, {first} 99999")
+    tab.press("[data-part=orders]", "Enter")
+    tab.wait_for_function("() => document.querySelector('[data-part=cuts]').data.length === 2")
+    names = tab.evaluate("document.querySelector('[data-part=cuts]').data.map((one) => one.name)")
+    assert [float(name.split(" = ")[0]) for name in names] == [first, second]
+    title = tab.evaluate("document.querySelector('[data-part=cuts]').layout.title.text")
+    assert "largest: 99999" in title.replace("<br>", " ")
+
+
 def test_speed_moves_all_pictures_and_the_sound(opened):
     tab = opened(DEMO)
     ids = ("campbell", "level", "spectrum", "lobes")

@@ -145,7 +145,7 @@ page.draw = (div) => {
   const seen = new Set(), traces = [], notes = [], narrow = width < 620;
   const layout = { height, width, margin: { l: gaps.left, r: gaps.right, t: gaps.top, b: gaps.bottom }, paper_bgcolor: "rgba(0,0,0,0)",
     plot_bgcolor: "rgba(0,0,0,0)", font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: narrow ? 11 : 13, color: page.style("--ink") },
-    hovermode: "closest", hoverlabel: { align: "left" }, dragmode: narrow ? false : "zoom",
+    hovermode: "closest", hoverlabel: { align: "left" }, modebar: { bgcolor: "rgba(0,0,0,0)", color: page.style("--soft"), activecolor: page.style("--ink") }, dragmode: narrow ? false : "zoom",
     legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom", x: 0, maxheight: 0.9 } };
   if (chart.title) layout.title = { text: title, x: 0.01, xref: "container", y: 1, yref: "container", yanchor: "top", pad: { t: 18 }, font: { size: 15 } };
   chart.panels.forEach((panel, i) => {

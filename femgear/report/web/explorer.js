@@ -1,6 +1,12 @@
 // A run-up to walk through: modes and mesh orders, level, spectrum, lobes and sound at one speed.
 "use strict";
 
+// amplitude of the A-weighting at a frequency over that at 1 kHz (IEC 61672-1)
+page.aWeight = (hertz) => {
+  const f = hertz * hertz, way = (g) => (12194 ** 2 * g * g) / ((g + 20.6 ** 2) * Math.sqrt((g + 107.7 ** 2) * (g + 737.9 ** 2)) * (g + 12194 ** 2));
+  return way(f) / way(1e6);
+};
+
 page.explorer = (root) => {
   const data = page.data[root.dataset.run], part = (name) => root.querySelector(`[data-part="${name}"]`);
   const count = data.order.length, unpack = ({ unit, values }) => {
@@ -19,17 +25,21 @@ page.explorer = (root) => {
       : { unit: "Pa", quantity: "sound pressure", reference: 0, integrated: 0, scale: 1, peak };
   };
   const detector = (sum) => (chosen().peak ? (sum ? "peak = √2 r.m.s." : "peak") : "r.m.s.");
-  const words = (sum) => `${chosen().quantity}, ${detector(sum)} [${chosen().unit}]`;
+  const filtered = () => (weighted.checked ? ", A-weighted" : "") + (Number.isFinite(Number(band.value)) ? `, to ${Number(band.value) / 1000} kHz` : "");
+  const words = (sum) => `${chosen().quantity}, ${detector(sum)}${filtered()} [${chosen().unit}]`;
   // the value shown of a line, and of the sum of the powers of several
   const shownOf = (found) => {
     const { reference, integrated, scale, peak } = chosen();
     const square = found.reduce((sum, one) => (one.hertz > 0 ? sum + 0.5 * (one.size / (2 * Math.PI * one.hertz) ** integrated) ** 2 : sum), 0);
     return reference ? 20 * Math.log10(Math.sqrt(square) / reference) : Math.sqrt(square * (peak ? 2 : 1)) * scale;
   };
-  const told = (value) => `${value.toPrecision(4)} ${chosen().unit}`;
+  const told = (value) => `${Number.isFinite(value) ? value.toPrecision(4) : "0"} ${chosen().unit}${weighted.checked ? ", A-weighted" : ""}`;
   forms.forEach((_, i) => part("form").add(new Option("", String(i))));
-  const slider = part("speed"), shown = part("value"), source = part("source"), play = part("play"), volume = part("volume");
+  const slider = part("speed"), shown = part("value"), source = part("source"), play = part("play"), volume = part("volume"), band = part("band"), weighted = part("weighted");
   slider.max = data.speed.length - 1;
+  const highest = Math.max(...data.order) * Math.max(...data.carrier);
+  band.add(new Option("all frequencies", "Infinity"));
+  [5, 10, 20].filter((one) => 1000 * one < highest).forEach((one) => band.add(new Option(`to ${one} kHz`, String(1000 * one))));
   Object.keys(lines).forEach((name) => source.add(new Option({ acceleration: "accelerometer", pressure: "microphone" }[name], name)));
   if (lines.pressure) source.value = "pressure";
   // runs of former versions do not tell
@@ -42,15 +52,26 @@ page.explorer = (root) => {
     const re = lines[name][2 * (i * count + k)], im = lines[name][2 * (i * count + k) + 1];
     return { order, re, im, size: Math.hypot(re, im), hertz: order * data.carrier[i] };
   });
-  const look = (title) => ({ paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 62, r: 14, t: 34, b: 50 }, height: 330, width: part("level").clientWidth,
-    font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: 12, color: page.style("--ink") }, showlegend: false, hovermode: "closest",
-    title: { text: page.wrapped(title, part("level").clientWidth - 76).text, x: 0, xref: "paper", font: { size: 13 } } });
+  // what levels are made of: lines of the band, weighted as asked for
+  const hear = (i, name) => {
+    const top = Number(band.value);
+    return at(i, name).map((one) => {
+      const share = one.hertz > top ? 0 : weighted.checked ? page.aWeight(one.hertz) : 1;
+      return { ...one, re: one.re * share, im: one.im * share, size: one.size * share };
+    });
+  };
+  const look = (title, foot = 50) => {
+    const heading = page.wrapped(title, part("level").clientWidth - 76);
+    return { paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", margin: { l: 62, r: 14, t: 22 + 16 * heading.lines, b: foot }, height: 330, width: part("level").clientWidth,
+      font: { family: "system-ui, Segoe UI, DejaVu Sans, sans-serif", size: 12, color: page.style("--ink") }, showlegend: false, hovermode: "closest",
+      title: { text: heading.text, x: 0, xref: "paper", y: 1, yref: "container", yanchor: "top", pad: { t: 2 + 8 * heading.lines }, font: { size: 13 } } };
+  };
   const axis = (title, more) => ({ title: { text: title }, gridcolor: page.style("--rule"), linecolor: page.style("--soft"), showline: true, zeroline: false,
     exponentformat: "power", automargin: true, ...(more.type === "log" ? { dtick: 1 } : { tickformat: ",~r" }), ...more });
   const quiet = { displaylogo: false, responsive: false, displayModeBar: false };
   const top = Math.max(...data.mesh) * (data.harmonics + 0.5), speeds = [data.speed[0], data.speed[data.speed.length - 1]];
 
-  const below = { showlegend: true, height: 390, legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom" }, margin: { l: 62, r: 14, t: 34, b: 110 } };
+  const below = { showlegend: true, height: 390, legend: { orientation: "h", yref: "container", y: 0, yanchor: "bottom" } };
   const campbell = () => {
     const first = new Set();
     const traces = data.modes.map(([number, hertz, kind, colour]) => {
@@ -72,7 +93,7 @@ page.explorer = (root) => {
         + (alone === undefined ? "" : `<br>alone ${alone.toPrecision(3)} m/s² r.m.s.`)),
       hovertemplate: "%{text}<extra></extra>" });
     traces.push({ x: [], y: [], mode: "markers", showlegend: false, marker: { size: 8, color: page.colour("#d55e00") }, hoverinfo: "skip" });
-    Plotly.react(part("campbell"), traces, { ...look("Modes, mesh orders and their resonances (circles, larger for a higher level of that mode alone)"), ...below,
+    Plotly.react(part("campbell"), traces, { ...look("Modes, mesh orders and their resonances (circles, larger for a higher level of that mode alone)", 110), ...below,
       xaxis: axis("speed [rpm]", { range: speeds }), yaxis: axis("frequency [Hz]", { range: [0, top] }) }, quiet);
   };
   // an axis of levels with its lower end, some decades or the same in decibels below the largest value
@@ -81,18 +102,27 @@ page.explorer = (root) => {
     : { low: largest * 10 ** -decades, axis: axis(lined(words(sum)), { type: "log", range: [Math.log10(largest) - decades, Math.log10(largest) + 0.3] }) };
   const lined = (text) => text.replace(" [", "<br>[");
   const finite = (values) => values.filter(Number.isFinite).reduce((a, b) => Math.max(a, b), -1e30);
+  // the limit of the whole acceleration in the unit chosen
+  const limited = () => {
+    const { integrated, reference, scale, peak } = chosen();
+    if (!data.limit || integrated || source.value !== "acceleration" || filtered()) return null;
+    return data.limit.map((one) => (reference ? 20 * Math.log10(one / reference) : one * scale * (peak ? Math.SQRT2 : 1)));
+  };
   const levels = () => {
-    const values = data.speed.map((_, i) => shownOf(at(i, source.value)));
-    const end = finite(values), deep = chosen().reference ? (end - Math.min(...values)) / 20 : Math.log10(end / Math.min(...values));
+    const values = data.speed.map((_, i) => shownOf(hear(i, source.value)));
+    const { reference } = chosen(), end = finite(values), least = Math.min(...values.filter((value) => Number.isFinite(value) && (reference || value > 0)));
+    const deep = reference ? (end - least) / 20 : Math.log10(end / least);
     // dotted where the excitation ends short, which joins what is on either side
     const curve = (dotted) => ({ x: data.speed, y: values.map((value, i) => (short(i) === dotted || (dotted && (short(i - 1) || short(i + 1))) ? value : null)), mode: "lines",
       line: { color: page.colour("#0072b2"), width: 1.8, dash: dotted ? "dot" : "solid" }, hovertemplate: `%{x:.5g} rpm: %{y:.4g}${dotted ? "<br>the excitation ends short" : ""}<extra></extra>` });
     const doubtful = data.speed.some((_, i) => short(i));
-    Plotly.react(part("level"), doubtful ? [curve(false), curve(true)] : [curve(false)],
-      { ...look(`Level over the speed${doubtful ? "; dotted: the excitation ends short (W-EXCITATION)" : ""}`), xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(end, deep + 0.2, true).axis }, quiet);
+    const traces = doubtful ? [curve(false), curve(true)] : [curve(false)], limit = limited();
+    if (limit) traces.push({ x: data.speed, y: limit, mode: "lines", line: { color: page.colour("#d55e00"), width: 1.6, dash: "dash" }, hovertemplate: "%{x:.5g} rpm: limit %{y:.4g}<extra></extra>" });
+    Plotly.react(part("level"), traces,
+      { ...look(`Level over the speed${limit ? "; dashed: limit" : ""}${doubtful ? "; dotted: the excitation ends short (W-EXCITATION)" : ""}`), xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(end, deep + 0.2, true).axis }, quiet);
   };
   const spectrum = () => {
-    const found = at(index, source.value), x = [], y = [], values = found.map((one) => shownOf([one])), { low, axis: upright } = scaled(finite(values), 4, false);
+    const found = hear(index, source.value), x = [], y = [], values = found.map((one) => shownOf([one])), { low, axis: upright } = scaled(finite(values), 4, false);
     found.forEach((one, k) => { x.push(one.hertz, one.hertz, null); y.push(low, Math.max(values[k], low), null); });
     const tips = found.map((one, k) => `order ${one.order}, ${one.hertz.toFixed(1)} Hz<br>${told(values[k])}`);
     const loud = found.filter((_, k) => values[k] > low);
@@ -100,26 +130,32 @@ page.explorer = (root) => {
       { x: found.map((one) => one.hertz), y: values.map((one) => Math.max(one, low)), mode: "markers", marker: { size: 4, color: page.colour("#0072b2") }, text: tips, hovertemplate: "%{text}<extra></extra>" }],
       { ...look("Lines at this speed"), xaxis: axis("frequency [Hz]", { range: [0, Math.max(...loud.map((one) => one.hertz)) * 1.03] }), yaxis: upright }, quiet);
   };
-  // the strongest orders around the strongest mesh harmonics, over the speed
+  // the orders asked for, else the strongest ones around the strongest mesh harmonics, over the speed
   const cuts = () => {
-    const all = data.speed.map((_, i) => at(i, source.value)), peak = data.order.map((_, k) => finite(all.map((one) => shownOf([one[k]])))), bands = new Map();
+    const all = data.speed.map((_, i) => hear(i, source.value)), peak = data.order.map((_, k) => finite(all.map((one) => shownOf([one[k]])))), strongest = new Map();
     data.order.map((_, k) => k).sort((a, b) => peak[b] - peak[a]).forEach((k) => {
       const h = Math.round(data.order[k] / data.teeth);
-      if (h > 0 && bands.size < 6 && !bands.has(h)) bands.set(h, k);
+      if (h > 0 && strongest.size < 6 && !strongest.has(h)) strongest.set(h, k);
     });
+    const wanted = part("orders").value.split(/[\s,;]+/).filter(Boolean).map(Number);
+    const place = (order) => data.order.findIndex((one) => Math.abs(one - order) < 0.005);
+    const lacking = wanted.filter((order) => place(order) < 0), asked = wanted.map(place).filter((k) => k >= 0).slice(0, 6);
+    const drawn = (asked.length ? asked : [...strongest.values()]).sort((a, b) => data.order[a] - data.order[b]);
     const colours = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
-    const traces = [...bands].sort((a, b) => a[0] - b[0]).map(([h, k], i) => {
-      const beside = data.order[k] - h * data.teeth, name = `${data.order[k]} = ${h}·${data.teeth}${beside ? (beside > 0 ? " + " : " − ") + Math.abs(beside) : ""}`;
+    const traces = drawn.map((k, i) => {
+      const order = data.order[k], h = Math.round(order / data.teeth), beside = Number((order - h * data.teeth).toPrecision(6));
+      const name = h ? `${order} = ${h}·${data.teeth}${beside ? (beside > 0 ? " + " : " − ") + Math.abs(beside) : ""}` : String(order);
       return { x: data.speed, y: all.map((one) => shownOf([one[k]])), name, mode: "lines", line: { color: page.colour(colours[i]), width: 1.6 }, hovertemplate: `order ${name}<br>%{x:.5g} rpm: %{y:.4g}<extra></extra>` };
     });
-    Plotly.react(part("cuts"), traces, { ...look("Order cuts"), ...below,
-      xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(finite([...bands.values()].map((k) => peak[k])), 4, false).axis }, quiet);
+    const title = lacking.length ? `Order cuts; not among the ${count} largest: ${page.clear(lacking.slice(0, 6).join(", "))}` : "Order cuts";
+    Plotly.react(part("cuts"), traces, { ...look(title, 110), ...below,
+      xaxis: axis("speed [rpm]", { range: speeds }), yaxis: scaled(finite(drawn.map((k) => peak[k])), 4, false).axis }, quiet);
   };
   const waterfall = () => {
     const columns = 300, end = Math.max(...data.mesh) * (data.harmonics + 0.5), { reference, unit } = chosen();
     const rows = data.speed.map((_, i) => {
       const found = Array.from({ length: columns }, () => []);
-      at(i, source.value).forEach((one) => { if (one.hertz < end) found[Math.floor((one.hertz / end) * columns)].push(one); });
+      hear(i, source.value).forEach((one) => { if (one.hertz < end) found[Math.floor((one.hertz / end) * columns)].push(one); });
       return found.map((some) => (reference ? shownOf(some) : Math.log10(shownOf(some))));
     });
     const top = finite(rows.map(finite)), deep = reference ? 80 : 4, z = rows.map((row) => row.map((one) => Math.max(one, top - deep)));
@@ -153,7 +189,7 @@ page.explorer = (root) => {
   const lobes = () => {
     const { reference, integrated, scale, peak } = chosen(), to = (one) => (reference ? 1 : scale * (peak ? 1 : Math.SQRT1_2)) / (one.hertz > 0 ? (2 * Math.PI * one.hertz) ** integrated : 1);
     const value = (r) => told(reference ? 20 * Math.log10((r * Math.SQRT1_2) / reference) : r);
-    const found = at(index, source.value).map((one) => ({ ...one, re: one.re * to(one), im: one.im * to(one), size: one.size * to(one) })), bands = new Map();
+    const found = hear(index, source.value).map((one) => ({ ...one, re: one.re * to(one), im: one.im * to(one), size: one.size * to(one) })), bands = new Map();
     found.forEach((one) => { const h = Math.round(one.order / data.teeth); bands.set(h, Math.max(bands.get(h) || 0, one.size)); });
     const harmonic = [...bands].sort((a, b) => b[1] - a[1])[0][0], own = found.filter((one) => Math.round(one.order / data.teeth) === harmonic);
     const angle = Array.from({ length: 361 }, (_, i) => (2 * Math.PI * i) / 360);
@@ -230,7 +266,7 @@ page.explorer = (root) => {
   const walk = () => {
     index = Number(slider.value);
     const mesh = data.mesh[index];
-    shown.value = `${data.speed[index].toPrecision(6)} rpm, mesh ${mesh.toPrecision(5)} Hz, ${told(shownOf(at(index, source.value)))} ${detector(false)}${short(index) ? ": the excitation ends short (W-EXCITATION)" : ""}`;
+    shown.value = `${data.speed[index].toPrecision(6)} rpm, mesh ${mesh.toPrecision(5)} Hz, ${told(shownOf(hear(index, source.value)))} ${detector(false)}${short(index) ? ": the excitation ends short (W-EXCITATION)" : ""}`;
     slider.setAttribute("aria-valuetext", shown.value);
     const cursor = [{ type: "line", x0: data.speed[index], x1: data.speed[index], yref: "paper", y0: 0, y1: 1, line: { color: page.colour("#d55e00"), width: 1.5 } }];
     const campbellDiv = part("campbell");
@@ -254,12 +290,12 @@ page.explorer = (root) => {
   const all = () => { campbell(); over(); };
   slider.addEventListener("input", walk);
   source.addEventListener("change", over);
-  part("form").addEventListener("change", over);
+  [part("form"), band, weighted, part("orders")].forEach((one) => one.addEventListener("change", over));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => setTimeout(all));
   let width = 0;
   new ResizeObserver(() => { if (Math.abs(root.clientWidth - width) > 4) { width = root.clientWidth; all(); } }).observe(root);
   addEventListener("beforeprint", all);
   addEventListener("afterprint", () => setTimeout(all));
-  root.explorer = { turns, linesAt: at, shownOf, words, scaleOf };
+  root.explorer = { turns, linesAt: at, hear, shownOf, words, scaleOf };
 };
 page.parts.push(() => document.querySelectorAll(".runup").forEach(page.explorer));

@@ -525,15 +525,19 @@ def _write_explorer(drawn: Drawn, folder: Path) -> list[str]:
     """What the page walks through of the run-up."""
     runup, housing = drawn.data["runup"], drawn.data.get("housing")
     pressure = None if housing is None else run_up_lines(runup, housing.attrs)[1]
-    content = explorer(runup, drawn.data["modes"], pressure)
+    content = explorer(runup, drawn.data["modes"], pressure, _level_limit(drawn))
     write_text(json.dumps(content, allow_nan=False, separators=(",", ":")), folder / EXPLORER)
     return [EXPLORER]
 
 
 def _runup_figures(drawn: Drawn) -> Drawings:
-    runup, points = drawn.data["runup"], drawn.case.housing.level_limit
-    limit = limit_at(points, runup["speed"].values) if points else None
-    return runup_figures(runup, drawn.data["modes"], limit)
+    return runup_figures(drawn.data["runup"], drawn.data["modes"], _level_limit(drawn))
+
+
+def _level_limit(drawn: Drawn) -> np.ndarray | None:
+    """Largest level (speeds,) allowed at the sensor over the run-up [m/s^2]; None without a limit."""
+    points = drawn.case.housing.level_limit
+    return limit_at(points, drawn.data["runup"]["speed"].values) if points else None
 
 
 def _housing_figures(drawn: Drawn) -> Drawings:
