@@ -40,7 +40,7 @@ def test_the_page_names_the_variables_of_a_unit():
     patterns = [name.replace("...", ".*") for row in rows for name in re.findall(r"`([\w.]+)`", row)]
     for variable in unit_variables(chain_model()):
         assert any(re.fullmatch(pattern, variable.name) for pattern in patterns), variable.name
-    assert f"by default {TOLERANCE:g}".replace("e-0", "e-") in TEXT and f"by default they have {HARMONICS}." in TEXT
+    assert f"by default {TOLERANCE:g}".replace("e-0", "e-") in TEXT and f"the default is {HARMONICS}." in TEXT
 
 
 def test_the_page_names_all_endings():
