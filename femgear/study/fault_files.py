@@ -19,6 +19,7 @@ from femgear.report.tables import Block
 from femgear.stages.protocol import Progress, silent
 from femgear.storage.contents import Contents
 from femgear.storage.files import own_files, read_dataset, resumable, write_csv, write_dataset, write_text
+from femgear.study.fault_limits import fault_limits_into
 from femgear.study.fault_records import (
     KEPT_LINES,
     FaultPlan,
@@ -30,8 +31,9 @@ from femgear.study.fault_records import (
 from femgear.study.fault_request import FaultRequest, FurtherRecords
 from femgear.study.fault_sizes import KINDS
 from femgear.study.runner import Runner
+from femgear.study.samples import checked
 
-_LABELS = "labels.csv"
+_LABELS, _MOST_SIZES = "labels.csv", 100
 _PATTERNS = (_LABELS, "machine_*.nc", "record_*")
 _HEADER = ("record", "file", "machine", "kind", "gear", "planet", "tooth", "flank", "size [m]", "torque [N m]")
 _HEADER += ("speed [rpm]", "level [m/s^2]", "error")
@@ -56,6 +58,9 @@ def fault_records_into(
     progress("what machines share", 0.0, 1.0)
     plan = fault_plan(case, request, tolerances, cache=cache)
     progress("what machines share", 1.0, 1.0)
+    if further.limits is not None:
+        checked(further.limits, "--limits", 1, _MOST_SIZES)
+        return fault_limits_into(plan, folder, further.limits, progress=progress, runner=runner)
     own_files(folder, _PATTERNS)
     if further.index is not None:
         return [], _write_alone(plan, folder, further.index, further)

@@ -64,8 +64,12 @@ class FurtherRecords:
         A table of time and acceleration of every record.
     index
         Compute this record alone: record_INDEX.nc, the same to the last bit, and its case record_INDEX.toml.
+    limits
+        In place of records: from which size on faults stand out of healthy sets, by so many sizes of every kind;
+        limits.csv and limits.png.
     """
 
     wav: bool = False
     csv: bool = False
     index: int | None = None
+    limits: int | None = None

@@ -93,14 +93,14 @@ def test_records_of_another_request_are_refused(case, folder):
 
 
 def test_records_that_cannot_be_computed_are_told(case, tmp_path, monkeypatch):
-    solved = fault_records._solved
+    solved = fault_records.solved_lines
 
     def opened(plan, drawn):
         if drawn is plan.case:
             return solved(plan, drawn)
         raise ContactError("planet 1 carries nothing", code="E-CONTACT-OPEN")
 
-    monkeypatch.setattr(fault_records, "_solved", opened)
+    monkeypatch.setattr(fault_records, "solved_lines", opened)
     (block,), _ = write(case, tmp_path, count=1)
     assert "1 records cannot be computed: [E-CONTACT-OPEN]" in block.notes[1]
     assert np.isnan(read_dataset(tmp_path / "machine_00000.nc")["signal"].values).all()
