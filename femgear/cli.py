@@ -512,6 +512,7 @@ def cad(
         Replace the file.
     """
     from femgear.exchange.cad import placed_gears, write_cad
+    from femgear.stages.tooth_faults import undrawn_faults
     from femgear.trains.reading import read_case
     from femgear.trains.registry import train_of
 
@@ -521,6 +522,8 @@ def cad(
     output = output or Path(f"{case.stem}.step")
     _need_new([output], force=force)
     write_cad(gears, output, _say)
+    for text in undrawn_faults(data) if hasattr(data, "gear_names") else ():
+        _say(f"not drawn: {text}")
     _say(f"written: {output}")
     return 0
 

@@ -52,8 +52,47 @@ def _outline(occ, gear, turn, height):
     return joined
 
 
+def _sector(occ, gear, number, reach, turn, height):
+    """Add the curves of what is cut off a tooth: its sector from the radius that it reaches to beyond its tip."""
+    half, radius = np.pi / float(gear["teeth"]), np.hypot(*np.asarray(gear["flank"]).T)
+    beyond = (
+        min(radius.min(), reach) - 0.1 * np.ptp(radius) if gear["internal"] else radius.max() + 0.1 * np.ptp(radius)
+    )
+    centre, middle = occ.addPoint(0.0, 0.0, height), turn + 2.0 * half * number
+    corners = [
+        [
+            occ.addPoint(r * np.cos(middle + side * half), r * np.sin(middle + side * half), height)
+            for side in (-1.0, 1.0)
+        ]
+        for r in (reach, beyond)
+    ]
+    (a, b), (c, d) = corners
+    return [
+        occ.addCircleArc(a, centre, b),
+        occ.addLine(b, d),
+        occ.addCircleArc(d, centre, c),
+        occ.addLine(c, a),
+    ]
+
+
 def _body(occ, gear):
     """Add one gear with its first end at z = 0; returns the tag of its volume."""
+    tag, width, twist = _whole_body(occ, gear), float(gear["width"]), float(gear["twist"])
+    for number, reach in gear["short"]:
+        if twist == 0.0:
+            face = occ.addPlaneSurface([occ.addCurveLoop(_sector(occ, gear, number, reach, 0.0, 0.0))])
+            cut = next(tag_ for dim, tag_ in occ.extrude([(2, face)], 0.0, 0.0, width) if dim == 3)
+        else:
+            count = max(SECTIONS, 1 + int(np.ceil(abs(twist) / STEP)))
+            shares = np.linspace(0.0, 1.0, count)
+            wires = [occ.addWire(_sector(occ, gear, number, reach, twist * s, width * s)) for s in shares]
+            cut = next(tag_ for dim, tag_ in occ.addThruSections(wires, makeSolid=True) if dim == 3)
+        tag = occ.cut([(3, tag)], [(3, cut)])[0][0][1]
+    return tag
+
+
+def _whole_body(occ, gear):
+    """Add one gear with all its teeth as `_body`."""
     width, rim, internal, twist = float(gear["width"]), float(gear["rim"]), bool(gear["internal"]), float(gear["twist"])
     if twist == 0.0:
         teeth = occ.addCurveLoop(_outline(occ, gear, 0.0, 0.0))
@@ -77,7 +116,7 @@ def write_solids(gmsh, job, path):
     for kind, x, y, z, angle in places:
         kind = int(kind)
         if kind not in made:
-            names = ("teeth", "flank", "fillet", "root", "width", "rim", "internal", "twist")
+            names = ("teeth", "flank", "fillet", "root", "width", "rim", "internal", "twist", "short")
             made[kind] = _body(occ, {name: job[f"{name}_{kind}"] for name in names})
         tag = occ.copy([(3, made[kind])])[0][1]
         occ.rotate([(3, tag)], 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, angle)

@@ -20,6 +20,7 @@ import numpy as np
 from femgear.errors import CaseError, StorageError, nvh_library
 from femgear.fe.meshing import gmsh_missing
 from femgear.gears.gear import Gear
+from femgear.gears.short_teeth import ShortTeeth
 from femgear.gears.tooth import half_sector
 from femgear.storage.files import storage_errors, write_text
 
@@ -31,6 +32,8 @@ TIME_LIMIT = 3600.0
 """Longest time of the process that makes the solids [s]."""
 FORMATS = (".step", ".stp", ".dxf")
 """Ends of the names of the files that can be written."""
+_AT_REACH = 1e-6
+"""Share of a radius within which points lie on it."""
 _FLANK = 12
 """Edges of a flank: splines through their points miss the area of the gear by 2e-7."""
 
@@ -52,6 +55,8 @@ class PlacedGear:
         By which its teeth turn from the first to the second end [rad].
     angle : float
         Of a tooth at the first end [rad].
+    short : tuple of (int, float)
+        Teeth that are missing or short, counter-clockwise from that one, and the radii that they reach [m].
     """
 
     name: str
@@ -60,6 +65,7 @@ class PlacedGear:
     ends: tuple[float, float]
     twist: float = 0.0
     angle: float = 0.0
+    short: ShortTeeth = ()
 
 
 def placed_gears(bodies: Iterable[SpaceBody]) -> tuple[PlacedGear, ...]:
@@ -71,7 +77,7 @@ def placed_gears(bodies: Iterable[SpaceBody]) -> tuple[PlacedGear, ...]:
         E-TEETH: none has teeth.
     """
     gears = tuple(
-        PlacedGear(body.name, body.gear, body.axis, body.ends, body.twist, body.angle)
+        PlacedGear(body.name, body.gear, body.axis, body.ends, body.twist, body.angle, body.short)
         for body in bodies
         if body.gear is not None
     )
@@ -91,6 +97,31 @@ def half_curves(gear: Gear) -> dict[str, np.ndarray]:
             angle = np.arctan2(points[[0, -1], 1], points[[0, -1], 0])
             half[name] = points if angle[0] < angle[1] else points[::-1]
     return half
+
+
+def short_curves(half: dict[str, np.ndarray], reach: float, *, internal: bool) -> dict[str, np.ndarray]:
+    """Cut the curves (k, 2) of half a tooth off at the radius that it reaches [m], where an arc is its tip.
+
+    Flank and fillet keep what lies on the side of the root, with a point at that radius; of a missing tooth nothing.
+    """
+    curves = {name: half[name] for name in ("root",) if name in half}
+    ends = []
+    for name in ("flank", "fillet"):
+        points, radius = half[name], np.hypot(*half[name].T)
+        inside = radius > reach * (1.0 + _AT_REACH) if internal else radius < reach * (1.0 - _AT_REACH)
+        cut = points[inside]
+        if inside.any() and not inside.all():
+            last = int(np.flatnonzero(inside[:-1] != inside[1:])[0])
+            share = (reach - radius[last]) / (radius[last + 1] - radius[last])
+            between = points[last] + share * (points[last + 1] - points[last])
+            between = between * (reach / np.hypot(*between))
+            cut = np.vstack([between, cut]) if inside[-1] else np.vstack([cut, between])
+            ends.append(between)
+        curves[name] = cut
+    # of a missing tooth the arc spans the whole sector, from the middle of one gap to that of the next
+    last = half["root" if "root" in half else "fillet"][-1]
+    end = ends[0] if ends else last * (reach / np.hypot(*last))
+    return curves | {"tip": np.array([end, end])}
 
 
 def gear_area(gear: Gear) -> float:
@@ -121,12 +152,12 @@ def write_step(gears: Sequence[PlacedGear], path: Path) -> tuple[float, ...]:
     StorageError
         E-CAD: OpenCASCADE makes no solid of these gears.
     """
-    kinds: dict[tuple[Any, float, float], int] = {}
+    kinds: dict[tuple[Any, float, float, ShortTeeth], int] = {}
     job: dict[str, Any] = {}
     places = []
     for placed in gears:
         width = placed.ends[1] - placed.ends[0]
-        kind = kinds.setdefault((placed.gear, width, placed.twist), len(kinds))
+        kind = kinds.setdefault((placed.gear, width, placed.twist, placed.short), len(kinds))
         places.append([kind, *(1e3 * value for value in (*placed.axis, placed.ends[0])), placed.angle])
         if f"teeth_{kind}" not in job:
             curves = half_curves(placed.gear)
@@ -139,6 +170,7 @@ def write_step(gears: Sequence[PlacedGear], path: Path) -> tuple[float, ...]:
                 "rim": 1e3 * placed.gear.rim_radius,
                 "internal": placed.gear.internal,
                 "twist": placed.twist,
+                "short": np.array([(number, 1e3 * radius) for number, radius in placed.short]).reshape(-1, 2),
             }
             job |= {f"{name}_{kind}": value for name, value in of_kind.items()}
     job |= {"places": np.array(places), "time_limit": TIME_LIMIT, "names": np.array([placed.name for placed in gears])}
@@ -188,14 +220,17 @@ def write_dxf(gears: Sequence[PlacedGear], path: Path) -> None:
             c, s = math.cos(angle), math.sin(angle)
             return [tuple(point) for point in 1e3 * points @ np.array([[c, s], [-s, c]]) + centre]
 
+        reached = dict(placed.short)
         for number in range(gear.teeth):
             angle = middle + 2.0 * math.pi * number / gear.teeth
+            curves = half if number not in reached else short_curves(half, reached[number], internal=gear.internal)
             for side in (1.0, -1.0):
                 for name in ("flank", "fillet"):
-                    space.add_spline(turned(half[name] * [1.0, side], angle), dxfattribs=look)
+                    if len(curves[name]) > 1:
+                        space.add_spline(turned(curves[name] * [1.0, side], angle), dxfattribs=look)
             for name, at in (("tip", angle), ("root", angle + math.pi / gear.teeth)):
-                if name in half:
-                    end = half[name][-1 if name == "tip" else 0]
+                if name in curves:
+                    end = curves[name][-1 if name == "tip" else 0]
                     reach = abs(math.atan2(end[1], end[0]) - (0.0 if name == "tip" else math.pi / gear.teeth))
                     ends = math.degrees(at - reach), math.degrees(at + reach)
                     space.add_arc(tuple(centre), 1e3 * float(np.hypot(*end)), *ends, dxfattribs=look)

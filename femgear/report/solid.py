@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from femgear.fe.elasticity import Material
     from femgear.gears.gear import Gear
     from femgear.gears.planetary import PlanetarySet
+    from femgear.gears.short_teeth import ShortTeeth
 
 SOLID = "solid.json"
 """File of what the page turns in space."""
@@ -45,6 +46,7 @@ def solid(
     *,
     helix_angle: float = 0.0,
     backwards: bool = False,
+    short: Mapping[str, ShortTeeth] | None = None,
 ) -> dict[str, Any]:
     """Collect what the browser draws of a set in space.
 
@@ -64,6 +66,8 @@ def solid(
         On the reference cylinders [rad], positive where the sun is right-handed.
     backwards : bool
         The right flanks of the sun carry: contact runs along the other lines of action.
+    short : mapping, optional
+        Teeth that are missing or short by the names of the bodies, as their sectors are counted.
 
     Returns
     -------
@@ -85,6 +89,7 @@ def solid(
                 "angle": float(body.angle),
                 "displacement": packed_values(1e6 * moved[:, sector.nodes]),
                 "stress": packed_values(1e-6 * stress[:, sector.nodes]),
+                "short": [[number, 1e3 * radius] for number, radius in (short or {}).get(body.name, ())],
             }
         )
     gears = {gear.name: gear for gear in planetary_set.gears}
@@ -141,6 +146,7 @@ class _Sector:
             "count": gear.teeth,
             "width": 1e3 * gear.face_width,
             "twist": gear.face_width * slope,
+            "internal": gear.internal,
             "points": [round(1e3 * float(x), 4) for x in self.points.ravel()],
             "triangles": self.triangles.ravel().tolist(),
             "edges": self.edges.ravel().tolist(),

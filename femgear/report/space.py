@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from femgear.gears.gear import Gear
+from femgear.gears.short_teeth import ShortTeeth
 from femgear.gears.tooth import half_sector
 from femgear.report.solid import packed_values
 
@@ -60,6 +61,8 @@ class SpaceBody:
         By how much it turns about its own axis, over what turns fastest or the first body; 0 of what stands.
     orbit : (float, float, float), optional
         x and y [m] of the axis that its own one runs around, and turns of that.
+    short : tuple of (int, float)
+        Teeth that are missing or short, counter-clockwise from the first one, and the radii that they reach [m].
     """
 
     name: str
@@ -77,6 +80,7 @@ class SpaceBody:
     gear: Gear | None = None
     turns: float = 0.0
     orbit: tuple[float, float, float] | None = None
+    short: ShortTeeth = ()
 
 
 @dataclass(frozen=True)
@@ -173,5 +177,7 @@ def _body(body: SpaceBody) -> dict[str, Any]:
         data["orbit"] = [*_lengths(body.orbit[:2]), round(body.orbit[2], 9)]
     if body.section is not None:
         data |= {"section": _lengths(body.section), "teeth": body.teeth, "internal": body.internal}
+        if body.short:
+            data["short"] = [[number, round(1e3 * radius, _DIGITS)] for number, radius in body.short]
         data |= {"twist": round(body.twist, 6), "angle": round(math.remainder(body.angle, 2.0 * math.pi), 6)}
     return data

@@ -5,15 +5,18 @@ from __future__ import annotations
 import cmath
 import json
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from femgear.case.gear_set import planetary_set
+from femgear.case.gear_set import planetary_set, set_deviations
+from femgear.gears.faults import ToothFault
+from femgear.gears.kinematics import orientations
 from femgear.gears.pair import GearSet
 from femgear.gears.profile import base_helix_angle
+from femgear.gears.short_teeth import renumbered, short_teeth
 from femgear.report.solid import SOLID
 from femgear.report.space import SPACE, Motion, SpaceBody, space, tooth_section
 from femgear.stages.protocol import Drawn
@@ -66,7 +69,24 @@ def gear_turns(gears: GearSet) -> tuple[float, ...]:
     return tuple(turns)
 
 
-def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
+def teeth_zero(gears: GearSet) -> tuple[tuple[int, ...], ...]:
+    """Number the tooth that counts as zero from the drawn one that `tooth_angles` tells, of every gear and copy.
+
+    At the position at which tooth zero of the first gear stands on the x axis.
+    """
+    first, start = gears.gears[0], orientations(gears).gears[0][0]
+    turned = orientations(gears, -start / (gears.senses[0] * first.pitch_angle))
+    parts = zip(gears.gears, turned.gears, tooth_angles(gears), strict=True)
+    return tuple(
+        tuple(
+            round((angle - drawn) / gear.pitch_angle) % gear.teeth
+            for angle, drawn in zip(of_gear, of_drawing, strict=True)
+        )
+        for gear, of_gear, of_drawing in parts
+    )
+
+
+def gear_bodies(gears: GearSet, base_helix: float, faults: Iterable[ToothFault] = ()) -> Iterator[SpaceBody]:
     """List the gears of a pair or a set, their axes along z.
 
     Parameters
@@ -75,7 +95,11 @@ def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
         In their transverse section.
     base_helix : float
         Base helix angle of the first gear [rad], positive of a right-handed one.
+    faults : iterable of ToothFault
+        Of which teeth that are missing or short are drawn so.
     """
+    short = short_teeth(faults, gears)
+    zero = teeth_zero(gears) if short else ()
     hands, angles, turns = gear_hands(gears), tooth_angles(gears), gear_turns(gears)
     for number, gear in enumerate(gears.gears):
         section, half = tooth_section(gear), 0.5 * gear.face_width
@@ -83,7 +107,7 @@ def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
         words = gear.name.replace("_", " ")
         for copy, (centre, angle) in enumerate(zip(gears.centres[number], angles[number], strict=True), start=1):
             name = f"{words} {copy}" if gears.repeated[number] else words
-            radii = gear.rim_radius, gear.tip_radius
+            radii, body = (gear.rim_radius, gear.tip_radius), (number, copy - 1)
             yield SpaceBody(
                 name,
                 "gear",
@@ -99,12 +123,14 @@ def gear_bodies(gears: GearSet, base_helix: float) -> Iterator[SpaceBody]:
                 stage=number,
                 gear=gear,
                 turns=turns[number],
+                short=renumbered(short[body], -zero[number][copy - 1], gear.teeth) if body in short else (),
             )
 
 
 def case_bodies(case: Any) -> Iterator[SpaceBody]:
     """List the gears of the case of a pair or a set."""
-    return gear_bodies(planetary_set(case), base_helix_angle(case.pressure_angle, case.helix_angle or 0.0))
+    base = base_helix_angle(case.pressure_angle, case.helix_angle or 0.0)
+    return gear_bodies(planetary_set(case), base, set_deviations(case).faults)
 
 
 def write_gears_in_space(drawn: Drawn, folder: Path) -> list[str]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +29,7 @@ from femgear.gears.deviations import SetDeviations, loaded_flanks
 from femgear.gears.gear import Gear
 from femgear.gears.modifications import form_deviation
 from femgear.gears.pair import GearSet
+from femgear.gears.short_teeth import ShortTeeth, renumbered, short_teeth, without_tips
 from femgear.report.scene import View, assemble_set, deformed_picture, placed, whole_field, write_vtu
 from femgear.report.solid import SOLID, solid
 from femgear.report.style import (
@@ -685,10 +687,14 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     bodies, deformed = [], deformed_set(loaded, sectors, cycle)
     if backwards:
         deformed = [_reflected(body, of_kind[body.kind], order) for body in deformed]
+    short = _short_sectors(static, case, loaded, [body.name for body in deformed])
     for body in deformed:
         sector = of_kind[body.kind]
         count = sector.gear.teeth
         numbers, whole = copy_nodes(sector.grid, count), rotated_copies(sector.grid, count)
+        whole = replace(
+            whole, points=without_tips(whole.points, short.get(body.name, ()), count, internal=sector.gear.internal)
+        )
         moved = whole_field(np.asarray(body.displacement), numbers)
         bodies.append(placed(whole, name=body.name, centre=body.centre, angle=body.angle, displacement=moved))
     grid = assemble_set(bodies)
@@ -705,7 +711,7 @@ def _write_deformed_set(drawn: Drawn, folder: Path) -> list[str]:
     if not gears.members:
         return ["deformed_set.vtu", "deformed_set.png"]
     grids = {kind: sector.grid for kind, sector in of_kind.items()}
-    look: Any = {"helix_angle": case.helix_angle or 0.0, "backwards": backwards}
+    look: Any = {"helix_angle": case.helix_angle or 0.0, "backwards": backwards, "short": short}
     materials = dict(zip(grids, materials_of(case), strict=True))
     model = solid(gears, grids, deformed, materials, drawn.data.get("modes"), **look)
     write_text(json.dumps(model, allow_nan=False, separators=(",", ":")), folder / SOLID)
@@ -720,6 +726,21 @@ def _mesh_views(gears: GearSet) -> list[View]:
         at = gears.centres[gears.mates[kind][0]][0] + radius * along
         views.append(View(f"mesh {gears.mesh_names[rows.start]}", (at.real, at.imag), half))
     return views
+
+
+def _short_sectors(static: StaticResult, case: Case, loaded: GearSet, names: list[str]) -> dict[str, ShortTeeth]:
+    """Find the teeth that are missing or short by the names of the drawn bodies, as their sectors are counted.
+
+    Those of a mirror image that is seen from behind are counted the other way round.
+    """
+    deviations = loaded_image(static.planetary_set, static.sun_torque, set_deviations(case))[2]
+    found_teeth = short_teeth(() if deviations is None else deviations.faults, loaded)
+    sense, short = 1 if static.sun_torque >= 0 else -1, {}
+    for name, body in zip(names, loaded.bodies, strict=True):
+        teeth = found_teeth.get((body.gear, body.copy), ())
+        numbers = tuple((sense * number, radius) for number, radius in teeth)
+        short[name] = renumbered(numbers, 0, loaded.gears[body.gear].teeth)
+    return short
 
 
 def _left_flanks_loaded(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -120,7 +121,15 @@ def describe_faults(case: Any, mesh_frequency: float | None) -> Iterator[Block]:
             f"{often[gears.gears[item[1].gear].name]:.4f}" if often and item[1].tooth is not None else "-"
         ),
     }
-    yield tabulate("Faults of teeth", faults, columns)
+    notes = tuple(f"{text}: drawings have the tooth whole" for text in undrawn_faults(case))
+    yield replace(tabulate("Faults of teeth", faults, columns), notes=notes)
+
+
+def undrawn_faults(case: Any) -> Iterator[str]:
+    """Name the faults of a case that no drawing shows: all but teeth that are missing or broken off at their tips."""
+    for key, fault in keyed_faults(case, planetary_set(case)):
+        if not isinstance(fault, MissingTooth | BrokenTip):
+            yield f"{key} ({type(fault).__name__.lower()})"
 
 
 def archard_wear(

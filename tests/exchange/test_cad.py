@@ -15,7 +15,7 @@ from femgear.exchange import cad
 from femgear.exchange.cad import PlacedGear, gear_area, half_curves, placed_gears, write_cad, write_dxf, write_step
 from femgear.stages.gears_in_space import case_bodies
 from femgear.trains.gearbox.solid_bodies import gearbox_bodies
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, to_toml, with_values
 
 CASES = Path(__file__).parents[2] / "cases"
 READ = """import gmsh, sys
@@ -128,3 +128,62 @@ def test_what_opencascade_refuses_is_told_and_leaves_no_file(tmp_path, monkeypat
     with pytest.raises(StorageError) as refused:
         write_step([PlacedGear("a", gear, (0.0, 0.0), (0.0, 0.01))], tmp_path / "a.step")
     assert refused.value.code == "E-CAD" and not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("twist", [0.0, 0.2])
+def test_a_missing_tooth_is_gone_from_the_solid(tmp_path, twist):
+    gear = planetary_set(read_case(CASES / "planetary_27_40_108.toml")).sun
+    width = (0.0, gear.face_width)
+    placed = PlacedGear("sun", gear, (0.0, 0.0), width, twist=twist, short=((3, gear.root_radius),))
+    (volume,) = write_step([placed], tmp_path / "sun.step")
+    # of its sector a part of the annulus from bore to root is left
+    sector = (gear_area(gear) - np.pi * (gear.root_radius**2 - gear.rim_radius**2)) / gear.teeth
+    exact = (gear_area(gear) - sector) * gear.face_width
+    assert volume == pytest.approx(exact, rel=1e-6 if twist == 0.0 else 1e-4)
+    if twist == 0.0:
+        _, centres = read_back(tmp_path / "sun.step")
+        away = np.arctan2(*centres[0, 1::-1]) - 2.0 * np.pi * 3 / gear.teeth
+        assert np.cos(away) == pytest.approx(-1.0, abs=1e-6)
+
+
+def test_a_broken_tip_is_cut_off_the_ring(tmp_path):
+    gear = planetary_set(read_case(CASES / "planetary_27_40_108.toml")).ring
+    reach = gear.tip_radius + 0.4e-3
+    whole, short = (
+        write_step([PlacedGear("ring", gear, (0.0, 0.0), (0.0, 0.01), short=teeth)], tmp_path / f"{len(teeth)}.step")
+        for teeth in ((), ((5, reach),))
+    )
+    curves = half_curves(gear)
+    x, y = curves["flank"].T
+    radius = np.linspace(gear.tip_radius, reach, 200)
+    by_radius = np.argsort(np.hypot(x, y))
+    half = np.interp(radius, np.hypot(x, y)[by_radius], np.abs(np.arctan2(y, x))[by_radius])
+    # area between the tip and the radius that is left, of both halves
+    missing = 2.0 * np.trapezoid(radius * half, radius) * 0.01
+    assert whole[0] - short[0] == pytest.approx(missing, rel=1e-3)
+
+
+def test_short_teeth_have_short_outlines(tmp_path):
+    ezdxf = pytest.importorskip("ezdxf")
+    gears = planetary_set(read_case(CASES / "planetary_27_40_108.toml"))
+    sun, reach = gears.sun, gears.sun.tip_radius - 0.5e-3
+    placed = PlacedGear("sun", sun, (0.0, 0.0), (0.0, 0.01), short=((0, reach), (5, sun.root_radius)))
+    write_dxf([placed], tmp_path / "sun.dxf")
+    space = ezdxf.readfile(tmp_path / "sun.dxf").modelspace()
+    radii = np.array([arc.dxf.radius for arc in space.query("ARC")])
+    assert np.isclose(radii, 1e3 * sun.tip_radius, rtol=1e-9).sum() == sun.teeth - 2
+    assert np.isclose(radii, 1e3 * reach, rtol=1e-9).sum() == 1
+    whole = sun.teeth * 4
+    assert len(space.query("SPLINE")) == whole - 4
+    ends = [np.hypot(*np.array(spline.fit_points)[:, :2].T).max() for spline in space.query("SPLINE")]
+    assert np.isclose(ends, 1e3 * reach, rtol=1e-9).sum() == 2
+
+
+def test_what_is_not_drawn_is_told(tmp_path, capsys):
+    case = read_case(CASES / "planetary_27_40_108.toml")
+    wear = {"kind": "wear", "tooth": 3, "flank": "left", "depth": "5 um"}
+    faulty = with_values(case, {"sun.fault": [{"kind": "missing", "tooth": 3}, wear]})
+    (tmp_path / "case.toml").write_text(to_toml(faulty), encoding="utf-8")
+    assert main(["cad", str(tmp_path / "case.toml"), "-o", str(tmp_path / "case.dxf")]) == 0
+    told = capsys.readouterr()
+    assert "not drawn: sun.fault[1] (wear)" in told.out + told.err

@@ -10,9 +10,11 @@ import xarray as xr
 from matplotlib.path import Path as Outline
 
 from femgear.case.gear_set import planetary_set
+from femgear.contact.flank_pairs import tooth_numbers
+from femgear.gears.faults import MissingTooth
 from femgear.report.solid import SOLID
 from femgear.report.space import SPACE
-from femgear.stages.gears_in_space import gear_bodies, gear_hands, tooth_angles, write_gears_in_space
+from femgear.stages.gears_in_space import gear_bodies, gear_hands, teeth_zero, tooth_angles, write_gears_in_space
 from femgear.stages.protocol import Drawn
 from femgear.trains.reading import read_case
 
@@ -71,3 +73,30 @@ def test_modes_are_those_of_the_file_and_rigid_ones_are_left_out(tmp_path):
 def test_what_is_drawn_with_its_static_state_is_not_drawn_twice(tmp_path):
     (tmp_path / SOLID).touch()
     assert write_gears_in_space(Drawn(read_case(CASES / "spur_pair.toml"), {}), tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ("planetary_27_40_108", "spur_pair", "helical_30_20_70"))
+def test_drawn_teeth_have_the_numbers_that_mesh(name):
+    gears = planetary_set(read_case(CASES / f"{name}.toml"))
+    angles, zero = tooth_angles(gears), teeth_zero(gears)
+    first, second = tooth_numbers(gears, np.zeros((len(gears.meshes), 1), int))
+    for mesh, pair in zip(gears.meshes, np.hstack([first, second]), strict=True):
+        turned = []
+        for place, (body, tooth) in enumerate(zip(mesh.bodies, pair.tolist(), strict=True)):
+            number, copy = gears.bodies[body].gear, gears.bodies[body].copy
+            gear = gears.gears[number]
+            at = angles[number][copy] + (tooth + zero[number][copy]) * gear.pitch_angle
+            opposite = place == 1 and not gear.internal
+            away = np.angle(np.exp(1j * (at - mesh.angle - (np.pi if opposite else 0.0))))
+            turned.append(gears.senses[number] * away / gear.pitch_angle)
+        # the pair that touches at the pitch point at some position is as far from there on both gears
+        assert turned[0] == pytest.approx(turned[1], abs=0.75)
+
+
+def test_short_teeth_are_drawn_in_their_places():
+    gears = planetary_set(read_case(CASES / "planetary_27_40_108.toml"))
+    bodies = {body.name: body for body in gear_bodies(gears, 0.0, [MissingTooth(1, 1, 7, None)])}
+    (short,) = bodies["planet 2"].short
+    assert short == ((7 + teeth_zero(gears)[1][1]) % 40, gears.planet.root_radius)
+    assert not bodies["planet 1"].short
+    assert not bodies["sun"].short

@@ -16,7 +16,14 @@ from femgear.gears.gear import Gear
 from femgear.gears.kinematics import speeds
 from femgear.gears.planetary import close_set, equal_planet_angles
 from femgear.stages.static import solve_static
-from femgear.stages.tooth_faults import archard_wear, describe_faults, fault_findings, fault_frequencies, sun_fault_step
+from femgear.stages.tooth_faults import (
+    archard_wear,
+    describe_faults,
+    fault_findings,
+    fault_frequencies,
+    sun_fault_step,
+    undrawn_faults,
+)
 from femgear.trains.gearbox_of_case import gearbox_of_case
 from femgear.trains.reading import parse_case, read_case, with_values
 from femgear.trains.registry import train_of
@@ -137,3 +144,10 @@ def test_a_pair_with_a_fault_is_told_to_become_a_gearbox_for_its_vibration():
     pair = with_values(read_case(CASES / "spur_pair.toml"), {"gear_2.fault": [crack]})
     said = [str(finding) for finding in train_of(pair).warnings(pair)]
     assert any("span 36 mesh periods" in text and "femgear gearbox CASE" in text for text in said)
+
+
+def test_faults_that_drawings_do_not_show_are_named(healthy):
+    case = with_values(healthy, {"sun.fault": [{"kind": "missing", "tooth": 3}, WEAR | {"tooth": 9, "flank": "left"}]})
+    assert list(undrawn_faults(case)) == ["sun.fault[1] (wear)"]
+    (block,) = describe_faults(case, None)
+    assert block.notes == ("sun.fault[1] (wear): drawings have the tooth whole",)

@@ -19,10 +19,11 @@ page.solid = () => {
     const layers = Math.max(1, Math.ceil(Math.abs(twist) / LAYER)), wall = [...new Set(sector.edges)], rank = new Map(wall.map((i, k) => [i, k]));
     const faces = 2 * each * count, across = wall.length * count, size = faces + (layers + 1) * across;
     const rest = new Float32Array(2 * size), moved = new Float32Array(2 * size), position = new Float32Array(3 * size);
-    const node = new Int32Array(size), index = [];
+    const node = new Int32Array(size), index = [], reach = new Map(body.short || []);
     const place = (to, k, i, share) => {
       const turn = (2 * Math.PI * k) / count + body.angle + share * twist, c = Math.cos(turn), s = Math.sin(turn), at = 2 * (k * each + i);
-      const x = sector.points[2 * i], y = sector.points[2 * i + 1];
+      const factor = page.shortened(sector.points[2 * i], sector.points[2 * i + 1], reach.get(k), sector.internal);
+      const x = factor * sector.points[2 * i], y = factor * sector.points[2 * i + 1];
       rest[2 * to] = body.centre[0] + c * x - s * y;
       rest[2 * to + 1] = body.centre[1] + s * x + c * y;
       moved[2 * to] = c * field[at] - s * field[at + 1];

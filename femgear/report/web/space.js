@@ -24,12 +24,15 @@ page.space = () => {
   // outline in layers from the first to the second end: outer or toothed wall, inner wall, and both faces
   const AROUND = 40;
   const ring = (radius, count) => Array.from({ length: count }, (_, i) => [Math.cos((2 * Math.PI * i) / count) * radius, Math.sin((2 * Math.PI * i) / count) * radius]);
-  const toothed = ({ section, teeth }) => {
-    const points = [];
+  const toothed = ({ section, teeth, short, internal }) => {
+    const points = [], reach = new Map(short || []);
     for (let k = 0; k < teeth; k++) {
       const c = Math.cos((2 * Math.PI * k) / teeth), s = Math.sin((2 * Math.PI * k) / teeth);
       // the last point of a sector is the first one of the next
-      for (let i = 0; i < section.length - 2; i += 2) points.push([c * section[i] - s * section[i + 1], s * section[i] + c * section[i + 1]]);
+      for (let i = 0; i < section.length - 2; i += 2) {
+        const factor = page.shortened(section[i], section[i + 1], reach.get(k), internal);
+        points.push([factor * (c * section[i] - s * section[i + 1]), factor * (s * section[i] + c * section[i + 1])]);
+      }
     }
     return points;
   };

@@ -8,6 +8,11 @@ page.tint = (share) => {
   return page.HEAT[i].map((low, k) => (low + (at - i) * (page.HEAT[i + 1][k] - low)) / 255);
 };
 page.linear = (v) => (v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4);
+// what pulls a point of a sector to the radius that a short tooth reaches; 1 of a whole one
+page.shortened = (x, y, reach, internal) => {
+  const radius = Math.hypot(x, y);
+  return reach !== undefined && (internal ? radius < reach : radius > reach) ? reach / radius : 1;
+};
 page.unpack = ({ unit, values }) => {
   const bytes = Uint8Array.from(atob(values), (letter) => letter.charCodeAt(0));
   return Float32Array.from(new Int16Array(bytes.buffer), (whole) => whole * unit);
