@@ -140,7 +140,8 @@ class Bench:
         dict
             ``stage``, ``number`` of its result, ``same``, whether that is there already, ``seconds`` that it took,
             ``charts`` and ``captions`` by name, ``names`` of all that it has, None where that is not known,
-            ``sentence`` and ``judgements`` of page one as far as they are known, and ``findings``.
+            ``sentence`` and ``judgements`` of page one as far as they are known, None where others follow one that is
+            the ``same``, and ``findings``.
 
         Raises
         ------
@@ -158,7 +159,7 @@ class Bench:
         taken = {name for stage in wanted for name in stage.before(case)}
         # first what others go on from, then the quickest
         seconds = {stage.name: 0.0 if stage.name in taken else self._seconds.get(stage.name, 1.0) for stage in wanted}
-        for stage in sorted(wanted, key=lambda stage: seconds[stage.name]):
+        for stage in (ordered := sorted(wanted, key=lambda stage: seconds[stage.name])):
             self._go_on()
             start = time.perf_counter()
             computed[stage.name] = answer[stage.name]
@@ -166,7 +167,9 @@ class Bench:
             number = self._number(stage.name, computed[stage.name])
             same = seen.get(stage.name) == number
             drawings = self._drawings(train, stage, results, computed, () if same else shown)
-            sentence, judgements = train.summary(results)
+            # what is there already is judged once, with the last stage
+            told = not same or stage is ordered[-1]
+            sentence, judgements = train.summary(results) if told else (None, ())
             self._seconds[stage.name] = max(self._seconds.get(stage.name, 0.0), time.perf_counter() - start)
             yield {
                 "stage": stage.name,

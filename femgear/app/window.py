@@ -526,10 +526,9 @@ class Window:
 
     def _show_part(self, part: dict[str, Any]) -> None:
         """Show what became known with a stage."""
-        messages: list[dict[str, Any]] = [
-            {"what": "judge", "sentence": part["sentence"], "judgements": part["judgements"]}
-        ]
-        messages.append({"what": "fresh", "stage": part["stage"]})
+        messages: list[dict[str, Any]] = [{"what": "fresh", "stage": part["stage"]}]
+        if part["sentence"] is not None:
+            messages.append({"what": "judge", "sentence": part["sentence"], "judgements": part["judgements"]})
         if part["charts"]:
             given = {name: part[name] for name in ("stage", "charts", "captions")}
             messages.append({"what": "draw"} | given)

@@ -238,31 +238,36 @@ class Steps:
     """Results of steps that several cases share: the latest few of each, by the entries they depend on."""
 
     def __init__(self):
-        self._found: dict[str, OrderedDict[str, Any]] = {}
+        self._found: dict[str, OrderedDict[str, tuple[Any, float]]] = {}
 
     def kept(self, step: str, entries: Entries) -> Any:
         """Give the result of a step for these entries, all that decide it; None where it is not kept."""
         key, results = fingerprint(entries), self._found.setdefault(step, OrderedDict())
-        if key in results:
-            results.move_to_end(key)
-        return results.get(key)
+        if key not in results:
+            return None
+        results.move_to_end(key)
+        return results[key][0]
 
     def keep(self, step: str, entries: Entries, result: Result) -> Result:
         """Keep the result of a step for these entries, and return it."""
         key, results = fingerprint(entries), self._found.setdefault(step, OrderedDict())
-        results[key] = result
+        # a result that is kept again has its size still
+        size = results[key][1] if key in results and results[key][0] is result else _size(result)
+        results[key] = result, size
         results.move_to_end(key)
-        while len(results) > 1 and (len(results) > _KEPT or sum(map(_size, results.values())) > _ROOM):
+        while len(results) > 1 and (len(results) > _KEPT or sum(size for _, size in results.values()) > _ROOM):
             results.popitem(last=False)
         return result
 
 
 def _size(result: object) -> float:
     """Memory of the arrays of a result [bytes], roughly."""
-    if is_dataclass(result):
-        return sum(_size(value) for value in vars(result).values())
+    if isinstance(result, float | int | str):  # most of what long tuples hold
+        return 0
     if isinstance(result, tuple | list):
         return sum(map(_size, result))
+    if is_dataclass(result):
+        return sum(_size(value) for value in vars(result).values())
     return getattr(result, "nbytes", 0)
 
 

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from femgear.errors import CaseError
 from femgear.findings import once
+from femgear.remembered import remembered
 from femgear.report.style import Drawings
-from femgear.stages.protocol import Drawn, Train
+from femgear.stages.protocol import Drawn, Stage, Train
 from femgear.storage.contents import as_dataset
 from femgear.storage.results import Manifest, Results
 from femgear.trains.reading import read_case
@@ -21,9 +22,14 @@ from femgear.trains.registry import train_of
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
     from matplotlib.figure import Figure
 
+    from femgear.findings import Finding
     from femgear.stages.judgements import Judgement
+
+_STORED = 8
+"""Stages whose contents are kept: those of one run, which are asked for after each of them."""
 
 
 class Shown(Mapping[str, Any]):
@@ -99,15 +105,24 @@ def results_in_memory(case: Any, computed: Mapping[str, Any], folder: Path = Pat
         Where they would be.
     """
     train = train_of(case)
-    contents = {name: as_dataset(result.contents()) for name, result in computed.items()}
-    findings = {"": train.case_warnings(case)}
-    for name, data in contents.items():
-        stage = train.stage(name)
-        if stage is not None:
-            findings[name] = stage.findings(data)
-    everything = once(finding for of_stage in findings.values() for finding in of_stage)
+    stored = {name: _stored(train.stage(name), result) for name, result in computed.items()}
+    contents = {name: data for name, (data, _) in stored.items()}
+    everything = once([*_case_findings(case), *(finding for _, findings in stored.values() for finding in findings)])
     manifest = Manifest(complete=True, files={f"{name}.nc": "" for name in contents}, findings=everything)
     return Results(folder, manifest, read_case).with_known({"case": case} | contents)
+
+
+@remembered(latest=_STORED)
+def _stored(stage: Stage | None, result: Any) -> tuple[xr.Dataset, tuple[Finding, ...]]:
+    """Contents of the file of a stage, and what they say against themselves."""
+    data = as_dataset(result.contents())
+    return data, () if stage is None else stage.findings(data)
+
+
+@remembered(latest=1)
+def _case_findings(case: Any) -> tuple[Finding, ...]:
+    """What a case says against itself."""
+    return tuple(train_of(case).case_warnings(case))
 
 
 def _as_results(source: Any) -> tuple[Results, Mapping[str, Any]]:
