@@ -154,3 +154,15 @@ def test_sounds_keep_the_scale_of_the_first_one(answered):
 def test_what_is_refused_is_refused(bench):
     with pytest.raises(CaseError):
         next(bench.answer(TEXT.replace("teeth = 20", "teeth = 2"), "a.toml", [], ["static"]))
+
+
+def test_what_is_the_same_is_judged_once_with_the_last_stage(answered):
+    bench, looked, _ = answered
+    stages = [stage["name"] for stage in looked["stages"]]
+    parts = list(bench.answer(TEXT, "a.toml", [], stages))
+    seen = {part["stage"]: part["number"] for part in parts}
+    again = list(bench.answer(TEXT, "a.toml", [], stages, seen))
+    assert all(part["same"] for part in again) and len(again) == len(parts) > 1
+    assert [part["sentence"] for part in again[:-1]] == [None] * (len(again) - 1)
+    assert again[-1]["sentence"] == parts[-1]["sentence"] and again[-1]["judgements"] == parts[-1]["judgements"]
+    assert all(part["sentence"] is not None for part in parts)
