@@ -168,8 +168,8 @@ class Bench:
             same = seen.get(stage.name) == number
             drawings = self._drawings(train, stage, results, computed, () if same else shown)
             # what is there already is judged once, with the last stage
-            told = not same or stage is ordered[-1]
-            sentence, judgements = train.summary(results) if told else (None, ())
+            judged = not same or stage is ordered[-1]
+            sentence, judgements = train.summary(results) if judged else (None, ())
             self._seconds[stage.name] = max(self._seconds.get(stage.name, 0.0), time.perf_counter() - start)
             yield {
                 "stage": stage.name,
