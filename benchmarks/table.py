@@ -14,8 +14,8 @@ Time and peak memory of every stage of the reference case (`cases/planetary_27_4
 thread. Times are medians. Where there is a second core, stages and run-ups share contact in slices, compliances
 and speeds between two processes. Rows that count the processor's time have one process.
 
-* *Ratio*: seconds depend on the machine and its load, so this column divides them by those of a fixed piece of work
-  in the same run. That work factors a Laplacian of 160 x 160 points with SciPy's `splu` and solves for
+* *Ratio*: seconds depend on the machine and its load, so this column divides them by those of fixed work in the
+  same run. That work factors a Laplacian of 160 x 160 points with SciPy's `splu` and solves for
   8 right-hand sides ({baseline:.1f} ms here).
 * *Peak*: the resident memory of a fresh process at its highest during the stage. *Added*: how much of it came with the
   stage. Both contain the libraries that the stage loads.
@@ -31,8 +31,8 @@ MISSED = """## What misses its limit, and what was tried
 
 * **Static and modal stage in 25 slices**. Condensing the waves across the width once for both stages, and gear by gear
   for variants, halved the time. Panel sizes of SuperLU, and 3 to 16 positions at once, brought nothing. Nor did sharing
-  positions between two processes (3.06 s either way): 281 positions come in six walks, each as short as a copy of the
-  process.
+  positions between two processes (3.06 s either way): 281 positions come in six walks, each as short as copying
+  the process.
 * **Five planets in 25 slices** take 1.9 times as long as six at 16 positions, 1.8 times at 64; the aim is 1.3. Solving
   each state once brought 7.2 to 1.9, gathering single rows of the compliance 8.0 to 6.2 ms a step. With more positions
   a fifth of them is a larger batch. Ten meshes are one system of some 450 loaded slices, six planets in phase one
