@@ -158,7 +158,11 @@ def box_entries(stage: str, case: ReadCase) -> Entries:
     """List the entries of a gearbox that decide a stage, which goes on from the deflection alone."""
     kept = {"modes.damping_ratio"} if stage in ("dynamics", "runup", "balance", "transient") else frozenset()
     rubbing = _rubbing_entries(case) if stage in ("modes", "dynamics", "runup", "balance") else {}
-    return {**_entries(case, {"format", "title"} | _OIL | _BESIDE[stage], kept=kept), **rubbing}
+    entries = dict(_entries(case, {"format", "title"} | _OIL | _BESIDE[stage], kept=kept))
+    # limits are compared with what sensors hear
+    sensors: Any = entries["sensor"]
+    entries["sensor"] = tuple({key: sensor[key] for key in sensor if key != "level_limit"} for sensor in sensors)
+    return {**entries, **rubbing}
 
 
 def load_case_entries(case: ReadCase, load_case: BaseModel) -> Entries:

@@ -4,6 +4,7 @@ import pytest
 from case.test_sections import CASES
 
 from femgear.case.dependencies import (
+    box_entries,
     compliance_entries,
     dynamic_entries,
     fingerprint,
@@ -42,3 +43,11 @@ def test_the_edition_of_the_standard_decides_nominal_stresses_alone(case):
     other = with_value(case, "strength.edition", 2006)
     assert stress_entries(other) != stress_entries(case)
     assert static_entries(other) == static_entries(case) and modal_entries(other) == modal_entries(case)
+
+
+@pytest.mark.parametrize("stage", ["modes", "dynamics", "runup"])
+def test_a_limit_of_a_sensor_computes_nothing_again(stage):
+    plain = read_case(CASES / "five_megawatt_chain.toml")
+    limited = with_value(plain, "sensor[0].level_limit", "30 m/s^2")
+    assert box_entries(stage, limited) == box_entries(stage, plain)
+    assert box_entries(stage, with_value(plain, "gravity", {"direction": [1.0, 0.0, 0.0]})) != box_entries(stage, plain)
