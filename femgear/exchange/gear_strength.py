@@ -6,7 +6,7 @@ estimated as through hardened alloy steel of the hardness that goes with that st
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -33,6 +33,7 @@ TREATMENTS = {
 """Treatments by the values of ``heat_treated_material_type_iso_6336_2006`` and ``_2019``."""
 _TREATED = "heat_treated_material_type_iso_6336_2019", "heat_treated_material_type_iso_6336_2006"
 _HARDNESS = {"HV": "surface_hardness_vickers", "HBW": "surface_hardness_brinell"}
+_CLASS = "global_tolerance_class_iso_1328_2013"
 _FACTORS = "application_factor_iso_6336_2019", "application_factor_iso_6336_2006"
 _ESTIMATED = "through hardened alloy steel"
 _STRENGTH = 1e6 * np.array(
@@ -65,6 +66,27 @@ def treatment_of(model: Model, material: Component) -> dict[str, Any]:
         model.remark("material.hardness", f"{material} has {what}: {limit}", remedy="give treatment and hardness")
         return {}
     return {"treatment": treatment, "hardness": hardness}
+
+
+def written_treatment(material: Any, tell: Callable[[str], None]) -> dict[str, tuple[str, str]]:
+    """Write treatment and hardness of a material as attributes of REXS, and tell what it has no form for."""
+    if material.treatment is None:
+        return {}
+    kind = next((kind for kind, treatment in TREATMENTS.items() if treatment == material.treatment), None)
+    if kind is None:
+        tell(f"REXS has no {material.treatment}: left out, the limits of now come back")
+        return {}
+    if material.grade != "MQ":
+        tell(f"REXS has no grade of a material: {material.grade} comes back as MQ, with the limits that it has now")
+    unit = GEAR_STEELS[material.treatment].hardness
+    return {_TREATED[0]: (kind, "none"), _HARDNESS[unit]: (f"{material.hardness:.15g}", "none")}
+
+
+def written_strength(strength: Any) -> tuple[dict[str, tuple[str, str]], dict[str, tuple[str, str]]]:
+    """Write the tolerance class of gears and the application factor of meshes as attributes of REXS."""
+    of_gears = {} if strength.quality is None else {_CLASS: (str(strength.quality), "none")}
+    factor = strength.application_factor
+    return of_gears, {} if factor == 1.0 else {_FACTORS[0]: (f"{factor:.15g}", "none")}
 
 
 def estimated_treatment(model: Model, gear: str, part: Component, material: Component) -> dict[str, Any]:
@@ -123,7 +145,7 @@ def strength_table(model: Model, stages: Sequence[Component], gears: Sequence[Co
     Notes tell which of them the file has not.
     """
     factors = [factor for stage in stages for name in _FACTORS if (factor := model.number(stage, name)) is not None]
-    classes = [text for gear in gears if (text := model.text(gear, "global_tolerance_class_iso_1328_2013"))]
+    classes = [text for gear in gears if (text := model.text(gear, _CLASS))]
     quality = [int(text) for text in classes if text.isdigit()]
     table, missing = dict[str, Any](), list[str]()
     for key, values, usual in (

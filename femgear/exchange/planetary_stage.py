@@ -37,7 +37,7 @@ from femgear.case.quantities import (
 from femgear.case.sections import gear_material
 from femgear.errors import CaseError, FemgearError
 from femgear.exchange.flank_modifications import Flank, flank_modifications, written_modifications
-from femgear.exchange.gear_strength import add_treatments, strength_table
+from femgear.exchange.gear_strength import add_treatments, strength_table, written_strength, written_treatment
 from femgear.exchange.gear_unit import gears_of, loads_on, stage_components, unit_flow, with_load_case
 from femgear.exchange.rexs import Component, Model, Relation
 from femgear.exchange.unit_spectrum import load_case_shares, load_duration, spectrum_tables, tell_life_left_out
@@ -862,6 +862,7 @@ def add_planets(
                 "cylindrical_stage",
                 center_distance=a(gears.centre_distance, "mm"),
                 rotating_angle_around_neg_u_axis=a(direction % math.tau, "deg"),
+                **written_strength(case.strength)[1],
             )
             w.relate("assembly", assembly=stage, part=mesh)
             w.relate("stage", stage=mesh, gear_1=pair[0], gear_2=pair[1])
@@ -891,6 +892,7 @@ def add_gear(
         root_diameter=a(section.root_diameter, "mm"),
         u_coordinate_on_shaft=a(place, "mm"),
         inner_diameter=None if internal else rim,
+        **written_strength(case.strength)[0],
     )
     parts = [id]
     if internal and shaft is None:
@@ -913,6 +915,7 @@ def add_gear(
         poisson_ratio=a(material.poisson_ratio),
         endurance_limit_root=a(material.root_stress_limit, "N / mm^2"),
         endurance_limit_flank=a(material.contact_stress_limit, "N / mm^2"),
+        **written_treatment(material, lambda text: model.remark(f"{gear.name}.material.grade", text)),
     )
     w.relate("reference", origin=id, referenced=made)
     cutter = getattr(section, "cutter_teeth", None)

@@ -14,6 +14,7 @@ from femgear.case.gear_set import planetary_set
 from femgear.case.load_spectrum import running_shares
 from femgear.case.quantities import SPEED
 from femgear.errors import CaseError
+from femgear.exchange.gear_strength import written_strength
 from femgear.exchange.planetary_stage import ModelWriter, add_gear, add_planets, rexs_attribute
 from femgear.exchange.rexs import Model
 from femgear.exchange.unit_spectrum import load_duration, tell_life_left_out
@@ -268,7 +269,8 @@ class _UnitWriter:
                 key=f"{key}.teeth",
                 remedy="give the stage the tables of its teeth",
             )
-        return self.teeth[stage.name]
+        # teeth of a gearbox are rated as the gearbox says
+        return self.teeth[stage.name].model_copy(update={"strength": self.case.strength})
 
     def pair(self, stage: Any, key: str) -> None:
         """Add two gears and the stage that they make."""
@@ -290,6 +292,7 @@ class _UnitWriter:
             stage.name,
             center_distance=rexs_attribute(gears.centre_distance, "mm"),
             rotating_angle_around_neg_u_axis=rexs_attribute(angle % math.tau, "deg"),
+            **written_strength(self.case.strength)[1],
         )
         self.w.relate("assembly", assembly=self.unit, part=id)
         self.w.relate("stage", stage=id, gear_1=ids[0], gear_2=ids[1])

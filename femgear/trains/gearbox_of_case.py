@@ -15,6 +15,7 @@ from typing import Any
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set, support_stiffness
 from femgear.case.planetary import output_member
+from femgear.case.quantities import RPM
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.profile import base_helix_angle
@@ -81,13 +82,8 @@ def gearbox_of_case(case: Any) -> WrittenAsGearbox:
     for name, member in zip(_MACHINES, (driven, taking), strict=True):
         if (machine := getattr(case, name)) is not None:
             _add_machine(tables, name, member, machine)
-    speeds = case.operation.speeds or (0.0,)
     driver, output = (name if getattr(case, name) else at for name, at in zip(_MACHINES, (driven, taking), strict=True))
-    speed = {driven: quantity(speeds[0], "rad/s")}
-    tables["operation"] = {
-        "output": [output],
-        "load_case": [{"torque": {driver: quantity(case.operation.torque, "N m")}, "speed": speed}],
-    }
+    tables["operation"] = {"output": [output]} | _load_cases(case.operation, driver, driven)
     tables["modes"] = {"damping_ratio": case.dynamics.damping_ratio}
     up_to = case.dynamics.up_to
     dynamics = {"mesh_harmonics": _mesh_harmonics(case), "up_to": None if up_to is None else quantity(up_to, "Hz")}
@@ -120,6 +116,41 @@ def _ends(case: Any) -> tuple[str, str]:
     if case.train == "pair":
         return "gear 1", "gear 2"
     return case.operation.input, output_member(case)
+
+
+def _load_cases(operation: Any, driver: str, driven: str) -> dict[str, Any]:
+    """Torques at the driver and speeds of the driven shaft: those of the operation, or of its load spectrum."""
+
+    def loaded(torque: float, speed: float) -> dict[str, Any]:
+        return {"torque": {driver: quantity(torque, "N m")}, "speed": {driven: quantity(speed, "rad/s")}}
+
+    if not operation.load_case:
+        return {"load_case": [loaded(operation.torque, (operation.speeds or (0.0,))[0])]}
+    load_cases = [
+        {"name": _load_case_name(number, one)}
+        | loaded(one.torque, one.speed)
+        | ({"share": one.share} if one.hours is None else {"hours": one.hours})
+        for number, one in enumerate(operation.load_case)
+    ]
+    hours = {} if operation.required_hours is None else {"required_hours": operation.required_hours}
+    return {"load_case": load_cases, "first": 1 + _nearest_load_case(operation)} | hours
+
+
+def _load_case_name(number: int, load_case: Any) -> str:
+    """Write a name that a gearbox takes: letters, digits and blanks, its number in front where that changes it."""
+    given = load_case.name or ""
+    name = _NO_NAME.sub(" ", given).strip()
+    return name if name and name == given and len(name) <= 40 else f"{number + 1} {name}".strip()[:40]
+
+
+def _nearest_load_case(operation: Any) -> int:
+    """Number of the load case whose torque is nearest to that of the operation, of equal ones that with its speed."""
+    speed = (operation.speeds or (0.0,))[0]
+
+    def away(load_case: Any) -> tuple[float, float]:
+        return abs(load_case.torque - operation.torque), abs(load_case.speed - speed)
+
+    return min(range(len(operation.load_case)), key=lambda number: away(operation.load_case[number]))
 
 
 def _mesh_harmonics(case: Any) -> int | None:
@@ -292,9 +323,19 @@ def _left_out(case: Any, given: Mapping[str, Any]) -> Iterator[Finding]:
         **{f"planar.{key}": key in planar for key in ("branch", "response", "published")},
         "planet.bearing_clearance": bool(given.get("planet", {}).get("bearing_clearance")),
     }
+    if case.operation.load_case:
+        first = case.operation.load_case[_nearest_load_case(case.operation)]
+        if (first.torque, first.speed) != (case.operation.torque, (case.operation.speeds or (0.0,))[0]):
+            text = (
+                "torque and speed of the operation are no load case: contact, modes and pictures are those of "
+                f"{first.torque:g} N m at {first.speed / RPM:.5g} rpm"
+            )
+            yield Finding("W-UNUSED", "operation.torque", text, remedy="choose another one by operation.first")
     for key, there in entries.items():
         if there:
             text = f"{key} has no place in a gearbox of one stage"
             if key == "operation.speeds":
                 text = "of operation.speeds the first one is that of the load case"
+                if case.operation.load_case:
+                    text = "operation.speeds have no place in a gearbox, whose speeds are those of load cases"
             yield Finding("W-UNUSED", key, text)

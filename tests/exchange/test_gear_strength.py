@@ -1,15 +1,20 @@
 """Strength of the gears of a REXS unit: what the file says, what is estimated of it, and that this is told."""
 
+from types import SimpleNamespace
+
 import pytest
 from rexs_units import IndustrialUnit
 from trains.test_imports import drafts_of
 
+from femgear.case.sections import StrengthSection
 from femgear.exchange.gear_strength import (
     TREATMENTS,
     common_strength,
     strength_table,
     treatment_of,
     vickers_hardness,
+    written_strength,
+    written_treatment,
 )
 from femgear.exchange.rexs import Component, Model
 from femgear.findings import DOUBT, NOTE
@@ -46,6 +51,29 @@ def test_treatment_and_hardness_are_those_of_the_file():
     assert treatment_of(unit, part(**names)) == {}
     assert treatment_of(unit, part(**names, surface_hardness_vickers=(300.0, "HV"))) == {}
     assert [finding.severity for finding in unit.findings] == [DOUBT, DOUBT]
+
+
+@pytest.mark.parametrize("treatment", GEAR_STEELS)
+def test_what_is_written_comes_back(treatment):
+    line, told = GEAR_STEELS[treatment].contact["MQ"], list[str]()
+    hardness = 0.5 * (line.low + line.high)
+    material = SimpleNamespace(treatment=treatment, hardness=hardness, grade="ME")
+    attributes = written_treatment(material, told.append)
+    read = treatment_of(model(), part(**attributes))
+    assert len(told) == 1
+    if treatment in TREATMENTS.values():
+        assert read == {"treatment": treatment, "hardness": hardness} and "ME comes back as MQ" in told[0]
+    else:
+        assert read == {} and treatment in told[0]
+    assert written_treatment(SimpleNamespace(treatment=None), told.append) == {}
+    of_gears, of_meshes = written_strength(StrengthSection(application_factor=1.25, quality=6))
+    assert strength_table(
+        model(), [part("cylindrical_stage", **of_meshes)], [part("cylindrical_gear", **of_gears)]
+    ) == {
+        "application_factor": 1.25,
+        "quality": 6,
+    }
+    assert written_strength(StrengthSection()) == ({}, {})
 
 
 def test_factors_are_the_least_favourable_ones_and_what_is_missing_is_told():

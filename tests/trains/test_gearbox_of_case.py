@@ -7,7 +7,7 @@ from femgear import cli
 from femgear.errors import CaseError
 from femgear.run import solve
 from femgear.trains.gearbox_of_case import gearbox_of_case
-from femgear.trains.reading import read_case
+from femgear.trains.reading import read_case, with_values
 
 CASES = (
     "planetary_27_40_108",
@@ -72,3 +72,43 @@ def test_the_command_writes_a_case_that_runs_and_replaces_none(tmp_path, monkeyp
     assert read_case(path).train == "gearbox" and cli.main(["check", path]) == 0
     assert cli.main(["gearbox", "cases/spur_pair.toml", "-o", path]) == 2
     assert "--force" in capsys.readouterr().err
+
+
+def test_a_load_spectrum_goes_along():
+    spectrum = [
+        {"name": "start: cold", "torque": "150 N m", "speed": "500 rpm", "share": 0.02},
+        {"name": "run", "torque": "100 N m", "speed": "3100 rpm", "share": 0.9},
+        {"torque": "-60 N m", "speed": "1000 rpm", "share": 0.08},
+    ]
+    path = "cases/spur_pair.toml"
+    given = with_values(read_case(path), {"operation.load_case": spectrum, "operation.required_hours": 20000})
+    written = gearbox_of_case(given)
+    box = read_case(written.tables)
+    assert [one.name for one in box.operation.load_case] == ["1 start cold", "run", "3"]
+    assert [one.share for one in box.operation.load_case] == [0.02, 0.9, 0.08]
+    for ours, one in zip(box.operation.load_case, given.operation.load_case, strict=True):
+        assert list(ours.torque.values()) == [one.torque] and list(ours.speed.values()) == [one.speed]
+    assert box.operation.required_hours == 20000
+    nearest = min(given.operation.load_case, key=lambda one: abs(one.torque - given.operation.torque))
+    assert list(box.load_case.torque.values()) == [nearest.torque]
+    told = {one.key: one.text for one in written.findings}
+    assert f"{nearest.torque:g} N m" in told["operation.torque"]
+
+
+def test_lives_of_a_pair_are_those_of_its_gearbox():
+    entries = {
+        "material.treatment": "case hardened steel",
+        "material.hardness": 720,
+        "operation.load_case": [
+            {"torque": "300 N m", "speed": "600 rpm", "share": 0.1},
+            {"torque": "200 N m", "speed": "1500 rpm", "share": 0.9},
+        ],
+        "static.positions": 16,
+        "static.flank_elements": 8,
+    }
+    pair = with_values(read_case("cases/spur_pair.toml"), entries)
+    alone = solve(pair, only="life")["life"].dataset()
+    box = solve(read_case(gearbox_of_case(pair).tables), only="deflection")["deflection"].dataset()
+    for name in ("root_life", "flank_life", "root_equivalent_torque", "flank_damage_share"):
+        np.testing.assert_allclose(box[name], alone[name], rtol=1e-6)
+    assert np.isfinite(alone["flank_life"].values[0])
