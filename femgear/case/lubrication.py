@@ -250,12 +250,15 @@ def oil_doubts(case: Any) -> Iterator[Finding]:
     viscosity = oil_viscosity(oil.viscosity_40, oil.viscosity_100, celsius)
     if low <= celsius <= high and viscosity >= LEAST_VISCOSITY:
         return
+    remedy = "give lubricant.viscosity, that at the temperature of operation, in place of both"
+    if oil.permissible_film is not None:
+        remedy = "the film needs viscosities at the temperatures of the contact: give another oil or temperature"
     yield Finding(
         "W-OIL",
         "lubricant.temperature",
         f"{1e6 * viscosity:.3g} mm^2/s at {celsius:g} degC is extrapolated from 40 and 100 degC beyond where ASTM D341 "
         "holds",
-        remedy="give lubricant.viscosity, that at the temperature of operation, alone",
+        remedy=remedy,
         limit=f"{low:g} to {high:g} degC of {oil.kind} oil, and {1e6 * LEAST_VISCOSITY:g} mm^2/s or more",
     )
 
@@ -271,7 +274,10 @@ def check_film(case: Any) -> None:
     if oil.permissible_film is not None and (oil.viscosity_40 is None or oil.viscosity_100 is None):
         key = "lubricant.viscosity_40"
         message = "the film goes by the viscosity at the temperature of the contact, which is missing"
-        raise _missing(case, message, key, 'give lubricant.viscosity_40 = "100 mm^2/s" and viscosity_100')
+        remedy = 'give lubricant.viscosity_40 = "100 mm^2/s" and viscosity_100'
+        if oil.viscosity is not None:
+            remedy = "give viscosity_40 and viscosity_100 in place of viscosity, or leave permissible_film out"
+        raise _missing(case, message, key, remedy)
 
 
 def _missing(case: Any, message: str, key: str, remedy: str) -> CaseError:

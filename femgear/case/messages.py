@@ -237,6 +237,14 @@ def _assembly(error: GeometryError, case: Case) -> None:
     error.value = ", ".join(f"{math.degrees(angle):.6g}" for angle in angles[:24]) + " deg"
 
 
+_OF_MEASURES = {
+    "span": "check span and span_teeth, the teeth that it is over",
+    "over_balls": "check over_balls and ball_diameter",
+    "tooth_thickness": "check tooth_thickness, at the reference circle",
+}
+"""What to do about a measure from which no gear follows."""
+
+
 def _shift_left_out(error: GeometryError, case: Case) -> None:
     """A shift that was found is no entry to change: name the one that it follows from."""
     others = {"sun": "ring", "ring": "sun", "gear_1": "gear_2", "gear_2": "gear_1"}
@@ -250,6 +258,7 @@ def _shift_left_out(error: GeometryError, case: Case) -> None:
             given = getattr(section, measures[0])
             shown = ", ".join(map(LENGTH.show, given if isinstance(given, tuple) else (given,)))
             error.key, error.value = f"{gear}.{measures[0]}", shown
+            error.remedies = (_OF_MEASURES[measures[0]],)
             return
     if gear not in sections or entry != "profile_shift" or sections[gear].profile_shift is not None:
         return
@@ -335,7 +344,12 @@ def estimated_materials(case: Any) -> Iterator[Finding]:
 
 
 def oil_notices(case: Any) -> Iterator[Finding]:
-    """Tell an oil of a case without losses, which nothing asks for (W-UNUSED), and one extrapolated (W-OIL)."""
+    """Tell an oil without losses and coefficients beside a formula (W-UNUSED), and an oil extrapolated (W-OIL)."""
+    losses = case.losses
+    for name, kind in (("coefficient", "constant"), ("table", "table")):
+        if losses is not None and getattr(losses, name) is not None and losses.friction != kind:
+            text = f'has no effect: losses.friction is "{losses.friction}"'
+            yield Finding("W-UNUSED", f"losses.{name}", text, remedy=f'write friction = "{kind}", or leave it out')
     if case.lubricant is not None and case.losses is None:
         remedy = 'give [losses] with friction = "schlenk" or the like'
         yield Finding("W-UNUSED", "lubricant", "has no effect: losses are not asked for", remedy=remedy)

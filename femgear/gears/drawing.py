@@ -134,7 +134,7 @@ def check_span(gear: Gear, teeth: int, helix: float = 0.0) -> None:
             key=f"{gear.name}.span_teeth",
             value=teeth,
             limit=None if counts is None else f"{counts[0]} to {counts[1]}",
-            remedy="give over_balls with ball_diameter, or tooth_thickness"
+            remedy="check span and span_teeth, or give over_balls with ball_diameter"
             if counts is None
             else "take that many teeth",
         )
@@ -340,5 +340,7 @@ def _ball_fault(gear: Gear, ball: float, helix: float, size: str) -> GeometryErr
         key=f"{gear.name}.ball_diameter",
         value=ball,
         limit=None if low is None or high is None else f"{1e-3 * low:.3f} to {1e-3 * high:.3f} mm",
-        remedy="give tooth_thickness: no ball suits these gaps" if ends is None else "take a ball of that size",
+        remedy="check ball_diameter and over_balls, or give tooth_thickness"
+        if ends is None
+        else "take a ball of that size",
     )

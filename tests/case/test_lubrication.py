@@ -2,13 +2,15 @@
 
 import pytest
 
-from femgear.case.lubrication import check_losses, oil_at, oil_doubts
+from femgear.case.lubrication import check_film, check_losses, oil_at, oil_doubts
+from femgear.case.messages import oil_notices
 from femgear.errors import CaseError
 from femgear.trains.reading import read_case, with_values
 
 PAIR = "cases/spur_pair.toml"
 OIL = {"viscosity_40": "100 mm^2/s", "viscosity_100": "11 mm^2/s", "temperature": "70 degC", "density": "900 kg/m^3"}
 SCHLENK = {"friction": "schlenk", "roughness": "0.4 um"}
+TABLE = {"line_loads": ["100 N/mm"], "speeds": ["1 m/s"], "coefficients": [[0.06]]}
 
 
 def pair(losses=SCHLENK, oil=OIL):
@@ -93,3 +95,22 @@ def test_a_thin_oil_is_a_doubt_and_a_given_viscosity_none():
     (finding,) = oil_doubts(pair(oil=thin))
     assert "1.38 mm^2/s" in finding.text or "1.3" in finding.text
     assert not list(oil_doubts(pair(oil={"viscosity": "1 mm^2/s", "temperature": "250 degC"})))
+
+
+def test_remedies_of_an_oil_can_be_followed():
+    """Cold oil: its viscosity in operation is given, and then nothing is said; a film asks for the other two."""
+    cold = pair(oil=OIL | {"temperature": "-50 degC"})
+    assert "in place of both" in str(next(oil_doubts(cold)).remedy)
+    alone = pair(oil={"viscosity": "5000 mm^2/s", "temperature": "-50 degC"})
+    assert not [*oil_doubts(alone)]
+    check_film(alone)
+    film = pair(oil={"viscosity": "5000 mm^2/s", "temperature": "-50 degC", "permissible_film": 0.3})
+    with pytest.raises(CaseError) as refused:
+        check_film(film)
+    assert "in place of viscosity, or leave permissible_film out" in str(refused.value.remedy)
+
+
+@pytest.mark.parametrize(("name", "value"), [("coefficient", 0.02), ("table", TABLE)])
+def test_a_coefficient_beside_a_formula_is_told(name, value):
+    case = pair(losses=SCHLENK | {name: value})
+    assert [one.key for one in oil_notices(case) if one.code == "W-UNUSED"] == [f"losses.{name}"]

@@ -220,6 +220,7 @@ def locate_contact_error(
     if error.code != "E-SLICES" and isinstance(error, ContactError) and less not in remedies:
         remedies = [less, *remedies]
     error.remedies = tuple(remedies)
+    error.file = error.file or case.location(error.key)
 
 
 def loaded_tables(
