@@ -145,7 +145,8 @@ def fault_plan(
     checked(request.rate, "--rate", 1000, 10_000_000)
     torque, fastest = case.operation.torque, max(case.operation.speeds, key=abs)
     if not torque:
-        raise CaseError("without torque no tooth carries load", code="E-NO-LOAD", key="operation.torque", value=torque)
+        message, remedy = "without torque no tooth carries load", 'give a torque, as in operation.torque = "100 N m"'
+        raise CaseError(message, code="E-NO-LOAD", key="operation.torque", value=torque, remedy=remedy)
     up_to = request.up_to or ("5 kHz" if case.dynamics.up_to is None else f"{case.dynamics.up_to:.9g} Hz")
     to_si(up_to, FREQUENCY, low=10.0)
     common = {"dynamics.up_to": up_to, "static.stresses": False, "housing.published": None, "housing.measured": None}
