@@ -46,6 +46,10 @@ CATALOGUE = {
     "W-FAULT": (DOUBT, "A fault of a tooth has effects that the model leaves out, or none that shows."),
     "W-FILLET": (NOTE, "A tip runs into the root fillet of its mate by a little."),
     "W-FORMER": (NOTE, "A file of a former model is read as one of today."),
+    "W-FOUNDATION": (
+        DOUBT,
+        "A model for other programs has the ring on its foundation, not on supports or in a casing.",
+    ),
     "W-FREE": (DOUBT, "More modes have no stiffness than a gearbox has ways to turn."),
     "W-FRICTION": (DOUBT, "Friction acts at all speeds with the coefficient of one of them."),
     "W-GROWTH": (DOUBT, "The free motion grows: a parametric resonance."),

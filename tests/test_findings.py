@@ -524,6 +524,16 @@ def unsteady(folder: Path) -> list[Finding]:
     return [warning.message.args[0] for warning in caught if isinstance(warning.message, FindingWarning)]
 
 
+def model_of_a_set_on_bolts(folder: Path) -> tuple[Finding, ...]:
+    """A model for other programs of a set whose ring stands on supports."""
+    from femgear.run import dynamic_model
+
+    bolt = {"angle": "0 deg", "radial_stiffness": "2e8 N/m", "tangential_stiffness": "2e8 N/m"}
+    changes = {"housing.support": [bolt], "static.positions": 8, "static.flank_elements": 4, "static.stresses": False}
+    case = with_values(read_case(CASES / "planetary_27_40_108.toml"), changes | {"housing.published": None})
+    return told(lambda: dynamic_model(case))
+
+
 def without_compiler(folder: Path) -> tuple[Finding, ...]:
     """A unit that is written where there is no C compiler."""
     from chain_model import chain_model
@@ -538,6 +548,7 @@ def without_compiler(folder: Path) -> tuple[Finding, ...]:
 OTHERS: dict[str, Callable[[Path], Iterable[Finding]]] = {
     "W-CLIPPING": exported("wav", acceleration_scale=1e-6),
     "W-COMPILER": without_compiler,
+    "W-FOUNDATION": model_of_a_set_on_bolts,
     "W-JOURNAL": damaged_journal,
     "W-PLUGIN": plugin,
     "W-REXS": rexs,

@@ -69,6 +69,7 @@ typedef struct {
   double y[STATES];      /* angle of the input, modes, their rates */
   double value[VARIABLES];
   int known;             /* whether the values are those of this state */
+  int begun;             /* whether the initialization is over */
 } State;
 
 typedef struct {
@@ -348,7 +349,7 @@ EXPORT fmi2Status NAME(fmi2EnterInitializationMode)(fmi2Component c) {
 }
 
 EXPORT fmi2Status NAME(fmi2ExitInitializationMode)(fmi2Component c) {
-  rest(&((Instance *)c)->state);
+  ((Instance *)c)->state.begun = 1;
   return fmi2OK;
 }
 
@@ -397,6 +398,7 @@ EXPORT fmi2Status NAME(fmi2SetReal)(fmi2Component c, const fmi2ValueReference vr
     s->set[number] = value[i];
     s->known = 0;
   }
+  if (!s->begun) rest(s);
   return fmi2OK;
 }
 

@@ -11,6 +11,7 @@ import pytest
 from chain_model import (
     DAMPING,
     HARMONICS,
+    POSITIONS,
     RADII,
     TORQUE,
     chain_excitation,
@@ -122,6 +123,10 @@ def test_a_state_is_taken_and_given_back(tmp_path):
     unit.instantiate()
     unit.setupExperiment(startTime=0.0)
     unit.enterInitializationMode()
+    unit.setReal([references["start_phase"]], [0.25])
+    (turned,) = unit.getReal([references[DEFLECTION]])
+    assert turned == pytest.approx(chain_excitation().deflection[0, POSITIONS // 4], rel=1e-9)
+    unit.setReal([references["start_phase"]], [0.0])
     unit.exitInitializationMode()
     # at rest under its torque the mesh has the force and the deflection of its tables
     force, deflection = unit.getReal([references[FORCE], references[DEFLECTION]])

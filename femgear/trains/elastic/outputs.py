@@ -10,6 +10,7 @@ from scipy import linalg
 
 from femgear.case.gear_set import planetary_set
 from femgear.exchange.dynamic_model import DynamicModel, RingSensor
+from femgear.findings import Finding, tell
 from femgear.gears.planetary import mesh_names
 from femgear.housing.sensor import SensorLines, component_lines
 from femgear.solvers.linear.modal import output_load, output_response, residual_output, source_output
@@ -86,6 +87,10 @@ def lines_method(case: Case) -> str:
 
 def elastic_dynamic_model(case: Case, results: Mapping[str, Any]) -> DynamicModel:
     """Make the model of the set on the foundation of its ring, with torques at its ends and the sensor of the level."""
+    if case.housing.stands_still:
+        key = "housing.support" if case.housing.support else "housing.structure"
+        text = "the model for other programs has the ring on its foundation alone, as the modes"
+        tell(Finding("W-FOUNDATION", key, text, remedy="take levels at sensors from a run"))
     result: ModesResult = results["modes"]
     model, system = result.model, result.model.system
     turning, meshes = member_speeds(case, planetary_set(case)), mesh_names(len(result.modes.mesh_stiffness) // 2)
