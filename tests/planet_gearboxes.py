@@ -6,10 +6,14 @@ import random
 from fractions import Fraction
 
 import numpy as np
+from casings import casing_tables
 
 from femgear.gears.planet_assembly import double_gears, ravigneaux_gears, simple_gears, stepped_gears
 from femgear.gears.power_flow import pair_condition
 from femgear.gears.shaft_graph import INTERNAL, SpeedCondition, StageGears
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.response import solve_gearbox_response
+from femgear.trains.reading import read_case
 
 MESH = {"stiffness": "4e8 N/m"}
 BEARING = {"radial": "3e8 N/m", "axial": "1e8 N/m", "tilt": "2e5 N m/rad"}
@@ -126,6 +130,13 @@ def stepped_forces(opened, torque=100.0, sun_mesh=4e8, ring_mesh=3e8):
     stiffness = 1.0 / (1.0 / sun_mesh + lever**2 / ring_mesh)
     opened = np.asarray(opened)
     return abs(torque) / (3.0 * base) + stiffness * (opened.mean() - opened)
+
+
+def uneven_planets():
+    """Simple planets, the first of which has a bearing of its own: they stand where they are."""
+    tables = simple_set()
+    tables["bearing"].append({"name": "more", "shaft": "p0", "outer_shaft": "carrier", "radial": "1e5 N/m"})
+    return tables
 
 
 def springs_by_hand(stiffness):
@@ -249,3 +260,57 @@ def places_by_trial(gears: StageGears) -> np.ndarray:
     places = np.sort(np.concatenate(found))
     places = places[(places > -1e-9) & (places < 1.0 - 1e-7)]
     return places[np.diff(places, prepend=-1.0) > 1e-7]
+
+
+COUNTED = {"stiffness": "4e8 N/m", "contact_ratio": 1.63, "low_share": 0.7}
+SENSORS = [
+    {"name": "top", "position": ["0 mm", "0.2 m", "0 mm"], "direction": "y"},
+    {"name": "side", "position": ["-0.1 m", "0 mm", "50 mm"], "direction": "x"},
+]
+
+
+def in_casing(tables, harmonics=4, bands=4):
+    """A gearbox in a casing on uneven feet, which makes side bands of planets that run around."""
+    solver = {"mesh_harmonics": harmonics, "side_bands": bands, "tolerance": 1e-12}
+    return tables | {"casing": casing_tables(), "sensor": SENSORS, "dynamics": solver}
+
+
+def responded(tables):
+    """Response at 70 rad/s of the shaft whose speed counts."""
+    return solve_gearbox_response(solve_deflection(read_case(tables)), [70.0])
+
+
+def lines_of(response, rows):
+    """Orders and amplitudes of all lines of some outputs, those of one order together."""
+    order = np.concatenate([stage.order for stage in response.stages])
+    values = np.concatenate([stage.motion[0, rows] for stage in response.stages], axis=1)
+    known = np.round(order, 7)
+    every = np.unique(known)
+    return every, np.stack([values[:, known == number].sum(axis=1) for number in every], axis=1)
+
+
+def lines_apart(own, known):
+    """Largest difference of lines, where either has some, over the largest one of each output.
+
+    Of forces, all but two outputs, smaller ones than a millionth of the largest count as that.
+    """
+    sizes = [dict(zip(order.tolist(), amplitude.T, strict=True)) for order, amplitude in (own, known)]
+    nothing, largest = np.zeros(len(known[1])), np.abs(known[1]).max(axis=1)
+    largest = np.maximum(largest, 1e-6 * np.abs(known[1][2:]).max() * (np.arange(len(largest)) > 1))
+    numbers = {*sizes[0], *sizes[1]}
+    return max(np.abs((sizes[0].get(n, nothing) - sizes[1].get(n, nothing)) / largest).max() for n in numbers)
+
+
+def outer_lines(make, *, fixed, torque, motions="plane", planets=3):
+    """Lines of sensors on the casing, of central bearings and of feet, of `simple_set` or `known_set`."""
+    teeth = (28, 40, 108) if planets == 4 else (28, 38, 104)
+    tables = make(teeth=teeth, fixed="ring", planets=planets, mesh=COUNTED, torque=torque, motions=motions)
+    tables["operation"] |= {"fixed": [fixed], "output": ["carrier" if fixed != "carrier" else "ring"]}
+    if fixed == "sun":
+        tables["operation"]["load_case"][0] |= {"torque": {"ring": f"{torque} N m"}, "speed": {"ring": "1000 rpm"}}
+    response = responded(in_casing(tables))
+    names = response.deflection.model.bearing_names
+    central = [number for number, name in enumerate(names) if not name.startswith("pin")]
+    first, feet = 2 + 3 * len(names), 3 * len(response.deflection.model.casing.feet)
+    rows = [0, 1, *(2 + 3 * number + way for number in central for way in range(3)), *range(first, first + feet)]
+    return lines_of(response, rows)

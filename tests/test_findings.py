@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 import synthetic_results as synthetic
 import xarray as xr
-from planet_gearboxes import simple_set
+from planet_gearboxes import uneven_planets
 
 from femgear import cli
 from femgear.findings import CATALOGUE, SEVERITIES, Finding, FindingWarning, as_data, from_data, once, remark
@@ -358,7 +358,7 @@ RESULTS: dict[str, Callable[[], Iterable[Finding]]] = {
             drive_contact=("speed", [1.0, 0.9]), back_contact=("speed", [0.0, 0.0]), backlash=("x", [1e-5])
         ),
     ),
-    "W-STANDING": lambda: train_of(planets := read_case(simple_set())).case_warnings(planets),
+    "W-STANDING": lambda: train_of(planets := read_case(uneven_planets())).case_warnings(planets),
     "W-STRENGTH": lambda: of_stage("pair", "life", short_life(200.0, 0.0)),
     "W-STIFFNESS": lambda: of_stage(
         "gearbox",

@@ -133,14 +133,15 @@ THEMES = (
         "gearbox_planets",
         "Planets of any kind",
         "Planets that are shafts of their own. Compared with: places by trial of all teeth in random sets, speeds by "
-        "the teeth that pass, planetary stages, springs set up by hand; gates: exact; 1e-12 of linear statics, 1e-9, "
-        "1e-6 of a sun that all but floats; 0.3 % where pairs are solved one by one.",
+        "the teeth that pass, planetary stages, springs set up by hand, symmetry of lines; gates: exact; 1e-12 of "
+        "linear statics, 1e-10, 1e-9; 1e-6 of a sun that all but floats.",
         (
             gearbox_planets.places,
             gearbox_planets.kinematics,
             gearbox_planets.simple_planets,
             gearbox_planets.stepped_planets,
             gearbox_planets.planet_errors,
+            gearbox_planets.symmetric_lines,
         ),
     ),
     Theme(

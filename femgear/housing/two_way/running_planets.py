@@ -49,6 +49,8 @@ _STILL = 1e-12
 """Frequency over the mesh frequency below which it is none."""
 _SINGULAR = 1e-11
 """Singular value of a scaled system of the means, over the largest, of a motion of the whole that nothing holds."""
+_BENDING = 1e-10
+"""Square of a frequency of a free planet, over the highest, of a motion that bends it."""
 _ROOM = 64e6
 """Size of the systems that are in memory together [bytes]."""
 
@@ -115,6 +117,8 @@ class RunningStage(ReadOnlyArrays):
         Elastic ring in series with the meshes planet-ring.
     rubbing : RubbingPoints, optional
         Where the sources of the excitation act; without it there is no friction.
+    elastic : (p, p) array, optional
+        Stiffness of a planet that bends, or of a branch of planets, between its own motions [N/m, N, N m/rad].
     """
 
     natural_frequency: np.ndarray
@@ -134,6 +138,7 @@ class RunningStage(ReadOnlyArrays):
     flexibility: np.ndarray | None = None
     ring: RunningRing | None = None
     rubbing: RubbingPoints | None = None
+    elastic: np.ndarray | None = None
 
     @property
     def waves(self) -> np.ndarray:
@@ -160,6 +165,17 @@ class RunningStage(ReadOnlyArrays):
         """Products (m, (C W) ((C + F) W)) of the shapes of contact points with those of all points."""
         P, pushed = (shape.reshape(-1, shape.shape[2]) for shape in (self.shape, self.every_shape))
         return (P[:, None] * pushed.conj()).reshape(-1, P.shape[1]).T
+
+    @cached_property
+    def rigid_and_bent(self) -> tuple[np.ndarray, np.ndarray]:
+        """Motions (p, r) of a planet that bends that bend nothing, and all others (p, p - r)."""
+        assert self.elastic is not None
+        # the mass gives shifts and tilts a common scale
+        size = np.sqrt(np.maximum(np.diag(self.mass), np.finfo(float).tiny))
+        values, vectors = np.linalg.eigh(self.elastic / np.outer(size, size))
+        bending = values > _BENDING * values.max(initial=0.0)
+        motions = vectors / size[:, None]
+        return motions[:, ~bending], motions[:, bending]
 
     @property
     def ring_points(self) -> dict[int, np.ndarray]:
@@ -194,8 +210,12 @@ class RunningStage(ReadOnlyArrays):
 
         ``speed`` is that of the carrier, positive for its sense [rad/s].
         """
-        rate = 1j * np.asarray(omega)[..., None, None] * np.eye(len(self.mass)) + self.sense * speed * self.turning
-        return self.mass @ rate @ rate + mesh_frequency * self.gyroscopic @ rate
+        omega = np.asarray(omega)[..., None, None]
+        rate = 1j * omega * np.eye(len(self.mass)) + self.sense * speed * self.turning
+        inertial = self.mass @ rate @ rate + mesh_frequency * self.gyroscopic @ rate
+        if self.elastic is None:
+            return inertial
+        return inertial + self.elastic * (1.0 + 1j * self.structure_loss * np.sign(omega))
 
     def shared(self, whole: np.ndarray, omega: np.ndarray) -> np.ndarray:
         """Compliances (..., G, C, G, C) by bodies in common at whole orders (...) and frequencies [m/N].
@@ -237,6 +257,10 @@ class RunningResponse(ReadOnlyArrays):
     tail : float
         Share (root of energies) of the mesh forces in the upper half of the harmonics, and in the outermost
         side bands.
+    kinds : int
+        Meshes of a planet.
+    leaders : tuple of (int, int)
+        Number of the leader of every planet, and its turns from that.
     """
 
     mesh_frequency: float
@@ -250,6 +274,8 @@ class RunningResponse(ReadOnlyArrays):
     radius: float
     products: int
     tail: tuple[float, float]
+    kinds: int
+    leaders: tuple[tuple[int, int], ...]
 
     @property
     def frequency(self) -> np.ndarray:
@@ -383,6 +409,57 @@ def ring_lines(stage: RunningStage, response: RunningResponse, angles, direction
     return response.one_sided(displacement)
 
 
+@dataclass(frozen=True)
+class _PlanetEquations:
+    """Equations of one planet, ``rows g + dynamic x = 0``, and what its motions x add to the approach of its points.
+
+    Of a planet that bends motions are eliminated: all at mesh harmonics, about frequency zero those that bend it.
+
+    Parameters
+    ----------
+    bands : (n,) int array
+        Places of the bands that keep motions.
+    compliance : (blocks, b, C, C + F) array
+        Approach of the points by unit forces and friction through the motions that are eliminated [m/N].
+    rows, columns, dynamic : (blocks, n, p, C + F), (blocks, n, C, p) and (blocks, n, p, p) arrays
+        Of the motions that are kept.
+    """
+
+    bands: np.ndarray
+    compliance: np.ndarray
+    rows: np.ndarray
+    columns: np.ndarray
+    dynamic: np.ndarray
+
+
+def _planet_equations(stage: RunningStage, omega: np.ndarray, mesh_frequency: float, speed: float) -> _PlanetEquations:
+    """Make the equations of a planet at angular frequencies (blocks, b) in the frame of the carrier."""
+    count, b = omega.shape
+    pushed = stage.approach if stage.rubbing is None else np.hstack([stage.approach, stage.rubbing.approach])
+    C, dynamic = len(stage.stiffness), stage.planet_stiffness(omega, mesh_frequency, speed)
+    compliance = np.zeros((count, b, C, pushed.shape[1]), complex)
+    if stage.elastic is None:
+        rows = np.broadcast_to(pushed, (count, b, *pushed.shape))
+        columns = np.broadcast_to(-stage.approach.T, (count, b, *stage.approach.T.shape))
+        return _PlanetEquations(np.arange(b), compliance, rows, columns, dynamic)
+    # motions that nothing bends have no stiffness at rest, be it in the frame of the carrier or in that of the casing
+    still = (np.abs(omega) <= 1.5 * speed).any(axis=0)
+    moving = dynamic[:, ~still]
+    compliance[:, ~still] = stage.approach.T @ np.linalg.solve(
+        moving, np.broadcast_to(pushed, (*moving.shape[:2], *pushed.shape))
+    )
+    rigid, bent = stage.rigid_and_bent
+    kept, gone = dynamic[:, still] @ rigid, dynamic[:, still] @ bent
+    inverse = np.linalg.inv(bent.T @ gone)
+    through, of_bent = rigid.T @ gone @ inverse, bent.T @ pushed
+    compliance[:, still] = of_bent[:, :C].T @ inverse @ of_bent
+    rows = rigid.T @ pushed - through @ of_bent
+    columns = of_bent[:, :C].T @ inverse @ (bent.T @ kept) - (rigid.T @ stage.approach).T
+    return _PlanetEquations(
+        np.flatnonzero(still), compliance, rows, columns, rigid.T @ kept - through @ (bent.T @ kept)
+    )
+
+
 class _Problem:
     """A stage with so many harmonics of the excitation and of the response, at any speed."""
 
@@ -472,7 +549,9 @@ class _Problem:
         force, (band, modal) = self._forces(parts, extra), self._modal(parts, extra, mesh_frequency, speed)
         tail = self._tail(force[:, : self.stage.kinds])
         figures = approach(extra) + rubbed, band, modal, orders, residual, radius, products, tail
-        return RunningResponse(mesh_frequency, speed, force, *figures)
+        _, group, turn = self.stage.groups
+        repeated = tuple(zip(group.tolist(), turn.tolist(), strict=True))
+        return RunningResponse(mesh_frequency, speed, force, *figures, self.stage.kinds, repeated)
 
     def _groups_of_bands(self, residue: int) -> Iterator[tuple[np.ndarray, np.ndarray]]:
         """Side bands that the structure connects, and the bands of the structure between them, by residue."""
@@ -510,29 +589,32 @@ class _Problem:
         self, blocks, bands, structure_bands, mesh_frequency: float, speed: float
     ) -> tuple[np.ndarray, np.ndarray]:
         """Forces of the contact points by unit forces e of the meshes, (blocks, b G C, b G M), and by unit friction."""
-        stage, orders = self.stage, self.orders
-        G, C, p = len(self.leaders), len(stage.stiffness), len(stage.mass)
+        stage, orders, (G, C) = self.stage, self.orders, (len(self.leaders), len(self.stage.stiffness))
         b, line = len(bands), (orders.base[blocks] + orders.seed[blocks]) / orders.paths.z_ring
         omega = line[:, None] * mesh_frequency + orders.bands[bands] * speed
         omega[np.abs(omega) < _STILL * mesh_frequency] = 0.0
-        points, planets = b * G * C, b * G * p
-        system = np.zeros((len(blocks), points + planets, points + planets), complex)
         inner, free = self._compliance(blocks, bands, structure_bands, omega, (mesh_frequency, speed))
-        system[:, :points, :points] = inner[..., :C].reshape(len(blocks), points, points)
-        A = np.kron(np.eye(b * G), stage.approach)
-        system[:, points:, :points], system[:, :points, points:] = A, -A.T
-        planet_stiffness = stage.planet_stiffness(omega, mesh_frequency, speed)
+        planets = _planet_equations(stage, omega, mesh_frequency, speed)
         for k in range(b):
             for g in range(G):
-                at = points + (k * G + g) * p + np.arange(p)
-                system[:, at[:, None], at] = planet_stiffness[:, k]
+                inner[:, k, g, :, k, g] += planets.compliance[:, k]
+        points, p = b * G * C, planets.dynamic.shape[2]
+        size = points + len(planets.bands) * G * p
+        system = np.zeros((len(blocks), size, size), complex)
+        system[:, :points, :points] = inner[..., :C].reshape(len(blocks), points, points)
+        for n, k in enumerate(planets.bands.tolist()):
+            for g in range(G):
+                at, of_points = points + (n * G + g) * p + np.arange(p), (k * G + g) * C + np.arange(C)
+                system[:, at[:, None], of_points] = planets.rows[:, n, :, :C]
+                system[:, of_points[:, None], at] = planets.columns[:, n]
+                system[:, at[:, None], at] = planets.dynamic[:, n]
         if free:  # motions that nothing holds take up no mean force
-            border = np.zeros((len(free), points + planets), complex)
+            border = np.zeros((len(free), size), complex)
             border[:, :points] = free
             border = np.broadcast_to(border, (len(blocks), *border.shape))
             corner = np.zeros((len(blocks), len(free), len(free)))
             system = np.block([[system, -border.swapaxes(1, 2)], [border.conj(), corner]])
-        right = self._unit_forces(inner, stage.compliance(omega), system.shape[1])
+        right = self._unit_forces(inner, stage.compliance(omega), planets, system.shape[1])
         ends = np.array([b * G * stage.kinds])
         if free:
             answers = [_consistent(*equations, points) for equations in zip(system, right, strict=True)]
@@ -573,13 +655,15 @@ class _Problem:
                     inner[:, k, :, RING, k, :, at] += ring[:, k]
         return inner, free
 
-    def _unit_forces(self, inner: np.ndarray, compliance: np.ndarray, size: int) -> np.ndarray:
+    def _unit_forces(
+        self, inner: np.ndarray, compliance: np.ndarray, planets: _PlanetEquations, size: int
+    ) -> np.ndarray:
         """Right-hand sides (blocks, size, b G (M + F)) of unit forces e of all leading meshes, then of friction.
 
         Band by band, by the compliances of the points and (blocks, b, C) of the springs.
         """
         stage, kinds, G, C = self.stage, self.stage.kinds, len(self.leaders), len(self.stage.stiffness)
-        count, b, p = len(inner), inner.shape[1], len(stage.mass)
+        count, b, p = len(inner), inner.shape[1], planets.dynamic.shape[2]
         right = np.zeros((count, size, b, kinds, G), complex)
         for k in range(b):
             for g in range(G):
@@ -590,10 +674,10 @@ class _Problem:
         points, F = b * G * C, len(stage.rubbing)
         rubbing = np.zeros((count, size, b, F, G), complex)
         rubbing[:, :points] = -inner[..., C:].swapaxes(-1, -2).reshape(count, points, b, F, G)
-        for k in range(b):
+        for n, k in enumerate(planets.bands.tolist()):
             for g in range(G):
-                at = points + (k * G + g) * p
-                rubbing[:, at : at + p, k, :, g] = -stage.rubbing.approach
+                at = points + (n * G + g) * p
+                rubbing[:, at : at + p, k, :, g] = -planets.rows[:, n, :, C:]
         return np.concatenate([right.reshape(count, size, -1), rubbing.reshape(count, size, -1)], axis=2)
 
     def _add_structure(self, inner: np.ndarray, band: int, bands: np.ndarray, omega: np.ndarray) -> list[np.ndarray]:

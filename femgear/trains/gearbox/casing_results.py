@@ -92,8 +92,12 @@ def largest_foot_force(data: Any) -> Iterator[tuple[str, str]]:
 
 
 def seat_curve(one: xr.Dataset, way: int) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Find place along z [mm], motions along x or y [um] of casing and shaft at its bearings, of one load case."""
+    """Find place along z [mm], motions along x or y [um] of casing and shaft at its bearings, of one load case.
+
+    Bearings between shafts, as of planets, have no seat in the casing.
+    """
     if "seat_displacement" not in one:
         return None
     casing, shaft = (1e6 * one[name].values[:, way] for name in ("seat_displacement", "bearing_displacement"))
-    return 1e3 * one["bearing_place"].values[:, 2], casing, shaft
+    seated = np.isfinite(casing)
+    return 1e3 * one["bearing_place"].values[seated, 2], casing[seated], shaft[seated]

@@ -27,6 +27,7 @@ from femgear.trains.gearbox.casing import bearing_name
 from femgear.trains.gearbox.friction import friction_excites
 from femgear.trains.gearbox.geometry import set_sizes
 from femgear.trains.gearbox.mode_words import mode_distance
+from femgear.trains.gearbox.planet_branches import joint_names
 from femgear.trains.gearbox.power import gearbox_flow
 from femgear.trains.gearbox.resonance_table import loudest_resonance
 from femgear.trains.gearbox.sensors import gearbox_sensors
@@ -157,7 +158,9 @@ def _of_modes() -> Iterator[KeyFigure]:
 def _of_responses(case: GearboxCase) -> Iterator[KeyFigure]:
     sensors = [(sensor.name, (sensor.name,)) for sensor in gearbox_sensors(case)]
     flow = gearbox_flow(case)
-    excited = [(stage.name, (stage.name,)) for stage in exciting_sections(case) if flow.carries(stage)]
+    joint = joint_names(case)
+    exciting = [joint.get(stage.name, stage.name) for stage in exciting_sections(case) if flow.carries(stage)]
+    excited = [(name, (name,)) for name in dict.fromkeys(exciting)]
     if excited and friction_excites(case):
         yield FRICTION_FIGURE
     for words, stage in _RESPONSES:

@@ -17,7 +17,7 @@ from femgear.housing.two_way.running_planets import RunningResponse, forces_on_s
 from femgear.system.assembly import Assembly, solved_conditions
 from femgear.trains.gearbox.casing import CasingModel, rigid_foot_rows
 from femgear.trains.gearbox.deflection import Deflection, spread_rows
-from femgear.trains.gearbox.model import GearboxModel, StageModel
+from femgear.trains.gearbox.model import GearboxModel
 from femgear.trains.gearbox.modes import linear_system
 from femgear.trains.gearbox.sensors import sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, row_waves
@@ -160,14 +160,14 @@ def _casing_alone(
 
 
 def forces_on_casing(
-    paths: CasingPaths, found: Deflection, stage: StageModel, structured: StructuredStage, response: RunningResponse
+    paths: CasingPaths, found: Deflection, stage: str, structured: StructuredStage, response: RunningResponse
 ) -> np.ndarray:
     """Two-sided forces (Q + 1, S, P, c) of all paths on the casing while a stage excites the gearbox [N, N m].
 
     Of what the stage is taken out of the structure with, its meshes and pins, the forces themselves count.
     """
     names, model = list(paths.names), found.model
-    own, pins = f"meshes of {stage.name}", f"pins of {stage.name}"
+    own, pins = f"meshes of {stage}", f"pins of {stage}"
     by_modes = np.einsum("pcn,nm->pcm", paths.forces, structured.motion)
     loss = 1.0 + 2j * model.case.modes.damping_ratio
     ringed = {f"meshes of {part.ring.stage.name}" for part in structured.rings}
@@ -187,7 +187,7 @@ def forces_on_casing(
     assert casing is not None
     of_meshes = structured.of_meshes
     for station in {*casing.stations, *casing.own.values()}:
-        waves = np.array([row_waves(row, stage, station, assembly.places) for row in structured.rows])
+        waves = np.array([row_waves(row, structured.orbit, station, assembly.places) for row in structured.rows])
         if not waves.any():
             continue
         vectors = waves @ assembly.led[6 * station : 6 * station + 6][:, paths.places]

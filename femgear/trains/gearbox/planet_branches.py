@@ -14,11 +14,13 @@ from fractions import Fraction
 
 import numpy as np
 
+from femgear.case.gear_set import planetary_set, set_deviations
 from femgear.errors import CaseError
+from femgear.gears.deviations import common_period
 from femgear.gears.planet_assembly import assembly_step, nearest_places, timing_marks, tooth_relations
 from femgear.gears.shaft_graph import EXTERNAL, INTERNAL, StageGears, connected_sets
-from femgear.report.tables import Block
-from femgear.trains.gearbox.case_file import GearboxCase, PairSection
+from femgear.report.tables import Block, merged_names
+from femgear.trains.gearbox.case_file import GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, carriers, pair_sizes
 
 ASSEMBLY_TOLERANCE = 5e-3
@@ -40,12 +42,15 @@ class PlanetBranch:
         Gears as "SHAFT TEETH" of central ones, "NUMBER TEETH" of planets by their places in ``planets``.
     axes : (n, 2) array
         Of the planets, from the axis of the carrier [m].
+    pairs : tuple of str
+        Names of its pairs, in the order of the meshes of ``gears``.
     """
 
     carrier: str
     planets: tuple[str, ...]
     gears: StageGears
     axes: np.ndarray
+    pairs: tuple[str, ...]
 
     @property
     def angle(self) -> float:
@@ -94,7 +99,7 @@ def _branch(case: GearboxCase, carrier: str, planets: list[str], pairs: list[Pai
         )
 
     planets = sorted(planets, key=words)
-    teeth, shafts, meshes = dict[str, int](), dict[str, str | None](), list[tuple[str, str, int]]()
+    teeth, shafts, meshes = dict[str, int](), dict[str, str | None](), list[tuple[tuple[str, str, int], str]]()
     for stage in own:
         names = []
         for shaft, count in zip(stage.shafts, pair_sizes(stage).teeth, strict=True):
@@ -103,15 +108,17 @@ def _branch(case: GearboxCase, carrier: str, planets: list[str], pairs: list[Pai
             names.append(name)
             if shaft not in planets:
                 shafts[name] = shaft
-        meshes.append((names[0], names[1], INTERNAL if pair_sizes(stage).internal else EXTERNAL))
+        sense = INTERNAL if pair_sizes(stage).internal else EXTERNAL
+        meshes.append(((names[0], names[1], sense), stage.name))
     bodies = []
     for number, planet in enumerate(planets, start=1):
         gears = sorted(name for name in teeth if name not in shafts and name.startswith(f"{number} "))
         if not case.shaft_named(planet).gears_timed:
             bodies += [(gears[0], other) for other in gears[1:]]
     axes = np.subtract([case.shaft_named(planet).axis for planet in planets], case.shaft_named(carrier).axis)
-    gears = StageGears(teeth, shafts | {"carrier": carrier}, tuple(sorted(meshes)), tuple(bodies))
-    return PlanetBranch(carrier, tuple(planets), gears, axes)
+    meshing, names = zip(*sorted(meshes), strict=True)
+    gears = StageGears(teeth, shafts | {"carrier": carrier}, meshing, tuple(bodies))
+    return PlanetBranch(carrier, tuple(planets), gears, axes, names)
 
 
 def _turning(angle: float) -> np.ndarray:
@@ -136,6 +143,82 @@ def _beyond(branch: PlanetBranch, first: PlanetBranch) -> float:
     """Angle of a branch beyond the first one, from 0 to a turn [rad]."""
     angle = (branch.angle - first.angle) % _TURN
     return 0.0 if _TURN - angle < 1e-9 else angle
+
+
+@dataclass(frozen=True)
+class RunningSet:
+    """Branches that are alike and run around with a carrier, all its planets.
+
+    Parameters
+    ----------
+    branches : tuple of PlanetBranch
+        In the order of their angles.
+    pins : tuple of tuple of int
+        Numbers of the bearings of every branch on the carrier, in the same order in all of them.
+    """
+
+    branches: tuple[PlanetBranch, ...]
+    pins: tuple[tuple[int, ...], ...]
+
+    @property
+    def angles(self) -> tuple[float, ...]:
+        """Directions of the branches from the axis of the carrier, ascending from the first one [rad]."""
+        first = self.branches[0]
+        return tuple(first.angle + _beyond(branch, first) for branch in self.branches)
+
+    @property
+    def kinds(self) -> tuple[tuple[str, ...], ...]:
+        """Names of the pairs of every mesh of a branch, branch by branch."""
+        return tuple(zip(*(branch.pairs for branch in self.branches), strict=True))
+
+
+def running_sets(case: GearboxCase) -> list[RunningSet]:
+    """List the sets of branches that the response lets run around their carriers.
+
+    All branches of a carrier are alike, nothing but bearings on the carrier and gears holds their planets, and no gear
+    has errors that turn.
+    """
+    planets, found = carriers(case), list[RunningSet]()
+    sets = alike_branches(case)
+    for carrier in dict.fromkeys(planets.values()):
+        on_carrier = [alike for alike in sets if alike[0].carrier == carrier]
+        own = {planet for alike in on_carrier for branch in alike for planet in branch.planets}
+        held = any(not own.isdisjoint(coupling.between) for coupling in case.coupling)
+        held |= any(stage.carrier != carrier and not own.isdisjoint(stage.shafts) for stage in case.pair)
+        members = {name for stage in case.planetary for name in (stage.sun, stage.carrier, stage.ring)}
+        held |= not own.isdisjoint({*planets.values(), *members, *case.operation.fixed})
+        held |= any(stage.carrier == carrier and _deviates(stage) for stage in case.pair)
+        held |= any(bearing.outer_shaft in own for bearing in case.bearing)
+        held |= any(bearing.shaft in own and bearing.outer_shaft != carrier for bearing in case.bearing)
+        if held or len(on_carrier) != 1:
+            continue
+        pins = [_pins(case, branch) for branch in on_carrier[0]]
+        if all([where for _, where in branch] == [where for _, where in pins[0]] for branch in pins):
+            numbers = tuple(tuple(number for number, _ in branch) for branch in pins)
+            found.append(RunningSet(tuple(on_carrier[0]), numbers))
+    return found
+
+
+def _deviates(stage: PairSection) -> bool:
+    """Whether the teeth of a pair have errors that take more than a mesh period to repeat."""
+    teeth = teeth_of(stage)
+    return teeth is not None and common_period(set_deviations(teeth), planetary_set(teeth))[0] > 1
+
+
+def joint_names(case: GearboxCase) -> dict[str, str]:
+    """Name what excites a gearbox together, such as all planets with the sun, by the names of its pairs."""
+    kinds = [names for running in running_sets(case) for names in running.kinds]
+    return {name: merged_names(names) for names in kinds for name in names}
+
+
+def _pins(case: GearboxCase, branch: PlanetBranch) -> list[tuple[int, tuple]]:
+    """Bearings of a branch with the planet that each is of and its places, in the order of these."""
+    listed = [
+        (number, (branch.planets.index(bearing.shaft), bearing.position or 0.0, bearing.outer_position or 0.0))
+        for number, bearing in enumerate(case.bearing)
+        if bearing.shaft in branch.planets
+    ]
+    return sorted(listed, key=lambda listed: listed[1])
 
 
 def misplaced_branches(case: GearboxCase) -> Iterator[CaseError]:

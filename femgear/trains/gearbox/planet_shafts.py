@@ -23,7 +23,7 @@ from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.trains.gearbox.case_file import CASING, GearboxCase, PairSection, teeth_of
 from femgear.trains.gearbox.geometry import DISTANCE_TOLERANCE, carriers, pair_sizes
-from femgear.trains.gearbox.planet_branches import ASSEMBLY_TOLERANCE
+from femgear.trains.gearbox.planet_branches import ASSEMBLY_TOLERANCE, running_sets
 from femgear.trains.gearbox.power import BoxFlow, gearbox_flow
 
 
@@ -149,13 +149,16 @@ def standing_planets(case: GearboxCase) -> Iterator[Finding]:
     """Tell that planets stand at one angle of a carrier that turns (W-STANDING)."""
     if not carriers(case):
         return
+    running = {found.branches[0].carrier for found in running_sets(case)}
     for name in turning_carriers(case, gearbox_flow(case)):
+        if name in running:
+            continue
         number = next(i for i, stage in enumerate(case.pair) if stage.carrier == name)
         yield Finding(
             "W-STANDING",
             f"pair[{number}].carrier",
             f"{name} turns, and the planets on it vibrate where they stand in the case: lines have no side bands",
-            remedy="the kind [[planetary]] has planets that run around, of sun, planets and ring",
+            remedy="equal branches without errors that turn, held by gears and bearings on this carrier alone",
         )
 
 

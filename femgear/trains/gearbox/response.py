@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -24,14 +24,18 @@ import numpy as np
 
 from femgear.case.dependencies import Steps
 from femgear.housing.two_way.running_planets import RunningResponse, ring_lines, solve_running
+from femgear.report.tables import merged_names
 from femgear.stages.protocol import Progress, silent
-from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection
+from femgear.system.system import MeshExcitation
+from femgear.trains.gearbox.case_file import CASING
 from femgear.trains.gearbox.deflection import Deflection, spread_rows
-from femgear.trains.gearbox.elastic_ring import elastic_rings
+from femgear.trains.gearbox.elastic_ring import ElasticRing, elastic_rings
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
 from femgear.trains.gearbox.model import GearboxModel, StageModel, reference_shaft
 from femgear.trains.gearbox.paths import CasingPaths, casing_paths, forces_on_casing
+from femgear.trains.gearbox.planet_branches import running_sets
 from femgear.trains.gearbox.planet_shafts import pair_phases
+from femgear.trains.gearbox.running_branches import BranchForces, branch_stage
 from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 from femgear.trains.gearbox.stage_structure import StructuredStage, running_stage
 
@@ -75,6 +79,10 @@ class StageLines:
         Products with the fluctuating stiffness.
     harmonics : (v,) int array
         Mesh harmonics.
+    meshes : tuple of int
+        Numbers of the meshes of the stage, kind by kind.
+    varying : tuple of int
+        Numbers of the meshes whose k(t) acts on the motion.
     paths : (v, P, s, L) complex array, optional
         Displacements of the sensors by every path into the casing [m], see `CasingPaths`.
     """
@@ -95,6 +103,8 @@ class StageLines:
     outer: np.ndarray
     products: np.ndarray
     harmonics: np.ndarray
+    meshes: tuple[int, ...]
+    varying: tuple[int, ...]
     paths: np.ndarray | None = None
 
 
@@ -136,13 +146,12 @@ class GearboxResponse:
         """
         found = np.zeros((len(self.speed), len(self.stages), len(self.stages)))
         every = self.dynamic_forces
-        meshes = {stage.name: stage.meshes for stage in self.deflection.model.stages}
         for a, excited in enumerate(self.stages):
-            count = len(meshes[excited.name]) // len(excited.spread)
+            count = len(excited.meshes) // len(excited.spread)
             for b, other in enumerate(self.stages):
-                if a == b:
+                if a == b or not {*other.varying}.isdisjoint(excited.meshes):
                     continue
-                moved = other.approach[:, list(meshes[excited.name])].reshape(len(self.speed), -1, count).max(axis=2)
+                moved = other.approach[:, list(excited.meshes)].reshape(len(self.speed), -1, count).max(axis=2)
                 whole = np.maximum(every[:, a, : len(excited.spread)], np.finfo(float).tiny)
                 found[:, a, b] = (excited.spread * moved / whole).max(axis=1)
         return found
@@ -155,10 +164,9 @@ class GearboxResponse:
         """
         every = np.sqrt((self.mesh_forces**2).sum(axis=2))
         found = np.full((len(self.speed), len(self.stages), 2), np.nan)
-        meshes = {stage.name: list(stage.meshes) for stage in self.deflection.model.stages}
         for number, stage in enumerate(self.stages):
             kinds = len(stage.spread)
-            own = every[:, meshes[stage.name]].reshape(len(every), kinds, -1)
+            own = every[:, list(stage.meshes)].reshape(len(every), kinds, -1)
             found[:, number, :kinds] = own.max(axis=2)
         return found
 
@@ -170,9 +178,8 @@ class GearboxResponse:
         stiffness = loss * np.array([contact.stiffness.sum() for contact in model.assembly.contacts])
         found = np.stack([stage.approach * stiffness for stage in self.stages], axis=2)
         for number, stage in enumerate(self.stages):
-            meshes = next(list(other.meshes) for other in model.stages if other.name == stage.name)
-            own = np.repeat(stage.dynamic_force, len(meshes) // stage.dynamic_force.shape[1], axis=1)
-            found[:, meshes, number] = own
+            own = np.repeat(stage.dynamic_force, len(stage.meshes) // stage.dynamic_force.shape[1], axis=1)
+            found[:, list(stage.meshes), number] = own
         return found
 
 
@@ -241,18 +248,20 @@ def solve_gearbox_response(
     up_to = case.dynamics.up_to
     rows, sensors = np.vstack(output_rows(found)), gearbox_sensors(case)
     paths = casing_paths(found) if by_path else None
-    lines, done = list[StageLines](), 0
-    staged = exciting_stages(found)
-    for one in staged:
-        excitation = excitation_of(found, one, rings, steps=steps, friction=friction)
-        structured = running_stage(found, one, excitation, rings)
-        forces = np.vstack([rows[len(sensors) :], mesh_rows(model, one)])
-        outputs = np.vstack([structured.at_sensors(rows[: len(sensors)], sensors), forces @ structured.motion])
-        lines.append(_stage_lines(found, one, structured, outputs, speeds / nominal, paths))
-        done += 1
-        progress(stage, done, len(staged))
+    lines, staged, phases = list[StageLines](), exciting_stages(found), pair_phases(case, model.flow)
+    excitations = {one.name: excitation_of(found, one, rings, steps=steps, friction=friction) for one in staged}
+    parts = [*_exciting_parts(found, staged, excitations, phases, rings)]
+    for done, part in enumerate(parts, start=1):
+        outputs = np.vstack([rows, mesh_rows(model, part.running_meshes)])
+        outputs[len(sensors) + part.running_rows] = 0.0
+        at_sensors = part.structured.at_sensors(rows[: len(sensors)], sensors)
+        outputs = np.vstack([at_sensors, outputs[len(sensors) :] @ part.structured.motion])
+        lines.append(_stage_lines(found, part, outputs, speeds / nominal, paths))
+        progress(stage, done, len(parts))
     missing = tuple(one.name for one in model.stages if one not in staged)
-    lines = _in_phase(lines, pair_phases(case, model.flow))
+    # what runs around has the phases of its teeth
+    alone = {part.name: phases.get(part.name, 0.0) for part in parts if part.forces is None}
+    lines = _in_phase(lines, alone)
     names = () if paths is None else paths.names
     return GearboxResponse(found, reference, speeds, tuple(lines), missing, up_to, names)
 
@@ -267,53 +276,115 @@ def _in_phase(lines: Sequence[StageLines], phases: Mapping[str, float]) -> list[
     return turned
 
 
-def mesh_rows(model: GearboxModel, stage: StageModel) -> np.ndarray:
-    """Rows (M, 6n) of the approach of the flanks of all meshes in the middle of their slices; zero of a stage's own."""
+@dataclass(frozen=True)
+class _ExcitingPart:
+    """What excites a gearbox at once: a stage, or one kind of the meshes of planets that are shafts.
+
+    Parameters
+    ----------
+    name : str
+        Of it.
+    stages : tuple of StageModel
+        Its stages, several of planets that are shafts.
+    structured : StructuredStage
+        As it runs in the structure of the rest.
+    forces : BranchForces, optional
+        Of planets that are shafts.
+    """
+
+    name: str
+    stages: tuple[StageModel, ...]
+    structured: StructuredStage
+    forces: BranchForces | None = None
+
+    @property
+    def meshes(self) -> tuple[int, ...]:
+        """Numbers of its meshes, kind by kind."""
+        return tuple(mesh for stage in self.stages for mesh in stage.meshes)
+
+    @property
+    def running_meshes(self) -> Collection[int]:
+        """Numbers of the meshes that are no motions of the structure: its own, of planets all on their carrier."""
+        return self.meshes if self.forces is None else self.forces.meshes.keys()
+
+    @property
+    def running_rows(self) -> np.ndarray:
+        """Rows of all bearing forces that are those of its pins."""
+        pins = [] if self.forces is None else list(self.forces.pins)
+        return (3 * np.array(pins, int)[:, None] + np.arange(3)).ravel()
+
+    @property
+    def own(self) -> slice:
+        """Kinds of meshes of the running stage that excite."""
+        return slice(None) if self.forces is None else self.forces.own
+
+
+def _exciting_parts(
+    found: Deflection,
+    staged: Sequence[StageModel],
+    excitations: Mapping[str, MeshExcitation],
+    phases: Mapping[str, float],
+    rings: Sequence[ElasticRing],
+) -> Iterator[_ExcitingPart]:
+    """Take what excites a gearbox out of it, part by part."""
+    stages, done = {stage.name: stage for stage in staged}, set[str]()
+    for running in running_sets(found.model.case):
+        for kind, names in enumerate(running.kinds):
+            own = tuple(stage for stage in found.model.stages if stage.name in names)
+            if stages.keys().isdisjoint(names):
+                continue
+            structured, forces = branch_stage(found, running, kind, excitations, phases, rings)
+            done |= {*names}
+            yield _ExcitingPart(merged_names(names), own, structured, forces)
+    for stage in staged:
+        if stage.name not in done:
+            structured = running_stage(found, stage, excitations[stage.name], rings)
+            yield _ExcitingPart(stage.name, (stage,), structured)
+
+
+def mesh_rows(model: GearboxModel, meshes: Collection[int]) -> np.ndarray:
+    """Rows (M, 6n) of the approach of the flanks of all meshes in the middle of their slices; zero of these ones."""
     assembly = model.assembly
     found = np.zeros((len(assembly.contacts), assembly.count))
     for number, part in enumerate(assembly.slices):
-        if number not in stage.meshes:
+        if number not in meshes:
             found[number] = assembly.columns[:, part].mean(axis=1)
     return found
 
 
 def _stage_lines(
-    found: Deflection,
-    stage: StageModel,
-    structured: StructuredStage,
-    outputs: np.ndarray,
-    factors: np.ndarray,
-    paths: CasingPaths | None,
+    found: Deflection, part: _ExcitingPart, outputs: np.ndarray, factors: np.ndarray, paths: CasingPaths | None
 ) -> StageLines:
     """Lines of one stage at all speeds, of outputs (k, m) per unit of a mode, the last ones approaches of meshes."""
-    model, running = found.model, structured.running
+    model, stage, running = found.model, part.stages[0], part.structured.running
     measured, up_to = len(outputs) - len(model.assembly.contacts), model.case.dynamics.up_to
     mesh = 2.0 * math.pi * model.flow.mesh_frequency[stage.name]
-    section = stage.section
-    carrier = 0.0
-    if isinstance(section, BoxPlanetarySection) and section.carrier != CASING:
-        carrier = abs(model.flow.speed[section.carrier])
+    carrier = _carrier_speed(model, stage) if part.structured.orbit is not None else 0.0
     most = model.case.dynamics.mesh_harmonics or _MOST
     counts = np.clip(np.floor(2.0 * math.pi * up_to / (mesh * factors) * (1.0 + 1e-12)), 1, most).astype(int)
 
     def solve(i: int) -> RunningResponse:
-        both, bands = (int(counts[i]), int(counts[i])), model.case.dynamics.side_bands if stage.planets else 0
+        both, bands = (int(counts[i]), int(counts[i])), 0
+        if part.structured.orbit is not None:
+            bands = model.case.dynamics.side_bands
         known = {"harmonics": both, "side_bands": bands, "tolerance": model.case.dynamics.tolerance}
         return solve_running(running, mesh * factors[i], carrier * factors[i], **known)
 
     widest, sensors = solve(int(counts.argmax())), gearbox_sensors(model.case)
-    on_own_ring = [number for number, sensor in enumerate(sensors) if sensor.ring == stage.name]
+    on_own_ring = [number for number, sensor in enumerate(sensors) if sensor.ring == part.name]
     places = np.array([sensors[i].angle for i in on_own_ring]), np.array([sensors[i].on_ring for i in on_own_ring])
-    harmonic, band, at = _line_numbers(widest, running.paths.symmetry, ring_lines(running, widest, *places))
+    on_ring = ring_lines(running, widest, *places)
+    harmonic, band, at = _line_numbers(widest, running.paths.symmetry, on_ring, on_pins=part.forces is not None)
     precision = np.complex64 if len(factors) > _MANY else np.complex128
     motion = np.zeros((len(factors), measured, len(harmonic)), precision)
-    kinds, count = running.kinds, max(len(stage.planets), 1)
+    count = len(running.paths.planet_angles)
+    kinds = len(range(running.kinds)[part.own])
     force, dynamic = np.zeros((len(factors), kinds, 3)), np.zeros((len(factors), kinds))
     approach, figures = np.full((len(factors), len(outputs) - measured), np.nan), np.zeros((5, len(factors)))
     by_path = None
     if paths is not None:
         by_path = np.zeros((len(factors), len(paths.names), len(paths.sensors), len(harmonic)), complex)
-    mean = running.excitation.force.mean(axis=1).reshape(kinds, count).mean(axis=1)
+    mean = running.excitation.force.mean(axis=1).reshape(-1, count)[part.own].mean(axis=1)
 
     def keep(i: int) -> None:
         response = widest if i == int(counts.argmax()) else solve(i)
@@ -323,46 +394,98 @@ def _stage_lines(
         motion[i][:, few] = amplitude[:, :measured].T
         approach[i] = np.sqrt(0.5 * (np.abs(amplitude[:, measured:]) ** 2).sum(axis=0))
         if paths is not None and by_path is not None:
-            forces = response.one_sided(forces_on_casing(paths, found, stage, structured, response))
-            moved = response.lines(structured.motion[paths.places].T)[harmonic[few], at[few]].T
+            forces = response.one_sided(forces_on_casing(paths, found, part.name, part.structured, response))
+            moved = response.lines(part.structured.motion[paths.places].T)[harmonic[few], at[few]].T
             omega = response.frequency[harmonic[few], at[few]]
             by_path[i][..., few] = paths.heard(np.moveaxis(forces[harmonic[few], at[few]], 0, -1), moved, omega)
-        low, high, dynamic[i] = _extremes(response, kinds)
+        if part.forces is not None:
+            motion[i][:, few] += _on_pins(part.forces, model, response, measured, (harmonic[few], at[few])).T
+            _add_branch_meshes(approach[i], part.forces, model, response)
+        low, high, dynamic[i] = _extremes(response, part.own)
         force[i] = np.stack([mean, mean + high, mean + low], axis=1)
         figures[:, i] = response.residual, response.radius, *response.tail, response.products
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         list(pool.map(keep, range(len(factors))))
-    approach[:, list(stage.meshes)] = np.nan
+    approach[:, list(part.meshes)] = np.nan
     nominal = abs(model.flow.speed[reference_shaft(model)])
     order = (harmonic * mesh + band * carrier) / nominal
-    stiffness = running.excitation.stiffness
-    mean_stiffness = stiffness.reshape(kinds, -1).mean(axis=1)
-    spread = stiffness.std(axis=1).reshape(kinds, count).max(axis=1)
+    stiffness = running.excitation.stiffness.reshape(running.kinds, count, -1)[part.own]
+    mean_stiffness = stiffness.mean(axis=(1, 2))
+    spread = stiffness.std(axis=2).max(axis=1)
     residual, radius, tail, outer, products = figures
-    lines = stage.name, harmonic, band, order, motion, force, mean_stiffness, spread, dynamic, approach
-    return StageLines(*lines, residual, radius, tail, outer, products.astype(int), counts, by_path)
+    lines = part.name, harmonic, band, order, motion, force, mean_stiffness, spread, dynamic, approach
+    solved = residual, radius, tail, outer, products.astype(int), counts
+    return StageLines(*lines, *solved, part.meshes, _varying(part), by_path)
+
+
+def _varying(part: _ExcitingPart) -> tuple[int, ...]:
+    """Numbers of the meshes whose k(t) acts on the motion: of branches those of all kinds of one mesh frequency."""
+    if part.forces is None:
+        return part.meshes
+    kinds = range(part.structured.running.kinds)
+    return tuple(mesh for mesh, (_, point) in part.forces.meshes.items() if point in kinds)
+
+
+def _carrier_speed(model: GearboxModel, stage: StageModel) -> float:
+    """Speed of the carrier of a stage, without sign [rad/s]."""
+    carrier = stage.section.carrier
+    return 0.0 if carrier is None or carrier == CASING else abs(model.flow.speed[carrier])
+
+
+def _on_pins(
+    forces: BranchForces, model: GearboxModel, response: RunningResponse, outputs: int, lines: tuple[np.ndarray, ...]
+) -> np.ndarray:
+    """Lines (L, outputs) of the forces of bearings on pins on their planets, along the axes of the planet [N].
+
+    ``lines`` are harmonics and places of the side bands of the structure.
+    """
+    found, sensors = np.zeros((len(lines[0]), outputs), complex), len(gearbox_sensors(model.case))
+    places = response.orders.place(response.band[lines[1]])
+    there = places < len(response.orders.bands)
+    for bearing, (branch, points, ways) in forces.pins.items():
+        group, turn = response.leaders[branch]
+        pushed = np.einsum("cbr,cw->brw", response.force[group, points], ways)
+        whole = response.orders.base[:, None] + response.orders.bands
+        N = response.orders.paths.symmetry
+        pushed = pushed * np.exp(2j * math.pi * (response.orders.sense * turn * (whole % N) % N) / N)[..., None]
+        at = sensors + 3 * bearing + np.arange(3)
+        found[np.ix_(there, at)] = 2.0 * pushed[lines[0][there], places[there]]
+    return found
+
+
+def _add_branch_meshes(
+    approach: np.ndarray, forces: BranchForces, model: GearboxModel, response: RunningResponse
+) -> None:
+    """Add the r.m.s. approaches of the meshes on the carrier, by their forces, to those (M,) of the structure [m]."""
+    loss = abs(1.0 + 2j * model.case.modes.damping_ratio)
+    for mesh, (branch, point) in forces.meshes.items():
+        force = response.force[response.leaders[branch][0], point]
+        energy = 2.0 * (np.abs(force) ** 2).sum() - (np.abs(force[0]) ** 2).sum()
+        approach[mesh] = math.sqrt(energy) / (loss * model.assembly.contacts[mesh].stiffness.sum())
 
 
 def _line_numbers(
-    response: RunningResponse, symmetry: int, on_ring: np.ndarray
+    response: RunningResponse, symmetry: int, on_ring: np.ndarray, *, on_pins: bool = False
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Harmonic and side band (L,) of the lines of structure and ring, and the places of these bands."""
+    """Harmonic and side band (L,) of the lines of structure, ring and pins, and the places of these bands."""
     moved = (np.abs(response.modal).max(axis=2) > 0.0) | (np.abs(on_ring).max(axis=2, initial=0.0) > 0.0)
     if symmetry > 1:
         moved[0, response.band % symmetry != 0] = False
+    if on_pins:
+        moved |= np.abs(response.band) <= response.orders.bands[-1]
     moved[0, response.band <= 0] = False
     harmonic, at = np.nonzero(moved)
     return harmonic, response.band[at], at
 
 
-def _extremes(response: RunningResponse, kinds: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Smallest and largest force (kinds,) of the leading meshes beyond their mean, and its r.m.s. [N].
+def _extremes(response: RunningResponse, own: slice) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Smallest and largest force (kinds,) of the leading meshes of own kinds beyond their mean, and its r.m.s. [N].
 
     Over a mesh period and a turn of the carrier, which are seldom in a small ratio.
     """
-    force = response.force[:, :kinds]
-    leaders, _, lines, bands = force.shape
+    force = response.force[:, : response.kinds][:, own]
+    leaders, kinds, lines, bands = force.shape
     points = max(_INSTANTS, 4 * lines)
     spectrum = np.zeros((leaders, kinds, points, bands), complex)
     spectrum[:, :, :lines] = 2.0 * force

@@ -92,6 +92,8 @@ class GearboxResponseResult(StageResult):
             variables |= _complex("bearing_force", "speed bearing axis line", lines, "N", text)
         variables |= {} if self.frictionless is None else _by_friction(found, self.frictionless, sensors, bearings)
         variables |= _of_several(found)
+        text = "exciting stage that the mesh is of; empty of others"
+        variables["stage_of_mesh"] = ("mesh", _stages_of_meshes(found), "1", text)
         names = [stage.name for stage in found.stages]
         coords: dict[str, Any] = {
             "speed": (("speed",), found.speed / RPM, "rpm", f"speed of {found.reference}"),
@@ -171,6 +173,12 @@ def _by_friction(found: GearboxResponse, without: GearboxResponse, sensors: int,
 def _decibels(level_with: np.ndarray, level_without: np.ndarray) -> np.ndarray:
     with np.errstate(divide="ignore", invalid="ignore"):
         return 20.0 * np.log10(level_with / level_without)
+
+
+def _stages_of_meshes(found: GearboxResponse) -> list[str]:
+    """Names of the exciting stages of all meshes."""
+    names = {mesh: stage.name for stage in found.stages for mesh in stage.meshes}
+    return [names.get(mesh, "") for mesh in range(len(found.deflection.model.assembly.contacts))]
 
 
 def _of_several(found: GearboxResponse) -> dict[str, tuple]:

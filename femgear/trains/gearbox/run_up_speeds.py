@@ -22,6 +22,7 @@ from femgear.trains.gearbox.elastic_ring import elastic_rings, with_rings
 from femgear.trains.gearbox.excitation import excitation_of, exciting_stages
 from femgear.trains.gearbox.model import StageModel, reference_shaft
 from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.planet_branches import joint_names
 from femgear.trains.gearbox.sensors import gearbox_sensors, sensor_rows
 
 _MOST = 1000
@@ -90,7 +91,7 @@ def gearbox_resonances(
         at_sensors += (ring.sensor_rows(gearbox_sensors(case)) @ part).T
         count += len(ring.stiffness)
     up_to, nominal = case.dynamics.up_to, abs(model.flow.speed[reference_shaft(model)])
-    parts, names = [np.zeros((5, 0))], list[str]()
+    parts, names, joint = [np.zeros((5, 0))], list[str](), joint_names(case)
     for stage in exciting_stages(found):
         excitation = excitation_of(found, stage, rings, steps=steps)
         mesh_turns = model.flow.mesh_frequency[stage.name] / nominal
@@ -106,7 +107,7 @@ def gearbox_resonances(
         heard = forces.heard[met.row, met.harmonic - 1]
         modal = forces.damping_ratio[met.row], met.harmonic, forces.frequency[met.row]
         parts.append(np.array([met.mesh_frequency / mesh_turns, heard, *modal]))
-        names += [stage.name] * len(met.row)
+        names += [joint.get(stage.name, stage.name)] * len(met.row)
     speed, heard, damping, harmonic, frequency = np.concatenate(parts, axis=1)
     return GearboxResonances(speed, heard, damping, tuple(names), harmonic.astype(int), frequency)
 

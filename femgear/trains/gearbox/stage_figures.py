@@ -57,7 +57,8 @@ def draw_stage_forces(runup: xr.Dataset) -> Figure | None:
         return None
     speed, meshes = runup["speed"].values, [str(mesh) for mesh in runup["mesh"].values]
     names = [str(name) for name in runup["stage"].values]
-    first = [meshes.index(name if name in meshes else f"{name} sun-planet 1") for name in names]
+    of_stage = [str(name) for name in runup["stage_of_mesh"].values]
+    first = [of_stage.index(name) for name in names]
     figure, axes = new_figure(rows=len(names), width=8.5, height=1.2 + 2.1 * len(names), sharex=True)
     for ax, mesh in zip(axes, first, strict=True):
         parts = runup["mesh_force_by_stage"].values[:, mesh]

@@ -8,7 +8,7 @@ these where they are. Planets of the stage run around in it (`femgear.housing.tw
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -27,8 +27,8 @@ from femgear.housing.two_way.running_planets import RING, RubbingPoints, Running
 from femgear.solvers.linear.modal import undamped_modes
 from femgear.stages.friction_source import friction_on_meshes
 from femgear.stages.static import over_width, record_positions, static_supports
-from femgear.system.assembly import GROUND, Assembly, Inertia
-from femgear.system.system import MechanicalSystem, MeshExcitation
+from femgear.system.assembly import GROUND, Assembly, Contact, Inertia
+from femgear.system.system import MechanicalSystem, MeshExcitation, Modes
 from femgear.trains.gearbox.carrier import pin_axes, pin_compliance
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, teeth_of
 from femgear.trains.gearbox.contact import StageContact
@@ -93,6 +93,14 @@ def stage_excitation(
 
 
 @dataclass(frozen=True)
+class Orbit:
+    """The circle that planets run on: ``angle`` of the first one [rad], ``centre`` (3,) of the carrier [m]."""
+
+    angle: float
+    centre: np.ndarray
+
+
+@dataclass(frozen=True)
 class RingInStructure:
     """An elastic ring in the structure of a stage.
 
@@ -127,6 +135,8 @@ class StructuredStage:
         Whether these belong to meshes; the others are those of its pin.
     rings : tuple of RingInStructure
         Elastic rings in the structure: of other stages, and of its own ring what moves with the casing.
+    orbit : Orbit or None
+        Of the planets; None of a pair.
     """
 
     running: RunningStage
@@ -134,6 +144,7 @@ class StructuredStage:
     rows: tuple[Row, ...]
     of_meshes: np.ndarray
     rings: tuple[RingInStructure, ...] = ()
+    orbit: Orbit | None = None
 
     def at_sensors(self, rows: np.ndarray, sensors: Sequence[BoxSensor]) -> np.ndarray:
         """Displacements (s, m) of sensors by the modes, of which all motions make those by the rows (s, 6n)."""
@@ -158,17 +169,7 @@ def running_stage(
     """
     ring = next((ring for ring in rings if ring.stage.name == stage.name), None)
     joined = tuple(other.with_structure if other is ring else other for other in rings)
-    assembly, system, slices = structure_without(found, stage, joined)
-    modes = undamped_modes(system, slices, damping_ratio=0.0)
-    count = assembly.motions.shape[1]
-    motion, inner = assembly.motions @ modes.shape[:count], list[RingInStructure]()
-    pressed = spring_forces(system, slices, modes.shape)
-    for other in joined:
-        names = {found.model.assembly.contacts[mesh].name for mesh in other.stage.meshes}
-        ours = [part for part, contact in zip(assembly.slices, assembly.contacts, strict=True) if contact.name in names]
-        pushed = -sum((assembly.columns[:, part] @ pressed[part] for part in ours), np.zeros_like(motion))
-        inner.append(RingInStructure(other, modes.shape[count : count + len(other.stiffness)], pushed))
-        count += len(other.stiffness)
+    modes, motion, inner = structure_modes(found, structure_without(found, stage, joined), joined)
     damping = found.model.case.modes.damping_ratio
     section = stage.section
     planetary = isinstance(section, BoxPlanetarySection)
@@ -187,11 +188,12 @@ def running_stage(
         rows, stiffness, of_meshes = [*rows, *pins], np.append(stiffness, springs), of_meshes + [False] * len(pins)
         points = np.vstack([points, np.eye(6)[used]])
         mass, gyroscopic, turning = _planet(found.model, stage)
-    shape = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rows])
+    orbit = _orbit(stage, found.model.assembly.places)
+    shape = np.array([shape_waves(row, orbit, motion, found.model.assembly.places) for row in rows])
     waves, rubbing = None, None
     if excitation.source is not None:
         rubbed, sliding = rubbing_rows(found, stage)
-        of_friction = np.array([_waves(row, stage, motion, found.model.assembly.places) for row in rubbed])
+        of_friction = np.array([shape_waves(row, orbit, motion, found.model.assembly.places) for row in rubbed])
         rows, of_meshes = [*rows, *rubbed], of_meshes + [True] * len(rubbed)
         rubbing = RubbingPoints(of_friction, sliding.T[free])
     if ring is not None:
@@ -221,7 +223,33 @@ def running_stage(
         ring=waves,
         rubbing=rubbing,
     )
-    return StructuredStage(running, motion, tuple(rows), np.array(of_meshes), tuple(inner))
+    return StructuredStage(running, motion, tuple(rows), np.array(of_meshes), inner, orbit)
+
+
+def _orbit(stage: StageModel, places: np.ndarray) -> Orbit | None:
+    """Circle of the planets of a stage; None of a pair."""
+    return Orbit(stage.angles[0], stage_centre(stage, places)) if stage.planets else None
+
+
+def structure_modes(
+    found: Deflection, structure: tuple[Assembly, MechanicalSystem, np.ndarray], joined: Sequence[ElasticRing]
+) -> tuple[Modes, np.ndarray, tuple[RingInStructure, ...]]:
+    """Modes of a structure, the motions (6n, m) of all stations by them [kg^-1/2], and elastic rings in it.
+
+    The structure is that of `structure_apart`, with the coordinates of the rings.
+    """
+    assembly, system, slices = structure
+    modes = undamped_modes(system, slices, damping_ratio=0.0)
+    count = assembly.motions.shape[1]
+    motion, inner = assembly.motions @ modes.shape[:count], list[RingInStructure]()
+    pressed = spring_forces(system, slices, modes.shape)
+    for other in joined:
+        names = {found.model.assembly.contacts[mesh].name for mesh in other.stage.meshes}
+        ours = [part for part, contact in zip(assembly.slices, assembly.contacts, strict=True) if contact.name in names]
+        pushed = -sum((assembly.columns[:, part] @ pressed[part] for part in ours), np.zeros_like(motion))
+        inner.append(RingInStructure(other, modes.shape[count : count + len(other.stiffness)], pushed))
+        count += len(other.stiffness)
+    return modes, motion, tuple(inner)
 
 
 def _ring_waves(ring: ElasticRing, wave: np.ndarray, inner: np.ndarray) -> np.ndarray:
@@ -255,28 +283,48 @@ def structure_without(
 
     Coordinates of elastic ``rings`` follow those of the assembly.
     """
-    assembly, _, stiffness = linear_system(found)
     carrier = stage.elastic_carrier
     gone = {*stage.planets, *(carrier.stations[1:] if carrier else ())}
+    rigid = [_rigid_carrier(found.model, stage)] if carrier is not None and carrier.stations[0] != GROUND else []
+    return structure_apart(found, gone, stage.meshes, rings, rigid)
+
+
+def structure_apart(
+    found: Deflection,
+    gone: Set[int],
+    meshes: Collection[int],
+    rings: Sequence[ElasticRing] = (),
+    added: Sequence[Inertia] = (),
+) -> tuple[Assembly, MechanicalSystem, np.ndarray]:
+    """Take stations, all that acts on them, and meshes out of the linear gearbox; stiffness (g,) of what is left [N/m].
+
+    Parameters
+    ----------
+    found : Deflection
+        Loaded state.
+    gone, meshes : set and collection of int
+        Numbers of stations and of contacts.
+    rings : sequence of ElasticRing
+        Whose coordinates follow those of the assembly.
+    added : sequence of Inertia
+        In the place of what is gone.
+    """
+    assembly, _, stiffness = linear_system(found)
     held = assembly.held.copy()
     for station in gone:
         held[6 * station : 6 * station + 6] = True
-    inertias = [one for one in assembly.inertias if gone.isdisjoint(one.stations)]
-    if carrier is not None and carrier.stations[0] != GROUND:
-        inertias.append(_rigid_carrier(found.model, stage))
-    kept = np.concatenate(
-        [np.full(part.stop - part.start, i not in stage.meshes) for i, part in enumerate(assembly.slices)]
-    )
+    kept = np.concatenate([np.full(part.stop - part.start, i not in meshes) for i, part in enumerate(assembly.slices)])
     rest = replace(
         assembly,
         held=held,
-        inertias=tuple(inertias),
+        inertias=(*(one for one in assembly.inertias if gone.isdisjoint(one.stations)), *added),
+        beams=tuple(one for one in assembly.beams if gone.isdisjoint(one.stations)),
         springs=tuple(one for one in assembly.springs if gone.isdisjoint(one.stations)),
-        contacts=tuple(one for i, one in enumerate(assembly.contacts) if i not in stage.meshes),
+        contacts=tuple(one for i, one in enumerate(assembly.contacts) if i not in meshes),
     )
     system, first, slices = rest.system(), 0, dict[int, slice]()
     for number, part in enumerate(assembly.slices):
-        if number not in stage.meshes:
+        if number not in meshes:
             slices[number] = slice(first, first + part.stop - part.start)
             first = slices[number].stop
     return rest, *with_rings(replace(system, gyroscopic=None), stiffness[kept], rest, slices, rings)
@@ -304,14 +352,9 @@ def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndar
     approach, slope = [], []
     axes = np.kron(np.eye(2), pin_axes(stage.angles[0])) if stage.planets else np.eye(6)
     for mesh in stage.meshes[::count]:
-        contact, k = assembly.contacts[mesh], stiffness[assembly.slices[mesh]]
-        weight = k / k.sum()
-        mean = np.einsum("s,gsm->gm", weight, contact.approach)
-        height = contact.heights - weight @ contact.heights
-        tilt = np.zeros_like(mean)
-        if len(k) > 1:
-            tilt = (contact.approach[:, -1] - contact.approach[:, 0]) / (contact.heights[-1] - contact.heights[0])
-        for kept, rows, value in ((approach, mean, k.sum()), (slope, tilt, float(k @ height**2))):
+        contact = assembly.contacts[mesh]
+        springs = springs_of_mesh(contact, stiffness[assembly.slices[mesh]])
+        for kept, (rows, value) in zip((approach, slope), springs, strict=True):
             if value > 0.0:
                 kept.append((contact.stations, rows, value))
     rows, points, springs = list[Row](), [], []
@@ -322,6 +365,22 @@ def _mesh_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndar
         points.append(axes @ planet[0] if planet else np.zeros(6))
         springs.append(value)
     return rows, np.array(springs), np.array(points)
+
+
+def springs_of_mesh(
+    contact: Contact, stiffness: np.ndarray
+) -> tuple[tuple[np.ndarray, float], tuple[np.ndarray, float]]:
+    """Springs of a mesh by the stiffness (S,) of its slices: of their approach, and of its slope along the width.
+
+    Rows (2, 6) by the motions of both stations, and stiffness [N/m, N m/rad].
+    """
+    weight = stiffness / stiffness.sum()
+    mean = np.einsum("s,gsm->gm", weight, contact.approach)
+    height = contact.heights - weight @ contact.heights
+    tilt = np.zeros_like(mean)
+    if len(stiffness) > 1:
+        tilt = (contact.approach[:, -1] - contact.approach[:, 0]) / (contact.heights[-1] - contact.heights[0])
+    return (mean, float(stiffness.sum())), (tilt, float(stiffness @ height**2))
 
 
 def rubbing_rows(found: Deflection, stage: StageModel) -> tuple[list[Row], np.ndarray]:
@@ -392,21 +451,21 @@ def _pin_rows(
     return rows, bearing[used], flexibility
 
 
-def row_waves(row: Row, stage: StageModel, station: int, places: np.ndarray) -> np.ndarray:
+def row_waves(row: Row, orbit: Orbit | None, station: int, places: np.ndarray) -> np.ndarray:
     """Approach (W, 6) of a contact point by the motions of a station, as the planet runs around.
 
     Waves -1, 0, 1; of a pair 0 alone. ``places`` (n, 3) are those of all stations [m]. A station beside the axis of the
     stage, such as the centre of a casing, counts with the motions of the point on the axis: only these turn with the
     planet.
     """
-    waves, effect = np.zeros((3 if stage.planets else 1, 6), complex), np.zeros(6)
+    waves, effect = np.zeros((1 if orbit is None else 3, 6), complex), np.zeros(6)
     for place, part in row:
         effect = effect + part if place == station else effect
-    if not stage.planets:
+    if orbit is None:
         waves[0] = effect
         return waves
-    beside = np.append((stage_centre(stage, places) - places[station])[:2], 0.0)
-    there, turn = effect @ rigid_link(-beside), np.exp(-1j * stage.angles[0])
+    beside = np.append((orbit.centre - places[station])[:2], 0.0)
+    there, turn = effect @ rigid_link(-beside), np.exp(-1j * orbit.angle)
     waves[1, [2, 5]] = there[[2, 5]]
     for first in (0, 3):
         x, y = there[first : first + 2]
@@ -417,11 +476,11 @@ def row_waves(row: Row, stage: StageModel, station: int, places: np.ndarray) -> 
     return waves @ rigid_link(beside)
 
 
-def _waves(row: Row, stage: StageModel, motion: np.ndarray, places: np.ndarray) -> np.ndarray:
+def shape_waves(row: Row, orbit: Orbit | None, motion: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Approach (W, m) of a contact point by modes whose motions (6n, m) are given, as the planet runs around."""
-    shape = np.zeros((3 if stage.planets else 1, motion.shape[1]), complex)
+    shape = np.zeros((1 if orbit is None else 3, motion.shape[1]), complex)
     for station in {station for station, _ in row}:
-        shape += row_waves(row, stage, station, places) @ motion[6 * station : 6 * station + 6]
+        shape += row_waves(row, orbit, station, places) @ motion[6 * station : 6 * station + 6]
     return shape
 
 
@@ -445,11 +504,11 @@ def in_time(
     section, flow = stage.section, model.flow
     if not isinstance(section, BoxPlanetarySection):
         turns = flow.speed[section.shafts[0]] - flow.speed[section.carrier or CASING]
-        return _reversed(excitation, back=turns < 0.0), MeshPaths(1, (0.0,)), 1
+        return reversed_in_time(excitation, back=turns < 0.0), MeshPaths(1, (0.0,)), 1
     carrier = flow.speed[section.carrier] if section.carrier != CASING else 0.0
     sun = flow.speed[section.sun] if section.sun != CASING else 0.0
     ring = flow.speed[section.ring] if section.ring != CASING else 0.0
-    excitation = _reversed(excitation, back=sun < carrier)
+    excitation = reversed_in_time(excitation, back=sun < carrier)
     sense = -1 if carrier < 0.0 else 1
     teeth = stage.sizes.teeth[2] * sense * (1 if carrier > ring else -1)
     count = _alike(section, stage.angles)
@@ -474,7 +533,7 @@ def _alike(section: BoxPlanetarySection, angles: Sequence[float]) -> int:
     return max(count for count, one in turned.items() if np.abs(one - places).min(axis=1).max() < 1e-6)
 
 
-def _reversed(excitation: MeshExcitation, *, back: bool) -> MeshExcitation:
+def reversed_in_time(excitation: MeshExcitation, *, back: bool) -> MeshExcitation:
     """Excitation of gears that turn the other way round."""
     if not back:
         return excitation

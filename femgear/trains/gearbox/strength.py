@@ -246,9 +246,10 @@ def _computed_factors(data: Any, response: Any) -> np.ndarray:
     """K_v (M,) of the response for every mesh of deflection.nc; NaN of stages that it has not."""
     factor = response["dynamic_factor"].max("speed").values
     rows = {str(name): row for row, name in enumerate(response["stage"].values)}
-    names = [str(name) for name in data["stage"].values]
+    exciting = dict(zip(response["mesh"].values, response["stage_of_mesh"].values, strict=True))
     computed = np.full(data.sizes["mesh"], np.nan)
     for mesh, (stage, kind) in enumerate(data["iso_place"].values.tolist()):
-        if stage >= 0 and names[stage] in rows:
-            computed[mesh] = factor[rows[names[stage]], kind]
+        name = str(exciting[data["mesh"].values[mesh]])
+        if stage >= 0 and name in rows:
+            computed[mesh] = factor[rows[name], kind]
     return computed

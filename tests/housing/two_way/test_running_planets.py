@@ -251,6 +251,39 @@ def test_bodies_in_common_are_springs_in_series():
     assert np.abs(both[0].modal - both[1].modal).max() < 1e-9 * np.abs(both[0].modal).max()
 
 
+@pytest.mark.parametrize("symmetry", [3, 1])
+def test_planets_that_bend_have_springs_between_their_own_motions(symmetry):
+    """Springs of a planet against itself, which meet no structure, are contact points too."""
+    stage = replace(running(twin(3, 13), symmetry=symmetry), viscous=np.zeros(4), loss=np.full(4, 0.04))
+    stage = replace(stage, structure_loss=0.04)
+    ways = np.array(
+        [[1.0, 0.0, 0.3, 0.0, -0.2, 0.1], [0.0, 1.0, 0.0, 0.4, -1.0, 0.0], [0.2, 0.0, 1.0, -0.5, 0.0, -1.0]]
+    )
+    nothing = np.zeros((3, 3))
+    parts = {
+        "mass": np.block([[stage.mass, nothing], [nothing, 0.7 * stage.mass]]),
+        "gyroscopic": np.zeros((6, 6)),
+        "turning": np.block([[stage.turning, nothing], [nothing, stage.turning]]),
+        "approach": np.vstack([stage.approach * [1, 0, 1, 0], stage.approach * [0, 1, 0, 1]]),
+    }
+    springs = np.array([2e7, 1e7, 3e7])
+    bending = replace(stage, **parts, elastic=(ways.T * springs) @ ways)
+    beside = parts | {"approach": np.hstack([parts["approach"], ways.T])}
+    widened = np.concatenate([stage.shape, np.zeros((3, *stage.shape.shape[1:]))])
+    joined = replace(
+        stage,
+        **beside,
+        shape=widened,
+        stiffness=np.append(stage.stiffness, springs),
+        loss=np.full(7, 0.04),
+        viscous=np.zeros(7),
+    )
+    known = {"harmonics": (2, 4), "side_bands": 5, "tolerance": 1e-13}
+    bent, sprung = (solve_running(one, 13 * TURN, TURN, **known) for one in (bending, joined))
+    assert np.abs(bent.modal - sprung.modal).max() < 1e-9 * np.abs(sprung.modal).max()
+    assert np.abs(bent.force - sprung.force[:, :4]).max() < 1e-9 * np.abs(sprung.force).max()
+
+
 def test_an_undamped_resonance_is_refused():
     system = twin(3, 13)
     stage = replace(running(system), damping_ratio=np.zeros(11), viscous=np.zeros(4))

@@ -75,18 +75,21 @@ def test_what_the_stiffness_of_a_stage_does_on_the_motion_of_another_is_told():
     assert np.isnan(stage.approach).all()
     model = replace(found.deflection.model, stages=tuple(replace(found.deflection.model.stages[0]) for _ in range(2)))
     moved = replace(stage, approach=np.full((2, 1), 3e-8), spread=np.array([2e7]), dynamic_force=np.full((2, 1), 6.0))
+    moved = replace(moved, varying=())  # as of other meshes
     both = replace(found, deflection=replace(found.deflection, model=model), stages=(moved, moved))
     cross = both.cross_excitation
     # over the force by both stages, which are equally strong here
     assert cross[:, 0, 1] == pytest.approx(np.sqrt([0.005, 0.005]))
     assert not cross[:, 0, 0].any()
+    together = replace(moved, varying=(0,))
+    assert not replace(both, stages=(together, together)).cross_excitation.any()
 
 
 def test_rows_of_other_meshes_are_their_approach():
     found = pair_in_a_casing()
     stage = found.model.stages[0]
-    assert not mesh_rows(found.model, stage).any()
-    other = mesh_rows(found.model, replace(stage, meshes=()))
+    assert not mesh_rows(found.model, stage.meshes).any()
+    other = mesh_rows(found.model, ())
     assert other[0] == pytest.approx(found.model.assembly.columns.mean(axis=1))
 
 

@@ -37,6 +37,7 @@ def response_data(*, speeds=5, sensors=2) -> xr.Dataset:
             "lines_imag": (("speed", "sensor", "line"), lines[1]),
             "dynamic_factor": (("speed", "stage", "kind"), factor),
             "mesh_force_by_stage": (("speed", "mesh", "stage"), rng.uniform(1.0, 9.0, (speeds, 2, 2))),
+            "stage_of_mesh": ("mesh", STAGES),
             "order": ("line", order),
             "origin": ("line", ["first"] * 3 + ["second"] * 5),
             "harmonic": ("line", [1, 2, 3, 1, 2, 2, 2, 0]),

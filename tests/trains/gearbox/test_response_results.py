@@ -33,9 +33,11 @@ def test_the_file_has_levels_lines_and_forces(data):
         "line": 7,
         "sensor": 3,
         "bearing": 4,
+        "mesh": 1,
         "axis": 3,
         "foot": 4,
     }
+    assert data["stage_of_mesh"].values.tolist() == ["stage"]
     assert data["speed"].values == pytest.approx([1000.0, 2500.0])
     lines = np.hypot(data["lines_real"], data["lines_imag"]).values
     assert data["level"].values == pytest.approx(np.sqrt(0.5 * (lines**2).sum(axis=2)))

@@ -27,7 +27,9 @@ def forces_data() -> xr.Dataset:
     force = np.arange(1.0, 19.0).reshape(3, 3, 2)
     meshes = ["first sun-planet 1", "first planet 1-ring", "second"]
     coords = {"speed": [100.0, 200.0, 300.0], "mesh": meshes, "stage": STAGES}
-    return xr.Dataset({"mesh_force_by_stage": (("speed", "mesh", "stage"), force)}, coords, {"reference": "input"})
+    of_stage = "mesh", ["first", "first", "second"]
+    forces = {"mesh_force_by_stage": (("speed", "mesh", "stage"), force), "stage_of_mesh": of_stage}
+    return xr.Dataset(forces, coords, {"reference": "input"})
 
 
 def test_every_class_has_a_panel_with_the_shares_of_the_stages():

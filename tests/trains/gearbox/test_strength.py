@@ -149,7 +149,11 @@ def test_the_verdict_has_the_dynamic_factor_of_the_response(data):
     assert text.startswith(f"{least:.2f}, ") and ", full: sigma_F0" in text
     factor = np.array([[[3.0, 3.0], [3.0, np.nan]]])
     response = xr.Dataset(
-        {"dynamic_factor": (("speed", "stage", "kind"), factor)}, coords={"stage": ["pair stage", "set"]}
+        {
+            "dynamic_factor": (("speed", "stage", "kind"), factor),
+            "stage_of_mesh": ("mesh", ["pair stage", *["set"] * (data.sizes["mesh"] - 1)]),
+        },
+        coords={"stage": ["pair stage", "set"], "mesh": data["mesh"].values},
     )
     running = dict(smallest_safeties(data.assign_attrs(load_case=1), response, Marks(())))
     expected = np.nanmin(data["iso_root_safety"].values[1] * data["iso_dynamic_factor"].values[1, :, None] / 3.0)

@@ -1,0 +1,101 @@
+"""Planets that are shafts run around: as those of a planetary stage, lines by symmetry, one planet as all of them."""
+
+import numpy as np
+import pytest
+from planet_gearboxes import (
+    in_casing,
+    known_set,
+    lines_apart,
+    lines_of,
+    outer_lines,
+    planet_shaft,
+    responded,
+    simple_set,
+    stepped_set,
+)
+
+from femgear.trains.gearbox.planet_branches import running_sets
+from femgear.trains.gearbox.planet_shafts import standing_planets
+from femgear.trains.gearbox.response_results import GearboxResponseResult
+from femgear.trains.reading import read_case
+
+
+@pytest.mark.parametrize(
+    ("fixed", "torque", "motions", "planets"),
+    [
+        ("ring", 100.0, "space", 3),
+        ("ring", -80.0, "plane", 4),
+        ("carrier", 100.0, "plane", 3),
+        ("sun", 90.0, "plane", 3),
+    ],
+)
+def test_simple_planets_run_around_as_those_of_a_planetary_stage(fixed, torque, motions, planets):
+    """Sensors on an uneven casing, bearings and feet, with k(t) of 30 % of all meshes."""
+    tables = {"fixed": fixed, "torque": torque, "motions": motions, "planets": planets}
+    own, known = (outer_lines(make, **tables) for make in (simple_set, known_set))
+    assert np.abs(known[1][:2]).max() > 1e-12
+    assert lines_apart(own, known) < 1e-9
+    assert len(own[0]) > 4 or fixed == "carrier" or planets == 4  # side bands beside four harmonics
+
+
+SEQUENTIAL = (25, 56, 28, 109)
+"""Planets one third of a mesh period after one another, at both meshes."""
+AROUND = {"sun-0..2": 56 * 109 // 28, "0..2-ring": 109}
+"""Mesh periods in a turn of the carrier against what stands."""
+
+
+def excited_set(teeth=SEQUENTIAL):
+    tables = stepped_set(teeth=teeth)
+    for stage in tables["pair"]:
+        stage["mesh"] |= {"contact_ratio": 1.63, "low_share": 0.8}
+    return tables
+
+
+def test_equal_stepped_planets_make_lines_that_their_symmetry_allows():
+    """Both base frequencies, of planets that are all solved for: even errors of zero make each one of its own."""
+    few, tables = responded(in_casing(excited_set(), harmonics=3)), excited_set()
+    planet_shaft(tables, 0)["pin_error"] = {}
+    every = responded(in_casing(tables, harmonics=3))
+    assert [stage.name for stage in every.stages] == ["0..2-ring", "sun-0..2"]
+    for stage, alike in zip(every.stages, few.stages, strict=True):
+        off = (stage.harmonic * AROUND[stage.name] + stage.side_band) % 3 != 0
+        size = np.abs(stage.motion[0, :2]).max(axis=1)
+        assert off.any() and (np.abs(stage.motion[0, :2][:, off]).max(axis=1) < 1e-10 * size).all()
+        heard = np.abs(alike.motion[0, :2]).max(axis=0) > 0.0
+        assert {1, -1} <= {*alike.side_band[heard].tolist()}
+        assert ((alike.harmonic * AROUND[stage.name] + alike.side_band)[heard] % 3 == 0).all()
+    assert lines_apart(lines_of(every, slice(None)), lines_of(few, slice(None))) < 1e-8
+
+
+def test_forces_on_pins_are_those_of_all_planets_alike():
+    found = responded(in_casing(excited_set()))
+    data = GearboxResponseResult(found, True).dataset()
+    names = [str(name) for name in data["bearing"].values]
+    pins = [number for number, name in enumerate(names) if name.startswith("pin")]
+    force = data["bearing_force_rms"].values[0, pins]
+    assert force[:, :2].min() > 0.0
+    np.testing.assert_allclose(force, np.broadcast_to(force[0], force.shape), rtol=1e-8, atol=1e-9 * force.max())
+
+
+def test_what_a_pin_error_changes_is_small_and_there():
+    tables = excited_set()
+    equal = responded(in_casing(tables))
+    planet_shaft(tables, 1)["pin_error"] = {"tangential": "3 um"}
+    uneven = responded(in_casing(tables))
+    order, amplitude = lines_of(uneven, slice(0, 2))
+    known = lines_of(equal, slice(0, 2))
+    silent = known[0][np.abs(known[1][0]) < 1e-12 * np.abs(known[1][0]).max()]
+    beside = np.abs(amplitude[0, np.isin(order, silent)])
+    assert max(beside) > 1e-4 * np.abs(amplitude[0]).max()
+
+
+@pytest.mark.parametrize("change", ["none", "alone", "unequal"])
+def test_planets_that_something_else_holds_stand(change):
+    tables = stepped_set()
+    if change == "alone":
+        tables["bearing"].append({"name": "more", "shaft": "p0", "radial": "1e5 N/m"})
+    if change == "unequal":
+        tables["bearing"].append({"name": "more", "shaft": "p0", "outer_shaft": "carrier", "radial": "1e5 N/m"})
+    case = read_case(tables)
+    assert len(running_sets(case)) == (change == "none")
+    assert [one.code for one in standing_planets(case)] == ([] if change == "none" else ["W-STANDING"])
