@@ -105,8 +105,7 @@ def branch_stage(
     kinds = [[stages[name] for name in names] for names in running.kinds]
     stations = [_stations(model, branch.planets) for branch in running.branches]
     gone, meshes = {at for own in stations for at in own}, {s.meshes[0] for names in kinds for s in names}
-    joined = tuple(ring.with_structure for ring in rings)
-    modes, motion, inner = structure_modes(found, structure_apart(found, gone, meshes, joined), joined)
+    modes, motion, inner = structure_modes(found, structure_apart(found, gone, meshes, rings), rings)
     frequencies = [model.flow.mesh_frequency[names[0].name] for names in kinds]
     together = [n for n, hertz in enumerate(frequencies) if math.isclose(hertz, frequencies[kind], rel_tol=1e-9)]
     order = [*together, *(n for n in range(len(kinds)) if n not in together)]

@@ -1,8 +1,11 @@
 """Planets that are shafts run around: as those of a planetary stage, lines by symmetry, one planet as all of them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from planet_gearboxes import (
+    COUNTED,
     in_casing,
     known_set,
     lines_apart,
@@ -14,9 +17,16 @@ from planet_gearboxes import (
     stepped_set,
 )
 
+from femgear.housing.two_way.running_planets import solve_running
+from femgear.system.system import MeshExcitation
+from femgear.trains.gearbox.deflection import solve_deflection
+from femgear.trains.gearbox.excitation import pair_count_excitation
 from femgear.trains.gearbox.planet_branches import running_sets
-from femgear.trains.gearbox.planet_shafts import standing_planets
+from femgear.trains.gearbox.planet_shafts import pair_phases, standing_planets
 from femgear.trains.gearbox.response_results import GearboxResponseResult
+from femgear.trains.gearbox.running_branches import branch_stage
+from femgear.trains.gearbox.sensors import sensor_rows
+from femgear.trains.gearbox.stage_structure import running_stage
 from femgear.trains.reading import read_case
 
 
@@ -99,3 +109,54 @@ def test_planets_that_something_else_holds_stand(change):
     case = read_case(tables)
     assert len(running_sets(case)) == (change == "none")
     assert [one.code for one in standing_planets(case)] == ([] if change == "none" else ["W-STANDING"])
+
+
+def rubbed(found):
+    """Excitations of all stages by counts of tooth pairs, with a friction of two harmonics at each."""
+    theta = 2.0 * np.pi * np.arange(512) / 512
+    listed = {}
+    for stage in found.model.stages:
+        count = 2 * len(stage.meshes)
+        drive = pair_count_excitation(found.model, stage)
+        source = np.outer(np.arange(1.0, count + 1.0), 3.0 * np.cos(theta) + np.sin(2.0 * theta))
+        whole = {name: getattr(drive, name)[:, :: drive.stiffness.shape[1] // 512][:, :512] for name in RECORDS}
+        listed[stage.name] = MeshExcitation(*whole.values(), drive.backlash, source=source)
+    return listed
+
+
+RECORDS = ("stiffness", "deflection", "force")
+
+
+def test_friction_acts_on_planets_as_on_those_of_a_planetary_stage():
+    """All records of both kinds of meshes and of their friction, as the branches take them, in the planetary stage."""
+    own, known = (
+        solve_deflection(read_case(in_casing(make(teeth=(28, 38, 104), mesh=COUNTED, motions="space"))))
+        for make in (simple_set, known_set)
+    )
+    (running,) = running_sets(own.model.case)
+    phases = pair_phases(own.model.case, own.model.flow)
+    branches, _ = branch_stage(own, running, 0, rubbed(own), phases)
+    assert [names[0] for names in running.kinds] == ["0-ring", "sun-0"]
+    (stage,) = known.model.stages
+    box = running_stage(known, stage, rubbed(known)[stage.name])
+    drive = branches.running.excitation
+    # the planetary stage has the sun first
+    swapped = {name: np.roll(getattr(drive, name).reshape(2, 3, -1), 1, axis=0).reshape(6, -1) for name in RECORDS}
+    assert drive.source is not None
+    source = np.roll(drive.source.reshape(2, 2, 3, -1), 1, axis=1).reshape(12, -1)
+    paths = replace(box.running.paths, symmetry=branches.running.paths.symmetry)
+    drive = MeshExcitation(*swapped.values(), drive.backlash, source=source)
+    # damping is that of the mean stiffness
+    stiffness = np.append(branches.running.stiffness[[1, 0]], box.running.stiffness[2:])
+    set_running = replace(box.running, excitation=drive, paths=paths, stiffness=stiffness)
+    mesh = 2.0 * np.pi * own.model.flow.mesh_frequency["sun-0"]
+    speed = abs(own.model.flow.speed["carrier"])
+    options = {"harmonics": (3, 3), "side_bands": 4, "tolerance": 1e-12}
+    rows = sensor_rows(own.model), sensor_rows(known.model)
+    heard = [
+        solve_running(part, mesh, speed, **options).lines((row @ motion).T)
+        for part, row, motion in zip((branches.running, set_running), rows, (branches.motion, box.motion), strict=True)
+    ]
+    assert np.abs(heard[0] - heard[1]).max() < 1e-9 * np.abs(heard[1]).max()
+    still = solve_running(replace(set_running, rubbing=None), mesh, speed, **options).lines((rows[1] @ box.motion).T)
+    assert np.abs(heard[1] - still).max() > 1e-6 * np.abs(still).max()
