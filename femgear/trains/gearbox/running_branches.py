@@ -65,7 +65,7 @@ class BranchForces:
 
 @dataclass(frozen=True)
 class _Point:
-    """A contact point of the first branch: springs of a stiffness [N/m, N m/rad] between planets and structure.
+    """A contact point of the first branch: springs of a ``stiffness`` [N/m, N m/rad] between planets and structure.
 
     ``row`` is what the structure does to it, ``approach`` (p,) what the planets do along their own axes.
     """
