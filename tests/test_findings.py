@@ -460,7 +460,9 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     ),
     "W-RIM": lambda: of_case(PLANETARY, {"ring.outer_radius": "85 mm"}),
     "W-SIZE": large,
-    "W-SLICES": lambda: of_case(HELICAL, {"helical.slices": 30}),
+    "W-SLICES": lambda: of_case(
+        HELICAL, {"helical.slices": 30, "operation.speeds": {"from": "100 rpm", "to": "3000 rpm", "count": 1000}}
+    ),
     "W-SMOOTHING": lambda: of_case("nrel_pgb", {"planar.smoothing": "2 um"}),
     "W-SPECTRUM": lambda: of_case(CHAIN, {"transient.resolution": "0.01 Hz"}),
     "W-SPEED": lambda: of_case(

@@ -230,9 +230,11 @@ def test_contact_points_of_the_paper_and_many_slices_are_warned_of(case):
     (said,) = map(str, with_value(case, "helical.contact_points", "base_circles").notices)
     assert said.startswith("[W-CONTACT-POINTS] helical.contact_points:") and "13 %" in said
     assert with_value(case, "helical.slices", 10).notices == ()
-    (said,) = map(str, with_value(case, "helical.slices", 30).notices)
-    assert said.startswith("[W-SLICES] helical.slices: 30 slices of 8 meshes at 95 speeds") and "6 min" in said
-    assert with_value(with_value(case, "helical.slices", 30), "operation.speeds", ["250 rpm"]).notices == ()
+    many = with_value(case, "helical.slices", 30)
+    assert many.notices == ()
+    many = with_value(many, "operation.speeds", {"from": "100 rpm", "to": "3000 rpm", "count": 1000})
+    (said,) = map(str, many.notices)
+    assert said.startswith("[W-SLICES] helical.slices: 30 slices of 8 meshes at 1000 speeds") and "2 min" in said
 
 
 def test_errors_that_turn_are_refused(case):
