@@ -693,6 +693,7 @@ def measured(
     search: Annotated[LineSearch | None, Parameter(name="*")] = None,
     causes: Annotated[bool, Parameter(negative="")] = False,
     further: Annotated[FurtherFiles | None, Parameter(name="*", negative="")] = None,
+    stage: str | None = None,
     output: Annotated[Path | None, Parameter(name=("--output", "-o"))] = None,
 ) -> int:
     """Say of every line of a recording whether a healthy set makes it, unequal planets, a fault, or none of these.
@@ -700,20 +701,27 @@ def measured(
     Parameters
     ----------
     case
-        TOML case file of a planetary set whose ring stands still.
+        TOML case file of a planetary set whose ring stands still, or of a gearbox with such a stage.
     signal
         Recording of a sensor on the housing: text in columns, WAV or MATLAB file (docs/measured.md).
     causes
         Rank errors that would make the abnormal lines, with the size of each: some minutes of computation.
+    stage
+        Of a gearbox: name of the planetary stage, where it has several.
     output
         Folder of lines.csv, order_spectrum.csv and lines.png. Default: none is written.
     """
     from femgear.measured.verdict import measured_into
     from femgear.trains.reading import read_case
+    from femgear.trains.registry import heard_in, train_of
 
     data = read_case(case)
+    gear_set = heard_in(data, stage)
+    if causes and train_of(data).heard is not None:
+        message, remedy = "causes are those of a set of its own", "femgear measured of the case of its teeth"
+        raise CaseError(message, code="E-ARGUMENTS", key="--causes", remedy=remedy)
     wanted = recording or Recording(), search or LineSearch()
-    verdict, blocks, names = measured_into(data, signal, *wanted, output, further)
+    verdict, blocks, names = measured_into(gear_set, signal, *wanted, output, further)
     _print(blocks)
     if causes:
         from femgear.causes import describe_causes, rank_causes

@@ -95,9 +95,10 @@ class LoadedPeriod:
         curves = np.array([np.interp(at, tau, row, period=whole) for row in values])
         for piece, place, ends in self._smooth_pieces():
             for turn in (-whole, 0, whole):
-                first, last = np.searchsorted(at + turn, ends, side="left")
+                first, last = np.searchsorted(at, np.subtract(ends, turn), side="left")
                 inside = slice(first, last + (last < count and at[last % count] + turn == ends[1]))
-                curves[:, inside] = parabolas(place, values[:, piece].T, at[inside] + turn).T
+                if inside.stop > inside.start:
+                    curves[:, inside] = parabolas(place, values[:, piece].T, at[inside] + turn).T
         return curves
 
     def _smooth_pieces(self):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
 
 from femgear.errors import CaseError
 
@@ -22,7 +21,7 @@ class Recording:
     pulses
         Name or number of the channel of the pulses.
     pulses_of
-        Member whose turns they count, sun, ring or carrier. Default: the input.
+        Member whose turns they count, sun or carrier; of a gearbox any shaft. Default: the input.
     per_turn
         Pulses in a turn.
     speed
@@ -36,7 +35,7 @@ class Recording:
     channel: str | None = None
     rate: float | None = None
     pulses: str | None = None
-    pulses_of: Literal["sun", "ring", "carrier"] | None = None
+    pulses_of: str | None = None
     per_turn: int = 1
     speed: str | None = None
     within: float | None = None

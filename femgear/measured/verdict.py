@@ -81,11 +81,11 @@ class MeasuredVerdict:
 def measured_verdict(
     case: Any, path: str | os.PathLike, recording: Recording, search: LineSearch | None = None
 ) -> MeasuredVerdict:
-    """Compute the order spectrum of a recording and give every line its verdict.
+    """Compute the order spectrum of a recording of a case, or of a set, and give every line its verdict.
 
     CaseError: a case or a recording that cannot be used; see `heard_set`, `read_by_turns` and `order_tolerance`.
     """
-    gear_set, search = heard_set(case), search or LineSearch()
+    gear_set, search = case if isinstance(case, HeardSet) else heard_set(case), search or LineSearch()
     signal = read_by_turns(path, recording, gear_set)
     tolerance = order_tolerance(signal.turns, search.tolerance)
     spectrum = windowed_spectrum(signal)

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from femgear.exchange.dynamic_model import DynamicModel
     from femgear.exchange.formats import Sampling, Shapes, Signal, Spectrum
     from femgear.findings import Finding
+    from femgear.measured.heard_set import HeardSet
     from femgear.report.space import SpaceBody
     from femgear.stages.key_figures import KeyFigure
     from femgear.storage.results import Results
@@ -355,6 +356,8 @@ class Train:
         Stage that has the mesh stiffness over the position, and its variables of stiffness and transmission error.
     front : tuple of (str, int)
         Charts of page one, the first two of which are there: name of the figure, and number of its panel.
+    heard : callable, optional
+        ``(case) -> stages``: planetary stages that recordings tell, by name; None of trains that are no gearbox.
     """
 
     name: str
@@ -373,6 +376,7 @@ class Train:
     dynamic_model: Callable[[Any, Mapping[str, Any]], DynamicModel] | None = None
     stiffness_curves: tuple[str, str, str] = ("static", "mesh_stiffness", "ste")
     front: tuple[tuple[str, int], ...] = ()
+    heard: Callable[[Any], Mapping[str, HeardSet]] | None = None
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""

@@ -14,6 +14,7 @@ from femgear.errors import CaseError, FemgearError
 from femgear.findings import Finding, tell
 
 if TYPE_CHECKING:
+    from femgear.measured.heard_set import HeardSet
     from femgear.stages.protocol import Stage, Train
     from femgear.storage.results import Results
 
@@ -204,3 +205,28 @@ def check_case(case, only: str | None = None) -> None:
                 for problem in (error, *error.problems):
                     problem.file = problem.file or case.location(problem.key or "")
                 raise
+
+
+def heard_in(case: Any, stage: str | None = None) -> HeardSet:
+    """Choose what the lines on a housing depend on: a set, or a planetary stage of a gearbox by its name.
+
+    CaseError: a stage that there is not, or several of which none is named (E-CHOICE), and those of `heard_set`.
+    """
+    from femgear.measured.heard_set import heard_set
+
+    heard = train_of(case).heard
+    if heard is None:
+        if stage is not None:
+            message, remedy = "a set of its own has no stages", "leave it out"
+            raise CaseError(message, code="E-ARGUMENTS", key="--stage", value=stage, remedy=remedy)
+        return heard_set(case)
+    stages = heard(case)
+    if not stages:
+        message = "no planetary stage of the gearbox has a ring that stands still and a carrier that turns"
+        raise CaseError(message, code="E-MODEL", key="planetary", remedy="give speeds to the load case")
+    name = next(iter(stages)) if stage is None and len(stages) == 1 else stage
+    if name is None or name not in stages:
+        names = ", ".join(f'"{known_name}"' for known_name in stages)
+        message = "the gearbox has several planetary stages" if name is None else f"there is no planetary stage {name}"
+        raise CaseError(message, code="E-CHOICE", key="--stage", value=stage, limit=names, remedy="name one by --stage")
+    return stages[name]

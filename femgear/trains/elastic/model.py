@@ -493,6 +493,14 @@ def _outer_surface_outputs(grid: Grid) -> np.ndarray:
     return outputs
 
 
+def record_count(gears: PlanetarySet, periods: int) -> int:
+    """Count the positions of the excitation over some mesh periods.
+
+    Equal planets are equal to rounding when their phases are among them.
+    """
+    return gears.n_planets * -(-RECORD // gears.n_planets) * periods
+
+
 def mesh_springs(gears: PlanetarySet, ring: RingModel, state: LoadedPeriod) -> tuple[MeshExcitation, np.ndarray]:
     """Mesh springs of the loaded state, and the compliance (2N, 2N) of the bodies between them [m/N]."""
     held, compliance = (
@@ -500,8 +508,7 @@ def mesh_springs(gears: PlanetarySet, ring: RingModel, state: LoadedPeriod) -> t
         for values in (ring.held_compliance, ring.compliance)
     )
     flexibility = body_flexibility(state.held_compliance, held)
-    # equal planets are equal to rounding when their phases are among the positions
-    record = gears.n_planets * -(-RECORD // gears.n_planets) * state.periods
+    record = record_count(gears, state.periods)
     excitation = mesh_excitation(
         state.resampled("held_stiffness", record),
         state.resampled("deflection", record),

@@ -122,12 +122,12 @@ from femgear.trains.elastic.excitation_limit import (
 from femgear.trains.elastic.judgements import set_with_ring_judgements
 from femgear.trains.elastic.model import (
     RADIAL,
-    RECORD,
     TANGENTIAL,
     RingModel,
     elastic_set,
     highest_mesh_mode,
     mesh_springs,
+    record_count,
     ring_field,
     ring_model,
 )
@@ -243,7 +243,7 @@ def solve_modes(
     friction, entries = acting_friction(case, gears), state_entries(case)
     loading, name = partial(_loading, case, static, steps, partial(progress, "modes")), "loaded state"
     state = steps.kept(name, entries) or steps.keep(name, entries, loaded_period(gears, *bodies, **loading(friction)))
-    stiffness = state.resampled("held_stiffness", RECORD * state.periods).mean(axis=1)
+    stiffness = state.resampled("held_stiffness", record_count(gears, state.periods)).mean(axis=1)
     mesh_mode = highest_mesh_mode(case, gears, stiffness, sun_torque=torque)
     reach = highest_excitation(case, mesh_mode, fastest_mesh_frequency(case, gears))
     ring, entries = _ring_of_case(case, static, bodies, steps, reach), {**entries, "reach": reach}
@@ -299,7 +299,7 @@ def _sharing_over_bearings(
     Means over a few positions, of plane contact: within 0.5 % of those of the record. None where planets
     share equally, or their bearings are rigid.
     """
-    share = _shares(state.resampled("force", RECORD * state.periods))
+    share = _shares(state.resampled("force", record_count(gears, state.periods)))
     supports, entries = linear_supports(case), state_entries(case)
     if supports.planet is None or np.abs(share - 1.0).max() < _EQUAL:
         return None

@@ -27,6 +27,7 @@ from femgear.trains.gearbox.casing_draft import draft_casing
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
 from femgear.trains.gearbox.friction import box_friction_findings, friction_excites
+from femgear.trains.gearbox.heard_stages import heard_stages
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries
@@ -348,6 +349,7 @@ GEARBOX = Train(
     warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case), *box_friction_findings(case)),
     bodies=lambda case: gearbox_bodies(case, {}),
     draft_casing=draft_casing,
+    heard=heard_stages,
     judgements=gearbox_judgements,
     front=(
         ("run_up_levels", 0),
