@@ -1,4 +1,4 @@
-"""Planetary stages of a gearbox as recordings tell them: teeth, planets, and turns of their carriers in those of shafts."""
+"""Planetary stages of a gearbox as recordings tell them: teeth, planets, turns of carriers in one of the shafts."""
 
 from __future__ import annotations
 
