@@ -8,24 +8,33 @@ with modes (R. J. Allemang and D. L. Brown, A correlation coefficient for modal 
 Around every mesh harmonic heights are taken over those of the normal lines there, measured and computed alike: so the
 path to the sensor, its calibration and the strength of that harmonic drop out. Harmonics without a normal line that was
 measured are left aside.
+
+Faults of teeth do not answer in proportion: lines of two sizes are computed, and the size is that at which the heights
+are the measured ones, between both by a power of the size. Where it would lie beyond them, or a tooth is missing, the
+likeness is less by the square of how far the heights are off.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 
+from femgear.case.dependencies import Steps
+from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError
 from femgear.housing.orders import FOREIGN, NORMAL, spacing_symmetry
 from femgear.measured.heard_set import HeardSet
 from femgear.measured.verdict import MeasuredVerdict
 from femgear.report.tables import Block
-from femgear.run import solve
+from femgear.run import grid_cache, solve
 from femgear.stages.protocol import Progress
+from femgear.study.fault_records import solved_lines
+from femgear.study.fault_sizes import FaultPlace, carrying_flanks, fault_entries
 from femgear.trains.reading import with_values
 
 _STEP = 1e-6
@@ -33,6 +42,7 @@ _STEP = 1e-6
 _COARSE = {"static.flank_elements": 8, "static.positions": 16, "static.stresses": False, "housing.published": None}
 _ONE = {"planet": 1}
 _OLD = ("set.pin_errors", "planet.individual", "carrier.errors", "sun.errors", "planet.errors", "ring.errors")
+_OLD += ("sun.fault", "planet.fault", "ring.fault")
 _WHOLE = 1e-9
 
 
@@ -67,6 +77,13 @@ CAUSES = (
     Cause("runout of one planet", "planet.individual", lambda size: [_ONE | {"runout_amplitude": size}], "planet"),
 )
 """Errors that are tried."""
+_FAULT_SIZES = {"crack": (0.4, 1.0), "spall": (0.2, 0.5), "missing": (0.0,)}
+"""Sizes of faults whose lines are computed [modules]; a missing tooth has none."""
+_FAULT_WORDS = {
+    "crack": "crack in a tooth of the {}",
+    "spall": "spall on a tooth of the {}",
+    "missing": "missing tooth of the {}",
+}
 
 
 @dataclass(frozen=True)
@@ -116,7 +133,56 @@ def rank_causes(case: Any, verdict: MeasuredVerdict, *, progress: Progress | Non
         _fitted(cause, derivative, abnormal, verdict.tolerance)
         for cause, derivative in zip(causes, derivatives, strict=True)
     ]
-    return tuple(sorted(ranked, key=lambda entry: (-round(entry.explained, 2), entry.size)))
+    ranked += _ranked_faults(case, verdict, abnormal, scales, progress)
+    smallest_first = sorted(ranked, key=lambda entry: math.inf if math.isnan(entry.size) else entry.size)
+    return tuple(sorted(smallest_first, key=lambda entry: -round(entry.explained, 2)))
+
+
+def _ranked_faults(
+    case: Any,
+    verdict: MeasuredVerdict,
+    abnormal: Mapping[float, float],
+    scales: Mapping[int, float],
+    progress: Progress | None,
+) -> Iterator[RankedCause]:
+    """Rank faults of teeth of the parts whose turns lines have."""
+    gears, steps = planetary_set(case), Steps()
+    turning = {line.place.part for line in verdict.lines if line.place.part}
+    for gear, kind in product(sorted(turning & {"sun", "planet"}), _FAULT_SIZES):
+        sizes = [share * gears.sun.module for share in _FAULT_SIZES[kind]]
+        flank = carrying_flanks(gears, gear, back=case.torque_on_first_gear() < 0.0)[0]
+        fitted = []
+        for number, size in enumerate(sizes):
+            if progress is not None:
+                progress(f"{kind} of the {gear}", float(number), float(len(sizes)))
+            place = FaultPlace(kind, gear, int(gear == "planet"), 0, "" if kind == "missing" else flank, size)
+            lines = _fault_heights(with_values(case, fault_entries(place, gears)), steps)
+            made = _over_normal(lines, {}, lines, verdict, scales)
+            cause = Cause(_FAULT_WORDS[kind].format(gear), f"{gear}.fault", lambda size: size, gear)
+            fitted.append(_fitted(cause, made, abnormal, verdict.tolerance))
+        yield _between_sizes(fitted, sizes)
+
+
+def _between_sizes(fitted: Sequence[RankedCause], sizes: Sequence[float]) -> RankedCause:
+    """Find the size of a fault at which its heights are the measured ones, of fits at some sizes [m], ascending.
+
+    The ``size`` of a fit is the factor by which its heights would have to grow.
+    """
+    factors = [fit.size for fit in fitted]
+    if not all(factor > 0.0 for factor in factors):
+        return replace(fitted[-1], size=math.nan, explained=0.0)
+    if len(sizes) == 1:
+        return replace(fitted[0], size=math.nan, explained=fitted[0].explained * min(factors[0], 1.0 / factors[0]) ** 2)
+    at = np.interp(0.0, -np.log(factors), np.log(sizes))
+    nearest = int(np.abs(np.log(sizes) - at).argmin())
+    off = factors[0] if factors[0] < 1.0 else 1.0 / factors[-1] if factors[-1] > 1.0 else 1.0
+    return replace(fitted[nearest], size=float(np.exp(at)), explained=fitted[nearest].explained * off**2)
+
+
+def _fault_heights(case: Any, steps: Steps) -> dict[float, complex]:
+    """Lines of the sensor [m/s^2] of a set with a fault by their orders, at the only speed."""
+    lines = solved_lines(case, cache=grid_cache(), steps=steps)
+    return dict(zip(np.round(lines.order, 6).tolist(), lines.acceleration[0].tolist(), strict=True))
 
 
 def _harmonic(order: float, verdict: MeasuredVerdict) -> int:
@@ -166,15 +232,27 @@ def _derivative(
 ) -> dict[float, float]:
     """Abnormal lines over the normal ones of their harmonic [1/m] that a cause makes, by their orders."""
     lines = _heights(with_values(case, {cause.entry: cause.value(f"{_STEP * 1e6:g} um")}), progress)
+    made = _over_normal(lines, healthy, healthy, verdict, scales)
+    return {order: height / _STEP for order, height in made.items()}
+
+
+def _over_normal(
+    lines: Mapping[float, complex],
+    less: Mapping[float, complex],
+    normal: Mapping[float, complex],
+    verdict: MeasuredVerdict,
+    scales: Mapping[int, float],
+) -> dict[float, float]:
+    """Abnormal lines, less others, over the normal ones of their harmonic among some lines, by their orders."""
     symmetry = spacing_symmetry(verdict.gear_set.angles)
     squares = dict.fromkeys(scales, 0.0)
     for line in verdict.lines:
         if line.verdict == NORMAL and _harmonic(line.order, verdict) in squares:
-            squares[_harmonic(line.order, verdict)] += abs(healthy.get(float(round(line.order)), 0.0)) ** 2
+            squares[_harmonic(line.order, verdict)] += abs(normal.get(float(round(line.order)), 0.0)) ** 2
     return {
-        order: abs(height - healthy.get(order, 0.0)) / _STEP * squares[_harmonic(order, verdict)] ** -0.5
+        order: abs(height - less.get(order, 0.0)) * squares[_harmonic(order, verdict)] ** -0.5
         for order, height in lines.items()
-        if _harmonic(order, verdict) in squares and (order != round(order) or round(order) % symmetry)
+        if squares.get(_harmonic(order, verdict), 0.0) > 0.0 and (order != round(order) or round(order) % symmetry)
     }
 
 
@@ -206,6 +284,7 @@ def describe_causes(ranked: tuple[RankedCause, ...]) -> Block:
     notes = (
         "size: of the error that comes nearest to the measured lines, each over the normal lines of its mesh harmonic",
         f"by lines of errors of {_STEP * 1e6:g} µm, coarsely computed, in proportion; likeness 1: heights spread alike",
+        "faults of teeth by lines of two sizes: depth of a crack, length of a spall; a missing tooth has none",
     )
     header = ("cause", "entry", "size [µm]", "likeness", "its strongest orders")
     return Block("What would make the abnormal lines", header, tuple(_rows(ranked)), notes)
@@ -214,5 +293,5 @@ def describe_causes(ranked: tuple[RankedCause, ...]) -> Block:
 def _rows(ranked: tuple[RankedCause, ...]) -> Iterator[tuple[str, ...]]:
     for entry in ranked:
         orders = ", ".join(f"{order:.6g}" for order in entry.strongest)
-        size = "-" if math.isnan(entry.size) else f"{entry.size * 1e6:.3g}"
+        size = "-" if math.isnan(entry.size) else f"{float(f'{entry.size * 1e6:.3g}'):g}"
         yield entry.cause.name, entry.cause.entry, size, f"{entry.explained:.2f}", orders

@@ -69,6 +69,49 @@ def test_what_is_refused(tmp_path, known_lines):
         rank_causes(read_case(CASE), verdict_of(tmp_path, [215, 3], [1.0, 0.5]))
 
 
+@pytest.fixture
+def known_faults(monkeypatch):
+    """Lines of faults of a planet that are made up: a crack's grow with its square, and spread otherwise."""
+
+    def heights(case, steps):
+        (fault,) = case.planet.fault
+        size = 0.0 if fault.kind == "missing" else (fault.depth if fault.kind == "crack" else fault.length) / 1.5e-3
+        height = {"crack": 0.1 * size**2, "spall": 0.001 * size, "missing": 5.0}[fault.kind]
+        spread = {326.7: 2.0, 321.3: 1.0} if fault.kind == "crack" else {326.7: 0.5, 321.3: 2.0}
+        healthy = {float(order): complex(value) for order, value in HEALTHY.items()}
+        return healthy | {order: height * share for order, share in spread.items()}
+
+    monkeypatch.setattr(causes, "_fault_heights", heights)
+
+
+def test_a_fault_has_the_size_at_which_its_lines_are_as_high(known_faults):
+    fits = [causes._fitted(CAUSES[4], {1.0: 0.1 * size**2}, {1.0: 0.1 * 0.6**2}, 0.02) for size in (0.4, 1.0)]
+    found = causes._between_sizes(fits, [0.4, 1.0])
+    assert found.size == pytest.approx(0.6, rel=1e-9)
+    assert found.explained == pytest.approx(1.0)
+    # beyond the largest size the heights tell against it
+    fits = [causes._fitted(CAUSES[4], {1.0: 0.1 * size**2}, {1.0: 0.4}, 0.02) for size in (0.4, 1.0)]
+    found = causes._between_sizes(fits, [0.4, 1.0])
+    assert found.size == pytest.approx(1.0)
+    assert found.explained == pytest.approx(1.0 / 16.0)
+    single = causes._between_sizes(fits[1:], [0.0])
+    assert np.isnan(single.size)
+    assert single.explained == pytest.approx(1.0 / 16.0)
+
+
+def test_faults_of_the_part_whose_turns_are_heard_are_tried(tmp_path, known_lines, known_faults):
+    height = 0.1 * 0.6**2
+    lines = HEALTHY | {326.7: 2.0 * height, 321.3: height}
+    ranked = rank_causes(read_case(CASE), verdict_of(tmp_path, lines, lines.values()))
+    assert ranked[0].cause.name == "crack in a tooth of the planet"
+    assert ranked[0].size == pytest.approx(0.6 * 1.5e-3, rel=0.02)
+    assert ranked[0].explained == pytest.approx(1.0, abs=0.01)
+    likeness = {entry.cause.name: entry.explained for entry in ranked}
+    assert likeness["missing tooth of the planet"] < 0.01
+    assert likeness["spall on a tooth of the planet"] < 0.7
+    assert not any(name.endswith("the sun") and "tooth" in name for name in likeness)
+
+
 @pytest.mark.slow
 def test_a_pin_that_stands_wrong_by_20_um_is_found_with_its_size(tmp_path):
     case = with_values(read_case(CASE), COARSE)

@@ -124,7 +124,7 @@ def _levels_of(plan: FaultPlan, item: tuple[int, FaultPlace]) -> dict[str, float
         **fault_entries(fault, gears),
     }
     try:
-        return line_levels(solved_lines(plan, with_values(case, values)), gears, noise)
+        return line_levels(solved_lines(with_values(case, values), cache=plan.cache, steps=plan.steps), gears, noise)
     except FemgearError as error:
         return f"[{error.code}] {error}"
 

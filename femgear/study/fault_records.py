@@ -168,7 +168,7 @@ def fault_plan(
         cache,
         steps,
     )
-    solved_lines(plan, case)  # what all machines share stays in the steps
+    solved_lines(case, cache=cache, steps=steps)  # what all machines share stays in the steps
     return plan
 
 
@@ -233,10 +233,10 @@ def _record_shares(plan: FaultPlan, record: int) -> np.ndarray:
     return np.random.default_rng([plan.seed, record, _RECORD]).random(2)
 
 
-def solved_lines(plan: FaultPlan, case: Any) -> SensorLines:
+def solved_lines(case: Any, *, cache: Path | None, steps: Steps) -> SensorLines:
     """Solve for the lines of the sensor at all speeds of a case; FemgearError where they cannot be computed."""
-    static = static_without_load(case, cache=plan.cache, steps=plan.steps)
-    modes = elastic_stages.solve_modes(case, static, steps=plan.steps, over_bearings=False)
+    static = static_without_load(case, cache=cache, steps=steps)
+    modes = elastic_stages.solve_modes(case, static, steps=steps, over_bearings=False)
     most, module = float(np.abs(modes.state.deflection).max()), static.planetary_set.sun.module
     if most > LARGEST_APPROACH * module:
         message = f"the flanks approach by {most * 1e3:.4g} mm: the model is one of small displacements"
@@ -253,7 +253,7 @@ def solve_machine(plan: FaultPlan, machine: int) -> MachineRecords:
     shares = np.array([_record_shares(plan, number)[1] for number in numbers])
     signal = np.full((plan.each, plan.samples), np.nan, np.float32)
     try:
-        lines = solved_lines(plan, case)
+        lines = solved_lines(case, cache=plan.cache, steps=plan.steps)
     except FemgearError as error:
         return MachineRecords(
             machine, case, fault, errors, 2.0 * np.pi * shares, signal, None, f"[{error.code}] {error}"

@@ -88,7 +88,7 @@ def test_limits_are_written_and_taken_up_again(plan, tmp_path, monkeypatch):
     assert block.rows[0][:2] == ("wear", "sun")
     assert all((tmp_path / name).exists() for name in names)
 
-    def never(*_):
+    def never(*_, **__):
         raise AssertionError
 
     monkeypatch.setattr(fault_limits, "solved_lines", never)
