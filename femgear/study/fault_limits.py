@@ -42,7 +42,8 @@ _MARGIN = 1.0
 _WEAK = 40.0
 """Level of mesh harmonics under all lines together below which they tell nothing [dB]."""
 _WHOLE = 1e-6
-NEW_LINES = "new lines"
+NEW_LINES = ("whole orders", "between whole orders")
+"""Lines that no healthy set of equal planets has, by where they lie."""
 _TOOTH = 3
 
 
@@ -79,8 +80,9 @@ class FaultLimit:
 def line_levels(lines: SensorLines, gears: Any, noise: float) -> dict[str, float]:
     """Compute levels of the lines of the first speed over all of them together [dB], by what they are.
 
-    Of the normal lines of every mesh harmonic, ``"mesh 1"`` and so on, and of the strongest of all others,
-    ``"new lines"``, which is not below what stands out of the noise (amplitude of a line over all together).
+    Of the normal lines of every mesh harmonic, ``"mesh 1"`` and so on, and of the strongest of all others: at whole
+    orders, where unequal planets have lines too, and between these. Levels of these two are not below what stands out
+    of the noise (amplitude of a line over all together).
     """
     amplitude, order = np.abs(lines.acceleration[0]), np.asarray(lines.order, float)
     amplitude = np.where(order > 0.0, amplitude, 0.0)
@@ -89,8 +91,11 @@ def line_levels(lines: SensorLines, gears: Any, noise: float) -> dict[str, float
     harmonic = np.rint(order / gears.ring.teeth).astype(int)
     squares = np.bincount(harmonic[normal], weights=amplitude[normal] ** 2)
     levels = {f"mesh {h}": _decibel(np.sqrt(squares[h]) / together) for h in range(1, len(squares))}
-    strongest = float(amplitude[~normal].max(initial=0.0)) / together
-    return levels | {NEW_LINES: max(_decibel(strongest), _decibel(noise))}
+    whole = np.abs(order - np.rint(order)) < _WHOLE
+    for name, lines_there in zip(NEW_LINES, (whole & ~normal, ~whole), strict=True):
+        strongest = float(amplitude[lines_there].max(initial=0.0)) / together
+        levels[name] = max(_decibel(strongest), _decibel(noise))
+    return levels
 
 
 def _decibel(ratio: float) -> float:
@@ -99,12 +104,11 @@ def _decibel(ratio: float) -> float:
 
 def standing_out(levels: Mapping[str, float], healthy: Sequence[Mapping[str, float]]) -> tuple[float, str]:
     """Find the level by which a set stands out of healthy ones [dB], negative where it does not, and by what."""
-    best = (levels[NEW_LINES] - max(levels_there[NEW_LINES] for levels_there in healthy), NEW_LINES)
+    best = max((levels[name] - max(levels_there[name] for levels_there in healthy), name) for name in NEW_LINES)
     for name, level in levels.items():
         others = [levels_there.get(name, -np.inf) for levels_there in healthy]
-        if name == NEW_LINES or max(level, *others) < -_WEAK:
-            continue
-        best = max(best, (max(level - max(others), min(others) - level) - _MARGIN, name))
+        if name not in NEW_LINES and max(level, *others) >= -_WEAK:
+            best = max(best, (max(level - max(others), min(others) - level) - _MARGIN, name))
     return best
 
 
@@ -222,6 +226,9 @@ def draw_limits(limits: Sequence[FaultLimit]) -> Figure:
         for i, limit in enumerate(limit for limit in limits if limit.kind == kind):
             ax.plot(1e3 * limit.size, limit.excess, marker="o", label=limit.gear, **line_style(i))
         ax.set_xscale("log")
+        sizes = sorted({1e3 * float(size) for limit in limits if limit.kind == kind for size in limit.size})
+        ax.set_xticks(sizes, [f"{size:.2g}" for size in sizes])
+        ax.minorticks_off()
         label(ax, f"{SIZED[kind]} [mm]", "stands out by [dB]" if number == 0 else "", kind)
     legend_below(figure)
     return figure

@@ -25,6 +25,7 @@ from femgear.study.fault_request import FaultRequest
 from femgear.trains.reading import read_case, with_values
 
 CASES = Path(__file__).parents[2] / "cases"
+WHOLE, BETWEEN = NEW_LINES
 GEARS = SimpleNamespace(rotations=3, ring=SimpleNamespace(teeth=108))
 
 
@@ -35,20 +36,24 @@ def made(orders, accelerations):
 
 
 def test_levels_are_those_of_the_lines():
-    levels = line_levels(made([0, 105, 108, 109, 216], [9.0, 3.0, 4.0, 0.5, 12.0]), GEARS, 1e-6)
-    together = np.sqrt(9 + 16 + 0.25 + 144)
+    levels = line_levels(made([0, 105, 108, 108.5, 109, 216], [9.0, 3.0, 4.0, 0.1, 0.5, 12.0]), GEARS, 1e-6)
+    together = np.sqrt(9 + 16 + 0.01 + 0.25 + 144)
     assert levels["mesh 1"] == pytest.approx(20 * np.log10(5.0 / together))
     assert levels["mesh 2"] == pytest.approx(20 * np.log10(12.0 / together))
-    assert levels[NEW_LINES] == pytest.approx(20 * np.log10(0.5 / together))
+    assert levels[WHOLE] == pytest.approx(20 * np.log10(0.5 / together))
+    assert levels[BETWEEN] == pytest.approx(20 * np.log10(0.1 / together))
 
 
 def test_lines_below_the_noise_are_none():
-    assert line_levels(made([108, 109], [1.0, 1e-6]), GEARS, 1e-3)[NEW_LINES] == pytest.approx(-60.0)
+    levels = line_levels(made([108, 109], [1.0, 1e-6]), GEARS, 1e-3)
+    assert levels[WHOLE] == levels[BETWEEN] == pytest.approx(-60.0)
 
 
 def test_a_set_stands_out_by_what_healthy_ones_have_not():
-    healthy = [{"mesh 1": -1.0, "mesh 2": -9.0, NEW_LINES: -50.0}, {"mesh 1": -1.2, "mesh 2": -8.0, NEW_LINES: -46.0}]
-    assert standing_out(healthy[0] | {NEW_LINES: -40.0}, healthy) == (6.0, NEW_LINES)
+    none = {BETWEEN: -60.0, "mesh 1": -1.0}
+    healthy = [none | {"mesh 2": -9.0, WHOLE: -50.0}, none | {"mesh 2": -8.0, WHOLE: -46.0}]
+    assert standing_out(healthy[0] | {WHOLE: -40.0}, healthy) == (6.0, WHOLE)
+    assert standing_out(healthy[0] | {BETWEEN: -50.0}, healthy) == (10.0, BETWEEN)
     assert standing_out(healthy[0] | {"mesh 2": -5.0}, healthy) == (2.0, "mesh 2")
     assert standing_out(healthy[0] | {"mesh 2": -13.0}, healthy) == (3.0, "mesh 2")
     excess, _ = standing_out(healthy[0], healthy)

@@ -7,17 +7,22 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from femgear.case.quantities import TORQUE
 from femgear.errors import CaseError, FemgearError
 from femgear.gears.kinematics import willis_weights
 from femgear.gears.power_flow import pair_condition, planetary_condition, power_flow
 from femgear.gears.shaft_graph import ShaftGraph, SpeedCondition
 from femgear.gears.stage_frequencies import StageFrequencies, stage_frequencies
+from femgear.measured.heard_set import HeardSet
 from femgear.trains.gearbox.case_file import CASING, BoxPlanetarySection, GearboxCase, LoadCaseSection, PairSection
 from femgear.trains.gearbox.geometry import carriers, pair_sizes, set_sizes
 
 # Torque of a stage over the largest one of any that counts as none.
 _IDLE = 1e-9
+# Speed over the largest one of the gearbox that is none.
+_STILL = 1e-9
 # Where the refusals of the graph stand in the case file.
 _KEYS = {
     "E-SPEED": "operation.load_case[{}].speed",
@@ -227,3 +232,24 @@ def turns_in_words(frequencies: StageFrequencies) -> str:
         return "-"
     first, second = frequencies.hunting_turns[mesh]
     return f"{first} and {second} turns, {frequencies.hunting_time[mesh]:.4g} s"
+
+
+def heard_stages(case: GearboxCase) -> dict[str, HeardSet]:
+    """List the planetary stages whose ring stands still while their carrier turns, by name.
+
+    Speeds are those of the first load case; the input is the first shaft whose speed is given. FemgearError: shafts
+    whose speeds contradict one another, as of `gearbox_flow`.
+    """
+    flow, stages = gearbox_flow(case), dict[str, HeardSet]()
+    fastest = max(map(abs, flow.speed.values()), default=0.0)
+    turning = {name: abs(speed) for name, speed in flow.speed.items() if abs(speed) > _STILL * fastest}
+    given = next((name for name in case.load_case.speed if name in turning), "carrier")
+    for stage in case.planetary:
+        if stage.ring in turning or stage.carrier not in turning:
+            continue
+        (sun, planet, ring), angles = set_sizes(stage).teeth, set_sizes(stage).planet_angles
+        carrier = turning[stage.carrier]
+        per_turn = {name: carrier / speed for name, speed in turning.items()}
+        members = {"carrier": 1.0} | ({"sun": carrier / turning[stage.sun]} if stage.sun in turning else {})
+        stages[stage.name] = HeardSet(ring, sun, planet, np.asarray(angles), given, {**per_turn, **members})
+    return stages

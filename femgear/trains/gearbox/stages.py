@@ -27,14 +27,13 @@ from femgear.trains.gearbox.casing_draft import draft_casing
 from femgear.trains.gearbox.casing_file import check_casing_file, describe_casing
 from femgear.trains.gearbox.deflection import Deflection, check_held, solve_deflection
 from femgear.trains.gearbox.friction import box_friction_findings, friction_excites
-from femgear.trains.gearbox.heard_stages import heard_stages
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries
 from femgear.trains.gearbox.model import reference_shaft
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.planet_branches import describe_branches
-from femgear.trains.gearbox.power import gearbox_flow, port_shafts, turns_in_words
+from femgear.trains.gearbox.power import gearbox_flow, heard_stages, port_shafts, turns_in_words
 from femgear.trains.gearbox.resonance_table import describe_resonances
 from femgear.trains.gearbox.response import solve_gearbox_response
 from femgear.trains.gearbox.response_results import (
