@@ -214,13 +214,13 @@ def heard_in(case: Any, stage: str | None = None) -> HeardSet:
     """
     from femgear.measured.heard_set import heard_set
 
-    heard = train_of(case).heard
-    if heard is None:
+    stages_of_case = train_of(case).heard
+    if stages_of_case is None:
         if stage is not None:
             message, remedy = "a set of its own has no stages", "leave it out"
             raise CaseError(message, code="E-ARGUMENTS", key="--stage", value=stage, remedy=remedy)
         return heard_set(case)
-    stages = heard(case)
+    stages = stages_of_case(case)
     if not stages:
         message = "no planetary stage of the gearbox has a ring that stands still and a carrier that turns"
         raise CaseError(message, code="E-MODEL", key="planetary", remedy="give speeds to the load case")
