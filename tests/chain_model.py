@@ -52,12 +52,9 @@ def chain_model(
 
 
 def rubbing_chain() -> tuple[DynamicModel, Modes]:
-    """The chain with friction on its mesh: a force along the flanks, a moment, and what the load takes.
-
-    They do no work on the rotation of the whole: what friction gave it at the beginning would stay.
-    """
+    """The chain with friction on its mesh: a force along the flanks, a moment, and what the load takes of both."""
     sources = np.zeros((4, 3))
-    sources[1:3, 0], sources[1:3, 1], sources[3, 2] = (0.01, 0.015), (1.0, 1.5), 1.0
+    sources[1:3, 0], sources[1:3, 1], sources[3, 2] = (0.01, -0.02), (1.0, -0.5), 1.0
     system, plain = chain_system(sources), chain_excitation()
     theta = 2.0 * np.pi * np.arange(POSITIONS) / POSITIONS
     acting = np.stack([50.0 * np.sin(theta), 0.3 * np.cos(theta), 0.0 * theta])

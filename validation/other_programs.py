@@ -37,6 +37,7 @@ _START_FORGOTTEN = 20.0
 _PAIR = {"static.positions": 16, "static.stresses": False, "set.backlash": "0.1 mm", "dynamics.damping_ratio": 0.02}
 _PAIR |= {"dynamics.mesh_harmonics": 6, "dynamics.response_harmonics": 120, "runup.count": 0}
 _PAIR |= {"operation.speeds": ["7400 rpm", "7700 rpm", "8500 rpm"]}
+_OF_PAIR = ["deflection_of_gear_1_gear_2", "force_of_gear_1_gear_2"]
 _HELICAL = {"helical.slices": 5, "operation.speeds": ["2500 rpm"], "sun.support_stiffness": "1e7 N/m"}
 _SET = {"dynamics.damping_ratio": 0.1, "static.stresses": False, "housing.published": None}
 
@@ -85,7 +86,7 @@ def pairs() -> tuple[Row, ...]:
         return _MISSING
     case, modes, model = _case("spur_pair", _PAIR)
     motion, rows = solve(case, "dynamics")["dynamics"].motion, list[Row]()
-    names = ["deflection_of_gear_1_gear_2", "force_of_gear_1_gear_2"]
+    names = _OF_PAIR
     for number, speed in enumerate(case.operation.speeds):
         found = last_period(model, speed, 6, names)
         parted = motion.lowest[number] <= 0.0
@@ -99,6 +100,22 @@ def pairs() -> tuple[Row, ...]:
         for word, name, line in zip(("deflection", "force"), names, lines, strict=False):
             text = f"{word} of the mesh by the FMU, largest difference [1]"
             rows.append(at_most(which, BALANCE if parted else SPECTRAL, text, GATE, _apart(found[name], line)))
+    return tuple(rows)
+
+
+def rubbing() -> tuple[Row, ...]:
+    """A pair with friction on its flanks, flanks in contact."""
+    if not _installed():
+        return _MISSING
+    acts = {"losses": {"friction": "constant", "coefficient": 0.06, "excites": True}, "dynamics.damping_ratio": 0.05}
+    _, modes, model = _case("spur_pair", _PAIR | acts | {"operation.speeds": ["2865 rpm"]})
+    known = {"excitation_harmonics": 6, "response_harmonics": RESPONSE, "tolerance": 1e-12}
+    response = solve_spectral(modes.modes, modes.excitation, [model.mesh_rate * model.speed], **known)
+    found, rows = last_period(model, model.speed, 6, _OF_PAIR), list[Row]()
+    for word, name in zip(("deflection", "force"), _OF_PAIR, strict=True):
+        text = f"{word} of the mesh by the FMU, largest difference [1]"
+        apart = _apart(found[name], getattr(response, word)[0, 0])
+        rows.append(at_most("pair with friction, mu 0.06, at 2865 rpm", SPECTRAL, text, GATE, apart))
     return tuple(rows)
 
 

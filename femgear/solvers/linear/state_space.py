@@ -161,14 +161,15 @@ def modal_model(
 
     Notes
     -----
-    Residual flexibility: Geradin and Rixen, Mechanical Vibrations, 3rd ed., section 2.9, as in
-    `femgear.solvers.linear.modal.undamped_modes`.
+    Friction moves no rigid mode, as in `femgear.solvers.periodic.spectral.solve_spectral`: its mean is in balance, and
+    what it leaves strains nothing. Residual flexibility: Geradin and Rixen, Mechanical Vibrations, 3rd ed., section
+    2.9, as in `femgear.solvers.linear.modal.undamped_modes`.
     """
     n, count = system.W.shape
     if len(meshes) != count or any(len(port.direction) != n for port in (*inputs, *outputs)):
         raise CaseError("names or directions do not fit the system", code="E-SHAPE", limit=f"{count} meshes, {n} rows")
     inputs = [*inputs, *_other_loads(system, inputs)]
-    inputs += _friction(system, meshes)
+    inputs += (rubbing := _friction(system, meshes))
     loads = np.array([port.direction for port in inputs]).reshape(-1, n).T
     rows = np.array([port.direction for port in outputs]).reshape(-1, n)
     springs, omega = spring_directions(system, modes.mesh_stiffness), 2.0 * np.pi * modes.frequency
@@ -176,6 +177,7 @@ def modal_model(
     static = pseudo_solve(*rigid_basis(system, modes), np.hstack([springs, loads]))
     by_mesh, by_input = static[:, :count], static[:, count:]
     modal, moved = loads.T @ modes.shape, rows @ modes.shape
+    modal[len(inputs) - len(rubbing) :, omega == 0.0] = 0.0
     in_modes = inverse[:, None] * modal.T
     return ModalModel(
         omega=omega,
