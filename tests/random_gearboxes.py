@@ -8,15 +8,41 @@ from __future__ import annotations
 
 import copy
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
+
+from femgear.solvers.linear.modal import undamped_modes
+from femgear.trains.gearbox.deflection import Deflection, solve_deflection
+from femgear.trains.gearbox.model import bearing_motions
+from femgear.trains.gearbox.modes import linear_system
+from femgear.trains.gearbox.play import slack_bearings
+from femgear.trains.reading import read_case
 
 MEMBERS = ("sun", "carrier", "ring")
 # all have a number of rolling elements divisible by it: a turn by 120 degrees leaves them as they are
 SYMMETRY = 3
 _APART = 0.16  # of the stages along z [m]
 _BEYOND = 0.06  # of the shafts beyond their stages [m]
+MODES = 30
+"""Natural frequencies that are compared."""
+IMAGES = ("turned", "shifted", "mirrored across", "mirrored along", "renamed", "in other units")
+_OTHER_UNITS = {
+    "m": ("um", 1e6),
+    "mm": ("m", 1e-3),
+    "um": ("mm", 1e-3),
+    "N": ("kN", 1e-3),
+    "N m": ("kN m", 1e-3),
+    "N/m": ("N/mm", 1e-3),
+    "N m/rad": ("kN m/rad", 1e-3),
+    "rpm": ("rad/s", math.pi / 30.0),
+    "deg": ("rad", math.pi / 180.0),
+    "rad": ("deg", 180.0 / math.pi),
+    "kg": ("g", 1e3),
+    "kg m^2": ("g m^2", 1e3),
+    "GPa": ("MPa", 1e3),
+}
 
 
 def metres(value: float) -> str:
@@ -428,3 +454,81 @@ def renamed(tables: dict[str, Any], seed: int) -> dict[str, Any]:
     for kind in ("shaft", "bearing", "pair", "planetary", "load", "mass"):
         rng.shuffle(new[kind])
     return new
+
+
+def in_other_units(tables: Any) -> Any:
+    """The same gearbox with millimetres as metres, newtons as kilonewtons, degrees as radians, kilograms as grams."""
+    if isinstance(tables, dict):
+        return {key: in_other_units(value) for key, value in tables.items()}
+    if isinstance(tables, list | tuple):
+        return [in_other_units(value) for value in tables]
+    if not isinstance(tables, str):
+        return tables
+    number, _, unit = tables.partition(" ")
+    if unit not in _OTHER_UNITS:
+        return tables
+    other, factor = _OTHER_UNITS[unit]
+    return f"{float(number) * factor!r} {other}"
+
+
+def largest_load(found: Deflection) -> float:
+    """Largest force of loads and meshes [N]: bearings of a set without other loads carry nothing."""
+    return max(np.abs(found.model.load).max(), found.mesh_force.max())
+
+
+def answer(found: Deflection) -> dict[str, np.ndarray]:
+    """Magnitudes that hang on no direction, of bearings in the order of their names."""
+    order = np.argsort(found.model.bearing_names)
+    force, motion = found.bearing_force[order], bearing_motions(found.model, found.motion)[order]
+    # where a shaft lies in play that nothing presses it into is open
+    motion = np.where(slack_bearings(found)[order, :3].any(axis=1, keepdims=True), 0.0, motion)
+    _, system, stiffness = linear_system(found)
+    still = replace(system, gyroscopic=None, load=np.zeros(len(system.dofs)))
+    frequency = undamped_modes(still, stiffness, damping_ratio=0.03, count=min(MODES, len(system.dofs))).frequency
+
+    def sizes(vectors):
+        return np.column_stack([np.hypot(vectors[:, 0], vectors[:, 1]), np.abs(vectors[:, 2])])
+
+    tilts = np.hypot(force[:, 3], force[:, 4])
+    feet = found.foot_force
+    if found.model.casing is not None:
+        # rigid feet that are more than needed share forces
+        feet = feet[np.isfinite(found.model.casing.foot_stiffness[:, 0])]
+    return {
+        "foot force": sizes(feet),
+        "force": sizes(force),
+        "moment": tilts,
+        "deflection": sizes(motion),
+        "mesh force": np.sort(found.mesh_force),
+        "frequency": np.sort(frequency),
+    }
+
+
+def image(tables, name: str, seed: int):
+    """Put the gearbox down in another way."""
+    rng = np.random.default_rng(seed)
+    if name == "turned":
+        rolling = any("kind" in bearing for bearing in tables["bearing"])
+        return turned(tables, 2.0 * math.pi / SYMMETRY if rolling else float(rng.uniform(-2.0, 2.0)))
+    if name == "shifted":
+        return shifted(tables, tuple(rng.uniform(-1.0, 1.0, 3)))
+    if name == "renamed":
+        return renamed(tables, seed)
+    if name == "in other units":
+        return in_other_units(tables)
+    return mirrored_across(tables) if name == "mirrored across" else mirrored_along(tables)
+
+
+def unlike(tables, found: Deflection, name: str, seed: int) -> dict[str, float]:
+    """How far the answers of a gearbox and of its image are apart, over their size."""
+    wanted, met = answer(found), answer(solve_deflection(read_case(image(tables, name, seed))))
+    force = largest_load(found)
+    least = {"foot force": 1e-3 * force, "force": 1e-3 * force, "moment": 1e-4 * force, "deflection": 1e-12 * force}
+    apart = {}
+    for what, values in wanted.items():
+        # a shaft that is held is held at its left end: its mirror image is another shaft
+        if name == "mirrored along" and what == "frequency" and tables["operation"]["fixed"]:
+            continue
+        size = max(np.abs(values).max(initial=0.0), least.get(what, 0.0))
+        apart[what] = float(np.abs(met[what] - values).max(initial=0.0) / size) if size else 0.0
+    return apart

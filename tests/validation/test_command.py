@@ -255,7 +255,7 @@ LONG = {
     "elasticity": {"thick_cylinder"},
     "face width": {"cantilever_plate"},
     "fixed_housing": {"yielding", "axisymmetric"},
-    "gearbox": {"beams", "on_feet", "rigid_body", "other_trains", "of_files"},
+    "gearbox": {"beams", "images", "on_feet", "rigid_body", "other_trains", "of_files"},
     "gearbox_nonlinear": {"pairs"},
     "gearbox_response": {"on_foundation"},
     "heat": {"whole_run"},
