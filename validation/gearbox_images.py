@@ -1,4 +1,4 @@
-"""Gearboxes put down in another way: turned, shifted, mirrored, with other names and in other units they are themselves."""
+"""Gearboxes put down in another way: turned, shifted, mirrored, renamed and in other units they are themselves."""
 
 from __future__ import annotations
 
