@@ -154,6 +154,11 @@ RUNS = {
         "Casing of the electric axle",
         casing="Casing of the axle, seen through, with the surfaces that are tied to its nodes.",
     ),
+    "stepped_e_axle": _case(
+        "stepped_e_axle", "Electric axle with stepped planets", ("sensor_spectra", "load_patterns")
+    ),
+    "robot_reducer": _case("robot_reducer", "Robot reducer with two rings", ("sensor_spectra",)),
+    "ravigneaux_set": _case("ravigneaux_set", "Ravigneaux set in its second gear", ("sensor_spectra",)),
     "planet_carrier": _case("planet_carrier", "Planetary stage with an elastic carrier", ("mode_energy",)),
     "five_megawatt_chain": _case(
         "five_megawatt_chain", "Chain of a five-megawatt wind turbine", ("deflected_shafts", "mode_energy")

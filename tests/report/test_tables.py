@@ -58,3 +58,5 @@ def test_a_level_that_hardly_changes_has_no_sign():
 def test_names_that_differ_in_a_number_alone_stand_once_in_the_order_of_their_first():
     names = ["sun-planet 1", "planet 1-ring", "sun-planet 2", "planet 2-ring", "counter", "planet 4-ring"]
     assert merged_names(names) == "sun-planet 1..2, planet 1..2-ring, planet 4-ring, counter"
+    assert merged_names([f"short {n}-long {n}" for n in (1, 2, 3)]) == "short 1..3-long 1..3"
+    assert merged_names(["set 2 pair 1", "set 2 pair 2"]) == "set 2 pair 1..2"
