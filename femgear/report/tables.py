@@ -75,7 +75,7 @@ def merged_names(names: Iterable[str]) -> str:
 def _with_ranges(names: Sequence[str]) -> list[str]:
     """Join names of one form: by a number that stands several times in each, "short planet 1..3-long planet 1..3"."""
     numbers = [{int(digits) for digits in re.findall(r"\d+", name)} for name in names]
-    first = min(min(found, default=0) for found in numbers)
+    first = min(min(inside, default=0) for inside in numbers)
     if len(names) > 1 and numbers == [{first + n} for n in range(len(names))]:
         return [re.sub(r"\d+", f"{first}..{first + len(names) - 1}", names[0])]
     return [words for (words,) in merged([(name,) for name in names])]
