@@ -238,7 +238,7 @@ class Excited:
         structured = running_stage(self.found, self.stage, self.excitation)
         known = {"harmonics": harmonics, "side_bands": 4 if carrier else 0, "tolerance": 1e-13}
         response = solve_running(structured.running, factor * self.mesh, carrier, **known)
-        approach = mesh_rows(self.found.model, self.stage) @ structured.motion
+        approach = mesh_rows(self.found.model, self.stage.meshes) @ structured.motion
         loss = 1.0 + 2j * self.found.model.case.modes.damping_ratio
         return response, loss * response.lines(approach.T) * mesh_stiffness(self.found)
 
@@ -386,7 +386,7 @@ def turning_frames() -> tuple[Row, ...]:
     paths = replace(structured.running.paths, symmetry=1)
     running = replace(structured.running, excitation=excitation, paths=paths)
     excited = Excited(found, stage, excitation)
-    approach = mesh_rows(found.model, stage) @ structured.motion
+    approach = mesh_rows(found.model, stage.meshes) @ structured.motion
     rows = list[Row]()
     standing = solve_running(running, excited.mesh, 0.0, harmonics=(1, 1), side_bands=0)
     for kind, mesh, reference in zip((0, 1), ("sun-planet 1", "planet 1-ring"), np.array(former["rest"])[[0, 2]]):
