@@ -204,10 +204,11 @@ def describe_limits(limits: Sequence[FaultLimit]) -> Block:
     rows = []
     for limit in limits:
         sizes = "-" if limit.kind not in SIZED else f"{1e3 * limit.size[0]:.4g} to {1e3 * limit.size[-1]:.4g}"
-        least = "whole tooth" if limit.kind not in SIZED else f"{1e3 * limit.least:.4g}"
+        least = "whole tooth" if limit.kind not in SIZED else f"{1e3 * limit.least:.2g}"
         least = least if np.isfinite(limit.least) else "none of these"
         last = f"{limit.excess[-1]:.1f}" if np.isfinite(limit.excess[-1]) else "-"
-        rows.append((limit.kind, limit.gear, sizes, least, last, limit.by[-1]))
+        by = limit.by[-1] if limit.excess[-1] > 0.0 or np.isnan(limit.excess[-1]) else "nothing"
+        rows.append((limit.kind, limit.gear, sizes, least, last, by))
     notes = (
         f"out of {HEALTHY_SETS} healthy sets with drawn errors, at torque and largest speed of the case",
         f"lines that healthy sets have not count from {_OUT_OF_NOISE:g} dB over the noise of a record on, normal ones "
