@@ -247,6 +247,22 @@ def with_value(case: Case, key: str, value: object) -> Case:
     return with_values(case, {key: value})
 
 
+def parse_comparable(text: str, *, name: str = "") -> Any:
+    """Read the case of a TOML text without the published and measured lines that it does not compute, as `parse_case`.
+
+    ``notices`` of the case says what was left out.
+    """
+    try:
+        return parse_case(text, name=name)
+    except CaseError as error:
+        data = case_text.parse(text, name)
+        if not (notice := without_uncomputed(data, error)):
+            raise
+        case = parse_case(case_text.write(data), name=name, numbered=False)
+        case._notices += (notice,)
+        return case
+
+
 def with_values(case: Case, values: Mapping[str, object]) -> Case:
     """Change several entries of a case, which is checked as a whole after all changes.
 

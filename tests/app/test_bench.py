@@ -166,3 +166,13 @@ def test_what_is_the_same_is_judged_once_with_the_last_stage(answered):
     assert [part["sentence"] for part in again[:-1]] == [None] * (len(again) - 1)
     assert again[-1]["sentence"] == parts[-1]["sentence"] and again[-1]["judgements"] == parts[-1]["judgements"]
     assert all(part["sentence"] is not None for part in parts)
+
+
+def test_a_speed_that_leaves_a_published_line_is_answered_without_the_line(bench):
+    text = (CASES / "planetary_27_40_108.toml").read_text(encoding="utf-8")
+    seen = bench.look(text.replace('"3100 rpm"', '"3090 rpm"', 1), "a.toml")
+    assert seen["problems"] == [] and seen["stages"]
+    assert any("housing.published are left out" in finding["text"] for finding in seen["findings"])
+    assert not any("left out: their speed" in finding["text"] for finding in bench.look(text, "a.toml")["findings"])
+    wrong = text.replace('"3100 rpm"', '"3090 rpm"', 1).replace("teeth = 40", "teeth = 2")
+    assert "E-PUBLISHED" not in {problem["code"] for problem in bench.look(wrong, "a.toml")["problems"][:1]}

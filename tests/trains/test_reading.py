@@ -14,7 +14,15 @@ from hypothesis import strategies as st
 from femgear.case import text as case_text
 from femgear.case.gear_set import planetary_set
 from femgear.errors import CaseError, GeometryError
-from femgear.trains.reading import case_schema, parse_case, read_case, to_toml, with_value, with_values
+from femgear.trains.reading import (
+    case_schema,
+    parse_case,
+    parse_comparable,
+    read_case,
+    to_toml,
+    with_value,
+    with_values,
+)
 
 CASE = Path(__file__).parents[2] / "cases" / "planetary_27_40_108.toml"
 TEXT = CASE.read_text(encoding="utf-8")
@@ -542,3 +550,15 @@ def test_a_rexs_file_is_to_be_imported(ending, tmp_path):
     with pytest.raises(CaseError) as error:
         read_case(tmp_path / f"unit{ending}")
     assert error.value.code == "E-FILE" and "femgear import" in error.value.remedy
+
+
+def test_published_lines_that_are_not_computed_are_left_out_where_that_is_asked():
+    changed = TEXT.replace('"3100 rpm"', '"3090 rpm"', 1)
+    with pytest.raises(CaseError, match="this speed is not computed"):
+        parse_case(changed)
+    case = parse_comparable(changed)
+    assert len(case.housing.published) < len(parse_case(TEXT).housing.published)
+    assert any("are left out" in notice.text for notice in case.notices)
+    assert parse_comparable(TEXT).source == TEXT
+    with pytest.raises(CaseError, match="E-"):
+        parse_comparable(changed.replace("planets = 3", "planets = 0"))
