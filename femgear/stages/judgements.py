@@ -263,9 +263,14 @@ def judge_heat(results: Any) -> Iterator[Judgement]:
         return
     values = np.asarray(results.losses["efficiency"].values, float)
     loss = np.asarray(results.losses["loss"].values, float)
-    if not np.isfinite(values).any():
+    unknown = str(results.losses.attrs.get("unknown", ""))
+    if unknown:
+        efficiency, sentence = "efficiency not known", f"Nothing tells what the meshes of {unknown} lose"
+    elif np.isfinite(values).any():
+        efficiency = f"efficiency {100.0 * np.nanmin(values):.2f} %, losses {np.nanmax(loss):,.0f} W"
+        sentence = f"It loses {np.nanmax(loss):,.0f} W"
+    else:
         return
-    efficiency = f"efficiency {100.0 * np.nanmin(values):.2f} %, losses {np.nanmax(loss):,.0f} W"
     limits, below = list[str](), list[str]()
     if "heat" in results.stages:
         for name, words in (("scuffing_safety", "S_B"), ("film_safety", "S_lambda")):
@@ -277,13 +282,13 @@ def judge_heat(results: Any) -> Iterator[Judgement]:
         hottest = float(np.nanmax(results.heat["highest_temperature"].values))
         efficiency += f", contact {hottest:.0f} °C"
     answer = ", ".join([efficiency, *limits])
-    sentence = f"It loses {np.nanmax(loss):,.0f} W"
     if below:
         yield Judgement(HEAT, "bad", answer, "at least 1", f"{sentence} and its oil fails ({', '.join(below)})")
     elif limits:
         yield Judgement(HEAT, "good", answer, "at least 1, ISO/TS 6336-20 and -22", sentence)
     else:
-        yield Judgement(HEAT, "open", answer, "lubricant.fzg_stage gives a limit", sentence)
+        remedy = f"give the teeth of {unknown}" if unknown else "lubricant.fzg_stage gives a limit"
+        yield Judgement(HEAT, "open", answer, remedy, sentence)
 
 
 def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgement:

@@ -92,6 +92,8 @@ class LossPoint:
         By bearing [W]; NaN where nothing tells its friction.
     seal_loss : mapping
         By seal [W].
+    unknown : tuple of str
+        Stages that pass power on through meshes of given stiffness, whose losses nothing tells.
     """
 
     flow: LossyFlow
@@ -99,6 +101,12 @@ class LossPoint:
     mesh_loss: Mapping[str, np.ndarray]
     bearing_loss: Mapping[str, float]
     seal_loss: Mapping[str, float] = field(default_factory=dict)
+    unknown: tuple[str, ...] = ()
+
+    @property
+    def efficiency(self) -> float:
+        """Power that leaves over power that enters; NaN where none enters, or losses of meshes are unknown."""
+        return math.nan if self.unknown else self.flow.efficiency
 
     @property
     def stages(self) -> tuple[str, ...]:
@@ -141,7 +149,8 @@ class LossesResult(StageResult):
         """What losses are of: teeth, and bearings and seals as far as something tells theirs."""
         first = self.points[0]
         bearings = any(math.isfinite(loss) for loss in first.bearing_loss.values())
-        return ("teeth", *(("bearings",) if bearings else ()), *(("seals",) if first.seal_loss else ()))
+        teeth = ("teeth",) if self.points[0].friction else ()
+        return (*teeth, *(("bearings",) if bearings else ()), *(("seals",) if first.seal_loss else ()))
 
     @property
     def residual(self) -> float:
@@ -177,11 +186,13 @@ class LossesResult(StageResult):
             "stage_efficiency": [
                 [basic_efficiency(point.friction[stage].passed) for stage in stages] for point in points
             ],
-            "lossy_torque": [[flow.torque[shaft] for shaft in shafts] for flow in flows],
             "power_imbalance": [flow.imbalance for flow in flows],
+            "input_power": [flow.input_power for flow in flows],
+            "efficiency": [point.efficiency for point in points],
         }
-        values |= {name: [getattr(flow, name) for flow in flows] for name in ("input_power", "output_power", "loss")}
-        values["efficiency"] = [flow.efficiency for flow in flows]
+        known = np.array([math.nan if point.unknown else 1.0 for point in points])
+        values["lossy_torque"] = known[:, None] * [[flow.torque[shaft] for shaft in shafts] for flow in flows]
+        values |= {name: known * [getattr(flow, name) for flow in flows] for name in ("output_power", "loss")}
         bearings = [*first.bearing_loss]
         coords: dict[str, tuple] = {
             "mesh": ("mesh", [name for stage in stages for name in self.meshes[stage]], "1", "gear mesh"),
@@ -209,6 +220,7 @@ class LossesResult(StageResult):
             "friction": self.section.friction,
             "missing": " | ".join(self.missing),
             "contains": ", ".join(self.parts),
+            "unknown": ", ".join(dict.fromkeys(name for point in points for name in point.unknown)),
         }
         return Contents(declared(texts, {name: np.asarray(value) for name, value in values.items()}), coords, attrs)
 
@@ -251,10 +263,14 @@ def describe_losses(data: Any) -> Block:
         finite = values[np.isfinite(values)]
         return f"{finite.sum():.5g}" if finite.size else "-"
 
+    def bounded(number: int) -> str:
+        unknown = not np.isfinite(data["loss"].values[number])
+        return "> " if unknown and len(data["mesh"].values) else ""
+
     columns = {
         "speed" if dim == "speed" else "load case": lambda i: _label(data, i),
         "input [W]": lambda i: watts("input_power", i),
-        "meshes [W]": lambda i: watts("mesh_loss", i),
+        "meshes [W]": lambda i: f"{bounded(i)}{watts('mesh_loss', i)}",
     }
     if "bearing_loss" in data:
         columns["bearings [W]"] = lambda i: watts("bearing_loss", i)
@@ -263,7 +279,7 @@ def describe_losses(data: Any) -> Block:
     columns |= {
         "losses [W]": lambda i: watts("loss", i),
         "output [W]": lambda i: watts("output_power", i),
-        "efficiency": lambda i: f"{float(data['efficiency'].values[i]):.6f}",
+        "efficiency": lambda i: _fraction(float(data["efficiency"].values[i])),
     }
     left = (f"the first {_SHOWN} of {count}; all in losses.nc",) if count > _SHOWN else ()
     missing = tuple(filter(None, str(data.attrs["missing"]).split(" | ")))
@@ -271,10 +287,14 @@ def describe_losses(data: Any) -> Block:
     return tabulate("Losses", range(min(count, _SHOWN)), columns, notes)
 
 
+def _fraction(value: float) -> str:
+    return f"{value:.6f}" if math.isfinite(value) else "-"
+
+
 def _not_contained(data: Any) -> list[str]:
     """Losses that an efficiency has not."""
     contains = str(data.attrs.get("contains", "teeth")).split(", ")
-    return [*(part for part in ("bearings", "seals") if part not in contains), "churning and windage"]
+    return [*(part for part in ("teeth", "bearings", "seals") if part not in contains), "churning and windage"]
 
 
 _FORMULAS = {
@@ -289,13 +309,15 @@ _FORMULAS = {
 def _friction_words(data: Any) -> Iterator[str]:
     """Say of the kinds of mesh their coefficients of friction and loss factors."""
     mu = np.asarray(data["friction_coefficient"].values)
+    if not mu.size:
+        return
     span = f"{mu.min():.4f}" if np.ptp(mu) < 5e-5 else f"{mu.min():.4f} to {mu.max():.4f}"
     yield f"coefficient of friction {span}, {_FORMULAS[str(data.attrs['friction'])]}"
 
 
 def mesh_loss_block(data: Any) -> Block:
     """Tabulate loss factors and losses of all meshes at the operating point of losses.nc with the largest losses."""
-    number = int(np.argmax(data["loss"].values))
+    number = int(np.argmax(np.asarray(data["mesh_loss"].values).sum(axis=1)))
 
     def figure(name: str, form: str, mesh: int) -> str:
         values = np.asarray(data[name].values)
@@ -316,13 +338,14 @@ def mesh_loss_block(data: Any) -> Block:
 
 def loss_tables(data: Any) -> Iterator[Block]:
     """Tabulate what losses.nc has beside `describe_losses`: meshes, and the map over torque and speed."""
-    yield mesh_loss_block(data)
+    if len(data["mesh"].values):
+        yield mesh_loss_block(data)
     if "efficiency_map" not in data:
         return
     values, speeds = data["efficiency_map"].values, data["speed_share"].values
     columns = {"torque": lambda i: f"{float(data['torque_share'].values[i]):g}"}
     for place, share in enumerate(speeds[:_SHOWN]):
-        columns[f"speed {float(share):g}"] = lambda i, place=place: f"{values[i, place]:.6f}"
+        columns[f"speed {float(share):g}"] = lambda i, place=place: f"{_fraction(float(values[i, place]))}"
     note = "shares of the torque and of the last speed of operation"
     yield tabulate("Efficiency over torque and speed", range(len(values)), columns, (note,))
 
@@ -333,6 +356,9 @@ def efficiency_rows(results: Any, marks: Marks) -> Iterator[tuple[str, str]]:
         return
     data = results.losses
     values = np.asarray(data["efficiency"].values, float)
+    if unknown := str(data.attrs.get("unknown", "")):
+        yield "efficiency", f"{marks('not known', 'W-LOSSES')}: nothing tells what the meshes of {unknown} lose"
+        return
     if not np.isfinite(values).any():
         return
     at = int(np.nanargmin(values))

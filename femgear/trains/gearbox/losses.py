@@ -1,7 +1,8 @@
 """Stage "losses" of a gearbox: teeth and bearings of all load cases, torques with losses, efficiency.
 
 The teeth lose by the loads of their contact, with the misalignment that the gearbox gives them, bearings by Palmgren's
-formula. Stages whose teeth are not computed, and bearings of given stiffness, lose nothing here, as a finding says.
+formula. What meshes of given stiffness lose is unknown, and with it the efficiency of a gearbox whose power passes them.
+Bearings of given stiffness lose nothing here. Findings say so.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ from femgear.case.messages import oil_notices
 from femgear.errors import CaseError
 from femgear.findings import Finding
 from femgear.gears.power_losses import FrictionTorque, lossy_flow
+from femgear.report.tables import merged_names
 from femgear.stages.heat import heat_result, mesh_heat
 from femgear.stages.heat_results import HeatResult, MeshHeat, describe_heat, heat_tables
 from femgear.stages.losses import NO_LOSSES, check_loss_entries, losses_of_meshes, mesh_friction, seal_frictions
@@ -116,6 +118,7 @@ def loss_point(state: Deflection, load_case: LoadCaseSection, speed_share: float
         {name: losses_of_meshes(flow, name, friction[name], sets[name]) for name in friction},
         {name: flow.friction_loss.get(name, math.nan) for name in torques},
         {seal.name: flow.friction_loss[seal.name] for seal in seals},
+        tuple(name for name, drives in flow.first_drives.items() if drives is not None and name not in friction),
     )
 
 
@@ -164,7 +167,7 @@ def solve_box_losses(
         torque = {port: share * value for port, value in chosen.torque.items()}
         with_torque = chosen.model_copy(update={"torque": torque})
         state = loaded.state if share == 1.0 else solve_deflection(case, with_torque, steps=steps)
-        efficiency[row] = [loss_point(state, with_torque, each).flow.efficiency for each in losses.speed_shares]
+        efficiency[row] = [loss_point(state, with_torque, each).efficiency for each in losses.speed_shares]
     named = {stage.name: stage_meshes(stage) for stage in (*case.pair, *case.planetary)}
     meshes = {name: named[name] for name in points[0].stages}
     missing = tuple(_left_out(case, points[0]))
@@ -225,9 +228,6 @@ def _no_box_heat(case: GearboxCase) -> str:
 
 def _left_out(case: GearboxCase, point: LossPoint) -> Iterator[str]:
     """Say which losses are left out, and what would give them."""
-    stages = [stage.name for stage in (*case.pair, *case.planetary) if stage.name not in point.friction]
-    if stages:
-        yield f"stages without computed teeth lose nothing here: {', '.join(stages)}"
     if case.losses is None or not case.losses.bearings:
         return
     silent_bearings = [name for name, loss in point.bearing_loss.items() if not math.isfinite(loss)]
@@ -256,6 +256,25 @@ def idle_loss_entries(case: GearboxCase) -> Iterator[Finding]:
                     key = f"{kind}[{number}].teeth.{name}"
                     remedy = f"give [{name}] of the gearbox"
                     yield Finding("W-UNUSED", key, "losses are those of the gearbox", remedy=remedy)
+
+
+def unknown_mesh_losses(case: GearboxCase) -> Iterator[Finding]:
+    """Tell the stages whose meshes have a given stiffness: without their losses no efficiency is known (W-LOSSES)."""
+    if case.losses is None:
+        return
+    stages = [
+        (kind, number, stage) for kind in ("pair", "planetary") for number, stage in enumerate(getattr(case, kind))
+    ]
+    unknown = [(kind, number, stage) for kind, number, stage in stages if not (stage.teeth and case.deflection.contact)]
+    if not unknown:
+        return
+    kind, number, first = unknown[0]
+    names = merged_names([stage.name for _, _, stage in unknown])
+    text = f"nothing tells what the meshes of {names} lose, whose stiffness is given: the efficiency is not known"
+    if first.teeth:
+        yield Finding("W-LOSSES", "deflection.contact", text, remedy="leave it out, or give true")
+    else:
+        yield Finding("W-LOSSES", f"{kind}[{number}].teeth", text, remedy="give the teeth of the stage")
 
 
 def no_box_losses(case: GearboxCase) -> str:

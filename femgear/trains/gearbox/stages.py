@@ -29,7 +29,7 @@ from femgear.trains.gearbox.deflection import Deflection, check_held, solve_defl
 from femgear.trains.gearbox.friction import box_friction_findings, friction_excites
 from femgear.trains.gearbox.judgements import gearbox_judgements
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
-from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries
+from femgear.trains.gearbox.losses import BOX_HEAT, BOX_LOSSES, idle_loss_entries, unknown_mesh_losses
 from femgear.trains.gearbox.model import reference_shaft
 from femgear.trains.gearbox.modes import solve_gearbox_modes
 from femgear.trains.gearbox.planet_branches import describe_branches
@@ -345,7 +345,12 @@ GEARBOX = Train(
         ),
     ),
     describe=describe_gearbox,
-    warnings=lambda case: (*gearbox_warnings(case), *idle_loss_entries(case), *box_friction_findings(case)),
+    warnings=lambda case: (
+        *gearbox_warnings(case),
+        *idle_loss_entries(case),
+        *unknown_mesh_losses(case),
+        *box_friction_findings(case),
+    ),
     bodies=lambda case: gearbox_bodies(case, {}),
     draft_casing=draft_casing,
     heard=heard_stages,

@@ -1,6 +1,7 @@
 """Losses of a gearbox: teeth, bearings, balance of powers, what is left out."""
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,8 +10,11 @@ from small_gearbox import pair_tables, set_on_shafts
 from femgear.case.lubrication import oil_at
 from femgear.errors import CaseError
 from femgear.gears.power_losses import planetary_efficiency
+from femgear.report.tables import Marks
+from femgear.stages.judgements import judge_heat
 from femgear.stages.key_figures import figure_of
 from femgear.stages.losses import check_loss_entries
+from femgear.stages.losses_results import describe_losses, efficiency_rows, loss_tables
 from femgear.stages.planet_bearings import planet_friction
 from femgear.trains.gearbox.deflection import solve_deflection
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
@@ -20,6 +24,7 @@ from femgear.trains.gearbox.losses import (
     loss_point,
     solve_box_heat,
     solve_box_losses,
+    unknown_mesh_losses,
 )
 from femgear.trains.gearbox.results import DeflectionResult
 from femgear.trains.reading import read_case
@@ -35,9 +40,9 @@ LOSSES = {"friction": "constant", "coefficient": 0.05}
 OIL = {"viscosity": "20 mm^2/s"}
 
 
-def geared(losses=LOSSES, oil=OIL, **bearing):
-    """Gearbox of a pair with teeth, whose bearings A and C have balls."""
-    tables = pair_tables(teeth=True) | {"losses": losses, "deflection": {"slices": 3, "passes": 3}}
+def geared(losses=LOSSES, oil=OIL, *, teeth=True, **bearing):
+    """Gearbox of a pair, with teeth or a given mesh, whose bearings A and C have balls."""
+    tables = pair_tables(teeth=teeth) | {"losses": losses, "deflection": {"slices": 3, "passes": 3}}
     tables |= {"lubricant": oil} if oil else {}
     for number in (0, 2):
         section = tables["bearing"][number]
@@ -177,3 +182,25 @@ def test_a_planetary_stage_has_the_efficiency_of_its_closed_form():
     (friction,) = point.friction.values()
     basic = friction.passed[0] * friction.passed[1]
     assert point.flow.efficiency == pytest.approx(planetary_efficiency(basic, 73 / 23), rel=1e-9)
+
+
+def test_without_losses_of_given_meshes_no_efficiency_is_known_and_losses_of_bearings_stay():
+    """A gearbox whose stage has a given mesh: its bearings A and C have friction, its teeth none that anything tells."""
+    case = geared(LOSSES | {"torque_shares": [1.0], "speed_shares": [1.0]}, teeth=False)
+    (finding,) = unknown_mesh_losses(case)
+    assert (finding.code, finding.key) == ("W-LOSSES", "pair[0].teeth") and "stage" in finding.text
+    assert not [*unknown_mesh_losses(geared())] and not [*unknown_mesh_losses(read_case(pair_tables()))]
+    result = solve_box_losses(case, solved(case))
+    data = result.dataset()
+    assert all(np.isnan(data[name].values).all() for name in ("efficiency", "efficiency_map", "loss", "output_power"))
+    assert float(data["bearing_loss"].sel(bearing="A")[0]) > 0.0 and data.sizes["mesh"] == 0
+    block = describe_losses(data)
+    assert block.rows[0][block.header.index("efficiency")] == "-"
+    assert float(block.rows[0][block.header.index("bearings [W]")]) > 0.0
+    assert any("teeth" in note for note in block.notes) and [*loss_tables(data)][-1].rows == (("1", "-"),)
+    results = SimpleNamespace(stages=("losses",), losses=data)
+    (judgement,) = judge_heat(results)
+    assert judgement.state == "open" and "efficiency not known" in judgement.answer
+    assert [row for _, row in efficiency_rows(results, Marks(()))] == [
+        "not known: nothing tells what the meshes of stage lose"
+    ]
