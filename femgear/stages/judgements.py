@@ -15,9 +15,9 @@ import numpy as np
 
 from femgear.case.sections import StrengthSection
 from femgear.findings import CATALOGUE, DOUBT, NOTE, Finding
-from femgear.report.tables import Block
-from femgear.stages.life_results import first_to_fail, hours_text
-from femgear.stages.strength import RatedFlank, Rating
+from femgear.report.tables import Block, merged_names
+from femgear.stages.life_results import SYMBOLS, first_to_fail, hours_text
+from femgear.stages.strength import OF_TEETH, RatedFlank, Rating, gear_words
 
 State = Literal["good", "look", "bad", "open"]
 _WORDS: dict[State, str] = {"good": "✓ holds", "look": "▲ look", "bad": "✕ fails", "open": "○ no limit"}
@@ -75,10 +75,13 @@ class Least:
         S_F or S_H.
     where : str
         Root or flank that it is of.
+    over_life : bool
+        Whether it is one over the life asked for, with the load factors of all load cases.
     """
 
     value: float
     where: str
+    over_life: bool = False
 
 
 def joined_sentence(judgements: Iterable[Judgement]) -> str:
@@ -129,8 +132,39 @@ def least_over_life(data: Any, kind: str, of_load: Least | None) -> Least | None
     if name not in data or not np.isfinite(data[name].values).any():
         return of_load
     at = int(np.nanargmin(data[name].values))
-    over_life = Least(float(data[name].values[at]), f"{kind} of {data[kind].values[at]}, over the life asked for")
+    where = f"{kind} of {data[kind].values[at]}, over the life asked for"
+    over_life = Least(float(data[name].values[at]), where, over_life=True)
     return over_life if of_load is None or over_life.value < of_load.value else of_load
+
+
+def unrated_gears(rating: Rating) -> list[str]:
+    """Name the gears that lack both safeties, or one of them: ``"gear 2"``, ``"S_F of gear 2"``.
+
+    A safety is missing without a limit of the material and outside the range of the method, not without a load.
+    """
+    gears = dict[str, set[str]]()
+    for flank in rating.flanks:
+        lacking = gears.setdefault(gear_words(flank.gear), set())
+        lacking |= {"S_F"} if flank.root_limit is None or math.isnan(flank.root_stress) else set()
+        lacking |= {"S_H"} if flank.contact_limit is None or math.isnan(flank.contact_stress) else set()
+    return [
+        gear if len(lacking) == 2 else f"{next(iter(lacking))} of {gear}" for gear, lacking in gears.items() if lacking
+    ]
+
+
+def _not_rated(parts: Sequence[str]) -> str:
+    """Say of gears, stages or safeties that they are not rated; empty of none."""
+    return f"{_and(parts)} {'is' if len(parts) == 1 else 'are'} not rated" if parts else ""
+
+
+def _and(names: Sequence[str]) -> str:
+    return " and ".join(merged_names(names).rsplit(", ", 1))
+
+
+def _doubtful(findings: Iterable[Finding], codes: Sequence[str]) -> str:
+    """Say which doubts and faults with some codes were raised, with their meanings; empty of none."""
+    raised = {finding.code for finding in findings if finding.severity != NOTE}
+    return "; ".join(f"{code}: {CATALOGUE[code][1].rstrip('.')}" for code in dict.fromkeys(codes) if code in raised)
 
 
 def stresses_text(root: np.ndarray, pressure: np.ndarray) -> str:
@@ -147,6 +181,7 @@ def judge_strength(
     doubts: Sequence[str] = (),
     open_factors: str = "",
     remedy: str = "give material.treatment and material.hardness for safeties",
+    unrated: Sequence[str] = (),
 ) -> Judgement:
     """Judge safeties against those that the case asks for.
 
@@ -166,7 +201,10 @@ def judge_strength(
         Load factors that were taken as 1, in words.
     remedy : str
         What gives safeties where there are none.
+    unrated : sequence of str
+        Gears or stages that carry and have no safety.
     """
+    findings = list(findings)
     raised = {finding.code for finding in findings if finding.severity != NOTE}
     beyond = sorted(raised & _BEYOND)
     rated = [
@@ -179,8 +217,7 @@ def judge_strength(
     ]
     if beyond:
         answer = ", ".join(f"{symbol} {least.value:.2f} ({least.where})" for symbol, least, _ in rated) or stresses
-        how = "; ".join(f"{code}: {CATALOGUE[code][1].rstrip('.')}" for code in beyond)
-        return Judgement(STRONG, "bad", answer, how, f"Not strong enough ({', '.join(beyond)})")
+        return Judgement(STRONG, "bad", answer, _doubtful(findings, beyond), f"Not strong enough ({', '.join(beyond)})")
     if not rated:
         return Judgement(STRONG, "open", stresses or "not rated", remedy, "Its strength is not rated")
     low = [(symbol, least, required) for symbol, least, required in rated if not least.value >= required]
@@ -188,17 +225,24 @@ def judge_strength(
     limit = (
         f"{' and '.join(f'{symbol} at least {required:g}' for symbol, _, required in rated)}, ISO 6336:{limits.edition}"
     )
-    limit += f"; {open_factors}" if open_factors else ""
+    whole = [] if len(rated) == 2 else ["S_H" if rated[0][0] == "S_F" else "S_F"]
+    missing = _not_rated([*whole, *(part for part in unrated if not part.startswith(tuple(whole)))])
+    reasons = _doubtful(findings, doubts)
+    limit = "; ".join(filter(None, (limit, open_factors, missing, reasons)))
     if low:
         failing = " and ".join(f"{symbol} {least.value:.2f} of the {least.where}" for symbol, least, _ in low)
         return Judgement(STRONG, "bad", answer, limit, f"Not strong enough: {failing}")
-    if len(rated) == 1:
-        missing = "S_H is not rated" if rated[0][0] == "S_F" else "S_F is not rated"
-        return Judgement(STRONG, "look", answer, f"{limit}; {missing}", f"Strong enough by {answer}; {missing}")
-    return Judgement(STRONG, "look" if raised & {*doubts} else "good", answer, limit, f"Strong enough: {answer}")
+    if missing:
+        return Judgement(STRONG, "look", answer, limit, f"Strong enough as far as it is rated: {answer}; {missing}")
+    return Judgement(STRONG, "look" if reasons else "good", answer, limit, f"Strong enough: {answer}")
 
 
-def judge_lives(parts: Iterable[tuple[str, float, str]], required: float | None) -> Iterator[Judgement]:
+def judge_lives(
+    parts: Iterable[tuple[str, float, str]],
+    required: float | None,
+    findings: Iterable[Finding] = (),
+    unrated: Sequence[str] = (),
+) -> Iterator[Judgement]:
     """Judge lives against the one that the case asks for; nothing where none was computed.
 
     Parameters
@@ -207,6 +251,10 @@ def judge_lives(parts: Iterable[tuple[str, float, str]], required: float | None)
         What lives, its shortest life [h], and where: ``("teeth", 31000.0, "root of the sun")``.
     required : float, optional
         Life asked for [h].
+    findings : iterable of Finding
+        Of the run; doubts of load factors and materials concern lives too.
+    unrated : sequence of str
+        Gears or stages that carry and have no life.
     """
     lives = [(name, hours, where) for name, hours, where in parts if not math.isnan(hours)]
     if not lives:
@@ -217,13 +265,16 @@ def judge_lives(parts: Iterable[tuple[str, float, str]], required: float | None)
     if math.isinf(shortest):
         sentence = "No tooth and no bearing fails under these loads"
     else:
-        sentence = f"It lives {_hours(shortest)} ({words})"
-    if required is None:
-        yield Judgement(LIFE, "open", answer, "operation.required_hours gives a limit", sentence)
-        return
-    state: State = "bad" if shortest < required else "good"
-    wanted = "" if math.isinf(shortest) else f" of the {required:,.0f} h asked for"
-    yield Judgement(LIFE, state, answer, f"at least {required:,.0f} h", sentence.replace(" (", f"{wanted} (", 1))
+        wanted = f" of the {required:,.0f} h asked for" if required is not None else ""
+        sentence = f"It lives {_hours(shortest)}{wanted} ({words})"
+    missing = f"the life of {_and(unrated)} is not known" if unrated else ""
+    sentence += f"; {missing}" if missing else ""
+    reasons = _doubtful(findings, OF_TEETH)
+    asked = "operation.required_hours gives a limit" if required is None else f"at least {required:,.0f} h"
+    state: State = "look" if missing or reasons else "good"
+    if required is None or shortest < required:
+        state = "open" if required is None else "bad"
+    yield Judgement(LIFE, state, answer, "; ".join(filter(None, (asked, missing, reasons))), sentence)
 
 
 def _hours(hours: float) -> str:
@@ -241,6 +292,12 @@ def lives_of_teeth(data: Any) -> Iterator[tuple[str, float, str]]:
     kind = min(kinds, key=lambda kind: float(data[f"{kind}_life"].values.min()))
     lives, at = data[f"{kind}_life"].values, first_to_fail(data, kind)
     yield "teeth", float(lives[at]), f"the {kind} of {data[kind].values[at]}"
+
+
+def without_life(data: Any, gears: Sequence[str]) -> list[str]:
+    """List the gears whose roots or flanks have no life in a file with lives; ``gears`` are sections of the case."""
+    titles = [{str(title).partition(",")[0] for title in data[kind].values} if kind in data else {} for kind in SYMBOLS]
+    return [gear_words(gear) for gear in gears if not all(gear.replace("_", " ") in named for named in titles)]
 
 
 def lives_of_bearings(data: Any) -> Iterator[tuple[str, float, str]]:

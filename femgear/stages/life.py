@@ -41,6 +41,7 @@ from femgear.stages.protocol import Progress, Stage, StageResult, one_blas_threa
 from femgear.stages.static import solve_static
 from femgear.stages.static_results import StaticResult
 from femgear.stages.strength import rate_case
+from femgear.stages.strength_results import missing_of_all
 from femgear.stages.tooth_spectra import (
     RatedLoad,
     RatedSpectrum,
@@ -126,6 +127,7 @@ class LifeResult(StageResult):
         coords["kind"] = (("kind",), np.arange(1, kinds + 1), "1", "number of the kind of mesh")
         attrs: dict[str, Any] = {"title": "life of the teeth over load cases"}
         attrs |= {} if self.required is None else {"required_hours": self.required}
+        attrs["iso_missing"] = " ".join(missing_of_all(load.rating for load in self.loads))
         lives, planets = planet_bearing_variables([self.bearings] if self.bearings else [])
         return Contents(variables | lives, coords | tooth_life_coordinates(self.spectra) | planets, attrs)
 

@@ -44,7 +44,11 @@ LOSS_VARIABLES = {
     "input_power": ("{}", "W", "power that enters"),
     "output_power": ("{}", "W", "power that leaves"),
     "loss": ("{}", "W", "all losses"),
-    "efficiency": ("{}", "1", "power that leaves over power that enters"),
+    "efficiency": (
+        "{}",
+        "1",
+        "power that leaves over power that enters; NaN where given meshes pass it on",
+    ),
     "power_imbalance": ("{}", "1", "power that enters less output and losses, over what enters"),
     "lossy_torque": ("{} shaft", "N m", "torque from outside on the shaft with losses"),
     "efficiency_map": ("torque_share speed_share", "1", "efficiency over shares of torque and speed of operation"),

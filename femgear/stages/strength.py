@@ -63,6 +63,18 @@ HARDENED = 1e9
 """sigma_Hlim above which flanks run in as surface hardened ones [Pa], as do those without a limit."""
 
 
+OF_TEETH = (
+    "W-MATERIAL",
+    "W-FACE-LOAD",
+    "W-THRUST",
+    "W-STIFFNESS",
+    "W-PASSES",
+    "W-DEFLECTION",
+    "W-OPEN",
+)
+"""Codes of the findings that concern safeties and lives alike: limits, and load factors of the contact."""
+
+
 @dataclass(frozen=True)
 class NominalStresses:
     """Nominal stresses after ISO 6336 with equal load on all planets and no load factors.
@@ -196,7 +208,7 @@ class RatedFlank:
     @property
     def words(self) -> str:
         """Name in a sentence: "the sun", "gear 1"."""
-        return self.name if self.gear.startswith("gear_") else f"the {self.name}"
+        return gear_words(self.name)
 
     @property
     def root_safety(self) -> float:
@@ -211,6 +223,12 @@ class RatedFlank:
         if self.contact_limit is None or self.contact_stress == 0.0:
             return math.nan
         return contact_safety(self.contact_limit, self.contact_stress, self.contact_factor)
+
+
+def gear_words(name: str) -> str:
+    """Name a gear, by its section or its title, in a sentence: "the sun", "gear 1"."""
+    title = name.replace("_", " ")
+    return title if title.startswith("gear ") else f"the {title}"
 
 
 def nominal_stresses(

@@ -20,7 +20,7 @@ from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.planet_bearings import planet_bearing_rows
-from femgear.stages.strength import MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
+from femgear.stages.strength import OF_TEETH, MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
 from femgear.stages.stress_reasons import reason_row
 from femgear.system.fourier import sample
 
@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 
 SYMBOLS = {"sharing": "K_gamma", "dynamic": "K_v", "face": "K_Hβ", "transverse": "K_Hα"}
 """Symbols of the load factors by the names of their arrays."""
+OF_RESPONSE = "W-PULL", "W-TAIL", "W-SEPARATION"
+"""Codes of the findings that concern safeties with the K_v of a response."""
 _GIVEN_BY = {
     "sharing": "K_γ (a response, or of rigid bodies a static solution)",
     "dynamic": "K_v (a response, or operation.speeds with strength.quality)",
@@ -58,8 +60,7 @@ def strength_verdict(results: Results) -> Iterator[Block]:
             yield Block("Verdict", rows=tuple(rows), notes=marks.notes)
         return
     rating, kinds = rated
-    doubts = "W-MATERIAL", "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
-    rows = [*((name, marks(text, *doubts)) for name, text in safety_rows(rating, kinds)), *rows]
+    rows = [*((name, marks(text, *OF_TEETH, *OF_RESPONSE)) for name, text in safety_rows(rating, kinds)), *rows]
     yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
     yield strength_block(rating, kinds)
 
@@ -239,6 +240,15 @@ def _missing_factors(factors: MeshLoadFactors, *, planets: bool) -> Iterator[str
 def missing_factors(factors: MeshLoadFactors, *, planets: bool) -> list[str]:
     """List the names of the load factors that nothing told, which are 1; without planets there is no K_gamma."""
     return [name for name in _GIVEN_BY if name not in factors.sources and (planets or name != "sharing")]
+
+
+def missing_of_all(ratings: Iterable[Rating | None]) -> list[str]:
+    """List the names of the load factors that nothing told one or more of some ratings, in the order of `SYMBOLS`."""
+    missing = set[str]()
+    for rating in filter(None, ratings):
+        planets = any(flank.gear == "planet" for flank in rating.flanks)
+        missing |= {*missing_factors(rating.factors, planets=planets)}
+    return [name for name in SYMBOLS if name in missing]
 
 
 def taken_as_one(names: Iterable[str]) -> str:

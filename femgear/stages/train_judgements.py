@@ -11,6 +11,7 @@ from femgear.case.load_spectrum import required_life
 from femgear.report.tables import significant
 from femgear.stages.judgements import (
     Judgement,
+    Least,
     judge_heat,
     judge_lives,
     judge_noise,
@@ -22,19 +23,22 @@ from femgear.stages.judgements import (
     lives_of_bearings,
     lives_of_teeth,
     stresses_text,
+    unrated_gears,
+    without_life,
 )
 from femgear.stages.static_results import peak_to_peak
-from femgear.stages.strength import Rating
+from femgear.stages.strength import OF_TEETH, Rating
 from femgear.stages.strength_results import (
+    OF_RESPONSE,
+    SYMBOLS,
     computed_dynamic_factor,
     kind_names,
-    missing_factors,
+    missing_of_all,
     rate_results,
     taken_as_one,
 )
 from femgear.stages.stress_reasons import largest_pressure
 
-_OF_SAFETIES = "W-FACE-LOAD", "W-THRUST", "W-PULL", "W-TAIL", "W-SEPARATION"
 _RESPONSES = "dynamics", "response", "runup", "branch"
 """Stages with motion."""
 
@@ -62,16 +66,32 @@ def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None 
     root, flank = (None, None) if rating is None else least_of(rating)
     if "life" in stages:
         root, flank = (least_over_life(results.life, *least) for least in (("root", root), ("flank", flank)))
-    open_factors = ""
-    if rating is not None:
-        planets = any(of_gear.gear == "planet" for of_gear in rating.flanks)
-        open_factors = taken_as_one(missing_factors(rating.factors, planets=planets))
-    yield judge_strength(root, flank, case.strength, _stresses(results), findings, _OF_SAFETIES, open_factors)
+    shown = [least for least in (root, flank) if least is not None]
+    yield judge_strength(
+        root,
+        flank,
+        case.strength,
+        _stresses(results),
+        findings,
+        (*OF_TEETH, *(() if all(least.over_life for least in shown) else OF_RESPONSE)),
+        taken_as_one(_missing_factors(results, rating, shown)),
+        unrated=() if rating is None else unrated_gears(rating),
+    )
     if "life" in stages:
         parts = (*lives_of_teeth(results.life), *lives_of_bearings(results.life))
-        yield from judge_lives(parts, required_life(case.operation))
+        unknown = without_life(results.life, case.gear_names)
+        yield from judge_lives(parts, required_life(case.operation), findings, unknown)
     yield from judge_heat(results)
     yield judge_smoothness(_motion(results, dynamic), results, _RESPONSES)
+
+
+def _missing_factors(results: Any, rating: Rating | None, shown: Sequence[Least]) -> list[str]:
+    """List the load factors that nothing told of the safeties shown: of the run's load, and of all load cases."""
+    of_load = rating if not all(least.over_life for least in shown) else None
+    missing = {*missing_of_all([of_load])}
+    if any(least.over_life for least in shown):
+        missing |= {*str(results.life.attrs.get("iso_missing", "")).split()}
+    return [name for name in SYMBOLS if name in missing]
 
 
 def _stresses(results: Any) -> str:

@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from femgear.case.sections import StrengthSection
-from femgear.findings import DOUBT, FAULT, NOTE, Finding
+from femgear.findings import CATALOGUE, DOUBT, FAULT, NOTE, Finding
 from femgear.stages.judgements import (
     Least,
     judge_heat,
@@ -23,6 +23,8 @@ from femgear.stages.judgements import (
     lives_of_bearings,
     lives_of_teeth,
     margin_of_levels,
+    unrated_gears,
+    without_life,
 )
 
 ROOT, FLANK = Least(1.92, "root of the planet"), Least(1.21, "flank of the sun")
@@ -51,8 +53,27 @@ def test_strength_without_limits_is_open_and_half_of_it_deserves_a_look():
     half = judge_strength(None, FLANK, StrengthSection())
     assert half.state == "look" and half.limit.endswith("S_F is not rated")
     doubt = Finding("W-FACE-LOAD", "", "text", severity=DOUBT)
-    assert judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-FACE-LOAD"]).state == "look"
+    doubtful = judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-FACE-LOAD"])
+    assert doubtful.state == "look" and doubtful.limit.endswith("; W-FACE-LOAD: " + CATALOGUE["W-FACE-LOAD"][1][:-1])
     assert judge_strength(ROOT, FLANK, StrengthSection(), "", [doubt], ["W-THRUST"]).state == "good"
+
+
+def test_gears_that_nothing_rates_deserve_a_look_and_are_named():
+    """Gear 2 has no limits, the sun no root that the method covers, the ring no load."""
+    values = ("gear_2", None, None, 1e8), ("sun", 5e8, 1e9, math.nan), ("ring", 5e8, 1e9, 0.0)
+    flanks = [
+        SimpleNamespace(gear=gear, root_limit=root, contact_limit=contact, root_stress=stress, contact_stress=5e8)
+        for gear, root, contact, stress in values
+    ]
+    assert unrated_gears(SimpleNamespace(flanks=flanks)) == ["gear 2", "S_F of the sun"]
+    part = judge_strength(ROOT, FLANK, StrengthSection(), unrated=["gear 2"])
+    assert part.state == "look" and part.limit.endswith("; gear 2 is not rated")
+    assert part.sentence.startswith("Strong enough as far as it is rated: ") and "; gear 2 is not" in part.sentence
+    low = judge_strength(ROOT, FLANK, StrengthSection(required_root_safety=9.0), unrated=["gear 2"])
+    assert low.state == "bad" and "gear 2" in low.limit
+    # what no gear has is said once
+    whole = judge_strength(ROOT, None, StrengthSection(), unrated=["S_H of gear 1", "gear 2"])
+    assert whole.limit.endswith("; S_H and gear 2 are not rated")
 
 
 def test_what_no_steel_carries_fails_whatever_its_safeties():
@@ -67,7 +88,7 @@ def test_what_no_steel_carries_fails_whatever_its_safeties():
 def test_the_safety_over_the_life_counts_where_it_is_smaller():
     data = xr.Dataset({"root_spectrum_safety": ("root", [2.5, 1.24])}, {"root": ["sun", "planet, sun side"]})
     least = least_over_life(data, "root", ROOT)
-    assert least == Least(1.24, "root of planet, sun side, over the life asked for")
+    assert least == Least(1.24, "root of planet, sun side, over the life asked for", over_life=True)
     assert least_over_life(data, "root", Least(1.1, "root")) == Least(1.1, "root")
     assert least_over_life(data, "flank", FLANK) == FLANK and least_over_life(data, "root", None) == least
     nothing = xr.Dataset({"root_spectrum_safety": ("root", [math.nan])}, {"root": ["sun"]})
@@ -102,6 +123,19 @@ def test_lives_without_end_hold_and_none_is_not_judged():
     (judgement,) = judge_lives([("teeth", math.inf, "the root of gear 1")], 100.0)
     assert judgement.state == "good" and judgement.sentence == "No tooth and no bearing fails under these loads"
     assert not list(judge_lives([("bearings", math.nan, "")], 100.0))
+
+
+def test_lives_deserve_a_look_where_some_are_unknown_or_doubtful():
+    lives = [("teeth", 300.0, "the root of gear 1")]
+    (part,) = judge_lives(lives, 100.0, unrated=["stage 1", "stage 2"])
+    assert part.state == "look" and part.limit == "at least 100 h; the life of stage 1..2 is not known"
+    assert part.sentence.endswith("; the life of stage 1..2 is not known")
+    doubt = Finding("W-STIFFNESS", "", "text")
+    (doubtful,) = judge_lives(lives, 100.0, [doubt, Finding("W-TAIL", "", "of a response")])
+    assert doubtful.state == "look" and "W-STIFFNESS: " in doubtful.limit and "W-TAIL" not in doubtful.limit
+    assert [judgement.state for judgement in judge_lives(lives, 500.0, [doubt])] == ["bad"]
+    names = xr.Dataset(coords={"root": ["gear 1", "planet, sun side"], "flank": ["planet, sun side", "gear 1, back"]})
+    assert without_life(names, ["gear_1", "planet", "ring"]) == ["the ring"]
 
 
 def test_lives_come_from_the_files():

@@ -5,8 +5,16 @@ import math
 import pytest
 import xarray as xr
 
+from femgear.findings import Finding
 from femgear.report.tables import Marks
-from femgear.stages.life_results import describe_damage, describe_life, hours_text, life_findings, life_rows
+from femgear.stages.life_results import (
+    LIFE_FIGURES,
+    describe_damage,
+    describe_life,
+    hours_text,
+    life_findings,
+    life_rows,
+)
 
 
 @pytest.fixture
@@ -42,6 +50,12 @@ def test_the_verdict_names_what_fails_first_and_by_which_load_case(data):
     assert life == "400 h†, root of gear 2: 75% of the damage in start"
     # what fails too soon is marked alone
     assert root.startswith("0.90†, root of gear 2: damage 2.5") and flank.startswith("1.60, flank of gear 1: damage 0")
+
+
+def test_doubts_of_load_factors_mark_lives_and_safeties_over_them(data):
+    marks = Marks([Finding("W-STIFFNESS", "", "text", stage="deflection")])
+    assert all("†" in text.split(",")[0] for _, text in life_rows(data, marks, of=("deflection",)))
+    assert "W-STIFFNESS" in LIFE_FIGURES[0].codes
 
 
 def test_what_fails_at_once_is_told_by_its_code_and_has_no_share_of_a_damage(data):

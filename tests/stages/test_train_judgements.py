@@ -53,6 +53,20 @@ def test_a_pair_with_limits_is_rated_and_has_no_level():
     assert strong.state == "good" and strong.limit.endswith("K_v, K_Hβ, K_Hα taken as 1")
 
 
+def test_the_factors_taken_as_one_are_those_of_the_safeties_that_are_shown():
+    """Over the life all factors but K_Hbeta are known; under the load of the run nothing tells any."""
+    limits = {"material.root_stress_limit": "430 MPa", "material.contact_stress_limit": "1500 MPa"}
+    case = with_values(read_case(CASES / "spur_pair.toml"), limits)
+    over_life = {f"{kind}_spectrum_safety": (kind, [1.1, 1.05]) for kind in ("root", "flank")}
+    gears = {"root": ["gear 1", "gear 2"], "flank": ["gear 1", "gear 2"]}
+    life = xr.Dataset(over_life, gears, {"iso_missing": "face"})
+    strong = next(set_judgements(Files(case, life=life)))
+    assert "over the life" in strong.answer and strong.limit.endswith("; K_Hβ taken as 1")
+    life["flank_spectrum_safety"].values[:] = 9.0
+    strong = next(set_judgements(Files(case, life=life)))
+    assert strong.answer.count("over the life") == 1 and strong.limit.endswith("; K_v, K_Hβ, K_Hα taken as 1")
+
+
 def test_the_error_of_helical_meshes_is_that_of_the_slices(static):
     """static.nc has the spur gears of the transverse section, whose error nobody hears."""
     case = read_case(CASES / "helical_30_20_70.toml")

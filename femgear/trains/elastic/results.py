@@ -78,8 +78,14 @@ from femgear.stages.static_results import (
     root_doubts,
     shares,
 )
-from femgear.stages.strength import Rating, rate_case, rating_wanted
-from femgear.stages.strength_results import dynamic_factors, safety_notes, safety_rows, strength_block
+from femgear.stages.strength import OF_TEETH, Rating, rate_case, rating_wanted
+from femgear.stages.strength_results import (
+    computed_load_factors,
+    dynamic_factors,
+    safety_notes,
+    safety_rows,
+    strength_block,
+)
 from femgear.stages.stress_reasons import largest_pressure, reason_row
 from femgear.storage.contents import Contents
 from femgear.storage.results import (
@@ -627,6 +633,9 @@ def verdict(results: Results) -> Iterator[Block]:
         rows.append(("largest dynamic factor K_v, at operating speeds", text))
         rows += friction_rows(results, marks)
     rated = rating_wanted(results.case)
+    if rated and "dynamics" not in stages and "K_gamma" in computed:
+        text = _kinds("{:.3f}", computed["K_gamma"])
+        rows.append((f"planet load factor K_gamma{_where(results.static, ', static')}", text))
     if "K_Hβ" in computed:
         text = _kinds("{:.3f}", computed["K_Hβ"], lambda text: marks(text, "W-FACE-LOAD", "W-THRUST"))
         rows.append(("face load factor K_Hβ", text))
@@ -727,7 +736,8 @@ def factors_of_speeds(results: Results) -> np.ndarray:
 def known_factors(results: Results) -> dict[str, np.ndarray]:
     """Load factors (2,) of both kinds of mesh by their symbols, as far as they were computed, ISO 6336-1.
 
-    K_v is the largest at any operating speed, K_gamma the largest mean force of a mesh over that of all of its kind.
+    K_v is the largest at any operating speed, K_gamma the largest mean force of a mesh over that of all of its kind;
+    without a response that of the static solution.
     """
     factors = dict[str, np.ndarray]()
     if "dynamics" in results.stages:
@@ -735,9 +745,10 @@ def known_factors(results: Results) -> dict[str, np.ndarray]:
         of_kinds = mean.reshape(len(mean), len(KINDS), -1)
         sharing = (of_kinds.max(axis=2) / of_kinds.mean(axis=2)).max(axis=0)
         factors = {"K_gamma": np.maximum(sharing, 1.0), "K_v": factors_of_speeds(results).max(axis=0)}
-    if "static" in results.stages and "face_load_factor" in results.static:
-        static = results.static
-        factors["K_Hβ"] = _by_kind(static["mesh"].values, static["face_load_factor"].values)
+    if "static" in results.stages:
+        sharing, face = computed_load_factors(results.static, KINDS)
+        factors |= {} if sharing is None else {"K_gamma": factors.get("K_gamma", sharing)}
+        factors |= {} if face is None else {"K_Hβ": face}
     return factors
 
 
@@ -771,7 +782,7 @@ def _safeties(
     """
     rating = _rated(case, computed)
     for name, text in safety_rows(rating, KINDS):
-        yield name, marks(text, *doubts, "W-FACE-LOAD", "W-THRUST", of=("static", *_OF_LEVEL))
+        yield name, marks(text, *doubts, *OF_TEETH, of=("static", *_OF_LEVEL))
     notes += safety_notes(rating)
 
 

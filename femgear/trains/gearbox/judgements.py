@@ -28,10 +28,11 @@ from femgear.stages.judgements import (
     stresses_text,
 )
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
+from femgear.stages.strength import OF_TEETH
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.trains.gearbox.mode_words import nearest_mode
 from femgear.trains.gearbox.response_results import line_origin
-from femgear.trains.gearbox.strength import OF_TEETH, least_safety
+from femgear.trains.gearbox.strength import least_safety
 
 _RESPONSES = "dynamics", "runup", "balance", "transient"
 """Stages with motion."""
@@ -41,24 +42,48 @@ def gearbox_judgements(results: Any) -> Iterator[Judgement]:
     """Judge a gearbox."""
     stages, case, findings = results.stages, results.case, results.findings
     if "deflection" in stages:
-        data = results.deflection
-        response = results.dynamics if "dynamics" in stages else None
-        root, flank = (_least(least_safety(data, response, symbol), data) for symbol in ("S_F", "S_H"))
-        root, flank = (least_over_life(data, *least) for least in (("root", root), ("flank", flank)))
-        # deflection.nc has no response
-        missing = {*str(data.attrs.get("iso_missing", "")).split()} - ({"dynamic"} if response is not None else set())
-        open_factors = taken_as_one(name for name in SYMBOLS if name in missing)
-        with_teeth = [stage.name for stage in (*case.pair, *case.planetary) if stage.teeth]
-        remedy = "no stage has teeth of its own, which safeties are of"
-        if with_teeth:
-            remedy = f"give treatment and hardness in the material of the teeth of {merged_names(with_teeth)}"
-        yield judge_strength(root, flank, case.strength, _stresses(results), findings, OF_TEETH, open_factors, remedy)
-        yield from judge_lives((*lives_of_teeth(data), *lives_of_bearings(data)), required_life(case.operation))
+        yield _strength(results)
+        data, unknown = results.deflection, _listed(results.deflection, "without_life")
+        parts = (*lives_of_teeth(data), *lives_of_bearings(data))
+        yield from judge_lives(parts, required_life(case.operation), findings, unknown)
     yield from judge_heat(results)
     yield judge_smoothness(_motion(results), results, _RESPONSES)
     if "dynamics" in stages and results.dynamics.sizes.get("sensor", 0):
         yield _noise(results)
     yield judge_numbers(findings, results.manifest.complete)
+
+
+def _strength(results: Any) -> Judgement:
+    """Judge the smallest safeties over all load cases, and over the life asked for."""
+    case, data = results.case, results.deflection
+    response = results.dynamics if "dynamics" in results.stages else None
+    smallest = {kind: least_safety(data, response, symbol) for kind, symbol in (("root", "S_F"), ("flank", "S_H"))}
+    root, flank = (least_over_life(data, kind, _least(safety, data)) for kind, safety in smallest.items())
+    missing = {*str(data.attrs.get("iso_missing", "")).split()}
+    shown = [(least, smallest[kind]) for kind, least in (("root", root), ("flank", flank)) if least is not None]
+    chosen = -1 if response is None else int(data.attrs["load_case"])
+    if shown and all(not least.over_life and safety and safety[1][0] == chosen for least, safety in shown):
+        missing -= {"dynamic"}  # the response is one of the chosen load case
+    with_teeth = [stage.name for stage in (*case.pair, *case.planetary) if stage.teeth]
+    remedy = "no stage has teeth of its own, which safeties are of"
+    if with_teeth:
+        remedy = f"give treatment and hardness in the material of the teeth of {merged_names(with_teeth)}"
+    return judge_strength(
+        root,
+        flank,
+        case.strength,
+        _stresses(results),
+        results.findings,
+        OF_TEETH,
+        taken_as_one(name for name in SYMBOLS if name in missing),
+        remedy,
+        _listed(data, "iso_unrated"),
+    )
+
+
+def _listed(data: Any, name: str) -> list[str]:
+    """Read the names that an attribute of deflection.nc lists; none of files that have not got it."""
+    return [text for text in str(data.attrs.get(name, "")).split(" | ") if text]
 
 
 def _least(safety: tuple[float, tuple[int, int, int]] | None, data: Any) -> Least | None:

@@ -1,8 +1,8 @@
 """Stage "losses" of a gearbox: teeth and bearings of all load cases, torques with losses, efficiency.
 
 The teeth lose by the loads of their contact, with the misalignment that the gearbox gives them, bearings by Palmgren's
-formula. What meshes of given stiffness lose is unknown, and with it the efficiency of a gearbox whose power passes them.
-Bearings of given stiffness lose nothing here. Findings say so.
+formula. What meshes of given stiffness lose is unknown, and with it the efficiency of a gearbox whose power passes
+them. Bearings of given stiffness lose nothing here. Findings say so.
 """
 
 from __future__ import annotations

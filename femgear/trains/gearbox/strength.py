@@ -8,7 +8,7 @@ deflection.nc K_v is that of part 1, or 1; the verdict puts that of the response
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,15 +16,15 @@ import numpy as np
 from femgear.case import text as case_text
 from femgear.case.sections import StrengthSection
 from femgear.report.tables import Block, Marks, tabulate
-from femgear.stages.strength import Rating, rate_case, rating_wanted
-from femgear.stages.strength_results import factor_names, kind_names, missing_factors, missing_notes
+from femgear.stages.judgements import unrated_gears
+from femgear.stages.strength import OF_TEETH, Rating, rate_case, rating_wanted
+from femgear.stages.strength_results import factor_names, kind_names, missing_notes, missing_of_all
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
 from femgear.trains.gearbox.contact import StageContact, loaded_tables
 from femgear.trains.gearbox.deflection import Deflection
 from femgear.trains.gearbox.power import BoxFlow
 from femgear.trains.gearbox.shared_gears import bent_both_ways, shared_gears
 
-OF_TEETH = "W-PASSES", "W-DEFLECTION", "W-STIFFNESS", "W-FACE-LOAD", "W-OPEN", "W-MATERIAL"
 _SAFETIES = {"iso_root_safety": "S_F", "iso_contact_safety": "S_H"}
 _STRESSES = {"S_F": "sigma_F0", "S_H": "Z sigma_H0"}
 _WORDS = {
@@ -138,10 +138,26 @@ def strength_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], d
         if any({*gear.pushes(state.model.flow)} >= {1, -1} for state in states):
             notes.append(f"Y_M = 0.7 of {gear.name}, whose mates bend its teeth both ways")
     editions = ", ".join(dict.fromkeys(str(rating.nominal.edition) for rating in first.values()))
-    planets = {name: any(of_gear.gear == "planet" for of_gear in rating.flanks) for name, rating in first.items()}
-    missing = [name for stage in first for name in missing_factors(first[stage].factors, planets=planets[stage])]
-    attrs = {"iso_edition": editions, "iso_notes": " | ".join(notes), "iso_missing": " ".join(dict.fromkeys(missing))}
+    attrs = {
+        "iso_edition": editions,
+        "iso_notes": " | ".join(notes),
+        "iso_missing": " ".join(missing_of_all(rating for of_state in ratings for rating in of_state.values())),
+        "iso_unrated": " | ".join(_unrated(states, ratings)),
+    }
     return variables, coords, attrs
+
+
+def _unrated(states: Sequence[Deflection], ratings: Sequence[Mapping[str, Rating]]) -> Iterator[str]:
+    """Name the stages that carry in a load case and have no safety, and gears of others that lack one."""
+    for stage in states[0].model.stages:
+        if not any(state.model.flow.carries(stage.section) for state in states):
+            continue
+        rating = next((of_state[stage.name] for of_state in ratings if stage.name in of_state), None)
+        gears = unrated_gears(rating) if rating is not None else []
+        if rating is None or len({flank.gear for flank in rating.flanks}) == len(gears):
+            yield stage.name
+        else:
+            yield from (f"{stage.name} {gear}" for gear in gears)
 
 
 def _places(stage: Any, rating: Rating | None) -> Iterator[tuple[int, int, Any, float]]:

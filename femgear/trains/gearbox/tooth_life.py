@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +20,7 @@ from femgear.errors import CaseError
 from femgear.stages.planet_bearings import PlanetBearings, planet_bearing_variables, planet_bearings
 from femgear.stages.strength import Rating
 from femgear.stages.tooth_spectra import (
+    KINDS,
     RatedLoad,
     RatedSpectrum,
     rated_spectra,
@@ -74,13 +76,36 @@ def _of_shared_gear(
     return shared_spectra(loads, treatment, strength_of_stage(case, teeth))
 
 
-def tooth_life_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], dict[str, tuple], dict[str, float]]:
+def stages_without_life(states: Sequence[Deflection], spectra: Sequence[RatedSpectrum]) -> Iterator[str]:
+    """Name the stages that carry in a load case and have no life, and gears of others whose root or flank has none."""
+    titles = [{rated.name.partition(",")[0] for rated in spectra if rated.kind == kind} for kind in KINDS]
+    shared = {
+        (stage, number): gear.name for gear in shared_gears(states[0].model.case) for stage, number in gear.places
+    }
+    for stage in states[0].model.stages:
+        if not any(state.model.flow.carries(stage.section) for state in states):
+            continue
+        teeth = teeth_of(stage.section)
+        gears = {} if teeth is None else {name: name.replace("_", " ") for name in teeth.gear_names}
+        named = {
+            gear: shared.get((stage.name, number), f"{stage.name} {title}")
+            for number, (gear, title) in enumerate(gears.items())
+        }
+        lacking = [gear for gear, title in named.items() if not all(title in of_kind for of_kind in titles)]
+        if len(lacking) == len(gears):
+            yield stage.name
+        else:
+            yield from (f"{stage.name} {gears[gear]}" for gear in lacking)
+
+
+def tooth_life_contents(states: Sequence[Deflection]) -> tuple[dict[str, tuple], dict[str, tuple], dict[str, Any]]:
     """Collect variables, coordinates and attributes of deflection.nc on the lives of teeth.
 
     Without variables where no tooth has a line of life; the attribute is the life asked for [h], where there is one.
     """
     spectra, required = stage_spectra(states), required_life(states[0].model.case.operation)
-    attrs = {} if required is None else {"required_hours": required}
+    attrs: dict[str, Any] = {} if required is None else {"required_hours": required}
+    attrs["without_life"] = " | ".join(stages_without_life(states, spectra))
     variables, planets = planet_bearing_variables(stage_planet_bearings(states))
     return variables | tooth_life_variables(spectra, required), planets | tooth_life_coordinates(spectra), attrs
 

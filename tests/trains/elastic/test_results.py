@@ -45,6 +45,14 @@ def test_load_factors_are_the_largest_of_all_speeds_also_of_those_that_tables_le
     assert known_factors(fixed)["K_v"] == pytest.approx([1.9, 1.9])
 
 
+def test_without_a_response_the_shares_of_the_static_solution_give_the_load_factor():
+    """Planet 1 carries nothing, the others half each: 1.5 of the equal share, as in the life over load cases."""
+    share = np.array([[0.0, 0.0], [0.4, 0.6], [0.6, 0.4]])
+    static = xr.Dataset({"load_share": (("planet", "position"), share)}, {"planet": [1, 2, 3]})
+    results = SimpleNamespace(stages=("static",), static=static)
+    assert known_factors(results)["K_gamma"] == pytest.approx([1.5, 1.5], rel=1e-12)
+
+
 def test_measured_lines_stand_beside_the_computed_ones_of_their_order():
     housing = synthetic.housing()
     rpm, lines = float(housing["speed"][1]), stored_lines(housing.isel(speed=1))

@@ -185,7 +185,7 @@ def test_a_planetary_stage_has_the_efficiency_of_its_closed_form():
 
 
 def test_without_losses_of_given_meshes_no_efficiency_is_known_and_losses_of_bearings_stay():
-    """A gearbox whose stage has a given mesh: its bearings A and C have friction, its teeth none that anything tells."""
+    """A gearbox whose stage has a given mesh: its bearings A and C have friction, its teeth none that is known."""
     case = geared(LOSSES | {"torque_shares": [1.0], "speed_shares": [1.0]}, teeth=False)
     (finding,) = unknown_mesh_losses(case)
     assert (finding.code, finding.key) == ("W-LOSSES", "pair[0].teeth") and "stage" in finding.text

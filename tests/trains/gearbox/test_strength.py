@@ -56,9 +56,9 @@ def state_of(case, contacts):
     stages, first = [], 0
     for name, contact in contacts.items():
         count = len(contact.normal_force)
-        stages.append(SimpleNamespace(name=name, meshes=tuple(range(first, first + count))))
+        stages.append(SimpleNamespace(name=name, section=name, meshes=tuple(range(first, first + count))))
         first += count
-    flow = SimpleNamespace(mesh_frequency=dict.fromkeys(contacts, 500.0))
+    flow = SimpleNamespace(mesh_frequency=dict.fromkeys(contacts, 500.0), carries=lambda section: section != "idle")
     assembly = SimpleNamespace(contacts=[None] * first)
     model = SimpleNamespace(case=case, flow=flow, stages=stages, assembly=assembly)
     return SimpleNamespace(model=model, contacts=contacts)
@@ -117,6 +117,19 @@ def test_nothing_is_stored_where_nothing_asks(planetary):
     assert rated_stage(box(), "set", contact_of(plain, 50.0, [1000.0] * 6), 500.0) is None
     assert strength_contents([state_of(box(), {"set": contact_of(plain, 50.0, [1.0] * 6)})]) == ({}, {}, {})
     assert describe_strength(xr.Dataset(), 0, "") == () and not list(smallest_safeties(xr.Dataset(), None, Marks(())))
+
+
+def test_stages_and_gears_that_carry_without_a_safety_are_named(pair):
+    """Stages: rated, without limits, with those of gear 1 alone, and one that carries nothing."""
+    case, gear_1 = (
+        read_case(CASES / "spur_pair.toml"),
+        {key.replace("material", "gear_1.material"): value for key, value in LIMITS.items()},
+    )
+    cases = {"first": pair, "second": case, "third": with_values(case, gear_1), "idle": case}
+    state = state_of(box(edition=2019), {name: contact_of(of, 100.0, [1.0]) for name, of in cases.items()})
+    *_, attrs = strength_contents([state])
+    assert attrs["iso_unrated"] == "second | third gear 2"
+    assert attrs["iso_missing"] == "dynamic face transverse"
 
 
 def test_files_hold_stresses_and_safeties_of_all_load_cases(data, pair):

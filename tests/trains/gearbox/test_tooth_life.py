@@ -10,7 +10,12 @@ from femgear.stages.strength import rate_case
 from femgear.trains.gearbox.key_figures import gearbox_key_figures
 from femgear.trains.gearbox.life import bearing_life_findings
 from femgear.trains.gearbox.stages import solve_deflections
-from femgear.trains.gearbox.tooth_life import pitting_problems, stage_spectra, tooth_life_contents
+from femgear.trains.gearbox.tooth_life import (
+    pitting_problems,
+    stage_spectra,
+    stages_without_life,
+    tooth_life_contents,
+)
 from femgear.trains.reading import read_case
 
 STEEL = {"treatment": "case hardened steel", "hardness": 720}
@@ -55,13 +60,19 @@ def test_spectra_are_those_of_the_loaded_states(result):
 def test_the_file_has_lives_and_the_life_that_is_asked_for(result):
     variables, coords, attrs = tooth_life_contents(result.states)
     data = result.dataset()
-    assert attrs == {"required_hours": 20000.0} and data.attrs["required_hours"] == 20000.0
+    assert attrs == {"required_hours": 20000.0, "without_life": ""} and data.attrs["required_hours"] == 20000.0
     assert data["root_life"].values == pytest.approx(variables["root_life"][1])
     assert list(data["flank"].values) == coords["flank"][1]
     assert not list(bearing_life_findings(data))  # bearings without ratings
     data["spectrum_reference_life"][:] = [1e6, 3e3, 5e3, 1e7]
     (finding,) = bearing_life_findings(data)
     assert finding.code == "W-LIFE" and "B 3000 h, C 5000 h" in finding.text
+
+
+def test_stages_and_gears_that_carry_without_a_life_are_named(result):
+    of_gear_1 = [rated for rated in stage_spectra(result.states) if "gear 2" not in rated.name]
+    assert [*stages_without_life(result.states, of_gear_1)] == ["stage gear 2"]
+    assert [*stages_without_life(result.states, [])] == ["stage"]
 
 
 def test_lives_are_key_figures_of_the_gearbox(result):
