@@ -83,7 +83,7 @@ CATALOGUE = {
     "W-RELIEF-SIGN": (NOTE, "A modification adds material."),
     "W-RESIDUAL": (DOUBT, "Static compliance beyond the modes of a casing is missing."),
     "W-RIGID": (DOUBT, "A response holds bodies rigid that the modes have elastic."),
-    "W-RIM": (NOTE, "A rim is thin."),
+    "W-RIM": (NOTE, "A rim is thin; of rated gears a doubt where the rim factor of ISO 6336-3 does not hold."),
     "W-REXS": (DOUBT, "A REXS file holds what the case that was made of it has not, or has otherwise."),
     "W-ROWS": (NOTE, "Tables that no sheet can hold are left out."),
     "W-SEPARATION": (NOTE, "Flanks part at speeds of operation."),

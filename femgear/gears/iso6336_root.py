@@ -74,6 +74,10 @@ class NominalRootStress:
     edition: Edition
 
 
+THINNEST_RIM, THINNEST_RING = 0.5, 1.75
+"""Rims that Y_B covers: thicker than this in tooth heights, of internal gears in normal modules."""
+
+
 @dataclass(frozen=True)
 class _VirtualTooth:
     """Tooth of the virtual spur gear of the normal section (ISO 6336-3, section 6.2), of spur gears itself.
@@ -159,6 +163,22 @@ def rim_factor(rim: float, height: float, module: float, *, internal: bool) -> f
     return 1.0 if limit else max((1.15 if internal else 1.6) * math.log(thin), 1.0)
 
 
+def rim_beyond_range(gear: Gear) -> tuple[float, float] | None:
+    """Find a rim that is too thin for `rim_factor`: its thickness and the limit; None of one within the range.
+
+    Both in tooth heights, of internal gears in normal modules (ISO 6336-3, section 9).
+    """
+    rim, height = _rim_and_height(gear)
+    size = gear.module * math.cos(helix_of(gear)[0]) if gear.internal else height
+    limit = THINNEST_RING if gear.internal else THINNEST_RIM
+    return None if rim > limit * size else (rim / size, limit)
+
+
+def _rim_and_height(gear: Gear) -> tuple[float, float]:
+    """Thickness of the rim under the root circle and height of the tooth [m]."""
+    return abs(gear.root_radius - gear.rim_radius), abs(gear.tip_radius - gear.root_radius)
+
+
 def deep_tooth_factor(contact_ratio: float, grade: int | None) -> float:
     """Compute Y_DT of the virtual contact ratio (ISO 6336-3, section 10): below 1 of fine teeth that are deep.
 
@@ -222,9 +242,7 @@ def nominal_root_stress(
     form = share * 6.0 * arm * math.cos(angle) / (chord**2 * math.cos(tooth.pressure_angle))
     correction = stress_correction(chord / arm, 0.5 * chord / fillet)
     inclined, deep = root_helix_factor(helix, overlap, edition), deep_tooth_factor(contact_ratio, grade)
-    thin = rim_factor(
-        abs(gear.root_radius - gear.rim_radius), abs(gear.tip_radius - gear.root_radius), m, internal=gear.internal
-    )
+    thin = rim_factor(*_rim_and_height(gear), m, internal=gear.internal)
     nominal = tangential_force / (root_face_width(gear.face_width, common, m) * m)
     return NominalRootStress(
         stress=nominal * form * correction * inclined * thin * deep,

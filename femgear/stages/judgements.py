@@ -17,7 +17,7 @@ from femgear.case.sections import StrengthSection
 from femgear.findings import CATALOGUE, DOUBT, NOTE, Finding
 from femgear.report.tables import Block, merged_names
 from femgear.stages.life_results import SYMBOLS, first_to_fail, hours_text
-from femgear.stages.strength import OF_TEETH, RatedFlank, Rating, gear_words
+from femgear.stages.strength import OF_ROOTS, RatedFlank, Rating, gear_words
 
 State = Literal["good", "look", "bad", "open"]
 _WORDS: dict[State, str] = {"good": "✓ holds", "look": "▲ look", "bad": "✕ fails", "open": "○ no limit"}
@@ -269,12 +269,12 @@ def judge_lives(
         sentence = f"It lives {_hours(shortest)}{wanted} ({words})"
     missing = f"the life of {_and(unrated)} is not known" if unrated else ""
     sentence += f"; {missing}" if missing else ""
-    reasons = _doubtful(findings, OF_TEETH)
-    asked = "operation.required_hours gives a limit" if required is None else f"at least {required:,.0f} h"
+    reasons = _doubtful(findings, OF_ROOTS)
+    limit = "operation.required_hours gives a limit" if required is None else f"at least {required:,.0f} h"
     state: State = "look" if missing or reasons else "good"
     if required is None or shortest < required:
         state = "open" if required is None else "bad"
-    yield Judgement(LIFE, state, answer, "; ".join(filter(None, (asked, missing, reasons))), sentence)
+    yield Judgement(LIFE, state, answer, "; ".join(filter(None, (limit, missing, reasons))), sentence)
 
 
 def _hours(hours: float) -> str:

@@ -11,18 +11,24 @@ import numpy as np
 from femgear.findings import Finding
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.key_figures import HOURS, NUMBER, KeyFigure, Stored
-from femgear.stages.strength import OF_TEETH
+from femgear.stages.strength import OF_ROOTS, OF_TEETH
 
 SYMBOLS = {"root": "S_F", "flank": "S_H"}
 """Safeties by what they are of."""
-_OF_LIFE = "W-LIFE", "W-STRENGTH", *OF_TEETH
+_DOUBTS = {"root": OF_ROOTS, "flank": OF_TEETH}
+_OF_LIFE = {kind: ("W-LIFE", "W-STRENGTH", *doubts) for kind, doubts in _DOUBTS.items()}
 LIFE_FIGURES = tuple(
-    KeyFigure(f"{kind} life", HOURS, "life", Stored(f"{kind}_life", pick="smallest"), _OF_LIFE, whole=True)
+    KeyFigure(f"{kind} life", HOURS, "life", Stored(f"{kind}_life", pick="smallest"), _OF_LIFE[kind], whole=True)
     for kind in SYMBOLS
 )
 SPECTRUM_FIGURES = tuple(
     KeyFigure(
-        f"{symbol} over life", NUMBER, "life", Stored(f"{kind}_spectrum_safety", pick="smallest"), _OF_LIFE, whole=True
+        f"{symbol} over life",
+        NUMBER,
+        "life",
+        Stored(f"{kind}_spectrum_safety", pick="smallest"),
+        _OF_LIFE[kind],
+        whole=True,
     )
     for kind, symbol in SYMBOLS.items()
 )
@@ -83,7 +89,7 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
             hours = marks(hours, "W-STRENGTH", of=of)
         elif data[f"{shortest}_damage"].values[at] > 1.0:
             hours = marks(hours, "W-LIFE", of=of)
-        hours = marks(hours, *OF_TEETH)
+        hours = marks(hours, *_DOUBTS[shortest])
         what = f"{shortest} of {data[shortest].values[at]}"
         yield "shortest life of the teeth, ISO 6336-6", f"{hours}, {what}: {_most_damage(data, shortest, at)}"
     for kind in kinds:
@@ -94,7 +100,7 @@ def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Itera
         life, damage = float(data[f"{kind}_life"].values[at]), float(data[f"{kind}_damage"].values[at])
         text = f"{safety[at]:.2f}"
         text = marks(text, "W-STRENGTH" if life == 0.0 else "W-LIFE", of=of) if damage > 1.0 else text
-        text = marks(text, *OF_TEETH)
+        text = marks(text, *_DOUBTS[kind])
         cause = _most_damage(data, kind, at)
         if life > 0.0:
             cause = f"damage {_number(damage)}{f', {cause}' if math.isfinite(life) else ''}"

@@ -194,9 +194,9 @@ class LossesResult(StageResult):
             "input_power": [flow.input_power for flow in flows],
             "efficiency": [point.efficiency for point in points],
         }
-        known = np.array([math.nan if point.unknown else 1.0 for point in points])
-        values["lossy_torque"] = known[:, None] * [[flow.torque[shaft] for shaft in shafts] for flow in flows]
-        values |= {name: known * [getattr(flow, name) for flow in flows] for name in ("output_power", "loss")}
+        unknown_is_nan = np.array([math.nan if point.unknown else 1.0 for point in points])
+        values["lossy_torque"] = unknown_is_nan[:, None] * [[flow.torque[shaft] for shaft in shafts] for flow in flows]
+        values |= {name: unknown_is_nan * [getattr(flow, name) for flow in flows] for name in ("output_power", "loss")}
         bearings = [*first.bearing_loss]
         coords: dict[str, tuple] = {
             "mesh": ("mesh", [name for stage in stages for name in self.meshes[stage]], "1", "gear mesh"),

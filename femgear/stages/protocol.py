@@ -358,6 +358,8 @@ class Train:
         Charts of page one, the first two of which are there: name of the figure, and number of its panel.
     heard : callable, optional
         ``(case) -> stages``: planetary stages that recordings tell, by name; None of trains that are no gearbox.
+    stands_in : mapping of str to str
+        Stages of other trains, with the stage of this one that has their results.
     """
 
     name: str
@@ -377,6 +379,7 @@ class Train:
     stiffness_curves: tuple[str, str, str] = ("static", "mesh_stiffness", "ste")
     front: tuple[tuple[str, int], ...] = ()
     heard: Callable[[Any], Mapping[str, HeardSet]] | None = None
+    stands_in: Mapping[str, str] = field(default_factory=dict)
 
     def stage(self, name: str) -> Stage | None:
         """Find the stage of a name, None where the train has none of it."""

@@ -42,7 +42,7 @@ from femgear.report.style import family
 from femgear.report.tables import Block, Marks, chosen, significant, tabulate
 from femgear.stages.drawing_tables import describe_drawing
 from femgear.stages.protocol import StageResult
-from femgear.stages.strength import SIDES, NominalStresses
+from femgear.stages.strength import SIDES, NominalStresses, thin_rims
 from femgear.stages.stress_reasons import largest_pressure, over_hertz, reason_values, stress_reasons
 from femgear.stages.tooth_faults import describe_faults, fault_findings
 from femgear.storage.contents import Contents
@@ -1156,7 +1156,7 @@ def describe_set(case: Case) -> tuple[Block, ...]:
 def set_warnings(case: Case) -> Iterator[Finding]:
     """List what is allowed in any planetary set but deserves a look."""
     gears = planetary_set(case)
-    yield from (*check_set(gears, overlap=case_overlap(case, gears)), *case.notices)
+    yield from (*check_set(gears, overlap=case_overlap(case, gears)), *thin_rims(case), *case.notices)
     yield from load_warnings(case)
 
 

@@ -18,6 +18,7 @@ from femgear.case.gear_set import materials_of, planetary_set
 from femgear.case.sections import gear_material
 from femgear.errors import GeometryError
 from femgear.fe.elasticity import Material, material_of_each
+from femgear.findings import DOUBT, Finding
 from femgear.gears.iso6336 import (
     BY_EXPERIENCE,
     LATEST_EDITION,
@@ -45,7 +46,7 @@ from femgear.gears.iso6336_load import (
     running_in,
     transverse_load_factors,
 )
-from femgear.gears.iso6336_root import NominalRootStress, nominal_root_stress
+from femgear.gears.iso6336_root import NominalRootStress, nominal_root_stress, rim_beyond_range
 from femgear.gears.iso6336_stiffness import BENDING_SHARE, line_load_factor, material_factor, pair_mesh_stiffness
 from femgear.gears.kinematics import speeds
 from femgear.gears.pair import BRANCH, GearSet
@@ -73,6 +74,8 @@ OF_TEETH = (
     "W-OPEN",
 )
 """Codes of the findings that concern safeties and lives alike: limits, and load factors of the contact."""
+OF_ROOTS = (*OF_TEETH, "W-RIM")
+"""Those of roots."""
 
 
 @dataclass(frozen=True)
@@ -623,3 +626,22 @@ def rating_wanted(case: Any) -> bool:
     limits = (gear_material(case, gear) for gear in case.gear_names)
     given = "strength" in case.model_fields_set
     return given or any(material.root_stress_limit or material.contact_stress_limit for material in limits)
+
+
+def thin_rims(case: Any) -> Iterator[Finding]:
+    """Tell rated gears whose rim is too thin for the rim factor of ISO 6336-3 (W-RIM)."""
+    for name, gear in zip(case.gear_names, planetary_set(case).gears, strict=True):
+        beyond = rim_beyond_range(gear)
+        if beyond is None or gear_material(case, name).root_stress_limit is None:
+            continue
+        thickness, limit = beyond
+        unit = "modules" if gear.internal else "tooth heights"
+        yield Finding(
+            "W-RIM",
+            f"{name}.{'outer_radius' if gear.internal else 'bore_radius'}",
+            f"the rim of {gear_words(name)} is {thickness:.3g} {unit} thick: its S_F and life rest on a rim "
+            "factor Y_B outside its range",
+            remedy="a thicker rim",
+            severity=DOUBT,
+            limit=f"more than {limit:g} {unit} (ISO 6336-3)",
+        )

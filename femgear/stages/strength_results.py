@@ -20,7 +20,7 @@ from femgear.stages.heat_results import heat_rows
 from femgear.stages.life_results import life_rows
 from femgear.stages.losses_results import efficiency_rows
 from femgear.stages.planet_bearings import planet_bearing_rows
-from femgear.stages.strength import OF_TEETH, MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
+from femgear.stages.strength import OF_ROOTS, OF_TEETH, MeshLoadFactors, RatedFlank, Rating, rate_case, rating_wanted
 from femgear.stages.stress_reasons import reason_row
 from femgear.system.fourier import sample
 
@@ -60,7 +60,10 @@ def strength_verdict(results: Results) -> Iterator[Block]:
             yield Block("Verdict", rows=tuple(rows), notes=marks.notes)
         return
     rating, kinds = rated
-    rows = [*((name, marks(text, *OF_TEETH, *OF_RESPONSE)) for name, text in safety_rows(rating, kinds)), *rows]
+    rows = [
+        *((name, marks(text, *doubts_of(f"{name} {text}"), *OF_RESPONSE)) for name, text in safety_rows(rating, kinds)),
+        *rows,
+    ]
     yield Block("Verdict", rows=tuple(rows), notes=(*safety_notes(rating), *marks.notes))
     yield strength_block(rating, kinds)
 
@@ -167,6 +170,11 @@ def safety_rows(rating: Rating, kinds: Sequence[str]) -> Iterator[tuple[str, str
         yield f"safety S_H, ISO 6336-2:{edition}", text
     if smallest := smallest_safety(flanks):
         yield "smallest safety", smallest
+
+
+def doubts_of(row: str) -> tuple[str, ...]:
+    """List the codes of the findings that concern a row of `safety_rows`, by its name and text."""
+    return OF_ROOTS if "S_F" in row else OF_TEETH
 
 
 def smallest_safety(flanks: Sequence[RatedFlank]) -> str:

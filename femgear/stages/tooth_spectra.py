@@ -122,13 +122,14 @@ def rated_spectra(
 def _root(
     case: Any, gears: GearSet, loads: Sequence[RatedLoad], place: int, flank: RatedFlank, strength: StrengthSection
 ) -> RatedSpectrum:
-    """Spectrum of the root below a flank: load cases of both directions."""
+    """Spectrum of the root below a flank: load cases of both directions; one without load has no load cycles."""
     torque = np.array([load.torque if load.rating is not None else 0.0 for load in loads])
     ratio = np.array([_ratio(load, place, "root_safety") for load in loads])
     alternating = (torque > 0.0).any() and (torque < 0.0).any() and not flank.reversed_bending
     ratio = ratio / (strength.reversal_factor if alternating else 1.0)
     line = life_line(str(gear_material(case, flank.gear).treatment), "root")
-    return RatedSpectrum(flank.name, "root", ToothSpectrum(ratio, _cycles(gears, case, loads, flank), line), torque)
+    cycles = np.where(torque != 0.0, _cycles(gears, case, loads, flank), 0.0)
+    return RatedSpectrum(flank.name, "root", ToothSpectrum(ratio, cycles, line), torque)
 
 
 def _flanks(

@@ -27,7 +27,7 @@ from femgear.stages.judgements import (
     without_life,
 )
 from femgear.stages.static_results import peak_to_peak
-from femgear.stages.strength import OF_TEETH, Rating
+from femgear.stages.strength import OF_ROOTS, Rating
 from femgear.stages.strength_results import (
     OF_RESPONSE,
     SYMBOLS,
@@ -73,7 +73,7 @@ def judge_teeth(results: Any, rating: Rating | None, dynamic: np.ndarray | None 
         case.strength,
         _stresses(results),
         findings,
-        (*OF_TEETH, *(() if all(least.over_life for least in shown) else OF_RESPONSE)),
+        (*OF_ROOTS, *(() if all(least.over_life for least in shown) else OF_RESPONSE)),
         taken_as_one(_missing_factors(results, rating, shown)),
         unrated=() if rating is None else unrated_gears(rating),
     )

@@ -182,7 +182,15 @@ def stages_of(case, only: str | None = None) -> tuple[Stage, ...]:
     why = f"it is no stage of {train.words}" if last is None else last.unavailable(case)
     if why:
         allowed = [stage.name for stage in train.stages if not stage.unavailable(case)]
-        raise CaseError(f"no stage {only}: {why}", code="E-STAGE", key="only", value=only, limit=", ".join(allowed))
+        stands_in = train.stands_in.get(only) if last is None else None
+        raise CaseError(
+            f"no stage {only}: {why}",
+            code="E-STAGE",
+            key="only",
+            value=only,
+            limit=", ".join(allowed),
+            remedy=f"--only {stands_in} computes it here" if stands_in else None,
+        )
     needs, needed = {stage.name: stage.before(case) for stage in train.stages}, {only}
     while more := {stage for name in needed for stage in needs[name]} - needed:
         needed |= more

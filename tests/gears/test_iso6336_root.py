@@ -17,6 +17,7 @@ from femgear.gears.iso6336_root import (
     fillet_section,
     load_distribution_factor,
     nominal_root_stress,
+    rim_beyond_range,
     rim_factor,
     root_helix_factor,
     stress_correction,
@@ -155,6 +156,16 @@ def test_thin_rims_and_fine_deep_teeth():
     assert [deep_tooth_factor(2.3, grade) for grade in (None, 5)] == [1.0, 1.0]
     assert deep_tooth_factor(2.3, 4) == pytest.approx(2.366 - 0.666 * 2.3)
     assert deep_tooth_factor(2.05, 4) == pytest.approx(1.0) and deep_tooth_factor(2.6, 3) == 0.7
+
+
+def test_rims_beyond_the_range_of_their_factor_are_found(nrel):
+    """ISO 6336-3 covers rims of more than 0.5 tooth heights, and of more than 1.75 normal modules of internal gears."""
+    sun, ring = nrel.gears[0], nrel.gears[-1]
+    for gear, unit, limit in ((sun, abs(sun.tip_radius - sun.root_radius), 0.5), (ring, ring.module, 1.75)):
+        for share in (0.99, 1.01):
+            rim = gear.root_radius + (1.0 if gear.internal else -1.0) * share * limit * unit
+            beyond = rim_beyond_range(dataclasses.replace(gear, rim_radius=rim))
+            assert beyond == (None if share > 1.0 else (pytest.approx(share * limit), limit))
 
 
 def test_generated_fillet_of_a_rack_is_the_closed_form():

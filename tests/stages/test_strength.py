@@ -9,7 +9,15 @@ import pytest
 from femgear.case.gear_set import planetary_set
 from femgear.gears.iso6336 import overlap_of
 from femgear.gears.iso6336_load import dynamic_factor_of_speed
-from femgear.stages.strength import case_stresses, mesh_frequencies, rate_case, rating_wanted, standard_factors
+from femgear.stages.strength import (
+    OF_ROOTS,
+    case_stresses,
+    mesh_frequencies,
+    rate_case,
+    rating_wanted,
+    standard_factors,
+    thin_rims,
+)
 from femgear.stages.strength_results import safety_notes
 from femgear.trains.reading import read_case, with_values
 
@@ -31,6 +39,17 @@ H501 = {
     "static": {"slices": 25},
 }
 """FZG test gear H501."""
+
+
+def test_rated_gears_whose_rim_factor_does_not_hold_raise_a_doubt(planetary):
+    """A rim of the planet of 0.185 tooth heights, and one of the ring of 1.08 modules; the sun has a thick one."""
+    thin = with_values(planetary, {"planet.bore_radius": "27.5 mm", "ring.outer_radius": "84.5 mm"})
+    assert not [*thin_rims(thin)]  # nothing is rated
+    planet, ring = thin_rims(with_values(thin, LIMITS))
+    assert (planet.code, planet.severity, planet.key) == ("W-RIM", "doubt", "planet.bore_radius")
+    assert "0.185 tooth heights" in planet.text and "0.5" in planet.limit
+    assert ring.key == "ring.outer_radius" and "1.08 modules" in ring.text and "1.75" in ring.limit
+    assert planet.code in OF_ROOTS and not [*thin_rims(with_values(planetary, LIMITS))]
 
 
 @pytest.fixture(scope="module")

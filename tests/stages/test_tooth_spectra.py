@@ -73,6 +73,8 @@ def test_load_cases_without_load_count_in_the_time_alone(planetary):
     for name, rated in idle.items():
         assert rated.spectrum.ratio[0] == 0.0
         assert rated.spectrum.hours == alone[name].spectrum.hours
+        # no load cycle, of roots or of flanks: the equivalent torque is that of the other
+        assert rated.spectrum.cycles[0] == 0.0 and rated.equivalent_torque == pytest.approx(50.0)
     assert not spectra_of(planetary, (0.0, 540.0, 1.0))
 
 

@@ -78,9 +78,10 @@ from femgear.stages.static_results import (
     root_doubts,
     shares,
 )
-from femgear.stages.strength import OF_TEETH, Rating, rate_case, rating_wanted
+from femgear.stages.strength import Rating, rate_case, rating_wanted
 from femgear.stages.strength_results import (
     computed_load_factors,
+    doubts_of,
     dynamic_factors,
     safety_notes,
     safety_rows,
@@ -782,7 +783,7 @@ def _safeties(
     """
     rating = _rated(case, computed)
     for name, text in safety_rows(rating, KINDS):
-        yield name, marks(text, *doubts, *OF_TEETH, of=("static", *_OF_LEVEL))
+        yield name, marks(text, *doubts, *doubts_of(f"{name} {text}"), of=("static", *_OF_LEVEL))
     notes += safety_notes(rating)
 
 

@@ -28,7 +28,7 @@ from femgear.stages.judgements import (
     stresses_text,
 )
 from femgear.stages.key_figures import REFERENCE_ACCELERATION
-from femgear.stages.strength import OF_TEETH
+from femgear.stages.strength import OF_ROOTS
 from femgear.stages.strength_results import SYMBOLS, taken_as_one
 from femgear.trains.gearbox.mode_words import nearest_mode
 from femgear.trains.gearbox.response_results import line_origin
@@ -74,7 +74,7 @@ def _strength(results: Any) -> Judgement:
         case.strength,
         _stresses(results),
         results.findings,
-        OF_TEETH,
+        OF_ROOTS,
         taken_as_one(name for name in SYMBOLS if name in missing),
         remedy,
         _listed(data, "iso_unrated"),

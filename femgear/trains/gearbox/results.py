@@ -19,6 +19,7 @@ from femgear.report.tables import Block, describe_modes, tabulate
 from femgear.stages.life_results import describe_damage, describe_life, life_findings
 from femgear.stages.planet_bearings import describe_planet_bearings, planet_bearing_findings
 from femgear.stages.protocol import StageResult
+from femgear.stages.strength import thin_rims
 from femgear.stages.tooth_faults import left_out_of_faults
 from femgear.storage.contents import Contents
 from femgear.storage.results import coordinates, mode_entries
@@ -596,7 +597,7 @@ def gearbox_warnings(case: GearboxCase) -> Iterator[Finding]:
                 text = f"{', '.join(given)} of these teeth have no effect: shafts and bearings of the gearbox hold them"
                 yield Finding("W-UNUSED", f"{kind}[{i}].teeth", text)
             if (teeth := teeth_of(stage)) is not None:
-                for finding in (*estimated_materials(teeth), *left_out_of_faults(teeth)):
+                for finding in (*estimated_materials(teeth), *thin_rims(teeth), *left_out_of_faults(teeth)):
                     yield replace(finding, key=f"{kind}[{i}].teeth.{finding.key}")
 
 

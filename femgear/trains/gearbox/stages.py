@@ -354,6 +354,7 @@ GEARBOX = Train(
     bodies=lambda case: gearbox_bodies(case, {}),
     draft_casing=draft_casing,
     heard=heard_stages,
+    stands_in={"static": "deflection", "life": "deflection", "housing": "dynamics"},
     judgements=gearbox_judgements,
     front=(
         ("run_up_levels", 0),

@@ -17,7 +17,7 @@ from femgear.case import text as case_text
 from femgear.case.sections import StrengthSection
 from femgear.report.tables import Block, Marks, tabulate
 from femgear.stages.judgements import unrated_gears
-from femgear.stages.strength import OF_TEETH, Rating, rate_case, rating_wanted
+from femgear.stages.strength import OF_ROOTS, OF_TEETH, Rating, rate_case, rating_wanted
 from femgear.stages.strength_results import factor_names, kind_names, missing_notes, missing_of_all
 from femgear.trains.gearbox.case_file import BoxPlanetarySection, GearboxCase, PairSection, stage_case_of
 from femgear.trains.gearbox.contact import StageContact, loaded_tables
@@ -227,7 +227,7 @@ def smallest_safeties(data: Any, response: Any, marks: Marks) -> Iterator[tuple[
         stress = name.replace("_safety", "_stress")
         cause = f"{_STRESSES[symbol]} {1e-6 * float(data[stress].values[case, mesh, gear]):.1f} MPa"
         where = f", {cases[case]}" if len(cases) > 1 else ""
-        text = marks(f"{value:.2f}", *OF_TEETH, of=("deflection",))
+        text = marks(f"{value:.2f}", *(OF_ROOTS if symbol == "S_F" else OF_TEETH), of=("deflection",))
         edition, flank = data.attrs["iso_edition"], data["iso_flank"].values[mesh, gear]
         yield f"smallest safety {symbol}, ISO 6336:{edition}", f"{text}, {flank}{where}: {cause}"
 

@@ -6,6 +6,7 @@ from casings import casing_tables
 from small_gearbox import pair_tables
 
 from femgear.case.dependencies import Steps
+from femgear.errors import CaseError
 from femgear.exchange.formats import Sampling
 from femgear.run import export_results, run_case
 from femgear.storage.results import run_folder
@@ -15,6 +16,7 @@ from femgear.trains.gearbox.stages import describe_gearbox
 from femgear.trains.gearbox.verdict import gearbox_verdict
 from femgear.trains.live import Answer, Live
 from femgear.trains.reading import open_results, parse_case, read_case
+from femgear.trains.registry import stages_of
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 
@@ -31,6 +33,17 @@ def results(tmp_path_factory):
     with run_folder(folder) as place:
         run_case(read_case(tables), place)
     return open_results(folder)
+
+
+def test_a_stage_of_other_trains_is_refused_with_the_one_that_has_its_results():
+    case = read_case(pair_tables(teeth=True))
+    for wanted, stands_in in (("life", "deflection"), ("housing", "dynamics")):
+        with pytest.raises(CaseError, match="no stage of a gearbox") as refused:
+            stages_of(case, wanted)
+        assert refused.value.remedies == (f"--only {stands_in} computes it here",)
+    with pytest.raises(CaseError) as refused:
+        stages_of(case, "branch")
+    assert refused.value.remedies == ()
 
 
 def test_both_load_cases_are_in_the_file(results):
