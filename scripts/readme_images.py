@@ -105,6 +105,13 @@ RUNS = {
         "Reference set with a cracked planet, contact of its teeth",
         shows=("load_sharing", "static_transmission_error"),
     ),
+    "faults": Run(
+        "femgear faults cases/planetary_27_40_108.toml --tolerances cases/tolerances/still.toml --limits 3 --seed 7 "
+        "--gears sun,planet",
+        "Reference set, sizes from which on faults stand out",
+        entry=("positions = 64 ", "flank_elements = 8\npositions = 8 "),
+        says={"limits": "Level by which faults of sun and planet stand out of healthy sets, over their size"},
+    ),
     "in_a_casing": _case("in_a_casing", "Reference set in a casing of a file", HOUSING),
     "misaligned": Run(
         "femgear run cases/planetary_27_40_108.toml --only stress",
