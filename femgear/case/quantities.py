@@ -165,6 +165,10 @@ def to_si(
         raise CaseError("the number is not finite", code="E-FINITE", value=value, limit="finite numbers")
     if 0.0 < abs(number) < SMALLEST:
         raise _too_small(value)
+    # an end of the window in another unit misses it by rounding
+    end = min(max(number, low), high)
+    if abs(end - number) <= 1e-12 * abs(number):
+        number = end
     if not low <= number <= high:
         raise CaseError(
             f"{dimension.name} of {dimension.show(number)} is not plausible",

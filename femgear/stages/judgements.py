@@ -361,7 +361,7 @@ def judge_smoothness(answer: str, results: Any, stages: Sequence[str]) -> Judgem
     """
     present = [stage for stage in stages if stage in results.stages]
     if not present:
-        return Judgement(SMOOTH, "open", answer, "no motion was computed")
+        return Judgement(SMOOTH, "open", "not known" if answer == "-" else answer, "no motion was computed")
     against = list(dict.fromkeys(_against(results, present)))
     if not against:
         return Judgement(SMOOTH, "good", answer, "teeth stay in contact, motions are stable")

@@ -8,7 +8,7 @@ from types import FunctionType
 import pytest
 
 from femgear.case import quantities
-from femgear.case.quantities import MASS, Number, to_si
+from femgear.case.quantities import LENGTH, MASS, Number, to_si
 from femgear.errors import CaseError
 
 
@@ -139,3 +139,11 @@ def test_absorbed_doses_are_no_angles():
 def test_other_units_than_usual_ones_are_known():
     assert quantities.to_si("2 inch", quantities.LENGTH) == 2 * 0.0254
     assert "inch" not in quantities._FACTORS["m"]
+
+
+@pytest.mark.parametrize("text", ["1e-6 mm", "1e-9 m", "0.001 um", "20 um", "0.02 mm", "2e-5 m"])
+def test_ends_of_a_window_are_in_it_in_every_unit(text):
+    assert to_si(text, LENGTH, low=1e-9, high=2e-5) in (1e-9, 2e-5)
+    for beyond in ("0.9999999 nm", "20.000001 um"):
+        with pytest.raises(CaseError):
+            to_si(beyond, LENGTH, low=1e-9, high=2e-5)
