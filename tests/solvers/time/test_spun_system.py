@@ -1,12 +1,14 @@
 """A system on one rotation: tables over the phase, directions that turn, motions that nothing holds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from two_wheels import INERTIAS, RADII, TEETH, two_wheels
 
 from femgear.errors import CaseError
 from femgear.solvers.time.spun_system import DRIVE, SPRING, ContactGroup, spun_system
-from femgear.system.force_laws import GearMeshes, turning_wave
+from femgear.system.force_laws import GearMeshes, PolynomialSprings, turning_wave
 from femgear.system.fourier import FourierSeries
 from femgear.system.system import MechanicalSystem
 from femgear.system.turning_meshes import TurningMeshes
@@ -45,6 +47,16 @@ def test_directions_turn_with_their_carrier():
     assert S[:, 0, 0] == pytest.approx(np.cos(3.0 * angle)) and S[:, 1, 0] == pytest.approx(np.sin(3.0 * angle))
     assert np.all(S[:, :, 1] == [0.0, 1.0, 0.0]) and spun.closed == 2 and spun.drives.tolist() == [0]
     assert spun.spin == pytest.approx([0.0, 0.0, 1.0])
+
+
+def test_static_flexibility_holds_laws_that_are_springs():
+    """Contacts closed and a spring of a law beside one another; the rotation that is driven stays out of it."""
+    spun = replace(turning(), laws=(PolynomialSprings(np.array([1]), np.array([[2e5]])),))
+    W, k = np.array([[1.0], [0.0], [0.0]]), np.array([3e5])
+    assert spun.law_springs[1] == pytest.approx(2e5)
+    held = spun.static_flexibility(W, k)[:2, :2]
+    wanted = np.diag([1e6, 1e6]) + np.diag([3e5, 0.0]) + np.diag([0.0, 2e5])
+    assert np.linalg.inv(held) == pytest.approx(wanted, rel=1e-9, abs=1e-3)
 
 
 def test_springs_beside_flanks_are_no_mesh_force():

@@ -32,6 +32,18 @@ def test_newton_steps_are_halved_until_the_columns_fit_better():
     assert (x.tolist(), g.tolist(), slope.tolist()) == ([1.0 / 512.0], [100.0 / 512.0], [100.0])
 
 
+def test_columns_whose_newton_steps_are_halved_end_in_balance():
+    """``x + 5 tanh(20 x) = 1``: the first step, from where the law is flat, goes far beyond."""
+    aim, flexibility = np.ones(1), np.array([[5.0]])
+
+    def law(i, x):
+        return np.tanh(20.0 * x), 20.0 / np.cosh(20.0 * x) ** 2
+
+    g, missed, _, count = steps._solve_columns(law, 0, flexibility, np.eye(1), aim, np.zeros(1), 1.0, (1e-24, 40))
+    assert missed <= 1e-24 and count < 40
+    assert np.tanh(20.0 * (aim - flexibility @ g)) == pytest.approx(g, rel=1e-9)
+
+
 @pytest.mark.parametrize("accelerations", [True, False])
 def test_motion_between_steps_is_a_cubic(accelerations):
     """Exact for q = t^3 - 2 t; without accelerations the velocity runs straight from step to step."""
