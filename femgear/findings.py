@@ -82,6 +82,7 @@ CATALOGUE = {
     "W-RECORD": (NOTE, "A record ends below a frequency that matters."),
     "W-RELIEF-SIGN": (NOTE, "A modification adds material."),
     "W-RESIDUAL": (DOUBT, "Static compliance beyond the modes of a casing is missing."),
+    "W-REVERSAL": (NOTE, "Load cases of both directions bend roots both ways, which lowers their strength."),
     "W-RIGID": (DOUBT, "A response holds bodies rigid that the modes have elastic."),
     "W-RIM": (NOTE, "A rim is thin; of rated gears a doubt where the rim factor of ISO 6336-3 does not hold."),
     "W-REXS": (DOUBT, "A REXS file holds what the case that was made of it has not, or has otherwise."),

@@ -112,6 +112,12 @@ def short_life(*lives: float) -> xr.Dataset:
     )
 
 
+def reversed_root() -> xr.Dataset:
+    """A root that the second load case bends back."""
+    both = ("load_case", "root"), [[0], [1]]
+    return short_life(9e9, 9e9).isel(root=[0]).assign(root_reversed=both, root_reversal_factor=("root", [0.7]))
+
+
 def told(work: Callable[[], object]) -> tuple[Finding, ...]:
     """Findings that exports and studies tell beside results."""
     with warnings.catch_warnings(record=True) as said:
@@ -458,6 +464,7 @@ OF_CASES: dict[str, Callable[[], Iterable[Finding]]] = {
     "W-RELIEF-SIGN": lambda: of_case(
         PLANETARY, {"sun.modifications": [{"kind": "profile crowning", "amount": "-5 um"}]}
     ),
+    "W-REVERSAL": lambda: of_stage("pair", "life", reversed_root()),
     "W-RIM": lambda: of_case(PLANETARY, {"ring.outer_radius": "85 mm"}),
     "W-SIZE": large,
     "W-SLICES": lambda: of_case(

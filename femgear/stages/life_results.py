@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from femgear.findings import Finding
-from femgear.report.tables import Block, Marks, tabulate
+from femgear.report.tables import Block, Marks, merged_names, tabulate
 from femgear.stages.key_figures import HOURS, NUMBER, KeyFigure, Stored
 from femgear.stages.strength import OF_ROOTS, OF_TEETH
 
@@ -41,7 +41,8 @@ _MOST = 40  # rows of load cases in a table
 
 
 def life_findings(data: Any) -> Iterator[Finding]:
-    """List teeth that fail at once (W-STRENGTH), and whose life ends before the one that the case asks for (W-LIFE)."""
+    """List teeth that fail at once (W-STRENGTH) or too soon (W-LIFE), and roots bent both ways (W-REVERSAL)."""
+    yield from _bent_both_ways(data)
     for kind in SYMBOLS:
         if f"{kind}_damage" not in data:
             continue
@@ -61,6 +62,19 @@ def life_findings(data: Any) -> Iterator[Finding]:
             others = f"; beyond 1 too: {', '.join(failing[1:5])}" if len(failing) > 1 else ""
             remedy = "less torque or time in that load case, a wider face, a larger module, or another treatment"
             yield Finding("W-LIFE", "operation.load_case", text + others, remedy=remedy, limit="at most 1")
+
+
+def _bent_both_ways(data: Any) -> Iterator[Finding]:
+    """Tell the roots that load cases of both directions bend both ways, and the load cases that do (W-REVERSAL)."""
+    if "root_reversed" not in data or not data["root_reversed"].values.any():
+        return
+    back, factor = data["root_reversed"].values.astype(bool), data["root_reversal_factor"].values
+    roots = merged_names(str(name) for name in data["root"].values[factor != 1.0])
+    cases = data["load_case"].values[back.any(axis=1)].tolist()
+    shown = ", ".join(map(str, cases[:3])) + (f" and {len(cases) - 3} more" if len(cases) > 3 else "")
+    text = f"roots of {roots} are bent back in {shown}: they have Y_M {factor.min():g} in all load cases"
+    remedy = "give the factor of your load spectrum, or leave load cases out that reverse no load"
+    yield Finding("W-REVERSAL", "strength.reversal_factor", text, remedy=remedy)
 
 
 def life_rows(data: Any, marks: Marks, of: tuple[str, ...] = ("life",)) -> Iterator[tuple[str, str]]:
@@ -163,6 +177,9 @@ def describe_life(data: Any, name: str = "") -> Iterator[Block]:
             _most_damage(data, *row) if data[f"{row[0]}_damage_share"].values[:, row[1]].any() else "-"
         ),
     }
+    if "root_reversed" in data and data["root_reversed"].values.any():
+        factor = data["root_reversal_factor"].values
+        columns["Y_M, reversed"] = lambda row: f"{factor[row[1]]:g}" if row[0] == "root" else "-"
     notes = [
         "damage and safety are those over the life asked for (operation.required_hours, or all hours)",
         "T_eq: equivalent torque on the sun or gear 1; K_v of part 1 at the speed of each load case, or 1",

@@ -391,8 +391,8 @@ class Train:
         return Block(case.title), *self.describe(case), Block("Warnings", notes=warnings or ("none",))
 
     def describe_results(self, results: Results) -> tuple[Block, ...]:
-        """Tabulate the numbers of a run: its verdict, one block a stage, and the time that each took."""
-        blocks = self.describe_stages(results).values()
+        """Tabulate the numbers of a run: its verdict, all tables of its stages, and the time that each took."""
+        blocks = [block for stage in self._in(results) for block in (stage.describe(results), *stage.tables(results))]
         timings = ((stage, f"{seconds:.2f}") for stage, seconds in results.manifest.timings.items())
         time = Block("Time", ("stage", "[s]"), tuple(timings))
         return (*self.verdict(results), *blocks, *listed(results.findings), time)

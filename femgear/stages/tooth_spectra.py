@@ -59,12 +59,21 @@ class RatedSpectrum:
         Stresses and load cycles.
     torque : (c,) array
         Torques on the sun or gear 1 of the load cases that load it [N m], zero of others.
+    reversal_factor : float
+        Y_M of a root that load cases of both directions bend both ways; 1 of others.
     """
 
     name: str
     kind: str
     spectrum: ToothSpectrum
     torque: np.ndarray
+    reversal_factor: float = 1.0
+
+    @property
+    def bends_back(self) -> np.ndarray:
+        """Load cases (c,) that bend a root with a reversal factor against the first one."""
+        sides = np.sign(self.torque)
+        return (self.reversal_factor != 1.0) & (sides == -next((side for side in sides if side), 0.0)) & (sides != 0.0)
 
     @property
     def equivalent_torque(self) -> float:
@@ -126,10 +135,11 @@ def _root(
     torque = np.array([load.torque if load.rating is not None else 0.0 for load in loads])
     ratio = np.array([_ratio(load, place, "root_safety") for load in loads])
     alternating = (torque > 0.0).any() and (torque < 0.0).any() and not flank.reversed_bending
-    ratio = ratio / (strength.reversal_factor if alternating else 1.0)
+    reversal = strength.reversal_factor if alternating else 1.0
+    ratio = ratio / reversal
     line = life_line(str(gear_material(case, flank.gear).treatment), "root")
     cycles = np.where(torque != 0.0, _cycles(gears, case, loads, flank), 0.0)
-    return RatedSpectrum(flank.name, "root", ToothSpectrum(ratio, cycles, line), torque)
+    return RatedSpectrum(flank.name, "root", ToothSpectrum(ratio, cycles, line), torque, reversal)
 
 
 def _flanks(
@@ -203,6 +213,13 @@ def tooth_life_variables(spectra: Sequence[RatedSpectrum], required: float | Non
         if of_kind:
             for name, (before, unit, text) in _WORDS.items():
                 variables[f"{kind}_{name}"] = (f"{before}{kind}", values[name], unit, text.format(kind))
+    if roots := [rated for rated in spectra if rated.kind == "root"]:
+        factor = [rated.reversal_factor for rated in roots]
+        back = np.array([rated.bends_back for rated in roots]).T.astype(int)
+        words = "Y_M of roots that load cases bend both ways; 1 of others"
+        variables["root_reversal_factor"] = "root", factor, "1", words
+        text = "1 where the load case bends such a root against the first one"
+        variables["root_reversed"] = "load_case root", back, "1", text
     return variables
 
 

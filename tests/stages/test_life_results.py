@@ -93,3 +93,15 @@ def test_tables_have_a_row_a_root_and_a_row_a_load_case(data):
 
 def test_hours_in_words():
     assert [hours_text(value) for value in (math.inf, 0.0, 12345.6)] == ["no damage", "0", "1.235e+04"]
+
+
+def test_roots_that_are_bent_both_ways_are_told_with_their_factor(data):
+    assert not any(finding.code == "W-REVERSAL" for finding in life_findings(data))
+    assert "Y_M, reversed" not in next(describe_life(data)).header
+    data["root_reversal_factor"] = ("root", [1.0, 0.7])
+    data["root_reversed"] = (("load_case", "root"), [[0, 0], [0, 1]])
+    finding = next(finding for finding in life_findings(data) if finding.code == "W-REVERSAL")
+    assert finding.key == "strength.reversal_factor" and finding.severity == "note"
+    assert finding.text.startswith("roots of gear 2 are bent back in run: they have Y_M 0.7")
+    block = next(describe_life(data))
+    assert [row[block.header.index("Y_M, reversed")] for row in block.rows] == ["1", "0.7", "-"]

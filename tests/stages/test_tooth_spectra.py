@@ -101,3 +101,16 @@ def test_variables_are_those_of_the_spectra(planetary):
     without = tooth_life_variables(spectra, None)
     assert all(math.isnan(value) for value in without["flank_spectrum_safety"][1])
     assert tooth_life_variables((), None) == {} and tooth_life_coordinates(()) == {}
+
+
+def test_roots_that_load_cases_bend_both_ways_say_so(planetary):
+    """Sun and ring have the reversal factor of the section strength, planets their Y_M under every load."""
+    forth, back = (50.0, 540.0, 0.9), (-0.001, 540.0, 0.1)
+    spectra = spectra_of(planetary, forth, (0.0, 540.0, 0.0), back)
+    factors = {name: rated.reversal_factor for (kind, name), rated in spectra.items() if kind == "root"}
+    assert factors == {"sun": 0.7, "planet, sun side": 1.0, "planet, ring side": 1.0, "ring": 0.7}
+    assert spectra["root", "sun"].bends_back.tolist() == [False, False, True]
+    data = {name: variable[1] for name, variable in tooth_life_variables([*spectra.values()], None).items()}
+    assert data["root_reversal_factor"] == [0.7, 1.0, 1.0, 0.7] and data["root_reversed"][2].tolist() == [1, 0, 0, 1]
+    same = spectra_of(planetary, forth, (0.001, 540.0, 0.1))
+    assert all(rated.reversal_factor == 1.0 and not rated.bends_back.any() for rated in same.values())

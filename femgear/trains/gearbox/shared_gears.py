@@ -149,7 +149,8 @@ def shared_spectra(loads: GearLoads, treatment: str, strength: StrengthSection) 
         ratio = _alternating(root, loads.push, strength.reversal_factor)
         cycles = np.where(ratio > 0.0, loads.cycles.max(axis=1, keepdims=True), 0.0)
         spectrum = ToothSpectrum(ratio, cycles, life_line(treatment, "root"))
-        spectra.append(RatedSpectrum(loads.gear.name, "root", spectrum, loads.torque))
+        reversal = strength.reversal_factor if _reversed_by_load_cases(loads.push) else 1.0
+        spectra.append(RatedSpectrum(loads.gear.name, "root", spectrum, loads.torque, reversal))
     flank = _ratios(loads, "contact")
     if flank is None:
         return spectra
@@ -181,11 +182,17 @@ def _alternating(ratio: np.ndarray, push: np.ndarray, reversal_factor: float) ->
     factor where other load cases press the other side.
     """
     kept = np.zeros(ratio.shape)
-    both_ways = (push > 0).any() and (push < 0).any()
+    reversal = reversal_factor if _reversed_by_load_cases(push) else 1.0
     for case, signs in enumerate(push):
         forwards, backwards = int((signs > 0).sum()), int((signs < 0).sum())
         count = max(forwards, backwards)
         kept[case, :count] = np.sort(ratio[case])[::-1][:count]
-        if both_ways and not (forwards and backwards):
-            kept[case] /= reversal_factor
+        if not (forwards and backwards):
+            kept[case] /= reversal
     return kept
+
+
+def _reversed_by_load_cases(push: np.ndarray) -> bool:
+    """Whether load cases press both sides, and one of them a single side."""
+    forwards, backwards = (push > 0).any(axis=1), (push < 0).any(axis=1)
+    return bool(forwards.any() and backwards.any() and (forwards != backwards).any())

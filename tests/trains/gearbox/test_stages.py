@@ -16,7 +16,7 @@ from femgear.trains.gearbox.stages import describe_gearbox
 from femgear.trains.gearbox.verdict import gearbox_verdict
 from femgear.trains.live import Answer, Live
 from femgear.trains.reading import open_results, parse_case, read_case
-from femgear.trains.registry import stages_of
+from femgear.trains.registry import stages_of, train_of
 
 pytestmark = pytest.mark.usefixtures("pictures_undrawn")
 
@@ -215,3 +215,10 @@ def test_teeth_that_several_stages_have_are_drawn_once():
         "Play of the meshes, sun-planet 1..3, planet 1..3-ring",
         "Drawing, planet 1..3-ring",
     ]
+
+
+def test_all_tables_of_a_run_have_those_of_every_stage(results):
+    """Lives, load cases and strength of a gearbox stand behind the first table of its deflection."""
+    titles = [block.title for block in train_of(results.case).describe_results(results)]
+    of_stage = [block.title for block in describe_deflection(results.deflection)]
+    assert len(of_stage) > 1 and {*of_stage} <= {*titles}
